@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""Everything that can go wrong, as one tree of exceptions.
+
+A message is one line that says what, where and what to do. Only `hodograph.cli.main` turns an
+exception into a line on stderr and an exit status; the table of statuses is docs/cli.md.
+"""
+
+
+class HodographError(Exception):
+    """Base of all errors that Hodograph reports on purpose."""
+
+    exit_status = 1
+
+
+class InputError(HodographError):
+    """A file, a key, a value or the command line is wrong."""
+
+    exit_status = 2
+
+
+class PlanError(HodographError):
+    """The input is well formed, but the path or the feed asked for is not possible."""
+
+    exit_status = 3
+
+
+class BusError(HodographError):
+    """No bus, no node that answers, or an answer that breaks the protocol."""
+
+    exit_status = 4
+
+
+class RefusedError(HodographError):
+    """The controller refused a program, a command or a setting."""
+
+    exit_status = 5
+
+
+class RunError(HodographError):
+    """A fault in motion, an incomplete recording, or results that disagree."""
+
+    exit_status = 6
+
+
+INTERRUPTED_EXIT_STATUS = 130
+"""Exit status after Ctrl-C (128 + SIGINT), as shells have it."""
