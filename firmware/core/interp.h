@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The interpolator: program time in, point on the path out.
+ *
+ * The point is a pure function of (program, time, kernel): the cursor inside struct interp only remembers
+ * which segment and piece are expanded. So a run, a seek and a run backwards by seeks give the same bits.
+ * Kernels: docs/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12 (the inverse of arc length).
+ * The program must have passed program_check with any limits; the image must outlive the struct.
+ * interp_at is meant for the tick (interrupt); the other functions for the main loop.
+ */
+#ifndef HODOGRAPH_CORE_INTERP_H
+#define HODOGRAPH_CORE_INTERP_H
+
+#include <stdint.h>
+
+#include "core/program.h"
+
+enum interp_kernel {
+    INTERP_FIXED = 0,  /* integers only, the same bits everywhere, within 1 nm */
+    INTERP_FLOAT = 1,  /* single precision and integers, within 10 nm */
+    INTERP_DOUBLE = 2, /* the host's reference, within 1e-9 mm */
+};
+
+enum interp_result {
+    INTERP_OK = 0,
+    INTERP_END = 1,          /* time is at or beyond the end: the point is the exact end point */
+    INTERP_ERR_KERNEL = -1,  /* no such kernel */
+    INTERP_ERR_PROGRAM = -2, /* no program */
+    INTERP_ERR_JUMP = -3,    /* time is before the cursor, or more than two ends ahead: seek first */
+};
+
+/* Unrounded output of a tick, the same units for all kernels. */
+struct interp_point {
+    int64_t arc_length_q40_mm;
+    int64_t x_q40_mm; /* machine coordinates */
+    int64_t y_q40_mm;
+    int64_t feed_q32_mm_s; /* F' at rate 1 */
+};
+
+/* Caller allocates; contents private. */
+struct interp {
+    const struct program *program;
+    enum interp_kernel kernel;
+    uint32_t piece;
+    uint32_t segment;
+    uint64_t piece_start_q32_s;
+};
+
+/* Starts at time 0. Returns 0 or INTERP_ERR_... */
+int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
+
+/* The point at a program time (2^-32 s, any value not before the cursor's piece). Crosses at most two
+ * piece ends and two segment ends, which program_check guarantees to suffice for steps up to two periods; otherwise
+ * INTERP_ERR_JUMP, *out and the cursor unchanged. Returns INTERP_OK or INTERP_END. */
+int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out);
+
+/* Moves the cursor to any time, forward or back; linear in the number of segments and pieces.
+ * Returns 0 or INTERP_ERR_... */
+int interp_seek(struct interp *it, uint64_t time_q32_s);
+
+#endif

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/program.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "core/crc32.h"
+#include "core/program_check.h"
+#include "core/qmath.h"
+
+#define CRC_FROM 16u /* the CRC covers everything behind itself */
+
+static uint32_t read_u16(const uint8_t *b)
+{
+    return (uint32_t)b[0] | (uint32_t)b[1] << 8;
+}
+
+static uint32_t read_u32(const uint8_t *b)
+{
+    return read_u16(b) | read_u16(b + 2) << 16;
+}
+
+static uint64_t read_u64(const uint8_t *b)
+{
+    return (uint64_t)read_u32(b) | (uint64_t)read_u32(b + 4) << 32;
+}
+
+static int64_t read_i64(const uint8_t *b)
+{
+    return (int64_t)read_u64(b);
+}
+
+static void read_header(struct program_header *h, const uint8_t *b)
+{
+    h->version = (uint16_t)read_u16(b + 4);
+    h->header_size = (uint16_t)read_u16(b + 6);
+    h->image_size = read_u32(b + 8);
+    h->crc32 = read_u32(b + 12);
+    h->period_us = read_u32(b + 16);
+    h->segment_count = read_u32(b + 20);
+    h->piece_count = read_u32(b + 24);
+    h->flags = (uint16_t)read_u16(b + 28);
+    h->axis_count = (uint16_t)read_u16(b + 30);
+    h->duration_q32_s = read_u64(b + 32);
+    h->length_q40_mm = read_i64(b + 40);
+    h->offset_q40_mm[0] = read_i64(b + 48);
+    h->offset_q40_mm[1] = read_i64(b + 56);
+    h->feed_limit_um_s = read_u32(b + 64);
+    h->acceleration_limit_um_s2 = read_u32(b + 68);
+    h->jerk_limit_mm_s3 = read_u32(b + 72);
+    memcpy(h->name, b + 80, 32);
+    h->name[32] = '\0';
+}
+
+/* Counts that cannot fit are refused before they are multiplied, so nothing wraps. */
+static int check_size(const struct program_header *h, uint32_t size)
+{
+    if (h->image_size > size || h->image_size < PROGRAM_HEADER_SIZE) {
+        return PROGRAM_ERR_SIZE;
+    }
+    uint64_t need = PROGRAM_HEADER_SIZE + (uint64_t)h->segment_count * PROGRAM_SEGMENT_SIZE +
+                    (uint64_t)h->piece_count * PROGRAM_PIECE_SIZE;
+    if (need != h->image_size) {
+        return PROGRAM_ERR_SIZE;
+    }
+    return h->segment_count == 0 || h->piece_count == 0 ? PROGRAM_ERR_COUNT : 0;
+}
+
+int program_open(struct program *p, const uint8_t *image, uint32_t size)
+{
+    if (image == NULL || size < PROGRAM_HEADER_SIZE) {
+        return PROGRAM_ERR_SIZE;
+    }
+    if (memcmp(image, "HDGP", 4) != 0) {
+        return PROGRAM_ERR_MAGIC;
+    }
+    read_header(&p->header, image);
+    if (p->header.version != PROGRAM_VERSION || p->header.header_size != PROGRAM_HEADER_SIZE) {
+        return PROGRAM_ERR_VERSION;
+    }
+    int err = check_size(&p->header, size);
+    if (err != 0) {
+        return err;
+    }
+    p->image = image;
+    p->size = p->header.image_size;
+    uint32_t crc = crc32_update(0, image + CRC_FROM, p->size - CRC_FROM);
+    return crc == p->header.crc32 ? 0 : PROGRAM_ERR_CRC;
+}
+
+void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out)
+{
+    const uint8_t *b = p->image + PROGRAM_HEADER_SIZE + (size_t)i * PROGRAM_SEGMENT_SIZE;
+    out->start_q40_mm = read_i64(b);
+    out->x_q40_mm = read_i64(b + 8);
+    out->y_q40_mm = read_i64(b + 16);
+    for (int k = 0; k < 3; k++) {
+        out->u_q44[k] = read_i64(b + 24 + 16 * k);
+        out->v_q44[k] = read_i64(b + 32 + 16 * k);
+    }
+}
+
+void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out)
+{
+    const uint8_t *b = p->image + PROGRAM_HEADER_SIZE +
+                       (size_t)p->header.segment_count * PROGRAM_SEGMENT_SIZE +
+                       (size_t)i * PROGRAM_PIECE_SIZE;
+    out->duration_q32_s = read_u64(b);
+    out->start_q40_mm = read_i64(b + 8);
+    for (int k = 0; k < 7; k++) {
+        out->c_q40_mm[k] = read_i64(b + 16 + 8 * k);
+    }
+    out->override_factor_q24 = read_u32(b + 72);
+    out->override_rate_q16_per_s = read_u32(b + 76);
+    out->override_second_q8_per_s2 = read_u32(b + 80);
+}
+
+uint32_t program_ticks(const struct program *p)
+{
+    /* duration / period = (duration / 2^26) * 15625 / period_us, since 2^32 / 10^6 = 2^26 / 15625 */
+    uint64_t d = p->header.duration_q32_s;
+    uint64_t low = (d & ((1u << 26) - 1u)) * 15625u;
+    uint64_t us = (d >> 26) * 15625u + ((low + (1u << 26) - 1u) >> 26);
+    return (uint32_t)qmath_div_u64(us + p->header.period_us - 1u, p->header.period_us) + 1u;
+}
+
+int program_piece_exponent(uint64_t duration_q32_s)
+{
+    int bits = duration_q32_s <= 1u ? 0 : 64 - qmath_clz64(duration_q32_s - 1u);
+    return bits - 32 > 31 ? 31 : bits - 32;
+}

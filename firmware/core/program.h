@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The uploaded program image: reading its header, segments and feed pieces.
+ *
+ * The format is docs/protocol.md section 1: little-endian scaled integers at any alignment. The
+ * image is never copied; it must stay unchanged as long as a struct program or a struct interp
+ * refers to it. `program_open` checks what is needed to read without leaving the image (sizes, counts,
+ * CRC); everything else is the business of `program_check` (core/program_check.h), which has to pass
+ * before a program is interpolated.
+ *
+ * No heap, no globals; every function may be called from any context.
+ */
+#ifndef HODOGRAPH_CORE_PROGRAM_H
+#define HODOGRAPH_CORE_PROGRAM_H
+
+#include <stdint.h>
+
+#define PROGRAM_HEADER_SIZE 128u
+#define PROGRAM_SEGMENT_SIZE 72u
+#define PROGRAM_PIECE_SIZE 88u
+#define PROGRAM_VERSION 1u
+#define PROGRAM_FLAG_CLOSED 1u
+
+/* Header of the image, protocol.md 1.1; field names carry the units. */
+struct program_header {
+    uint16_t version;
+    uint16_t header_size;
+    uint32_t image_size;
+    uint32_t crc32;
+    uint32_t period_us;
+    uint32_t segment_count;
+    uint32_t piece_count;
+    uint16_t flags; /* PROGRAM_FLAG_... */
+    uint16_t axis_count;
+    uint64_t duration_q32_s;
+    int64_t length_q40_mm;
+    int64_t offset_q40_mm[2]; /* for information: already contained in the coordinates */
+    uint32_t feed_limit_um_s;
+    uint32_t acceleration_limit_um_s2;
+    uint32_t jerk_limit_mm_s3;
+    char name[33]; /* UTF-8, always terminated */
+};
+
+/* A PH segment, protocol.md 1.2. w = u + iv in Bernstein form, mm^(1/2). */
+struct program_segment {
+    int64_t start_q40_mm; /* arc length at its start */
+    int64_t x_q40_mm;     /* start point */
+    int64_t y_q40_mm;
+    int64_t u_q44[3];
+    int64_t v_q44[3];
+};
+
+/* A feed piece, protocol.md 1.3: F = start + sum of c[k-1] tau^k, tau = t / 2^e. */
+struct program_piece {
+    uint64_t duration_q32_s;
+    int64_t start_q40_mm;
+    int64_t c_q40_mm[7];
+    uint32_t override_factor_q24;
+    uint32_t override_rate_q16_per_s;
+    uint32_t override_second_q8_per_s2;
+};
+
+struct program {
+    const uint8_t *image;
+    uint32_t size;
+    struct program_header header;
+};
+
+/* Opens an image of `size` bytes: magic, version, header size, counts against the size, CRC. The
+ * buffer may be longer than the image says (a fixed store); never shorter. Cost: the CRC, linear in the
+ * size. Returns 0 or a negative PROGRAM_ERR_... of core/program_check.h; *p is then not usable. */
+int program_open(struct program *p, const uint8_t *image, uint32_t size);
+
+/* Reads segment or piece number i; i must be below the count of the header. Constant time. */
+void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
+void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out);
+
+/* Setpoints of the program: ceil(duration / period) + 1, with the period of the header. Needs a
+ * program that passed program_check. */
+uint32_t program_ticks(const struct program *p);
+
+/* Time scale of a piece: the smallest e with 2^e s not below the duration; -32 ... 31 (above: 31).
+ * A duration of 0 gives -32. */
+int program_piece_exponent(uint64_t duration_q32_s);
+
+#endif
