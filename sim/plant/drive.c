@@ -1,0 +1,237 @@
+/* SPDX-License-Identifier: MIT */
+#include "plant/drive.h"
+
+#include <stddef.h>
+
+/* Setpoints of one period: command at sample i is start + i * step. */
+struct command {
+    double start_mm;
+    double step_mm;
+    double speed_mm_s;
+};
+
+/* Also false for NaN. */
+static bool in_range(double value, double above, double most)
+{
+    return value > above && value <= most;
+}
+
+static bool drive_plant_ok(const struct drive_plant *p)
+{
+    const double most = 1e9;
+    return in_range(p->gain_rad_s_v, 0.0, most) && in_range(p->time_constant_s, 0.0, most) &&
+           in_range(p->screw_mm_rad, 1e-9, 1e6) && in_range(p->torque_to_volts, 0.0, most) &&
+           in_range(p->volts_limit, 0.0, 32.0);
+}
+
+static bool drive_gains_ok(const struct drive_pdff *g)
+{
+    const double gains[] = {g->k_pp_rad_s_mm, g->k_pv_nm_s_rad, g->k_iv_per_s, g->k_pf_rad_mm, g->k_vf};
+    for (size_t i = 0; i < sizeof gains / sizeof gains[0]; i++) {
+        if (!(gains[i] >= 0.0 && gains[i] <= 1e9))
+            return false;
+    }
+    return true;
+}
+
+static bool drive_encoder_ok(const struct drive_config *c)
+{
+    return c->encoder_counts_per_rev >= 1 && c->encoder_counts_per_rev <= (UINT32_C(1) << 28) &&
+           c->counts_per_mm >= 1 && c->counts_per_mm <= UINT32_C(1000000000);
+}
+
+/* Servo samples per period; 0 when they are no whole number or too many. */
+static uint32_t drive_samples(const struct drive_config *c)
+{
+    const uint64_t scaled = (uint64_t)c->loop_rate_hz * c->period_us;
+    if (c->period_us < 1 || c->period_us > 1000000 || scaled % 1000000 != 0 || scaled / 1000000 > 65536)
+        return 0;
+    return (uint32_t)(scaled / 1000000);
+}
+
+static int drive_check(const struct drive_config *c)
+{
+    if (!drive_plant_ok(&c->plant))
+        return DRIVE_ERR_PLANT;
+    if (!drive_gains_ok(&c->pdff))
+        return DRIVE_ERR_GAIN;
+    if (!drive_encoder_ok(c))
+        return DRIVE_ERR_ENCODER;
+    if (drive_samples(c) == 0)
+        return DRIVE_ERR_RATE;
+    if (c->plant.time_constant_s * (double)c->loop_rate_hz < 1.0)
+        return DRIVE_ERR_STEP;
+    return 0;
+}
+
+const char *drive_error_text(int code)
+{
+    switch (code) {
+    case 0:
+        return "no error";
+    case DRIVE_ERR_PLANT:
+        return "plant figures must be positive numbers and volts_limit at most 32 V";
+    case DRIVE_ERR_GAIN:
+        return "PDFF gains must be finite and not negative";
+    case DRIVE_ERR_ENCODER:
+        return "encoder counts_per_rev must be 1 to 2^28 and counts_per_mm 1 to 10^9";
+    case DRIVE_ERR_RATE:
+        return "the period must hold a whole number of servo samples, 1 to 65536 (loop_rate_hz times period)";
+    case DRIVE_ERR_STEP:
+        return "the plant's time constant is shorter than one servo sample";
+    default:
+        return "unknown error";
+    }
+}
+
+static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
+{
+    d->pdff.k_pp_rad_s_mm = c->pdff.k_pp_rad_s_mm;
+    d->pdff.k_pf_rad_mm = c->pdff.k_pf_rad_mm;
+    d->pdff.k_vf = c->pdff.k_vf;
+    d->pdff.k_iv_per_s = c->pdff.k_iv_per_s;
+    d->pdff.volts_s_rad = c->plant.torque_to_volts * c->pdff.k_pv_nm_s_rad;
+    d->pdff.volts_limit = c->plant.volts_limit;
+    d->pdff.step_s = 1.0 / (double)c->loop_rate_hz;
+}
+
+int drive_init(struct drive *d, const struct drive_config *c)
+{
+    const int error = drive_check(c);
+    if (error != 0)
+        return error;
+    drive_set_up_loop(d, c);
+    motor_init(&d->motor, c->plant.gain_rad_s_v, c->plant.time_constant_s, c->plant.screw_mm_rad, d->pdff.step_s);
+    encoder_init(&d->encoder, c->plant.screw_mm_rad, c->encoder_counts_per_rev);
+    d->counts_per_mm = (double)c->counts_per_mm;
+    d->mm_per_count = 1.0 / d->counts_per_mm;
+    d->samples = drive_samples(c);
+    d->sample_fraction = 1.0 / (double)d->samples;
+    d->samples_per_s = (double)c->loop_rate_hz;
+    drive_place(d, 0);
+    return 0;
+}
+
+static void drive_rest(struct drive *d)
+{
+    d->state.speed_rad_s = 0.0;
+    d->integral_rad = 0.0;
+    d->volts = 0.0;
+}
+
+void drive_place(struct drive *d, int32_t target_counts)
+{
+    drive_rest(d);
+    d->state.position_mm = (double)target_counts * d->mm_per_count;
+    d->target_counts = target_counts;
+    d->same_target_periods = DRIVE_PARK_PERIODS;
+    d->parked = true;
+}
+
+void drive_hold(struct drive *d)
+{
+    drive_rest(d);
+    d->target_counts = drive_position_counts(d);
+    d->same_target_periods = 0;
+    d->parked = false;
+}
+
+static bool drive_near_target(const struct drive *d)
+{
+    const double away_mm =
+        encoder_read_mm(&d->encoder, d->state.position_mm) - (double)d->target_counts * d->mm_per_count;
+    const double most_mm = DRIVE_PARK_INCREMENTS * d->encoder.increment_mm;
+    return away_mm <= most_mm && away_mm >= -most_mm;
+}
+
+/* Counts the periods of one target and parks the axis when its time has come. Returns whether it stays parked. */
+static bool drive_stays_parked(struct drive *d, int32_t target_counts)
+{
+    if (target_counts != d->target_counts) {
+        d->same_target_periods = 0;
+        d->parked = false;
+        return false;
+    }
+    if (d->same_target_periods < DRIVE_PARK_PERIODS)
+        d->same_target_periods++;
+    if (!d->parked && d->same_target_periods == DRIVE_PARK_PERIODS && drive_near_target(d))
+        drive_place(d, target_counts);
+    return d->parked;
+}
+
+/* The step is one multiplication of the exact difference in counts: a difference of two rounded positions in mm
+ * would put noise on the speed feedforward. */
+static struct command drive_command(struct drive *d, int32_t target_counts)
+{
+    struct command c;
+    const double counts = (double)target_counts - (double)d->target_counts;
+    c.start_mm = (double)d->target_counts * d->mm_per_count;
+    c.step_mm = counts * d->mm_per_count * d->sample_fraction;
+    c.speed_mm_s = c.step_mm * d->samples_per_s;
+    d->target_counts = target_counts;
+    return c;
+}
+
+static inline void drive_sample(struct drive *d, const struct command *c, uint32_t i)
+{
+    const struct pdff_input in = {
+        .command_mm = c->start_mm + (double)i * c->step_mm,
+        .command_mm_s = c->speed_mm_s,
+        .position_mm = encoder_read_mm(&d->encoder, d->state.position_mm),
+        .speed_rad_s = d->state.speed_rad_s,
+    };
+    d->volts = pdff_step(&d->pdff, &d->integral_rad, &in);
+    motor_step(&d->motor, &d->state, d->volts);
+}
+
+static void drive_run(struct drive *d, int32_t target_counts)
+{
+    const struct command c = drive_command(d, target_counts);
+    for (uint32_t i = 0; i < d->samples; i++)
+        drive_sample(d, &c, i);
+}
+
+static void drive_run_pair(struct drive *first, struct drive *second, const int32_t target_counts[2])
+{
+    const struct command c0 = drive_command(first, target_counts[0]);
+    const struct command c1 = drive_command(second, target_counts[1]);
+    for (uint32_t i = 0; i < first->samples; i++) {
+        drive_sample(first, &c0, i);
+        drive_sample(second, &c1, i);
+    }
+}
+
+void drive_period(struct drive *d, int32_t target_counts)
+{
+    if (!drive_stays_parked(d, target_counts))
+        drive_run(d, target_counts);
+}
+
+void drive_period_pair(struct drive *first, struct drive *second, const int32_t target_counts[2])
+{
+    const bool first_parked = drive_stays_parked(first, target_counts[0]);
+    const bool second_parked = drive_stays_parked(second, target_counts[1]);
+    if (!first_parked && !second_parked && first->samples == second->samples) {
+        drive_run_pair(first, second, target_counts);
+        return;
+    }
+    if (!first_parked)
+        drive_run(first, target_counts[0]);
+    if (!second_parked)
+        drive_run(second, target_counts[1]);
+}
+
+int32_t drive_position_counts(const struct drive *d)
+{
+    return encoder_to_i32(encoder_read_mm(&d->encoder, d->state.position_mm) * d->counts_per_mm);
+}
+
+int16_t drive_volts_mv(const struct drive *d)
+{
+    return (int16_t)encoder_to_i32(d->volts * 1000.0);
+}
+
+bool drive_parked(const struct drive *d)
+{
+    return d->parked;
+}

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/* PDFF servo loop (pseudo-derivative feedback with feedforward), one sample at a time; paper.md section 5:
+ *
+ *     speed_ref = k_pp (x_com - x_act) + k_pf d(x_com)/dt
+ *     torque    = k_pv (k_vf speed_ref + k_iv * integral of (speed_ref - speed) - speed)
+ *     volts     = torque_to_volts * torque, within +-volts_limit
+ *
+ * The integral counts the present sample too (backward Euler) and stands still while the output is saturated.
+ * Error of the sampling: docs/numerics.md section 13.
+ */
+#ifndef HODOGRAPH_PLANT_PDFF_H
+#define HODOGRAPH_PLANT_PDFF_H
+
+struct pdff {
+    double k_pp_rad_s_mm;
+    double k_pf_rad_mm;
+    double k_vf;
+    double k_iv_per_s;
+    double volts_s_rad; /* torque_to_volts * k_pv: V per rad/s of speed error */
+    double volts_limit;
+    double step_s;
+};
+
+/* What one sample sees. */
+struct pdff_input {
+    double command_mm;
+    double command_mm_s; /* d(x_com)/dt */
+    double position_mm;  /* as the encoder reads it */
+    double speed_rad_s;
+};
+
+/* One sample: returns the volts for the step that begins; integral_rad is the loop's only state. */
+static inline double pdff_step(const struct pdff *pdff, double *integral_rad, const struct pdff_input *in)
+{
+    const double speed_ref =
+        pdff->k_pp_rad_s_mm * (in->command_mm - in->position_mm) + pdff->k_pf_rad_mm * in->command_mm_s;
+    const double integral = *integral_rad + pdff->step_s * (speed_ref - in->speed_rad_s);
+    const double volts =
+        pdff->volts_s_rad * (pdff->k_vf * speed_ref + pdff->k_iv_per_s * integral - in->speed_rad_s);
+    if (volts > pdff->volts_limit)
+        return pdff->volts_limit;
+    if (volts < -pdff->volts_limit)
+        return -pdff->volts_limit;
+    *integral_rad = integral;
+    return volts;
+}
+
+#endif
