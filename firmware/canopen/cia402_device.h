@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: MIT */
+/* cia402_device: the drive's side of the CiA 402 state machine.
+ *
+ * The drive tells the machine what happens inside it (ready, fault, reaction finished), gives it
+ * each controlword, and does what cia402_device_action says. Functions return true when the state
+ * changed. All in one context (that of the drive's period).
+ */
+#ifndef CANOPEN_CIA402_DEVICE_H
+#define CANOPEN_CIA402_DEVICE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "canopen/cia402.h"
+
+/* What the power stage and the motion control have to do now. */
+enum cia402_action {
+    CIA402_POWER_OFF, /* no torque */
+    CIA402_HOLD,   /* Switched on: powered, not following; the simulated drive keeps its torque off
+                      here too if it likes */
+    CIA402_FOLLOW, /* Operation enabled: follow the setpoints */
+    CIA402_STOP_QUICKLY,  /* Quick stop active: stop with 0x6085, then cia402_device_stopped */
+    CIA402_STOP_FOR_FAULT /* Fault reaction: as 0x605E says, then cia402_device_stopped */
+};
+
+/* Option codes, from the object dictionary. */
+struct cia402_options {
+    int16_t quick_stop; /* 0x605A: 0 power off; 1, 2, 3 stop, then Switch on disabled; 5, 6, 7 stop
+                           and stay */
+    int16_t fault_reaction; /* 0x605E: 0 power off; 1, 2, 3 stop, then Fault */
+};
+
+struct cia402_device {
+    enum cia402_state state;
+    struct cia402_options options; /* may change at any time */
+    uint16_t controlword;          /* last one, for edges */
+    uint16_t flags; /* CIA402_STATUS_... bits beside the state; the drive sets and clears them */
+    bool stopped;   /* in Quick stop active: the motor has come to rest */
+};
+
+void cia402_device_init(struct cia402_device *device);
+
+/* Initialisation is finished: Not ready -> Switch on disabled (transition 1). */
+bool cia402_device_ready(struct cia402_device *device);
+
+/* A controlword: transitions 2 ... 12, 15, 16. At most one transition a call. */
+bool cia402_device_control(struct cia402_device *device, uint16_t controlword);
+
+/* A fault: any state -> Fault reaction active (13), or straight to Fault when there is nothing to
+ * stop. */
+bool cia402_device_fault(struct cia402_device *device);
+
+/* The stop that cia402_device_action asked for is finished: transitions 14, or 12 when 0x605A says
+ * so. */
+bool cia402_device_stopped(struct cia402_device *device);
+
+/* Quick stop from inside (SYNC or heartbeat lost), like transition 11. */
+bool cia402_device_quick_stop(struct cia402_device *device);
+
+/* What to do in the present state. */
+enum cia402_action cia402_device_action(const struct cia402_device *device);
+
+/* 0x6041: state and flags. */
+uint16_t cia402_device_statusword(const struct cia402_device *device);
+
+#endif

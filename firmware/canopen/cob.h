@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: MIT */
+/* cob: identifiers of the predefined connection set (CiA 301, 7.3.3) and little-endian access to
+ * frame bytes.
+ *
+ * Pure functions, any context.
+ */
+#ifndef CANOPEN_COB_H
+#define CANOPEN_COB_H
+
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+/* Add the node id (1 ... 127) to those with "+ node". */
+#define COB_NMT        0x000u
+#define COB_SYNC       0x080u
+#define COB_EMCY       0x080u /* + node */
+#define COB_TPDO1      0x180u /* + node */
+#define COB_RPDO1      0x200u /* + node */
+#define COB_TPDO2      0x280u /* + node */
+#define COB_RPDO2      0x300u /* + node */
+#define COB_SDO_ANSWER 0x580u /* + node: server to client */
+#define COB_SDO_ASK    0x600u /* + node: client to server */
+#define COB_HEARTBEAT  0x700u /* + node */
+
+#define NODE_ID_MIN 1u
+#define NODE_ID_MAX 127u
+
+/* Sets *out to an empty frame: identifier, length and zero bytes. */
+void cob_frame(struct can_msg *out, uint32_t id, uint8_t len);
+
+/* The `size` (1 ... 8) bytes at `from`, least significant first, without sign extension. */
+uint64_t cob_get(const uint8_t *from, uint32_t size);
+
+/* Stores the low `size` (0 ... 8) bytes of `value` at `to`, least significant first. */
+void cob_put(uint8_t *to, uint64_t value, uint32_t size);
+
+/* Two's complement reading of the low `size` (1 ... 8) bytes of `value`. */
+int64_t cob_signed(uint64_t value, uint32_t size);
+
+#endif

@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: MIT */
+/* heartbeat: producer (0x1017) and consumer (0x1016) (CiA 301, 7.2.8.3.2.2). */
+#ifndef CANOPEN_HEARTBEAT_H
+#define CANOPEN_HEARTBEAT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+#include "canopen/nmt.h"
+
+struct heartbeat_producer {
+    uint32_t waited_us;
+    uint8_t node;
+};
+
+/* Mainline or timer, one of them. */
+void heartbeat_producer_init(struct heartbeat_producer *producer, uint8_t node);
+
+/* Lets time pass. `period_ms` is the present value of 0x1017, 0 switches off; nothing is sent in
+ * INITIALISING. Returns 1 when *out is to be sent. Late calls give one frame, not several. Mainline
+ * or timer, one of them. */
+int heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
+                               enum nmt_state state, uint32_t elapsed_us, struct can_msg *out);
+
+enum heartbeat_event {
+    HEARTBEAT_NOTHING,
+    HEARTBEAT_BOOTED,  /* boot-up frame: the node (re)started */
+    HEARTBEAT_CHANGED, /* first heartbeat, or the state differs from the last one */
+    HEARTBEAT_LOST     /* none for longer than the consumer time; reported once, until the next one
+                          comes */
+};
+
+enum heartbeat_presence {
+    HEARTBEAT_UNKNOWN, /* no heartbeat yet: monitoring starts with the first one */
+    HEARTBEAT_PRESENT,
+    HEARTBEAT_MISSING
+};
+
+/* Watches one node. */
+struct heartbeat_consumer {
+    uint32_t time_us; /* of 0x1016; 0: not monitored, though states are still followed */
+    uint32_t silence_us;
+    enum heartbeat_presence presence;
+    enum nmt_state state; /* last one heard */
+    uint8_t node;
+};
+
+void heartbeat_consumer_init(struct heartbeat_consumer *consumer, uint8_t node, uint16_t time_ms);
+
+/* Splits an entry of 0x1016 (CiA 301: bits 16 ... 23 node, 0 ... 15 time in ms). */
+void heartbeat_consumer_init_entry(struct heartbeat_consumer *consumer, uint32_t entry);
+
+/* Takes a frame; others than this node's heartbeat give HEARTBEAT_NOTHING. Same context as
+ * _process. */
+enum heartbeat_event heartbeat_consumer_receive(struct heartbeat_consumer *consumer,
+                                                const struct can_msg *in);
+
+/* Lets time pass; HEARTBEAT_LOST once when it was too much. */
+enum heartbeat_event heartbeat_consumer_process(struct heartbeat_consumer *consumer,
+                                                uint32_t elapsed_us);
+
+#endif

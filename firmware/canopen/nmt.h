@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: MIT */
+/* nmt: network management (CiA 301, 7.2.8 and 7.3.2): the slave's state machine and the master's
+ * commands. */
+#ifndef CANOPEN_NMT_H
+#define CANOPEN_NMT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+/* Values as in heartbeat frames. */
+enum nmt_state {
+    NMT_INITIALISING = 0x00,
+    NMT_STOPPED = 0x04,
+    NMT_OPERATIONAL = 0x05,
+    NMT_PRE_OPERATIONAL = 0x7F
+};
+
+enum nmt_command {
+    NMT_START = 0x01,
+    NMT_STOP = 0x02,
+    NMT_ENTER_PRE_OPERATIONAL = 0x80,
+    NMT_RESET_NODE = 0x81,
+    NMT_RESET_COMMUNICATION = 0x82
+};
+
+/* All are called from nmt_slave_process; each may be NULL. */
+struct nmt_hooks {
+    void (*reset_node)(void *context); /* all values back to power-on, then communication */
+    void (*reset_communication)(
+        void *context); /* communication objects 0x1000 ... 0x1FFF back to power-on */
+    void (*changed)(void *context, enum nmt_state state);
+};
+
+struct nmt_slave {
+    const struct nmt_hooks *hooks;
+    void *context;
+    volatile enum nmt_state state; /* INITIALISING until the boot-up frame is out */
+    volatile uint8_t reset_due;    /* 0, NMT_RESET_NODE or NMT_RESET_COMMUNICATION */
+    enum nmt_state told;           /* last state given to hooks->changed */
+    uint8_t node;
+};
+
+/* Starts in INITIALISING. `hooks` may be NULL. Mainline, before any frame comes. */
+void nmt_slave_init(struct nmt_slave *slave, uint8_t node, const struct nmt_hooks *hooks,
+                    void *context);
+
+/* Takes an NMT command for this node or for all; other frames and unknown commands are ignored. The
+ * state changes at once; resets are carried out by nmt_slave_process. Returns true when it was a
+ * command for this node. Receive interrupt. */
+bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in);
+
+/* Carries out resets, tells hooks->changed, and, from INITIALISING, gives the boot-up frame and
+ * enters PRE-OPERATIONAL. Returns 1 when *out is to be sent, else 0. Mainline. */
+int nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
+
+/* Which services a state permits (CiA 301, table 39). Pure. */
+bool nmt_permits_sdo(enum nmt_state state); /* SDO, also SYNC, EMCY: pre-operational, operational */
+bool nmt_permits_pdo(enum nmt_state state); /* operational only */
+
+/* The master's command frame; node 0 means all nodes. Any context. */
+void nmt_master_command(enum nmt_command command, uint8_t node, struct can_msg *out);
+
+#endif

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* pdo: the fixed process data of the bus (docs/protocol.md, section 2).
+ *
+ * `drive` is always the node id of the drive, on both sides. Decoding returns the drive's node id,
+ * or 0 when the frame is not this PDO of a node, or PDO_ERR_SHORT when it is but has fewer bytes
+ * than the mapping (CiA 301: such a PDO is not processed); longer ones are accepted, extra bytes
+ * ignored. Pure functions, any context.
+ */
+#ifndef CANOPEN_PDO_H
+#define CANOPEN_PDO_H
+
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+#define PDO_ERR_SHORT (-1)
+
+/* RPDO1 of a drive: 0x6040, 0x607A. */
+struct pdo_setpoint {
+    int32_t target_counts;
+    uint16_t controlword;
+};
+
+/* TPDO1 of a drive: 0x6041, 0x6064. */
+struct pdo_actual {
+    int32_t position_counts;
+    uint16_t statusword;
+};
+
+void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out);
+int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint);
+
+void pdo_encode_actual(uint8_t drive, const struct pdo_actual *actual, struct can_msg *out);
+int pdo_decode_actual(const struct can_msg *in, struct pdo_actual *actual);
+
+/* TPDO2 of a simulated drive: 0x2100, the motor voltage. */
+void pdo_encode_volts(uint8_t drive, int16_t volts_mv, struct can_msg *out);
+int pdo_decode_volts(const struct can_msg *in, int16_t *volts_mv);
+
+#endif

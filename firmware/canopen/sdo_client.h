@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: MIT */
+/* sdo_client: reads and writes values of other nodes, expedited or segmented (CiA 301, 7.2.4), as a
+ * polled machine.
+ *
+ *     sdo_client_write_number(&client, 2, 0x6060, 0, 8, 1, &out);      -> send out
+ *     each frame:      if (sdo_client_receive(&client, &in, &out)) -> send out
+ *     each poll:       if (sdo_client_process(&client, elapsed_us, &out)) -> send out
+ *     until client.status is not SDO_CLIENT_BUSY
+ *
+ * One transfer at a time, over the predefined COB-IDs. All functions: mainline.
+ */
+#ifndef CANOPEN_SDO_CLIENT_H
+#define CANOPEN_SDO_CLIENT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+enum sdo_client_status {
+    SDO_CLIENT_IDLE,
+    SDO_CLIENT_BUSY,
+    SDO_CLIENT_DONE,    /* read: `size` bytes are in the buffer */
+    SDO_CLIENT_REFUSED, /* the server aborted with abort_code */
+    SDO_CLIENT_FAILED   /* this client aborted with abort_code (SDO_ABORT_TIMEOUT: no answer) */
+};
+
+#define SDO_CLIENT_ERR_BUSY     (-1)
+#define SDO_CLIENT_ERR_ARGUMENT (-2)
+
+struct sdo_client {
+    enum sdo_client_status status;
+    uint32_t abort_code; /* of REFUSED and FAILED */
+    uint32_t size;       /* bytes of the value; read: known when DONE */
+    uint32_t timeout_us; /* for each answer */
+    uint32_t silence_us;
+    const uint8_t *source; /* write */
+    uint8_t *target;       /* read */
+    uint32_t capacity;
+    uint32_t moved;
+    uint16_t index;
+    uint8_t sub;
+    uint8_t node;
+    uint8_t toggle;
+    uint8_t step;      /* which answer is due; internal */
+    uint8_t number[8]; /* of the _number calls */
+};
+
+void sdo_client_init(struct sdo_client *client, uint32_t timeout_us);
+
+/* Begin a transfer: fill *out with the request and return 1 (send it), or a negative error with
+ * nothing changed: a transfer is under way, node not 1 ... 127, size 0. `data` and `buffer` must
+ * stay until status is not BUSY. */
+int sdo_client_write(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                     const uint8_t *data, uint32_t size, struct can_msg *out);
+int sdo_client_read(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                    uint8_t *buffer, uint32_t capacity, struct can_msg *out);
+
+/* The same for a number of `size` (1 ... 8) bytes, kept inside the client. */
+int sdo_client_write_number(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                            uint64_t value, uint8_t size, struct can_msg *out);
+int sdo_client_read_number(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                           struct can_msg *out);
+
+/* The number that sdo_client_read_number brought (status DONE), as unsigned and as two's complement
+ * of its size. */
+uint64_t sdo_client_unsigned(const struct sdo_client *client);
+int64_t sdo_client_signed(const struct sdo_client *client);
+
+/* Takes a frame; others are ignored. Returns 1 when *out is to be sent, else 0. */
+int sdo_client_receive(struct sdo_client *client, const struct can_msg *in, struct can_msg *out);
+
+/* Lets time pass. Returns 1 when *out (an abort after a timeout) is to be sent, else 0. */
+int sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct can_msg *out);
+
+/* Gives the transfer up: status FAILED with `code`. Returns 1 when *out (the abort) is to be sent;
+ * 0 when there was none. */
+int sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg *out);
+
+#endif

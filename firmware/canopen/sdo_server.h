@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: MIT */
+/* sdo_server: gives an object dictionary to one SDO client (CiA 301, 7.2.4).
+ *
+ * Download (client writes): expedited, segmented, block with CRC and retransmission. Upload (client
+ * reads): expedited, segmented, block. Values other than DOMAIN are collected first and written in
+ * one piece at the end, so an aborted transfer changes nothing; DOMAIN data goes to the od hooks as
+ * it comes.
+ *
+ * One transfer at a time. A new initiate request in the middle of a transfer drops the old transfer
+ * (its DOMAIN hooks are told) and starts the new one, so a client that lost its answer can simply
+ * begin again.
+ *
+ * Loss within a block: segments after a gap are ignored and the answer at the block's end names the
+ * last good one, from where the client repeats. When the block's last segment itself is lost the
+ * server gives that answer after half of the timeout.
+ *
+ * Frames in, frames out. All functions: mainline (the hooks may take long); the receive interrupt
+ * only queues.
+ */
+#ifndef CANOPEN_SDO_SERVER_H
+#define CANOPEN_SDO_SERVER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+#include "canopen/od.h"
+
+#define SDO_BLOCK_SEGMENTS_MAX 127u
+/* Longest value that is not a DOMAIN, in bytes. */
+#define SDO_VALUE_MAX 64u
+
+enum sdo_server_state {
+    SDO_SERVER_IDLE,
+    SDO_SERVER_DOWNLOAD, /* segmented */
+    SDO_SERVER_UPLOAD,
+    SDO_SERVER_BLOCK_DOWNLOAD,     /* segments of a block are coming */
+    SDO_SERVER_BLOCK_DOWNLOAD_END, /* all came; the end request with the CRC is due */
+    SDO_SERVER_BLOCK_UPLOAD_READY, /* initiated; the client's go is due */
+    SDO_SERVER_BLOCK_UPLOAD,       /* sending segments from sdo_server_process */
+    SDO_SERVER_BLOCK_UPLOAD_ACK,   /* a block is sent; its acknowledgement is due */
+    SDO_SERVER_BLOCK_UPLOAD_END    /* end sent; the client's last word is due */
+};
+
+struct sdo_server {
+    struct od *od;
+    const struct od_entry *entry; /* of the transfer under way */
+    enum sdo_server_state state;
+    uint32_t timeout_us;
+    uint32_t silence_us;  /* since the last frame of this transfer */
+    uint32_t announced;   /* size said by the client, 0: none; upload: size of the whole */
+    uint32_t moved;       /* bytes given to, or taken from, the object so far */
+    uint32_t block_start; /* block upload: offset of the present block's first segment */
+    uint16_t index;       /* of the transfer, for abort frames */
+    uint16_t crc;
+    uint8_t sub;
+    uint8_t node;
+    uint8_t toggle;
+    uint8_t block_size;  /* segments a block that this server asks for; upload: the client's */
+    uint8_t block_limit; /* segments of the present block */
+    uint8_t sequence;    /* last segment received in order, or sent */
+    uint8_t held;        /* block download: bytes in `last` */
+    bool use_crc;
+    bool domain_open;        /* domain_begin succeeded, domain_end or domain_abort still due */
+    bool acknowledged_early; /* the answer after half of the timeout has been given */
+    uint8_t last[7]; /* block download: the newest segment: its padding is known only at the end */
+    uint8_t value[SDO_VALUE_MAX];
+};
+
+/* `timeout_us`: silence of the client after which a transfer is aborted; `block_segments` (1 ...
+ * 127): size of the blocks that it asks clients to send (fewer for small receive queues). */
+void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uint32_t timeout_us,
+                     uint8_t block_segments);
+
+/* Drops a transfer under way without a word (NMT reset, stop). */
+void sdo_server_reset(struct sdo_server *server);
+
+/* True for frames that sdo_server_receive wants. Any context. */
+bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in);
+
+/* Takes one frame; other frames are ignored. Returns 1 when *out is to be sent, else 0. */
+int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out);
+
+/* Lets time pass and gives frames that are due by themselves (timeouts, segments of a block
+ * upload). Returns 1 when *out is to be sent: then call again with elapsed_us 0 as long as the port
+ * takes frames. */
+int sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out);
+
+/* True while a transfer is under way. */
+bool sdo_server_busy(const struct sdo_server *server);
+
+#endif

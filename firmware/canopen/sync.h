@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: MIT */
+/* sync: SYNC with counter (CiA 301, 7.2.5; objects 0x1005, 0x1006, 0x1019). */
+#ifndef CANOPEN_SYNC_H
+#define CANOPEN_SYNC_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+/* Counter overflow values that CiA 301 allows: 0 (no counter), 2 ... 240. */
+#define SYNC_OVERFLOW_MAX 240u
+
+struct sync_producer {
+    uint8_t overflow;
+    uint8_t counter; /* of the last SYNC sent; 0 before the first */
+};
+
+/* Timer (or before it starts). `overflow` is 0x1019. */
+void sync_producer_init(struct sync_producer *producer, uint8_t overflow);
+
+/* The next SYNC: 1 ... overflow, then 1 again. Timer. */
+void sync_producer_next(struct sync_producer *producer, struct can_msg *out);
+
+struct sync_consumer {
+    uint8_t overflow;
+    uint8_t counter; /* of the last SYNC; 0 before the first */
+};
+
+#define SYNC_NONE        (-1) /* not a SYNC frame */
+#define SYNC_ERR_LENGTH  (-2) /* length does not fit 0x1019 */
+#define SYNC_ERR_COUNTER (-3) /* counter 0 or above the overflow value */
+
+void sync_consumer_init(struct sync_consumer *consumer, uint8_t overflow);
+
+/* Periods since the SYNC before: 1 normally and for the first one, more when SYNCs were lost, 0 for
+ * a repeated counter; or a negative code above, with nothing changed. Without counter (overflow 0):
+ * 1 for each. Receive interrupt. */
+int sync_consumer_receive(struct sync_consumer *consumer, const struct can_msg *in);
+
+#endif
