@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: MIT
+# Every entry point of Hodograph; `make help` lists them.
+#
+# Sources are found by wildcard, so a new file needs no line here. All output is under build/ (BUILD=...
+# to change), except .venv and the cffi module, which Python has to find beside its package.
+#
+# C is built in variants, each with its own objects and archives:
+#   build/host    the compiler of the host (CC), optimised: what runs
+#   build/asan    the same under the address and undefined-behaviour sanitizers: what is tested
+#   build/clang   clang, optimised: a second opinion, compiled by `make lint`
+
+SHELL       := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.SUFFIXES:
+MAKEFLAGS   += --no-builtin-rules -j$(shell nproc)
+.DEFAULT_GOAL := build
+
+BUILD  ?= build
+PYTHON ?= python3
+CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
+CLANG  ?= clang
+STAMPS := $(BUILD)/stamps
+VENV   := .venv
+PY     := $(VENV)/bin/python
+
+# A .venv that was made in another place (a moved or copied tree) is of no use: make it again.
+ifneq ($(wildcard $(VENV)/.ready),)
+ifneq ($(shell cat $(VENV)/.ready),$(CURDIR))
+$(shell rm -f $(VENV)/.ready)
+endif
+endif
+
+## ---- what there is ---------------------------------------------------------------------------
+
+OD_NAMES := $(if $(wildcard firmware/app/controller.eds),controller) $(if $(wildcard sim/node/drive.eds),drive)
+OD_C     := $(OD_NAMES:%=$(BUILD)/generated/od_%.c)
+OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
+
+LIBS        := app node port canopen sim core od
+core_SRC    := $(wildcard firmware/core/*.c)
+canopen_SRC := $(wildcard firmware/canopen/*.c)
+sim_SRC     := $(wildcard sim/plant/*.c sim/rig/*.c)
+app_SRC     := $(filter-out %/main.c,$(wildcard firmware/app/*.c))
+port_SRC    := $(filter-out %/main.c,$(wildcard firmware/port/linux/*.c))
+node_SRC    := $(filter-out %/main.c,$(wildcard sim/node/*.c))
+od_SRC      := $(OD_C)
+
+BINS            := controller drive
+controller_MAIN := $(wildcard firmware/app/main.c firmware/port/linux/main.c)
+drive_MAIN      := $(wildcard sim/node/main.c)
+BINS            := $(foreach b,$(BINS),$(if $($(b)_MAIN),$(b)))
+
+UNIT_SRC      := $(wildcard tests/unit/test_*.c)
+UNIT_SUPPORT  := $(filter-out $(UNIT_SRC),$(wildcard tests/unit/*.c))
+UNIT_NAMES    := $(UNIT_SRC:tests/unit/%.c=%)
+
+OWN_C    := $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(controller_MAIN) $(drive_MAIN)
+OWN_H    := $(wildcard firmware/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
+FUZZ_SRC := $(wildcard tests/fuzz/*.c)
+
+## ---- flags -----------------------------------------------------------------------------------
+
+WARN      := -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Werror
+INCLUDES  := -Ifirmware -Isim -I$(BUILD)/generated
+COMMON    := -std=c99 $(WARN) -ffp-contract=off -fPIC $(INCLUDES)
+UNITY_DIR := $(BUILD)/unity
+UNITY_DEF := -DUNITY_INCLUDE_DOUBLE -DUNITY_SUPPORT_64
+LDLIBS    := -lm -lpthread
+
+host_CC      := $(CC)
+host_CFLAGS  := $(COMMON) -O2 -g
+host_LDFLAGS :=
+asan_CC      := $(CC)
+asan_CFLAGS  := $(COMMON) -O1 -g -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+asan_LDFLAGS := -fsanitize=address,undefined
+clang_CC      := $(CLANG)
+clang_CFLAGS  := $(COMMON) -O2 -g
+clang_LDFLAGS :=
+VARIANTS := host asan clang
+
+## ---- entry points ----------------------------------------------------------------------------
+
+.PHONY: build c test unit pytest run lint format bench clean distclean help lock packages venv FORCE
+
+help: ## this list
+	@echo "make TARGET, from the root of the tree:"
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1\t\2/p' $(firstword $(MAKEFILE_LIST)) | awk -F'\t' '{printf "  %-10s %s\n", $$1, $$2}'
+
+build: c $(VENV)/.editable $(if $(wildcard host_tools/hodograph/native/build_native.py),native) ## prepare everything: packages, .venv, C programs, Python module
+	@true
+
+HOST_LIBS := $(LIBS:%=$(BUILD)/host/libhodograph_%.a)
+c: $(HOST_LIBS) $(BINS:%=$(BUILD)/bin/hodograph-%) ## the C archives and programs only
+
+UNIT_BINS := $(UNIT_NAMES:%=$(BUILD)/asan/tests/%)
+test: build $(UNIT_BINS) $(BINS:%=$(BUILD)/asan/bin/hodograph-%) ## every test, C and Python; ends with "N passed, N failed"
+	@$(PY) tools/run_tests.py --build $(BUILD)
+
+unit: $(UNIT_BINS) ## the C tests only, under the sanitizers
+	@$(PY) tools/run_tests.py --build $(BUILD) --only unit
+
+unit-plain: $(UNIT_NAMES:%=$(BUILD)/host/tests/%)
+
+pytest: build ## the Python tests only
+	@$(PY) tools/run_tests.py --build $(BUILD) --only python
+
+clean: ## remove build/ and the cffi module
+	rm -rf $(BUILD) host_tools/hodograph/native/_native*.so
+
+distclean: clean ## clean, and remove .venv and caches
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis host_tools/*.egg-info
+
+FORCE:
+
+## ---- what the machine must have --------------------------------------------------------------
+
+packages: $(STAMPS)/packages
+$(STAMPS)/packages: tools/packages.py
+	@mkdir -p $(@D)
+	@$(PYTHON) tools/packages.py build
+	@touch $@
+
+venv: $(VENV)/.editable
+$(VENV)/.ready: requirements.lock tools/make_venv.sh | $(STAMPS)/packages
+	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(VENV) requirements.lock
+
+$(VENV)/.editable: host_tools/pyproject.toml $(VENV)/.ready
+	@$(PY) -m pip install --quiet --no-deps --no-build-isolation --no-index -e host_tools
+	@touch $@
+
+lock: $(STAMPS)/uv/bin/uv ## write requirements.lock anew from requirements.in (newest versions)
+	$(STAMPS)/uv/bin/uv pip compile --universal --python-version 3.11 --generate-hashes --upgrade \
+	    --no-header --quiet requirements.in -o requirements.lock
+$(STAMPS)/uv/bin/uv: | $(STAMPS)/packages
+	$(PYTHON) -m venv $(STAMPS)/uv
+	$(STAMPS)/uv/bin/pip install --quiet uv
+
+## ---- Unity, fetched ----------------------------------------------------------------------------
+
+$(UNITY_DIR)/unity.c: tools/unity.lock tools/fetch_unity.sh $(VENV)/.ready
+	@bash tools/fetch_unity.sh $(PY) tools/unity.lock $(UNITY_DIR)
+$(UNITY_DIR)/unity.h: $(UNITY_DIR)/unity.c
+
+## ---- object dictionaries, generated from the EDS files -------------------------------------------
+
+define OD_RULE
+$(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h &: $(2) tools/eds_to_c.py $(VENV)/.ready
+	@mkdir -p $(BUILD)/generated
+	$(PY) tools/eds_to_c.py $(2) $(1) $(BUILD)/generated
+	@touch $(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h
+endef
+$(if $(filter controller,$(OD_NAMES)),$(eval $(call OD_RULE,controller,firmware/app/controller.eds)))
+$(if $(filter drive,$(OD_NAMES)),$(eval $(call OD_RULE,drive,sim/node/drive.eds)))
+
+## ---- C -------------------------------------------------------------------------------------------
+
+# A list of what a file is made from, rewritten only when it changes: so a removed source or a changed
+# flag rebuilds what depends on it.
+define NOTE
+$(1): FORCE
+	@mkdir -p $$(@D)
+	@printf '%s\n' '$(2)' | cmp -s - $$@ || printf '%s\n' '$(2)' > $$@
+endef
+
+# object_of VARIANT SOURCES: generated sources lie under $(BUILD) already
+object_of = $(patsubst %.c,$(BUILD)/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
+
+define LIB_RULE # variant, library
+$(BUILD)/$(1)/libhodograph_$(2).a: $(call object_of,$(1),$($(2)_SRC)) $(BUILD)/$(1)/obj/$(2).list
+	@rm -f $$@
+	@ar rcs $$@ $$(filter %.o,$$^)
+$(call NOTE,$(BUILD)/$(1)/obj/$(2).list,$($(2)_SRC))
+endef
+
+define LINK # variant
+	@mkdir -p $$(@D)
+	$$($(1)_CC) $$($(1)_LDFLAGS) -o $$@ $$(filter %.o,$$^) -Wl,--start-group $$(filter %.a,$$^) -Wl,--end-group $$(LDLIBS)
+endef
+
+define VARIANT_RULES # variant
+$(call NOTE,$(BUILD)/$(1)/obj/flags,$($(1)_CC) $($(1)_CFLAGS) $(UNITY_DEF))
+$(BUILD)/$(1)/obj/tests/%.o: tests/%.c $(BUILD)/$(1)/obj/flags $(UNITY_DIR)/unity.h | $(OD_H)
+	@mkdir -p $$(@D)
+	$$($(1)_CC) $$($(1)_CFLAGS) -Itests/unit -isystem $(UNITY_DIR) $(UNITY_DEF) -MMD -MP -c -o $$@ $$<
+$(BUILD)/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/$(1)/obj/flags | $(OD_H)
+	@mkdir -p $$(@D)
+	$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
+$(BUILD)/$(1)/obj/%.o: %.c $(BUILD)/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages
+	@mkdir -p $$(@D)
+	$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
+$(BUILD)/$(1)/obj/unity.o: $(UNITY_DIR)/unity.c $(BUILD)/$(1)/obj/flags
+	@mkdir -p $$(@D)
+	$$($(1)_CC) $$(filter-out -W%,$$($(1)_CFLAGS)) $(UNITY_DEF) -c -o $$@ $$<
+$(foreach l,$(LIBS),$(eval $(call LIB_RULE,$(1),$(l))))
+$(BUILD)/$(1)/tests/%: $(BUILD)/$(1)/obj/tests/unit/%.o $(call object_of,$(1),$(UNIT_SUPPORT)) $(BUILD)/$(1)/obj/unity.o $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a)
+$(call LINK,$(1))
+endef
+$(foreach v,$(VARIANTS),$(eval $(call VARIANT_RULES,$(v))))
+.SECONDARY:
+
+define BIN_RULE # variant, program, file
+$(3): $(call object_of,$(1),$($(2)_MAIN)) $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a)
+$(call LINK,$(1))
+endef
+$(foreach b,$(BINS),$(eval $(call BIN_RULE,host,$(b),$(BUILD)/bin/hodograph-$(b))))
+$(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph-$(b))))
+
+-include $(foreach v,$(VARIANTS),$(patsubst %.o,%.d,$(call object_of,$(v),$(OWN_C) $(OD_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))))
+
+## ---- the native module of the Python package -------------------------------------------------------
+
+NATIVE := host_tools/hodograph/native/_native.abi3.so
+.PHONY: native
+native: $(NATIVE)
+$(NATIVE): host_tools/hodograph/native/build_native.py $(BUILD)/host/libhodograph_core.a $(BUILD)/host/libhodograph_sim.a \
+           $(wildcard firmware/core/*.h sim/plant/*.h sim/rig/*.h) $(VENV)/.editable
+	$(PY) $<
+	@touch $@

@@ -1,0 +1,144 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""packages.py SET...: makes sure that what the machine must have is there.
+
+A set is `build` (compile, .venv, bus), `bus` or `lint`. Missing Debian packages are installed when this runs as
+root or with passwordless sudo; otherwise the command to type is printed and the exit status is 1. Standard
+library only: it runs before anything is installed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+
+class Need(NamedTuple):
+    """One thing the machine must have: how to see that it is there, and the Debian package that brings it."""
+
+    what: str
+    is_there: Callable[[], bool]
+    package: str
+
+
+def _program(name: str) -> Need:
+    return Need(name, lambda: _which(name) is not None, _PACKAGE_OF.get(name, name))
+
+
+def _which(name: str) -> str | None:
+    # Debian keeps administrators' programs out of an ordinary user's PATH.
+    return shutil.which(name, path=os.environ.get("PATH", "") + ":/usr/sbin:/sbin")
+
+
+def _file(path: str, package: str) -> Need:
+    return Need(path, lambda: Path(path).exists(), package)
+
+
+def _has_python_header() -> bool:
+    return Path(sysconfig.get_paths()["include"], "Python.h").exists()
+
+
+def _has_venv() -> bool:
+    return all(importlib.util.find_spec(name) is not None for name in ("venv", "ensurepip"))
+
+
+_PACKAGE_OF = {
+    "linux.uml": "user-mode-linux",
+    "ip": "iproute2",
+    "insmod": "kmod",
+    "taskset": "util-linux",
+    "ar": "binutils",
+}
+
+BUS = (
+    _program("linux.uml"),
+    _program("ip"),
+    _program("insmod"),
+    _program("taskset"),
+)
+BUILD = (
+    _program("gcc"),
+    _program("ar"),
+    _file("/usr/include/stdlib.h", "libc6-dev"),
+    _file("/usr/include/linux/can.h", "linux-libc-dev"),
+    Need("Python.h", _has_python_header, "python3-dev"),
+    Need("the Python modules venv and ensurepip", _has_venv, "python3-venv"),
+    *BUS,
+)
+LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"))
+SETS = {"build": BUILD, "bus": BUS, "lint": LINT}
+
+
+def _missing(needs: Sequence[Need]) -> list[Need]:
+    return [need for need in needs if not need.is_there()]
+
+
+def _becoming_root() -> list[str] | None:
+    """The words to put before a command so that root runs it; None when there is no way without a password."""
+    if os.geteuid() == 0:
+        return []
+    sudo = shutil.which("sudo")
+    if sudo and subprocess.run([sudo, "-n", "true"], capture_output=True, check=False).returncode == 0:
+        return [sudo, "-n", "env"]
+    return None
+
+
+def _install(packages: list[str], root: list[str]) -> bool:
+    """Installs; fetches the package lists once when they are missing or too old."""
+    apt = [*root, *(["env"] if not root else []), "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq"]
+    install = [*apt, "-o", "DPkg::Lock::Timeout=300", "install", "-y", "--no-install-recommends", *packages]
+    print(f"installing Debian packages: {' '.join(packages)}", file=sys.stderr)
+    lists = Path("/var/lib/apt/lists")
+    if any(lists.glob("*_Packages*")) and _quietly(install):
+        return True
+    return _quietly([*apt, "update"]) and _quietly(install, say=True)
+
+
+def _quietly(command: list[str], *, say: bool = False) -> bool:
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if done.returncode != 0 and say:
+        print(done.stdout[-2000:] + done.stderr[-2000:], file=sys.stderr)
+    return done.returncode == 0
+
+
+def ensure(names: Sequence[str]) -> int:
+    """Exit status 0 when all of the sets is there, now or already; 1 with one clear message otherwise."""
+    if sys.version_info < (3, 11):
+        print(f"packages: Python 3.11 or newer is needed, {sys.executable} is {sys.version.split()[0]}", file=sys.stderr)
+        return 1
+    needs = [need for name in names for need in SETS[name]]
+    missing = _missing(needs)
+    if not missing:
+        return 0
+    things = ", ".join(need.what for need in missing)
+    packages = sorted({need.package for need in missing})
+    if shutil.which("apt-get") is None:
+        print(f"packages: missing: {things} (Debian packages: {' '.join(packages)}); no apt-get here, install them by hand", file=sys.stderr)
+        return 1
+    root = _becoming_root()
+    if root is None:
+        print(f"packages: missing: {things}; type:\n  sudo apt-get update && sudo apt-get install -y --no-install-recommends {' '.join(packages)}", file=sys.stderr)
+        return 1
+    if not _install(packages, root):
+        print(f"packages: could not install: {' '.join(packages)}", file=sys.stderr)
+        return 1
+    left = _missing(needs)
+    if left:
+        print(f"packages: installed {' '.join(packages)}, and yet missing: {', '.join(n.what for n in left)}"
+              f" (for the interpreter {sys.executable})", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2 or any(name not in SETS for name in sys.argv[1:]):
+        print(f"usage: packages.py {{{'|'.join(SETS)}}}...", file=sys.stderr)
+        sys.exit(2)
+    sys.exit(ensure(sys.argv[1:]))
