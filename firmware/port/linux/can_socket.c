@@ -1,0 +1,189 @@
+/* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
+#include "port/linux/can_socket.h"
+
+#include <errno.h>
+#include <net/if.h>
+#include <net/if_arp.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <linux/can.h>
+#include <linux/can/raw.h>
+
+#define RECEIVE_BUFFER_BYTES (4 * 1024 * 1024)
+
+static int fail(char *reason, size_t size, int error, const char *text, const char *interface)
+{
+    (void)snprintf(reason, size, text, interface, strerror(error));
+    return -error;
+}
+
+static int interface_request(int fd, const char *interface, unsigned long request, struct ifreq *answer)
+{
+    memset(answer, 0, sizeof *answer);
+    memcpy(answer->ifr_name, interface, strlen(interface) + 1u);
+    return ioctl(fd, request, answer) == 0 ? 0 : errno;
+}
+
+/* Asks in the order in which a user would put things right. */
+static int check_interface(int fd, const char *interface, char *reason, size_t size)
+{
+    struct ifreq answer;
+    if (strlen(interface) == 0 || strlen(interface) >= IFNAMSIZ) {
+        return fail(reason, size, EINVAL, "'%s' is not the name of a network interface", interface);
+    }
+    int error = interface_request(fd, interface, SIOCGIFHWADDR, &answer);
+    if (error == ENODEV) {
+        return fail(reason, size, error,
+                    "no interface %s: create it (ip link add dev vcan0 type vcan) or run under tools/with-vcan", interface);
+    }
+    if (error != 0) {
+        return fail(reason, size, error, "interface %s: %s", interface);
+    }
+    if (answer.ifr_hwaddr.sa_family != ARPHRD_CAN) {
+        return fail(reason, size, EINVAL, "%s is not a CAN interface: name one like vcan0 or can0", interface);
+    }
+    error = interface_request(fd, interface, SIOCGIFFLAGS, &answer);
+    if (error == 0 && (answer.ifr_flags & IFF_UP) == 0) {
+        return fail(reason, size, ENETDOWN, "interface %s is down: bring it up (ip link set up dev NAME)", interface);
+    }
+    return error == 0 ? 0 : fail(reason, size, error, "interface %s: %s", interface);
+}
+
+static int bind_interface(int fd, const char *interface, char *reason, size_t size)
+{
+    struct sockaddr_can address;
+    memset(&address, 0, sizeof address);
+    address.can_family = AF_CAN;
+    address.can_ifindex = (int)if_nametoindex(interface);
+    if (bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        return fail(reason, size, errno, "cannot use %s: %s", interface);
+    }
+    return 0;
+}
+
+/* A simulated bus has no bit times: whoever sleeps for some milliseconds must find everything that was sent. */
+static void enlarge_buffers(int fd)
+{
+    const int bytes = RECEIVE_BUFFER_BYTES;
+    if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0) {
+        (void)setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+    }
+    if (setsockopt(fd, SOL_SOCKET, SO_SNDBUFFORCE, &bytes, sizeof bytes) != 0) {
+        (void)setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+    }
+}
+
+static int open_raw(const char *interface, char *reason, size_t size)
+{
+    const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
+    if (fd >= 0) {
+        return fd;
+    }
+    if (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT) {
+        return fail(reason, size, errno, "no CAN in this kernel, so no %s: run under tools/with-vcan", interface);
+    }
+    if (errno == EPERM || errno == EACCES) {
+        return fail(reason, size, errno, "no permission to open a CAN socket on %s: run as root or grant it", interface);
+    }
+    return fail(reason, size, errno, "cannot open a CAN socket on %s: %s", interface);
+}
+
+int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size)
+{
+    socket->fd = -1;
+    const int fd = open_raw(interface, reason, size);
+    if (fd < 0) {
+        return fd;
+    }
+    int error = check_interface(fd, interface, reason, size);
+    if (error == 0) {
+        enlarge_buffers(fd);
+        error = bind_interface(fd, interface, reason, size);
+    }
+    if (error != 0) {
+        (void)close(fd);
+        return error;
+    }
+    socket->fd = fd;
+    return 0;
+}
+
+void can_socket_close(struct can_socket *socket)
+{
+    if (socket->fd >= 0) {
+        (void)close(socket->fd);
+        socket->fd = -1;
+    }
+}
+
+int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters, size_t count)
+{
+    struct can_filter raw[CAN_SOCKET_FILTERS];
+    if (count > CAN_SOCKET_FILTERS) {
+        return -EINVAL;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        raw[i].can_id = filters[i].id;
+        raw[i].can_mask = (canid_t)(filters[i].mask | CAN_EFF_FLAG | CAN_RTR_FLAG);
+    }
+    const socklen_t bytes = (socklen_t)(count * sizeof raw[0]);
+    return setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_FILTER, raw, bytes) == 0 ? 0 : -errno;
+}
+
+int can_socket_send(struct can_socket *socket, const struct can_msg *message)
+{
+    struct can_frame frame;
+    memset(&frame, 0, sizeof frame);
+    frame.can_id = message->id;
+    frame.can_dlc = message->len;
+    memcpy(frame.data, message->data, sizeof frame.data);
+    if (write(socket->fd, &frame, sizeof frame) == (ssize_t)sizeof frame) {
+        return 0;
+    }
+    return errno == ENOBUFS ? -EAGAIN : -errno;
+}
+
+static int plain_frame(const struct can_frame *frame)
+{
+    return (frame->can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) == 0 && frame->can_dlc <= CAN_MAX_DLEN;
+}
+
+static void convert(struct can_msg *message, const struct can_frame *frame)
+{
+    memset(message, 0, sizeof *message);
+    message->id = frame->can_id & CAN_SFF_MASK;
+    message->len = frame->can_dlc;
+    memcpy(message->data, frame->data, frame->can_dlc);
+}
+
+int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH], int *more)
+{
+    struct can_frame frames[CAN_SOCKET_BATCH];
+    struct iovec vectors[CAN_SOCKET_BATCH];
+    struct mmsghdr headers[CAN_SOCKET_BATCH];
+    memset(headers, 0, sizeof headers);
+    for (size_t i = 0; i < CAN_SOCKET_BATCH; ++i) {
+        vectors[i].iov_base = &frames[i];
+        vectors[i].iov_len = sizeof frames[i];
+        headers[i].msg_hdr.msg_iov = &vectors[i];
+        headers[i].msg_hdr.msg_iovlen = 1;
+    }
+    *more = 0;
+    const int got = recvmmsg(socket->fd, headers, CAN_SOCKET_BATCH, MSG_DONTWAIT, NULL);
+    if (got < 0) {
+        return errno == EAGAIN || errno == EINTR ? 0 : -errno;
+    }
+    int count = 0;
+    for (int i = 0; i < got; ++i) {
+        if (headers[i].msg_len == sizeof frames[i] && plain_frame(&frames[i])) {
+            convert(&messages[count++], &frames[i]);
+        }
+    }
+    *more = got == (int)CAN_SOCKET_BATCH;
+    return count;
+}

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * can_socket: classic CAN frames through a raw SocketCAN socket. Used by the Linux port and by the simulated drives.
+ *
+ * The socket never blocks. Remote, extended and error frames are dropped on the way in. Frames that this socket
+ * sends do not come back to it; other sockets of the same machine see them.
+ */
+#ifndef PORT_LINUX_CAN_SOCKET_H
+#define PORT_LINUX_CAN_SOCKET_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+struct can_socket {
+    int fd; /* for poll(); -1 when closed */
+};
+
+struct can_socket_filter {
+    uint16_t id;
+    uint16_t mask; /* a frame passes when (id ^ filter id) & mask is 0 */
+};
+
+#define CAN_SOCKET_FILTERS 16u
+#define CAN_SOCKET_BATCH 32u
+
+/* Opens and binds. Returns 0, or a negative errno with one line in `reason`: what is wrong and what to do. */
+int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size);
+void can_socket_close(struct can_socket *socket);
+
+/* Lets only these frames through (none: all). At most CAN_SOCKET_FILTERS. 0 or negative errno. */
+int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters, size_t count);
+
+/* 0; -EAGAIN when the queue is full (the frame is not sent); else a negative errno (interface down, removed). */
+int can_socket_send(struct can_socket *socket, const struct can_msg *message);
+
+/* Takes up to CAN_SOCKET_BATCH waiting frames, oldest first. Returns how many are in `messages` and sets *more when
+ * others may wait; or a negative errno (interface down, removed). */
+int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH], int *more);
+
+#endif

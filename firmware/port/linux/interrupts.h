@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * interrupts: one thread that stands for the CAN receive interrupt and the timer interrupt of a microcontroller.
+ *
+ * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the tick. Both handlers run with the
+ * lock of port_lock() held. At real-time pace it asks for SCHED_FIFO and locked memory; where that is not permitted it
+ * says so once and runs as an ordinary thread. At fast pace it stays ordinary: it shall not take the processor
+ * from the simulated drives it waits for.
+ */
+#ifndef PORT_LINUX_INTERRUPTS_H
+#define PORT_LINUX_INTERRUPTS_H
+
+#include <stdbool.h>
+
+#include "port/linux/can_socket.h"
+#include "port/port.h"
+
+/* Prepares the lock. 0 or PORT_ERR_SYSTEM. */
+int interrupts_begin(struct can_socket *socket, bool lock_step);
+
+/* Starts the thread. 0 or PORT_ERR_SYSTEM. */
+int interrupts_start(const struct port_handlers *handlers, uint32_t period_us);
+
+/* Ends the thread and waits for it. Harmless when it never started. */
+void interrupts_end(void);
+
+/* Negative errno when the bus broke under the thread (interface down or removed), which ends it; else 0. */
+int interrupts_error(void);
+
+#endif

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* options: the command line of hodograph-controller. */
+#ifndef PORT_LINUX_OPTIONS_H
+#define PORT_LINUX_OPTIONS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum options_pace {
+    OPTIONS_REAL_TIME, /* a tick every period of the wall clock */
+    OPTIONS_FAST,      /* lock step: the next tick as soon as the drives have answered */
+};
+
+struct options {
+    const char *bus; /* CAN interface, points into argv */
+    uint8_t node;    /* 1 ... 127 */
+    enum options_pace pace;
+    bool verbose;
+};
+
+enum options_result {
+    OPTIONS_OK,
+    OPTIONS_HELP,  /* --help: the text has been printed */
+    OPTIONS_WRONG, /* one line on stderr says what */
+};
+
+enum options_result options_parse(struct options *options, int argc, char **argv);
+
+#endif

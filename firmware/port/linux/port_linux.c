@@ -1,0 +1,156 @@
+/* SPDX-License-Identifier: MIT */
+/* The Linux port: SocketCAN, a thread for the interrupts, main() for the mainline. */
+#define _GNU_SOURCE
+#include "port/port.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "port/linux/can_socket.h"
+#include "port/linux/clock.h"
+#include "port/linux/interrupts.h"
+#include "port/linux/options.h"
+
+enum exit_status { EXIT_MACHINE = 1, EXIT_USAGE = 2, EXIT_BUS = 4 };
+
+static struct {
+    struct options options;
+    struct can_socket socket;
+    int wake_fd;
+    volatile sig_atomic_t stop;
+} self;
+
+static void on_signal(int number)
+{
+    (void)number;
+    self.stop = 1;
+    port_wake();
+}
+
+static int catch_signals(void)
+{
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    action.sa_handler = on_signal;
+    (void)sigemptyset(&action.sa_mask);
+    return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, &action, NULL) == 0 ? 0 : PORT_ERR_SYSTEM;
+}
+
+static int open_bus(void)
+{
+    char reason[160];
+    if (can_socket_open(&self.socket, self.options.bus, reason, sizeof reason) == 0) {
+        return 0;
+    }
+    (void)fprintf(stderr, "hodograph-controller: %s\n", reason);
+    return EXIT_BUS;
+}
+
+int port_begin(int argc, char **argv)
+{
+    const enum options_result parsed = options_parse(&self.options, argc, argv);
+    if (parsed == OPTIONS_HELP) {
+        exit(EXIT_SUCCESS);
+    }
+    if (parsed != OPTIONS_OK) {
+        return EXIT_USAGE;
+    }
+    const int status = open_bus();
+    if (status != 0) {
+        return status;
+    }
+    self.wake_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    if (self.wake_fd < 0 || catch_signals() != 0 ||
+        interrupts_begin(&self.socket, self.options.pace == OPTIONS_FAST) != 0) {
+        (void)fprintf(stderr, "hodograph-controller: cannot prepare the process: %s\n", strerror(errno));
+        return EXIT_MACHINE;
+    }
+    return 0;
+}
+
+void port_end(void)
+{
+    interrupts_end();
+    can_socket_close(&self.socket);
+    (void)close(self.wake_fd);
+}
+
+/* A bus that is gone ends the controller too: there is nothing left to control. */
+bool port_stop_requested(void)
+{
+    return self.stop != 0 || interrupts_error() != 0;
+}
+
+uint8_t port_node_id(void)
+{
+    return self.options.node;
+}
+
+int port_can_accept(const struct port_filter *filters, size_t count)
+{
+    struct can_socket_filter copies[CAN_SOCKET_FILTERS];
+    if (count > CAN_SOCKET_FILTERS) {
+        return PORT_ERR_SYSTEM;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        copies[i] = (struct can_socket_filter){.id = filters[i].id, .mask = filters[i].mask};
+    }
+    return can_socket_filter(&self.socket, copies, count) == 0 ? 0 : PORT_ERR_SYSTEM;
+}
+
+int port_can_send(const struct can_msg *message)
+{
+    return can_socket_send(&self.socket, message) == 0 ? 0 : PORT_ERR_FULL;
+}
+
+uint64_t port_time_ns(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * CLOCK_NS_PER_S + (uint64_t)now.tv_nsec;
+}
+
+int port_start(const struct port_handlers *handlers, uint32_t period_us)
+{
+    return interrupts_start(handlers, period_us);
+}
+
+void port_wait(uint32_t timeout_us)
+{
+    struct pollfd waited = {.fd = self.wake_fd, .events = POLLIN, .revents = 0};
+    const struct timespec timeout = clock_timespec((uint64_t)timeout_us * 1000u);
+    if (ppoll(&waited, 1, &timeout, NULL) > 0) {
+        uint64_t count = 0;
+        if (read(self.wake_fd, &count, sizeof count) < 0) {
+            return; /* somebody else's wake; the next wait finds it gone */
+        }
+    }
+}
+
+void port_wake(void)
+{
+    const uint64_t one = 1;
+    if (write(self.wake_fd, &one, sizeof one) < 0) {
+        return; /* the counter is full of wakes already */
+    }
+}
+
+void port_log(enum port_level level, const char *text, int32_t value)
+{
+    if (level == PORT_WARNING || self.options.verbose) {
+        (void)fprintf(stderr, "hodograph-controller: %s %ld\n", text, (long)value);
+    }
+}
+
+void port_fatal(const char *text)
+{
+    (void)fprintf(stderr, "hodograph-controller: %s\n", text);
+    abort();
+}
