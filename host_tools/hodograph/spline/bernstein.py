@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Small Bernstein-form helpers, vectorised over spans (last axis: coefficients).
+
+Everything here is exact algebra on polynomials over [0, 1]; docs/numerics.md section 4.
+"""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+def basis(degree: int, xi: Real) -> Real:
+    """Values of the Bernstein polynomials at `xi` (n,) as an array (n, degree + 1)."""
+    out = np.empty((*xi.shape, degree + 1))
+    rest = 1.0 - xi
+    power = np.ones_like(xi)
+    for k in range(degree + 1):
+        out[..., k] = comb(degree, k) * power
+        power = power * xi
+    power = np.ones_like(xi)
+    for k in range(degree, -1, -1):
+        out[..., k] *= power
+        power = power * rest
+    return out
+
+
+def square(w: Complex) -> Complex:
+    """Coefficients (…, 5) of w^2 for quadratics `w` (…, 3)."""
+    w0, w1, w2 = w[..., 0], w[..., 1], w[..., 2]
+    return np.stack((w0 * w0, w0 * w1, (2.0 * w1 * w1 + w0 * w2) / 3.0, w1 * w2, w2 * w2), axis=-1)
+
+
+def square_modulus(w: Complex) -> Real:
+    """Coefficients (…, 5) of |w|^2 for quadratics `w` (…, 3); paper (9)."""
+    u0, u1, u2 = w[..., 0].real, w[..., 1].real, w[..., 2].real
+    v0, v1, v2 = w[..., 0].imag, w[..., 1].imag, w[..., 2].imag
+    middle = (2.0 * (u1 * u1 + v1 * v1) + u0 * u2 + v0 * v2) / 3.0
+    return np.stack(
+        (u0 * u0 + v0 * v0, u0 * u1 + v0 * v1, middle, u1 * u2 + v1 * v2, u2 * u2 + v2 * v2), axis=-1
+    )
+
+
+def halves(w: Complex) -> tuple[Complex, Complex]:
+    """The quadratics `w` (…, 3) on [0, 1/2] and [1/2, 1] in their own [0, 1], by de Casteljau."""
+    w0, w1, w2 = w[..., 0], w[..., 1], w[..., 2]
+    left, right = (w0 + w1) / 2.0, (w1 + w2) / 2.0
+    middle = (left + right) / 2.0
+    return np.stack((w0, left, middle), axis=-1), np.stack((middle, right, w2), axis=-1)
+
+
+def rotation(quadratic: Complex) -> Real:
+    """Angle (rad) by which complex quadratics (…, 3) turn about 0 as xi goes from 0 to 1.
+
+    Exact, not modulo 2 pi: a quadratic is a product of two linear factors, and [0, 1] seen from a root
+    spans less than pi. NaN-free also where the leading coefficient vanishes. docs/numerics.md 3.1.
+    """
+    c = quadratic[..., 0]
+    b = 2.0 * (quadratic[..., 1] - c)
+    a = quadratic[..., 2] - 2.0 * quadratic[..., 1] + c
+    root = np.sqrt(b * b - 4.0 * a * c)
+    # t = 1 / xi solves c t^2 + b t + a = 0, whose roots are finite when c is not 0; a factor of
+    # the quadratic is then (1 - t xi), which turns from 1 to 1 - t.
+    plus = np.where((np.conj(b) * root).real >= 0.0, b + root, b - root)
+    safe = np.where(plus == 0.0, 1.0, plus)
+    t1 = np.where(c == 0.0, 0.0, -plus / (2.0 * np.where(c == 0.0, 1.0, c)))
+    t2 = np.where(plus == 0.0, 0.0, -2.0 * a / safe)
+    return np.asarray(np.angle(1.0 - t1) + np.angle(1.0 - t2))

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""The curve itself: a chain of PH quintic segments, evaluated exactly; docs/numerics.md section 4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from .arclength import invert
+from .bernstein import Complex, Real, basis, square, square_modulus
+from .extremum import greatest_curvature
+from .splitting import split_segments
+
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class PHSpline:
+    """Segments r(xi) = origin + integral of w^2 from 0 to xi, xi in [0, 1]; mm.
+
+    origin  (N,) complex, start point of each segment
+    w       (N, 3) complex, Bernstein coefficients of w in mm^(1/2)
+    closed  the end is the start
+
+    Built by `from_control_polygon`, `through_points` or `line`, not by hand. All methods take arrays
+    of any one shape (or scalars) and give arrays of that shape. Arc lengths outside 0 … length_mm, beyond
+    rounding, raise InputError.
+    """
+
+    origin: Complex
+    w: Complex
+    closed: bool
+
+    @property
+    def segment_count(self) -> int:
+        """N."""
+        return int(self.origin.size)
+
+    @cached_property
+    def hodograph_coefficients(self) -> Complex:
+        """Bernstein coefficients (N, 5) of r' = w^2."""
+        return square(self.w)
+
+    @cached_property
+    def speed_coefficients(self) -> Real:
+        """Bernstein coefficients (N, 5) of sigma = |w|^2."""
+        return square_modulus(self.w)
+
+    @cached_property
+    def position_coefficients(self) -> Complex:
+        """Bezier points (N, 6) of the segments."""
+        steps = np.concatenate((self.origin[:, None], self.hodograph_coefficients / 5.0), axis=1)
+        return np.asarray(np.cumsum(steps, axis=1))
+
+    @cached_property
+    def _arc_coefficients(self) -> Real:
+        steps = np.zeros((self.segment_count, 6))
+        steps[:, 1:] = self.speed_coefficients / 5.0
+        return np.asarray(np.cumsum(steps, axis=1))
+
+    @property
+    def segment_lengths_mm(self) -> Real:
+        """Exact arc length (N,) of each segment."""
+        return self._arc_coefficients[:, 5]
+
+    @cached_property
+    def segment_starts_mm(self) -> Real:
+        """Arc length (N + 1,) at the joints, 0 first, `length_mm` last."""
+        total = np.cumsum(self.segment_lengths_mm.astype(np.longdouble))
+        return np.concatenate((np.zeros(1), total.astype(np.float64)))
+
+    @property
+    def length_mm(self) -> float:
+        """Arc length of the whole path."""
+        return float(self.segment_starts_mm[-1])
+
+    @cached_property
+    def nodal_points(self) -> Complex:
+        """Joints (N + 1,), from start to end (closed: the first again at the end)."""
+        end = self.origin[:1] if self.closed else self.position_coefficients[-1:, 5]
+        return np.concatenate((self.origin, end))
+
+    # By segment and parameter
+
+    def position(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
+        """Points of segments `segment` at `xi` in [0, 1]; mm."""
+        return np.asarray(_evaluate(self.position_coefficients, segment, xi))
+
+    def hodograph(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
+        """r' = w^2 (8)."""
+        w = self._w(segment, xi)
+        return w * w
+
+    def speed(self, segment: ArrayLike, xi: ArrayLike) -> Real:
+        """sigma = |w|^2 (9), mm per unit of xi."""
+        w = self._w(segment, xi)
+        return np.asarray(w.real * w.real + w.imag * w.imag)
+
+    def arc_length(self, segment: ArrayLike, xi: ArrayLike) -> Real:
+        """Arc length (10) from the start of the segment; mm."""
+        return np.asarray(_evaluate(self._arc_coefficients, segment, xi))
+
+    def curvature_at(self, segment: ArrayLike, xi: ArrayLike) -> Real:
+        """Signed curvature 2 Im(conj(w) w') / |w|^4, positive to the left; 1/mm."""
+        i = np.asarray(segment, dtype=np.intp)
+        slope = 2.0 * (self.w[i, 1:] - self.w[i, :-1])
+        w = self._w(i, xi)
+        derivative = np.sum(slope * basis(1, np.asarray(xi, dtype=np.float64)), axis=-1)
+        speed = w.real * w.real + w.imag * w.imag
+        return np.asarray(2.0 * (np.conj(w) * derivative).imag / (speed * speed))
+
+    def _w(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
+        return np.asarray(_evaluate(self.w, segment, xi))
+
+    # By arc length
+
+    def locate(self, s_mm: ArrayLike) -> tuple[Index, Real]:
+        """Segment and xi of the points at arc lengths `s_mm`, to about 1e-13 of the segment."""
+        s = np.asarray(s_mm, dtype=np.float64)
+        length = self.length_mm
+        slack = 1e-9 * length
+        if not np.all((s >= -slack) & (s <= length + slack)):
+            worst = s[~((s >= -slack) & (s <= length + slack))].flat[0]
+            raise InputError(f"arc length {worst:g} mm is outside the path, 0 … {length:g} mm")
+        s = np.clip(s, 0.0, length)
+        starts = self.segment_starts_mm
+        segment = np.searchsorted(starts[1:-1], s, side="right")
+        xi = invert(self._arc_coefficients, self.w, segment.ravel(), (s - starts[segment]).ravel())
+        return segment, xi.reshape(s.shape)
+
+    def point(self, s_mm: ArrayLike) -> Complex:
+        """Points at arc lengths `s_mm`; mm."""
+        return self.position(*self.locate(s_mm))
+
+    def tangent(self, s_mm: ArrayLike) -> Complex:
+        """Unit tangents at arc lengths `s_mm`."""
+        h = self.hodograph(*self.locate(s_mm))
+        return np.asarray(h / np.abs(h))
+
+    def curvature(self, s_mm: ArrayLike) -> Real:
+        """Signed curvature at arc lengths `s_mm`; 1/mm."""
+        return self.curvature_at(*self.locate(s_mm))
+
+    # The whole
+
+    def max_curvature_per_mm(self) -> float:
+        """Greatest |curvature| of the path, at its true extremum."""
+        return greatest_curvature(self.w)
+
+    def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> PHSpline:
+        """The same curve in shorter segments, as a program wants them (docs/protocol.md 1.2).
+
+        Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm` long and
+        the largest Bernstein coefficient of its speed is (a hair less than) at most `max_speed_ratio` times the
+        smallest, which is positive. Raises PlanError naming the segment where the curve all but stops.
+        """
+        origin, w = split_segments(self.origin, self.w, max_length_mm, max_speed_ratio)
+        return PHSpline(origin, w, self.closed)
+
+
+def _evaluate(coefficients: Any, segment: ArrayLike, xi: ArrayLike) -> Any:
+    x = np.asarray(xi, dtype=np.float64)
+    values = basis(coefficients.shape[1] - 1, x)
+    i = np.asarray(segment, dtype=np.intp)
+    return np.asarray(np.sum(coefficients[i] * values, axis=-1))

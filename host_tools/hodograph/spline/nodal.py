@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""From given points to what the solver needs: nodal points and the hodograph of the guiding curve.
+
+The guiding curve is the cubic B-spline of the control polygon (paper section 1; docs/numerics.md
+section 1) or, for given through points, the uniform C2 cubic spline through them. Its hodograph is
+handed on as Bernstein coefficients (M, 3) per span.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from .bernstein import Complex, Real
+
+
+@dataclass(frozen=True)
+class Guide:
+    """Nodal points (M + 1,) and the guiding curve's hodograph (M, 3), Bernstein form per span."""
+
+    nodal_points: Complex
+    hodograph: Complex
+    closed: bool
+
+
+def checked_points(
+    points: object, closed: bool, minimum: int, what: str
+) -> tuple[Complex, tuple[str, ...]]:
+    """`points` as a finite complex array without immediate repeats, and notes on what was dropped.
+
+    `what` names the points in messages, e.g. "control point"; `points` may be complex (n,) or real
+    (n, 2). A repeated tail of a closed path (`tail_length` points) is dropped with a note.
+
+    Raises InputError: not a list of points, NaN or infinity, a repeated point, too few points.
+    """
+    p = _as_complex(points, what)
+    bad = np.flatnonzero(~np.isfinite(p))
+    if bad.size:
+        raise InputError(f"{what} {bad[0]} is not finite: give two ordinary numbers")
+    notes: tuple[str, ...] = ()
+    if closed:
+        p, notes = _without_tail(p, what)
+    if p.size < minimum:
+        kind = "closed" if closed else "open"
+        raise InputError(f"{p.size} {what}s: a {kind} path needs at least {minimum}")
+    same = np.flatnonzero(p[1:] == p[:-1])
+    if same.size:
+        k = int(same[0])
+        raise InputError(f"{what} {k + 1} repeats {what} {k} at ({_xy(p[k])}): remove one of them")
+    if closed and p[0] == p[-1]:
+        raise InputError(f"the last {what} repeats the first at ({_xy(p[0])}): remove it")
+    return p, notes
+
+
+def _as_complex(points: object, what: str) -> Complex:
+    try:
+        p = np.asarray(points)
+        if p.ndim == 2 and p.shape[1] == 2 and not np.iscomplexobj(p):
+            p = np.asarray(p, dtype=np.float64)
+            p = p[:, 0] + 1j * p[:, 1]
+        p = np.array(p, dtype=np.complex128)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what}s must be a list of [x, y] pairs of numbers") from error
+    if p.ndim != 1:
+        raise InputError(f"{what}s must be a list of [x, y] pairs of numbers")
+    return p
+
+
+def _xy(point: complex) -> str:
+    return f"{point.real:g}, {point.imag:g}"
+
+
+def _without_tail(p: Complex, what: str) -> tuple[Complex, tuple[str, ...]]:
+    length = 1 if what.startswith("through") else 3
+    if p.size > length + 2 and np.array_equal(p[-length:], p[:length]):
+        dropped = f"the last {length} {what}s repeat" if length > 1 else f"the last {what} repeats"
+        return p[:-length], (f"{dropped} the first: dropped, the path is closed",)
+    return p, ()
+
+
+def control_polygon_guide(p: Complex, closed: bool) -> Guide:
+    """Guide of a checked control polygon: open of 4 points and more, closed of 3 and more."""
+    return _closed_polygon(p) if closed else _open_polygon(p)
+
+
+def _closed_polygon(p: Complex) -> Guide:
+    before, after = p, np.roll(p, -1)
+    nodes = (before + 4.0 * after + np.roll(p, -2)) / 6.0
+    leg = after - before
+    leg1, leg2 = np.roll(leg, -1), np.roll(leg, -2)
+    hodograph = np.stack(((leg + leg1) / 2.0, leg1, (leg1 + leg2) / 2.0), axis=-1)
+    return Guide(np.append(nodes, nodes[0]), hodograph, True)
+
+
+def open_nodal_points(p: Complex) -> Complex:
+    """Nodal points q_0 … q_(n-2) of an open polygon P_0 … P_n; paper (4), de Boor for n = 3, 4."""
+    n = p.size - 1
+    q = np.empty(n - 1, dtype=np.complex128)
+    q[0], q[-1] = p[0], p[-1]
+    if n == 4:
+        q[1] = (p[1] + 2.0 * p[2] + p[3]) / 4.0
+    elif n >= 5:
+        q[1] = (3.0 * p[1] + 7.0 * p[2] + 2.0 * p[3]) / 12.0
+        q[2:-2] = (p[2 : n - 3] + 4.0 * p[3 : n - 2] + p[4 : n - 1]) / 6.0
+        q[-2] = (2.0 * p[n - 3] + 7.0 * p[n - 2] + 3.0 * p[n - 1]) / 12.0
+    return q
+
+
+def _open_polygon(p: Complex) -> Guide:
+    spans = p.size - 3
+    knots = np.clip(np.arange(-3.0, spans + 4.0), 0.0, spans)
+    leg = 3.0 * (p[1:] - p[:-1]) / (knots[4 : p.size + 3] - knots[1 : p.size])
+    hodograph = np.empty((spans, 3), dtype=np.complex128)
+    hodograph[:, 1] = leg[1:-1]
+    hodograph[1:, 0] = (leg[1:-2] + leg[2:-1]) / 2.0
+    hodograph[:-1, 2] = hodograph[1:, 0]
+    hodograph[0, 0], hodograph[-1, 2] = leg[0], leg[-1]
+    return Guide(open_nodal_points(p), hodograph, False)
+
+
+def hodograph_from_derivatives(q: Complex, derivative: Complex) -> Complex:
+    """Bernstein hodograph (M, 3) of the cubic Hermite curve with these nodes and derivatives."""
+    first, last = derivative[:-1], derivative[1:]
+    return np.stack((first, 3.0 * (q[1:] - q[:-1]) - first - last, last), axis=-1)
+
+
+__all__ = [
+    "Guide",
+    "Real",
+    "checked_points",
+    "control_polygon_guide",
+    "hodograph_from_derivatives",
+    "open_nodal_points",
+]
