@@ -21,12 +21,13 @@ static bool drive_plant_ok(const struct drive_plant *p)
     const double most = 1e9;
     return in_range(p->gain_rad_s_v, 0.0, most) && in_range(p->time_constant_s, 0.0, most) &&
            in_range(p->screw_mm_rad, 1e-9, 1e6) && in_range(p->torque_to_volts, 0.0, most) &&
-           in_range(p->volts_limit, 0.0, 32.0);
+           in_range(p->volts_limit, 0.0, 32.767);
 }
 
 static bool drive_gains_ok(const struct drive_pdff *g)
 {
-    const double gains[] = {g->k_pp_rad_s_mm, g->k_pv_nm_s_rad, g->k_iv_per_s, g->k_pf_rad_mm, g->k_vf};
+    const double gains[] = {g->k_pp_rad_s_mm, g->k_pv_nm_s_rad, g->k_iv_per_s, g->k_pf_rad_mm,
+                            g->k_vf};
     for (size_t i = 0; i < sizeof gains / sizeof gains[0]; i++) {
         if (!(gains[i] >= 0.0 && gains[i] <= 1e9))
             return false;
@@ -44,7 +45,8 @@ static bool drive_encoder_ok(const struct drive_config *c)
 static uint32_t drive_samples(const struct drive_config *c)
 {
     const uint64_t scaled = (uint64_t)c->loop_rate_hz * c->period_us;
-    if (c->period_us < 1 || c->period_us > 1000000 || scaled % 1000000 != 0 || scaled / 1000000 > 65536)
+    if (c->period_us < 1 || c->period_us > 1000000 || scaled % 1000000 != 0 ||
+        scaled / 1000000 > 65536)
         return 0;
     return (uint32_t)(scaled / 1000000);
 }
@@ -70,13 +72,14 @@ const char *drive_error_text(int code)
     case 0:
         return "no error";
     case DRIVE_ERR_PLANT:
-        return "plant figures must be positive numbers and volts_limit at most 32 V";
+        return "plant figures must be positive numbers and volts_limit at most 32.767 V";
     case DRIVE_ERR_GAIN:
         return "PDFF gains must be finite and not negative";
     case DRIVE_ERR_ENCODER:
         return "encoder counts_per_rev must be 1 to 2^28 and counts_per_mm 1 to 10^9";
     case DRIVE_ERR_RATE:
-        return "the period must hold a whole number of servo samples, 1 to 65536 (loop_rate_hz times period)";
+        return "the period must hold a whole number of servo samples, 1 to 65536 (loop_rate_hz "
+               "times period)";
     case DRIVE_ERR_STEP:
         return "the plant's time constant is shorter than one servo sample";
     default:
@@ -101,7 +104,8 @@ int drive_init(struct drive *d, const struct drive_config *c)
     if (error != 0)
         return error;
     drive_set_up_loop(d, c);
-    motor_init(&d->motor, c->plant.gain_rad_s_v, c->plant.time_constant_s, c->plant.screw_mm_rad, d->pdff.step_s);
+    motor_init(&d->motor, c->plant.gain_rad_s_v, c->plant.time_constant_s, c->plant.screw_mm_rad,
+               d->pdff.step_s);
     encoder_init(&d->encoder, c->plant.screw_mm_rad, c->encoder_counts_per_rev);
     d->counts_per_mm = (double)c->counts_per_mm;
     d->mm_per_count = 1.0 / d->counts_per_mm;
@@ -138,13 +142,14 @@ void drive_hold(struct drive *d)
 
 static bool drive_near_target(const struct drive *d)
 {
-    const double away_mm =
-        encoder_read_mm(&d->encoder, d->state.position_mm) - (double)d->target_counts * d->mm_per_count;
+    const double away_mm = encoder_read_mm(&d->encoder, d->state.position_mm) -
+                           (double)d->target_counts * d->mm_per_count;
     const double most_mm = DRIVE_PARK_INCREMENTS * d->encoder.increment_mm;
     return away_mm <= most_mm && away_mm >= -most_mm;
 }
 
-/* Counts the periods of one target and parks the axis when its time has come. Returns whether it stays parked. */
+/* Counts the periods of one target and parks the axis when its time has come. Returns whether it
+ * stays parked. */
 static bool drive_stays_parked(struct drive *d, int32_t target_counts)
 {
     if (target_counts != d->target_counts) {
@@ -159,8 +164,8 @@ static bool drive_stays_parked(struct drive *d, int32_t target_counts)
     return d->parked;
 }
 
-/* The step is one multiplication of the exact difference in counts: a difference of two rounded positions in mm
- * would put noise on the speed feedforward. */
+/* The step is one multiplication of the exact difference in counts: a difference of two rounded
+ * positions in mm would put noise on the speed feedforward. */
 static struct command drive_command(struct drive *d, int32_t target_counts)
 {
     struct command c;
@@ -191,7 +196,8 @@ static void drive_run(struct drive *d, int32_t target_counts)
         drive_sample(d, &c, i);
 }
 
-static void drive_run_pair(struct drive *first, struct drive *second, const int32_t target_counts[2])
+static void drive_run_pair(struct drive *first, struct drive *second,
+                           const int32_t target_counts[2])
 {
     const struct command c0 = drive_command(first, target_counts[0]);
     const struct command c1 = drive_command(second, target_counts[1]);

@@ -1,17 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* One simulated servo axis in cyclic synchronous position mode: setpoint interpolation, PDFF loop, motor, screw,
- * encoder. No CAN and no clock: the caller advances it by whole bus periods. Model: docs/numerics.md section 13.
+/* One simulated servo axis in cyclic synchronous position mode: setpoint interpolation, PDFF loop,
+ * motor, screw, encoder. No CAN and no clock: the caller advances it by whole bus periods. Model:
+ * docs/numerics.md section 13.
  *
- * Use: drive_init, then drive_place (or drive_hold), then for every SYNC j: report drive_position_counts and
- * drive_volts_mv (they are those of the instant of SYNC j), latch the setpoint received since SYNC j-1 and call
- * drive_period with it; the axis is commanded to be there at SYNC j+1, in a straight line from the setpoint before.
+ * Use: drive_init, then drive_place (or drive_hold), then for every SYNC j: report
+ * drive_position_counts and drive_volts_mv (they are those of the instant of SYNC j), latch the
+ * setpoint received since SYNC j-1 and call drive_period with it; the axis is commanded to be there
+ * at SYNC j+1, in a straight line from the setpoint before.
  *
- * Parking (docs/protocol.md section 3): an axis that has had one target for DRIVE_PARK_PERIODS periods and reads
- * within DRIVE_PARK_INCREMENTS encoder increments of it is put exactly at rest at the target, the integrator empty. So what follows
- * depends on the target alone, however the axis came there.
+ * Parking (docs/protocol.md section 3): an axis that has had one target for DRIVE_PARK_PERIODS
+ * periods and reads within DRIVE_PARK_INCREMENTS encoder increments of it is put exactly at rest at
+ * the target, the integrator empty. So what follows depends on the target alone, however the axis
+ * came there.
  *
- * Arithmetic is double, in a fixed order, with + - * / only (compile with -ffp-contract=off): the same bits on
- * every IEEE 754 target. No heap, no I/O; each object is independent; not for use in an interrupt.
+ * Arithmetic is double, in a fixed order, with + - * / only (compile with -ffp-contract=off): the
+ * same bits on every IEEE 754 target. No heap, no I/O; each object is independent; not for use in
+ * an interrupt.
  */
 #ifndef HODOGRAPH_PLANT_DRIVE_H
 #define HODOGRAPH_PLANT_DRIVE_H
@@ -23,7 +27,7 @@
 #include "plant/motor.h"
 #include "plant/pdff.h"
 
-#define DRIVE_PARK_PERIODS 250
+#define DRIVE_PARK_PERIODS    250
 #define DRIVE_PARK_INCREMENTS 2
 
 struct drive_plant {
@@ -31,7 +35,7 @@ struct drive_plant {
     double time_constant_s; /* at least one servo step */
     double screw_mm_rad;    /* more than 0 */
     double torque_to_volts; /* V/(N m), more than 0 */
-    double volts_limit;     /* more than 0, at most 32 (volts travel as i16 mV) */
+    double volts_limit;     /* more than 0, at most 32.767 (volts travel as i16 mV) */
 };
 
 struct drive_pdff {
@@ -55,8 +59,8 @@ enum drive_error {
     DRIVE_ERR_PLANT = -1,   /* a plant figure is not a number or out of its range */
     DRIVE_ERR_GAIN = -2,    /* a gain is negative or not finite */
     DRIVE_ERR_ENCODER = -3, /* encoder_counts_per_rev or counts_per_mm out of range */
-    DRIVE_ERR_RATE = -4,    /* no whole number of servo samples per period, or too many (over 65536) */
-    DRIVE_ERR_STEP = -5,    /* the time constant is shorter than one servo sample */
+    DRIVE_ERR_RATE = -4, /* no whole number of servo samples per period, or too many (over 65536) */
+    DRIVE_ERR_STEP = -5, /* the time constant is shorter than one servo sample */
 };
 
 /* Fields are for the module's own use; read through the functions below. */
@@ -77,8 +81,8 @@ struct drive {
     bool parked;
 };
 
-/* Checks the configuration and prepares the coefficients; the axis is parked at 0 counts. Returns 0 or a negative
- * enum drive_error; on error the object is not to be used. */
+/* Checks the configuration and prepares the coefficients; the axis is parked at 0 counts. Returns 0
+ * or a negative enum drive_error; on error the object is not to be used. */
 int drive_init(struct drive *drive, const struct drive_config *config);
 
 /* One clear English phrase for a return value of drive_init. */
@@ -87,14 +91,15 @@ const char *drive_error_text(int code);
 /* Puts the axis at rest, parked at target_counts. */
 void drive_place(struct drive *drive, int32_t target_counts);
 
-/* Drive not enabled, brake on: the axis is at rest where it is; the next period starts from the encoder position. */
+/* Drive not enabled, brake on: the axis is at rest where it is; the next period starts from the
+ * encoder position. */
 void drive_hold(struct drive *drive);
 
 /* One bus period towards target_counts. */
 void drive_period(struct drive *drive, int32_t target_counts);
 
-/* The same for two axes at once: the same bits as two calls, but their chains of arithmetic overlap in the processor
- * (when both have the same number of servo samples per period). */
+/* The same for two axes at once: the same bits as two calls, but their chains of arithmetic overlap
+ * in the processor (when both have the same number of servo samples per period). */
 void drive_period_pair(struct drive *first, struct drive *second, const int32_t target_counts[2]);
 
 /* Encoder position in bus counts, rounded to nearest and saturated. */

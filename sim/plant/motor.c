@@ -3,8 +3,9 @@
 
 #include <assert.h>
 
-/* 1/k! - z/(k+1)! + z^2/(k+2)! - ...  (the function called phi_k(-z) in exponential integrators), for 0 <= z <= 1.
- * With 20 terms the first one left out is below 1/20!, far under the rounding of a double. */
+/* 1/k! - z/(k+1)! + z^2/(k+2)! - ...  (the function called phi_k(-z) in exponential integrators),
+ * for 0 <= z <= 1. With 20 terms the first one left out is below 1/20!, far under the rounding of a
+ * double. */
 static double motor_phi(int k, double z)
 {
     enum { TERMS = 20 };
@@ -17,8 +18,8 @@ static double motor_phi(int k, double z)
     return first * sum;
 }
 
-void motor_init(struct motor *motor, double gain_rad_s_v, double time_constant_s, double screw_mm_rad,
-                double step_s)
+void motor_init(struct motor *motor, double gain_rad_s_v, double time_constant_s,
+                double screw_mm_rad, double step_s)
 {
     const double z = step_s / time_constant_s;
     assert(z > 0.0 && z <= 1.0);

@@ -4,9 +4,10 @@
  *     speed' = (gain * volts - speed) / time_constant        [rad/s, paper.md section 5, G(s)]
  *     position' = screw * speed                              [mm]
  *
- * Over one step of h seconds with constant volts the solution is linear in the state and in the volts; motor_init
- * computes its coefficients once, by power series (no libm, so they have the same bits everywhere).
- * Derivation: docs/numerics.md section 13. All functions are pure; call them from any context.
+ * Over one step of h seconds with constant volts the solution is linear in the state and in the
+ * volts; motor_init computes its coefficients once, by power series (no libm, so they have the same
+ * bits everywhere). Derivation: docs/numerics.md section 13. All functions are pure; call them from
+ * any context.
  */
 #ifndef HODOGRAPH_PLANT_MOTOR_H
 #define HODOGRAPH_PLANT_MOTOR_H
@@ -14,7 +15,7 @@
 #include <float.h>
 
 #if !defined(FLT_EVAL_METHOD) || FLT_EVAL_METHOD != 0
-#error "the drive model needs double arithmetic without excess precision (for x86: -msse2 -mfpmath=sse)"
+#error "the drive model needs plain double arithmetic (on 32-bit x86: -msse2 -mfpmath=sse)"
 #endif
 
 /* Coefficients of one step. */
@@ -30,16 +31,19 @@ struct motor_state {
     double speed_rad_s;
 };
 
-/* gain: rad/s per V, more than 0; time_constant_s, more than 0; screw: mm/rad, more than 0; step_s: more than 0 and at
- * most time_constant_s (the caller has checked all this: drive_init does). */
-void motor_init(struct motor *motor, double gain_rad_s_v, double time_constant_s, double screw_mm_rad,
-                double step_s);
+/* gain: rad/s per V, more than 0; time_constant_s, more than 0; screw: mm/rad, more than 0; step_s:
+ * more than 0 and at most time_constant_s (the caller has checked all this: drive_init does). */
+void motor_init(struct motor *motor, double gain_rad_s_v, double time_constant_s,
+                double screw_mm_rad, double step_s);
 
-/* One step with the volts held. Inline because a simulated second has tens of thousands of steps. */
+/* One step with the volts held. Inline because a simulated second has tens of thousands of steps.
+ */
 static inline void motor_step(const struct motor *motor, struct motor_state *state, double volts)
 {
-    state->position_mm += motor->position_from_speed * state->speed_rad_s + motor->position_from_volts * volts;
-    state->speed_rad_s = motor->speed_from_speed * state->speed_rad_s + motor->speed_from_volts * volts;
+    state->position_mm +=
+        motor->position_from_speed * state->speed_rad_s + motor->position_from_volts * volts;
+    state->speed_rad_s =
+        motor->speed_from_speed * state->speed_rad_s + motor->speed_from_volts * volts;
 }
 
 #endif

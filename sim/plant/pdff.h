@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* PDFF servo loop (pseudo-derivative feedback with feedforward), one sample at a time; paper.md section 5:
+/* PDFF servo loop (pseudo-derivative feedback with feedforward), one sample at a time; paper.md
+ * section 5:
  *
  *     speed_ref = k_pp (x_com - x_act) + k_pf d(x_com)/dt
  *     torque    = k_pv (k_vf speed_ref + k_iv * integral of (speed_ref - speed) - speed)
  *     volts     = torque_to_volts * torque, within +-volts_limit
  *
- * The integral counts the present sample too (backward Euler) and stands still while the output is saturated.
- * Error of the sampling: docs/numerics.md section 13.
+ * The integral counts the present sample too (backward Euler) and stands still while the output is
+ * saturated. Error of the sampling: docs/numerics.md section 13.
  */
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H
@@ -30,13 +31,14 @@ struct pdff_input {
 };
 
 /* One sample: returns the volts for the step that begins; integral_rad is the loop's only state. */
-static inline double pdff_step(const struct pdff *pdff, double *integral_rad, const struct pdff_input *in)
+static inline double pdff_step(const struct pdff *pdff, double *integral_rad,
+                               const struct pdff_input *in)
 {
-    const double speed_ref =
-        pdff->k_pp_rad_s_mm * (in->command_mm - in->position_mm) + pdff->k_pf_rad_mm * in->command_mm_s;
+    const double speed_ref = pdff->k_pp_rad_s_mm * (in->command_mm - in->position_mm) +
+                             pdff->k_pf_rad_mm * in->command_mm_s;
     const double integral = *integral_rad + pdff->step_s * (speed_ref - in->speed_rad_s);
-    const double volts =
-        pdff->volts_s_rad * (pdff->k_vf * speed_ref + pdff->k_iv_per_s * integral - in->speed_rad_s);
+    const double volts = pdff->volts_s_rad *
+                         (pdff->k_vf * speed_ref + pdff->k_iv_per_s * integral - in->speed_rad_s);
     if (volts > pdff->volts_limit)
         return pdff->volts_limit;
     if (volts < -pdff->volts_limit)

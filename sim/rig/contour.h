@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: MIT */
+/* Contour error: distance of a point from the exact curve of a program, on the branch that is being
+ * run.
+ *
+ * The curve is that of the program image (docs/protocol.md 1.2), every segment expanded once to
+ * powers of its parameter. The foot of the perpendicular is found by Newton steps from the
+ * commanded arc length, across segment ends and, on a closed path, across its start; beyond the
+ * ends of an open path the end point is the nearest. Only feet within four times the point's
+ * distance from the commanded place count, so that at a self-crossing the branch under the tool is
+ * taken, not the other. Method and accuracy: docs/numerics.md section 14.
+ *
+ * The error of one point does not depend on points asked before. Double arithmetic and sqrt, the
+ * same bits on every IEEE 754 target. No heap: the caller lends the array of segments. Main loop
+ * only.
+ */
+#ifndef HODOGRAPH_RIG_CONTOUR_H
+#define HODOGRAPH_RIG_CONTOUR_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "core/program.h"
+
+/* One segment: position - origin = sum of r[k] xi^(k+1), k = 0 ... 4. Private to the module. */
+struct contour_segment {
+    double start_mm;
+    double length_mm;
+    double per_length;   /* 1 / length */
+    double slope[2];     /* d(xi)/d(s / length) at both ends */
+    double end_speed[2]; /* d(s)/d(xi) at both ends */
+    double origin[2];
+    double r[5][2];
+};
+
+struct contour {
+    const struct contour_segment *segments;
+    uint32_t count;
+    uint32_t cursor; /* where the last commanded arc length was: speeds up the search, changes no
+                        result */
+    double length_mm;
+    bool closed;
+};
+
+/* Expands a checked program into segments[program->header.segment_count], which must outlive
+ * *contour. */
+void contour_begin(struct contour *contour, const struct program *program,
+                   struct contour_segment *segments);
+
+/* Distance in mm of point (x, y mm, machine coordinates) from the curve near the commanded arc
+ * length, which is clamped to the program's. */
+double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[2]);
+
+/* n points in bus counts at once: errors in um. arc_length_q40_mm as interp gives it; act_counts
+ * holds x, y pairs. */
+void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
+                       const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um);
+
+#endif

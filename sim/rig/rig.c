@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: MIT */
+#include "rig/rig.h"
+
+#include <stddef.h>
+
+#include "core/counts.h"
+
+typedef char rig_assert_row_has_no_holes[sizeof(struct rig_row) == 64 ? 1 : -1];
+
+static int rig_start_point(struct rig *rig, const struct program *program, int32_t start[2])
+{
+    struct interp_point point;
+    if (interp_at(&rig->interp, 0, &point) < 0)
+        return RIG_ERR_INTERP;
+    start[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
+    start[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
+    return interp_begin(&rig->interp, program, rig->interp.kernel) == 0 ? 0 : RIG_ERR_INTERP;
+}
+
+static int rig_drives(struct rig *rig, const struct program *program,
+                      const struct drive_config drives[2])
+{
+    for (int axis = 0; axis < 2; axis++) {
+        const int error = drive_init(&rig->drives[axis], &drives[axis]);
+        if (error != 0)
+            return RIG_ERR_DRIVE - 10 * axis + error;
+        if (drives[axis].period_us != program->header.period_us)
+            return RIG_ERR_PERIOD;
+    }
+    return drives[0].counts_per_mm == drives[1].counts_per_mm ? 0 : RIG_ERR_COUNTS;
+}
+
+int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
+              const struct drive_config drives[2], struct contour_segment *segments)
+{
+    int32_t start[2];
+    int error = rig_drives(rig, program, drives);
+    if (error != 0)
+        return error;
+    rig->counts_per_mm = drives[0].counts_per_mm;
+    rig->tick = 0;
+    if (interp_begin(&rig->interp, program, kernel) != 0)
+        return RIG_ERR_KERNEL;
+    error = rig_start_point(rig, program, start);
+    if (error != 0)
+        return error;
+    for (int axis = 0; axis < 2; axis++)
+        drive_place(&rig->drives[axis], start[axis]);
+    timebase_begin(&rig->timebase, program, program->header.period_us);
+    contour_begin(&rig->contour, program, segments);
+    return 0;
+}
+
+static int rig_command(struct rig *rig, struct rig_row *row)
+{
+    struct interp_point point;
+    if (interp_at(&rig->interp, timebase_step(&rig->timebase), &point) < 0)
+        return RIG_ERR_INTERP;
+    row->arc_length_q40_mm = point.arc_length_q40_mm;
+    row->feed_q32_mm_s = point.feed_q32_mm_s;
+    row->cmd_q40_mm[0] = point.x_q40_mm;
+    row->cmd_q40_mm[1] = point.y_q40_mm;
+    row->set_counts[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
+    row->set_counts[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
+    row->tick = rig->tick++;
+    return 0;
+}
+
+static void rig_move(struct rig *rig, struct rig_row *row)
+{
+    drive_period_pair(&rig->drives[0], &rig->drives[1], row->set_counts);
+    for (int axis = 0; axis < 2; axis++) {
+        row->act_counts[axis] = drive_position_counts(&rig->drives[axis]);
+        row->volts_mv[axis] = drive_volts_mv(&rig->drives[axis]);
+    }
+}
+
+int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        const int error = rig_command(rig, &rows[i]);
+        if (error != 0)
+            return error;
+        rig_move(rig, &rows[i]);
+        contour_errors_um(&rig->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
+                          rig->counts_per_mm, &rows[i].contour_error_um);
+    }
+    return 0;
+}
+
+static int rig_point(struct interp *interp, uint64_t time_q32_s, struct interp_point *point)
+{
+    int result = interp_at(interp, time_q32_s, point);
+    if (result == INTERP_ERR_JUMP && interp_seek(interp, time_q32_s) == 0)
+        result = interp_at(interp, time_q32_s, point);
+    return result < 0 ? RIG_ERR_INTERP : 0;
+}
+
+int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
+               uint32_t counts_per_mm, struct interp_point *points, int32_t *counts)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        if (rig_point(interp, time_q32_s[i], &points[i]) != 0)
+            return RIG_ERR_INTERP;
+        if (counts == NULL)
+            continue;
+        counts[2 * i] = counts_from_q40_mm(points[i].x_q40_mm, counts_per_mm);
+        counts[2 * i + 1] = counts_from_q40_mm(points[i].y_q40_mm, counts_per_mm);
+    }
+    return 0;
+}
+
+/* round(tick * period * 2^32 / 10^6) = round(tick * period * 2^26 / 15625), in two parts against
+ * overflow. */
+static uint64_t rig_time(uint64_t microseconds)
+{
+    const uint64_t whole_s = microseconds / 1000000;
+    const uint64_t rest_us = microseconds % 1000000;
+    return (whole_s << 32) + ((rest_us << 27) + 15625) / 31250;
+}
+
+void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q32_s)
+{
+    const uint64_t duration = program->header.duration_q32_s;
+    for (uint32_t i = 0; i < n; i++) {
+        const uint64_t time = rig_time(((uint64_t)tick0 + i) * program->header.period_us);
+        time_q32_s[i] = time < duration ? time : duration;
+    }
+}
+
+void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts)
+{
+    for (uint32_t i = 0; i < n; i++)
+        counts[i] = counts_from_q40_mm(q40_mm[i], counts_per_mm);
+}

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+/* The whole chain in one process, without a bus: interpolator, rounding to counts, two simulated
+ * drives, contour error. Gives the same setpoints and encoder positions as a run on the bus, bit
+ * for bit.
+ *
+ * Timing (docs/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
+ * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC
+ * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
+ * repeat its end point (settling).
+ *
+ * Use: rig_begin, then rig_run as often as wanted. No heap: the caller lends the segment array, and
+ * the program, its image and the segments must outlive the rig. Main loop only.
+ */
+#ifndef HODOGRAPH_RIG_RIG_H
+#define HODOGRAPH_RIG_RIG_H
+
+#include <stdint.h>
+
+#include "core/interp.h"
+#include "core/program.h"
+#include "core/timebase.h"
+#include "plant/drive.h"
+#include "rig/contour.h"
+
+/* One tick; 64 bytes without holes. Python maps it as a numpy record. */
+struct rig_row {
+    int64_t arc_length_q40_mm;
+    int64_t feed_q32_mm_s;
+    int64_t cmd_q40_mm[2]; /* unrounded, from the kernel */
+    double contour_error_um;
+    int32_t set_counts[2];
+    int32_t act_counts[2];
+    int16_t volts_mv[2];
+    uint32_t tick;
+};
+
+enum rig_error {
+    RIG_ERR_KERNEL = -100, /* no such kernel */
+    RIG_ERR_PERIOD = -101, /* a drive's period is not the program's */
+    RIG_ERR_COUNTS = -102, /* the drives' counts per mm differ */
+    RIG_ERR_DRIVE = -200,  /* minus 10 * axis, plus the enum drive_error of that axis */
+    RIG_ERR_INTERP = -300, /* the interpolator failed: the program was not checked */
+};
+
+/* Fields are private. */
+struct rig {
+    struct interp interp;
+    struct timebase timebase;
+    struct contour contour;
+    struct drive drives[2];
+    uint32_t counts_per_mm;
+    uint32_t tick;
+};
+
+/* Sets up for a program that passed program_check; segments has room for its segment_count. Returns
+ * 0 or an error. */
+int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
+              const struct drive_config drives[2], struct contour_segment *segments);
+
+/* The next n ticks. Returns 0 or RIG_ERR_INTERP. */
+int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
+
+/* Commanded points alone, for n program times in 2^-32 s, in any order (ascending is quick).
+ * counts: x, y pairs, or NULL. The interpolator has to have begun. Returns 0 or RIG_ERR_INTERP. */
+int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
+               uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
+
+/* Program times of n ticks from tick0 on, as the controller's timebase gives them at rate 1, in
+ * 2^-32 s. */
+void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q32_s);
+
+/* counts_from_q40_mm for n values. */
+void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
+
+#endif
