@@ -2,19 +2,20 @@
 /*
  * port.h: everything that the controller needs of a machine, on one page.
  *
- * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It includes nothing above
- * this file but can/can_frame.h. The Linux port is in port/linux.
+ * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It
+ * includes nothing above this file but can/can_frame.h. The Linux port is in port/linux.
  *
  * Three contexts (drawn in docs/architecture.md):
  *   receive   the CAN receive interrupt: calls port_handlers.receive for every accepted frame
  *   timer     the timer interrupt: calls port_handlers.tick once a period
  *   mainline  main(): everything that may wait
- * The port calls both handlers as if between port_lock() and port_unlock(): they never overlap each other nor a critical section of
- * the mainline, so data shared with the mainline needs no other guard. (A board whose timer interrupt may preempt its
- * receive interrupt takes the lock around `receive`.) On Linux one thread stands for both interrupts.
+ * The port calls both handlers as if between port_lock() and port_unlock(): they never overlap each
+ * other nor a critical section of the mainline, so data shared with the mainline needs no other
+ * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
+ * `receive`.) On Linux one thread stands for both interrupts.
  *
- * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. Functions may be called from any context
- * unless their comment says otherwise; none from before port_begin().
+ * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. Functions may be called
+ * from any context unless their comment says otherwise; none from before port_begin().
  */
 #ifndef PORT_PORT_H
 #define PORT_PORT_H
@@ -31,47 +32,52 @@ enum port_error {
     PORT_ERR_SYSTEM = -3, /* the machine cannot do it; the port has logged why */
 };
 
-/* --- Life ---------------------------------------------------------------------------------------------------------*/
+/* --- Life --- */
 
-/* Sets up clock, bus and store; both interrupts stay off. A hosted port reads its command line, a board ignores it
- * (0, NULL). Returns 0; otherwise main() returns the result as its exit status: the reason has been reported. */
+/* Sets up clock, bus and store; both interrupts stay off. A hosted port reads its command line, a
+ * board ignores it (0, NULL). Returns 0; otherwise main() returns the result as its exit status:
+ * the reason has been reported. */
 int port_begin(int argc, char **argv);
 
 /* Stops both interrupts, leaves the bus. Mainline. */
 void port_end(void);
 
-/* True when the machine wants the controller to end (SIGTERM, SIGINT); never on a board without such a wish. */
+/* True when the machine wants the controller to end (SIGTERM, SIGINT); never on a board without
+ * such a wish. */
 bool port_stop_requested(void);
 
-/* CANopen node number of this controller, 1 ... 127, from the command line or the board's straps. */
+/* CANopen node number of this controller, 1 ... 127, from the command line or the board's straps.
+ */
 uint8_t port_node_id(void);
 
-/* --- CAN, classic frames ------------------------------------------------------------------------------------------*/
+/* --- CAN, classic frames --- */
 
 struct port_filter {
     uint16_t id;   /* a frame passes when (frame.id & mask) == (id & mask) for one of the filters */
     uint16_t mask; /* 11-bit identifiers */
 };
 
-/* Lets only matching frames through to the receive handler. At most PORT_FILTERS of them. Mainline, before port_start(). */
+/* Lets only matching frames through to the receive handler. At most PORT_FILTERS of them. Mainline,
+ * before port_start(). */
 #define PORT_FILTERS 16
 int port_can_accept(const struct port_filter *filters, size_t count);
 
 /* Queues one frame for sending, in call order per context. 0 or PORT_ERR_FULL. */
 int port_can_send(const struct can_msg *message);
 
-/* --- Time and tick ------------------------------------------------------------------------------------------------*/
+/* --- Time and tick --- */
 
 struct port_handlers {
     void *self; /* handed to both */
     void (*receive)(void *self, const struct can_msg *message);
-    /* late_ns: how long after its due time the tick began. A late tick is called late, never skipped; two ticks are
-     * never closer than three quarters of a period. */
-    void (*tick)(void *self, uint64_t late_ns);
+    /* late_ns: how long after its due time the tick began (4.29 s at most are told). A late tick is
+     * called late, never skipped; two ticks are never closer than three quarters of a period. */
+    void (*tick)(void *self, uint32_t late_ns);
 };
 
-/* Monotonic, from an arbitrary start. */
-uint64_t port_time_ns(void);
+/* Monotonic clocks that wrap round: only differences mean anything. */
+uint32_t port_time_ns(void); /* wraps after 4.29 s */
+uint32_t port_time_us(void); /* wraps after 71 minutes */
 
 /* Turns both interrupts on; the first tick comes one period later. Mainline, once. */
 int port_start(const struct port_handlers *handlers, uint32_t period_us);
@@ -79,23 +85,25 @@ int port_start(const struct port_handlers *handlers, uint32_t period_us);
 /* Changes the period from the next tick on. */
 void port_tick_period(uint32_t period_us);
 
-/* Lock step, for buses that are simulated. A tick that calls port_tick_await() wishes the next tick as soon as
- * port_tick_ready() is called (from the receive handler: all drives have answered), and at the latest guard_us
- * later. A port bound to the wall clock ignores both: the next tick comes after the period. */
+/* Lock step, for buses that are simulated. A tick that calls port_tick_await() wishes the next tick
+ * as soon as port_tick_ready() is called (from the receive handler: all drives have answered), and
+ * at the latest guard_us later. A port bound to the wall clock ignores both: the next tick comes
+ * after the period. */
 void port_tick_await(uint32_t guard_us);
 void port_tick_ready(void);
 
-/* --- Mainline -----------------------------------------------------------------------------------------------------*/
+/* --- Mainline --- */
 
 /* Critical section: holds off both interrupts. Short, not nested, mainline only. */
 void port_lock(void);
 void port_unlock(void);
 
-/* Sleeps until port_wake(), a wish to stop, or timeout_us. Mainline, outside the critical section. */
+/* Sleeps until port_wake(), a wish to stop, or timeout_us. Mainline, outside the critical section.
+ */
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 
-/* --- Program store: two banks, so that a broken upload leaves the other one whole. Mainline -------------------------*/
+/* --- Program store: two banks, so that a broken upload leaves the other one whole. Mainline --- */
 
 #define PORT_STORE_BANKS 2u
 
@@ -108,7 +116,7 @@ int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32
 /* The bank as memory, readable at any time and from any context. */
 const uint8_t *port_store_data(unsigned bank);
 
-/* --- Words for a human --------------------------------------------------------------------------------------------*/
+/* --- Words for a human --- */
 
 enum port_level {
     PORT_NOTE,    /* only where somebody asked for it (--verbose) */

@@ -22,7 +22,8 @@ static int fail(char *reason, size_t size, int error, const char *text, const ch
     return -error;
 }
 
-static int interface_request(int fd, const char *interface, unsigned long request, struct ifreq *answer)
+static int interface_request(int fd, const char *interface, unsigned long request,
+                             struct ifreq *answer)
 {
     memset(answer, 0, sizeof *answer);
     memcpy(answer->ifr_name, interface, strlen(interface) + 1u);
@@ -39,17 +40,21 @@ static int check_interface(int fd, const char *interface, char *reason, size_t s
     int error = interface_request(fd, interface, SIOCGIFHWADDR, &answer);
     if (error == ENODEV) {
         return fail(reason, size, error,
-                    "no interface %s: create it (ip link add dev vcan0 type vcan) or run under tools/with-vcan", interface);
+                    "no interface %s: create it (ip link add dev vcan0 type vcan) or run under "
+                    "tools/with-vcan",
+                    interface);
     }
     if (error != 0) {
         return fail(reason, size, error, "interface %s: %s", interface);
     }
     if (answer.ifr_hwaddr.sa_family != ARPHRD_CAN) {
-        return fail(reason, size, EINVAL, "%s is not a CAN interface: name one like vcan0 or can0", interface);
+        return fail(reason, size, EINVAL, "%s is not a CAN interface: name one like vcan0 or can0",
+                    interface);
     }
     error = interface_request(fd, interface, SIOCGIFFLAGS, &answer);
     if (error == 0 && (answer.ifr_flags & IFF_UP) == 0) {
-        return fail(reason, size, ENETDOWN, "interface %s is down: bring it up (ip link set up dev NAME)", interface);
+        return fail(reason, size, ENETDOWN,
+                    "interface %s is down: bring it up (ip link set up dev NAME)", interface);
     }
     return error == 0 ? 0 : fail(reason, size, error, "interface %s: %s", interface);
 }
@@ -66,7 +71,8 @@ static int bind_interface(int fd, const char *interface, char *reason, size_t si
     return 0;
 }
 
-/* A simulated bus has no bit times: whoever sleeps for some milliseconds must find everything that was sent. */
+/* A simulated bus has no bit times: whoever sleeps for some milliseconds must find everything that
+ * was sent. */
 static void enlarge_buffers(int fd)
 {
     const int bytes = RECEIVE_BUFFER_BYTES;
@@ -85,10 +91,12 @@ static int open_raw(const char *interface, char *reason, size_t size)
         return fd;
     }
     if (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT) {
-        return fail(reason, size, errno, "no CAN in this kernel, so no %s: run under tools/with-vcan", interface);
+        return fail(reason, size, errno,
+                    "no CAN in this kernel, so no %s: run under tools/with-vcan", interface);
     }
     if (errno == EPERM || errno == EACCES) {
-        return fail(reason, size, errno, "no permission to open a CAN socket on %s: run as root or grant it", interface);
+        return fail(reason, size, errno,
+                    "no permission to open a CAN socket on %s: run as root or grant it", interface);
     }
     return fail(reason, size, errno, "cannot open a CAN socket on %s: %s", interface);
 }
@@ -121,7 +129,8 @@ void can_socket_close(struct can_socket *socket)
     }
 }
 
-int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters, size_t count)
+int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters,
+                      size_t count)
 {
     struct can_filter raw[CAN_SOCKET_FILTERS];
     if (count > CAN_SOCKET_FILTERS) {
@@ -150,7 +159,8 @@ int can_socket_send(struct can_socket *socket, const struct can_msg *message)
 
 static int plain_frame(const struct can_frame *frame)
 {
-    return (frame->can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) == 0 && frame->can_dlc <= CAN_MAX_DLEN;
+    return (frame->can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) == 0 &&
+           frame->can_dlc <= CAN_MAX_DLEN;
 }
 
 static void convert(struct can_msg *message, const struct can_frame *frame)
@@ -161,7 +171,8 @@ static void convert(struct can_msg *message, const struct can_frame *frame)
     memcpy(message->data, frame->data, frame->can_dlc);
 }
 
-int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH], int *more)
+int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],
+                       int *more)
 {
     struct can_frame frames[CAN_SOCKET_BATCH];
     struct iovec vectors[CAN_SOCKET_BATCH];

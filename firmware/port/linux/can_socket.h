@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * can_socket: classic CAN frames through a raw SocketCAN socket. Used by the Linux port and by the simulated drives.
+ * can_socket: classic CAN frames through a raw SocketCAN socket. Used by the Linux port and by the
+ * simulated drives.
  *
- * The socket never blocks. Remote, extended and error frames are dropped on the way in. Frames that this socket
- * sends do not come back to it; other sockets of the same machine see them.
+ * The socket never blocks. Remote, extended and error frames are dropped on the way in. Frames that
+ * this socket sends do not come back to it; other sockets of the same machine see them.
  */
 #ifndef PORT_LINUX_CAN_SOCKET_H
 #define PORT_LINUX_CAN_SOCKET_H
@@ -23,20 +24,24 @@ struct can_socket_filter {
 };
 
 #define CAN_SOCKET_FILTERS 16u
-#define CAN_SOCKET_BATCH 32u
+#define CAN_SOCKET_BATCH   32u
 
-/* Opens and binds. Returns 0, or a negative errno with one line in `reason`: what is wrong and what to do. */
+/* Opens and binds. Returns 0, or a negative errno with one line in `reason`: what is wrong and what
+ * to do. */
 int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size);
 void can_socket_close(struct can_socket *socket);
 
 /* Lets only these frames through (none: all). At most CAN_SOCKET_FILTERS. 0 or negative errno. */
-int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters, size_t count);
+int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters,
+                      size_t count);
 
-/* 0; -EAGAIN when the queue is full (the frame is not sent); else a negative errno (interface down, removed). */
+/* 0; -EAGAIN when the queue is full (the frame is not sent); else a negative errno (interface down,
+ * removed). */
 int can_socket_send(struct can_socket *socket, const struct can_msg *message);
 
-/* Takes up to CAN_SOCKET_BATCH waiting frames, oldest first. Returns how many are in `messages` and sets *more when
- * others may wait; or a negative errno (interface down, removed). */
-int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH], int *more);
+/* Takes up to CAN_SOCKET_BATCH waiting frames, oldest first. Returns how many are in `messages` and
+ * sets *more when others may wait; or a negative errno (interface down, removed). */
+int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],
+                       int *more);
 
 #endif

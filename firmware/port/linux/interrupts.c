@@ -13,7 +13,7 @@
 #include "port/linux/clock.h"
 #include "port/linux/schedule.h"
 
-#define PRIORITY 60           /* above the kernel's threaded interrupts (50) */
+#define PRIORITY         60         /* above the kernel's threaded interrupts (50) */
 #define LONGEST_SLEEP_NS 100000000u /* how late a wish to end may be noticed */
 
 static struct {
@@ -50,14 +50,14 @@ void port_tick_await(uint32_t guard_us)
 
 void port_tick_ready(void)
 {
-    schedule_ready(&self.schedule, port_time_ns());
+    schedule_ready(&self.schedule, clock_ns());
 }
 
 static void run_tick(uint64_t now_ns)
 {
     port_lock();
     const uint64_t late_ns = schedule_start(&self.schedule, now_ns);
-    self.handlers.tick(self.handlers.self, late_ns);
+    self.handlers.tick(self.handlers.self, late_ns < UINT32_MAX ? (uint32_t)late_ns : UINT32_MAX);
     schedule_finish(&self.schedule, now_ns);
     port_unlock();
 }
@@ -87,7 +87,7 @@ static void receive_waiting(void)
 static void sleep_until(uint64_t due_ns)
 {
     struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
-    const uint64_t now_ns = port_time_ns();
+    const uint64_t now_ns = clock_ns();
     uint64_t wait_ns = due_ns > now_ns ? due_ns - now_ns : 0u;
     if (wait_ns > LONGEST_SLEEP_NS) {
         wait_ns = LONGEST_SLEEP_NS;
@@ -103,7 +103,7 @@ static void *run(void *unused)
     (void)unused;
     while (!self.ending && self.error == 0) {
         sleep_until(self.schedule.due_ns);
-        const uint64_t now_ns = port_time_ns();
+        const uint64_t now_ns = clock_ns();
         if (now_ns >= self.schedule.due_ns) {
             run_tick(now_ns);
         }
@@ -154,13 +154,14 @@ static int create_thread(bool real_time)
 int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
 {
     self.handlers = *handlers;
-    schedule_begin(&self.schedule, port_time_ns(), (uint64_t)period_us * 1000u, self.lock_step);
+    schedule_begin(&self.schedule, clock_ns(), (uint64_t)period_us * 1000u, self.lock_step);
     if (!self.lock_step && mlockall(MCL_CURRENT) != 0) {
         port_log(PORT_NOTE, "memory is not locked, page faults can delay ticks: errno", errno);
     }
     int error = create_thread(!self.lock_step);
     if (error != 0 && !self.lock_step) {
-        port_log(PORT_NOTE, "no permission for SCHED_FIFO, ticks come as the scheduler likes: errno", error);
+        port_log(PORT_NOTE,
+                 "no permission for SCHED_FIFO, ticks come as the scheduler likes: errno", error);
         error = create_thread(false);
     }
     self.started = error == 0;

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * interrupts: one thread that stands for the CAN receive interrupt and the timer interrupt of a microcontroller.
+ * interrupts: one thread that stands for the CAN receive interrupt and the timer interrupt of a
+ * microcontroller.
  *
- * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the tick. Both handlers run with the
- * lock of port_lock() held. At real-time pace it asks for SCHED_FIFO and locked memory; where that is not permitted it
- * says so once and runs as an ordinary thread. At fast pace it stays ordinary: it shall not take the processor
- * from the simulated drives it waits for.
+ * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the
+ * tick. Both handlers run with the lock of port_lock() held. At real-time pace it asks for
+ * SCHED_FIFO and locked memory; where that is not permitted it says so once and runs as an ordinary
+ * thread. At fast pace it stays ordinary: it shall not take the processor from the simulated drives
+ * it waits for.
  */
 #ifndef PORT_LINUX_INTERRUPTS_H
 #define PORT_LINUX_INTERRUPTS_H
@@ -24,7 +26,8 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us);
 /* Ends the thread and waits for it. Harmless when it never started. */
 void interrupts_end(void);
 
-/* Negative errno when the bus broke under the thread (interface down or removed), which ends it; else 0. */
+/* Negative errno when the bus broke under the thread (interface down or removed), which ends it;
+ * else 0. */
 int interrupts_error(void);
 
 #endif

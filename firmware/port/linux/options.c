@@ -8,16 +8,20 @@
 static const char help[] =
     "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--verbose]\n"
     "\n"
-    "The Hodograph motion controller as a CANopen node on a SocketCAN bus. All configuration comes over the bus\n"
-    "(SDO to the node). SIGTERM or SIGINT stops the axes along the path, switches the drives off and ends.\n"
+    "The Hodograph motion controller as a CANopen node on a SocketCAN bus. All configuration comes "
+    "over the bus\n"
+    "(SDO to the node). SIGTERM or SIGINT stops the axes along the path, switches the drives off "
+    "and ends.\n"
     "\n"
     "  --bus INTERFACE  a CAN interface that is up, such as vcan0 or can0\n"
     "  --node N         node number of the controller, 1 to 127; default 1\n"
     "  --pace PACE      real-time (default): one tick every period of the clock.\n"
-    "                   fast: while axes move, the next tick as soon as all drives have answered (simulated drives)\n"
+    "                   fast: while axes move, the next tick as soon as all drives have answered "
+    "(simulated drives)\n"
     "  --verbose        notes about states on stderr\n"
     "\n"
-    "exit status: 0 ended as asked, 1 the machine failed (a line says how), 2 wrong usage, 4 bus not usable,\n"
+    "exit status: 0 ended as asked, 1 the machine failed (a line says how), 2 wrong usage, 4 bus "
+    "not usable,\n"
     "             6 the axes did not stop or the drives did not switch off in time\n";
 
 static enum options_result wrong(const char *what, const char *value)
@@ -65,7 +69,8 @@ static bool takes_value(const char *name)
 
 enum options_result options_parse(struct options *options, int argc, char **argv)
 {
-    *options = (struct options){.bus = NULL, .node = 1, .pace = OPTIONS_REAL_TIME, .verbose = false};
+    *options =
+        (struct options){.bus = NULL, .node = 1, .pace = OPTIONS_REAL_TIME, .verbose = false};
     for (int i = 1; i < argc; ++i) {
         if (strcmp(argv[i], "--help") == 0) {
             (void)fputs(help, stdout);

@@ -40,7 +40,9 @@ static int catch_signals(void)
     memset(&action, 0, sizeof action);
     action.sa_handler = on_signal;
     (void)sigemptyset(&action.sa_mask);
-    return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, &action, NULL) == 0 ? 0 : PORT_ERR_SYSTEM;
+    return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, &action, NULL) == 0
+               ? 0
+               : PORT_ERR_SYSTEM;
 }
 
 static int open_bus(void)
@@ -69,7 +71,8 @@ int port_begin(int argc, char **argv)
     self.wake_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     if (self.wake_fd < 0 || catch_signals() != 0 ||
         interrupts_begin(&self.socket, self.options.pace == OPTIONS_FAST) != 0) {
-        (void)fprintf(stderr, "hodograph-controller: cannot prepare the process: %s\n", strerror(errno));
+        (void)fprintf(stderr, "hodograph-controller: cannot prepare the process: %s\n",
+                      strerror(errno));
         return EXIT_MACHINE;
     }
     return 0;
@@ -110,11 +113,14 @@ int port_can_send(const struct can_msg *message)
     return can_socket_send(&self.socket, message) == 0 ? 0 : PORT_ERR_FULL;
 }
 
-uint64_t port_time_ns(void)
+uint32_t port_time_ns(void)
 {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * CLOCK_NS_PER_S + (uint64_t)now.tv_nsec;
+    return (uint32_t)clock_ns();
+}
+
+uint32_t port_time_us(void)
+{
+    return (uint32_t)(clock_ns() / 1000u);
 }
 
 int port_start(const struct port_handlers *handlers, uint32_t period_us)

@@ -2,9 +2,10 @@
 /*
  * schedule: when the next tick is due. Pure arithmetic on monotonic nanoseconds.
  *
- * Real time: ticks are due a period apart on the clock. A tick that started late is not skipped and the following
- * ones are not bunched: two starts are at least three quarters of a period apart, so lateness is made up over some ticks.
- * Lock step (schedule_await): the next tick is due when schedule_ready() is called, else after the guard time.
+ * Real time: ticks are due a period apart on the clock. A tick that started late is not skipped and
+ * the following ones are not bunched: two starts are at least three quarters of a period apart, so
+ * lateness is made up over some ticks. Lock step (schedule_await): the next tick is due when
+ * schedule_ready() is called, else after the guard time.
  */
 #ifndef PORT_LINUX_SCHEDULE_H
 #define PORT_LINUX_SCHEDULE_H

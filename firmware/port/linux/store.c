@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The program store in memory: what a board keeps in two banks of flash. Lost when the process ends. */
+/* The program store in memory: what a board keeps in two banks of flash. Lost when the process
+ * ends. */
 #include "port/port.h"
 
 #include <string.h>
