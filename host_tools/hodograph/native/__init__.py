@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""The C core and simulator, called from Python: the same objects as in the controller.
+
+The compiled module is made by `make build` (build_native.py); without it every call raises a HodographError that
+says so. Arrays go in and out without copies; the interpreter lock is released during the calls.
+"""
+
+from .contour import Contour
+from .drive import DriveModel
+from .library import library
+from .program import (
+    KERNELS,
+    POINT,
+    NativeFault,
+    NativeLimits,
+    NativeProgram,
+    counts_from_q40_mm,
+    kernel_code,
+)
+from .rig import ROW, Rig
+
+__all__ = [
+    "KERNELS",
+    "POINT",
+    "ROW",
+    "Contour",
+    "DriveModel",
+    "NativeFault",
+    "NativeLimits",
+    "NativeProgram",
+    "Rig",
+    "counts_from_q40_mm",
+    "kernel_code",
+    "library",
+]

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Builds `_native`, the package's door to the C core and the simulator (cffi, API mode).
+
+    python build_native.py [--build DIR]
+
+Links DIR/host/libhodograph_{sim,core}.a (DIR: `build` at the root of the tree), which `make c` makes,
+and puts `_native.abi3.so` beside this file. The Makefile calls it.
+"""
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+from cffi import FFI
+
+PACKAGE = Path(__file__).resolve().parent
+ROOT = PACKAGE.parents[2]
+HEADERS = ("core/program_check.h", "core/interp.h", "plant/drive.h", "rig/contour.h", "rig/rig.h")
+LIBRARIES = ("sim", "core")
+
+
+def declarations() -> str:
+    """The C declarations that the module offers to Python."""
+    return (PACKAGE / "declarations.h").read_text(encoding="utf-8")
+
+
+def build(build_dir: Path) -> Path:
+    """Compile and link the module; returns its path. Raises FileNotFoundError without the archives."""
+    archives = [build_dir / "host" / f"libhodograph_{name}.a" for name in LIBRARIES]
+    for archive in archives:
+        if not archive.is_file():
+            raise FileNotFoundError(f"{archive} is missing: run `make c` first")
+    ffi = FFI()
+    ffi.cdef(declarations())
+    ffi.set_source(
+        "hodograph.native._native",
+        "#include <stdbool.h>\n" + "".join(f'#include "{header}"\n' for header in HEADERS),
+        include_dirs=[str(ROOT / "firmware"), str(ROOT / "sim")],
+        extra_objects=[str(archive) for archive in archives],
+        extra_compile_args=["-std=c99", "-O2", "-ffp-contract=off"],
+        libraries=["m"],
+        py_limited_api=True,
+    )
+    work = build_dir / "native"
+    work.mkdir(parents=True, exist_ok=True)
+    made = Path(ffi.compile(tmpdir=str(work)))
+    target = PACKAGE / made.name
+    fresh = target.with_suffix(".new")
+    shutil.copyfile(made, fresh)
+    fresh.replace(target)
+    return target
+
+
+def main() -> int:
+    """Entry point; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--build", type=Path, default=ROOT / "build")
+    try:
+        build(parser.parse_args().build.resolve())
+    except FileNotFoundError as error:
+        print(f"build_native: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

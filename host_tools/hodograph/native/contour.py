@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""Distance from the exact curve of a program (sim/rig/contour.h, docs/numerics.md section 14)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .library import library
+from .program import NativeProgram
+
+
+class Contour:
+    """The curve of a checked program, expanded once; asks are independent of each other."""
+
+    def __init__(self, program: NativeProgram) -> None:
+        """Expand the segments; raises InputError when the program does not pass its check."""
+        ffi, lib = library()
+        program.require()
+        self._segments = ffi.new("struct contour_segment[]", program.segment_count)
+        self.pointer = ffi.new("struct contour *")
+        lib.contour_begin(self.pointer, program.pointer, self._segments)
+
+    def distance_mm(self, arc_length_mm: float, x_mm: float, y_mm: float) -> float:
+        """Distance of a point from the curve near the commanded arc length, mm."""
+        _, lib = library()
+        return float(lib.contour_distance_mm(self.pointer, arc_length_mm, [x_mm, y_mm]))
+
+    def errors_um(
+        self,
+        arc_length_q40_mm: NDArray[np.int64],
+        act_counts: NDArray[np.int32],
+        counts_per_mm: int,
+    ) -> NDArray[np.float64]:
+        """Contour errors in um, (n,), of encoder positions (n, 2) beside commanded arc lengths (n,)."""
+        ffi, lib = library()
+        arc = np.ascontiguousarray(arc_length_q40_mm, dtype=np.int64)
+        act = np.ascontiguousarray(act_counts, dtype=np.int32)
+        if act.shape != (arc.size, 2):
+            raise ValueError(f"act_counts has shape {act.shape}, not ({arc.size}, 2)")
+        errors = np.empty(arc.size, dtype=np.float64)
+        lib.contour_errors_um(
+            self.pointer,
+            arc.size,
+            ffi.from_buffer("int64_t[]", arc),
+            ffi.from_buffer("int32_t[]", act),
+            counts_per_mm,
+            ffi.from_buffer("double[]", errors),
+        )
+        return errors

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: MIT */
+/* What Python sees of the C side (cffi API mode: the C compiler checks it against the real headers and fills in
+ * what stands as "..."). Meanings and units: the headers named here. */
+
+/* core/program.h, core/program_check.h */
+struct program_header {
+    uint32_t period_us;
+    uint32_t segment_count;
+    uint32_t piece_count;
+    uint16_t flags;
+    uint64_t duration_q32_s;
+    int64_t length_q40_mm;
+    ...;
+};
+struct program {
+    struct program_header header;
+    ...;
+};
+struct program_limits {
+    uint32_t period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
+    int64_t min_q40_mm[2], max_q40_mm[2];
+};
+struct program_fault {
+    int code;
+    uint32_t index;
+};
+int program_open(struct program *p, const uint8_t *image, uint32_t size);
+uint32_t program_ticks(const struct program *p);
+int program_check(const struct program *p, const struct program_limits *limits,
+                  struct program_fault *fault);
+const char *program_error_text(int code);
+
+/* core/interp.h */
+enum interp_kernel { INTERP_FIXED, INTERP_FLOAT, INTERP_DOUBLE };
+struct interp_point {
+    int64_t arc_length_q40_mm, x_q40_mm, y_q40_mm, feed_q32_mm_s;
+};
+struct interp {
+    ...;
+};
+int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
+
+/* plant/drive.h */
+struct drive_plant {
+    double gain_rad_s_v, time_constant_s, screw_mm_rad, torque_to_volts, volts_limit;
+};
+struct drive_pdff {
+    double k_pp_rad_s_mm, k_pv_nm_s_rad, k_iv_per_s, k_pf_rad_mm, k_vf;
+};
+struct drive_config {
+    struct drive_plant plant;
+    struct drive_pdff pdff;
+    uint32_t encoder_counts_per_rev, loop_rate_hz, counts_per_mm, period_us;
+};
+struct drive {
+    ...;
+};
+int drive_init(struct drive *drive, const struct drive_config *config);
+const char *drive_error_text(int code);
+void drive_place(struct drive *drive, int32_t target_counts);
+void drive_period(struct drive *drive, int32_t target_counts);
+int32_t drive_position_counts(const struct drive *drive);
+int16_t drive_volts_mv(const struct drive *drive);
+bool drive_parked(const struct drive *drive);
+
+/* rig/contour.h */
+struct contour_segment {
+    ...;
+};
+struct contour {
+    ...;
+};
+void contour_begin(struct contour *contour, const struct program *program,
+                   struct contour_segment *segments);
+double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[2]);
+void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
+                       const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um);
+
+/* rig/rig.h */
+struct rig_row {
+    int64_t arc_length_q40_mm;
+    int64_t feed_q32_mm_s;
+    int64_t cmd_q40_mm[2];
+    double contour_error_um;
+    int32_t set_counts[2];
+    int32_t act_counts[2];
+    int16_t volts_mv[2];
+    uint32_t tick;
+};
+struct rig {
+    ...;
+};
+int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
+              const struct drive_config drives[2], struct contour_segment *segments);
+int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
+int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
+               uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
+void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q32_s);
+void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
+enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };

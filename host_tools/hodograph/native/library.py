@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+"""Finds the compiled module; everything else in this package goes through `library`."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from ..errors import HodographError
+
+
+@cache
+def library() -> tuple[Any, Any]:
+    """(ffi, lib) of the compiled module. Raises HodographError when it is not built or does not load."""
+    try:
+        module = import_module("hodograph.native._native")
+    except ModuleNotFoundError:
+        raise HodographError(
+            "hodograph.native: the compiled module is not there: run `make build` in the source tree"
+        ) from None
+    except ImportError as error:
+        reason = " ".join(str(error).split())
+        raise HodographError(
+            f"hodograph.native: the compiled module does not load ({reason}): "
+            "run `make clean` and `make build`"
+        ) from None
+    return module.ffi, module.lib
+
+
+def text(pointer: Any) -> str:
+    """A C string as Python text."""
+    ffi, _ = library()
+    return str(ffi.string(pointer).decode("utf-8"))

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: MIT
+"""The controller's own view of a program image: opening, checking, interpolating (firmware/core)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .library import library, text
+
+KERNELS = ("fixed", "float", "double")
+"""Names of the number kernels; the index is their code in C and in object 0x2004 sub 5."""
+
+POINT = np.dtype(
+    [
+        ("arc_length_q40_mm", "<i8"),
+        ("x_q40_mm", "<i8"),
+        ("y_q40_mm", "<i8"),
+        ("feed_q32_mm_s", "<i8"),
+    ]
+)
+"""One interpolated point, struct interp_point of core/interp.h: unrounded output of a kernel."""
+
+
+@dataclass(frozen=True)
+class NativeLimits:
+    """What a controller allows: struct program_limits. 0 stands for no limit in the first four.
+
+    Travel limits are (x, y) in mm * 2^40; period in us, feed in um/s, acceleration in um/s^2, jerk in mm/s^3.
+    """
+
+    period_us: int = 0
+    feed_um_s: int = 0
+    acceleration_um_s2: int = 0
+    jerk_mm_s3: int = 0
+    min_q40_mm: tuple[int, int] = (-(2**52), -(2**52))
+    max_q40_mm: tuple[int, int] = (2**52, 2**52)
+
+
+@dataclass(frozen=True)
+class NativeFault:
+    """The first rule that a program breaks: code of core/program_check.h, segment or piece, meaning."""
+
+    code: int
+    index: int
+    text: str
+
+
+def kernel_code(kernel: str) -> int:
+    """The code of a kernel's name; raises InputError."""
+    if kernel not in KERNELS:
+        raise InputError(f'kernel: "{kernel}" is none; use one of: {", ".join(KERNELS)}')
+    return KERNELS.index(kernel)
+
+
+class NativeProgram:
+    """A program image as the firmware reads it.
+
+    Opening checks size, magic, version, counts and CRC. `check` applies every other rule; interpolating a
+    program that does not pass it is refused.
+    """
+
+    def __init__(self, image: bytes) -> None:
+        """Open `image` (docs/protocol.md section 1); raises InputError when it cannot be read."""
+        ffi, lib = library()
+        self.image = bytes(image)
+        self._buffer = ffi.from_buffer("uint8_t[]", self.image)
+        self.pointer = ffi.new("struct program *")
+        code = lib.program_open(self.pointer, self._buffer, len(self.image))
+        if code != 0:
+            raise InputError(
+                f"program image: {text(lib.program_error_text(code))}: compile it again (code {code})"
+            )
+        self._accepted: bool | None = None
+
+    @property
+    def period_us(self) -> int:
+        """Period of the setpoints, us."""
+        return int(self.pointer.header.period_us)
+
+    @property
+    def segment_count(self) -> int:
+        """Number of PH segments."""
+        return int(self.pointer.header.segment_count)
+
+    @property
+    def ticks(self) -> int:
+        """Number of setpoints, ceil(duration / period) + 1."""
+        _, lib = library()
+        return int(lib.program_ticks(self.pointer))
+
+    @property
+    def duration_q32_s(self) -> int:
+        """Duration, s * 2^32."""
+        return int(self.pointer.header.duration_q32_s)
+
+    def check(self, limits: NativeLimits | None = None) -> NativeFault | None:
+        """The controller's check of all rules; None: accepted."""
+        ffi, lib = library()
+        given = limits or NativeLimits()
+        c_limits = ffi.new(
+            "struct program_limits *",
+            {name: getattr(given, name) for name in given.__dataclass_fields__},
+        )
+        fault = ffi.new("struct program_fault *")
+        code = lib.program_check(self.pointer, c_limits, fault)
+        if code == 0:
+            return None
+        return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
+
+    def require(self) -> None:
+        """Raise InputError unless the program passes `check` (without limits of a machine)."""
+        if self._accepted:
+            return
+        fault = self.check()
+        if fault is not None:
+            raise InputError(
+                f"program image: {fault.text} (code {fault.code}, number {fault.index}): compile it again"
+            )
+        self._accepted = True
+
+    def tick_times_q32_s(self, tick0: int = 0, count: int | None = None) -> NDArray[np.uint64]:
+        """Program times of `count` ticks from `tick0` on (default: to the last), s * 2^32, (count,)."""
+        ffi, lib = library()
+        n = self.ticks - tick0 if count is None else count
+        times = np.empty(n, dtype=np.uint64)
+        lib.rig_times(self.pointer, tick0, n, ffi.from_buffer("uint64_t[]", times))
+        return times
+
+    def points(self, kernel: str, times_q32_s: NDArray[np.uint64]) -> NDArray[np.void]:
+        """Points at any program times (ascending is quick), as an array of POINT, (n,).
+
+        Raises InputError for an unknown kernel and for a program that does not pass `check`.
+        """
+        ffi, lib = library()
+        self.require()
+        code = kernel_code(kernel)
+        times = np.ascontiguousarray(times_q32_s, dtype=np.uint64)
+        points = np.empty(times.size, dtype=POINT)
+        interp = ffi.new("struct interp *")
+        begun = lib.interp_begin(interp, self.pointer, code)
+        made = begun or lib.rig_points(
+            interp,
+            times.size,
+            ffi.from_buffer("uint64_t[]", times),
+            1,
+            ffi.cast("struct interp_point *", ffi.from_buffer(points)),
+            ffi.NULL,
+        )
+        if made != 0:
+            raise InputError(f"kernel {kernel}: cannot interpolate this program (code {made})")
+        return points
+
+    def setpoints(
+        self, kernel: str, counts_per_mm: int, tick0: int = 0, count: int | None = None
+    ) -> tuple[NDArray[np.void], NDArray[np.int32]]:
+        """Points (n,) of POINT and setpoints in counts (n, 2) of `count` ticks from `tick0` on."""
+        points = self.points(kernel, self.tick_times_q32_s(tick0, count))
+        xy = np.stack([points["x_q40_mm"], points["y_q40_mm"]], axis=1)
+        return points, counts_from_q40_mm(xy, counts_per_mm)
+
+
+def counts_from_q40_mm(q40_mm: NDArray[np.int64], counts_per_mm: int) -> NDArray[np.int32]:
+    """Bus counts of positions in mm * 2^40, any shape: round half up, saturated (core/counts.h)."""
+    ffi, lib = library()
+    source = np.ascontiguousarray(q40_mm, dtype=np.int64)
+    counts = np.empty(source.shape, dtype=np.int32)
+    lib.rig_counts(
+        source.size,
+        ffi.from_buffer("int64_t[]", source),
+        counts_per_mm,
+        ffi.from_buffer("int32_t[]", counts),
+    )
+    return counts

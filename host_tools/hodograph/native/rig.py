@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""The whole chain in one process, without a bus (sim/rig/rig.h)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import HodographError, InputError
+from .drive import drive_config
+from .library import library, text
+from .program import NativeProgram, kernel_code
+
+if TYPE_CHECKING:
+    from ..config.drive_file import Drive
+
+ROW = np.dtype(
+    [
+        ("arc_length_q40_mm", "<i8"),
+        ("feed_q32_mm_s", "<i8"),
+        ("cmd_q40_mm", "<i8", (2,)),
+        ("contour_error_um", "<f8"),
+        ("set_counts", "<i4", (2,)),
+        ("act_counts", "<i4", (2,)),
+        ("volts_mv", "<i2", (2,)),
+        ("tick", "<u4"),
+    ]
+)
+"""One tick, struct rig_row of sim/rig/rig.h: setpoint k beside the drives' report for SYNC k+2."""
+
+
+class Rig:
+    """Interpolator, two drives and contour error; begins with the drives parked at the start point."""
+
+    def __init__(
+        self, program: NativeProgram, kernel: str, drives: tuple[Drive, Drive], counts_per_mm: int
+    ) -> None:
+        """Set up. Raises InputError: unknown kernel, figures out of range, program not acceptable."""
+        ffi, lib = library()
+        program.require()
+        code = kernel_code(kernel)
+        self._program = program  # keeps the image alive
+        self._segments = ffi.new("struct contour_segment[]", program.segment_count)
+        self._rig = ffi.new("struct rig *")
+        configs = [drive_config(drive, counts_per_mm, program.period_us) for drive in drives]
+        error = lib.rig_begin(
+            self._rig,
+            program.pointer,
+            code,
+            ffi.new("struct drive_config[2]", configs),
+            self._segments,
+        )
+        if error != 0:
+            raise InputError(_begin_error(error))
+
+    def run(self, rows: NDArray[np.void]) -> None:
+        """Fill `rows` (contiguous, of ROW) with the next ticks."""
+        ffi, lib = library()
+        if rows.dtype != ROW or not rows.flags.c_contiguous:
+            raise ValueError("rows must be a contiguous array of ROW")
+        error = lib.rig_run(
+            self._rig, ffi.cast("struct rig_row *", ffi.from_buffer(rows)), rows.size
+        )
+        if error != 0:
+            raise HodographError(
+                f"simulation: the interpolator failed (code {error}): report a bug"
+            )
+
+
+def _begin_error(code: int) -> str:
+    _, lib = library()
+    if lib.RIG_ERR_INTERP < code < lib.RIG_ERR_DRIVE:
+        axis, error = divmod(lib.RIG_ERR_DRIVE - code, 10)
+        return f"drive of axis {axis + 1}: {text(lib.drive_error_text(-error))}: correct its file"
+    return f"simulation: cannot set up (code {code}): report a bug"

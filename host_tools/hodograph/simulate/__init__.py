@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""Runs without a bus, and the analysis that they share with recorded ones.
+
+`simulate` runs a program through the controller's own kernels and two simulated drives in one process; `analyse`
+makes the same result from what a recorder saw on the bus. Both give a `Motion`: rows, hashes, maxima.
+"""
+
+from .motion import SETTLING_S, Motion, Tally, settling_ticks
+from .recording import analyse
+from .simulation import simulate
+from .trace import TRACE_HEADER, write_trace
+
+__all__ = [
+    "SETTLING_S",
+    "TRACE_HEADER",
+    "Motion",
+    "Tally",
+    "analyse",
+    "settling_ticks",
+    "simulate",
+    "write_trace",
+]

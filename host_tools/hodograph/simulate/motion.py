@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""The result of a run, simulated or recorded: rows a tick, hashes, maxima."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+SETTLING_S = 0.2
+"""Time after the last tick that maxima count, hashes and traces do not (docs/protocol.md section 2)."""
+
+_Q40 = 2.0**-40
+_Q32 = 2.0**-32
+
+
+def settling_ticks(period_us: int) -> int:
+    """Ticks of the settling time."""
+    return round(SETTLING_S * 1e6) // period_us
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A run. Row k: setpoint k, and what the drives reported for SYNC k+2, when it is reached.
+
+    `rows` has `native.ROW` records: the program's ticks, then the settling time; it is empty when the run
+    did not keep them. Hashes are over i32 little-endian x, y of the program's ticks. The following error
+    is that of one axis, setpoint less position; the contour error is the distance from the exact curve.
+    """
+
+    kernel: str
+    period_us: int
+    counts_per_mm: int
+    ticks: int
+    rows: NDArray[np.void]
+    setpoints_sha256: str
+    encoders_sha256: str
+    max_contour_error_um: float
+    max_following_error_um: float
+    max_volts: float
+
+    def summary(self) -> dict[str, object]:
+        """The keys that tools may rely on in `--json` output."""
+        return {
+            "ticks": self.ticks,
+            "setpoints_sha256": self.setpoints_sha256,
+            "encoders_sha256": self.encoders_sha256,
+            "max_contour_error_um": self.max_contour_error_um,
+            "max_following_error_um": self.max_following_error_um,
+            "max_volts": self.max_volts,
+            "kernel": self.kernel,
+        }
+
+    @property
+    def program_rows(self) -> NDArray[np.void]:
+        """The rows of the program's ticks, without the settling time."""
+        return self.rows[: self.ticks]
+
+    @property
+    def t_s(self) -> NDArray[np.float64]:
+        """Time of each row since tick 0, s, (n,)."""
+        return np.asarray(self.rows["tick"].astype(np.float64) * self.period_us / 1e6)
+
+    @property
+    def arc_length_mm(self) -> NDArray[np.float64]:
+        """Commanded arc length, mm, (n,)."""
+        return self.rows["arc_length_q40_mm"] * _Q40
+
+    @property
+    def feed_mm_s(self) -> NDArray[np.float64]:
+        """Commanded feed, mm/s, (n,)."""
+        return self.rows["feed_q32_mm_s"] * _Q32
+
+    @property
+    def cmd_mm(self) -> NDArray[np.float64]:
+        """Commanded point from the kernel, unrounded, mm, (n, 2)."""
+        return self.rows["cmd_q40_mm"] * _Q40
+
+    @property
+    def set_mm(self) -> NDArray[np.float64]:
+        """Setpoint as it goes over the bus, mm, (n, 2)."""
+        return self.rows["set_counts"] / self.counts_per_mm
+
+    @property
+    def act_mm(self) -> NDArray[np.float64]:
+        """Encoder position, mm, (n, 2)."""
+        return self.rows["act_counts"] / self.counts_per_mm
+
+    @property
+    def following_error_um(self) -> NDArray[np.float64]:
+        """Setpoint less position, by axis, um, (n, 2)."""
+        difference = self.rows["set_counts"].astype(np.int64) - self.rows["act_counts"]
+        return difference * (1000.0 / self.counts_per_mm)
+
+    @property
+    def contour_error_um(self) -> NDArray[np.float64]:
+        """Distance of the encoder position from the exact curve, um, (n,)."""
+        return np.asarray(self.rows["contour_error_um"])
+
+    @property
+    def volts(self) -> NDArray[np.float64]:
+        """Drive voltage by axis, V, (n, 2)."""
+        return self.rows["volts_mv"] / 1000.0
+
+
+class Tally:
+    """Gathers hashes and maxima, chunk by chunk, so that a run of any length needs bounded memory."""
+
+    def __init__(self, ticks: int, counts_per_mm: int) -> None:
+        """Of a program with `ticks` ticks; what is added beyond them counts as settling."""
+        self._left = ticks
+        self._um_per_count = 1000.0 / counts_per_mm
+        self._setpoints = hashlib.sha256()
+        self._encoders = hashlib.sha256()
+        self._contour_um = 0.0
+        self._following_counts = 0
+        self._volts_mv = 0
+
+    def add(self, rows: NDArray[np.void]) -> None:
+        """The next rows, of `native.ROW`."""
+        counted = rows[: self._left]
+        self._left -= counted.size
+        self._setpoints.update(counted["set_counts"].tobytes())
+        self._encoders.update(counted["act_counts"].tobytes())
+        if rows.size == 0:
+            return
+        behind = np.abs(rows["set_counts"].astype(np.int64) - rows["act_counts"])
+        self._following_counts = max(self._following_counts, int(behind.max()))
+        self._contour_um = max(self._contour_um, float(rows["contour_error_um"].max()))
+        self._volts_mv = max(self._volts_mv, int(np.abs(rows["volts_mv"].astype(np.int32)).max()))
+
+    def motion(
+        self, *, kernel: str, period_us: int, counts_per_mm: int, ticks: int, rows: NDArray[np.void]
+    ) -> Motion:
+        """The result, with `rows` as they were kept."""
+        return Motion(
+            kernel=kernel,
+            period_us=period_us,
+            counts_per_mm=counts_per_mm,
+            ticks=ticks,
+            rows=rows,
+            setpoints_sha256=self._setpoints.hexdigest(),
+            encoders_sha256=self._encoders.hexdigest(),
+            max_contour_error_um=self._contour_um,
+            max_following_error_um=self._following_counts * self._um_per_count,
+            max_volts=self._volts_mv / 1000.0,
+        )
