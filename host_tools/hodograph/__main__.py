@@ -3,7 +3,7 @@
 
 import sys
 
-from hodograph.cli import main
+from hodograph.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Names of buses, as python-can has them: `socketcan:vcan0`, `slcan:/dev/ttyACM0@115200`, `virtual:test`."""
+
+from __future__ import annotations
+
+import fcntl
+import socket
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import BusError, InputError
+
+DEFAULT_BUS = "socketcan:vcan0"
+_SIOCGIFFLAGS = 0x8913
+_IFF_UP = 1
+
+
+@dataclass(frozen=True)
+class BusAddress:
+    """A python-can interface and a channel of it."""
+
+    interface: str
+    channel: str
+
+    def __str__(self) -> str:
+        return f"{self.interface}:{self.channel}"
+
+    @property
+    def is_socketcan(self) -> bool:
+        """Whether this is a network interface of the kernel."""
+        return self.interface == "socketcan"
+
+
+def parse_address(text: str) -> BusAddress:
+    """`interface:channel`; a bare channel means SocketCAN. Raises InputError."""
+    interface, colon, channel = text.partition(":")
+    if not colon:
+        interface, channel = "socketcan", text
+    if not interface or not channel:
+        raise InputError(f'--bus "{text}": write interface:channel, as in {DEFAULT_BUS}')
+    return BusAddress(interface, channel)
+
+
+def check_socketcan(address: BusAddress) -> None:
+    """Raises BusError with the remedy when this SocketCAN interface is not there or is down."""
+    name = address.channel
+    try:
+        probe = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    except PermissionError:
+        raise BusError(f"{address}: no permission to open CAN sockets: run as another user") from None
+    except OSError:
+        raise BusError(
+            f"{address}: this kernel has no CAN: put tools/with-vcan in front of the command"
+        ) from None
+    with probe:
+        try:
+            request = struct.pack("16sH14x", name.encode()[:15], 0)
+            flags = struct.unpack("16sH14x", fcntl.ioctl(probe, _SIOCGIFFLAGS, request))[1]
+        except OSError:
+            raise BusError(
+                f"{address}: no such network interface: put tools/with-vcan in front of the command, "
+                f"or as root: ip link add dev {name} type vcan && ip link set {name} up"
+            ) from None
+    if not flags & _IFF_UP:
+        raise BusError(f"{address}: the interface is down: as root: ip link set {name} up")
+
+
+def is_virtual(address: BusAddress) -> bool:
+    """Whether no hardware is behind this SocketCAN interface, so that simulated nodes may be started."""
+    if not address.is_socketcan:
+        return False
+    device = Path("/sys/class/net") / address.channel
+    if device.exists():
+        return "/virtual/" in str(device.resolve())
+    return address.channel.startswith(("vcan", "vxcan"))

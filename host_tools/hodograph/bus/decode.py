@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""From recorded frames to ticks: what was set, what was answered, by SYNC.
+
+Order on the bus (docs/protocol.md section 2): SYNC j, then the setpoints of tick j; the drives answer SYNC j with TPDO1
+and TPDO2, which may come before or after the setpoints, on a late host even after SYNC j+1, but never out of
+order. So the n-th answer belongs to the n-th SYNC; what sits between two SYNCs only checks that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RunError
+from .recorder import Frames
+
+SYNC_ID, RPDO1, TPDO1, TPDO2 = 0x080, 0x200, 0x180, 0x280
+SYNC_OVERFLOW = 240
+_LONGEST_LAG = 2
+_LEAD_IN = 100
+"""SYNCs at the beginning of a recording (standstill) within which a late answer must have shown itself."""
+
+Int32 = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Ticks:
+    """Rows by SYNC, columns by axis: targets sent after SYNC j, answers to SYNC j.
+
+    `volts_mv` is None when the drives send no TPDO2. Rows at both ends, which a recording cuts, are left out.
+    """
+
+    targets: Int32
+    actual: Int32
+    statuswords: NDArray[np.uint16]
+    volts_mv: NDArray[np.int16] | None
+
+    @property
+    def count(self) -> int:
+        """Number of SYNCs."""
+        return int(self.targets.shape[0])
+
+
+def decode_ticks(frames: Frames, nodes: Sequence[int]) -> Ticks:
+    """All whole ticks of a recording. Raises RunError: frames missing, doubled or out of order."""
+    identifiers = frames["id"]
+    sync_at = np.flatnonzero(identifiers == SYNC_ID)
+    if sync_at.size < 3:
+        raise RunError(f"{sync_at.size} SYNCs recorded: is the controller running?")
+    _check_counters(frames["data"][sync_at, 0].astype(np.int64))
+    targets = [_by_sync(frames, sync_at, RPDO1 + n, f"setpoints of node {n}") for n in nodes]
+    answers = [_by_sync(frames, sync_at, TPDO1 + n, f"positions of node {n}") for n in nodes]
+    streams = targets + answers
+    with_volts = all(np.any(identifiers == TPDO2 + n) for n in nodes)
+    volts = []
+    if with_volts:
+        volts = [_by_sync(frames, sync_at, TPDO2 + n, f"volts of node {n}") for n in nodes]
+        streams = streams + volts
+    count = min(len(stream) for stream in streams)
+    if count < sync_at.size - _LONGEST_LAG:
+        raise RunError(f"recording ends in the middle: {count} of {sync_at.size} ticks are whole")
+    return Ticks(
+        targets=np.stack([_integers(d[:count], 2, "<i4") for d in targets], axis=1),
+        actual=np.stack([_integers(d[:count], 2, "<i4") for d in answers], axis=1),
+        statuswords=np.stack([_integers(d[:count], 0, "<u2") for d in answers], axis=1),
+        volts_mv=np.stack([_integers(d[:count], 0, "<i2") for d in volts], axis=1)
+        if with_volts
+        else None,
+    )
+
+
+def _check_counters(counters: NDArray[np.int64]) -> None:
+    steps = (np.diff(counters) - 1) % SYNC_OVERFLOW
+    bad = np.flatnonzero(steps)
+    if bad.size or counters.min() < 1 or counters.max() > SYNC_OVERFLOW:
+        at = int(bad[0]) if bad.size else 0
+        raise RunError(
+            f"SYNC counter jumps from {counters[at]} to {counters[at + 1]} at SYNC {at}: "
+            "frames were lost, or a second SYNC producer is on the bus"
+        )
+
+
+def _by_sync(
+    frames: Frames, sync_at: NDArray[np.intp], identifier: int, what: str
+) -> NDArray[np.uint8]:
+    """Data (n, 8) of the frames with this identifier, row n belonging to SYNC n."""
+    at = np.flatnonzero(frames["id"] == identifier)
+    interval = np.searchsorted(sync_at, at) - 1
+    at, interval = at[interval >= 0], interval[interval >= 0]
+    lag = interval - np.arange(at.size)
+    # A late answer to a SYNC before the recording shifts all others by one, until the first is dropped.
+    for _ in range(_LONGEST_LAG):
+        early = np.flatnonzero(lag < 0)
+        if not early.size or early[0] > _LEAD_IN:
+            break
+        at, interval = at[1:], interval[1:]
+        lag = interval - np.arange(at.size)
+    early = np.flatnonzero(lag < 0)
+    if early.size:
+        raise RunError(f"{what}: more than one frame for SYNC {int(interval[early[0]])}")
+    late = np.flatnonzero(lag > _LONGEST_LAG)
+    if late.size:
+        raise RunError(f"{what}: no frame for SYNC {int(late[0])}: the recording is incomplete")
+    return np.asarray(frames["data"][at])
+
+
+def _integers(data: NDArray[np.uint8], offset: int, kind: str) -> NDArray[np.generic]:
+    size = np.dtype(kind).itemsize
+    return np.ascontiguousarray(data[:, offset : offset + size]).view(kind)[:, 0]

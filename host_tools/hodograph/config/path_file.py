@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""Path files: the curve, the feed asked for, its limits, and the machine to run it on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..feed import FeedRequest, Limits
+from ..feed.request import (
+    GREATEST_DEGREE,
+    GREATEST_FEED_MM_S,
+    GREATEST_N_C,
+    GREATEST_RAMP_S,
+    LEAST_DEGREE,
+    LEAST_FEED_MM_S,
+    LEAST_RAMP_S,
+    POLICIES,
+    PROFILES,
+)
+from .table import Table, read_toml
+
+COORDINATE_LIMIT_MM = 4096.0
+ENDS = ("natural", "not-a-knot", "tangent")
+
+
+@dataclass(frozen=True, eq=False)
+class PathSpec:
+    """Points (n,) as x + iy in mm, of a control polygon or to go through, and the end conditions."""
+
+    closed: bool
+    points: NDArray[np.complex128]
+    through: bool
+    ends: str | None
+    start_tangent: complex | None
+    end_tangent: complex | None
+
+
+@dataclass(frozen=True, eq=False)
+class PathFile:
+    """What a path file says. `machine_file` is None when it names none."""
+
+    file: Path
+    name: str
+    path: PathSpec
+    feed: FeedRequest
+    limits: Limits
+    machine_file: Path | None
+
+
+_SECTIONS = ("path", "feed", "limits", "machine")
+_PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent")
+_FEED = ("profile", "nominal_mm_s", "ramp_time_s", "n_c", "degree")
+_LIMITS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "policy")
+
+
+def load_path_file(file: Path) -> PathFile:
+    """The path file `file`; raises InputError. The machine file is named, not read."""
+    root = Table(file, "", read_toml(file), _SECTIONS)
+    machine = root.table("machine", ("file",), required=False)
+    return PathFile(
+        file=file,
+        name=file.stem,
+        path=_path(root.table("path", _PATH)),
+        feed=_feed(root.table("feed", _FEED)),
+        limits=_limits(root.table("limits", _LIMITS, required=False)),
+        machine_file=machine.path("file") if machine.has("file") else None,
+    )
+
+
+def _path(table: Table) -> PathSpec:
+    through = table.has("through")
+    if through and table.has("control_points"):
+        raise table.error("through", "is given beside control_points: keep one of the two")
+    if not through and not table.has("control_points"):
+        raise table.error("control_points", "is missing: add it, or through = [[x, y], ...]")
+    closed = table.flag("closed")
+    for key in ("ends", "start_tangent", "end_tangent"):
+        if table.has(key) and (closed or not through):
+            raise table.error(key, "applies to open paths with through points only: remove it")
+    tangents = table.has("start_tangent") or table.has("end_tangent")
+    return PathSpec(
+        closed=closed,
+        points=table.points("through" if through else "control_points", limit=COORDINATE_LIMIT_MM),
+        through=through,
+        ends=table.choice("ends", ENDS, "tangent" if tangents else "not-a-knot")
+        if through and not closed
+        else None,
+        start_tangent=_tangent(table, "start_tangent"),
+        end_tangent=_tangent(table, "end_tangent"),
+    )
+
+
+def _tangent(table: Table, key: str) -> complex | None:
+    if not table.has(key):
+        return None
+    value = complex(*table.pair(key, low=-1e9, high=1e9))
+    if value == 0:
+        raise table.error(key, "must not be [0, 0]: give a direction")
+    return value
+
+
+def _feed(table: Table) -> FeedRequest:
+    profile = table.choice("profile", PROFILES, "exponential")
+    return FeedRequest(
+        profile=profile,
+        nominal_mm_s=table.number("nominal_mm_s", low=LEAST_FEED_MM_S, high=GREATEST_FEED_MM_S),
+        ramp_time_s=table.number("ramp_time_s", low=LEAST_RAMP_S, high=GREATEST_RAMP_S),
+        n_c=_n_c(table),
+        degree=table.integer("degree", 5, low=LEAST_DEGREE, high=GREATEST_DEGREE),
+    )
+
+
+def _n_c(table: Table) -> float | Literal["optimise"]:
+    if table.is_text("n_c") or not table.has("n_c"):
+        table.choice("n_c", ("optimise",), "optimise")
+        return "optimise"
+    return table.number("n_c", low=0, high=GREATEST_N_C)
+
+
+def _limits(table: Table) -> Limits:
+    return Limits(
+        feed_mm_s=table.optional_number("feed_mm_s", low=0.001, high=1e5),
+        acceleration_mm_s2=table.optional_number("acceleration_mm_s2", low=0.01, high=1e9),
+        jerk_mm_s3=table.optional_number("jerk_mm_s3", low=0.1, high=1e12),
+        policy=table.choice("policy", POLICIES, "respect"),
+    )

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: MIT
+"""Reading TOML tables with checks whose messages name the file, the key and the remedy.
+
+A `Table` knows the file it came from and the name of its section, and every getter either returns a value of
+the promised type and range or raises `InputError` with one line such as
+`path.toml: [feed] nominal_mm_s must be a number, but is "fast"`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+MAX_FILE_BYTES = 64 * 2**20
+"""A configuration file above this size is refused unread (10^5 points take about 4 MB)."""
+
+_MISSING: Any = object()
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """The contents of a TOML file.
+
+    Raises InputError: no such file, not readable, too large, not UTF-8, not TOML.
+    """
+    try:
+        if file.stat().st_size > MAX_FILE_BYTES:
+            raise InputError(f"{file}: larger than {MAX_FILE_BYTES >> 20} MB: is this a path file?")
+        return tomllib.loads(file.read_bytes().decode("utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file") from None
+    except IsADirectoryError:
+        raise InputError(f"{file}: is a directory: name a TOML file") from None
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file}: not UTF-8 text (byte {error.start}): is it TOML?") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file}: not valid TOML: {_one_line(error)}") from None
+    except RecursionError:
+        raise InputError(f"{file}: not valid TOML: nested too deeply") from None
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+class Table:
+    """One table of a TOML file, with the names that it may hold."""
+
+    def __init__(
+        self, file: Path, section: str, data: Mapping[str, Any], known: Collection[str]
+    ) -> None:
+        """Wrap `data`; raises InputError when it holds a key outside `known`."""
+        self.file = file
+        self.section = section
+        self._data = data
+        for key in data:
+            if key not in known:
+                raise InputError(f"{file}: {self._name(key)}: unknown key; {_advice(key, known)}")
+
+    def _name(self, key: str) -> str:
+        return f"[{self.section}] {key}" if self.section else f"[{key}]"
+
+    def error(self, key: str, message: str) -> InputError:
+        """An InputError about one key of this table."""
+        return InputError(f"{self.file}: {self._name(key)} {message}")
+
+    def has(self, key: str) -> bool:
+        """Whether the file gives this key."""
+        return key in self._data
+
+    def is_text(self, key: str) -> bool:
+        """Whether the file gives this key, and as a text."""
+        return isinstance(self._data.get(key), str)
+
+    def _get(self, key: str, default: Any, what: str) -> Any:
+        if key in self._data:
+            return self._data[key]
+        if default is _MISSING:
+            raise self.error(key, f"is missing: add {key} = {what}")
+        return default
+
+    def number(
+        self, key: str, default: float = _MISSING, *, low: float = -1e12, high: float = 1e12
+    ) -> float:
+        """A finite number from `low` to `high`, both included."""
+        value = self._get(key, default, "a number")
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise self.error(key, f"must be a number, but is {_show(value)}")
+        if not math.isfinite(value):
+            raise self.error(key, f"must be a finite number, but is {value}")
+        if not low <= value <= high:
+            raise self.error(key, f"must be from {low:g} to {high:g}, but is {value:g}")
+        return float(value)
+
+    def optional_number(self, key: str, *, low: float, high: float) -> float | None:
+        """As `number`; None when the file does not give the key."""
+        return self.number(key, low=low, high=high) if self.has(key) else None
+
+    def integer(self, key: str, default: int = _MISSING, *, low: int, high: int) -> int:
+        """A whole number from `low` to `high`, both included."""
+        value = self._get(key, default, "a whole number")
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.error(key, f"must be a whole number, but is {_show(value)}")
+        if not low <= value <= high:
+            raise self.error(key, f"must be from {low} to {high}, but is {value}")
+        return value
+
+    def choice(self, key: str, choices: Sequence[str], default: str = _MISSING) -> str:
+        """One of the words `choices`."""
+        value = self._get(key, default, " or ".join(f'"{c}"' for c in choices))
+        if value not in choices or not isinstance(value, str):
+            advice = _advice(value, choices) if isinstance(value, str) else "use one of: "
+            if not isinstance(value, str):
+                advice += ", ".join(choices)
+            raise self.error(key, f"cannot be {_show(value)}; {advice}")
+        return value
+
+    def text(self, key: str, default: str = _MISSING) -> str:
+        """A text that is not empty."""
+        value = self._get(key, default, "a text")
+        if not isinstance(value, str) or not value.strip():
+            raise self.error(key, f"must be a text, but is {_show(value)}")
+        return value
+
+    def flag(self, key: str, default: bool = _MISSING) -> bool:
+        """true or false."""
+        value = self._get(key, default, "true or false")
+        if not isinstance(value, bool):
+            raise self.error(key, f"must be true or false, but is {_show(value)}")
+        return value
+
+    def pair(
+        self, key: str, default: tuple[float, float] = _MISSING, *, low: float, high: float
+    ) -> tuple[float, float]:
+        """Two finite numbers from `low` to `high`."""
+        value = self._get(key, default, "[a, b]")
+        if not isinstance(value, (list, tuple)) or len(value) != 2:
+            raise self.error(key, f"must be two numbers [a, b], but is {_show(value)}")
+        one = Table(self.file, self.section, {key: value[0]}, (key,))
+        two = Table(self.file, self.section, {key: value[1]}, (key,))
+        return one.number(key, low=low, high=high), two.number(key, low=low, high=high)
+
+    def points(self, key: str, *, limit: float) -> NDArray[np.complex128]:
+        """A list of [x, y] as complex numbers x + iy, each component within ±`limit`."""
+        value = self._get(key, _MISSING, "[[x, y], ...]")
+        if not isinstance(value, list) or not value:
+            raise self.error(key, f"must be a list [[x, y], ...], but is {_show(value)}")
+        for i, point in enumerate(value):
+            if not isinstance(point, list) or len(point) != 2:
+                raise self.error(key, f"point {i} must be [x, y], but is {_show(point)}")
+            for coordinate in point:
+                if isinstance(coordinate, bool) or not isinstance(coordinate, (int, float)):
+                    raise self.error(key, f"point {i} holds {_show(coordinate)}: give two numbers")
+                if not math.isfinite(coordinate):
+                    raise self.error(key, f"point {i} holds {coordinate}: give two finite numbers")
+                if abs(coordinate) > limit:
+                    raise self.error(
+                        key, f"point {i} holds {coordinate:g}: at most {limit:g} mm from 0"
+                    )
+        xy = np.asarray(value, dtype=np.float64)
+        return np.asarray(xy[:, 0] + 1j * xy[:, 1])
+
+    def table(self, key: str, known: Collection[str], *, required: bool = True) -> Table:
+        """The sub-table `key`; empty when it is absent and not required."""
+        if key not in self._data and required:
+            raise InputError(f"{self.file}: the section {self._name(key)} is missing: add it")
+        value = self._data.get(key, {})
+        if not isinstance(value, dict):
+            raise self.error(key, f"must be a section, but is {_show(value)}")
+        return Table(self.file, key, value, known)
+
+    def tables(self, key: str, known: Collection[str]) -> list[Table]:
+        """The array of tables [[key]]; at least one."""
+        value = self._data.get(key, [])
+        if not isinstance(value, list) or not value or not all(isinstance(v, dict) for v in value):
+            raise InputError(f"{self.file}: needs one section [[{key}]] or more")
+        return [Table(self.file, f"{key} {i + 1}", v, known) for i, v in enumerate(value)]
+
+    def path(self, key: str) -> Path:
+        """A file name, relative to the directory of this file."""
+        name = self.text(key)
+        if "\0" in name:
+            raise self.error(key, "holds a NUL character: name a file")
+        found = self.file.parent / Path(name).expanduser()
+        if not found.is_file():
+            raise self.error(key, f"names {found}, which is not there")
+        return found
+
+
+def _advice(key: str, known: Collection[str]) -> str:
+    near = difflib.get_close_matches(key, list(known), n=1, cutoff=0.6)
+    if near:
+        return f'did you mean "{near[0]}"?'
+    return "use one of: " + ", ".join(known)
+
+
+def _show(value: object) -> str:
+    text = repr(value) if not isinstance(value, str) else f'"{value}"'
+    text = " ".join(text.split())
+    return text if len(text) <= 40 else text[:37] + "..."
