@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: MIT
+"""Owns a user-mode Linux process with a vcan0 and joins clients to the agent inside it.
+
+Runs as a process in a session of its own, so that a Ctrl-C at the terminal does not reach it. The client that opened the
+bus is connected from the start; when that connection ends, for whatever reason, the kernel inside is ended and
+everything removed. If the broker itself is killed, the line into the kernel is cut and the agent stops the kernel.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import platform
+import selectors
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from vcan import frames, registry
+from vcan.errors import BusUnavailable
+from vcan.registry import Bus
+
+BOOT_LIMIT_S = 60.0
+_PR_SET_CHILD_SUBREAPER = 36
+_MODULES = Path("/usr/lib/uml/modules")
+_HERE = Path(__file__).resolve().parent
+
+
+class Client:
+    """A connection: one command."""
+
+    def __init__(self, connection: socket.socket, channel: int) -> None:
+        connection.setblocking(False)
+        self.connection = connection
+        self.channel = channel
+        self.decoder = frames.Decoder()
+        self.queue = bytearray()
+        self.ended = False
+
+
+class Broker:
+    """The loop between the line into the kernel and the clients."""
+
+    def __init__(self, bus: Bus, owner: socket.socket, memory: str) -> None:
+        self._bus = bus
+        self._selector = selectors.DefaultSelector()
+        self._clients: dict[int, Client] = {}
+        self._channels = 0
+        self._line_queue = bytearray()
+        self._ready = False
+        self._lock = registry.create(bus)
+        self._listener = socket.socket(socket.AF_UNIX)
+        self._listener.bind(str(bus.folder / "socket"))
+        self._listener.listen()
+        self._selector.register(self._listener, selectors.EVENT_READ, self._accept)
+        self._owner = self._add(owner)
+        self._line, inner = socket.socketpair()
+        self._line.setblocking(False)
+        self._decoder = frames.Decoder()
+        self._kernel = _boot(bus, inner, memory)
+        inner.close()
+        self._selector.register(self._line, selectors.EVENT_READ, self._line_turn)
+
+    def serve(self) -> None:
+        """Until the owner is gone or the kernel has ended; then everything is taken away."""
+        trouble = "the bus has ended"
+        limit = time.monotonic() + BOOT_LIMIT_S
+        try:
+            while not self._owner.ended:
+                self._watch()
+                for key, events in self._selector.select(None if self._ready else 1.0):
+                    key.data(events)
+                if not self._ready and time.monotonic() > limit:
+                    raise BusUnavailable(f"user-mode Linux did not start in {BOOT_LIMIT_S:.0f} s")
+        except BusUnavailable as error:
+            trouble = f"{error}{self._log_end()}"
+        finally:
+            _end(self._kernel)
+            registry.remove(self._bus)
+            self._farewell(trouble)
+
+    def _watch(self) -> None:
+        """Asks for readiness to write only where something waits."""
+        both = selectors.EVENT_READ | selectors.EVENT_WRITE
+        waiting = self._ready and bool(self._line_queue)
+        self._selector.modify(self._line, both if waiting else selectors.EVENT_READ, self._line_turn)
+        for client in self._clients.values():
+            wanted = both if client.queue else selectors.EVENT_READ
+            key = self._selector.get_key(client.connection)
+            if key.events != wanted:
+                self._selector.modify(client.connection, wanted, key.data)
+
+    def _add(self, connection: socket.socket) -> Client:
+        self._channels += 1
+        client = Client(connection, self._channels)
+        self._clients[client.channel] = client
+        self._selector.register(connection, selectors.EVENT_READ, lambda events: self._client_turn(client, events))
+        return client
+
+    def _accept(self, _events: int) -> None:
+        client = self._add(self._listener.accept()[0])
+        if self._ready:
+            client.queue += frames.encode(frames.READY, 0)
+
+    def _client_turn(self, client: Client, events: int) -> None:
+        try:
+            if events & selectors.EVENT_WRITE and client.queue:
+                del client.queue[: client.connection.send(client.queue)]
+            if events & selectors.EVENT_READ:
+                data = client.connection.recv(65536)
+                if not data:
+                    self._drop(client)
+                for kind, _, payload in client.decoder.feed(data):
+                    self._line_queue += frames.encode(kind, client.channel, payload)
+        except BlockingIOError:
+            pass
+        except (OSError, ValueError):
+            self._drop(client)
+
+    def _drop(self, client: Client) -> None:
+        if client.ended:
+            return
+        client.ended = True
+        self._selector.unregister(client.connection)
+        del self._clients[client.channel]
+        if client is not self._owner:
+            client.connection.close()
+        self._line_queue += frames.encode(frames.CLOSE, client.channel)
+
+    def _line_turn(self, events: int) -> None:
+        if events & selectors.EVENT_WRITE and self._line_queue:
+            del self._line_queue[: self._line.send(self._line_queue)]
+        if not events & selectors.EVENT_READ:
+            return
+        try:
+            data = self._line.recv(65536)
+        except ConnectionError:
+            data = b""
+        if not data:
+            raise BusUnavailable("user-mode Linux has ended" if self._ready else "user-mode Linux did not start")
+        for kind, channel, payload in self._decoder.feed(data):
+            if kind == frames.READY:
+                self._ready = True
+                for client in self._clients.values():
+                    client.queue += frames.encode(frames.READY, 0)
+            elif channel in self._clients:
+                self._clients[channel].queue += frames.encode(kind, 0, payload)
+
+    def _log_end(self) -> str:
+        with contextlib.suppress(OSError):
+            lines = (self._bus.folder / "log").read_text(errors="replace").splitlines()
+            return "".join(f"\n    {line}" for line in lines[-12:])
+        return ""
+
+    def _farewell(self, trouble: str) -> None:
+        """The last word to every client; the owner's connection is closed last, when nothing is left."""
+        others = [client for client in self._clients.values() if client is not self._owner]
+        for client in [*others, self._owner]:
+            with contextlib.suppress(OSError):
+                client.connection.settimeout(1.0)
+                client.connection.sendall(client.queue + frames.encode(frames.FAIL, 0, trouble.encode()))
+            client.connection.close()
+
+
+def _boot(bus: Bus, line: socket.socket, memory: str) -> subprocess.Popen[bytes]:
+    """Starts the kernel. Descriptors: its serial line is `line`, its console goes to the log."""
+    (bus.folder / "init").symlink_to(_HERE / "init.sh")
+    modules = next(iter(sorted(_MODULES.iterdir())), None) if _MODULES.is_dir() else None
+    if modules is None:
+        raise BusUnavailable(f"no modules of user-mode Linux under {_MODULES}; apt-get install user-mode-linux")
+    _boot_file(bus.folder / "boot", PYTHON=sys.executable, AGENT=str(_HERE / "agent.py"), MODULES=str(modules), HOST=platform.node())
+    fd = line.fileno()
+    with (bus.folder / "log").open("wb") as log:
+        return subprocess.Popen(
+            [
+                shutil.which("linux.uml") or "/usr/bin/linux.uml",
+                f"mem={memory}",
+                "rootfstype=hostfs",
+                "rw",
+                "quiet",
+                f"init={bus.folder}/init",
+                "con=null",
+                f"con0=null,fd:{log.fileno()}",
+                "ssl=null",
+                f"ssl0=fd:{fd},fd:{fd}",
+                f"uml_dir={bus.folder}/",
+            ],
+            pass_fds=(fd, log.fileno()),
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            cwd="/",
+            env={"PATH": os.environ.get("PATH", "/usr/bin:/bin"), "TMPDIR": _memory_folder(memory), "HOME": str(bus.folder)},
+            start_new_session=True,
+            preexec_fn=None if bus.cpu is None else lambda: os.sched_setaffinity(0, {bus.cpu or 0}),
+        )
+
+
+def _boot_file(path: Path, **values: str) -> None:
+    quoted = {name: value.replace("'", "'\\''") for name, value in values.items()}
+    path.write_text("".join(f"{name}='{value}'\n" for name, value in quoted.items()))
+
+
+def _memory_folder(memory: str) -> str:
+    """Where the kernel's memory file can lie: room for all of it, and mapping as code not forbidden."""
+    need = int(memory.rstrip("MG")) << (30 if memory.endswith("G") else 20)
+    for folder in ("/dev/shm", "/tmp", "/var/tmp"):  # noqa: S108
+        with contextlib.suppress(OSError):
+            facts = os.statvfs(folder)
+            if facts.f_bavail * facts.f_frsize >= need and not facts.f_flag & os.ST_NOEXEC:
+                return folder
+    raise BusUnavailable(f"neither /dev/shm, /tmp nor /var/tmp has {memory} free and may be mapped as code; make room or use --memory 512M")
+
+
+def _end(kernel: subprocess.Popen[bytes]) -> None:
+    """Ends the kernel and the stub processes it runs its processes in: all are of its session."""
+    with contextlib.suppress(ProcessLookupError):
+        while True:
+            os.killpg(kernel.pid, signal.SIGKILL)
+            with contextlib.suppress(ChildProcessError):
+                while os.waitpid(-1, os.WNOHANG)[0]:
+                    pass
+            time.sleep(0.002)
+
+
+def main(bus: Bus, owner: socket.socket, memory: str) -> None:
+    """The process: serves one bus from boot to end."""
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGPIPE):
+        signal.signal(number, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    # Stubs whose kernel has died become children of this process, which can then wait for them.
+    ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    try:
+        Broker(bus, owner, memory).serve()
+    except BusUnavailable as error:
+        registry.remove(bus)
+        with contextlib.suppress(OSError):
+            owner.sendall(frames.encode(frames.FAIL, 0, str(error).encode()))

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""Frames of the multiplexed channel between client, broker and agent.
+
+A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command inside
+(later perhaps one TCP connection). Data flows against credit, so that a slow reader holds up only itself:
+each side may send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
+"""
+
+from __future__ import annotations
+
+import struct
+
+HEADER = struct.Struct("<BII")
+COUNT = struct.Struct("<BI")  # CREDIT: stream, bytes
+STATUS = struct.Struct("<i")  # EXIT: status; SIGNAL: number
+WINDOW = 64 * 1024
+CHUNK = 4096
+LONGEST = 4 * 1024 * 1024
+
+READY = 1  # agent to broker, broker to clients: booted, the bus is up
+OPEN = 2  # client: JSON of the command: argv, env, cwd, umask, uid, gid, groups
+DATA = 3  # payload: stream u8 and bytes; no bytes: end of the stream
+CREDIT = 4  # payload: stream u8 and count u32
+SIGNAL = 5  # client: send this signal to the command's process group
+EXIT = 6  # agent: exit status of the command (128 + number when a signal ended it)
+FAIL = 7  # broker: text; there is no bus (any more)
+CLOSE = 8  # broker: the client of this channel is gone
+
+STDIN, STDOUT, STDERR = 0, 1, 2
+
+
+def encode(kind: int, channel: int, payload: bytes = b"") -> bytes:
+    """One frame."""
+    return HEADER.pack(kind, channel, len(payload)) + payload
+
+
+class Decoder:
+    """Cuts a byte stream into frames."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[tuple[int, int, bytes]]:
+        """The frames (type, channel, payload) that are complete with these bytes. ValueError: not our stream."""
+        self._buffer += data
+        frames = []
+        start = 0
+        while len(self._buffer) - start >= HEADER.size:
+            kind, channel, length = HEADER.unpack_from(self._buffer, start)
+            if not READY <= kind <= CLOSE or length > LONGEST:
+                raise ValueError(f"frame of type {kind} and length {length}")
+            end = start + HEADER.size + length
+            if len(self._buffer) < end:
+                break
+            frames.append((kind, channel, bytes(self._buffer[start + HEADER.size : end])))
+            start = end
+        del self._buffer[:start]
+        return frames

@@ -1,0 +1,27 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# First program inside user-mode Linux: the file systems a command expects, the bus, then the agent.
+# $0 lies in the folder of the bus, where `boot` sets PYTHON, AGENT, MODULES and HOST.
+PATH=/usr/sbin:/usr/bin:/sbin:/bin
+# shellcheck source=/dev/null
+. "${0%/*}/boot"
+mount -t proc proc /proc
+mount -t sysfs sys /sys
+mkdir -p /dev/pts /dev/shm
+mount -t devpts dev /dev/pts
+mount -t tmpfs shm /dev/shm
+ln -s /proc/self/fd /dev/fd
+ln -s /proc/self/fd/0 /dev/stdin
+ln -s /proc/self/fd/1 /dev/stdout
+ln -s /proc/self/fd/2 /dev/stderr
+echo "$HOST" >/proc/sys/kernel/hostname
+for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev drivers/net/can/vcan; do
+    insmod "$MODULES/kernel/$module.ko"
+done
+ip link set lo up
+ip link add dev vcan0 type vcan && ip link set vcan0 up || echo "with-vcan: no vcan0"
+"$PYTHON" -I -S "$AGENT" /dev/ttyS0
+echo "with-vcan: the agent has ended: $?"
+sync
+echo o >/proc/sysrq-trigger
+sleep 5
