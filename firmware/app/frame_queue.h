@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* frame_queue: frames from the receive interrupt to the mainline, in order. */
+#ifndef APP_FRAME_QUEUE_H
+#define APP_FRAME_QUEUE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+/* A whole SDO block (127 segments) comes without a pause, among other traffic. */
+#define FRAME_QUEUE_SIZE 256u
+
+struct frame_queue {
+    uint32_t head; /* frames ever put in; wraps */
+    uint32_t tail; /* frames ever taken out */
+    uint32_t lost; /* frames that found no room */
+    struct can_msg frames[FRAME_QUEUE_SIZE];
+};
+
+void frame_queue_init(struct frame_queue *queue);
+
+/* Returns true when the queue was empty, so that the mainline may have to be woken. Receive. */
+bool frame_queue_put(struct frame_queue *queue, const struct can_msg *frame);
+
+/* Takes the oldest; false when there is none. Under the lock. */
+bool frame_queue_take(struct frame_queue *queue, struct can_msg *frame);
+
+#endif

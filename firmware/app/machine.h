@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * machine: the axes as one machine: its state (object 0x2002), what it is told to do, what it does
+ * each tick.
+ *
+ *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
+ *                                       RUNNING -> STOPPING -> READY
+ *
+ * The state changes in two places only: in the requests below (mainline, under the lock) and in
+ * machine_step (timer). The whole struct is guarded by the port's lock.
+ */
+#ifndef APP_MACHINE_H
+#define APP_MACHINE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/axis.h"
+#include "app/config.h"
+#include "app/fault.h"
+#include "app/motion.h"
+#include "app/statistics.h"
+
+/* Values of object 0x2002. */
+enum machine_state {
+    MACHINE_BOOT = 0,     /* drives not yet found or configured */
+    MACHINE_OFF = 1,      /* drives configured, not enabled */
+    MACHINE_ENABLING = 2, /* on the way to READY */
+    MACHINE_READY = 3,    /* enabled, standstill */
+    MACHINE_RUNNING = 4,  /* a program runs, or its last point is being settled at */
+    MACHINE_STOPPING = 5, /* the same for a stop along the path */
+    MACHINE_FAULT = 6,
+};
+
+/* What goes on inside FAULT. */
+enum machine_fault_phase {
+    MACHINE_FAULT_BRAKING,   /* the drives that still obey stop along the path */
+    MACHINE_FAULT_OFF,       /* drives are switched off; waits for the reset */
+    MACHINE_FAULT_RESETTING, /* drives are being reset; then BOOT */
+};
+
+/* Why a request was refused: values of object 0x2003 sub 4. */
+enum machine_refusal {
+    MACHINE_ACCEPTED = 0,
+    MACHINE_NO_PROGRAM = 1,
+    MACHINE_AWAY_FROM_START = 2,
+    MACHINE_MOVING = 3,
+    MACHINE_DRIVES_OFF = 4,
+    MACHINE_FAULT_PRESENT = 5,
+    MACHINE_DRIVES_MISSING = 6,
+    MACHINE_OUTSIDE_LIMITS = 7,
+};
+
+#define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
+#define MACHINE_ENABLE_TICKS 2000u /* time for the drives to switch on */
+#define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
+
+struct machine {
+    struct config config;
+    struct axis axes[AXES_MAX]; /* config.axis_count of them */
+    struct motion motion;
+    struct statistics statistics;
+    struct fault fault;
+    enum machine_state state;
+    enum machine_fault_phase fault_phase; /* in FAULT */
+    uint32_t ticks_left;                  /* settling, enabling, resetting */
+    bool boot_due; /* the mainline shall find and configure the drives (anew) */
+};
+
+void machine_init(struct machine *machine, const struct config *config);
+
+/* --- Requests, mainline under the lock; MACHINE_ACCEPTED or why not, then nothing has changed ---
+ */
+
+enum machine_refusal machine_enable(struct machine *machine);
+enum machine_refusal machine_disable(struct machine *machine);
+/* Never refused; without effect when nothing runs. From ENABLING it leads back to OFF. */
+enum machine_refusal machine_request_stop(struct machine *machine);
+enum machine_refusal machine_reset(struct machine *machine);
+/* Starts a prepared motion whose first setpoint is at start_counts: copied, if the axes are
+ * enabled, stand still and are within the configured tolerance. */
+enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
+                                   const int32_t start_counts[PLANE_AXES]);
+
+/* True where 0x1006 and 0x2004 ... 0x2007 may be written: BOOT, OFF, FAULT with the axes at rest.
+ */
+bool machine_configurable(const struct machine *machine);
+/* True from start until READY, and while braking in a fault: the program must stay as it is. */
+bool machine_moving(const struct machine *machine);
+
+/* New configuration, where machine_configurable. When it concerns the drives: to BOOT. */
+void machine_configure(struct machine *machine, const struct config *config, bool drives);
+/* Forgets the drives; the mainline has to find and configure them. Under the lock. */
+void machine_enter_boot(struct machine *machine);
+/* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF. */
+void machine_drives_configured(struct machine *machine);
+
+/* Something is wrong: FAULT, stopping on the path first when a program runs. Only the first fault
+ * counts. Any context, under the lock. */
+void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail);
+
+/* --- Timer --- */
+
+/* The SYNC before this tick is over: counts missing answers, watches the drives. */
+void machine_supervise(struct machine *machine, uint32_t now_us);
+/* Moves on by one tick: states, goals and targets of the axes. */
+void machine_step(struct machine *machine);
+/* Whether setpoints are to be sent in this state. */
+bool machine_drives_operational(const struct machine *machine);
+/* Whether at lock step the next tick should come as soon as the drives have answered: something
+ * moves, switches or has to be waited for. */
+bool machine_busy(const struct machine *machine);
+
+/* --- Receive --- */
+
+/* Takes a TPDO1; true when all drives have now answered the present SYNC. */
+bool machine_receive(struct machine *machine, const struct can_msg *in, uint32_t now_us);
+
+/* The axis of a node, or NULL. Pure. */
+struct axis *machine_axis(struct machine *machine, uint8_t node);
+
+#endif

@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/program_slot.h"
+
+#include <string.h>
+
+#include "core/counts.h"
+#include "core/interp.h"
+#include "port/port.h"
+
+void program_slot_init(struct program_slot *slot)
+{
+    memset(slot, 0, sizeof *slot);
+}
+
+enum program_slot_state program_slot_state(const struct program_slot *slot)
+{
+    if (slot->receiving) {
+        return PROGRAM_SLOT_RECEIVING;
+    }
+    return slot->present ? PROGRAM_SLOT_READY : PROGRAM_SLOT_NONE;
+}
+
+static unsigned spare_bank(const struct program_slot *slot)
+{
+    return 1u - slot->bank;
+}
+
+int program_slot_begin(struct program_slot *slot, uint32_t size)
+{
+    if (size > port_store_size() || port_store_erase(spare_bank(slot)) != 0) {
+        return PORT_ERR_STORE;
+    }
+    slot->receiving = true;
+    return 0;
+}
+
+int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t *data,
+                       uint32_t size)
+{
+    return port_store_write(spare_bank(slot), offset, data, size);
+}
+
+void program_slot_abandon(struct program_slot *slot)
+{
+    slot->receiving = false;
+}
+
+static int check(const struct program *program, const struct config *config,
+                 struct program_fault *fault)
+{
+    struct program_limits limits;
+    config_limits(config, &limits);
+    return program_check(program, &limits, fault);
+}
+
+static void point_at(const struct program_slot *slot, const struct config *config,
+                     uint64_t time_q32_s, int32_t counts[PLANE_AXES])
+{
+    struct interp interp;
+    struct interp_point point;
+    if (interp_begin(&interp, &slot->program, (enum interp_kernel)config->kernel) != 0 ||
+        interp_seek(&interp, time_q32_s) != 0 || interp_at(&interp, time_q32_s, &point) < 0) {
+        return;
+    }
+    counts[0] = counts_from_q40_mm(point.x_q40_mm, config->counts_per_mm);
+    counts[1] = counts_from_q40_mm(point.y_q40_mm, config->counts_per_mm);
+}
+
+static void find_ends(struct program_slot *slot, const struct config *config)
+{
+    point_at(slot, config, 0, slot->start_counts);
+    point_at(slot, config, slot->program.header.duration_q32_s, slot->end_counts);
+}
+
+int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config)
+{
+    const unsigned bank = spare_bank(slot);
+    struct program candidate;
+    slot->refused.index = 0;
+    slot->refused.code = program_open(&candidate, port_store_data(bank), size);
+    if (slot->refused.code == 0 && candidate.header.image_size != size) {
+        slot->refused.code = PROGRAM_ERR_SIZE;
+    }
+    if (slot->refused.code == 0) {
+        (void)check(&candidate, config, &slot->refused);
+    }
+    slot->receiving = false;
+    if (slot->refused.code != 0) {
+        return slot->refused.code;
+    }
+    slot->program = candidate;
+    slot->bank = bank;
+    slot->present = true;
+    slot->acceptable = true;
+    slot->checked = true;
+    find_ends(slot, config);
+    return 0;
+}
+
+void program_slot_stale(struct program_slot *slot)
+{
+    slot->checked = false;
+}
+
+void program_slot_refresh(struct program_slot *slot, const struct config *config)
+{
+    if (!slot->present || slot->checked) {
+        return;
+    }
+    struct program_fault fault = {.code = 0, .index = 0};
+    slot->acceptable = check(&slot->program, config, &fault) == 0;
+    if (!slot->acceptable) {
+        slot->refused = fault;
+    }
+    find_ends(slot, config);
+    slot->checked = true;
+}

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * program_slot: the active program and the upload of its successor (object 0x2000).
+ *
+ * An upload goes to the spare bank of the port's store; only a complete image that passes every
+ * check takes over, so a broken or refused one leaves the active program as it was. Mainline.
+ * Nobody may run the program while an upload ends (see machine_moving).
+ */
+#ifndef APP_PROGRAM_SLOT_H
+#define APP_PROGRAM_SLOT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/config.h"
+#include "core/program.h"
+#include "core/program_check.h"
+
+/* Values of object 0x2000 sub 2. */
+enum program_slot_state {
+    PROGRAM_SLOT_NONE = 0,
+    PROGRAM_SLOT_RECEIVING = 1,
+    PROGRAM_SLOT_READY = 2,
+};
+
+struct program_slot {
+    struct program program;           /* active, when present */
+    struct program_fault refused;     /* last refusal; code 0: none */
+    int32_t start_counts[PLANE_AXES]; /* first and last setpoint with the present configuration */
+    int32_t end_counts[PLANE_AXES];
+    unsigned bank; /* of the active program */
+    bool present;
+    bool receiving;
+    bool checked;    /* the three below hold for the present configuration */
+    bool acceptable; /* within the limits now configured */
+};
+
+void program_slot_init(struct program_slot *slot);
+
+enum program_slot_state program_slot_state(const struct program_slot *slot);
+
+/* An upload: begin, write in order, then finish or abandon. 0 or PORT_ERR_STORE; finish: 0 or the
+ * code that is then in slot->refused. */
+int program_slot_begin(struct program_slot *slot, uint32_t size);
+int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t *data,
+                       uint32_t size);
+int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config);
+void program_slot_abandon(struct program_slot *slot);
+
+/* The configuration has changed: the next refresh checks anew. */
+void program_slot_stale(struct program_slot *slot);
+
+/* Brings start, end and `acceptable` up to date; costs a whole check when stale. */
+void program_slot_refresh(struct program_slot *slot, const struct config *config);
+
+#endif
