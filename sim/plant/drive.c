@@ -29,8 +29,9 @@ static bool drive_gains_ok(const struct drive_pdff *g)
     const double gains[] = {g->k_pp_rad_s_mm, g->k_pv_nm_s_rad, g->k_iv_per_s, g->k_pf_rad_mm,
                             g->k_vf};
     for (size_t i = 0; i < sizeof gains / sizeof gains[0]; i++) {
-        if (!(gains[i] >= 0.0 && gains[i] <= 1e9))
+        if (!(gains[i] >= 0.0 && gains[i] <= 1e9)) {
             return false;
+        }
     }
     return true;
 }
@@ -46,23 +47,29 @@ static uint32_t drive_samples(const struct drive_config *c)
 {
     const uint64_t scaled = (uint64_t)c->loop_rate_hz * c->period_us;
     if (c->period_us < 1 || c->period_us > 1000000 || scaled % 1000000 != 0 ||
-        scaled / 1000000 > 65536)
+        scaled / 1000000 > 65536) {
         return 0;
+    }
     return (uint32_t)(scaled / 1000000);
 }
 
 static int drive_check(const struct drive_config *c)
 {
-    if (!drive_plant_ok(&c->plant))
+    if (!drive_plant_ok(&c->plant)) {
         return DRIVE_ERR_PLANT;
-    if (!drive_gains_ok(&c->pdff))
+    }
+    if (!drive_gains_ok(&c->pdff)) {
         return DRIVE_ERR_GAIN;
-    if (!drive_encoder_ok(c))
+    }
+    if (!drive_encoder_ok(c)) {
         return DRIVE_ERR_ENCODER;
-    if (drive_samples(c) == 0)
+    }
+    if (drive_samples(c) == 0) {
         return DRIVE_ERR_RATE;
-    if (c->plant.time_constant_s * (double)c->loop_rate_hz < 1.0)
+    }
+    if (c->plant.time_constant_s * (double)c->loop_rate_hz < 1.0) {
         return DRIVE_ERR_STEP;
+    }
     return 0;
 }
 
@@ -101,8 +108,9 @@ static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
 int drive_init(struct drive *d, const struct drive_config *c)
 {
     const int error = drive_check(c);
-    if (error != 0)
+    if (error != 0) {
         return error;
+    }
     drive_set_up_loop(d, c);
     motor_init(&d->motor, c->plant.gain_rad_s_v, c->plant.time_constant_s, c->plant.screw_mm_rad,
                d->pdff.step_s);
@@ -157,10 +165,12 @@ static bool drive_stays_parked(struct drive *d, int32_t target_counts)
         d->parked = false;
         return false;
     }
-    if (d->same_target_periods < DRIVE_PARK_PERIODS)
+    if (d->same_target_periods < DRIVE_PARK_PERIODS) {
         d->same_target_periods++;
-    if (!d->parked && d->same_target_periods == DRIVE_PARK_PERIODS && drive_near_target(d))
+    }
+    if (!d->parked && d->same_target_periods == DRIVE_PARK_PERIODS && drive_near_target(d)) {
         drive_place(d, target_counts);
+    }
     return d->parked;
 }
 
@@ -192,8 +202,9 @@ static inline void drive_sample(struct drive *d, const struct command *c, uint32
 static void drive_run(struct drive *d, int32_t target_counts)
 {
     const struct command c = drive_command(d, target_counts);
-    for (uint32_t i = 0; i < d->samples; i++)
+    for (uint32_t i = 0; i < d->samples; i++) {
         drive_sample(d, &c, i);
+    }
 }
 
 static void drive_run_pair(struct drive *first, struct drive *second,
@@ -209,8 +220,9 @@ static void drive_run_pair(struct drive *first, struct drive *second,
 
 void drive_period(struct drive *d, int32_t target_counts)
 {
-    if (!drive_stays_parked(d, target_counts))
+    if (!drive_stays_parked(d, target_counts)) {
         drive_run(d, target_counts);
+    }
 }
 
 void drive_period_pair(struct drive *first, struct drive *second, const int32_t target_counts[2])
@@ -221,10 +233,12 @@ void drive_period_pair(struct drive *first, struct drive *second, const int32_t 
         drive_run_pair(first, second, target_counts);
         return;
     }
-    if (!first_parked)
+    if (!first_parked) {
         drive_run(first, target_counts[0]);
-    if (!second_parked)
+    }
+    if (!second_parked) {
         drive_run(second, target_counts[1]);
+    }
 }
 
 int32_t drive_position_counts(const struct drive *d)

@@ -13,9 +13,11 @@ void encoder_init(struct encoder *encoder, double screw_mm_rad, uint32_t counts_
 
 int32_t encoder_to_i32(double value)
 {
-    if (value >= (double)INT32_MAX)
+    if (value >= (double)INT32_MAX) {
         return INT32_MAX;
-    if (value <= (double)INT32_MIN)
+    }
+    if (value <= (double)INT32_MIN) {
         return INT32_MIN;
+    }
     return (int32_t)encoder_round(value);
 }

@@ -10,11 +10,13 @@ static double motor_phi(int k, double z)
 {
     enum { TERMS = 20 };
     double first = 1.0;
-    for (int i = 2; i <= k; i++)
+    for (int i = 2; i <= k; i++) {
         first /= i;
+    }
     double sum = 1.0;
-    for (int i = TERMS; i >= 1; i--)
+    for (int i = TERMS; i >= 1; i--) {
         sum = 1.0 - z / (double)(k + i) * sum;
+    }
     return first * sum;
 }
 

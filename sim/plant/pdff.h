@@ -39,10 +39,12 @@ static inline double pdff_step(const struct pdff *pdff, double *integral_rad,
     const double integral = *integral_rad + pdff->step_s * (speed_ref - in->speed_rad_s);
     const double volts = pdff->volts_s_rad *
                          (pdff->k_vf * speed_ref + pdff->k_iv_per_s * integral - in->speed_rad_s);
-    if (volts > pdff->volts_limit)
+    if (volts > pdff->volts_limit) {
         return pdff->volts_limit;
-    if (volts < -pdff->volts_limit)
+    }
+    if (volts < -pdff->volts_limit) {
         return -pdff->volts_limit;
+    }
     *integral_rad = integral;
     return volts;
 }

@@ -112,12 +112,15 @@ void contour_begin(struct contour *c, const struct program *program,
 /* Brings an arc length into the program: modulo the length on a closed path, else clamped. */
 static double contour_wrap(const struct contour *c, double arc_length_mm)
 {
-    if (c->closed && arc_length_mm < 0.0)
+    if (c->closed && arc_length_mm < 0.0) {
         return arc_length_mm + c->length_mm;
-    if (c->closed && arc_length_mm > c->length_mm)
+    }
+    if (c->closed && arc_length_mm > c->length_mm) {
         return arc_length_mm - c->length_mm;
-    if (arc_length_mm > c->length_mm)
+    }
+    if (arc_length_mm > c->length_mm) {
         return c->length_mm;
+    }
     return arc_length_mm >= 0.0 ? arc_length_mm : 0.0;
 }
 
@@ -130,18 +133,21 @@ static bool contour_holds(const struct contour *c, uint32_t i, double arc_length
 /* The segment that holds an arc length: the last one used, its successor, or by bisection. */
 static uint32_t contour_find(const struct contour *c, uint32_t hint, double arc_length_mm)
 {
-    if (contour_holds(c, hint, arc_length_mm))
+    if (contour_holds(c, hint, arc_length_mm)) {
         return hint;
-    if (hint + 1 < c->count && contour_holds(c, hint + 1, arc_length_mm))
+    }
+    if (hint + 1 < c->count && contour_holds(c, hint + 1, arc_length_mm)) {
         return hint + 1;
+    }
     uint32_t low = 0;
     uint32_t high = c->count;
     while (high - low > 1) {
         const uint32_t middle = low + (high - low) / 2;
-        if (c->segments[middle].start_mm <= arc_length_mm)
+        if (c->segments[middle].start_mm <= arc_length_mm) {
             low = middle;
-        else
+        } else {
             high = middle;
+        }
     }
     return low;
 }
@@ -258,10 +264,11 @@ static double contour_search(const struct contour *c, double arc_length_mm, doub
     for (int i = 0; i < CONTOUR_SECTIONS; i++) {
         const double inner_low = high - golden * (high - low);
         const double inner_high = low + golden * (high - low);
-        if (contour_gap_at(c, inner_low, point) < contour_gap_at(c, inner_high, point))
+        if (contour_gap_at(c, inner_low, point) < contour_gap_at(c, inner_high, point)) {
             high = inner_high;
-        else
+        } else {
             low = inner_low;
+        }
     }
     const double gap = contour_gap_at(c, 0.5 * (low + high), point);
     return gap < least ? gap : least;
@@ -276,8 +283,9 @@ double contour_distance_mm(struct contour *c, double arc_length_mm, const double
     const double gap = contour_gap(c, start, point);
     const struct foot foot = contour_newton(c, start, point);
     const double window = CONTOUR_WINDOW * gap + 0.001;
-    if (foot.found && foot.distance_mm <= gap + CONTOUR_STEP_MM && fabs(foot.moved_mm) <= window)
+    if (foot.found && foot.distance_mm <= gap + CONTOUR_STEP_MM && fabs(foot.moved_mm) <= window) {
         return foot.distance_mm;
+    }
     return contour_search(c, arc, window, point);
 }
 

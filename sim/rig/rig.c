@@ -10,8 +10,9 @@ typedef char rig_assert_row_has_no_holes[sizeof(struct rig_row) == 64 ? 1 : -1];
 static int rig_start_point(struct rig *rig, const struct program *program, int32_t start[2])
 {
     struct interp_point point;
-    if (interp_at(&rig->interp, 0, &point) < 0)
+    if (interp_at(&rig->interp, 0, &point) < 0) {
         return RIG_ERR_INTERP;
+    }
     start[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
     start[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
     return interp_begin(&rig->interp, program, rig->interp.kernel) == 0 ? 0 : RIG_ERR_INTERP;
@@ -22,10 +23,12 @@ static int rig_drives(struct rig *rig, const struct program *program,
 {
     for (int axis = 0; axis < 2; axis++) {
         const int error = drive_init(&rig->drives[axis], &drives[axis]);
-        if (error != 0)
+        if (error != 0) {
             return RIG_ERR_DRIVE - 10 * axis + error;
-        if (drives[axis].period_us != program->header.period_us)
+        }
+        if (drives[axis].period_us != program->header.period_us) {
             return RIG_ERR_PERIOD;
+        }
     }
     return drives[0].counts_per_mm == drives[1].counts_per_mm ? 0 : RIG_ERR_COUNTS;
 }
@@ -35,17 +38,21 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
 {
     int32_t start[2];
     int error = rig_drives(rig, program, drives);
-    if (error != 0)
+    if (error != 0) {
         return error;
+    }
     rig->counts_per_mm = drives[0].counts_per_mm;
     rig->tick = 0;
-    if (interp_begin(&rig->interp, program, kernel) != 0)
+    if (interp_begin(&rig->interp, program, kernel) != 0) {
         return RIG_ERR_KERNEL;
+    }
     error = rig_start_point(rig, program, start);
-    if (error != 0)
+    if (error != 0) {
         return error;
-    for (int axis = 0; axis < 2; axis++)
+    }
+    for (int axis = 0; axis < 2; axis++) {
         drive_place(&rig->drives[axis], start[axis]);
+    }
     timebase_begin(&rig->timebase, program, program->header.period_us);
     contour_begin(&rig->contour, program, segments);
     return 0;
@@ -54,8 +61,9 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
 static int rig_command(struct rig *rig, struct rig_row *row)
 {
     struct interp_point point;
-    if (interp_at(&rig->interp, timebase_step(&rig->timebase), &point) < 0)
+    if (interp_at(&rig->interp, timebase_step(&rig->timebase), &point) < 0) {
         return RIG_ERR_INTERP;
+    }
     row->arc_length_q40_mm = point.arc_length_q40_mm;
     row->feed_q32_mm_s = point.feed_q32_mm_s;
     row->cmd_q40_mm[0] = point.x_q40_mm;
@@ -79,8 +87,9 @@ int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
         const int error = rig_command(rig, &rows[i]);
-        if (error != 0)
+        if (error != 0) {
             return error;
+        }
         rig_move(rig, &rows[i]);
         contour_errors_um(&rig->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
                           rig->counts_per_mm, &rows[i].contour_error_um);
@@ -91,8 +100,9 @@ int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n)
 static int rig_point(struct interp *interp, uint64_t time_q32_s, struct interp_point *point)
 {
     int result = interp_at(interp, time_q32_s, point);
-    if (result == INTERP_ERR_JUMP && interp_seek(interp, time_q32_s) == 0)
+    if (result == INTERP_ERR_JUMP && interp_seek(interp, time_q32_s) == 0) {
         result = interp_at(interp, time_q32_s, point);
+    }
     return result < 0 ? RIG_ERR_INTERP : 0;
 }
 
@@ -100,10 +110,12 @@ int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts)
 {
     for (uint32_t i = 0; i < n; i++) {
-        if (rig_point(interp, time_q32_s[i], &points[i]) != 0)
+        if (rig_point(interp, time_q32_s[i], &points[i]) != 0) {
             return RIG_ERR_INTERP;
-        if (counts == NULL)
+        }
+        if (counts == NULL) {
             continue;
+        }
         counts[2 * i] = counts_from_q40_mm(points[i].x_q40_mm, counts_per_mm);
         counts[2 * i + 1] = counts_from_q40_mm(points[i].y_q40_mm, counts_per_mm);
     }
@@ -130,6 +142,7 @@ void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64
 
 void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts)
 {
-    for (uint32_t i = 0; i < n; i++)
+    for (uint32_t i = 0; i < n; i++) {
         counts[i] = counts_from_q40_mm(q40_mm[i], counts_per_mm);
+    }
 }

@@ -92,7 +92,7 @@ class Motion:
     def following_error_um(self) -> NDArray[np.float64]:
         """Setpoint less position, by axis, um, (n, 2)."""
         difference = self.rows["set_counts"].astype(np.int64) - self.rows["act_counts"]
-        return difference * (1000.0 / self.counts_per_mm)
+        return np.asarray(difference * (1000.0 / self.counts_per_mm))
 
     @property
     def contour_error_um(self) -> NDArray[np.float64]:

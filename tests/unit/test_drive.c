@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: MIT */
+#include "plant/drive.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "unity.h"
+
+enum { TICKS = 400 };
+
+static struct drive_config config;
+
+void setUp(void)
+{
+    const struct drive_config alpha_x = {
+        .plant = {83.0089, 0.19936, 1.59, 1.0 / 0.716, 5.0},
+        .pdff = {97.38, 1.19, 252.8, 0.8, 0.85},
+        .encoder_counts_per_rev = 1u << 20,
+        .loop_rate_hz = 16000,
+        .counts_per_mm = 1000000,
+        .period_us = 1000,
+    };
+    config = alpha_x;
+}
+
+void tearDown(void)
+{
+}
+
+static struct drive made(void)
+{
+    struct drive d;
+    TEST_ASSERT_EQUAL_INT(0, drive_init(&d, &config));
+    return d;
+}
+
+/* A smooth start to 100 mm/s on a circle of 8 mm radius, one coordinate of it. */
+static int32_t target_at(int k)
+{
+    const double t = k * 1e-3, u = t / 0.1;
+    const double s =
+        u < 1.0 ? 10.0 * u * u * u * u * (2.5 - 3.0 * u + u * u) : 5.0 + 100.0 * (t - 0.1);
+    return (int32_t)lrint(8e6 * sin(s / 8.0));
+}
+
+/* The continuous loop of paper.md section 5 between the same setpoints: Runge and Kutta, 2.5 us. */
+struct flow {
+    double position_mm, speed_rad_s, integral_rad;
+};
+
+static struct flow flow_rate(struct flow y, double command_mm, double command_mm_s)
+{
+    const struct drive_plant *p = &config.plant;
+    const struct drive_pdff *g = &config.pdff;
+    const double ref =
+        g->k_pp_rad_s_mm * (command_mm - y.position_mm) + g->k_pf_rad_mm * command_mm_s;
+    const double torque =
+        g->k_pv_nm_s_rad * (g->k_vf * ref + g->k_iv_per_s * y.integral_rad - y.speed_rad_s);
+    const double volts = fmin(fmax(p->torque_to_volts * torque, -p->volts_limit), p->volts_limit);
+    const struct flow rate = {p->screw_mm_rad * y.speed_rad_s,
+                              (p->gain_rad_s_v * volts - y.speed_rad_s) / p->time_constant_s,
+                              ref - y.speed_rad_s};
+    return rate;
+}
+
+static struct flow flow_add(struct flow y, struct flow rate, double h)
+{
+    const struct flow sum = {y.position_mm + h * rate.position_mm,
+                             y.speed_rad_s + h * rate.speed_rad_s,
+                             y.integral_rad + h * rate.integral_rad};
+    return sum;
+}
+
+static struct flow flow_period(struct flow y, double from_mm, double to_mm)
+{
+    enum { STEPS = 400 };
+    const double h = 1e-3 / STEPS, v = (to_mm - from_mm) / 1e-3;
+    for (int i = 0; i < STEPS; i++) {
+        const double x = from_mm + v * h * i;
+        const struct flow k1 = flow_rate(y, x, v);
+        const struct flow k2 = flow_rate(flow_add(y, k1, h / 2), x + v * h / 2, v);
+        const struct flow k3 = flow_rate(flow_add(y, k2, h / 2), x + v * h / 2, v);
+        const struct flow k4 = flow_rate(flow_add(y, k3, h), x + v * h, v);
+        y = flow_add(y, k1, h / 6);
+        y = flow_add(y, k2, h / 3);
+        y = flow_add(y, k3, h / 3);
+        y = flow_add(y, k4, h / 6);
+    }
+    return y;
+}
+
+/* Largest distance of the sampled drive from the continuous loop, um. */
+static double sampling_error_um(uint32_t loop_rate_hz)
+{
+    config.loop_rate_hz = loop_rate_hz;
+    struct drive d = made();
+    struct flow y = {0.0, 0.0, 0.0};
+    double worst = 0.0;
+    for (int k = 1; k < TICKS; k++) {
+        y = flow_period(y, target_at(k - 1) * 1e-6, target_at(k) * 1e-6);
+        drive_period(&d, target_at(k));
+        worst = fmax(worst, fabs(drive_position_counts(&d) * 1e-6 - y.position_mm));
+    }
+    return worst * 1e3;
+}
+
+/* First order in the servo sample, as a zero-order hold must be; the figures stand in numerics.md
+ * section 13. */
+static void test_sampling_converges_to_the_continuous_loop(void)
+{
+    const double coarse = sampling_error_um(8000), usual = sampling_error_um(16000);
+    const double fine = sampling_error_um(64000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.46, usual);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 2.0, coarse / usual);
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 4.0, usual / fine);
+}
+
+static void test_pair_gives_the_bits_of_single_drives(void)
+{
+    struct drive a = made(), b = made(), c = a, d = b;
+    config.pdff.k_pv_nm_s_rad = 1.53;
+    TEST_ASSERT_EQUAL_INT(0, drive_init(&b, &config));
+    d = b;
+    for (int k = 0; k < TICKS; k++) {
+        const int32_t targets[2] = {target_at(k), k < 50 ? 0 : -target_at(k)};
+        drive_period(&a, targets[0]);
+        drive_period(&b, targets[1]);
+        drive_period_pair(&c, &d, targets);
+        TEST_ASSERT_TRUE(a.state.position_mm == c.state.position_mm && a.volts == c.volts);
+        TEST_ASSERT_TRUE(b.state.position_mm == d.state.position_mm && b.volts == d.volts);
+    }
+}
+
+static void test_parked_drive_does_not_move(void)
+{
+    struct drive d = made();
+    drive_place(&d, -1234567);
+    const int32_t position = drive_position_counts(&d);
+    for (int k = 0; k < 1000; k++) {
+        drive_period(&d, -1234567);
+        TEST_ASSERT_TRUE(drive_parked(&d));
+        TEST_ASSERT_EQUAL_INT32(position, drive_position_counts(&d));
+        TEST_ASSERT_EQUAL_INT16(0, drive_volts_mv(&d));
+    }
+    TEST_ASSERT_INT32_WITHIN(5, -1234567, position);
+}
+
+/* Whatever way an axis came, once parked it has the state of one placed there. */
+static void test_parks_after_250_periods_in_the_same_state(void)
+{
+    struct drive d = made(), placed = made();
+    drive_place(&placed, 5000000);
+    for (int k = 0; k <= 1000; k++) {
+        drive_period(&d, 5000 * k);
+    }
+    for (int k = 1; k < DRIVE_PARK_PERIODS; k++) {
+        drive_period(&d, 5000000);
+        TEST_ASSERT_FALSE(drive_parked(&d));
+    }
+    drive_period(&d, 5000000);
+    TEST_ASSERT_TRUE(drive_parked(&d));
+    for (int k = 0; k < 50; k++) {
+        drive_period(&d, 5000000 + 1000 * k);
+        drive_period(&placed, 5000000 + 1000 * k);
+        TEST_ASSERT_TRUE(d.state.position_mm == placed.state.position_mm);
+        TEST_ASSERT_TRUE(d.volts == placed.volts);
+    }
+}
+
+static void test_held_drive_starts_from_where_it_is(void)
+{
+    struct drive d = made();
+    for (int k = 0; k < 200; k++) {
+        drive_period(&d, target_at(k));
+    }
+    drive_hold(&d);
+    const int32_t position = drive_position_counts(&d);
+    TEST_ASSERT_EQUAL_INT16(0, drive_volts_mv(&d));
+    for (int k = 0; k < 300; k++) {
+        drive_period(&d, position);
+        TEST_ASSERT_INT32_WITHIN(20, position, drive_position_counts(&d));
+    }
+    TEST_ASSERT_TRUE(drive_parked(&d));
+}
+
+static void test_volts_saturate_on_a_jump(void)
+{
+    struct drive d = made();
+    drive_period(&d, 1000000);
+    TEST_ASSERT_EQUAL_INT16(5000, drive_volts_mv(&d));
+    for (int k = 0; k < 700; k++) {
+        drive_period(&d, 1000000);
+    }
+    TEST_ASSERT_INT32_WITHIN(20, 1000000, drive_position_counts(&d));
+}
+
+static int init_error(void)
+{
+    struct drive d;
+    const int error = drive_init(&d, &config);
+    TEST_ASSERT_TRUE(strlen(drive_error_text(error)) > 5);
+    setUp();
+    return error;
+}
+
+static void test_bad_figures_are_refused(void)
+{
+    config.plant.gain_rad_s_v = 0.0;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_PLANT, init_error());
+    config.plant.time_constant_s = (double)NAN;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_PLANT, init_error());
+    config.plant.volts_limit = 33.0;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_PLANT, init_error());
+    config.pdff.k_vf = -0.1;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_GAIN, init_error());
+    config.pdff.k_iv_per_s = (double)INFINITY;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_GAIN, init_error());
+    config.encoder_counts_per_rev = 0;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_ENCODER, init_error());
+    config.counts_per_mm = 0;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_ENCODER, init_error());
+    config.loop_rate_hz = 16001;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_RATE, init_error());
+    config.loop_rate_hz = 0;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_RATE, init_error());
+    config.plant.time_constant_s = 5e-5;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_STEP, init_error());
+    TEST_ASSERT_EQUAL_INT(0, init_error());
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_sampling_converges_to_the_continuous_loop);
+    RUN_TEST(test_pair_gives_the_bits_of_single_drives);
+    RUN_TEST(test_parked_drive_does_not_move);
+    RUN_TEST(test_parks_after_250_periods_in_the_same_state);
+    RUN_TEST(test_held_drive_starts_from_where_it_is);
+    RUN_TEST(test_volts_saturate_on_a_jump);
+    RUN_TEST(test_bad_figures_are_refused);
+    return UNITY_END();
+}

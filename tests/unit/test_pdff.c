@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: MIT */
+#include "plant/pdff.h"
+
+#include "unity.h"
+
+static const struct pdff LOOP = {
+    .k_pp_rad_s_mm = 100.0,
+    .k_pf_rad_mm = 0.5,
+    .k_vf = 0.8,
+    .k_iv_per_s = 250.0,
+    .volts_s_rad = 2.0,
+    .volts_limit = 5.0,
+    .step_s = 1e-3,
+};
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+/* By hand: ref = 100 * 0.01 + 0.5 * 2 = 2; integral = 0.1 + 1e-3 * (2 - 1.5) = 0.1005;
+ * volts = 2 (0.8 * 2 + 250 * 0.1005 - 1.5) = 50.45, too much; with integral 0.001: 2 (1.6 + 0.375
+ * - 1.5) */
+static void test_one_sample_by_hand(void)
+{
+    const struct pdff_input in = {1.01, 2.0, 1.0, 1.5};
+    double integral = 0.001;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.95, pdff_step(&LOOP, &integral, &in));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.0015, integral);
+}
+
+static void test_saturates_and_stops_the_integral(void)
+{
+    const struct pdff_input up = {1.0, 0.0, 0.0, 0.0}, down = {-1.0, 0.0, 0.0, 0.0};
+    double integral = 0.125;
+    TEST_ASSERT_TRUE(pdff_step(&LOOP, &integral, &up) == 5.0);
+    TEST_ASSERT_TRUE(integral == 0.125);
+    integral = -0.125;
+    TEST_ASSERT_TRUE(pdff_step(&LOOP, &integral, &down) == -5.0);
+    TEST_ASSERT_TRUE(integral == -0.125);
+}
+
+static void test_at_rest_stays_at_rest(void)
+{
+    const struct pdff_input in = {3.0, 0.0, 3.0, 0.0};
+    double integral = 0.0;
+    TEST_ASSERT_TRUE(pdff_step(&LOOP, &integral, &in) == 0.0);
+    TEST_ASSERT_TRUE(integral == 0.0);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_one_sample_by_hand);
+    RUN_TEST(test_saturates_and_stops_the_integral);
+    RUN_TEST(test_at_rest_stays_at_rest);
+    return UNITY_END();
+}
