@@ -246,7 +246,9 @@ class Reader:
         subs = self.subs(section)
         declared = self.number(section, "SubNumber")
         if declared != len(subs):
-            raise EdsError(f"[{section}] SubNumber={declared}, but there are {len(subs)} sub-indices")
+            raise EdsError(
+                f"[{section}] SubNumber={declared}, but there are {len(subs)} sub-indices"
+            )
         values = tuple(self.value(name, index, sub) for sub, name in subs)
         self.check_shape(section, kind, values)
         return Entry(index, label, kind, values)

@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: MIT */
+#include "canopen/emcy.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "canopen/cob.h"
+
+#define EMCY_BYTES 8u
+#define QUEUE_SIZE (sizeof((struct emcy_producer *)0)->queue / sizeof(struct emcy))
+
+void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *error_register,
+                        uint32_t *history, uint8_t *history_count, uint8_t history_size)
+{
+    memset(producer, 0, sizeof *producer);
+    producer->error_register = error_register;
+    producer->history = history;
+    producer->history_count = history_count;
+    producer->history_size = history_size;
+    producer->node = node;
+    *error_register = 0;
+    emcy_producer_forget(producer);
+}
+
+static void queue(struct emcy_producer *producer, uint16_t code, const uint8_t *detail)
+{
+    if (producer->queued == QUEUE_SIZE) {
+        return;
+    }
+    struct emcy *emcy = &producer->queue[producer->queued];
+    emcy->code = code;
+    emcy->error_register = *producer->error_register;
+    memset(emcy->detail, 0, sizeof emcy->detail);
+    if (detail != NULL) {
+        memcpy(emcy->detail, detail, sizeof emcy->detail);
+    }
+    producer->queued++;
+}
+
+static void remember(struct emcy_producer *producer, uint16_t code, const uint8_t *detail)
+{
+    uint32_t more = detail == NULL ? 0 : (uint32_t)cob_get(detail, 2);
+
+    for (uint8_t i = (uint8_t)(producer->history_size - 1u); i > 0; i--) {
+        producer->history[i] = producer->history[i - 1];
+    }
+    producer->history[0] = code | (more << 16);
+    if (*producer->history_count < producer->history_size) {
+        (*producer->history_count)++;
+    }
+}
+
+void emcy_producer_raise(struct emcy_producer *producer, uint16_t code, uint8_t bits,
+                         const uint8_t detail[EMCY_DETAIL_SIZE])
+{
+    *producer->error_register = (uint8_t)(*producer->error_register | bits | EMCY_REGISTER_GENERIC);
+    remember(producer, code, detail);
+    queue(producer, code, detail);
+}
+
+void emcy_producer_clear(struct emcy_producer *producer, uint8_t bits)
+{
+    uint8_t before = *producer->error_register;
+    uint8_t left = (uint8_t)(before & (uint8_t)~bits);
+
+    if ((left & (uint8_t)~EMCY_REGISTER_GENERIC) == 0) {
+        left = 0;
+    }
+    *producer->error_register = left;
+    if (before != 0 && left == 0) {
+        queue(producer, EMCY_NO_ERROR, NULL);
+    }
+}
+
+void emcy_producer_forget(struct emcy_producer *producer)
+{
+    memset(producer->history, 0, producer->history_size * sizeof *producer->history);
+    *producer->history_count = 0;
+}
+
+int emcy_producer_process(struct emcy_producer *producer, struct can_msg *out)
+{
+    const struct emcy *first = &producer->queue[0];
+
+    if (producer->queued == 0) {
+        return 0;
+    }
+    cob_frame(out, COB_EMCY + producer->node, EMCY_BYTES);
+    cob_put(out->data, first->code, 2);
+    out->data[2] = first->error_register;
+    memcpy(out->data + 3, first->detail, EMCY_DETAIL_SIZE);
+    producer->queued--;
+    memmove(&producer->queue[0], &producer->queue[1], producer->queued * sizeof *first);
+    return 1;
+}
+
+uint8_t emcy_decode(const struct can_msg *in, struct emcy *emcy)
+{
+    if (in->id <= COB_EMCY || in->id > COB_EMCY + NODE_ID_MAX || in->len != EMCY_BYTES) {
+        return 0;
+    }
+    emcy->code = (uint16_t)cob_get(in->data, 2);
+    emcy->error_register = in->data[2];
+    memcpy(emcy->detail, in->data + 3, EMCY_DETAIL_SIZE);
+    return (uint8_t)(in->id - COB_EMCY);
+}

@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: MIT */
+#include "canopen/nmt.h"
+
+#include <stddef.h>
+
+#include "canopen/cob.h"
+
+static const struct nmt_hooks no_hooks = {0};
+
+void nmt_slave_init(struct nmt_slave *slave, uint8_t node, const struct nmt_hooks *hooks,
+                    void *context)
+{
+    slave->hooks = hooks == NULL ? &no_hooks : hooks;
+    slave->context = context;
+    slave->state = NMT_INITIALISING;
+    slave->told = NMT_INITIALISING;
+    slave->reset_due = 0;
+    slave->node = node;
+}
+
+static bool obey(struct nmt_slave *slave, uint8_t command)
+{
+    switch (command) {
+    case NMT_START:
+        slave->state = NMT_OPERATIONAL;
+        return true;
+    case NMT_STOP:
+        slave->state = NMT_STOPPED;
+        return true;
+    case NMT_ENTER_PRE_OPERATIONAL:
+        slave->state = NMT_PRE_OPERATIONAL;
+        return true;
+    case NMT_RESET_NODE:
+    case NMT_RESET_COMMUNICATION:
+        slave->state = NMT_INITIALISING;
+        slave->reset_due = command;
+        return true;
+    default:
+        return false;
+    }
+}
+
+bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in)
+{
+    if (in->id != COB_NMT || in->len != 2 || (in->data[1] != 0 && in->data[1] != slave->node)) {
+        return false;
+    }
+    if (slave->state == NMT_INITIALISING &&
+        (in->data[0] != NMT_RESET_NODE || slave->reset_due == 0)) {
+        /* Not booted yet: only a node reset, which does more than a pending communication reset. */
+        return false;
+    }
+    return obey(slave, in->data[0]);
+}
+
+static void carry_out_reset(struct nmt_slave *slave)
+{
+    uint8_t reset = slave->reset_due;
+
+    slave->reset_due = 0;
+    if (reset == NMT_RESET_NODE && slave->hooks->reset_node != NULL) {
+        slave->hooks->reset_node(slave->context);
+    }
+    if (reset == NMT_RESET_COMMUNICATION && slave->hooks->reset_communication != NULL) {
+        slave->hooks->reset_communication(slave->context);
+    }
+}
+
+static void tell(struct nmt_slave *slave)
+{
+    enum nmt_state state = slave->state;
+
+    if (state != slave->told) {
+        slave->told = state;
+        if (slave->hooks->changed != NULL) {
+            slave->hooks->changed(slave->context, state);
+        }
+    }
+}
+
+int nmt_slave_process(struct nmt_slave *slave, struct can_msg *out)
+{
+    tell(slave);
+    if (slave->state != NMT_INITIALISING) {
+        return 0;
+    }
+    carry_out_reset(slave);
+    cob_frame(out, COB_HEARTBEAT + slave->node, 1);
+    slave->state = NMT_PRE_OPERATIONAL;
+    tell(slave);
+    return 1;
+}
+
+bool nmt_permits_sdo(enum nmt_state state)
+{
+    return state == NMT_PRE_OPERATIONAL || state == NMT_OPERATIONAL;
+}
+
+bool nmt_permits_pdo(enum nmt_state state)
+{
+    return state == NMT_OPERATIONAL;
+}
+
+void nmt_master_command(enum nmt_command command, uint8_t node, struct can_msg *out)
+{
+    cob_frame(out, COB_NMT, 2);
+    out->data[0] = (uint8_t)command;
+    out->data[1] = node;
+}

@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: MIT */
+#include "canopen/pdo.h"
+
+#include "canopen/cob.h"
+
+#define WORD_AND_POSITION_BYTES 6u
+#define VOLTS_BYTES             2u
+
+static void put_word_and_position(struct can_msg *out, uint32_t cob, uint8_t drive, uint16_t word,
+                                  int32_t position)
+{
+    cob_frame(out, cob + drive, WORD_AND_POSITION_BYTES);
+    cob_put(out->data, word, 2);
+    cob_put(out->data + 2, (uint32_t)position, 4);
+}
+
+/* Node id, 0 or PDO_ERR_SHORT, as pdo.h has it. */
+static int node_of(const struct can_msg *in, uint32_t cob, uint8_t bytes)
+{
+    if (in->id <= cob || in->id > cob + NODE_ID_MAX) {
+        return 0;
+    }
+    return in->len < bytes ? PDO_ERR_SHORT : (int)(in->id - cob);
+}
+
+static int32_t get_position(const struct can_msg *in)
+{
+    return (int32_t)cob_signed(cob_get(in->data + 2, 4), 4);
+}
+
+void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out)
+{
+    put_word_and_position(out, COB_RPDO1, drive, setpoint->controlword, setpoint->target_counts);
+}
+
+int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint)
+{
+    int drive = node_of(in, COB_RPDO1, WORD_AND_POSITION_BYTES);
+
+    if (drive > 0) {
+        setpoint->controlword = (uint16_t)cob_get(in->data, 2);
+        setpoint->target_counts = get_position(in);
+    }
+    return drive;
+}
+
+void pdo_encode_actual(uint8_t drive, const struct pdo_actual *actual, struct can_msg *out)
+{
+    put_word_and_position(out, COB_TPDO1, drive, actual->statusword, actual->position_counts);
+}
+
+int pdo_decode_actual(const struct can_msg *in, struct pdo_actual *actual)
+{
+    int drive = node_of(in, COB_TPDO1, WORD_AND_POSITION_BYTES);
+
+    if (drive > 0) {
+        actual->statusword = (uint16_t)cob_get(in->data, 2);
+        actual->position_counts = get_position(in);
+    }
+    return drive;
+}
+
+void pdo_encode_volts(uint8_t drive, int16_t volts_mv, struct can_msg *out)
+{
+    cob_frame(out, COB_TPDO2 + drive, VOLTS_BYTES);
+    cob_put(out->data, (uint16_t)volts_mv, 2);
+}
+
+int pdo_decode_volts(const struct can_msg *in, int16_t *volts_mv)
+{
+    int drive = node_of(in, COB_TPDO2, VOLTS_BYTES);
+
+    if (drive > 0) {
+        *volts_mv = (int16_t)cob_signed(cob_get(in->data, 2), 2);
+    }
+    return drive;
+}

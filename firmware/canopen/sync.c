@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: MIT */
+#include "canopen/sync.h"
+
+#include "canopen/cob.h"
+
+void sync_producer_init(struct sync_producer *producer, uint8_t overflow)
+{
+    producer->overflow = overflow;
+    producer->counter = 0;
+}
+
+void sync_producer_next(struct sync_producer *producer, struct can_msg *out)
+{
+    if (producer->overflow == 0) {
+        cob_frame(out, COB_SYNC, 0);
+        return;
+    }
+    producer->counter =
+        producer->counter >= producer->overflow ? 1u : (uint8_t)(producer->counter + 1u);
+    cob_frame(out, COB_SYNC, 1);
+    out->data[0] = producer->counter;
+}
+
+void sync_consumer_init(struct sync_consumer *consumer, uint8_t overflow)
+{
+    consumer->overflow = overflow;
+    consumer->counter = 0;
+}
+
+int sync_consumer_receive(struct sync_consumer *consumer, const struct can_msg *in)
+{
+    int difference = 1;
+    uint8_t counter = in->data[0];
+
+    if (in->id != COB_SYNC) {
+        return SYNC_NONE;
+    }
+    if (in->len != (consumer->overflow == 0 ? 0 : 1)) {
+        return SYNC_ERR_LENGTH;
+    }
+    if (consumer->overflow == 0) {
+        return difference;
+    }
+    if (counter == 0 || counter > consumer->overflow) {
+        return SYNC_ERR_COUNTER;
+    }
+    if (consumer->counter != 0) {
+        difference = (counter + consumer->overflow - consumer->counter) % consumer->overflow;
+    }
+    consumer->counter = counter;
+    return difference;
+}
