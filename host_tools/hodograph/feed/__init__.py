@@ -1,6 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Feed along a path: profiles, plans inside limits, and the feed pieces of a program."""
 
+from .pattern_search import SearchStep
+from .pieces import FeedPiece, FeedPieces
+from .plan import Excess, FeedPlan, plan_feed
 from .request import ControllerLimits, FeedRequest, Limits
 
-__all__ = ["ControllerLimits", "FeedRequest", "Limits"]
+__all__ = [
+    "ControllerLimits",
+    "Excess",
+    "FeedPiece",
+    "FeedPieces",
+    "FeedPlan",
+    "FeedRequest",
+    "Limits",
+    "SearchStep",
+    "plan_feed",
+]

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""Bounds for hold and override of each feed piece; docs/numerics.md section 7."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .request import ControllerLimits, Limits
+
+Real = NDArray[np.float64]
+Unsigned = NDArray[np.uint32]
+
+GREATEST_FACTOR = 2.0
+FACTOR_SHARE = 0.5
+"""Part of the room under each limit that a factor above 1 may use up."""
+
+_HAIR = 1.0 - 1e-9
+_U32_MAX = 2.0**32 - 1.0
+_TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class OverrideBounds:
+    """Integers of the format, one each per piece; rounded down."""
+
+    factor_q24: Unsigned
+    rate_q16_per_s: Unsigned
+    second_q8_per_s2: Unsigned
+
+
+def override_bounds(
+    feed_mm_s: Real,
+    acceleration_mm_s2: Real,
+    jerk_mm_s3: Real,
+    controller: ControllerLimits,
+    program: Limits,
+) -> OverrideBounds:
+    """Bounds from the peaks of each piece (M,), such that for every |lambda| <= factor,
+    |lambda'| <= rate, |lambda''| <= second rate the controller's limits hold, and at constant
+    lambda <= factor the program's too.
+    """
+    v, a, j = (np.maximum(p, _TINY) for p in (feed_mm_s, acceleration_mm_s2, jerk_mm_s3))
+    factor = np.minimum.reduce(
+        (
+            controller.feed_mm_s / v,
+            np.sqrt(_shared(a, controller.acceleration_mm_s2)),
+            np.cbrt(_shared(j, controller.jerk_mm_s3)),
+            _ratio(program.feed_mm_s, v),
+            np.sqrt(_ratio(program.acceleration_mm_s2, a)),
+            np.cbrt(_ratio(program.jerk_mm_s3, j)),
+        )
+    )
+    # Rounded first: the rates then use the room that the stored factor really leaves.
+    factor_q24 = np.floor(np.clip(factor * _HAIR, 1.0, GREATEST_FACTOR) * 2.0**24)
+    factor = factor_q24 / 2.0**24
+    room_a = controller.acceleration_mm_s2 - factor**2 * a
+    room_j = controller.jerk_mm_s3 - factor**3 * j
+    rate = np.minimum(room_a / v, 0.5 * room_j / (3.0 * factor * a))
+    rate_q16 = np.floor(np.clip(rate * _HAIR * 2.0**16, 0.0, _U32_MAX))
+    second = (room_j - 3.0 * factor * (rate_q16 / 2.0**16) * a) / v
+    second_q8 = np.floor(np.clip(second * _HAIR * 2.0**8, 0.0, _U32_MAX))
+    return OverrideBounds(
+        factor_q24.astype(np.uint32), rate_q16.astype(np.uint32), second_q8.astype(np.uint32)
+    )
+
+
+def _shared(peak: Real, limit: float) -> Real:
+    return np.asarray(1.0 + FACTOR_SHARE * np.maximum(limit - peak, 0.0) / peak)
+
+
+def _ratio(limit: float | None, peak: Real) -> Real:
+    return np.full_like(peak, np.inf) if limit is None else np.asarray(limit / peak)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Feed pieces of the program format (docs/protocol.md 1.3) as arrays; docs/numerics.md section 6."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+Int = NDArray[np.int64]
+Unsigned = NDArray[np.uint32]
+
+DEGREE = 7
+
+
+@dataclass(frozen=True)
+class FeedPiece:
+    """F(t) = start + c1 tau + … + c7 tau^7, tau = t / 2^e; the integers of the format."""
+
+    duration_q32_s: int
+    start_q40: int
+    c_q40: tuple[int, ...]
+    override_factor_q24: int
+    override_rate_q16_per_s: int
+    override_second_q8_per_s2: int
+
+    @property
+    def exponent(self) -> int:
+        """e: 2^e s is the least power of two not below the duration."""
+        return (self.duration_q32_s - 1).bit_length() - 32
+
+
+@dataclass(frozen=True, eq=False)
+class FeedPieces:
+    """All pieces of a program, in order; arrays of length M, `c_q40` (M, 7)."""
+
+    duration_q32_s: Int
+    start_q40: Int
+    c_q40: Int
+    override_factor_q24: Unsigned
+    override_rate_q16_per_s: Unsigned
+    override_second_q8_per_s2: Unsigned
+
+    def __len__(self) -> int:
+        return int(self.duration_q32_s.size)
+
+    def __getitem__(self, index: int) -> FeedPiece:
+        return FeedPiece(
+            int(self.duration_q32_s[index]),
+            int(self.start_q40[index]),
+            tuple(int(c) for c in self.c_q40[index]),
+            int(self.override_factor_q24[index]),
+            int(self.override_rate_q16_per_s[index]),
+            int(self.override_second_q8_per_s2[index]),
+        )
+
+    def __iter__(self) -> Iterator[FeedPiece]:
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def total_q32_s(self) -> int:
+        """Duration of the program, exactly."""
+        return int(self.duration_q32_s.sum(dtype=np.int64))
+
+
+def exponents(duration_q32_s: Int) -> Int:
+    """e of each piece, so that 2^e s is the least power of two not below the duration."""
+    mantissa, e = np.frexp(duration_q32_s.astype(np.float64))
+    # frexp gives duration = mantissa 2^e with mantissa in [1/2, 1): an exact power of two is one too high.
+    # Above 2^53 the conversion could round up to a power of two; durations end at 2^54.
+    exact = (mantissa == 0.5) & (duration_q32_s <= (np.int64(1) << (e - 1).astype(np.int64)))
+    return np.asarray(e - exact - 32, dtype=np.int64)
+
+
+def derivative_bounds(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]:
+    """Bernstein coefficients of F' (M, 7), F'' (M, 6) and F''' (M, 5); mm, s.
+
+    The extremes of each row bound the derivative over its piece; the first and last are its end values.
+    """
+    e = exponents(duration_q32_s)
+    end = np.ldexp(duration_q32_s.astype(np.float64), -(e + 32))
+    k = np.arange(1, DEGREE + 1)
+    unit = c_q40.astype(np.float64) * 2.0**-40 * end[:, None] ** k
+    seconds = np.ldexp(duration_q32_s.astype(np.float64), -32)[:, None]
+    out = []
+    power = unit * k
+    for order in (1, 2, 3):
+        out.append(power @ _TO_BERNSTEIN[power.shape[1] - 1].T / seconds**order)
+        power = power[:, 1:] * np.arange(1, power.shape[1])
+    return out[0], out[1], out[2]
+
+
+def _to_bernstein(degree: int) -> Real:
+    return np.array(
+        [
+            [comb(j, i) / comb(degree, i) if i <= j else 0.0 for i in range(degree + 1)]
+            for j in range(degree + 1)
+        ]
+    )
+
+
+_TO_BERNSTEIN = {degree: _to_bernstein(degree) for degree in range(DEGREE)}

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""From a timeline to integer feed pieces; docs/numerics.md section 6."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .pieces import DEGREE, derivative_bounds, exponents
+from .ramp import ACCELERATION, FEED, JERK
+from .timeline import Timeline
+
+Real = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+LONGEST_PIECE_MM = 31.875
+"""A hair below the 32 mm of the format."""
+
+_COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128)
+_JERK_GOAL_MM_S3 = 1.0
+_LENGTH_GOAL_MM = 2e-10
+_TIGHT = 1.01
+_LEAST_FEED_MM_S = -(2.0**-11)
+
+# A piece in its own s = 0 … 1: Hermite data F', F'' at both ends and the way, by quintic; the two free
+# coefficients of degree 6 and 7 by least squares on the jerk at Chebyshev points.
+_SAMPLES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(12)
+_FREE = np.array([[0, 0, 0, 1, -3, 3, -1, 0], [0, 0, 0, 0, 1, -3, 3, -1]], dtype=np.float64)
+_THIRD = np.array([0, 0, 0, 6, 24, 60, 120, 210], dtype=np.float64)
+_POWERS = _SAMPLES[:, None] ** np.maximum(np.arange(8) - 3, 0)
+_FIT = np.linalg.pinv((_FREE * _THIRD) @ _POWERS.T)
+
+
+@dataclass(frozen=True, eq=False)
+class RawPieces:
+    """Durations (M,), starts (M,) and coefficients (M, 7) of pieces, and how well they fit."""
+
+    duration_q32_s: Int
+    start_q40: Int
+    c_q40: Int
+    jerk_error_mm_s3: float
+
+
+def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
+    """Pieces whose sum is the timeline over exactly `length_q40`, no two neighbours of them (but
+    for the first and last) shorter together than two periods.
+    """
+    end = round(line.duration_s * 2**32)
+    slack = float(Fraction(end, 2**32) - line.duration_s)
+    up_end = round(Fraction(line.ramp.time_s) * 2**32)
+    down_start = end - up_end if line.constant_s else up_end
+    for cuts in _cut_counts(line, up_end, period_us):
+        up_cuts = _even(0, up_end, cuts)
+        # The way down is the way up run backwards from the end, which is `slack` late.
+        down_cuts = end - _even(0, end - down_start, cuts)[::-1]
+        up = _fit_ramp(line, up_cuts, 0.0, False)
+        down = _fit_ramp(line, down_cuts, float(Fraction(end, 2**32)) - slack, True)
+        middle = _constant_cuts(line, up_end, down_start)
+        times = np.concatenate((up_cuts[:-1], middle[:-1], down_cuts))
+        starts = np.concatenate(
+            (
+                _ramp_starts(up, 0)[:-1],
+                _constant_starts(line, middle)[:-1],
+                length_q40 + _ramp_starts(down, 1),
+            )
+        )
+        shapes = np.concatenate((up.shape, _straight(starts, times, up, middle), down.shape))
+        pieces = _round_pieces(times, starts, shapes)
+        error = max(up.jerk_error, down.jerk_error)
+        raw = RawPieces(np.diff(times), starts[:-1], pieces, error)
+        if max(up.way_error, down.way_error) < _LENGTH_GOAL_MM and _good(raw, line):
+            break
+    return raw
+
+
+@dataclass(frozen=True, eq=False)
+class _Ramp:
+    way: Real  # mm, of each piece
+    shape: Real  # (n, 8), powers of s, mm
+    jerk_error: float
+    way_error: float
+
+
+def _cut_counts(line: Timeline, ramp_q32: int, period_us: int) -> list[int]:
+    """Numbers of pieces per ramp to try: long enough for the period, short enough in mm."""
+    most = max(1, int(ramp_q32 / 2**32 / (period_us * 1e-6 * (1.0 + 1e-6))))
+    least = line.ramp.feed_mm_s * line.ramp.time_s / LONGEST_PIECE_MM
+    fit = [n for n in _COUNTS if least <= n <= most]
+    if not fit:
+        return [min(most, int(np.ceil(least)) if least > _COUNTS[-1] else most)]
+    return fit
+
+
+def _even(start: int, end: int, count: int) -> Int:
+    return np.array([start + (end - start) * j // count for j in range(count + 1)], dtype=np.int64)
+
+
+def _fit_ramp(line: Timeline, cuts: Int, origin_s: float, backwards: bool) -> _Ramp:
+    """Polynomials for the pieces between `cuts`; backwards: from origin_s - t on the ramp."""
+    t = cuts.astype(np.float64) * 2.0**-32
+    h = np.diff(t)[:, None]
+    sign = -1.0 if backwards else 1.0
+
+    def ramp(order: int, s: Real) -> Real:
+        local = t[:-1, None] + s * h
+        value = line.ramp.value(order, origin_s - local if backwards else local)
+        return sign**order * value if order else value
+
+    ends = np.array([0.0, 1.0])
+    v, a = ramp(FEED, ends) * h, ramp(ACCELERATION, ends) * h**2
+    way = 0.5 * h[:, 0] * (ramp(FEED, 0.5 + 0.5 * _GAUSS_X) @ _GAUSS_W)
+    shape = _hermite(way, v[:, 0], v[:, 1], a[:, 0], a[:, 1])
+    target = ramp(JERK, _SAMPLES) * h**3
+    shape = shape + (target - (shape * _THIRD) @ _POWERS.T) @ _FIT @ _FREE
+    jerk = ramp(JERK, _CHECK) * h**3 - (shape * _THIRD) @ _CHECK_POWERS.T
+    # The way's error is the jerk's integrated three times from both ends: below jerk h^3 / 100.
+    worst = np.abs(jerk).max(axis=1)
+    return _Ramp(way, shape, float((worst / h[:, 0] ** 3).max()), float(worst.max() / 100.0))
+
+
+_CHECK = np.linspace(0.0, 1.0, 33)
+_CHECK_POWERS = _CHECK[:, None] ** np.maximum(np.arange(8) - 3, 0)
+
+
+def _hermite(way: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:
+    out = np.zeros((way.size, 8))
+    out[:, 1], out[:, 2] = v0, a0 / 2.0
+    p = way - v0 - a0 / 2.0
+    v = v1 - v0 - a0
+    a = a1 - a0
+    out[:, 3] = 10.0 * p - 4.0 * v + a / 2.0
+    out[:, 4] = -15.0 * p + 7.0 * v - a
+    out[:, 5] = 6.0 * p - 3.0 * v + a / 2.0
+    return out
+
+
+def _ramp_starts(ramp: _Ramp, from_end: int) -> Int:
+    total = np.concatenate((np.zeros(1), np.cumsum(ramp.way)))
+    if from_end:
+        total = -np.concatenate((np.cumsum(ramp.way[::-1])[::-1], np.zeros(1)))
+    return np.rint(total * 2.0**40).astype(np.int64)
+
+
+def _constant_cuts(line: Timeline, start: int, end: int) -> Int:
+    if end == start:
+        return np.array([start], dtype=np.int64)
+    way = line.ramp.feed_mm_s * (end - start) / 2**32
+    return _even(start, end, int(np.ceil(way / LONGEST_PIECE_MM)))
+
+
+def _constant_starts(line: Timeline, cuts: Int) -> Int:
+    """F = V (t - T/2) at the cuts, in exact arithmetic."""
+    feed = Fraction(line.ramp.feed_mm_s)
+    first = round(feed * (Fraction(int(cuts[0]), 2**32) - Fraction(line.ramp.time_s) / 2) * 2**72)
+    step = round(feed * 2**72)  # per 2^-32 s, in 2^-104 mm: exact to far below 2^-40 mm
+    base = int(cuts[0])
+    half = 1 << 31
+    return np.array(
+        [(first + ((int(t) - base) * step >> 32) + half) >> 32 for t in cuts], dtype=np.int64
+    )
+
+
+def _straight(starts: Int, times: Int, up: _Ramp, middle: Int) -> Real:
+    first, count = up.way.size, middle.size - 1
+    out = np.zeros((count, 8))
+    out[:, 1] = np.diff(starts[first : first + count + 1]) * 2.0**-40
+    return out
+
+
+def _round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
+    """Coefficients c1 … c7 in tau; c1 such that each end is the next start to the last bit."""
+    duration = np.diff(times)
+    e = exponents(duration)
+    stretch = np.ldexp(1.0, e + 32) / duration
+    k = np.arange(1, DEGREE + 1)
+    c = np.rint(shapes[:, 1:] * stretch[:, None] ** k * 2.0**40).astype(np.int64)
+    way = np.diff(starts)
+    curved = np.any(c[:, 1:] != 0, axis=1)
+    for i in range(duration.size):
+        d, shift = int(duration[i]), int(e[i]) + 32
+        rest = int(way[i]) << (shift * DEGREE)
+        if curved[i]:
+            rest -= sum(
+                int(c[i, n - 1]) * d**n << (shift * (DEGREE - n)) for n in range(2, DEGREE + 1)
+            )
+        below = d << (shift * (DEGREE - 1))
+        c[i, 0] = (2 * rest + below) // (2 * below)
+    return c
+
+
+def _good(raw: RawPieces, line: Timeline) -> bool:
+    feed, acceleration, jerk = derivative_bounds(raw.duration_q32_s, raw.c_q40)
+    return bool(
+        raw.jerk_error_mm_s3 < _JERK_GOAL_MM_S3
+        and feed.min() > _LEAST_FEED_MM_S
+        and np.abs(acceleration).max() < _TIGHT * line.ramp.peak(ACCELERATION)
+        and np.abs(jerk).max() < _TIGHT * line.ramp.peak(JERK)
+    )

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: MIT
+"""The uploaded program: compile, encode, decode, check, print; docs/protocol.md section 1."""
+
+from .check import Fault, ProgramLimits, check
+from .compiler import Compilation, compile_path, compile_program
+from .image import Program, decode, encode
+from .inspection import inspect_dict, inspect_text
+
+__all__ = [
+    "Compilation",
+    "Fault",
+    "Program",
+    "ProgramLimits",
+    "check",
+    "compile_path",
+    "compile_program",
+    "decode",
+    "encode",
+    "inspect_dict",
+    "inspect_text",
+]

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""Why a program is refused: the codes of the controller, in its own names and numbers.
+
+The same table as `enum program_error` in firmware/core/program_check.h (a test compares them).
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ProgramError(IntEnum):
+    """Code of a refusal (object 0x2000 sub 3). `text` says it in English."""
+
+    SIZE = -1
+    MAGIC = -2
+    VERSION = -3
+    CRC = -4
+    COUNT = -5
+    PERIOD = -10
+    PERIOD_USED = -11
+    FLAGS = -12
+    AXES = -13
+    DURATION = -14
+    LENGTH = -15
+    NAME = -16
+    W_RANGE = -20
+    POINT_RANGE = -21
+    ARC_RANGE = -22
+    SIGMA = -23
+    SIGMA_RATIO = -24
+    SEGMENT_LONG = -25
+    SEGMENT_FIRST = -26
+    JOIN_POINT = -27
+    JOIN_ARC = -28
+    JOIN_DIRECTION = -29
+    SEGMENT_END = -30
+    NOT_CLOSED = -31
+    SEGMENT_SHORT = -32
+    TRAVEL = -33
+    PIECE_DURATION = -40
+    COEFFICIENT = -41
+    PIECE_LONG = -42
+    PIECE_FIRST = -43
+    JOIN_LENGTH = -44
+    JOIN_FEED = -45
+    JOIN_ACCELERATION = -46
+    START_MOVING = -47
+    END_MOVING = -48
+    PIECE_END = -49
+    PIECE_SHORT = -50
+    BACKWARDS = -51
+    FEED = -52
+    ACCELERATION = -53
+    JERK = -54
+    OVERRIDE = -55
+    PIECE_RESERVED = -56
+
+    @property
+    def text(self) -> str:
+        """One line in English."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    ProgramError.SIZE: "truncated, or sizes and counts do not fit each other",
+    ProgramError.MAGIC: 'does not begin with "HDGP"',
+    ProgramError.VERSION: "version or header size unknown",
+    ProgramError.CRC: "CRC-32 of the contents is wrong",
+    ProgramError.COUNT: "no segment or no piece",
+    ProgramError.PERIOD: "period not 1000, 2000, 4000 or 8000 us",
+    ProgramError.PERIOD_USED: "period is not the one configured in the controller",
+    ProgramError.FLAGS: "unknown flag, or a reserved field of the header is not 0",
+    ProgramError.AXES: "axis count is not 2",
+    ProgramError.DURATION: "not the sum of the pieces, or above 2^22 s",
+    ProgramError.LENGTH: "length not in (0, 2^22) mm",
+    ProgramError.NAME: "name not padded with zeros",
+    ProgramError.W_RANGE: "|u| or |v| is 64 or more",
+    ProgramError.POINT_RANGE: "coordinate is 4096 mm or more",
+    ProgramError.ARC_RANGE: "arc length is negative or 2^22 mm or more",
+    ProgramError.SIGMA: "a Bernstein coefficient of the parametric speed is not positive",
+    ProgramError.SIGMA_RATIO: "the largest is more than twice the smallest",
+    ProgramError.SEGMENT_LONG: "longer than 32 mm",
+    ProgramError.SEGMENT_FIRST: "the first segment does not start at arc length 0",
+    ProgramError.JOIN_POINT: "points differ by more than 2^-34 mm",
+    ProgramError.JOIN_ARC: "arc lengths differ by more than 2^-34 mm",
+    ProgramError.JOIN_DIRECTION: "directions differ by more than 2^-20 rad",
+    ProgramError.SEGMENT_END: "the last segment does not end at the length of the header",
+    ProgramError.NOT_CLOSED: 'flag "closed", but end and start are more than 2^-24 mm apart',
+    ProgramError.SEGMENT_SHORT: "a tick at 200 % could cross more than two segment ends",
+    ProgramError.TRAVEL: "leaves the travel limits",
+    ProgramError.PIECE_DURATION: "duration 0",
+    ProgramError.COEFFICIENT: "a coefficient is above 2^14 mm",
+    ProgramError.PIECE_LONG: "longer than 32 mm",
+    ProgramError.PIECE_FIRST: "the first piece does not start at arc length 0",
+    ProgramError.JOIN_LENGTH: "F differs by more than 2^-34 mm",
+    ProgramError.JOIN_FEED: "F' differs by more than 2^-16 mm/s",
+    ProgramError.JOIN_ACCELERATION: "F'' differs by more than 2^-6 mm/s^2",
+    ProgramError.START_MOVING: "the program does not begin at rest",
+    ProgramError.END_MOVING: "the program does not end at rest",
+    ProgramError.PIECE_END: "the last piece does not end at the length of the header",
+    ProgramError.PIECE_SHORT: "two neighbouring pieces last no longer than two periods",
+    ProgramError.BACKWARDS: "feed below -2^-10 mm/s",
+    ProgramError.FEED: "above the feed limit of the controller",
+    ProgramError.ACCELERATION: "above its acceleration limit",
+    ProgramError.JERK: "above its jerk limit",
+    ProgramError.OVERRIDE: "override factor not in 1.0 ... 2.0, rate or second rate 0",
+    ProgramError.PIECE_RESERVED: "reserved field of a piece is not 0",
+}

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""From a spline and a feed plan to a program; docs/numerics.md section 8."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, PlanError
+from ..feed import FeedPlan
+from ..feed.pieces import FeedPieces
+from ..spline import PHSpline
+from .check import Fault, ProgramLimits, check
+from .exactmath import cumulative, segment_ways, way_to_q40
+from .image import NAME_SIZE, Program
+from .neighbours import brief_pairs
+
+Int = NDArray[np.int64]
+
+LONGEST_SEGMENT_MM = 31.875
+_ANCHOR_Q40 = 16
+"""Points may be moved to those of the ideal curve by this much per joint, 2^-36 mm."""
+
+_U32_MAX = 2**32 - 1
+_MOST_ROUNDS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Compilation:
+    """A program, the plan it holds (its feed lowered where short segments ask for it), what the user
+    should know, and the greatest distance of a segment's start from the ideal curve.
+    """
+
+    program: Program
+    plan: FeedPlan
+    notes: tuple[str, ...]
+    drift_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Geometry:
+    start_q40: Int  # (N + 1,), the last is the length
+    x_q40: Int
+    y_q40: Int
+    u_q44: Int
+    v_q44: Int
+    drift_mm: float
+
+
+def compile_program(
+    spline: PHSpline,
+    plan: FeedPlan,
+    *,
+    period_us: int | None = None,
+    offset_mm: complex = 0j,
+    limits: ProgramLimits | None = None,
+    name: str = "",
+) -> Program:
+    """The program of `compile_path`, for callers that need nothing else."""
+    return compile_path(
+        spline, plan, period_us=period_us, offset_mm=offset_mm, limits=limits, name=name
+    ).program
+
+
+def compile_path(
+    spline: PHSpline,
+    plan: FeedPlan,
+    *,
+    period_us: int | None = None,
+    offset_mm: complex = 0j,
+    limits: ProgramLimits | None = None,
+    name: str = "",
+) -> Compilation:
+    """Compiles `plan` along `spline`, shifted by the work offset into machine coordinates.
+
+    limits  of the controller, travel included; without, only the rules of the format are checked
+    Under policy "respect" the feed is lowered where two neighbouring segments would pass within one tick at
+    200 %. Raises InputError (period, name, offset) and PlanError (travel left, segments too short, and whatever
+    `check` finds).
+    """
+    if period_us is not None and period_us != plan.period_us:
+        raise InputError(
+            f"period_us {period_us} differs from the plan's {plan.period_us}: plan again"
+        )
+    if len(name.encode()) > NAME_SIZE:
+        name = name.encode()[:NAME_SIZE].decode(errors="ignore")
+    geometry = _quantise(spline.split(LONGEST_SEGMENT_MM, 2.0), offset_mm)
+    length_q40 = int(geometry.start_q40[-1])
+    if abs(length_q40 * 2.0**-40 - plan.length_mm) > 1e-6:
+        raise InputError(
+            f"the plan is for {plan.length_mm:.9g} mm, the path has {length_q40 * 2.0**-40:.9g} mm"
+        )
+    plan, pieces = _fit_feed(plan, geometry.start_q40, spline)
+    program = Program(
+        name=name,
+        period_us=plan.period_us,
+        closed=spline.closed,
+        duration_q32_s=pieces.total_q32_s,
+        length_q40=length_q40,
+        offset_x_q40=round(offset_mm.real * 2**40),
+        offset_y_q40=round(offset_mm.imag * 2**40),
+        feed_limit_um_s=_limit(plan.limits.feed_mm_s, 1000.0),
+        acceleration_limit_um_s2=_limit(plan.limits.acceleration_mm_s2, 1000.0),
+        jerk_limit_mm_s3=_limit(plan.limits.jerk_mm_s3, 1.0),
+        start_q40=geometry.start_q40[:-1],
+        x_q40=geometry.x_q40,
+        y_q40=geometry.y_q40,
+        u_q44=geometry.u_q44,
+        v_q44=geometry.v_q44,
+        pieces=pieces,
+    )
+    fault = check(program, limits)
+    if fault is not None:
+        raise PlanError(_advice(fault, program, limits))
+    return Compilation(program, plan, plan.notes, geometry.drift_mm)
+
+
+def _quantise(spline: PHSpline, offset_mm: complex) -> _Geometry:
+    """Integer segments: w rounded, then everything else from exact sums of the rounded w."""
+    far = np.abs(np.concatenate((spline.origin, [offset_mm])))
+    if not np.all(far < 8192.0):
+        raise InputError("path or work offset: a coordinate is beyond the 4096 mm of the format")
+    if np.abs(spline.w.view(np.float64)).max(initial=0.0) >= 2.0**18:
+        raise InputError("path: a segment is too long for the format")
+    u = np.rint(spline.w.real * 2.0**44).astype(np.int64)
+    v = np.rint(spline.w.imag * 2.0**44).astype(np.int64)
+    dx, dy, ds = (cumulative(way) for way in segment_ways(u, v))
+    x, x_drift = _anchored(way_to_q40(dx)[:-1], spline.origin.real, offset_mm.real)
+    y, y_drift = _anchored(way_to_q40(dy)[:-1], spline.origin.imag, offset_mm.imag)
+    return _Geometry(way_to_q40(ds), x, y, u, v, float(np.hypot(x_drift, y_drift).max()))
+
+
+def _anchored(
+    way_q40: Int, ideal_mm: NDArray[np.float64], offset_mm: float
+) -> tuple[Int, NDArray[np.float64]]:
+    """Start points from exact ways, drawn to the ideal ones as far as joints stay within 2^-36 mm."""
+    offset = round(offset_mm * 2**40)
+    ideal = np.rint(ideal_mm * 2.0**40).astype(np.int64)
+    chained = ideal[0] + way_q40
+    pull = ideal - chained
+    if np.abs(np.diff(pull)).max(initial=0) > _ANCHOR_Q40:
+        pull = np.zeros_like(pull)
+    points = chained + pull
+    return points + offset, (points - ideal) * 2.0**-40
+
+
+def _fit_feed(plan: FeedPlan, joints_q40: Int, spline: PHSpline) -> tuple[FeedPlan, FeedPieces]:
+    """The plan with its feed low enough for the segments, and its pieces over their exact length."""
+    length_q40 = int(joints_q40[-1])
+    for _ in range(_MOST_ROUNDS):
+        pieces = plan.pieces_over(length_q40)
+        pairs, way_mm, allowed_mm_s = brief_pairs(joints_q40, pieces, plan.period_us)
+        if not pairs.size:
+            return plan, pieces
+        worst = int(allowed_mm_s.argmin())
+        feed = float(allowed_mm_s[worst]) * (1.0 - 1e-6)
+        place_mm = float(joints_q40[pairs[worst]]) * 2.0**-40
+        span = int(np.searchsorted(spline.segment_starts_mm, place_mm + 1e-9, side="right"))
+        where = (
+            f"the path has {way_mm[worst]:.4g} mm in two neighbouring segments at arc length "
+            f"{place_mm:.6g} mm (span {span}), less than one tick at 200 %"
+        )
+        if plan.limits.policy == "report" or feed <= 0.0:
+            raise PlanError(
+                f'{where}: {feed:.4g} mm/s would do; lower nominal_mm_s or set policy "respect"'
+            )
+        plan = plan.with_feed_cap(feed, where)
+    raise PlanError("path: no feed found at which no tick passes more than two segment ends")
+
+
+def _limit(value: float | None, scale: float) -> int:
+    return 0 if value is None else max(1, min(ceil(value * scale), _U32_MAX))
+
+
+def _advice(fault: Fault, program: Program, limits: ProgramLimits | None) -> str:
+    text = f"program: {fault.code.text} ({fault.code.name}, {fault.place})"
+    if fault.code.name == "TRAVEL" and limits is not None:
+        low = [v * 2.0**-40 for v in limits.min_q40_mm]
+        high = [v * 2.0**-40 for v in limits.max_q40_mm]
+        point = (program.x_q40[fault.index] * 2.0**-40, program.y_q40[fault.index] * 2.0**-40)
+        text += (
+            f": its start ({point[0]:.6g}, {point[1]:.6g}) mm, travel x {low[0]:g} … {high[0]:g}, "
+            f"y {low[1]:g} … {high[1]:g}; change [work] offset_mm or the path"
+        )
+    return text

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Reference evaluation of a program in 50 digits; needs mpmath (a development dependency).
+
+The curve and the feed exactly as docs/protocol.md 1.2 and 1.3 define them. For tests of the kernels; slow
+on purpose (about 1 ms a point).
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+
+from .image import Program
+
+DIGITS = 50
+
+
+@dataclass(frozen=True)
+class ExactPoint:
+    """Arc length, point, feed and its derivatives as mpmath numbers; mm, s."""
+
+    arc_length_mm: Any
+    x_mm: Any
+    y_mm: Any
+    feed_mm_s: Any
+    acceleration_mm_s2: Any
+    jerk_mm_s3: Any
+
+
+class ExactProgram:
+    """A program to be evaluated at any time (integers in 2^-32 s)."""
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self._starts = [int(s) for s in program.start_q40]
+        self._times = [0]
+        for duration in program.pieces.duration_q32_s:
+            self._times.append(self._times[-1] + int(duration))
+
+    def at(self, time_q32_s: int) -> ExactPoint:
+        """The point at a time, clipped to the program."""
+        with mpmath.workdps(DIGITS):
+            s, feed, acceleration, jerk = self._arc_length(time_q32_s)
+            x, y = self._point(s)
+            return ExactPoint(s, x, y, feed, acceleration, jerk)
+
+    def _arc_length(self, time_q32_s: int) -> tuple[Any, Any, Any, Any]:
+        time = min(max(time_q32_s, 0), self._times[-1])
+        i = min(bisect_right(self._times, time) - 1, len(self._times) - 2)
+        piece = self._program.pieces[i]
+        scale = mpmath.mpf(2) ** piece.exponent
+        tau = mpmath.ldexp(time - self._times[i], -32) / scale
+        c = [mpmath.ldexp(v, -40) for v in (piece.start_q40, *piece.c_q40)]
+        values = []
+        for order in range(4):
+            values.append(mpmath.polyval(c[::-1], tau) / scale**order)
+            c = [k * v for k, v in enumerate(c)][1:]
+        return values[0], values[1], values[2], values[3]
+
+    def _point(self, s: Any) -> tuple[Any, Any]:
+        p = self._program
+        key = int(mpmath.floor(mpmath.ldexp(s, 40)))
+        i = min(max(bisect_right(self._starts, key) - 1, 0), len(self._starts) - 1)
+        w = [
+            mpmath.mpc(mpmath.ldexp(int(u), -44), mpmath.ldexp(int(v), -44))
+            for u, v in zip(p.u_q44[i], p.v_q44[i], strict=True)
+        ]
+        way = s - mpmath.ldexp(self._starts[i], -40)
+        sigma = _square(w, [mpmath.conj(b) for b in w])
+        xi = way / mpmath.re(sum(sigma) / 5)
+        for _ in range(12):
+            move = (mpmath.re(_integral(sigma, xi)) - way) / mpmath.re(_bernstein(sigma, xi))
+            xi -= move
+            if abs(move) < mpmath.mpf(10) ** (5 - DIGITS):
+                break
+        r = _integral(_square(w, w), xi)
+        return (
+            mpmath.ldexp(int(p.x_q40[i]), -40) + mpmath.re(r),
+            mpmath.ldexp(int(p.y_q40[i]), -40) + mpmath.im(r),
+        )
+
+
+def _square(a: list[Any], b: list[Any]) -> list[Any]:
+    """Bernstein coefficients of the product of two quadratics."""
+    return [
+        a[0] * b[0],
+        (a[0] * b[1] + a[1] * b[0]) / 2,
+        (4 * a[1] * b[1] + a[0] * b[2] + a[2] * b[0]) / 6,
+        (a[1] * b[2] + a[2] * b[1]) / 2,
+        a[2] * b[2],
+    ]
+
+
+def _bernstein(c: list[Any], xi: Any) -> Any:
+    degree = len(c) - 1
+    return sum(
+        mpmath.binomial(degree, k) * v * xi**k * (1 - xi) ** (degree - k) for k, v in enumerate(c)
+    )
+
+
+def _integral(c: list[Any], xi: Any) -> Any:
+    sums = [mpmath.mpf(0)]
+    for v in c:
+        sums.append(sums[-1] + v / len(c))
+    return _bernstein(sums, xi)

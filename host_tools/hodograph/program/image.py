@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""The program image as arrays, to and from bytes; docs/protocol.md 1.1 to 1.3."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..feed.pieces import FeedPieces
+from .codes import ProgramError
+
+Int = NDArray[np.int64]
+
+MAGIC = b"HDGP"
+VERSION = 1
+HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE = 128, 72, 88
+FLAG_CLOSED = 1
+NAME_SIZE = 32
+
+_HEADER = struct.Struct("<4sHHII III HH Q qqq III I 32s 16s".replace(" ", ""))
+_CRC_FROM = 16
+_PIECE = np.dtype(
+    [
+        ("duration", "<u8"),
+        ("start", "<i8"),
+        ("c", "<i8", 7),
+        ("factor", "<u4"),
+        ("rate", "<u4"),
+        ("second", "<u4"),
+        ("reserved", "<u4"),
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A program as the image has it: integers in the Q formats of docs/protocol.md.
+
+    start_q40, x_q40, y_q40  (N,) arc length and point at the start of each segment, mm
+    u_q44, v_q44             (N, 3) Bernstein coefficients of w = u + iv, mm^(1/2)
+    pieces                   the M feed pieces
+    Limits of 0 mean none.
+    """
+
+    name: str
+    period_us: int
+    closed: bool
+    duration_q32_s: int
+    length_q40: int
+    offset_x_q40: int
+    offset_y_q40: int
+    feed_limit_um_s: int
+    acceleration_limit_um_s2: int
+    jerk_limit_mm_s3: int
+    start_q40: Int
+    x_q40: Int
+    y_q40: Int
+    u_q44: Int
+    v_q44: Int
+    pieces: FeedPieces
+
+    @property
+    def segment_count(self) -> int:
+        """N."""
+        return int(self.start_q40.size)
+
+    @property
+    def piece_count(self) -> int:
+        """M."""
+        return len(self.pieces)
+
+    @property
+    def image_size(self) -> int:
+        """Bytes of the image."""
+        return HEADER_SIZE + SEGMENT_SIZE * self.segment_count + PIECE_SIZE * self.piece_count
+
+    @property
+    def ticks(self) -> int:
+        """Setpoints: ceil(duration / period) + 1, in exact arithmetic."""
+        return -(-self.duration_q32_s * 1_000_000 // (self.period_us << 32)) + 1
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the program."""
+        return self.duration_q32_s * 2.0**-32
+
+    @property
+    def length_mm(self) -> float:
+        """Arc length of the path."""
+        return self.length_q40 * 2.0**-40
+
+    def tick_times_q32_s(self) -> Int:
+        """Program time (ticks,) of each setpoint: min(floor(k period + 1/2), duration) in 2^-32 s."""
+        k = np.arange(self.ticks, dtype=np.int64)
+        whole_s, rest_us = np.divmod(k * self.period_us, 1_000_000)
+        times = (whole_s << 32) + ((rest_us << 32) + 500_000) // 1_000_000
+        return np.asarray(np.minimum(times, self.duration_q32_s))
+
+
+def encode(program: Program) -> bytes:
+    """The image. Writes what it is given, right or wrong (`check` judges); raises InputError for
+    values that the fields cannot hold.
+    """
+    segments = np.empty((program.segment_count, 9), dtype="<i8")
+    segments[:, 0], segments[:, 1], segments[:, 2] = program.start_q40, program.x_q40, program.y_q40
+    segments[:, 3::2], segments[:, 4::2] = program.u_q44, program.v_q44
+    pieces = np.zeros(program.piece_count, dtype=_PIECE)
+    own = program.pieces
+    pieces["duration"], pieces["start"], pieces["c"] = own.duration_q32_s, own.start_q40, own.c_q40
+    pieces["factor"], pieces["rate"] = own.override_factor_q24, own.override_rate_q16_per_s
+    pieces["second"] = own.override_second_q8_per_s2
+    body = segments.tobytes() + pieces.tobytes()
+    name = program.name.encode()
+    if len(name) > NAME_SIZE:
+        raise InputError(
+            f"program: name {program.name!r} is longer than {NAME_SIZE} bytes of UTF-8"
+        )
+    try:
+        head = _HEADER.pack(
+            MAGIC,
+            VERSION,
+            HEADER_SIZE,
+            program.image_size,
+            0,
+            program.period_us,
+            program.segment_count,
+            program.piece_count,
+            FLAG_CLOSED if program.closed else 0,
+            2,
+            program.duration_q32_s,
+            program.length_q40,
+            program.offset_x_q40,
+            program.offset_y_q40,
+            program.feed_limit_um_s,
+            program.acceleration_limit_um_s2,
+            program.jerk_limit_mm_s3,
+            0,
+            name,
+            b"",
+        )
+    except struct.error as error:
+        raise InputError(f"program: a header field does not fit the format: {error}") from None
+    return with_crc(head + body)
+
+
+def with_crc(image: bytes) -> bytes:
+    """The image with its CRC-32 (bytes 12 … 15) made right."""
+    crc = zlib.crc32(image[_CRC_FROM:])
+    return image[: _CRC_FROM - 4] + struct.pack("<I", crc) + image[_CRC_FROM:]
+
+
+def decode(image: bytes) -> Program:
+    """The program in an image. Raises InputError, with the code of docs/protocol.md 1.4, for what
+    `program_open` of the controller refuses (sizes, magic, version, CRC, counts); the rest is for `check`.
+    """
+    fault = open_fault(image)
+    if fault is not None:
+        raise InputError(f"program image: {fault.text} ({fault.name}): compile it again")
+    head = _HEADER.unpack_from(image)
+    segment_count, piece_count = head[6], head[7]
+    after = HEADER_SIZE + SEGMENT_SIZE * segment_count
+    segments = np.frombuffer(image, "<i8", 9 * segment_count, HEADER_SIZE).reshape(-1, 9)
+    segments = segments.astype(np.int64)
+    raw = np.frombuffer(image, _PIECE, piece_count, after)
+    pieces = FeedPieces(
+        raw["duration"].astype(np.int64),
+        raw["start"].astype(np.int64),
+        raw["c"].astype(np.int64),
+        raw["factor"].astype(np.uint32),
+        raw["rate"].astype(np.uint32),
+        raw["second"].astype(np.uint32),
+    )
+    return Program(
+        name=head[18].rstrip(b"\0").decode(errors="replace"),
+        period_us=head[5],
+        closed=bool(head[8] & FLAG_CLOSED),
+        duration_q32_s=head[10],
+        length_q40=head[11],
+        offset_x_q40=head[12],
+        offset_y_q40=head[13],
+        feed_limit_um_s=head[14],
+        acceleration_limit_um_s2=head[15],
+        jerk_limit_mm_s3=head[16],
+        start_q40=segments[:, 0],
+        x_q40=segments[:, 1],
+        y_q40=segments[:, 2],
+        u_q44=segments[:, 3::2],
+        v_q44=segments[:, 4::2],
+        pieces=pieces,
+    )
+
+
+def open_fault(image: bytes) -> ProgramError | None:
+    """What `program_open` of the controller would answer, None for an image that opens."""
+    if len(image) < HEADER_SIZE:
+        return ProgramError.SIZE
+    head = _HEADER.unpack_from(image)
+    if head[0] != MAGIC:
+        return ProgramError.MAGIC
+    if head[1] != VERSION or head[2] != HEADER_SIZE:
+        return ProgramError.VERSION
+    size = HEADER_SIZE + SEGMENT_SIZE * head[6] + PIECE_SIZE * head[7]
+    if head[3] != size or len(image) < size:
+        return ProgramError.SIZE
+    if head[6] == 0 or head[7] == 0:
+        return ProgramError.COUNT
+    if head[4] != zlib.crc32(image[_CRC_FROM:size]):
+        return ProgramError.CRC
+    return None
+
+
+def reserved_faults(image: bytes) -> tuple[bool, bool, bool, int]:
+    """Of an image that opens, what `Program` does not hold: flags or reserved fields of the header wrong,
+    axis count wrong, name badly padded, and the first piece whose reserved field is not 0 (-1: none).
+    """
+    head = _HEADER.unpack_from(image)
+    flags = bool(head[8] & ~FLAG_CLOSED or head[17] or any(head[19]))
+    name = head[18]
+    padded = b"\0" in name and any(name[name.index(b"\0") :])
+    after = HEADER_SIZE + SEGMENT_SIZE * head[6]
+    reserved = np.frombuffer(image, _PIECE, head[7], after)["reserved"]
+    wrong = np.flatnonzero(reserved)
+    return flags, head[9] != 2, padded, int(wrong[0]) if wrong.size else -1

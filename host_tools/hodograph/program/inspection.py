@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""A program for people: `hodograph inspect`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..feed.pieces import derivative_bounds
+from .exactmath import segment_ways, way_to_q40
+from .image import Program
+
+_ROWS = 12
+
+
+def inspect_dict(program: Program) -> dict[str, Any]:
+    """What a program holds, as plain numbers in mm and s, for JSON."""
+    pieces = program.pieces
+    feed, acceleration, jerk = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)
+    dx, dy, _ = (way_to_q40(way) for way in segment_ways(program.u_q44, program.v_q44))
+    return {
+        "name": program.name,
+        "version": 1,
+        "image_bytes": program.image_size,
+        "period_us": program.period_us,
+        "closed": program.closed,
+        "segments": program.segment_count,
+        "pieces": program.piece_count,
+        "ticks": program.ticks,
+        "duration_s": program.duration_s,
+        "length_mm": program.length_mm,
+        "offset_mm": [program.offset_x_q40 * 2.0**-40, program.offset_y_q40 * 2.0**-40],
+        "start_mm": [float(program.x_q40[0]) * 2.0**-40, float(program.y_q40[0]) * 2.0**-40],
+        "end_mm": [
+            float(program.x_q40[-1] + dx[-1]) * 2.0**-40,
+            float(program.y_q40[-1] + dy[-1]) * 2.0**-40,
+        ],
+        "feed_limit_mm_s": program.feed_limit_um_s / 1000 or None,
+        "acceleration_limit_mm_s2": program.acceleration_limit_um_s2 / 1000 or None,
+        "jerk_limit_mm_s3": float(program.jerk_limit_mm_s3) or None,
+        "peak_feed_mm_s": float(feed.max()),
+        "peak_acceleration_mm_s2": float(np.abs(acceleration).max()),
+        "peak_jerk_mm_s3": float(np.abs(jerk).max()),
+        "override_factor_least": float(pieces.override_factor_q24.min()) * 2.0**-24,
+        "override_rate_least_per_s": float(pieces.override_rate_q16_per_s.min()) * 2.0**-16,
+        "override_second_least_per_s2": float(pieces.override_second_q8_per_s2.min()) * 2.0**-8,
+    }
+
+
+def inspect_text(program: Program, *, full: bool = False) -> str:
+    """The same for reading, with the tables of segments and pieces (their first and last rows, or all)."""
+    d = inspect_dict(program)
+    limits = ", ".join(
+        f"{key} {d[name]:g} {unit}"
+        for key, name, unit in (
+            ("feed", "feed_limit_mm_s", "mm/s"),
+            ("acceleration", "acceleration_limit_mm_s2", "mm/s^2"),
+            ("jerk", "jerk_limit_mm_s3", "mm/s^3"),
+        )
+        if d[name] is not None
+    )
+    lines = [
+        f"program   {d['name'] or '(no name)'}, format {d['version']}, {d['image_bytes']} bytes",
+        f"path      {'closed' if d['closed'] else 'open'}, {d['length_mm']:.9f} mm in {d['segments']} segments",
+        f"from      ({d['start_mm'][0]:.9f}, {d['start_mm'][1]:.9f}) mm",
+        f"to        ({d['end_mm'][0]:.9f}, {d['end_mm'][1]:.9f}) mm",
+        f"offset    ({d['offset_mm'][0]:g}, {d['offset_mm'][1]:g}) mm, contained",
+        f"time      {d['duration_s']:.9f} s in {d['pieces']} pieces, {d['ticks']} ticks of {d['period_us']} us",
+        f"limits    {limits or 'none given'}",
+        f"peaks     feed {d['peak_feed_mm_s']:.6g} mm/s, acceleration {d['peak_acceleration_mm_s2']:.6g} "
+        f"mm/s^2, jerk {d['peak_jerk_mm_s3']:.6g} mm/s^3 (bounds of the pieces)",
+        f"override  factor {d['override_factor_least']:.4g}, rate {d['override_rate_least_per_s']:.4g} /s, "
+        f"second {d['override_second_least_per_s2']:.4g} /s^2 (tightest)",
+        "",
+        " segment       start mm           x mm           y mm      length mm",
+        *_rows(_segment_rows(program), full),
+        "",
+        "   piece     duration s       start mm  feed mm/s  peak acc  peak jerk  factor    rate  second",
+        *_rows(_piece_rows(program), full),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _segment_rows(program: Program) -> list[str]:
+    joints = np.append(program.start_q40, program.length_q40) * 2.0**-40
+    x, y = program.x_q40 * 2.0**-40, program.y_q40 * 2.0**-40
+    return [
+        f"{i:8d} {joints[i]:14.6f} {x[i]:14.6f} {y[i]:14.6f} {joints[i + 1] - joints[i]:14.6f}"
+        for i in range(program.segment_count)
+    ]
+
+
+def _piece_rows(program: Program) -> list[str]:
+    pieces = program.pieces
+    feed, acceleration, jerk = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)
+    return [
+        f"{i:8d} {pieces.duration_q32_s[i] * 2.0**-32:14.9f} {pieces.start_q40[i] * 2.0**-40:14.6f} "
+        f"{feed[i].max():10.4f} {np.abs(acceleration[i]).max():9.2f} {np.abs(jerk[i]).max():10.1f} "
+        f"{pieces.override_factor_q24[i] * 2.0**-24:7.4f} "
+        f"{pieces.override_rate_q16_per_s[i] * 2.0**-16:7.4g} "
+        f"{pieces.override_second_q8_per_s2[i] * 2.0**-8:7.4g}"
+        for i in range(program.piece_count)
+    ]
+
+
+def _rows(rows: list[str], full: bool) -> list[str]:
+    if full or len(rows) <= 2 * _ROWS:
+        return rows
+    return [*rows[:_ROWS], f"     ... {len(rows) - 2 * _ROWS} more", *rows[-_ROWS:]]
