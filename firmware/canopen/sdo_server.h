@@ -6,9 +6,9 @@
  * one piece at the end, so an aborted transfer changes nothing; DOMAIN data goes to the od hooks as
  * it comes.
  *
- * One transfer at a time. A new initiate request in the middle of a transfer drops the old transfer
- * (its DOMAIN hooks are told) and starts the new one, so a client that lost its answer can simply
- * begin again.
+ * One transfer at a time. A new initiate request drops the old transfer (its DOMAIN hooks are told)
+ * and starts the new one, so a client that lost its answer can simply begin again; only between the
+ * segments of a block download is each frame a segment, and the client has to abort first.
  *
  * Loss within a block: segments after a gap are ignored and the answer at the block's end names the
  * last good one, from where the client repeats. When the block's last segment itself is lost the

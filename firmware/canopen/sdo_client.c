@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: MIT */
+#include "canopen/sdo_client.h"
+
+#include <string.h>
+
+#include "canopen/cob.h"
+#include "canopen/sdo_abort.h"
+
+#define SDO_BYTES       8u
+#define SEGMENT_BYTES   7u
+#define EXPEDITED_BYTES 4u
+
+#define TOGGLE       0x10u
+#define LAST_SEGMENT 0x01u
+#define SIZE_GIVEN   0x01u
+#define EXPEDITED    0x02u
+#define ABORT        0x80u
+
+#define ASK_DOWNLOAD         0x20u
+#define ASK_DOWNLOAD_SEGMENT 0x00u
+#define ASK_UPLOAD           0x40u
+#define ASK_UPLOAD_SEGMENT   0x60u
+
+/* Command specifiers of answers, bits 5 ... 7. */
+#define SPECIFIER               0xE0u
+#define ANSWER_DOWNLOAD         0x60u
+#define ANSWER_DOWNLOAD_SEGMENT 0x20u
+#define ANSWER_UPLOAD           0x40u
+#define ANSWER_UPLOAD_SEGMENT   0x00u
+
+enum step { STEP_DOWNLOAD, STEP_DOWNLOAD_SEGMENT, STEP_UPLOAD, STEP_UPLOAD_SEGMENT };
+
+void sdo_client_init(struct sdo_client *client, uint32_t timeout_us)
+{
+    memset(client, 0, sizeof *client);
+    client->timeout_us = timeout_us;
+    client->status = SDO_CLIENT_IDLE;
+}
+
+static void ask(const struct sdo_client *client, uint8_t command, struct can_msg *out)
+{
+    cob_frame(out, COB_SDO_ASK + client->node, SDO_BYTES);
+    out->data[0] = command;
+}
+
+static void ask_about_object(const struct sdo_client *client, uint8_t command, struct can_msg *out)
+{
+    ask(client, command, out);
+    cob_put(out->data + 1, client->index, 2);
+    out->data[3] = client->sub;
+}
+
+static int begin(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                 uint32_t size)
+{
+    if (client->status == SDO_CLIENT_BUSY) {
+        return SDO_CLIENT_ERR_BUSY;
+    }
+    if (node < NODE_ID_MIN || node > NODE_ID_MAX || size == 0) {
+        return SDO_CLIENT_ERR_ARGUMENT;
+    }
+    client->status = SDO_CLIENT_BUSY;
+    client->node = node;
+    client->index = index;
+    client->sub = sub;
+    client->abort_code = SDO_OK;
+    client->silence_us = 0;
+    client->moved = 0;
+    client->toggle = 0;
+    return 1;
+}
+
+int sdo_client_write(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                     const uint8_t *data, uint32_t size, struct can_msg *out)
+{
+    int begun = begin(client, node, index, sub, size);
+
+    if (begun < 0) {
+        return begun;
+    }
+    client->source = data;
+    client->size = size;
+    client->step = STEP_DOWNLOAD;
+    ask_about_object(client, ASK_DOWNLOAD | SIZE_GIVEN, out);
+    if (size <= EXPEDITED_BYTES) {
+        out->data[0] |= (uint8_t)(EXPEDITED | ((EXPEDITED_BYTES - size) << 2));
+        memcpy(out->data + 4, data, size);
+        client->moved = size;
+    } else {
+        cob_put(out->data + 4, size, 4);
+    }
+    return 1;
+}
+
+int sdo_client_read(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                    uint8_t *buffer, uint32_t capacity, struct can_msg *out)
+{
+    int begun = begin(client, node, index, sub, capacity);
+
+    if (begun < 0) {
+        return begun;
+    }
+    client->target = buffer;
+    client->capacity = capacity;
+    client->size = 0;
+    client->step = STEP_UPLOAD;
+    ask_about_object(client, ASK_UPLOAD, out);
+    return 1;
+}
+
+int sdo_client_write_number(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                            uint64_t value, uint8_t size, struct can_msg *out)
+{
+    if (client->status == SDO_CLIENT_BUSY) {
+        return SDO_CLIENT_ERR_BUSY;
+    }
+    if (size > sizeof client->number) {
+        return SDO_CLIENT_ERR_ARGUMENT;
+    }
+    cob_put(client->number, value, size);
+    return sdo_client_write(client, node, index, sub, client->number, size, out);
+}
+
+int sdo_client_read_number(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
+                           struct can_msg *out)
+{
+    return sdo_client_read(client, node, index, sub, client->number, sizeof client->number, out);
+}
+
+uint64_t sdo_client_unsigned(const struct sdo_client *client)
+{
+    return cob_get(client->number, client->size);
+}
+
+int64_t sdo_client_signed(const struct sdo_client *client)
+{
+    return cob_signed(sdo_client_unsigned(client), client->size);
+}
+
+int sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg *out)
+{
+    if (client->status != SDO_CLIENT_BUSY) {
+        return 0;
+    }
+    client->status = SDO_CLIENT_FAILED;
+    client->abort_code = code;
+    ask_about_object(client, ABORT, out);
+    cob_put(out->data + 4, code, 4);
+    return 1;
+}
+
+static int done(struct sdo_client *client)
+{
+    client->status = SDO_CLIENT_DONE;
+    return 0;
+}
+
+/* The next segment of a write, or the end of it. */
+static int send_segment(struct sdo_client *client, struct can_msg *out)
+{
+    uint32_t left = client->size - client->moved;
+    uint32_t size = left < SEGMENT_BYTES ? left : SEGMENT_BYTES;
+
+    if (left == 0) {
+        return done(client);
+    }
+    ask(client,
+        (uint8_t)(ASK_DOWNLOAD_SEGMENT | client->toggle | ((SEGMENT_BYTES - size) << 1) |
+                  (size == left ? LAST_SEGMENT : 0u)),
+        out);
+    memcpy(out->data + 1, client->source + client->moved, size);
+    client->moved += size;
+    client->step = STEP_DOWNLOAD_SEGMENT;
+    return 1;
+}
+
+static int ask_segment(struct sdo_client *client, struct can_msg *out)
+{
+    client->step = STEP_UPLOAD_SEGMENT;
+    ask(client, (uint8_t)(ASK_UPLOAD_SEGMENT | client->toggle), out);
+    return 1;
+}
+
+static int take(struct sdo_client *client, const uint8_t *data, uint32_t size, struct can_msg *out)
+{
+    if (size > client->capacity - client->moved) {
+        return sdo_client_cancel(client, SDO_ABORT_MEMORY, out);
+    }
+    memcpy(client->target + client->moved, data, size);
+    client->moved += size;
+    client->size = client->moved;
+    return 0;
+}
+
+static int answer_upload(struct sdo_client *client, const uint8_t *data, struct can_msg *out)
+{
+    if ((data[0] & EXPEDITED) == 0) {
+        return ask_segment(client, out);
+    }
+    uint32_t unused = (data[0] & SIZE_GIVEN) != 0 ? (data[0] >> 2) & 3u : 0;
+    int aborted = take(client, data + 4, EXPEDITED_BYTES - unused, out);
+    return aborted != 0 ? aborted : done(client);
+}
+
+static int answer_upload_segment(struct sdo_client *client, const uint8_t *data,
+                                 struct can_msg *out)
+{
+    int aborted = take(client, data + 1, SEGMENT_BYTES - ((data[0] >> 1) & 7u), out);
+
+    if (aborted != 0) {
+        return aborted;
+    }
+    if ((data[0] & LAST_SEGMENT) != 0) {
+        return client->size == 0 ? sdo_client_cancel(client, SDO_ABORT_NO_DATA, out) : done(client);
+    }
+    client->toggle ^= TOGGLE;
+    return ask_segment(client, out);
+}
+
+static bool is_about_object(const struct sdo_client *client, const uint8_t *data)
+{
+    return cob_get(data + 1, 2) == client->index && data[3] == client->sub;
+}
+
+/* The answer that is due in this step: an abort code when `data` is another one. */
+static uint32_t check(const struct sdo_client *client, const uint8_t *data)
+{
+    static const uint8_t due[] = {
+        [STEP_DOWNLOAD] = ANSWER_DOWNLOAD,
+        [STEP_DOWNLOAD_SEGMENT] = ANSWER_DOWNLOAD_SEGMENT,
+        [STEP_UPLOAD] = ANSWER_UPLOAD,
+        [STEP_UPLOAD_SEGMENT] = ANSWER_UPLOAD_SEGMENT,
+    };
+    bool segment = client->step == STEP_DOWNLOAD_SEGMENT || client->step == STEP_UPLOAD_SEGMENT;
+
+    if ((data[0] & SPECIFIER) != due[client->step]) {
+        return SDO_ABORT_COMMAND;
+    }
+    if (segment) {
+        return (data[0] & TOGGLE) == client->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
+    }
+    return is_about_object(client, data) ? SDO_OK : SDO_ABORT_INCOMPATIBLE;
+}
+
+static int go_on(struct sdo_client *client, const uint8_t *data, struct can_msg *out)
+{
+    switch (client->step) {
+    case STEP_UPLOAD:
+        return answer_upload(client, data, out);
+    case STEP_UPLOAD_SEGMENT:
+        return answer_upload_segment(client, data, out);
+    case STEP_DOWNLOAD_SEGMENT:
+        client->toggle ^= TOGGLE;
+        return send_segment(client, out);
+    default:
+        return send_segment(client, out);
+    }
+}
+
+int sdo_client_receive(struct sdo_client *client, const struct can_msg *in, struct can_msg *out)
+{
+    uint32_t code;
+
+    if (client->status != SDO_CLIENT_BUSY || in->id != COB_SDO_ANSWER + client->node ||
+        in->len != SDO_BYTES) {
+        return 0;
+    }
+    if (in->data[0] == ABORT) {
+        client->status = SDO_CLIENT_REFUSED;
+        client->abort_code = (uint32_t)cob_get(in->data + 4, 4);
+        return 0;
+    }
+    client->silence_us = 0;
+    code = check(client, in->data);
+    return code != SDO_OK ? sdo_client_cancel(client, code, out) : go_on(client, in->data, out);
+}
+
+int sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct can_msg *out)
+{
+    if (client->status != SDO_CLIENT_BUSY) {
+        return 0;
+    }
+    client->silence_us += elapsed_us < client->timeout_us ? elapsed_us : client->timeout_us;
+    return client->silence_us >= client->timeout_us
+               ? sdo_client_cancel(client, SDO_ABORT_TIMEOUT, out)
+               : 0;
+}

@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: MIT */
+#include "canopen/sdo_server.h"
+
+#include <string.h>
+
+#include "canopen/cob.h"
+#include "canopen/sdo_abort.h"
+#include "canopen/sdo_server_private.h"
+
+/* Command specifiers of a client, bits 5 ... 7 of the first byte. */
+enum client_command {
+    CLIENT_DOWNLOAD_SEGMENT = 0,
+    CLIENT_DOWNLOAD = 1,
+    CLIENT_UPLOAD = 2,
+    CLIENT_UPLOAD_SEGMENT = 3,
+    CLIENT_ABORT = 4,
+    CLIENT_BLOCK_UPLOAD = 5,
+    CLIENT_BLOCK_DOWNLOAD = 6
+};
+
+/* Within CLIENT_BLOCK_...: initiate has these bits 0. */
+#define BLOCK_UPLOAD_SUBCOMMAND   0x03u
+#define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
+
+void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uint32_t timeout_us,
+                     uint8_t block_segments)
+{
+    memset(server, 0, sizeof *server);
+    server->od = od;
+    server->node = node;
+    server->timeout_us = timeout_us;
+    server->block_size = block_segments;
+    server->state = SDO_SERVER_IDLE;
+}
+
+void sdo_server_reset(struct sdo_server *server)
+{
+    sdo_server_drop(server);
+}
+
+bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
+{
+    return in->id == COB_SDO_ASK + server->node && in->len == SDO_BYTES;
+}
+
+bool sdo_server_busy(const struct sdo_server *server)
+{
+    return server->state != SDO_SERVER_IDLE;
+}
+
+void sdo_server_frame(const struct sdo_server *s, uint8_t command, struct can_msg *out)
+{
+    cob_frame(out, COB_SDO_ANSWER + s->node, SDO_BYTES);
+    out->data[0] = command;
+}
+
+void sdo_server_frame_with_object(const struct sdo_server *s, uint8_t command, struct can_msg *out)
+{
+    sdo_server_frame(s, command, out);
+    cob_put(out->data + 1, s->index, 2);
+    out->data[3] = s->sub;
+}
+
+int sdo_server_fail(struct sdo_server *s, uint32_t code, struct can_msg *out)
+{
+    sdo_server_drop(s);
+    sdo_server_frame_with_object(s, SDO_ABORT_COMMAND_BYTE, out);
+    cob_put(out->data + 4, code, 4);
+    return 1;
+}
+
+/* Forgets a transfer under way and notes the object of the new one. */
+static void begin(struct sdo_server *s, const uint8_t *data)
+{
+    sdo_server_drop(s);
+    s->index = (uint16_t)cob_get(data + 1, 2);
+    s->sub = data[3];
+    s->toggle = 0;
+}
+
+static bool is_initiate(const uint8_t *data)
+{
+    switch (data[0] >> 5) {
+    case CLIENT_DOWNLOAD:
+    case CLIENT_UPLOAD:
+        return true;
+    case CLIENT_BLOCK_UPLOAD:
+        return (data[0] & BLOCK_UPLOAD_SUBCOMMAND) == 0;
+    case CLIENT_BLOCK_DOWNLOAD:
+        return (data[0] & BLOCK_DOWNLOAD_SUBCOMMAND) == 0;
+    default:
+        return false;
+    }
+}
+
+static int initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    begin(s, data);
+    switch (data[0] >> 5) {
+    case CLIENT_DOWNLOAD:
+        return sdo_server_download_initiate(s, data, out);
+    case CLIENT_UPLOAD:
+        return sdo_server_upload_initiate(s, out);
+    case CLIENT_BLOCK_UPLOAD:
+        return sdo_server_block_upload_initiate(s, data, out);
+    default:
+        return sdo_server_block_download_initiate(s, data, out);
+    }
+}
+
+static int go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint8_t command = data[0] >> 5;
+
+    switch (s->state) {
+    case SDO_SERVER_DOWNLOAD:
+        return command == CLIENT_DOWNLOAD_SEGMENT ? sdo_server_download_segment(s, data, out)
+                                                  : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+    case SDO_SERVER_UPLOAD:
+        return command == CLIENT_UPLOAD_SEGMENT ? sdo_server_upload_segment(s, data, out)
+                                                : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+    case SDO_SERVER_BLOCK_DOWNLOAD_END:
+        return command == CLIENT_BLOCK_DOWNLOAD ? sdo_server_block_download_end(s, data, out)
+                                                : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+    case SDO_SERVER_BLOCK_UPLOAD_READY:
+    case SDO_SERVER_BLOCK_UPLOAD:
+    case SDO_SERVER_BLOCK_UPLOAD_ACK:
+    case SDO_SERVER_BLOCK_UPLOAD_END:
+        return command == CLIENT_BLOCK_UPLOAD ? sdo_server_block_upload_command(s, data, out)
+                                              : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+    default:
+        s->index = 0;
+        s->sub = 0;
+        return sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+    }
+}
+
+int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out)
+{
+    if (!sdo_server_wants(server, in)) {
+        return 0;
+    }
+    server->silence_us = 0;
+    /* A whole byte: within a block, 0x81 ... 0xFF are last segments. */
+    if (in->data[0] == SDO_ABORT_COMMAND_BYTE) {
+        sdo_server_drop(server);
+        return 0;
+    }
+    if (server->state == SDO_SERVER_BLOCK_DOWNLOAD) {
+        return sdo_server_block_download_segment(server, in->data, out);
+    }
+    if (is_initiate(in->data)) {
+        return initiate(server, in->data, out);
+    }
+    return go_on(server, in->data, out);
+}
+
+/* A block whose last segment was lost is answered before the client gives up. */
+static int acknowledge_early(struct sdo_server *s, struct can_msg *out)
+{
+    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || s->acknowledged_early ||
+        s->silence_us < s->timeout_us / 2) {
+        return 0;
+    }
+    s->acknowledged_early = true;
+    return sdo_server_block_download_acknowledge(s, out);
+}
+
+int sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out)
+{
+    if (server->state == SDO_SERVER_IDLE) {
+        return 0;
+    }
+    if (server->state == SDO_SERVER_BLOCK_UPLOAD) {
+        server->silence_us = 0; /* it is the server that talks */
+        return sdo_server_block_upload_send(server, out);
+    }
+    server->silence_us =
+        elapsed_us > UINT32_MAX - server->silence_us ? UINT32_MAX : server->silence_us + elapsed_us;
+    if (server->silence_us >= server->timeout_us) {
+        return sdo_server_fail(server, SDO_ABORT_TIMEOUT, out);
+    }
+    return acknowledge_early(server, out);
+}
