@@ -99,6 +99,10 @@ void machine_drives_configured(struct machine *machine);
  * counts. Any context, under the lock. */
 void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail);
 
+/* In FAULT: gives the stop on the path up and switches the drives off. Any context, under the lock.
+ */
+void machine_switch_off(struct machine *machine);
+
 /* --- Timer --- */
 
 /* The SYNC before this tick is over: counts missing answers, watches the drives. */

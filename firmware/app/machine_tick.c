@@ -94,7 +94,7 @@ static void step_motion(struct machine *machine)
     }
 }
 
-static void switch_off(struct machine *machine)
+void machine_switch_off(struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         machine->axes[i].goal = CIA402_GOAL_OFF;
@@ -107,7 +107,7 @@ static void step_fault(struct machine *machine)
     if (machine->fault_phase == MACHINE_FAULT_BRAKING) {
         next_targets(machine);
         if (motion_over(&machine->motion)) {
-            switch_off(machine);
+            machine_switch_off(machine);
         }
     } else if (machine->fault_phase == MACHINE_FAULT_RESETTING) {
         if (straggler(machine) == NULL || time_is_up(machine)) {

@@ -39,8 +39,9 @@ enum port_error {
  * the reason has been reported. */
 int port_begin(int argc, char **argv);
 
-/* Stops both interrupts, leaves the bus. Mainline. */
-void port_end(void);
+/* Stops both interrupts, leaves the bus. Returns 0, or the exit status for main() when the machine
+ * failed on the way (the bus went away); that has been reported. Mainline. */
+int port_end(void);
 
 /* True when the machine wants the controller to end (SIGTERM, SIGINT); never on a board without
  * such a wish. */

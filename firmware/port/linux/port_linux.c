@@ -78,11 +78,18 @@ int port_begin(int argc, char **argv)
     return 0;
 }
 
-void port_end(void)
+int port_end(void)
 {
     interrupts_end();
     can_socket_close(&self.socket);
     (void)close(self.wake_fd);
+    const int error = interrupts_error();
+    if (error == 0) {
+        return 0;
+    }
+    (void)fprintf(stderr, "hodograph-controller: %s is gone: %s\n", self.options.bus,
+                  strerror(-error));
+    return EXIT_BUS;
 }
 
 /* A bus that is gone ends the controller too: there is nothing left to control. */

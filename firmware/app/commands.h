@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/* commands: object 0x2001. Mainline. */
+#ifndef APP_COMMANDS_H
+#define APP_COMMANDS_H
+
+#include "app/controller.h"
+
+enum command {
+    COMMAND_ENABLE = 1,
+    COMMAND_START = 2,
+    COMMAND_STOP = 3,
+    COMMAND_DISABLE = 4,
+    COMMAND_RESET = 5,
+};
+
+/* Does it, or says why not; the answer is also kept in controller->refusal. */
+enum machine_refusal commands_execute(struct controller *controller, enum command command);
+
+#endif

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/controller.h"
+
+#include <string.h>
+
+#include "app/od_program.h"
+#include "app/od_read.h"
+#include "app/od_write.h"
+#include "canopen/cob.h"
+#include "port/port.h"
+
+#define SDO_TIMEOUT_US     2000000u
+#define SDO_BLOCK_SEGMENTS 127u
+#define SEND_TRIES         40u
+#define SEND_PAUSE_US      500u
+
+static const struct od_hooks od_hooks = {
+    .read = od_read_hook,
+    .write = od_write_hook,
+    .written = od_written_hook,
+    .domain_begin = od_program_begin,
+    .domain_write = od_program_write,
+    .domain_end = od_program_end,
+    .domain_abort = od_program_abort,
+    .domain_size = od_program_size,
+    .domain_read = od_program_read,
+};
+
+static void init_values(struct controller *controller)
+{
+    struct od_controller *values = &controller->values;
+    const uint8_t node = controller->node;
+    *values = od_controller_defaults;
+    values->cob_id_emcy = COB_EMCY + node;
+    values->sdo_server_parameter.cob_id_client_to_server = COB_SDO_ASK + node;
+    values->sdo_server_parameter.cob_id_server_to_client = COB_SDO_ANSWER + node;
+    od_init(&controller->od, &od_controller_table, values, &od_hooks, controller);
+    emcy_producer_init(&controller->emcy, node, &values->error_register,
+                       values->predefined_error_field, &values->predefined_error_field_count,
+                       (uint8_t)(sizeof values->predefined_error_field /
+                                 sizeof values->predefined_error_field[0]));
+}
+
+void controller_init(struct controller *controller, uint8_t node)
+{
+    memset(controller, 0, sizeof *controller);
+    controller->node = node;
+    init_values(controller);
+    config_read(&controller->config, &controller->od);
+    machine_init(&controller->machine, &controller->config);
+    tick_init(&controller->tick, &controller->machine);
+    frame_queue_init(&controller->queue);
+    program_slot_init(&controller->slot);
+    drive_boot_init(&controller->boot);
+    drive_watch_begin(&controller->watch, &controller->config);
+    sdo_server_init(&controller->server, &controller->od, node, SDO_TIMEOUT_US, SDO_BLOCK_SEGMENTS);
+    nmt_slave_init(&controller->nmt, node, NULL, NULL);
+    heartbeat_producer_init(&controller->heartbeat, node);
+}
+
+/* Receive: process data at once, the rest waits for the mainline. */
+static void on_receive(void *self, const struct can_msg *message)
+{
+    struct controller *controller = self;
+    struct pdo_actual unused;
+    if (pdo_decode_actual(message, &unused) != 0) {
+        if (machine_receive(&controller->machine, message, port_time_us())) {
+            port_tick_ready();
+        }
+    } else if (frame_queue_put(&controller->queue, message)) {
+        port_wake();
+    }
+}
+
+static void on_tick(void *self, uint32_t late_ns)
+{
+    struct controller *controller = self;
+    tick_run(&controller->tick, late_ns);
+}
+
+int controller_start(struct controller *controller)
+{
+    const struct port_filter filters[] = {
+        {COB_NMT, CAN_ID_MAX},
+        {COB_EMCY, 0x780u},
+        {COB_TPDO1, 0x780u},
+        {COB_SDO_ANSWER, 0x780u},
+        {(uint16_t)(COB_SDO_ASK + controller->node), CAN_ID_MAX},
+        {COB_HEARTBEAT, 0x780u},
+    };
+    const struct port_handlers handlers = {
+        .self = controller, .receive = on_receive, .tick = on_tick};
+    controller->polled_us = port_time_us();
+    const int result = port_can_accept(filters, sizeof filters / sizeof filters[0]);
+    return result != 0 ? result : port_start(&handlers, controller->config.period_us);
+}
+
+void controller_send(const struct can_msg *message)
+{
+    for (unsigned i = 0; i < SEND_TRIES && port_can_send(message) != 0; ++i) {
+        port_wait(SEND_PAUSE_US);
+    }
+}

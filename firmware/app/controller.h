@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * controller: node 1: the wiring of machine, tick, protocol objects and port.
+ *
+ *     static struct controller controller;        the only instance lives in main
+ *     controller_init(&controller, port_node_id());
+ *     controller_start(&controller);              interrupts on
+ *     while (...) { port_wait(...); controller_poll(&controller); }
+ *
+ * docs/architecture.md draws which context runs what. All functions: mainline.
+ */
+#ifndef APP_CONTROLLER_H
+#define APP_CONTROLLER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/drive_boot.h"
+#include "app/drive_watch.h"
+#include "app/frame_queue.h"
+#include "app/machine.h"
+#include "app/program_slot.h"
+#include "app/tick.h"
+#include "canopen/emcy.h"
+#include "canopen/heartbeat.h"
+#include "canopen/nmt.h"
+#include "canopen/od.h"
+#include "canopen/sdo_server.h"
+#include "od_controller.h"
+
+/* The longest the mainline may sleep without a frame: the resolution of its timeouts. */
+#define CONTROLLER_POLL_US 5000u
+
+struct controller {
+    /* shared with the interrupts, under the port's lock */
+    struct machine machine;
+    struct tick tick;
+    struct frame_queue queue;
+    /* mainline only */
+    struct config config; /* the same values as machine.config */
+    struct program_slot slot;
+    struct drive_boot boot;
+    struct drive_watch watch;
+    struct od od;
+    struct od_controller values;
+    struct sdo_server server;
+    struct nmt_slave nmt;
+    struct heartbeat_producer heartbeat;
+    struct emcy_producer emcy;
+    uint32_t polled_us;             /* port_time_us() of the last poll */
+    uint16_t reported_fault;        /* the fault code that the last EMCY told of */
+    enum machine_state noted_state; /* last one logged */
+    enum machine_refusal refusal;   /* of the last command */
+    uint8_t node;
+    bool same_value; /* the write under way changes nothing */
+};
+
+/* Everything to its power-on state. */
+void controller_init(struct controller *controller, uint8_t node);
+
+/* Turns the interrupts on. 0 or PORT_ERR_SYSTEM. */
+int controller_start(struct controller *controller);
+
+/* One round: takes every waiting frame, lets time pass, sends what is due. */
+void controller_poll(struct controller *controller);
+
+/* Ends in bounded time: stops along the path if running, switches the drives off, leaves them
+ * pre-operational. True when all of that succeeded. Interrupts are still on afterwards. */
+bool controller_shut_down(struct controller *controller);
+
+/* Sends from the mainline, waiting a little when the port is full; then the frame is dropped: every
+ * protocol above can stand a lost frame. */
+void controller_send(const struct can_msg *message);
+
+#endif

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: MIT */
+/* The controller's mainline: one round of all protocol objects. */
+#include "app/controller.h"
+
+#include <stddef.h>
+
+#include "port/port.h"
+
+/* The node is its own NMT master: it enters OPERATIONAL by itself, and obeys resets from outside
+ * while its drives are off. */
+static bool nmt_obeyed(struct controller *controller, const struct can_msg *in)
+{
+    const bool reset = in->len >= 2u && (in->data[0] == (uint8_t)NMT_RESET_NODE ||
+                                         in->data[0] == (uint8_t)NMT_RESET_COMMUNICATION);
+    port_lock();
+    const bool idle = machine_configurable(&controller->machine);
+    port_unlock();
+    return reset && idle;
+}
+
+static void take_nmt(struct controller *controller, const struct can_msg *in)
+{
+    if (!nmt_obeyed(controller, in) || !nmt_slave_receive(&controller->nmt, in)) {
+        return;
+    }
+    sdo_server_reset(&controller->server);
+    port_lock();
+    if (controller->machine.state == MACHINE_OFF) {
+        machine_enter_boot(&controller->machine);
+    }
+    port_unlock();
+}
+
+static void take_frame(struct controller *controller, const struct can_msg *in)
+{
+    struct can_msg out;
+    if (in->id == 0u) {
+        take_nmt(controller, in);
+    } else if (sdo_server_wants(&controller->server, in)) {
+        if (sdo_server_receive(&controller->server, in, &out) != 0) {
+            controller_send(&out);
+        }
+    } else {
+        if (drive_boot_receive(&controller->boot, in, &out) != 0) {
+            controller_send(&out);
+        }
+        drive_watch_receive(&controller->watch, &controller->machine, in);
+    }
+}
+
+static bool next_frame(struct controller *controller, struct can_msg *in)
+{
+    port_lock();
+    const bool got = frame_queue_take(&controller->queue, in);
+    port_unlock();
+    return got;
+}
+
+static void poll_nmt(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    if (nmt_slave_process(&controller->nmt, &out) != 0) {
+        controller_send(&out);
+        struct can_msg start;
+        nmt_master_command(NMT_START, controller->node, &start);
+        (void)nmt_slave_receive(&controller->nmt, &start);
+    }
+    if (heartbeat_producer_process(&controller->heartbeat,
+                                   controller->values.producer_heartbeat_time,
+                                   controller->nmt.state, elapsed_us, &out) != 0) {
+        controller_send(&out);
+    }
+}
+
+static void poll_server(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    int due = sdo_server_process(&controller->server, elapsed_us, &out);
+    while (due != 0) {
+        controller_send(&out);
+        due = sdo_server_process(&controller->server, 0, &out);
+    }
+}
+
+static bool boot_requested(struct machine *machine)
+{
+    port_lock();
+    const bool due = machine->boot_due;
+    machine->boot_due = false;
+    port_unlock();
+    return due;
+}
+
+static void poll_boot(struct controller *controller, uint32_t elapsed_us)
+{
+    if (boot_requested(&controller->machine)) {
+        drive_boot_begin(&controller->boot, &controller->config);
+        drive_watch_begin(&controller->watch, &controller->config);
+    }
+    struct can_msg out;
+    int due = drive_boot_process(&controller->boot, elapsed_us, &out);
+    while (due != 0) {
+        controller_send(&out);
+        due = drive_boot_process(&controller->boot, 0, &out);
+    }
+    if (drive_boot_finished(&controller->boot)) {
+        port_lock();
+        if (!controller->machine.boot_due) {
+            machine_drives_configured(&controller->machine);
+        }
+        port_unlock();
+    }
+}
+
+/* Faults are raised in interrupts; their telling is left to the mainline. */
+static void report_fault(struct controller *controller)
+{
+    port_lock();
+    const struct fault fault = controller->machine.fault;
+    port_unlock();
+    if (fault.code == controller->reported_fault) {
+        return;
+    }
+    if (fault.code == EMCY_NO_ERROR) {
+        emcy_producer_clear(&controller->emcy, EMCY_REGISTER_PROFILE);
+    } else {
+        const uint8_t detail[EMCY_DETAIL_SIZE] = {
+            fault.node, (uint8_t)fault.detail, (uint8_t)(fault.detail >> 8),
+            (uint8_t)(fault.detail >> 16), (uint8_t)(fault.detail >> 24)};
+        emcy_producer_raise(&controller->emcy, fault.code, EMCY_REGISTER_PROFILE, detail);
+        port_log(PORT_WARNING, emcy_text(fault.code), fault.node);
+    }
+    controller->reported_fault = fault.code;
+}
+
+static void poll_emergency(struct controller *controller)
+{
+    struct can_msg out;
+    report_fault(controller);
+    while (emcy_producer_process(&controller->emcy, &out) != 0) {
+        controller_send(&out);
+    }
+}
+
+static void note_state(struct controller *controller)
+{
+    static const char *const names[] = {"state boot",  "state off",     "state enabling",
+                                        "state ready", "state running", "state stopping",
+                                        "state fault"};
+    const enum machine_state state = controller->machine.state;
+    if (state != controller->noted_state) {
+        controller->noted_state = state;
+        port_log(PORT_NOTE, names[state], (int32_t)state);
+    }
+}
+
+void controller_poll(struct controller *controller)
+{
+    struct can_msg in;
+    while (next_frame(controller, &in)) {
+        take_frame(controller, &in);
+    }
+    const uint32_t now_us = port_time_us();
+    const uint32_t elapsed_us = now_us - controller->polled_us;
+    controller->polled_us = now_us;
+    poll_nmt(controller, elapsed_us);
+    poll_server(controller, elapsed_us);
+    poll_boot(controller, elapsed_us);
+    drive_watch_process(&controller->watch, &controller->machine, elapsed_us);
+    poll_emergency(controller);
+    note_state(controller);
+}

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: MIT */
+/* drive_watch: heartbeats and emergency messages of the drives. Mainline; takes the port's lock
+ * where it touches the machine. */
+#ifndef APP_DRIVE_WATCH_H
+#define APP_DRIVE_WATCH_H
+
+#include <stdint.h>
+
+#include "app/machine.h"
+#include "canopen/heartbeat.h"
+
+#define DRIVE_WATCH_HEARTBEAT_MS 500u /* consumer time; the drives send five times as often */
+/* The mainline may be busy for long (a program check); that is no silence of a drive. */
+#define DRIVE_WATCH_ELAPSED_MAX_US 20000u
+
+struct drive_watch {
+    struct heartbeat_consumer consumers[AXES_MAX];
+    uint8_t count;
+};
+
+/* Begins to watch the drives of the configuration, all unknown. */
+void drive_watch_begin(struct drive_watch *watch, const struct config *config);
+
+/* Takes any frame. A drive that restarts, or reports an error, makes a fault or a new boot. */
+void drive_watch_receive(struct drive_watch *watch, struct machine *machine,
+                         const struct can_msg *in);
+
+/* Lets time pass; a drive that has fallen silent likewise. */
+void drive_watch_process(struct drive_watch *watch, struct machine *machine, uint32_t elapsed_us);
+
+#endif

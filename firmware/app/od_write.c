@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/od_write.h"
+
+#include "app/commands.h"
+#include "canopen/cob.h"
+#include "canopen/sdo_abort.h"
+#include "port/port.h"
+
+static uint32_t allow_configuration(struct controller *controller, const struct od_entry *entry,
+                                    uint64_t value)
+{
+    port_lock();
+    const bool possible = machine_configurable(&controller->machine);
+    port_unlock();
+    if (!possible) {
+        return SDO_ABORT_STATE;
+    }
+    return config_value_allowed(entry->index, entry->sub, value) ? SDO_OK : SDO_ABORT_VALUE;
+}
+
+uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_t *value,
+                       uint32_t size)
+{
+    struct controller *controller = context;
+    const uint64_t number = size <= 8u ? cob_get(value, size) : 0u;
+    if (entry->index == 0x2001) {
+        const enum machine_refusal refusal = commands_execute(controller, (enum command)number);
+        return refusal == MACHINE_ACCEPTED ? SDO_OK : SDO_ABORT_STATE;
+    }
+    if (entry->index == 0x1003) {
+        return number == 0u ? SDO_OK : SDO_ABORT_VALUE;
+    }
+    if (config_contains(entry->index)) {
+        uint8_t present[8] = {0};
+        cob_put(present, od_number(&controller->od, entry), entry->size);
+        controller->same_value = cob_get(present, entry->size) == number;
+        return allow_configuration(controller, entry, number);
+    }
+    return SDO_OK;
+}
+
+static void reconfigure(struct controller *controller, const struct od_entry *entry)
+{
+    config_read(&controller->config, &controller->od);
+    program_slot_stale(&controller->slot);
+    port_lock();
+    machine_configure(&controller->machine, &controller->config,
+                      config_concerns_drives(entry->index, entry->sub));
+    port_tick_period(controller->config.period_us);
+    port_unlock();
+}
+
+void od_written_hook(void *context, const struct od_entry *entry)
+{
+    struct controller *controller = context;
+    if (entry->index == 0x1003) {
+        emcy_producer_forget(&controller->emcy);
+    } else if (config_contains(entry->index) && !controller->same_value) {
+        reconfigure(controller, entry);
+    }
+}
