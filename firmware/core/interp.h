@@ -13,6 +13,10 @@
 
 #include <stdint.h>
 
+#include "core/feed_piece.h"
+#include "core/kernel_double.h"
+#include "core/kernel_fixed.h"
+#include "core/kernel_float.h"
 #include "core/program.h"
 
 enum interp_kernel {
@@ -37,25 +41,37 @@ struct interp_point {
     int64_t feed_q32_mm_s; /* F' at rate 1 */
 };
 
-/* Caller allocates; contents private. */
+/* Caller allocates (about 0.6 KiB); contents private. */
 struct interp {
     const struct program *program;
     enum interp_kernel kernel;
-    uint32_t piece;
+    uint32_t piece; /* the one expanded below */
     uint32_t segment;
     uint64_t piece_start_q32_s;
+    uint64_t piece_end_q32_s;
+    struct interp_point end; /* the exact end point */
+    union {
+        struct feed_piece integers; /* fixed and float */
+        struct kernel_double_piece doubles;
+    } feed;
+    union {
+        struct kernel_fixed_segment fixed;
+        struct kernel_float_segment floats;
+        struct kernel_double_segment doubles;
+    } path;
 };
 
-/* Starts at time 0. Returns 0 or INTERP_ERR_... */
+/* Starts at time 0. Returns 0 or INTERP_ERR_... Main loop. */
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
 
-/* The point at a program time (2^-32 s, any value not before the cursor's piece). Crosses at most two
- * piece ends and two segment ends, which program_check guarantees to suffice for steps up to two periods; otherwise
- * INTERP_ERR_JUMP, *out and the cursor unchanged. Returns INTERP_OK or INTERP_END. */
+/* The point at a program time (2^-32 s). Crosses at most two piece ends forwards and two segment ends
+ * either way, which program_check guarantees to suffice for steps up to two periods; otherwise
+ * INTERP_ERR_JUMP: *out is unchanged, seek before going on. At or beyond the duration *out is the exact end point
+ * and the cursor stays. Returns INTERP_OK, INTERP_END or INTERP_ERR_JUMP. Tick context; bounded time. */
 int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out);
 
 /* Moves the cursor to any time, forward or back; linear in the number of segments and pieces.
- * Returns 0 or INTERP_ERR_... */
+ * Returns 0. Main loop. */
 int interp_seek(struct interp *it, uint64_t time_q32_s);
 
 #endif

@@ -88,9 +88,29 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size)
     return crc == p->header.crc32 ? 0 : PROGRAM_ERR_CRC;
 }
 
+static const uint8_t *segment_bytes(const struct program *p, uint32_t i)
+{
+    return p->image + PROGRAM_HEADER_SIZE + (size_t)i * PROGRAM_SEGMENT_SIZE;
+}
+
+static const uint8_t *piece_bytes(const struct program *p, uint32_t i)
+{
+    return segment_bytes(p, p->header.segment_count) + (size_t)i * PROGRAM_PIECE_SIZE;
+}
+
+int64_t program_segment_start(const struct program *p, uint32_t i)
+{
+    return read_i64(segment_bytes(p, i));
+}
+
+uint64_t program_piece_duration(const struct program *p, uint32_t i)
+{
+    return read_u64(piece_bytes(p, i));
+}
+
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out)
 {
-    const uint8_t *b = p->image + PROGRAM_HEADER_SIZE + (size_t)i * PROGRAM_SEGMENT_SIZE;
+    const uint8_t *b = segment_bytes(p, i);
     out->start_q40_mm = read_i64(b);
     out->x_q40_mm = read_i64(b + 8);
     out->y_q40_mm = read_i64(b + 16);
@@ -102,9 +122,7 @@ void program_segment_get(const struct program *p, uint32_t i, struct program_seg
 
 void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out)
 {
-    const uint8_t *b = p->image + PROGRAM_HEADER_SIZE +
-                       (size_t)p->header.segment_count * PROGRAM_SEGMENT_SIZE +
-                       (size_t)i * PROGRAM_PIECE_SIZE;
+    const uint8_t *b = piece_bytes(p, i);
     out->duration_q32_s = read_u64(b);
     out->start_q40_mm = read_i64(b + 8);
     for (int k = 0; k < 7; k++) {

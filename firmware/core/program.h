@@ -75,6 +75,10 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size);
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
 void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out);
 
+/* Only the start (arc length) of a segment, only the duration of a piece: cheaper. */
+int64_t program_segment_start(const struct program *p, uint32_t i);
+uint64_t program_piece_duration(const struct program *p, uint32_t i);
+
 /* Setpoints of the program: ceil(duration / period) + 1, with the period of the header. Needs a
  * program that passed program_check. */
 uint32_t program_ticks(const struct program *p);

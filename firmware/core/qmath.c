@@ -15,3 +15,20 @@ uint64_t qmath_div_u64(uint64_t a, uint32_t b)
     }
     return quotient;
 }
+
+/* a m / 2^64 with m = word 2^32 + word: the reciprocals 2^64/3 and 2^64/5 repeat one word. */
+static int64_t mul_reciprocal(int64_t a, uint32_t word)
+{
+    int64_t high = qmath_mul_unsigned(a, word);
+    return high + (high >> 32);
+}
+
+int64_t qmath_third(int64_t a)
+{
+    return mul_reciprocal(a, 0x55555555u);
+}
+
+int64_t qmath_fifth(int64_t a)
+{
+    return mul_reciprocal(a, 0x33333333u);
+}

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Integer arithmetic shared by the core: shifts, counts of zeros, wide products, slow division.
+ * Integer arithmetic shared by the core: counts of zeros, wide products, slow division.
  *
- * Right shifts of negative numbers: C99 leaves them to the implementation. gcc, clang and every compiler we build
- * with shift arithmetically (floor); qmath_assert_arithmetic_shift stops the build where that is not so. It is the only
- * implementation-defined behaviour the core relies on, besides conversion to a signed type modulo 2^N.
+ * Right shifts of negative numbers: C99 leaves them to the implementation. gcc, clang and every
+ * compiler we build with shift arithmetically (floor); the typedef below stops the build where that
+ * is not so. Beside it the core relies on one more implementation-defined rule: conversion to a
+ * narrower signed type is modulo 2^N. Nothing else.
+ *
+ * All inline functions: constant time, any context.
  */
 #ifndef HODOGRAPH_CORE_QMATH_H
 #define HODOGRAPH_CORE_QMATH_H
@@ -34,7 +37,65 @@ static inline int qmath_clz64(uint64_t a)
     return high != 0 ? qmath_clz32(high) : 32 + qmath_clz32((uint32_t)a);
 }
 
-/* floor(a / b), b not 0: shift and subtract, for targets without a 64-bit division. 64 rounds: not in the tick. */
+/* floor(a b / 2^32) of 32-bit numbers: one SMULL, or SMMUL where there is one. */
+static inline int32_t qmath_mul_hi(int32_t a, int32_t b)
+{
+    return (int32_t)(((int64_t)a * b) >> 32);
+}
+
+/* a b / 2^32 of a 64-bit and a 32-bit number; below the exact value by less than 2 units. Two SMULL:
+ * the lowest bit of a is dropped so that its lower half is a signed 32-bit number. Any a and b. */
+static inline int64_t qmath_mul_wide(int64_t a, int32_t b)
+{
+    int32_t high = (int32_t)(a >> 32);
+    int32_t low = (int32_t)((uint32_t)a >> 1);
+    return (int64_t)high * b + (((int64_t)low * b) >> 31);
+}
+
+/* floor(a b / 2^32) of a signed 64-bit and an unsigned 32-bit number. Any a and b. */
+static inline int64_t qmath_mul_unsigned(int64_t a, uint32_t b)
+{
+    int64_t high = (a >> 32) * (int64_t)b;
+    return high + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32);
+}
+
+/* floor(a b / 2^38), exact, for |a|, |b| < 2^50: q44 times q44 is q50. Limbs of 25 bits keep every
+ * partial sum inside 63 bits, so no carry is ever needed. */
+static inline int64_t qmath_mul_q44(int64_t a, int64_t b)
+{
+    int32_t a1 = (int32_t)(a >> 25);
+    int32_t b1 = (int32_t)(b >> 25);
+    int32_t a0 = (int32_t)(a & 0x1FFFFFF);
+    int32_t b0 = (int32_t)(b & 0x1FFFFFF);
+    int64_t middle = (int64_t)a1 * b0 + (int64_t)a0 * b1 + (((int64_t)a0 * b0) >> 25);
+    return (int64_t)a1 * b1 * 4096 + (middle >> 13);
+}
+
+/* a 2^shift, floor for negative shifts; -63 <= shift <= 63, and the result must fit. */
+static inline int64_t qmath_shift(int64_t a, int shift)
+{
+    return shift >= 0 ? (int64_t)((uint64_t)a << shift) : a >> -shift;
+}
+
+/* a / 2^bits to nearest, halves up; 1 <= bits <= 62 and |a| < 2^62. */
+static inline int64_t qmath_round(int64_t a, int bits)
+{
+    return (a + ((int64_t)1 << (bits - 1))) >> bits;
+}
+
+/* The nearest value of i32. */
+static inline int32_t qmath_clamp32(int64_t a)
+{
+    int32_t low = (int32_t)a;
+    return low == a ? low : a < 0 ? INT32_MIN : INT32_MAX;
+}
+
+/* floor(a / b), b not 0: shift and subtract, for targets without a 64-bit division. 64 rounds: not
+ * in the tick. */
 uint64_t qmath_div_u64(uint64_t a, uint32_t b);
+
+/* a / 3 and a / 5 for |a| < 2^62, by the reciprocal: at most 2 units below the exact value. */
+int64_t qmath_third(int64_t a);
+int64_t qmath_fifth(int64_t a);
 
 #endif

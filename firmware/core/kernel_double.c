@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/kernel_double.h"
+
+#define Q40 1099511627776.0
+#define Q48 281474976710656.0
+#define Q50 1125899906842624.0
+#define STEPS 3
+
+static double power_of_two(int n)
+{
+    double p = 1.0;
+    for (; n > 0; n--) {
+        p *= 2.0;
+    }
+    for (; n < 0; n++) {
+        p *= 0.5;
+    }
+    return p;
+}
+
+/* To nearest, halves away from zero: without libm, the same everywhere. */
+static int64_t round_scaled(double a, double scale)
+{
+    double b = a * scale;
+    return (int64_t)(b < 0.0 ? b - 0.5 : b + 0.5);
+}
+
+void kernel_double_piece_set(struct kernel_double_piece *k, const struct program_piece *piece)
+{
+    int e = program_piece_exponent(piece->duration_q32_s);
+    k->start_q40_mm = piece->start_q40_mm;
+    for (int i = 0; i < 7; i++) {
+        k->c_mm[i] = (double)piece->c_q40_mm[i] / Q40;
+    }
+    k->tau_per_q32 = power_of_two(-32 - e);
+    k->per_s = power_of_two(-e);
+}
+
+void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q32_s,
+                            struct feed_point *out)
+{
+    double tau = (double)t_q32_s * k->tau_per_q32;
+    double arc = k->c_mm[6];
+    double slope = arc;
+    for (int i = 5; i >= 0; i--) {
+        arc = arc * tau + k->c_mm[i];
+        slope = slope * tau + arc;
+    }
+    out->arc_length_q40_mm = k->start_q40_mm + round_scaled(arc * tau, Q40);
+    out->feed_q32_mm_s = round_scaled(slope * k->per_s, 4294967296.0);
+}
+
+/* Cubic with z(0) = 0, z(1) = 1 and the slopes of the inverse of s(z) there; numerics.md section 12. */
+static void set_inverse(double g[4], double half, double sigma_middle, double sigma_end)
+{
+    double first = 2.0 * half / sigma_middle;
+    double last = 2.0 * half / sigma_end;
+    g[0] = 1.0 / half;
+    g[1] = first;
+    g[2] = 3.0 - 2.0 * first - last;
+    g[3] = first + last - 2.0;
+}
+
+void kernel_double_segment_set(struct kernel_double_segment *k, const struct ph_segment *ph)
+{
+    for (int axis = PH_X; axis <= PH_S; axis++) {
+        k->origin_q40_mm[axis] = ph->origin_q40_mm[axis];
+        for (int i = 0; i < 6; i++) {
+            k->c_mm[axis][i] = (double)ph->c_q48_mm[axis][i] / Q48;
+        }
+    }
+    int64_t end_q48[3];
+    ph_segment_end(ph, end_q48);
+    double before = k->c_mm[PH_S][0];
+    double behind = (double)end_q48[PH_S] / Q48 - before;
+    double sigma[3];
+    for (int i = 0; i < 3; i++) {
+        sigma[i] = (double)ph->sigma_q50_mm[i] / Q50;
+    }
+    set_inverse(k->inverse[0], before, sigma[1], sigma[0]);
+    set_inverse(k->inverse[1], behind, sigma[1], sigma[2]);
+}
+
+static double first_guess(const struct kernel_double_segment *k, double from_middle)
+{
+    const double *g = from_middle < 0.0 ? k->inverse[0] : k->inverse[1];
+    double sign = from_middle < 0.0 ? -1.0 : 1.0;
+    double t = sign * from_middle * g[0];
+    t = t > 1.0 ? 1.0 : t;
+    return sign * t * (g[1] + t * (g[2] + t * g[3]));
+}
+
+static double newton_step(const double c[6], double s, double z)
+{
+    double value = c[5];
+    double slope = value;
+    for (int i = 4; i >= 1; i--) {
+        value = value * z + c[i];
+        slope = slope * z + value;
+    }
+    return z - (value * z + c[0] - s) / slope;
+}
+
+static double horner(const double c[6], double z)
+{
+    return ((((c[5] * z + c[4]) * z + c[3]) * z + c[2]) * z + c[1]) * z + c[0];
+}
+
+void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc_length_q40_mm,
+                              int64_t point_q40_mm[2])
+{
+    double s = (double)(arc_length_q40_mm - k->origin_q40_mm[PH_S]) / Q40;
+    double z = first_guess(k, s - k->c_mm[PH_S][0]);
+    for (int i = 0; i < STEPS; i++) {
+        z = newton_step(k->c_mm[PH_S], s, z);
+    }
+    for (int axis = PH_X; axis <= PH_Y; axis++) {
+        point_q40_mm[axis] =
+            k->origin_q40_mm[axis] + round_scaled(horner(k->c_mm[axis], z), Q40);
+    }
+}

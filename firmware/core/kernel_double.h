@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The double kernel: IEEE double, the host's reference; docs/numerics.md section 11.
+ * Only + - * / and conversions, so with -ffp-contract=off its bits are the same on every IEEE host.
+ * Pure, tick context.
+ */
+#ifndef HODOGRAPH_CORE_KERNEL_DOUBLE_H
+#define HODOGRAPH_CORE_KERNEL_DOUBLE_H
+
+#include "core/feed_piece.h"
+#include "core/ph_segment.h"
+
+struct kernel_double_piece {
+    int64_t start_q40_mm;
+    double c_mm[7];
+    double tau_per_q32; /* 2^(-32-e) */
+    double per_s;       /* 2^-e */
+};
+
+struct kernel_double_segment {
+    int64_t origin_q40_mm[3];
+    double c_mm[3][6];
+    double inverse[2][4]; /* first guess of z, behind and before the middle: scale, then cubic */
+};
+
+void kernel_double_piece_set(struct kernel_double_piece *k, const struct program_piece *piece);
+void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q32_s,
+                            struct feed_point *out);
+
+void kernel_double_segment_set(struct kernel_double_segment *k, const struct ph_segment *ph);
+
+/* Point at an arc length of this segment (counted from the start of the program; a little outside is allowed:
+ * the curve is continued). Within 1e-9 mm. Three Newton steps, always. */
+void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc_length_q40_mm,
+                              int64_t point_q40_mm[2]);
+
+#endif

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The fixed kernel: integers only, for targets without an FPU; the same bits everywhere.
+ * Derivation, ranges and the error bound: docs/numerics.md sections 9 and 12. Feed pieces are
+ * core/feed_piece.h. Pure, tick context.
+ *
+ * "Normalised" is divided by 2^exponent of the segment, so that sigma lies in [1/8, 1). Polynomials in z keep their coefficient k
+ * times 2^k, because a product of the upper halves with z in q31 is half the product: no shift in the Horner step.
+ */
+#ifndef HODOGRAPH_CORE_KERNEL_FIXED_H
+#define HODOGRAPH_CORE_KERNEL_FIXED_H
+
+#include "core/ph_segment.h"
+
+/* First guess of z by a cubic in t = |s - s(middle)| / (its length), one per half. */
+struct kernel_fixed_inverse {
+    int32_t scale_q26;
+    int32_t g_q26[3]; /* coefficient k of t^k times 2^k, k = 1 ... 3 */
+};
+
+struct kernel_fixed_segment {
+    int64_t origin_q40_mm[3];
+    int64_t c_q48_mm[3][6];
+    int32_t s_q30[6];     /* normalised arc length from the middle */
+    int32_t slope_q29[5]; /* its derivative in z: sigma / 2 */
+    int32_t u_q28[3];     /* normalised w */
+    int32_t v_q28[3];
+    struct kernel_fixed_inverse inverse[2]; /* before and behind the middle */
+    int exponent;
+};
+
+void kernel_fixed_segment_set(struct kernel_fixed_segment *k, const struct ph_segment *ph);
+
+/* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside is
+ * allowed: the curve is continued by its tangent). Within 2^-32 mm by the bound that needs no numerics, 2^-37 mm measured. Two Newton steps with one 32-bit
+ * division each, 15 wide products. */
+void kernel_fixed_segment_at(const struct kernel_fixed_segment *k, int64_t arc_length_q40_mm,
+                             int64_t point_q40_mm[2]);
+
+#endif
