@@ -21,6 +21,10 @@ PYTHON ?= python3
 CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
 CLANG  ?= clang
 STAMPS := $(BUILD)/stamps
+
+# V=1 shows the commands, else one short line for each file.
+Q   := $(if $(V),,@)
+say  = $(if $(V),,@printf '  %-6s %s\n' '$(1)' '$(2)')
 VENV   := .venv
 PY     := $(VENV)/bin/python
 
@@ -77,6 +81,7 @@ asan_LDFLAGS := -fsanitize=address,undefined
 clang_CC      := $(CLANG)
 clang_CFLAGS  := $(COMMON) -O2 -g
 clang_LDFLAGS :=
+clang_NEEDS   := $(STAMPS)/packages-lint
 VARIANTS := host asan clang
 
 ## ---- entry points ----------------------------------------------------------------------------
@@ -105,6 +110,13 @@ unit-plain: $(UNIT_NAMES:%=$(BUILD)/host/tests/%)
 pytest: build ## the Python tests only
 	@$(PY) tools/run_tests.py --build $(BUILD) --only python
 
+OUT ?= out
+run: build ## run the alpha and the heart on a CAN bus, write a report to out/, print a summary
+	@tools/with-vcan --name run-$$$$ bash tools/run_examples.sh $(OUT) $(BUILD)
+
+bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
+	@$(PY) tools/bench.py --build $(BUILD)
+
 clean: ## remove build/ and the cffi module
 	rm -rf $(BUILD) host_tools/hodograph/native/_native*.so
 
@@ -119,6 +131,10 @@ packages: $(STAMPS)/packages
 $(STAMPS)/packages: tools/packages.py
 	@mkdir -p $(@D)
 	@$(PYTHON) tools/packages.py build
+	@touch $@
+
+$(STAMPS)/packages-lint: tools/packages.py | $(STAMPS)/packages
+	@$(PYTHON) tools/packages.py lint
 	@touch $@
 
 venv: $(VENV)/.editable
@@ -147,7 +163,8 @@ $(UNITY_DIR)/unity.h: $(UNITY_DIR)/unity.c
 define OD_RULE
 $(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h &: $(2) tools/eds_to_c.py $(VENV)/.ready
 	@mkdir -p $(BUILD)/generated
-	$(PY) tools/eds_to_c.py $(2) $(1) $(BUILD)/generated
+	$$(call say,eds,$$<)
+	$$(Q)$(PY) tools/eds_to_c.py $(2) $(1) $(BUILD)/generated
 	@touch $(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h
 endef
 $(if $(filter controller,$(OD_NAMES)),$(eval $(call OD_RULE,controller,firmware/app/controller.eds)))
@@ -175,23 +192,28 @@ endef
 
 define LINK # variant
 	@mkdir -p $$(@D)
-	$$($(1)_CC) $$($(1)_LDFLAGS) -o $$@ $$(filter %.o,$$^) -Wl,--start-group $$(filter %.a,$$^) -Wl,--end-group $$(LDLIBS)
+	$$(call say,link,$$@)
+	$$(Q)$$($(1)_CC) $$($(1)_LDFLAGS) -o $$@ $$(filter %.o,$$^) -Wl,--start-group $$(filter %.a,$$^) -Wl,--end-group $$(LDLIBS)
 endef
 
 define VARIANT_RULES # variant
 $(call NOTE,$(BUILD)/$(1)/obj/flags,$($(1)_CC) $($(1)_CFLAGS) $(UNITY_DEF))
-$(BUILD)/$(1)/obj/tests/%.o: tests/%.c $(BUILD)/$(1)/obj/flags $(UNITY_DIR)/unity.h | $(OD_H)
+$(BUILD)/$(1)/obj/tests/%.o: tests/%.c $(BUILD)/$(1)/obj/flags $(UNITY_DIR)/unity.h | $(OD_H) $($(1)_NEEDS)
 	@mkdir -p $$(@D)
-	$$($(1)_CC) $$($(1)_CFLAGS) -Itests/unit -isystem $(UNITY_DIR) $(UNITY_DEF) -MMD -MP -c -o $$@ $$<
-$(BUILD)/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/$(1)/obj/flags | $(OD_H)
+	$$(call say,$(1),$$<)
+	$$(Q)$$($(1)_CC) $$($(1)_CFLAGS) -Itests/unit -isystem $(UNITY_DIR) $(UNITY_DEF) -MMD -MP -c -o $$@ $$<
+$(BUILD)/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/$(1)/obj/flags | $(OD_H) $($(1)_NEEDS)
 	@mkdir -p $$(@D)
-	$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
-$(BUILD)/$(1)/obj/%.o: %.c $(BUILD)/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages
+	$$(call say,$(1),$$<)
+	$$(Q)$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
+$(BUILD)/$(1)/obj/%.o: %.c $(BUILD)/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages $($(1)_NEEDS)
 	@mkdir -p $$(@D)
-	$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
+	$$(call say,$(1),$$<)
+	$$(Q)$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
 $(BUILD)/$(1)/obj/unity.o: $(UNITY_DIR)/unity.c $(BUILD)/$(1)/obj/flags
 	@mkdir -p $$(@D)
-	$$($(1)_CC) $$(filter-out -W%,$$($(1)_CFLAGS)) $(UNITY_DEF) -c -o $$@ $$<
+	$$(call say,$(1),$$<)
+	$$(Q)$$($(1)_CC) $$(filter-out -W%,$$($(1)_CFLAGS)) $(UNITY_DEF) -c -o $$@ $$<
 $(foreach l,$(LIBS),$(eval $(call LIB_RULE,$(1),$(l))))
 $(BUILD)/$(1)/tests/%: $(BUILD)/$(1)/obj/tests/unit/%.o $(call object_of,$(1),$(UNIT_SUPPORT)) $(BUILD)/$(1)/obj/unity.o $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a)
 $(call LINK,$(1))
@@ -208,6 +230,56 @@ $(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph
 
 -include $(foreach v,$(VARIANTS),$(patsubst %.o,%.d,$(call object_of,$(v),$(OWN_C) $(OD_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))))
 
+## ---- lint ------------------------------------------------------------------------------------------
+
+C_FILES    := $(OWN_C) $(OWN_H) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(wildcard tests/fuzz/*.h)
+PY_TREES   := $(wildcard host_tools tools tests benchmarks)
+SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)
+LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC)
+# Every C file under the warning flags of gcc and of clang; the fuzz drivers too, though not linked.
+LINT_OBJ   := $(foreach v,host clang,$(call object_of,$(v),$(LINTED_C) $(OD_C)))
+LINT_PARTS := warnings tidy cppcheck clang-format ruff mypy shellcheck directions
+.PHONY: $(LINT_PARTS:%=lint-%)
+
+lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, formats, ruff, mypy, directions
+	@echo "lint: all is well"
+
+lint-warnings: $(LINT_OBJ)
+lint-tidy: $(LINTED_C:%=$(BUILD)/lint/%.tidy)
+$(BUILD)/lint/%.tidy: % $(BUILD)/clang/obj/%.tidy-deps .clang-tidy
+	@mkdir -p $(@D)
+	$(call say,tidy,$<)
+	$(Q)$(VENV)/bin/clang-tidy --quiet $< -- -std=c99 $(INCLUDES) -Itests/unit -isystem $(UNITY_DIR) $(UNITY_DEF) 2> $@.err || { cat $@.err; exit 1; }
+	@touch $@
+# A file is looked at again when its clang object is newer: that one knows the headers.
+$(BUILD)/clang/obj/%.c.tidy-deps: $(BUILD)/clang/obj/%.o
+	@touch $@
+lint-cppcheck: $(STAMPS)/packages-lint $(OD_H)
+	$(call say,cppcheck,firmware sim)
+	@mkdir -p $(BUILD)/lint/cppcheck
+	$(Q)cppcheck --quiet --std=c99 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
+	    --suppress=missingIncludeSystem --cppcheck-build-dir=$(BUILD)/lint/cppcheck $(INCLUDES) $(OWN_C)
+lint-clang-format: $(VENV)/.ready
+	$(call say,format,C)
+	$(Q)$(VENV)/bin/clang-format --dry-run -Werror $(C_FILES)
+lint-ruff: $(VENV)/.ready
+	$(call say,ruff,$(PY_TREES))
+	$(Q)$(VENV)/bin/ruff check --quiet $(PY_TREES) tools/with-vcan && $(VENV)/bin/ruff format --quiet --diff $(PY_TREES) tools/with-vcan
+lint-mypy: $(VENV)/.editable
+	$(call say,mypy,host_tools tools)
+	$(Q)$(VENV)/bin/mypy --no-error-summary host_tools/hodograph tools
+lint-shellcheck: $(STAMPS)/packages-lint
+	$(call say,shell,$(SH_FILES))
+	$(Q)shellcheck $(SH_FILES)
+lint-directions:
+	$(call say,who,may use whom)
+	$(Q)$(PYTHON) tools/check_directions.py
+
+format: $(VENV)/.ready ## bring C and Python into the formats that lint asks for
+	$(VENV)/bin/clang-format -i $(C_FILES)
+	$(VENV)/bin/ruff check --quiet --fix-only $(PY_TREES) tools/with-vcan
+	$(VENV)/bin/ruff format --quiet $(PY_TREES) tools/with-vcan
+
 ## ---- the native module of the Python package -------------------------------------------------------
 
 NATIVE := host_tools/hodograph/native/_native.abi3.so
@@ -215,5 +287,6 @@ NATIVE := host_tools/hodograph/native/_native.abi3.so
 native: $(NATIVE)
 $(NATIVE): host_tools/hodograph/native/build_native.py $(BUILD)/host/libhodograph_core.a $(BUILD)/host/libhodograph_sim.a \
            $(wildcard firmware/core/*.h sim/plant/*.h sim/rig/*.h) $(VENV)/.editable
-	$(PY) $<
+	$(call say,cffi,$@)
+	$(Q)$(PY) $< --build $(BUILD)
 	@touch $@

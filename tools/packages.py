@@ -85,15 +85,32 @@ def _becoming_root() -> list[str] | None:
     if os.geteuid() == 0:
         return []
     sudo = shutil.which("sudo")
-    if sudo and subprocess.run([sudo, "-n", "true"], capture_output=True, check=False).returncode == 0:
+    if (
+        sudo
+        and subprocess.run([sudo, "-n", "true"], capture_output=True, check=False).returncode == 0
+    ):
         return [sudo, "-n", "env"]
     return None
 
 
 def _install(packages: list[str], root: list[str]) -> bool:
     """Installs; fetches the package lists once when they are missing or too old."""
-    apt = [*root, *(["env"] if not root else []), "DEBIAN_FRONTEND=noninteractive", "apt-get", "-qq"]
-    install = [*apt, "-o", "DPkg::Lock::Timeout=300", "install", "-y", "--no-install-recommends", *packages]
+    apt = [
+        *root,
+        *(["env"] if not root else []),
+        "DEBIAN_FRONTEND=noninteractive",
+        "apt-get",
+        "-qq",
+    ]
+    install = [
+        *apt,
+        "-o",
+        "DPkg::Lock::Timeout=300",
+        "install",
+        "-y",
+        "--no-install-recommends",
+        *packages,
+    ]
     print(f"installing Debian packages: {' '.join(packages)}", file=sys.stderr)
     lists = Path("/var/lib/apt/lists")
     if any(lists.glob("*_Packages*")) and _quietly(install):
@@ -102,7 +119,9 @@ def _install(packages: list[str], root: list[str]) -> bool:
 
 
 def _quietly(command: list[str], *, say: bool = False) -> bool:
-    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
     if done.returncode != 0 and say:
         print(done.stdout[-2000:] + done.stderr[-2000:], file=sys.stderr)
     return done.returncode == 0
@@ -111,7 +130,10 @@ def _quietly(command: list[str], *, say: bool = False) -> bool:
 def ensure(names: Sequence[str]) -> int:
     """Exit status 0 when all of the sets is there, now or already; 1 with one clear message otherwise."""
     if sys.version_info < (3, 11):
-        print(f"packages: Python 3.11 or newer is needed, {sys.executable} is {sys.version.split()[0]}", file=sys.stderr)
+        print(
+            f"packages: Python 3.11 or newer is needed, {sys.executable} is {sys.version.split()[0]}",
+            file=sys.stderr,
+        )
         return 1
     needs = [need for name in names for need in SETS[name]]
     missing = _missing(needs)
@@ -120,19 +142,28 @@ def ensure(names: Sequence[str]) -> int:
     things = ", ".join(need.what for need in missing)
     packages = sorted({need.package for need in missing})
     if shutil.which("apt-get") is None:
-        print(f"packages: missing: {things} (Debian packages: {' '.join(packages)}); no apt-get here, install them by hand", file=sys.stderr)
+        print(
+            f"packages: missing: {things} (Debian packages: {' '.join(packages)}); no apt-get here, install them by hand",
+            file=sys.stderr,
+        )
         return 1
     root = _becoming_root()
     if root is None:
-        print(f"packages: missing: {things}; type:\n  sudo apt-get update && sudo apt-get install -y --no-install-recommends {' '.join(packages)}", file=sys.stderr)
+        print(
+            f"packages: missing: {things}; type:\n  sudo apt-get update && sudo apt-get install -y --no-install-recommends {' '.join(packages)}",
+            file=sys.stderr,
+        )
         return 1
     if not _install(packages, root):
         print(f"packages: could not install: {' '.join(packages)}", file=sys.stderr)
         return 1
     left = _missing(needs)
     if left:
-        print(f"packages: installed {' '.join(packages)}, and yet missing: {', '.join(n.what for n in left)}"
-              f" (for the interpreter {sys.executable})", file=sys.stderr)
+        print(
+            f"packages: installed {' '.join(packages)}, and yet missing: {', '.join(n.what for n in left)}"
+            f" (for the interpreter {sys.executable})",
+            file=sys.stderr,
+        )
         return 1
     return 0
 

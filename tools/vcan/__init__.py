@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """A vcan0 for a command: the kernel's own, or one inside user-mode Linux. tools/with-vcan is the command.
 
-    main       command line
-    kernel     the bus of this kernel: vcan0 that is there, or one in a network namespace of its own
-    client     runs one command on a user-mode bus, passing its streams, signals and exit status
-    broker     owns the user-mode Linux process; joins clients to the agent; ends and cleans everything
-    agent      first process inside user-mode Linux: starts the commands
-    frames     what client, broker and agent say to each other
-    registry   which buses are open
+main       command line
+kernel     the bus of this kernel: vcan0 that is there, or one in a network namespace of its own
+client     runs one command on a user-mode bus, passing its streams, signals and exit status
+broker     owns the user-mode Linux process; joins clients to the agent; ends and cleans everything
+agent      first process inside user-mode Linux: starts the commands
+frames     what client, broker and agent say to each other
+registry   which buses are open
 """

@@ -18,7 +18,7 @@ import tty
 from typing import Any
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import frames  # noqa: E402  (a package import would need the parents of this file)
+import frames
 
 _GRACE_S = 2.0
 

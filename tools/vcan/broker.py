@@ -88,7 +88,9 @@ class Broker:
         """Asks for readiness to write only where something waits."""
         both = selectors.EVENT_READ | selectors.EVENT_WRITE
         waiting = self._ready and bool(self._line_queue)
-        self._selector.modify(self._line, both if waiting else selectors.EVENT_READ, self._line_turn)
+        self._selector.modify(
+            self._line, both if waiting else selectors.EVENT_READ, self._line_turn
+        )
         for client in self._clients.values():
             wanted = both if client.queue else selectors.EVENT_READ
             key = self._selector.get_key(client.connection)
@@ -99,7 +101,9 @@ class Broker:
         self._channels += 1
         client = Client(connection, self._channels)
         self._clients[client.channel] = client
-        self._selector.register(connection, selectors.EVENT_READ, lambda events: self._client_turn(client, events))
+        self._selector.register(
+            connection, selectors.EVENT_READ, lambda events: self._client_turn(client, events)
+        )
         return client
 
     def _accept(self, _events: int) -> None:
@@ -142,7 +146,9 @@ class Broker:
         except ConnectionError:
             data = b""
         if not data:
-            raise BusUnavailable("user-mode Linux has ended" if self._ready else "user-mode Linux did not start")
+            raise BusUnavailable(
+                "user-mode Linux has ended" if self._ready else "user-mode Linux did not start"
+            )
         for kind, channel, payload in self._decoder.feed(data):
             if kind == frames.READY:
                 self._ready = True
@@ -163,7 +169,9 @@ class Broker:
         for client in [*others, self._owner]:
             with contextlib.suppress(OSError):
                 client.connection.settimeout(1.0)
-                client.connection.sendall(client.queue + frames.encode(frames.FAIL, 0, trouble.encode()))
+                client.connection.sendall(
+                    client.queue + frames.encode(frames.FAIL, 0, trouble.encode())
+                )
             client.connection.close()
 
 
@@ -172,8 +180,16 @@ def _boot(bus: Bus, line: socket.socket, memory: str) -> subprocess.Popen[bytes]
     (bus.folder / "init").symlink_to(_HERE / "init.sh")
     modules = next(iter(sorted(_MODULES.iterdir())), None) if _MODULES.is_dir() else None
     if modules is None:
-        raise BusUnavailable(f"no modules of user-mode Linux under {_MODULES}; apt-get install user-mode-linux")
-    _boot_file(bus.folder / "boot", PYTHON=sys.executable, AGENT=str(_HERE / "agent.py"), MODULES=str(modules), HOST=platform.node())
+        raise BusUnavailable(
+            f"no modules of user-mode Linux under {_MODULES}; apt-get install user-mode-linux"
+        )
+    _boot_file(
+        bus.folder / "boot",
+        PYTHON=sys.executable,
+        AGENT=str(_HERE / "agent.py"),
+        MODULES=str(modules),
+        HOST=platform.node(),
+    )
     fd = line.fileno()
     with (bus.folder / "log").open("wb") as log:
         return subprocess.Popen(
@@ -195,7 +211,11 @@ def _boot(bus: Bus, line: socket.socket, memory: str) -> subprocess.Popen[bytes]
             stdout=log,
             stderr=log,
             cwd="/",
-            env={"PATH": os.environ.get("PATH", "/usr/bin:/bin"), "TMPDIR": _memory_folder(memory), "HOME": str(bus.folder)},
+            env={
+                "PATH": os.environ.get("PATH", "/usr/bin:/bin"),
+                "TMPDIR": _memory_folder(memory),
+                "HOME": str(bus.folder),
+            },
             start_new_session=True,
             preexec_fn=None if bus.cpu is None else lambda: os.sched_setaffinity(0, {bus.cpu or 0}),
         )
@@ -209,12 +229,14 @@ def _boot_file(path: Path, **values: str) -> None:
 def _memory_folder(memory: str) -> str:
     """Where the kernel's memory file can lie: room for all of it, and mapping as code not forbidden."""
     need = int(memory.rstrip("MG")) << (30 if memory.endswith("G") else 20)
-    for folder in ("/dev/shm", "/tmp", "/var/tmp"):  # noqa: S108
+    for folder in ("/dev/shm", "/tmp", "/var/tmp"):
         with contextlib.suppress(OSError):
             facts = os.statvfs(folder)
             if facts.f_bavail * facts.f_frsize >= need and not facts.f_flag & os.ST_NOEXEC:
                 return folder
-    raise BusUnavailable(f"neither /dev/shm, /tmp nor /var/tmp has {memory} free and may be mapped as code; make room or use --memory 512M")
+    raise BusUnavailable(
+        f"neither /dev/shm, /tmp nor /var/tmp has {memory} free and may be mapped as code; make room or use --memory 512M"
+    )
 
 
 def _end(kernel: subprocess.Popen[bytes]) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Frames of the multiplexed channel between client, broker and agent.
 
-A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command inside
-(later perhaps one TCP connection). Data flows against credit, so that a slow reader holds up only itself:
+A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command
+inside (later perhaps one TCP connection). Data flows against credit, so that a slow reader holds up only itself:
 each side may send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
 """
 

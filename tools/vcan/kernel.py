@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The bus of this kernel: vcan0 where there is one, else one in a network namespace of the command's own.
 
-A namespace keeps buses apart, so that tests may run at once, and leaves nothing behind. Without root it is entered through a user
-namespace, in which the user keeps his number.
+A namespace keeps buses apart, so that tests may run at once, and leaves nothing behind. Without root it
+is entered through a user namespace, in which the user keeps his number.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ def has_bus() -> bool:
 def can_make_namespace() -> bool:
     """Tries it in a child process, since a failed attempt can't be taken back."""
     if os.geteuid() == 0 and shutil.which("modprobe"):
-        subprocess.run(["modprobe", "-q", "vcan"], stdin=subprocess.DEVNULL, capture_output=True, check=False)
+        subprocess.run(
+            ["modprobe", "-q", "vcan"], stdin=subprocess.DEVNULL, capture_output=True, check=False
+        )
     pid = os.fork()
     if pid == 0:
         status = 1
@@ -68,7 +70,9 @@ def enter_new_namespace() -> None:
         Path("/proc/self/uid_map").write_text(f"{uid} {uid} 1")
         Path("/proc/self/gid_map").write_text(f"{gid} {gid} 1")
     kind = _attribute(_IFLA_INFO_KIND, b"vcan")
-    _new_link(0, _attribute(_IFLA_IFNAME, b"vcan0\0") + _attribute(_IFLA_LINKINFO, kind), create=True)
+    _new_link(
+        0, _attribute(_IFLA_IFNAME, b"vcan0\0") + _attribute(_IFLA_LINKINFO, kind), create=True
+    )
     _new_link(socket.if_nametoindex("lo"), b"", create=False)
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
         bus.bind(("vcan0",))
@@ -81,7 +85,9 @@ def join_namespace(pid: int) -> None:
         descriptor = os.pidfd_open(pid)
         _check(ctypes.CDLL(None, use_errno=True).setns(descriptor, flags))
     except OSError as error:
-        raise BusUnavailable(f"cannot enter the network namespace of process {pid}: {error.strerror}") from error
+        raise BusUnavailable(
+            f"cannot enter the network namespace of process {pid}: {error.strerror}"
+        ) from error
 
 
 def _unshare(flags: int) -> None:

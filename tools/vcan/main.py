@@ -26,9 +26,9 @@ from vcan.registry import Bus
 _TROUBLE = 125
 
 _ABOUT = """\
-Runs COMMAND with a CAN bus vcan0: the kernel's own where there is one, else one in a network namespace, else one
-inside user-mode Linux (installed when missing). The exit status is COMMAND's, 128 + N when signal N ended it, 127 when it was
-not found, 125 when there is no bus."""
+Runs COMMAND with a CAN bus vcan0: the kernel's own where there is one, else one in a network namespace,
+else one inside user-mode Linux (installed when missing). The exit status is COMMAND's, 128 + N when
+signal N ended it, 127 when it was not found, 125 when there is no bus."""
 
 
 def main(arguments: list[str]) -> int:
@@ -49,15 +49,35 @@ def main(arguments: list[str]) -> int:
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="with-vcan", description=_ABOUT, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--join", action="store_true", help="run COMMAND on a bus that is open, not a new one")
-    parser.add_argument("--bus", metavar="NAME", help="with --join: which; default: the newest of this source tree, else the newest")
+    parser = argparse.ArgumentParser(
+        prog="with-vcan", description=_ABOUT, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--join", action="store_true", help="run COMMAND on a bus that is open, not a new one"
+    )
+    parser.add_argument(
+        "--bus",
+        metavar="NAME",
+        help="with --join: which; default: the newest of this source tree, else the newest",
+    )
     parser.add_argument("--list", action="store_true", help="list the open buses")
-    parser.add_argument("--own", action="store_true", help="a bus of its own, even where the kernel has a vcan0")
-    parser.add_argument("--user-mode", action="store_true", help="user-mode Linux, even where the kernel has CAN")
+    parser.add_argument(
+        "--own", action="store_true", help="a bus of its own, even where the kernel has a vcan0"
+    )
+    parser.add_argument(
+        "--user-mode", action="store_true", help="user-mode Linux, even where the kernel has CAN"
+    )
     parser.add_argument("--name", help="name of the new bus; default: bus-PID")
-    parser.add_argument("--cpu", type=int, help="core that user-mode Linux is bound to; default: the one with the fewest buses")
-    parser.add_argument("--memory", default="1024M", help="memory of user-mode Linux (default 1024M; taken as it is touched)")
+    parser.add_argument(
+        "--cpu",
+        type=int,
+        help="core that user-mode Linux is bound to; default: the one with the fewest buses",
+    )
+    parser.add_argument(
+        "--memory",
+        default="1024M",
+        help="memory of user-mode Linux (default 1024M; taken as it is touched)",
+    )
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="COMMAND...")
     options = parser.parse_args(arguments)
     options.command = options.command[1:] if options.command[:1] == ["--"] else options.command
@@ -75,7 +95,9 @@ def _list() -> int:
     for bus in buses:
         age_s = time.time() - bus.started_s
         cpu = "" if bus.cpu is None else f"cpu {bus.cpu}"
-        print(f"{bus.name}\t{bus.kind}\t{cpu}\t{age_s:.0f} s\tpid {bus.pid}\t{' '.join(bus.command)}")
+        print(
+            f"{bus.name}\t{bus.kind}\t{cpu}\t{age_s:.0f} s\tpid {bus.pid}\t{' '.join(bus.command)}"
+        )
     if not buses:
         print("no bus is open", file=sys.stderr)
     return 0
@@ -105,7 +127,9 @@ def _open(options: argparse.Namespace) -> int:
     if registry.in_user_mode_linux():
         raise BusUnavailable("no further bus can be had inside user-mode Linux")
     if packages.ensure(["bus"]) != 0:
-        raise BusUnavailable("this kernel has no CAN (no vcan0, and none can be made), and user-mode Linux is missing: see above")
+        raise BusUnavailable(
+            "this kernel has no CAN (no vcan0, and none can be made), and user-mode Linux is missing: see above"
+        )
     return _open_user_mode(options)
 
 
@@ -120,7 +144,9 @@ def _become(command: list[str]) -> NoReturn:
 def _open_namespace(options: argparse.Namespace) -> NoReturn:
     bus = Bus(options.name or f"bus-{os.getpid()}", "namespace", os.getpid(), None, options.command)
     lock = registry.create(bus)
-    os.set_inheritable(lock, True)  # the bus is open as long as the command, or a child of it, lives
+    os.set_inheritable(
+        lock, True
+    )  # the bus is open as long as the command, or a child of it, lives
     kernel.enter_new_namespace()
     _become(options.command)
 
@@ -130,7 +156,14 @@ def _open_user_mode(options: argparse.Namespace) -> int:
     bus = Bus(options.name or f"bus-{os.getpid()}", "user-mode", os.getpid(), cpu, options.command)
     here, there = socket.socketpair()
     process = subprocess.Popen(
-        [sys.executable, sys.argv[0], "--broker", str(there.fileno()), options.memory, dumps(asdict(bus))],
+        [
+            sys.executable,
+            sys.argv[0],
+            "--broker",
+            str(there.fileno()),
+            options.memory,
+            dumps(asdict(bus)),
+        ],
         pass_fds=(there.fileno(),),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

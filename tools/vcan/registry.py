@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Which buses are open: one folder each under /tmp/hodograph-bus-UID.
 
-A folder holds `info.json` and `lock`. Whoever keeps the bus alive holds the lock (flock), so a folder whose lock is free is
-a left-over, whatever became of its processes. A user-mode bus also keeps its socket and boot log there.
+A folder holds `info.json` and `lock`. Whoever keeps the bus alive holds the lock (flock), so a folder
+whose lock is free is a left-over, whatever became of its processes. A user-mode bus also keeps its
+socket and boot log there.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Bus:
 
 def root() -> Path:
     """The folder of all buses of this user; made when missing, refused when it is another's."""
-    path = Path(f"/tmp/hodograph-bus-{os.getuid()}")  # noqa: S108  (fixed, so that every shell finds it)
+    path = Path(f"/tmp/hodograph-bus-{os.getuid()}")
     path.mkdir(mode=0o700, exist_ok=True)
     if path.stat().st_uid != os.getuid() or path.is_symlink():
         raise BusUnavailable(f"{path} belongs to another user; remove it")
@@ -51,12 +52,16 @@ def root() -> Path:
 def create(bus: Bus) -> int:
     """Makes the folder; returns the descriptor that holds its lock."""
     if not re.fullmatch(r"[A-Za-z0-9._-]{1,40}", bus.name) or bus.name.startswith("."):
-        raise BusUnavailable(f"{bus.name!r} is no name for a bus: use up to 40 letters, digits, dots, dashes")
+        raise BusUnavailable(
+            f"{bus.name!r} is no name for a bus: use up to 40 letters, digits, dots, dashes"
+        )
     _sweep()
     try:
         bus.folder.mkdir(mode=0o700)
     except FileExistsError:
-        raise BusUnavailable(f"a bus named {bus.name} is open already; tools/with-vcan --list") from None
+        raise BusUnavailable(
+            f"a bus named {bus.name} is open already; tools/with-vcan --list"
+        ) from None
     lock = os.open(bus.folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     fcntl.flock(lock, fcntl.LOCK_EX)
     _write(bus.folder / "info.json", json.dumps(asdict(bus)))

@@ -1,0 +1,279 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""check_directions.py [ROOT]: who may use whom. Prints FILE:LINE and the rule for each breach; exit status 1 then.
+
+The two tables below are the whole of the rules. A C layer is a folder (or single header), known by the longest
+prefix of the path; a Python layer is a package or module directly under hodograph. A file may use its own layer, and
+those its row names. A folder without a row is a breach too, so that new ones are thought about. Besides: no circles between
+files, and no I/O or heap headers where the row says so.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+C_RULES: dict[str, set[str]] = {
+    "firmware/can": set(),
+    "firmware/core": set(),
+    "firmware/canopen": {"firmware/can"},
+    "firmware/port/port.h": {"firmware/can"},
+    "firmware/port/*": {"firmware/port/port.h", "firmware/can"},  # each board; not one another
+    "firmware/app": {
+        "firmware/can",
+        "firmware/core",
+        "firmware/canopen",
+        "firmware/port/port.h",
+        "generated",
+    },
+    "sim/plant": set(),
+    "sim/rig": {"firmware/core", "sim/plant"},
+    "sim/node": {
+        "firmware/can",
+        "firmware/canopen",
+        "firmware/port/linux/can_socket.h",
+        "sim/plant",
+        "generated",
+    },
+}
+
+# Where neither operating system nor heap may be needed: the only system headers allowed.
+C_FREESTANDING = ("firmware/can", "firmware/core", "firmware/canopen", "firmware/app", "sim/plant")
+C_PURE_HEADERS = {"assert.h", "float.h", "limits.h", "math.h", "stdbool.h", "stddef.h", "stdint.h"}
+C_PURE_HEADERS |= {"string.h", "inttypes.h"}
+
+PYTHON_RULES: dict[str, set[str]] = {
+    "errors": set(),
+    "data": set(),
+    "spline": {"errors"},
+    "feed": {"errors"},
+    "config": {"errors", "feed"},
+    "native": {"errors", "config"},
+    "program": {"errors", "spline", "feed", "native"},
+    "simulate": {"errors", "config", "native", "program"},
+    "bus": {
+        "errors",
+        "data",
+        "config",
+        "spline",
+        "feed",
+        "native",
+        "program",
+        "simulate",
+        "chain",
+    },
+    "chain": {"errors", "config", "spline", "feed", "program"},
+    "report": {"errors", "config", "spline", "feed", "program", "simulate", "chain"},
+    "paper": {"errors", "config", "spline", "feed", "program", "simulate", "chain"},
+    "cli": {"*"},
+    "__main__": {"cli"},
+    "__init__": {"errors"},
+}
+
+# What the native module may take from the C side.
+NATIVE_MAY_INCLUDE = ("core/", "plant/", "rig/")
+
+_INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"(?P<own>[^"]+)"|<(?P<system>[^>]+)>)')
+_C_ROOTS = ("firmware", "sim")
+
+
+@dataclass(frozen=True, order=True)
+class Breach:
+    """One line that breaks a rule; `path` relative to the root."""
+
+    path: str
+    line: int
+    rule: str
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: {self.rule}"
+
+
+@dataclass(frozen=True)
+class Use:
+    """File `source` uses file `target` in `line`."""
+
+    source: str
+    line: int
+    target: str
+
+
+def c_layer(path: str) -> str | None:
+    """The layer of a C file; None when no row covers it."""
+    for prefix in sorted(C_RULES, key=len, reverse=True):
+        if path == prefix or path.startswith(prefix + "/"):
+            return prefix
+    parts = path.split("/")
+    return "firmware/port/*" if parts[:2] == ["firmware", "port"] and len(parts) > 3 else None
+
+
+def check_c(root: Path) -> Iterator[Breach]:
+    """Breaches of C_RULES and circles of includes."""
+    uses = []
+    for path in _files(root, _C_ROOTS, (".c", ".h")):
+        layer = c_layer(path)
+        if layer is None:
+            yield Breach(path, 1, "this folder has no row in tools/check_directions.py")
+            continue
+        for number, own, system in _includes(root / path):
+            if system is not None:
+                yield from _system_breach(path, number, layer, system)
+                continue
+            target = _resolve(root, path, own)
+            if target is None:
+                yield Breach(path, number, f'"{own}" is neither ours nor generated')
+                continue
+            uses.append(Use(path, number, target))
+            if not _c_allowed(path, layer, target):
+                yield Breach(
+                    path, number, f"{layer} may not use {target} (may: {_row(C_RULES[layer])})"
+                )
+    yield from _circles(uses)
+
+
+def _system_breach(path: str, line: int, layer: str, header: str) -> Iterator[Breach]:
+    if layer in C_FREESTANDING and header not in C_PURE_HEADERS:
+        yield Breach(path, line, f"{layer} does without <{header}>: no operating system, no heap")
+
+
+def _c_allowed(path: str, layer: str, target: str) -> bool:
+    if target.startswith("generated/"):
+        return "generated" in C_RULES[layer]
+    if layer == "firmware/port/*" and target.startswith("firmware/port/"):
+        same_board = path.split("/")[2] == target.split("/")[2]
+        return same_board or target == "firmware/port/port.h"
+    other = c_layer(target)
+    return other == layer or other in C_RULES[layer] or target in C_RULES[layer]
+
+
+def _includes(file: Path) -> Iterator[tuple[int, str, str | None]]:
+    for number, text in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+        found = _INCLUDE.match(text)
+        if found:
+            yield number, found["own"] or "", found["system"]
+
+
+def _resolve(root: Path, path: str, own: str) -> str | None:
+    """The file an include means, relative to the root; generated ones as generated/NAME."""
+    if re.fullmatch(r"od_\w+\.h", own):
+        return f"generated/{own}"
+    for base in (*_C_ROOTS, str(Path(path).parent)):
+        if (root / base / own).is_file():
+            return (Path(base) / own).as_posix()
+    return None
+
+
+def check_python(root: Path) -> Iterator[Breach]:
+    """Breaches of PYTHON_RULES, circles of imports, and what the native module takes from C."""
+    base = root / "host_tools"
+    uses = []
+    for path in _files(root, ("host_tools/hodograph",), (".py",)):
+        layer = _python_layer(path)
+        if layer not in PYTHON_RULES:
+            yield Breach(path, 1, f"{layer} has no row in tools/check_directions.py")
+            continue
+        for line, module, deferred in _imports(root / path, base):
+            other = _python_layer(f"host_tools/{module.replace('.', '/')}")
+            allowed = PYTHON_RULES[layer]
+            if other not in ({layer, "__init__", "*"} | allowed) and "*" not in allowed:
+                yield Breach(path, line, f"{layer} may not use {other} (may: {_row(allowed)})")
+            target = _module_file(base, module)
+            if target is not None and not deferred:
+                uses.append(Use(path, line, target.relative_to(root).as_posix()))
+    yield from _circles(uses)
+    yield from _native_includes(root)
+
+
+def _python_layer(path: str) -> str:
+    parts = path.removesuffix(".py").split("/")
+    return parts[2] if len(parts) > 2 else "__init__"
+
+
+def _imports(file: Path, base: Path) -> Iterator[tuple[int, str, bool]]:
+    """(line, full name of a module of ours, whether imported only when a function runs or for types)."""
+    package = list(file.relative_to(base).parent.parts)
+    tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
+    at_load = {id(node) for node in tree.body}
+    for node in ast.walk(tree):
+        deferred = id(node) not in at_load
+        if isinstance(node, ast.Import):
+            for name in node.names:
+                if name.name.split(".")[0] == "hodograph":
+                    yield node.lineno, name.name, deferred
+        elif isinstance(node, ast.ImportFrom):
+            start = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*start, *([node.module] if node.module else [])])
+            if module.split(".")[0] == "hodograph":
+                for name in node.names:
+                    full = f"{module}.{name.name}"
+                    yield node.lineno, full if _module_file(base, full) else module, deferred
+
+
+def _module_file(base: Path, module: str) -> Path | None:
+    path = base.joinpath(*module.split("."))
+    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+def _native_includes(root: Path) -> Iterator[Breach]:
+    for path in _files(root, ("host_tools/hodograph/native",), (".py", ".h")):
+        for number, text in enumerate((root / path).read_text(encoding="utf-8").splitlines(), 1):
+            for header in re.findall(r'"(\w+/[\w/]+\.h)"', text):
+                if not header.startswith(NATIVE_MAY_INCLUDE):
+                    yield Breach(
+                        path,
+                        number,
+                        f'the native module may not use "{header}" (may: core, plant, rig)',
+                    )
+
+
+def _circles(uses: Iterable[Use]) -> Iterator[Breach]:
+    """One breach for each circle, at the line that closes it."""
+    graph: dict[str, list[Use]] = {}
+    for use in uses:
+        if use.source != use.target:
+            graph.setdefault(use.source, []).append(use)
+    done: set[str] = set()
+
+    def walk(file: str, trail: list[str]) -> Iterator[Breach]:
+        for use in graph.get(file, []):
+            if use.target in trail:
+                circle = [*trail[trail.index(use.target) :], use.target]
+                yield Breach(file, use.line, "circle: " + " -> ".join(circle))
+            elif use.target not in done:
+                yield from walk(use.target, [*trail, use.target])
+        done.add(file)
+
+    for file in sorted(graph):
+        if file not in done:
+            yield from walk(file, [file])
+
+
+def _files(root: Path, folders: Iterable[str], endings: tuple[str, ...]) -> Iterator[str]:
+    for folder in folders:
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix in endings and path.is_file():
+                yield path.relative_to(root).as_posix()
+
+
+def _row(names: set[str]) -> str:
+    return ", ".join(sorted(names)) or "nothing of ours"
+
+
+def main(arguments: list[str]) -> int:
+    """Exit status."""
+    root = Path(arguments[0]) if arguments else Path(__file__).resolve().parent.parent
+    breaches = sorted({*check_c(root), *check_python(root)})
+    for breach in breaches:
+        print(breach)
+    return 1 if breaches else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
