@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: MIT
 """bench.py: runs every benchmarks/*.py, prints its figures and gathers them in build/bench.json.
 
-Each script takes `--json OUT` and writes one JSON object: name of a figure to its value (a number, text, or an object). A script with the
-line `# bench: bus` near its top runs under tools/with-vcan. Exit status 1 when one of them fails.
+Each script takes `--json OUT` and writes one JSON object: name of a figure to its value (a number, text,
+or an object). A script with the line `# bench: bus` near its top runs under tools/with-vcan. Exit status
+1 when one of them fails.
 """
 
 from __future__ import annotations

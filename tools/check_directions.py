@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: MIT
 """check_directions.py [ROOT]: who may use whom. Prints FILE:LINE and the rule for each breach; exit status 1 then.
 
-The two tables below are the whole of the rules. A C layer is a folder (or single header), known by the longest
-prefix of the path; a Python layer is a package or module directly under hodograph. A file may use its own layer, and
-those its row names. A folder without a row is a breach too, so that new ones are thought about. Besides: no circles between
-files, and no I/O or heap headers where the row says so.
+The two tables below are the whole of the rules. A C layer is a folder (or single header), known by the
+longest prefix of the path; a Python layer is a package or module directly under hodograph. A file may use
+its own layer, and those its row names. A folder without a row is a breach too, so that new ones are
+thought about. Besides: no circles between files, and no I/O or heap headers in C_FREESTANDING.
 """
 
 from __future__ import annotations

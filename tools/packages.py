@@ -127,44 +127,34 @@ def _quietly(command: list[str], *, say: bool = False) -> bool:
     return done.returncode == 0
 
 
+def _complain(text: str) -> int:
+    print(f"packages: {text}", file=sys.stderr)
+    return 1
+
+
 def ensure(names: Sequence[str]) -> int:
-    """Exit status 0 when all of the sets is there, now or already; 1 with one clear message otherwise."""
-    if sys.version_info < (3, 11):
-        print(
-            f"packages: Python 3.11 or newer is needed, {sys.executable} is {sys.version.split()[0]}",
-            file=sys.stderr,
-        )
-        return 1
-    needs = [need for name in names for need in SETS[name]]
-    missing = _missing(needs)
+    """0 when all of the sets is there, already or now; else 1, after one clear message."""
+    if sys.version_info < (3, 11):  # noqa: UP036  (this is where an older one is found out)
+        return _complain(f"Python 3.11 or newer is needed; {sys.executable} is older")
+    missing = _missing([need for name in names for need in SETS[name]])
     if not missing:
         return 0
     things = ", ".join(need.what for need in missing)
     packages = sorted({need.package for need in missing})
+    words = " ".join(packages)
     if shutil.which("apt-get") is None:
-        print(
-            f"packages: missing: {things} (Debian packages: {' '.join(packages)}); no apt-get here, install them by hand",
-            file=sys.stderr,
-        )
-        return 1
+        return _complain(f"missing: {things}; no apt-get here: install what Debian has as {words}")
     root = _becoming_root()
     if root is None:
-        print(
-            f"packages: missing: {things}; type:\n  sudo apt-get update && sudo apt-get install -y --no-install-recommends {' '.join(packages)}",
-            file=sys.stderr,
+        return _complain(
+            f"missing: {things}; this is not root and has no passwordless sudo, so please type:\n"
+            f"  sudo apt-get update && sudo apt-get install -y --no-install-recommends {words}"
         )
-        return 1
     if not _install(packages, root):
-        print(f"packages: could not install: {' '.join(packages)}", file=sys.stderr)
-        return 1
-    left = _missing(needs)
+        return _complain(f"could not install {words}; apt-get's words are above")
+    left = ", ".join(need.what for need in _missing(missing))
     if left:
-        print(
-            f"packages: installed {' '.join(packages)}, and yet missing: {', '.join(n.what for n in left)}"
-            f" (for the interpreter {sys.executable})",
-            file=sys.stderr,
-        )
-        return 1
+        return _complain(f"installed {words}, yet missing for {sys.executable}: {left}")
     return 0
 
 

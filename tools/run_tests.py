@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: MIT
 """run_tests.py: runs every test there is, C and Python, and counts them together.
 
-The last line of its output is `N passed, N failed` (and `, N skipped` where there are any); the exit status is 0 only when none
-has failed and at least one has passed. A C test binary that crashes, or says nothing, counts as one failed test.
-Three groups of Python tests run after the C tests: those that need no bus (two at a time), those that must be alone, and those
-marked `bus` under tools/with-vcan.
+The last line of its output is `N passed, N failed` (and `, N skipped` where there are any); the exit
+status is 0 only when none has failed and at least one has passed. A C test binary that crashes, or says
+nothing, counts as one failed test. Three groups of Python tests run after the C tests: those that need no
+bus (two at a time), those that must be alone, and those marked `bus` under tools/with-vcan.
 """
 
 from __future__ import annotations
@@ -86,6 +86,8 @@ def run_unit(binary: Path) -> Count:
             timeout=_UNIT_LIMIT_S,
             check=False,
         )
+    except OSError as error:
+        return Count(failures=[f"{binary.name}: {error.strerror}"])
     except subprocess.TimeoutExpired:
         return Count(failures=[f"{binary.name}: not finished after {_UNIT_LIMIT_S} s"])
     count = read_unity(binary.name, done.stdout, done.returncode)

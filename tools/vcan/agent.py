@@ -17,8 +17,9 @@ import termios
 import tty
 from typing import Any
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import frames
+# No pathlib here: importing it takes longer than all the rest.
+sys.path.insert(0, os.path.dirname(os.path.dirname(__file__)))  # noqa: PTH120
+from vcan import frames
 
 _GRACE_S = 2.0
 
@@ -122,15 +123,15 @@ class Agent:
             pass
 
     def _turn(self) -> bool:
-        readers = {self.line: None, self.wake: None}
-        writers = {}
+        readers: dict[int, Job] = {}
+        writers: dict[int, Job] = {}
         for job in self.jobs.values():
             for fd, stream in job.outputs.items():
                 if job.credit[stream] > 0:
                     readers[fd] = job
             if job.stdin_queue:
                 writers[job.stdin] = job
-        ready, writable, _ = select.select(list(readers), list(writers), [])
+        ready, writable, _ = select.select([self.line, self.wake, *readers], list(writers), [])
         for fd in writable:
             self._feed(writers[fd])
         for fd in ready:

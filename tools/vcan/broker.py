@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Owns a user-mode Linux process with a vcan0 and joins clients to the agent inside it.
 
-Runs as a process in a session of its own, so that a Ctrl-C at the terminal does not reach it. The client that opened the
-bus is connected from the start; when that connection ends, for whatever reason, the kernel inside is ended and
-everything removed. If the broker itself is killed, the line into the kernel is cut and the agent stops the kernel.
+Runs as a process in a session of its own, so that a Ctrl-C at the terminal does not reach it. The client
+that opened the bus is connected from the start; when that connection ends, for whatever reason, the kernel
+inside is ended and everything removed. If the broker itself is killed, the line into the kernel is cut and
+the agent stops the kernel.
 """
 
 from __future__ import annotations
@@ -235,7 +236,7 @@ def _memory_folder(memory: str) -> str:
             if facts.f_bavail * facts.f_frsize >= need and not facts.f_flag & os.ST_NOEXEC:
                 return folder
     raise BusUnavailable(
-        f"neither /dev/shm, /tmp nor /var/tmp has {memory} free and may be mapped as code; make room or use --memory 512M"
+        f"neither /dev/shm, /tmp nor /var/tmp has {memory} free and allows code; make room or use --memory 512M"
     )
 
 

@@ -9,6 +9,7 @@ import os
 import select
 import signal
 import socket
+from pathlib import Path
 
 from vcan import frames
 from vcan.errors import BusUnavailable
@@ -125,7 +126,7 @@ def _request(command: list[str]) -> dict[str, object]:
     return {
         "argv": command,
         "env": dict(os.environ),
-        "cwd": os.getcwd(),
+        "cwd": str(Path.cwd()),
         "umask": umask,
         "uid": os.getuid(),
         "gid": os.getgid(),
