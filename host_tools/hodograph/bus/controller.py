@@ -20,6 +20,8 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 from ..config import KERNELS, Machine
 from ..data import CONTROLLER_EDS
 from ..errors import BusError, RefusedError, RunError
+from ..program.check import Fault
+from ..program.codes import ProgramError
 from .address import BusAddress
 from .network import open_network
 from .texts import PROGRAM_STATES, REFUSALS, STATES, fault_text
@@ -179,8 +181,8 @@ class Controller:
             return BusError(f"upload to {self._who()} failed: {error}: the old program stays")
         code, index = self.read(PROGRAM, 3), self.read(PROGRAM, 4)
         return RefusedError(
-            f"{self._who()} refused the program: {program_error_text(code)} "
-            f"(code {code}, {program_error_place(code, index)}); the old program stays"
+            f"{self._who()} refused the program: {program_fault_text(code, index)}; "
+            "the old program stays"
         )
 
     def program_crc(self) -> int | None:
@@ -358,18 +360,13 @@ def _configuration(machine: Machine, kernel: str) -> list[tuple[tuple[int, int |
     return wanted
 
 
-def program_error_text(code: int) -> str:
-    """What a refusal code of program_check means, in the firmware's own words."""
-    from .. import native
-
-    return str(native.program_error_text(code))
-
-
-def program_error_place(code: int, index: int) -> str:
-    """What the index of a refusal counts: codes -20 … -39 segments, -40 and below pieces."""
-    if code > -20:
-        return "header"
-    return f"{'segment' if code > -40 else 'piece'} {index}"
+def program_fault_text(code: int, index: int) -> str:
+    """A refusal code of program_check in words, with its place."""
+    try:
+        fault = Fault(ProgramError(code), index)
+    except ValueError:
+        return f"code {code} at {index}, unknown to this version of the host tools"
+    return f"{fault.code.text} ({fault.code.name}, code {code}, {fault.place})"
 
 
 def _name(index: int, sub: int | None) -> str:

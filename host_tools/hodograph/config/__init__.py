@@ -3,6 +3,7 @@
 
 from .drive_file import Drive, load_drive
 from .machine_file import KERNELS, Axis, Machine, load_machine
+from .table import read_toml
 from .path_file import PathFile, PathSpec, load_path_file
 
 __all__ = [
@@ -15,4 +16,5 @@ __all__ = [
     "load_drive",
     "load_machine",
     "load_path_file",
+    "read_toml",
 ]

@@ -81,7 +81,7 @@ def load_machine(file: Path) -> Machine:
         feed_mm_s=controller.number("feed_mm_s", low=0.01, high=4000),
         acceleration_mm_s2=controller.number("acceleration_mm_s2", low=0.1, high=4e6),
         jerk_mm_s3=controller.number("jerk_mm_s3", low=1, high=4e9),
-        reserve=controller.number("reserve", 0.02, low=0, high=0.5),
+        reserve=controller.number("reserve", 0.1, low=0, high=0.9),
         start_tolerance_mm=controller.number("start_tolerance_mm", 0.005, low=1e-6, high=10),
         offset_mm=complex(*work.pair("offset_mm", (0.0, 0.0), low=-4096, high=4096)),
         counts_per_mm=counts_per_mm,

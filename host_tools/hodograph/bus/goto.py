@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Straight, jerk-limited moves from where the axes stand: programs like any other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from ..chain import controller_limits, program_limits
+from ..config import Machine
+from ..errors import InputError
+from ..feed import FeedRequest, Limits, plan_feed
+from ..program import compile_path, encode
+from ..spline import line
+from .controller import READY, Controller
+
+GOTO_FEED_MM_S = 100.0
+GOTO_RAMP_S = 0.25
+SHORTEST_MOVE_MM = 0.002
+"""Shorter moves (the format ends near 1 um) go by way of a point DETOUR_MM away."""
+DETOUR_MM = 0.1
+
+
+def line_image(start_mm: complex, end_mm: complex, machine: Machine) -> bytes:
+    """The program of a straight move in machine coordinates. Raises PlanError when it leaves the travel."""
+    spline = line(start_mm, end_mm)
+    request = FeedRequest(
+        profile="minimax",
+        nominal_mm_s=min(GOTO_FEED_MM_S, machine.feed_mm_s),
+        ramp_time_s=GOTO_RAMP_S,
+        degree=5,
+    )
+    plan = plan_feed(
+        spline.length_mm,
+        request,
+        Limits(),
+        controller_limits(machine),
+        period_us=machine.period_us,
+    )
+    return encode(
+        compile_path(
+            spline, plan, period_us=machine.period_us, limits=program_limits(machine), name="goto"
+        ).program
+    )
+
+
+def legs(start_mm: complex, end_mm: complex, machine: Machine) -> list[tuple[complex, complex]]:
+    """The straight moves that lead from one point to another: none, one, or two for a tiny way."""
+    if start_mm == end_mm:
+        return []
+    if abs(end_mm - start_mm) >= SHORTEST_MOVE_MM:
+        return [(start_mm, end_mm)]
+    axis = machine.axes[0]
+    middle = (axis.travel_min_mm + axis.travel_max_mm) / 2
+    detour = start_mm + math.copysign(DETOUR_MM, middle - start_mm.real)
+    return [(start_mm, detour), (detour, end_mm)]
+
+
+def goto(
+    controller: Controller,
+    machine: Machine,
+    end_counts: tuple[int, int],
+    tick: Callable[[], None] | None = None,
+) -> float:
+    """Moves from the present setpoint to a point in counts; returns the way in mm, at standstill.
+
+    The drives have to be on (state ready). Each move replaces the program that is loaded.
+    """
+    for axis, counts in zip(machine.axes, end_counts, strict=True):
+        at_mm = counts / machine.counts_per_mm
+        if not axis.travel_min_mm <= at_mm <= axis.travel_max_mm:
+            raise InputError(
+                f"goto: {axis.name} = {at_mm:g} mm is outside the travel "
+                f"{axis.travel_min_mm:g} to {axis.travel_max_mm:g} mm"
+            )
+    here = controller.targets(len(machine.axes))
+    start_mm, end_mm = (
+        complex(x / machine.counts_per_mm, y / machine.counts_per_mm) for x, y in (here, end_counts)
+    )
+    way_mm = 0.0
+    for a, b in legs(start_mm, end_mm, machine):
+        controller.upload(line_image(a, b, machine))
+        controller.start()
+        controller.wait_for((READY,), math.inf, tick)
+        way_mm += abs(b - a)
+    return way_mm

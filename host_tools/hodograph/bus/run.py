@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: MIT
+"""A program on the bus: bring up, move to the start, run, record, analyse."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import Machine
+from ..errors import BusError, HodographError, RunError
+from ..native import NativeProgram
+from ..simulate import Motion, analyse, settling_ticks
+from .address import BusAddress, check_socketcan, is_virtual
+from .controller import DISABLE, READY, STATISTICS, Controller, connect
+from .decode import Ticks, decode_ticks
+from .goto import goto
+from .processes import Rig
+from .recorder import Recorder
+
+REACHED_AFTER = 2
+"""Setpoint k is reached at SYNC k+2 (docs/protocol.md section 2)."""
+
+_SYNCS, _TICK, _MISSES = 1, 2, 3
+_MARGIN_TICKS = 10
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class BusRun:
+    """A recorded run: the motion, and how the bus did. `frames` counts all that were recorded."""
+
+    motion: Motion
+    bus: str
+    deadline_misses: int
+    pace: str
+    frames: int
+    wall_s: float
+
+    def summary(self) -> dict[str, object]:
+        """The keys that tools may rely on in `hodograph run --json`."""
+        return self.motion.summary() | {
+            "bus": self.bus,
+            "deadline_misses": self.deadline_misses,
+            "pace": self.pace,
+            "frames": self.frames,
+        }
+
+
+@dataclass(frozen=True)
+class Station:
+    """A controller that answers; `pace` is known when its processes are ours."""
+
+    controller: Controller
+    pace: str | None
+    rig: Rig | None
+
+
+@contextmanager
+def station(
+    machine: Machine, address: BusAddress, pace: str, wait_s: float, note: Callable[[str], None]
+) -> Iterator[Station]:
+    """The machine's controller on this bus, with a simulated machine started on a virtual bus without one.
+
+    On the way out by an error or an interrupt the axes are stopped, and what was started is ended.
+    """
+    with ExitStack() as stack:
+        controller = stack.enter_context(connect(address, machine.node, machine.bitrate))
+        rig = None
+        if is_virtual(address) and not controller.answers(0.3):
+            rig = stack.enter_context(Rig(machine, address, pace))
+            _await_rig(controller, rig, max(wait_s, 5.0))
+        elif not is_virtual(address):
+            controller.require(wait_s)
+        if rig is None:
+            note(f"node {machine.node} is on {address} already: using it and its drives")
+        try:
+            yield Station(controller, pace if rig is not None else None, rig)
+        except BaseException:
+            with unbroken(), suppress(HodographError):
+                controller.stop_and_wait()
+            raise
+        if rig is not None:
+            with suppress(HodographError):
+                controller.command(DISABLE)
+
+
+def _await_rig(controller: Controller, rig: Rig, wait_s: float) -> None:
+    deadline = time.monotonic() + wait_s
+    while not controller.answers(0.25):
+        rig.check()
+        if time.monotonic() > deadline:
+            raise BusError(f"the controller started here does not answer within {wait_s:g} s")
+
+
+@contextmanager
+def unbroken() -> Iterator[None]:
+    """Ignores Ctrl-C and SIGTERM while the axes are being stopped."""
+    kept = {}
+    with suppress(ValueError):  # only the main thread may
+        for number in (signal.SIGINT, signal.SIGTERM):
+            kept[number] = signal.signal(number, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+
+
+def run_program(
+    at: Station, machine: Machine, image: bytes, kernel: str, progress: Progress | None = None
+) -> BusRun:
+    """Runs a program image from wherever the axes stand, and analyses the recording.
+
+    Raises RefusedError, BusError, and RunError when the recording is incomplete or its setpoints are not those that
+    the same kernel gives here.
+    """
+    controller = at.controller
+    program = NativeProgram(image)
+    _, setpoints = program.setpoints(kernel, machine.counts_per_mm)
+    controller.configure(machine, kernel)
+    controller.enable()
+    goto(controller, machine, (int(setpoints[0, 0]), int(setpoints[0, 1])))
+    controller.upload(image)
+    before = controller.statistics()
+    with Recorder(controller.address) as recorder:
+        begun = time.monotonic()
+        controller.start()
+        _follow(controller, at.rig, progress)
+        wall_s = time.monotonic() - begun
+        _settle(controller, settling_ticks(machine.period_us))
+    misses = controller.read(STATISTICS, _MISSES) - before["deadline_misses"]
+    if recorder.dropped:
+        raise RunError(
+            f"the kernel dropped {recorder.dropped} frames of the recording: run again, as root if you can "
+            "(larger receive buffer)"
+        )
+    frames = recorder.frames()
+    ticks = decode_ticks(frames, [axis.node for axis in machine.axes])
+    motion = _motion(image, program, ticks, setpoints, machine, kernel)
+    return BusRun(
+        motion=motion,
+        bus=str(controller.address),
+        deadline_misses=misses,
+        pace=at.pace or measured_pace(motion, wall_s),
+        frames=int(frames.size),
+        wall_s=wall_s,
+    )
+
+
+def measured_pace(motion: Motion, wall_s: float) -> str:
+    """The pace that a run's duration tells, for a controller that was there already."""
+    nominal_s = motion.ticks * motion.period_us / 1e6
+    return "real-time" if wall_s > 0.9 * nominal_s else "fast"
+
+
+def _follow(controller: Controller, rig: Rig | None, progress: Progress | None) -> None:
+    def tick() -> None:
+        if rig is not None:
+            rig.check()
+        if progress is not None:
+            progress(controller.read(STATISTICS, _TICK))
+
+    controller.wait_for((READY,), math.inf, tick)
+
+
+def _settle(controller: Controller, settling: int) -> None:
+    end = controller.read(STATISTICS, _SYNCS) + settling + REACHED_AFTER + _MARGIN_TICKS
+    deadline = time.monotonic() + 30.0
+    while controller.read(STATISTICS, _SYNCS) < end:
+        if time.monotonic() > deadline:
+            raise BusError("the controller has stopped sending SYNC: see hodograph status")
+        time.sleep(0.01)
+
+
+def _motion(
+    image: bytes,
+    program: NativeProgram,
+    ticks: Ticks,
+    setpoints: NDArray[np.int32],
+    machine: Machine,
+    kernel: str,
+) -> Motion:
+    if ticks.volts_mv is None:
+        ticks_volts = np.zeros((ticks.count, 2), dtype=np.int16)
+    else:
+        ticks_volts = ticks.volts_mv
+    first = first_tick(ticks.targets, setpoints)
+    count = program.ticks + settling_ticks(machine.period_us)
+    reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
+    return analyse(
+        image,
+        ticks.targets[first : first + count],
+        ticks.actual[reached],
+        ticks_volts[reached],
+        kernel=kernel,
+        counts_per_mm=machine.counts_per_mm,
+    )
+
+
+def first_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int:
+    """The row of `targets` that is tick 0 of `setpoints`.
+
+    Before a program the target stands still, and its first ticks may round to the same counts: the first
+    change on the bus is therefore matched with the first change in the program. Raises RunError when nothing
+    moves.
+    """
+    moves = np.flatnonzero(np.any(targets != targets[0], axis=1))
+    if not moves.size:
+        raise RunError("recording: the setpoints never move: was the program started?")
+    first_move = int(moves[0])
+    if np.any(targets[0] != setpoints[0]):
+        return first_move
+    return max(0, first_move - int(np.argmax(np.any(setpoints != setpoints[0], axis=1))))
+
+
+def rig_until_interrupted(
+    machine: Machine, address: BusAddress, pace: str, kernel: str, note: Callable[[str], None]
+) -> None:
+    """Controller and drives on a virtual bus, configured, until Ctrl-C."""
+    check_socketcan(address)
+    if not is_virtual(address):
+        raise BusError(f"{address}: not a virtual CAN: a simulated machine stays off real buses")
+    with connect(address, machine.node, machine.bitrate) as controller:
+        if controller.answers(0.3):
+            raise BusError(f"{address}: node {machine.node} is there already: end it first")
+        with Rig(machine, address, pace) as rig:
+            _await_rig(controller, rig, 5.0)
+            controller.configure(machine, kernel)
+            names = ", ".join(f"{axis.name} (node {axis.node})" for axis in machine.axes)
+            note(f"node {machine.node} and the drives {names} are on {address}; Ctrl-C ends them")
+            try:
+                while True:
+                    rig.check()
+                    time.sleep(0.2)
+            except KeyboardInterrupt:
+                with unbroken(), suppress(HodographError):
+                    controller.stop_and_wait()

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""From a path file to a program: the steps that all commands share, each computed once and when asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from .config import Machine, PathFile, load_machine, load_path_file
+from .errors import InputError
+from .feed import ControllerLimits, FeedPlan, plan_feed
+from .program import Compilation, Program, ProgramLimits, compile_path, encode
+from .spline import SplineResult, from_control_polygon
+
+
+def controller_limits(machine: Machine) -> ControllerLimits:
+    """The limits that a plan for this machine has to keep."""
+    return ControllerLimits(
+        feed_mm_s=machine.feed_mm_s,
+        acceleration_mm_s2=machine.acceleration_mm_s2,
+        jerk_mm_s3=machine.jerk_mm_s3,
+        reserve=machine.reserve,
+    )
+
+
+def program_limits(machine: Machine) -> ProgramLimits:
+    """What the controller of this machine checks a program against."""
+    low, high = (
+        tuple(round(mm * 2**40) for mm in ends)
+        for ends in (
+            [axis.travel_min_mm for axis in machine.axes[:2]],
+            [axis.travel_max_mm for axis in machine.axes[:2]],
+        )
+    )
+    return ProgramLimits(
+        period_us=machine.period_us,
+        feed_um_s=round(machine.feed_mm_s * 1000),
+        acceleration_um_s2=round(machine.acceleration_mm_s2 * 1000),
+        jerk_mm_s3=round(machine.jerk_mm_s3),
+        min_q40_mm=(low[0], low[1]),
+        max_q40_mm=(high[0], high[1]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A path file and everything computed from it. Errors come when a step is first asked for."""
+
+    file: PathFile
+    given_machine: Path | None = None
+    """A machine file that replaces the one the path file names."""
+
+    @cached_property
+    def machine_or_none(self) -> Machine | None:
+        """The machine, None when none is named."""
+        name = self.given_machine or self.file.machine_file
+        return load_machine(name) if name is not None else None
+
+    @property
+    def machine(self) -> Machine:
+        """The machine; raises InputError when none is named."""
+        if self.machine_or_none is None:
+            raise InputError(
+                f"{self.file.file}: names no machine: add [machine] file = \"...\" or use --machine FILE"
+            )
+        return self.machine_or_none
+
+    @cached_property
+    def spline_result(self) -> SplineResult:
+        """The spline and how it was found."""
+        path = self.file.path
+        try:
+            if not path.through:
+                return from_control_polygon(path.points, path.closed)
+            from .spline import through_points
+
+            return through_points(
+                path.points,
+                path.closed,
+                ends=path.ends,
+                start_tangent=path.start_tangent,
+                end_tangent=path.end_tangent,
+            )
+        except InputError as error:
+            raise InputError(f"{self.file.file}: [path] {error}") from error
+
+    @cached_property
+    def plan(self) -> FeedPlan:
+        """The feed over the spline."""
+        machine = self.machine_or_none
+        return plan_feed(
+            self.spline_result.spline.length_mm,
+            self.file.feed,
+            self.file.limits,
+            controller_limits(machine) if machine is not None else None,
+            period_us=machine.period_us if machine is not None else 1000,
+        )
+
+    @cached_property
+    def compilation(self) -> Compilation:
+        """The program for the machine, and the plan that it really holds."""
+        machine = self.machine
+        return compile_path(
+            self.spline_result.spline,
+            self.plan,
+            period_us=machine.period_us,
+            offset_mm=machine.offset_mm,
+            limits=program_limits(machine),
+            name=self.file.name,
+        )
+
+    @property
+    def program(self) -> Program:
+        """The program for the machine."""
+        return self.compilation.program
+
+    @cached_property
+    def image(self) -> bytes:
+        """The program's bytes."""
+        return encode(self.program)
+
+    def notes(self, plan: FeedPlan) -> tuple[str, ...]:
+        """What the user should know about the spline and about a plan for it, one line each."""
+        excesses = tuple(f"feed: {excess}" for excess in plan.excesses)
+        return (*self.spline_result.notes, *plan.notes, *excesses)
+
+
+def load_chain(file: Path, machine: Path | None = None) -> Chain:
+    """The chain that begins with a path file; raises InputError."""
+    return Chain(load_path_file(file), machine)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Entry point: from the command line to an exit status, never a traceback unless asked for."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Sequence
+from types import FrameType
+
+from ..errors import INTERRUPTED_EXIT_STATUS, HodographError
+from .output import note
+from .parser import make_parser
+
+TERMINATED_EXIT_STATUS = 143
+"""Exit status after SIGTERM (128 + SIGTERM)."""
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM: everything that Ctrl-C tidies up is tidied up."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit status."""
+    debug = bool(os.environ.get("HODOGRAPH_DEBUG"))
+    try:
+        options = make_parser().parse_args(arguments)
+        debug = debug or options.debug
+        _on_sigterm()
+        _run(options)
+        sys.stdout.flush()
+        return 0
+    except HodographError as error:
+        return _end(str(error), error.exit_status, debug)
+    except Terminated:
+        return _end("terminated", TERMINATED_EXIT_STATUS, debug)
+    except KeyboardInterrupt:
+        return _end("interrupted", INTERRUPTED_EXIT_STATUS, debug)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except MemoryError:
+        return _end("out of memory: the path or the run is too long for this machine", 1, debug)
+    except Exception as error:
+        text = " ".join(str(error).split())
+        return _end(
+            f"internal error, please report it ({type(error).__name__}: {text}); "
+            "HODOGRAPH_DEBUG=1 shows where",
+            1,
+            debug,
+        )
+
+
+def _run(options: argparse.Namespace) -> None:
+    from . import bus_commands, path_commands, report_commands
+
+    handlers = path_commands.COMMANDS | bus_commands.COMMANDS | report_commands.COMMANDS
+    handlers[options.command](options)
+
+
+def _end(message: str, status: int, debug: bool) -> int:
+    if debug:
+        traceback.print_exc()
+    note(" ".join(message.split()))
+    return status
+
+
+def _on_sigterm() -> None:
+    def terminate(number: int, frame: FrameType | None) -> None:
+        raise Terminated
+
+    try:
+        signal.signal(signal.SIGTERM, terminate)
+    except ValueError:  # not the main thread: whoever called us decides
+        return
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""What commands write: results on stdout, notes and progress on stderr."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+
+def note(text: str) -> None:
+    """One line for the user, on stderr."""
+    print(f"hodograph: {text}", file=sys.stderr)
+
+
+def print_json(value: object) -> None:
+    """The one JSON document of a command. NaN and infinities are a bug, so they raise."""
+    sys.stdout.write(json.dumps(value, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def print_rows(rows: Sequence[tuple[str, str]]) -> None:
+    """Names and values, aligned."""
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:<{width}}  {value}")
+
+
+def pairs(values: NDArray[np.complex128]) -> list[list[float]]:
+    """Complex numbers as [[x, y], …]."""
+    return [[float(v.real), float(v.imag)] for v in np.atleast_1d(values)]
+
+
+def number(value: float) -> str:
+    """A number for people: six digits, no exponent where it can be avoided."""
+    if value and (abs(value) >= 1e6 or abs(value) < 1e-4) and math.isfinite(value):
+        return f"{value:.4e}"
+    return f"{value:.6g}"
+
+
+@contextmanager
+def progress(
+    title: str, unit: str, total: int | None = None
+) -> Iterator[Callable[[int], None]]:
+    """A progress bar on stderr while it is a terminal; call the result with what is done so far."""
+    if not sys.stderr.isatty():
+        yield lambda done: None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=title, unit=unit, leave=False, delay=0.3) as bar:
+        yield lambda done: bar.update(done - bar.n)
+
+
+def write_file(file: Path, data: bytes) -> None:
+    """Writes a result, whole or not at all. Raises InputError."""
+    fresh = file.with_name(file.name + ".part")
+    try:
+        fresh.write_bytes(data)
+        fresh.replace(file)
+    except OSError as error:
+        fresh.unlink(missing_ok=True) if fresh.parent.is_dir() else None
+        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def without_keys(data: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+    """`data` less some keys."""
+    return {key: value for key, value in data.items() if key not in keys}

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""The command line: one sub-command per job, usage errors as InputError."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import math
+import re
+from pathlib import Path
+from typing import NoReturn
+
+from .. import __version__
+from ..bus.address import DEFAULT_BUS
+from ..bus.processes import PACES
+from ..config import KERNELS
+from ..errors import InputError
+
+DESCRIPTION = "From a control polygon to encoder counts: jerk-limited motion on PH splines over CAN."
+EPILOG = (
+    "exit status: 0 done, 1 internal or build, 2 wrong input, 3 path or feed not possible, 4 bus or node, "
+    "5 refused by the controller, 6 run failed, 130 interrupted (docs/cli.md)"
+)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Raises InputError with one line instead of printing usage."""
+
+    def error(self, message: str) -> NoReturn:
+        match = re.match(r"argument COMMAND: invalid choice: '(.*?)' \(choose from (.*)\)", message)
+        if match:
+            names = re.findall(r"\w+", match[2])
+            near = difflib.get_close_matches(match[1], names, n=1)
+            advice = f'did you mean "{near[0]}"?' if near else "one of: " + ", ".join(names)
+            message = f'there is no command "{match[1]}"; {advice}'
+        raise InputError(f"{message} (see {self.prog} --help)")
+
+
+def finite(text: str) -> float:
+    """A finite number on the command line."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a number') from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'"{text}" is not finite')
+    return value
+
+
+def node_number(text: str) -> int:
+    """A CANopen node number."""
+    if not text.isdigit() or not 1 <= int(text) <= 127:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a node number (1 to 127)')
+    return int(text)
+
+
+def _bus(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--bus",
+        default=DEFAULT_BUS,
+        metavar="INTERFACE:CHANNEL",
+        help=f"as python-can has it (default {DEFAULT_BUS})",
+    )
+    parser.add_argument(
+        "--wait", type=finite, default=2.0, metavar="S", help="how long to wait for the controller"
+    )
+
+
+def _node(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--node", type=node_number, default=1, help="the controller's node number (default 1)"
+    )
+
+
+def _file(parser: argparse.ArgumentParser, *, many: bool = False, what: str = "path file") -> None:
+    if many:
+        parser.add_argument("files", metavar="FILE", type=Path, nargs="+", help=f"{what} (TOML)")
+    else:
+        parser.add_argument("file", metavar="FILE", type=Path, help=f"{what} (TOML)")
+
+
+def _json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead")
+
+
+def _machine(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--machine", type=Path, metavar="FILE", help="machine file instead of the one FILE names"
+    )
+
+
+def _kernel(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--kernel", choices=KERNELS, help="number kernel (default: machine file)")
+
+
+def _at(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument("--at", type=finite, nargs="+", metavar="V", help=what)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    parser = _Parser(prog="hodograph", description=DESCRIPTION, epilog=EPILOG)
+    parser.add_argument("--version", action="version", version=f"hodograph {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show tracebacks (or HODOGRAPH_DEBUG=1)")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    def command(name: str, text: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text.capitalize() + ".")
+
+    spline = command("spline", "compute the PH spline of a path")
+    _file(spline)
+    _json(spline)
+    _at(spline, "arc lengths in mm at which to give point, tangent and curvature")
+
+    feed = command("feed", "plan the feed along a path")
+    _file(feed)
+    _machine(feed)
+    _json(feed)
+    _at(feed, "times in s at which to give arc length and feed")
+
+    compile_ = command("compile", "make the program image that the controller runs")
+    _file(compile_)
+    _machine(compile_)
+    _json(compile_)
+    compile_.add_argument(
+        "-o", "--output", type=Path, metavar="IMAGE", help="default: FILE with .hdgp, here"
+    )
+
+    inspect = command("inspect", "print what a program image holds")
+    inspect.add_argument("file", metavar="FILE", type=Path, help="program image, or a path file")
+    _machine(inspect)
+    _json(inspect)
+
+    inspect.add_argument("--full", action="store_true", help="print every segment and piece")
+
+    upload = command("upload", "configure the controller and send it a program")
+    upload.add_argument("file", metavar="FILE", type=Path, help="path file, or a program image")
+    _machine(upload)
+    _bus(upload)
+    _kernel(upload)
+    _json(upload)
+
+    goto = command("goto", "move straight to a program's start and load the program")
+    goto.add_argument("file", metavar="FILE", type=Path, help="path file, or a machine file with --to")
+    goto.add_argument(
+        "--to", type=finite, nargs=2, metavar=("X", "Y"), help="move there instead (machine mm)"
+    )
+    _machine(goto)
+    _bus(goto)
+    _kernel(goto)
+
+    start = command("start", "switch the drives on if need be and start the loaded program")
+    start.add_argument("--reset", action="store_true", help="reset a fault first")
+    start.add_argument("--follow", action="store_true", help="return when the axes stand again")
+    _bus(start)
+    _node(start)
+
+    stop = command("stop", "stop on the path, jerk-limited")
+    stop.add_argument("--off", action="store_true", help="then switch the drives off")
+    _bus(stop)
+    _node(stop)
+
+    status = command("status", "print the state of controller, drives and program")
+    _bus(status)
+    _node(status)
+    _json(status)
+
+    simulate = command("simulate", "run a path without a bus, as fast as it goes")
+    _file(simulate)
+    _machine(simulate)
+    _kernel(simulate)
+    _json(simulate)
+    simulate.add_argument("--trace", type=Path, metavar="CSV", help="write one row a tick")
+
+    run = command("run", "run paths on the bus, record and analyse")
+    _file(run, many=True)
+    _machine(run)
+    _bus(run)
+    _kernel(run)
+    _json(run)
+    run.add_argument(
+        "--pace", choices=PACES, help="of a controller started here (default real-time)"
+    )
+    run.add_argument("--trace", type=Path, metavar="CSV", help="write one row a tick (one FILE only)")
+    run.add_argument("--report", type=Path, metavar="DIR", help="write report.html and figures there")
+
+    report = command("report", "simulate paths and write a report with figures")
+    _file(report, many=True)
+    _machine(report)
+    _kernel(report)
+    report.add_argument(
+        "-o", "--output", type=Path, default=Path("report"), metavar="DIR", help="default: report"
+    )
+
+    paper = command("paper", "print the paper's numbers beside ours")
+    _json(paper)
+
+    rig = command("rig", "bring up a simulated machine on a virtual bus until Ctrl-C")
+    rig.add_argument("file", metavar="FILE", type=Path, help="machine file, or a path file that names one")
+    _bus(rig)
+    _kernel(rig)
+    rig.add_argument("--pace", choices=PACES, default="real-time")
+    return parser

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""Commands that need no bus: spline, feed, compile, inspect, simulate."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+
+from ..chain import Chain, load_chain
+from ..errors import InputError
+from ..feed import FeedPlan
+from ..program import Program, decode, inspect_dict, inspect_text
+from ..program.image import MAGIC
+from ..simulate import Motion, simulate, write_trace
+from .output import note, number, pairs, print_json, print_rows, progress, write_file
+
+
+def spline(options: Namespace) -> None:
+    """hodograph spline."""
+    chain = load_chain(options.file)
+    found = chain.spline_result
+    curve = found.spline
+    for line in found.notes:
+        note(line)
+    nodes = curve.nodal_points
+    result: dict[str, object] = {
+        "closed": curve.closed,
+        "segments": curve.segment_count,
+        "nodal_points": pairs(nodes),
+        "length_mm": curve.length_mm,
+        "segment_lengths_mm": curve.segment_lengths_mm.tolist(),
+        "newton_iterations": found.newton_iterations,
+        "max_curvature_per_mm": curve.max_curvature_per_mm(),
+    }
+    if options.at is not None:
+        s = _within("--at", options.at, curve.length_mm, "mm")
+        result["points"] = pairs(curve.point(s))
+        result["tangents"] = pairs(curve.tangent(s))
+        result["curvatures"] = np.atleast_1d(curve.curvature(s)).tolist()
+    if options.json:
+        print_json(result)
+        return
+    print_rows(
+        [
+            ("path", f"{'closed' if curve.closed else 'open'}, {curve.segment_count} segments"),
+            ("length", f"{number(curve.length_mm)} mm"),
+            ("greatest curvature", f"{number(curve.max_curvature_per_mm())} /mm"),
+            ("Newton iterations", str(found.newton_iterations)),
+        ]
+    )
+    if options.at is not None:
+        print(f"{'s mm':>12} {'x mm':>16} {'y mm':>16} {'curvature /mm':>16}")
+        for at, z, k in zip(options.at, curve.point(s), curve.curvature(s), strict=True):
+            print(f"{at:12.6g} {z.real:16.9f} {z.imag:16.9f} {k:16.9f}")
+
+
+def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray:
+    array = np.asarray(values, dtype=np.float64)
+    bad = array[(array < 0) | (array > end * (1 + 1e-12))]
+    if bad.size:
+        raise InputError(f"{what} {bad[0]:g}: must be from 0 to {end:.9g} {unit}")
+    return np.minimum(array, end)
+
+
+def print_notes(chain: Chain, plan: FeedPlan) -> None:
+    """The notes of a path, each with the file's name."""
+    for line in chain.notes(plan):
+        note(f"{chain.file.file.name}: {line}")
+
+
+def feed(options: Namespace) -> None:
+    """hodograph feed."""
+    chain = load_chain(options.file, options.machine)
+    plan = chain.plan
+    print_notes(chain, plan)
+    result: dict[str, object] = {
+        "profile": plan.profile,
+        "n_c": plan.n_c,
+        "evaluations": plan.evaluations,
+        "ramp_time_s": plan.ramp_time_s,
+        "duration_s": plan.duration_s,
+        "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
+        "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
+    }
+    if options.at is not None:
+        t = _within("--at", options.at, plan.duration_s, "s")
+        result["arc_length_mm"] = np.atleast_1d(plan.arc_length(t)).tolist()
+        result["feed_mm_s"] = np.atleast_1d(plan.feed(t)).tolist()
+    if options.json:
+        print_json(result)
+        return
+    slope = "" if plan.n_c is None else f", n_c {plan.n_c:.6g} ({plan.evaluations} evaluations)"
+    print_rows(
+        [
+            ("profile", plan.profile + slope),
+            ("feed", f"{number(plan.feed_mm_s)} mm/s"),
+            ("ramps", f"{number(plan.ramp_time_s)} s"),
+            ("duration", f"{number(plan.duration_s)} s"),
+            ("peak acceleration", f"{number(plan.peak_acceleration_mm_s2)} mm/s^2"),
+            ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
+        ]
+    )
+    if options.at is not None:
+        print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
+        for at, s, v in zip(options.at, plan.arc_length(t), plan.feed(t), strict=True):
+            print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
+
+
+def compile_(options: Namespace) -> None:
+    """hodograph compile."""
+    chain = load_chain(options.file, options.machine)
+    image = chain.image
+    print_notes(chain, chain.compilation.plan)
+    output = options.output or Path(chain.file.name + ".hdgp")
+    write_file(output, image)
+    program = chain.program
+    if options.json:
+        print_json({"file": str(output), "bytes": len(image)} | inspect_dict(program))
+        return
+    print(
+        f"{output}: {len(image)} bytes, {program.segment_count} segments, {program.piece_count} feed "
+        f"pieces, {program.ticks} ticks of {program.period_us} us"
+    )
+
+
+def read_image(file: Path) -> bytes | None:
+    """The bytes of a program image, None when the file is something else (a path file)."""
+    try:
+        with file.open("rb") as source:
+            if source.read(4) != MAGIC and file.suffix != ".hdgp":
+                return None
+            source.seek(0)
+            return source.read()
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+
+
+def decode_file(file: Path, image: bytes) -> Program:
+    """The program in an image; errors name the file."""
+    try:
+        return decode(image)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+
+
+def inspect(options: Namespace) -> None:
+    """hodograph inspect."""
+    image = read_image(options.file)
+    if image is None:
+        program = load_chain(options.file, options.machine).program
+    else:
+        program = decode_file(options.file, image)
+    if options.json:
+        print_json(inspect_dict(program))
+    else:
+        print(inspect_text(program, full=options.full))
+
+
+def simulate_chain(chain: Chain, kernel: str | None) -> Motion:
+    """A run of a path without a bus."""
+    machine = chain.machine
+    image = chain.image
+    with progress("simulate", "tick", chain.program.ticks) as bar:
+        return simulate(
+            image,
+            [axis.drive for axis in machine.axes],
+            kernel=kernel or machine.kernel,
+            counts_per_mm=machine.counts_per_mm,
+            progress=lambda done, total: bar(done),
+        )
+
+
+def simulate_(options: Namespace) -> None:
+    """hodograph simulate."""
+    chain = load_chain(options.file, options.machine)
+    motion = simulate_chain(chain, options.kernel)
+    print_notes(chain, chain.compilation.plan)
+    if options.trace is not None:
+        write_trace(motion, options.trace)
+    if options.json:
+        print_json(motion.summary())
+    else:
+        print_rows(motion_rows(motion))
+
+
+def motion_rows(motion: Motion) -> list[tuple[str, str]]:
+    """A run's results for people."""
+    return [
+        ("ticks", f"{motion.ticks} of {motion.period_us} us, kernel {motion.kernel}"),
+        ("greatest contour error", f"{motion.max_contour_error_um:.3f} um"),
+        ("greatest following error", f"{motion.max_following_error_um:.1f} um"),
+        ("greatest voltage", f"{motion.max_volts:.3f} V"),
+        ("setpoints SHA-256", motion.setpoints_sha256),
+        ("encoders SHA-256", motion.encoders_sha256),
+    ]
+
+
+COMMANDS = {
+    "spline": spline,
+    "feed": feed,
+    "compile": compile_,
+    "inspect": inspect,
+    "simulate": simulate_,
+}
