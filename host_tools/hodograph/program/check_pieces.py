@@ -38,7 +38,7 @@ def piece_faults(
     empty = duration <= 0
     if empty.any():
         return [(empty, 0, code.PIECE_DURATION)]
-    large = (np.abs(c) > COEFFICIENT_Q40).any(axis=1)
+    large = ((c > COEFFICIENT_Q40) | (c < -COEFFICIENT_Q40)).any(axis=1)
     if large.any():
         return [(large, 0, code.COEFFICIENT)]
     way_q44 = _ways_q44(duration, c)

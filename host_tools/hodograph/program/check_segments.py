@@ -37,8 +37,8 @@ def segment_faults(
     code = ProgramError
     count = program.segment_count
     u, v = program.u_q44, program.v_q44
-    wide = ((np.abs(u) >= W_LIMIT_Q44) | (np.abs(v) >= W_LIMIT_Q44)).any(axis=1)
-    far = (np.abs(program.x_q40) >= POINT_LIMIT_Q40) | (np.abs(program.y_q40) >= POINT_LIMIT_Q40)
+    wide = (_beyond(u, W_LIMIT_Q44) | _beyond(v, W_LIMIT_Q44)).any(axis=1)
+    far = _beyond(program.x_q40, POINT_LIMIT_Q40) | _beyond(program.y_q40, POINT_LIMIT_Q40)
     outside = (program.start_q40 < 0) | (program.start_q40 >= ARC_LIMIT_Q40)
     sigma = _sigma3(u.astype(object), v.astype(object))
     low, high = sigma.min(axis=1), sigma.max(axis=1)
@@ -67,6 +67,10 @@ def segment_faults(
     if limits is not None:
         out.append((_leaves(program, limits), 0, code.TRAVEL))
     return out
+
+
+def _beyond(values: Int, limit: int) -> Bool:
+    return np.asarray((values >= limit) | (values <= -limit))
 
 
 def _bool(values: Big) -> Bool:
@@ -99,8 +103,10 @@ def _turned(u: Int, v: Int) -> Bool:
 def _too_short(program: Program) -> Bool:
     joints = np.append(program.start_q40, program.length_q40)
     mask = np.zeros(program.segment_count, dtype=np.bool_)
-    if np.all(np.diff(joints) > 0) and np.all(np.diff(program.pieces.start_q40) > 0):
-        mask[brief_pairs(joints, program.pieces, program.period_us)[0] + 1] = True
+    pieces = program.pieces
+    rising = np.all(np.diff(joints) > 0) and np.all(np.diff(pieces.start_q40) >= 0)
+    if rising and np.all(pieces.duration_q32_s > 0):
+        mask[brief_pairs(joints, pieces, program.period_us)[0] + 1] = True
     return mask
 
 
