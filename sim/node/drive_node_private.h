@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/* What the parts of drive_node share: the object dictionary's hooks (drive_node_od.c), the motion
+ * of a period (drive_node_motion.c) and the frames (drive_node.c). */
+#ifndef NODE_DRIVE_NODE_PRIVATE_H
+#define NODE_DRIVE_NODE_PRIVATE_H
+
+#include "node/drive_node.h"
+
+extern const struct od_hooks drive_node_od_hooks;
+extern const struct nmt_hooks drive_node_nmt_hooks;
+
+/* Values that follow from the model's configuration. */
+void drive_node_od_fill(struct drive_node *node);
+
+/* Brings the fields that the bus can read up to date. */
+void drive_node_od_refresh(struct drive_node *node);
+
+/* A controlword, from RPDO1 or SDO. */
+void drive_node_control(struct drive_node *node, uint16_t controlword);
+
+/* One period of the axis, as the state asks. */
+void drive_node_step(struct drive_node *node);
+
+/* Quick stop because of `code`, an EMCY code, with its EMCY; nothing when the drive is not enabled.
+ */
+void drive_node_stop_for(struct drive_node *node, uint16_t code);
+
+#endif
