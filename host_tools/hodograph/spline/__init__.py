@@ -1,7 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""C2 Pythagorean-hodograph quintic splines: from control polygons or points to exact arc lengths."""
+"""C2 Pythagorean-hodograph quintic splines: from points to exact arc lengths."""
 
-from .build import SplineResult, from_control_polygon, line
+from .build import SplineResult, from_control_polygon, line, through_points
 from .curve import PHSpline
+from .ends import END_NAMES
 
-__all__ = ["PHSpline", "SplineResult", "from_control_polygon", "line"]
+__all__ = [
+    "END_NAMES",
+    "PHSpline",
+    "SplineResult",
+    "from_control_polygon",
+    "line",
+    "through_points",
+]

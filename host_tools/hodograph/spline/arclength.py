@@ -14,9 +14,9 @@ _MOST_STEPS = 200
 def invert(arc: Real, w: Complex, segment: NDArray[np.intp], s_mm: Real) -> Real:
     """xi (n,) in [0, 1] with arc length `s_mm` (n,) from the start of `segment` (n,).
 
-    `arc` (N, 6) are the Bernstein coefficients of the arc length of each segment, `w` (N, 3) those of w. The
-    error in arc length is about 1e-15 of the segment's length. The bracket shrinks every step, so
-    this ends also where the speed all but vanishes.
+    `arc` (N, 6) are the Bernstein coefficients of the arc length of each segment, `w` (N, 3)
+    those of w. The error in arc length is about 1e-15 of the segment's length. The bracket
+    shrinks every step, so this ends also where the speed all but vanishes.
     """
     length = arc[segment, 5]
     xi = np.clip(s_mm / length, 0.0, 1.0)

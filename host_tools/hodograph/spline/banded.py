@@ -31,7 +31,8 @@ def solve_tridiagonal(lower: Complex, diagonal: Complex, upper: Complex, rhs: Co
 def solve_cyclic(lower: Complex, diagonal: Complex, upper: Complex, rhs: Complex) -> Complex:
     """Same with corners: `lower[0]` multiplies x[M-1], `upper[-1]` multiplies x[0]; M >= 3.
 
-    Sherman-Morrison: the corners are the rank-one matrix (g, 0 … 0, upper[-1])^T (1, 0 … 0, lower[0] / g).
+    Sherman-Morrison: the corners are the rank-one matrix (g, 0 … 0, upper[-1])^T (1, 0 … 0,
+    lower[0] / g).
     """
     corner, other = upper[-1], lower[0]
     g = -diagonal[0] if diagonal[0] != 0.0 else 1.0 + 0.0j

@@ -42,7 +42,8 @@ def square_modulus(w: Complex) -> Real:
     v0, v1, v2 = w[..., 0].imag, w[..., 1].imag, w[..., 2].imag
     middle = (2.0 * (u1 * u1 + v1 * v1) + u0 * u2 + v0 * v2) / 3.0
     return np.stack(
-        (u0 * u0 + v0 * v0, u0 * u1 + v0 * v1, middle, u1 * u2 + v1 * v2, u2 * u2 + v2 * v2), axis=-1
+        (u0 * u0 + v0 * v0, u0 * u1 + v0 * v1, middle, u1 * u2 + v1 * v2, u2 * u2 + v2 * v2),
+        axis=-1,
     )
 
 
@@ -54,11 +55,22 @@ def halves(w: Complex) -> tuple[Complex, Complex]:
     return np.stack((w0, left, middle), axis=-1), np.stack((middle, right, w2), axis=-1)
 
 
-def rotation(quadratic: Complex) -> Real:
-    """Angle (rad) by which complex quadratics (…, 3) turn about 0 as xi goes from 0 to 1.
+def restricted(quadratic: Complex, low: Real, high: Real) -> Complex:
+    """Quadratics (n, 3) on [low, high] (n,) in their own [0, 1]; the values of the polar form."""
 
-    Exact, not modulo 2 pi: a quadratic is a product of two linear factors, and [0, 1] seen from a root
-    spans less than pi. NaN-free also where the leading coefficient vanishes. docs/numerics.md 3.1.
+    def polar(s: Real, t: Real) -> Complex:
+        q0, q1, q2 = quadratic[:, 0], quadratic[:, 1], quadratic[:, 2]
+        out: Complex = (1 - s) * (1 - t) * q0 + (s * (1 - t) + t * (1 - s)) * q1 + s * t * q2
+        return out
+
+    return np.stack((polar(low, low), polar(low, high), polar(high, high)), axis=-1)
+
+
+def factor_angles(quadratic: Complex) -> tuple[Real, Real]:
+    """Angles (rad) by which the two linear factors of quadratics (…, 3) turn over [0, 1].
+
+    Each lies within (-pi, pi): [0, 1] seen from a root spans less than pi. A factor that is
+    constant, or a quadratic that starts at 0, counts as 0. docs/numerics.md 3.1.
     """
     c = quadratic[..., 0]
     b = 2.0 * (quadratic[..., 1] - c)
@@ -67,7 +79,13 @@ def rotation(quadratic: Complex) -> Real:
     # t = 1 / xi solves c t^2 + b t + a = 0, whose roots are finite when c is not 0; a factor of
     # the quadratic is then (1 - t xi), which turns from 1 to 1 - t.
     plus = np.where((np.conj(b) * root).real >= 0.0, b + root, b - root)
-    safe = np.where(plus == 0.0, 1.0, plus)
-    t1 = np.where(c == 0.0, 0.0, -plus / (2.0 * np.where(c == 0.0, 1.0, c)))
-    t2 = np.where(plus == 0.0, 0.0, -2.0 * a / safe)
-    return np.asarray(np.angle(1.0 - t1) + np.angle(1.0 - t2))
+    with np.errstate(all="ignore"):
+        t1 = np.where(c == 0.0, 0.0, -plus / (2.0 * c))
+        t2 = np.where(plus == 0.0, 0.0, -2.0 * a / plus)
+    return np.angle(1.0 - t1), np.angle(1.0 - t2)
+
+
+def rotation(quadratic: Complex) -> Real:
+    """Angle (rad, not modulo 2 pi) by which complex quadratics (…, 3) turn about 0."""
+    first, second = factor_angles(quadratic)
+    return np.asarray(first + second)

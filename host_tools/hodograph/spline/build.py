@@ -10,32 +10,71 @@ import numpy as np
 from ..errors import InputError
 from .bernstein import Complex
 from .curve import PHSpline
+from .ends import EndCondition, through_guide
 from .nodal import Guide, checked_points, control_polygon_guide
-from .start import followed_branch, root_on_branch, starting_values
-from .system import System, clamped_end
+from .solve import solve
+from .start import followed_branch, root_on_branch, starting_values, without_rests
+from .system import EndRule, System, clamped_end
 
 
 @dataclass(frozen=True)
 class SplineResult:
-    """A spline and how it was found.
+    """A spline, how it was found and how good it is; docs/numerics.md 3.5.
 
-    newton_iterations  linear systems solved in all, steps of continuation and retries included
+    newton_iterations  linear systems solved in all; steps of continuation, trials of other sides of
+                       near-cusps and polishing are counted too
+    changed_sides      near-cusps passed on the other side than the guide's, for less bending
+    extra_turning_rad  greatest total turning beyond the guide's within three spans that also bend
+    more bending_ratio      bending energy beside the guide's (cubic B-spline or cubic spline)
     notes              one line each, for stderr
     """
 
     spline: PHSpline
     newton_iterations: int
+    changed_sides: int = 0
+    extra_turning_rad: float = 0.0
+    bending_ratio: float = 1.0
     notes: tuple[str, ...] = ()
 
 
 def from_control_polygon(points: object, closed: bool) -> SplineResult:
     """C2 PH quintic spline of a cubic B-spline control polygon (paper sections 1 and 2).
 
-    `points`: complex (n,) or real (n, 2), mm; open from 4 points on, closed from 3 on (each point once).
+    `points`: complex (n,) or real (n, 2), mm; open from 4 points on, closed from 3 on (each point
+    once; a repeated tail of three is dropped with a note). Raises InputError for bad points and
+    PlanError, naming the span, where there is no decent spline.
     """
     p, notes = checked_points(points, closed, 3 if closed else 4, "control point")
     guide = control_polygon_guide(p, closed)
-    return _solved(guide, notes)
+    first, last = complex(guide.hodograph[0, 0]), complex(guide.hodograph[-1, 2])
+    return _solved(guide, first, last, notes)
+
+
+def through_points(
+    points: object,
+    closed: bool,
+    ends: str = "cubic",
+    start_tangent: complex | None = None,
+    end_tangent: complex | None = None,
+) -> SplineResult:
+    """C2 PH quintic spline through given points, one span between neighbours.
+
+    `points`: complex (n,) or real (n, 2), mm; open from 2 points on, closed from 3 on (each point
+    once; a repeated last point is dropped with a note). Ends of an open path:
+
+        ends = "cubic"      the end spans are PH cubics (w linear), the default
+        ends = "natural"    no curvature at the ends
+        start_tangent, end_tangent   direction there (any length), instead of `ends` at that end
+
+    A closed path is periodic and takes no tangents. Raises InputError and PlanError as above.
+    """
+    p, notes = checked_points(points, closed, 3 if closed else 2, "through point")
+    start = EndCondition.chosen(ends, start_tangent, "start_tangent", closed)
+    end = EndCondition.chosen(ends, end_tangent, "end_tangent", closed)
+    guide = through_guide(p, closed, start, end)
+    first = complex(guide.hodograph[0, 0]) if start.tangent else start.rule(p.size - 1)
+    last = complex(guide.hodograph[-1, 2]) if end.tangent else end.rule(p.size - 1)
+    return _solved(guide, first, last, notes)
 
 
 def line(start: complex, end: complex) -> PHSpline:
@@ -46,21 +85,32 @@ def line(start: complex, end: complex) -> PHSpline:
     return PHSpline(np.array([start], dtype=np.complex128), w, False)
 
 
-def _solved(guide: Guide, notes: tuple[str, ...]) -> SplineResult:
-    branch = followed_branch(guide.hodograph)
-    chords = np.diff(guide.nodal_points)
+def _solved(
+    guide: Guide, first: complex | EndRule, last: complex | EndRule, notes: tuple[str, ...]
+) -> SplineResult:
+    """`first`, `last`: derivative there, or the rule that takes its place (open paths)."""
+    hodograph = without_rests(guide.hodograph, guide.closed)
+    branch = followed_branch(hodograph)
+    chords: Complex = np.diff(guide.nodal_points)
     if guide.closed:
         turns = round(float(branch.node_angle[-1] - branch.node_angle[0]) / (2.0 * np.pi))
         system = System(chords, cyclic_sign=-1 if turns % 2 else 1)
     else:
-        a = root_on_branch(guide.hodograph[0, 0], branch.node_angle[0])
-        b = root_on_branch(guide.hodograph[-1, 2], branch.node_angle[-1])
-        system = System(chords, clamped_end(complex(a)), clamped_end(complex(b)))
-    z: Complex = starting_values(guide.hodograph, branch)
-    for k in range(50):
-        residual = system.residual(z)
-        if np.abs(residual).max() < 60e-14 * np.abs(chords).max():
-            break
-        z = z + system.newton_step(z, residual)
-    spline = PHSpline(guide.nodal_points[:-1].copy(), system.coefficients(z), guide.closed)
-    return SplineResult(spline, k, notes)
+        start = _end_rule(first, branch.node_angle[:1])
+        system = System(chords, start, _end_rule(last, branch.node_angle[-1:]))
+    solution = solve(system, starting_values(hodograph, branch), hodograph)
+    spline = PHSpline(guide.nodal_points[:-1].copy(), solution.w, guide.closed)
+    return SplineResult(
+        spline,
+        solution.newton_iterations,
+        solution.changed_sides,
+        solution.verdict.extra_turning_rad,
+        solution.verdict.bending_ratio,
+        notes,
+    )
+
+
+def _end_rule(end: complex | EndRule, angle: np.ndarray) -> EndRule:
+    if isinstance(end, EndRule):
+        return end
+    return clamped_end(complex(root_on_branch(np.array([end]), angle)[0]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The curve itself: a chain of PH quintic segments, evaluated exactly; docs/numerics.md section 4."""
+"""The curve: a chain of PH quintic segments, evaluated exactly; docs/numerics.md section 4."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class PHSpline:
     w       (N, 3) complex, Bernstein coefficients of w in mm^(1/2)
     closed  the end is the start
 
-    Built by `from_control_polygon`, `through_points` or `line`, not by hand. All methods take arrays
-    of any one shape (or scalars) and give arrays of that shape. Arc lengths outside 0 … length_mm, beyond
-    rounding, raise InputError.
+    Built by `from_control_polygon`, `through_points` or `line`, not by hand. All methods take
+    arrays of any one shape (or scalars) and give arrays of that shape. Arc lengths outside 0 …
+    length_mm, beyond rounding, raise InputError.
     """
 
     origin: Complex
@@ -155,9 +155,10 @@ class PHSpline:
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> PHSpline:
         """The same curve in shorter segments, as a program wants them (docs/protocol.md 1.2).
 
-        Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm` long and
-        the largest Bernstein coefficient of its speed is (a hair less than) at most `max_speed_ratio` times the
-        smallest, which is positive. Raises PlanError naming the segment where the curve all but stops.
+        Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm`
+        long and the largest Bernstein coefficient of its speed is (a hair less than) at most
+        `max_speed_ratio` times the smallest, which is positive. Raises PlanError naming the
+        segment where the curve all but stops.
         """
         origin, w = split_segments(self.origin, self.w, max_length_mm, max_speed_ratio)
         return PHSpline(origin, w, self.closed)

@@ -15,7 +15,8 @@ def curvature_numerator(w: Complex) -> Real:
     """Bernstein coefficients (…, 3) of 2 Im(conj(w) w'), whose cubic term cancels."""
     first, second, third = w[..., 0], w[..., 1], w[..., 2]
     out = np.stack(
-        (2.0 * np.conj(first) * second, np.conj(first) * third, 2.0 * np.conj(second) * third), axis=-1
+        (2.0 * np.conj(first) * second, np.conj(first) * third, 2.0 * np.conj(second) * third),
+        axis=-1,
     )
     return np.asarray(2.0 * out.imag)
 
@@ -23,8 +24,9 @@ def curvature_numerator(w: Complex) -> Real:
 def greatest_curvature(w: Complex) -> float:
     """Greatest |curvature| (1/mm) over segments with w (N, 3), to 1e-13 relative.
 
-    Branch and bound: |kappa| = |A| / sigma^2 lies below max |A_k| / min(sigma_k)^2 of the Bernstein coefficients,
-    a bound whose gap shrinks with the square of the interval. Infinite for a cusp.
+    Branch and bound: |kappa| = |A| / sigma^2 lies below max |A_k| / min(sigma_k)^2 of the
+    Bernstein coefficients, a bound whose gap shrinks with the square of the interval. Infinite
+    for a cusp.
     """
     best = 0.0
     for _ in range(_MOST_ROUNDS):

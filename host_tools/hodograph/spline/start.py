@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Starting values: a continuous square root of the guiding curve's hodograph; docs/numerics.md 3."""
+"""Starting values: continuous square root of the guide's hodograph; docs/numerics.md 3.1."""
 
 from __future__ import annotations
 
@@ -9,10 +9,33 @@ import numpy as np
 
 from .bernstein import Complex, Real, halves, rotation
 
+_REST = 1e-6
+_NUDGE = 1e-3
+
+
+def without_rests(hodograph: Complex, closed: bool) -> Complex:
+    """The hodograph (M, 3) with zeros at the joints moved aside by a thousandth, to the left.
+
+    A guide that stops and turns back exactly at a joint (legs that retrace each other) has no
+    tangent there to follow. For judging and starting only, never for end tangents.
+    """
+    before = hodograph if closed else hodograph[:-1]
+    after = np.roll(hodograph, -1, axis=0) if closed else hodograph[1:]
+    size = np.abs(before[:, 1]) + np.abs(after[:, 1])
+    rests = np.flatnonzero(np.abs(after[:, 0]) <= _REST * size)
+    if rests.size == 0:
+        return hodograph
+    out = hodograph.copy()
+    direction = before[rests, 1] - after[rests, 1]
+    direction = np.where(direction == 0.0, 1.0, direction)
+    out[rests, 2] = _NUDGE * size[rests] * 1j * direction / np.abs(direction)
+    out[(rests + 1) % hodograph.shape[0], 0] = out[rests, 2]
+    return out
+
 
 @dataclass(frozen=True)
 class Branch:
-    """Tangent angle (rad) of the guide, followed continuously: at the nodes (M + 1,), mid-span (M,)."""
+    """Tangent angle (rad) of the guide, followed: at the nodes (M + 1,), mid-span (M,)."""
 
     node_angle: Real
     middle_angle: Real

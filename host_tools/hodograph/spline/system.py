@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The interpolation system (13) of the paper with its end conditions; docs/numerics.md section 2.
 
-Unknowns z_1 … z_M (complex, mm^(1/2)), one per span. The two values beyond the ends follow linearly:
+Unknowns z_1 … z_M (complex, mm^(1/2)), one per span. The two values beyond the ends follow
+linearly:
 
     open    z_0 = a z_1 + b z_2 + c     and the same, mirrored, at the end
     closed  z_0 = e z_M,  z_(M+1) = e z_1,  e = +1 or -1
@@ -38,6 +39,12 @@ CUBIC_END = EndRule(2.0, -1.0, 0.0j)
 """w linear in the end span, which is a PH cubic then. Needs two spans."""
 
 
+def coefficients_between(extended: Complex) -> Complex:
+    """Bernstein coefficients (M, 3) of w from z_0 … z_(M+1); paper (11)."""
+    joints = (extended[1:] + extended[:-1]) / 2.0
+    return np.stack((joints[:-1], extended[1:-1], joints[1:]), axis=-1)
+
+
 @dataclass(frozen=True)
 class System:
     """Chords q_i - q_(i-1) (M,) with end rules, or `cyclic_sign` e for a closed curve (0: open)."""
@@ -47,23 +54,25 @@ class System:
     end: EndRule = NATURAL_END
     cyclic_sign: int = 0
 
+    def outer(self, z: Complex) -> tuple[complex, complex]:
+        """z_0 and z_(M+1)."""
+        if self.cyclic_sign:
+            return complex(self.cyclic_sign * z[-1]), complex(self.cyclic_sign * z[0])
+        second = min(1, z.size - 1)
+        before = self.start.first * z[0] + self.start.second * z[second] + self.start.constant
+        after = self.end.first * z[-1] + self.end.second * z[-1 - second] + self.end.constant
+        return complex(before), complex(after)
+
     def extended(self, z: Complex) -> Complex:
         """z_0 … z_(M+1)."""
         out = np.empty(z.size + 2, dtype=np.complex128)
         out[1:-1] = z
-        if self.cyclic_sign:
-            out[0], out[-1] = self.cyclic_sign * z[-1], self.cyclic_sign * z[0]
-            return out
-        second = min(1, z.size - 1)
-        out[0] = self.start.first * z[0] + self.start.second * z[second] + self.start.constant
-        out[-1] = self.end.first * z[-1] + self.end.second * z[-1 - second] + self.end.constant
+        out[0], out[-1] = self.outer(z)
         return out
 
     def coefficients(self, z: Complex) -> Complex:
-        """Bernstein coefficients (M, 3) of w per span; paper section 2."""
-        x = self.extended(z)
-        joints = (x[1:] + x[:-1]) / 2.0
-        return np.stack((joints[:-1], z, joints[1:]), axis=-1)
+        """Bernstein coefficients (M, 3) of w per span."""
+        return coefficients_between(self.extended(z))
 
     def residual(self, z: Complex) -> Complex:
         """Left side of (13): 60 times the integral of w^2 over each span, less 60 chords."""

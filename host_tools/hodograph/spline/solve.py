@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""From starting values to the good solution, or a clear refusal; docs/numerics.md section 3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import PlanError
+from .bernstein import Complex, rotation
+from .loops import Unlooped, without_loops, without_stubborn_loops
+from .newton import Outcome, continued, newton
+from .system import System
+from .verdict import Verdict, judge
+
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Solution:
+    """w (M, 3) of the spline and how it was found.
+
+    newton_iterations  linear systems solved in all: continuation, trials and polishing included
+    changed_sides      near-cusps that were passed on the other side to get rid of a loop
+    """
+
+    w: Complex
+    newton_iterations: int
+    changed_sides: int
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class _State:
+    system: System
+    z: Complex
+    spent: int
+    changes: int
+
+
+def solve(system: System, z: Complex, guide_hodograph: Complex) -> Solution:
+    """The good solution near the starting values `z` (M,), judged beside the guide (M, 3).
+
+    Raises PlanError naming the span: nothing found, or nothing without a loop or cusp of its own.
+    """
+    state = _converged(_State(system, z, 0, 0))
+    better = without_loops(state.system, state.z, rotation(guide_hodograph))
+    state = _polished(state, better)
+    verdict = _judged(state, guide_hodograph)
+    for _ in range(_ROUNDS):
+        if not verdict.problem:
+            break
+        better = without_stubborn_loops(state.system, state.z, verdict.loops + verdict.cusps)
+        state = _polished(state, better)
+        verdict = _judged(state, guide_hodograph)
+        if not better.changes:
+            break
+    if verdict.problem:
+        raise PlanError(
+            f"no decent spline: {verdict.problem}; move or add points around it, "
+            "or make neighbouring spans more alike in length"
+        )
+    return Solution(state.system.coefficients(state.z), state.spent, state.changes, verdict)
+
+
+def _judged(state: _State, guide_hodograph: Complex) -> Verdict:
+    closed = state.system.cyclic_sign != 0
+    return judge(state.system.coefficients(state.z), guide_hodograph, closed)
+
+
+def _polished(state: _State, better: Unlooped) -> _State:
+    state = replace(state, spent=state.spent + better.iterations)
+    if not better.changes:
+        return state
+    changes = state.changes + better.changes
+    return _converged(_State(better.system, better.z, state.spent, changes))
+
+
+def _converged(state: _State) -> _State:
+    outcome = newton(state.system, state.z)
+    spent = state.spent + outcome.iterations
+    if not outcome.converged:
+        outcome = continued(state.system, state.z)
+        spent += outcome.iterations
+    _require(outcome)
+    return replace(state, z=outcome.z, spent=spent)
+
+
+def _require(outcome: Outcome) -> None:
+    if not (outcome.converged and np.isfinite(outcome.z).all()):
+        raise PlanError(
+            f"no spline found: span {outcome.worst} cannot be fitted; "
+            "move or add points around it so that the path turns less sharply"
+        )

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""Whether a converged solution is decent: no loop, no cusp of its own; docs/numerics.md 3.5."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bernstein import Complex, Real, square_modulus
+from .quality import bending, guide_bending, most_turning, total_turning
+
+_EXTRA_TURNING = np.pi
+_TIGHT = 1e3
+_TIGHTER_THAN_GUIDE = 1e2
+_CUSP = 1e6
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Figures of a solution beside its guide.
+
+    extra_turning_rad   greatest excess of total turning over the guide's, in windows of three spans
+                        that bend more than the guide does
+    bending_ratio       bending energy of the whole beside the guide's
+    loops, cusps        middle spans of windows with a loop of their own, spans that turn on the
+                        spot; the worst first
+    """
+
+    extra_turning_rad: float
+    bending_ratio: float
+    loops: tuple[int, ...]
+    cusps: tuple[int, ...]
+
+    @property
+    def problem(self) -> str:
+        """Empty for a decent solution, else what is wrong, naming the span."""
+        if self.cusps:
+            return f"span {self.cusps[0]} would turn on the spot (a cusp)"
+        if self.loops:
+            return f"span {self.loops[0]} would make a loop of its own"
+        return ""
+
+
+def judge(w: Complex, guide_hodograph: Complex, closed: bool) -> Verdict:
+    """Compare the spline with w (M, 3) with the guide of hodograph (M, 3)."""
+    own, guide = bending(w), guide_bending(guide_hodograph)
+    total = float(guide.sum())
+    ratio = float(own.sum()) / total if total > 0.0 else 1.0
+    extra = _extra_turning(w, guide_hodograph, closed)
+    extra[_windows(own, closed) < _windows(guide, closed)] = 0.0
+    length = square_modulus(w).mean(axis=-1)
+    return Verdict(
+        max(float(extra.max()), 0.0),
+        ratio,
+        _worst_first(extra, extra > _EXTRA_TURNING),
+        _worst_first(own, _turns_on_the_spot(own * length, guide * length)),
+    )
+
+
+def _worst_first(size: Real, chosen: NDArray[np.bool_]) -> tuple[int, ...]:
+    found = np.flatnonzero(chosen)
+    return tuple(int(k) for k in found[np.argsort(-size[found], kind="stable")])
+
+
+def _extra_turning(w: Complex, guide_hodograph: Complex, closed: bool) -> Real:
+    """Total turning (M,) beyond the guide's in windows; 0 where a bound rules loops out."""
+    bound = _windows(most_turning(w), closed)
+    if float(bound.max()) <= _EXTRA_TURNING:
+        return np.zeros(bound.size)
+    return _windows(2.0 * total_turning(w) - total_turning(guide_hodograph), closed)
+
+
+def _windows(figure: Real, closed: bool) -> Real:
+    """Sums over a span and its neighbours."""
+    if figure.size < 3:
+        return np.full(figure.size, figure.sum())
+    before, after = np.roll(figure, 1), np.roll(figure, -1)
+    if not closed:
+        before[0] = after[-1] = 0.0
+    return np.asarray(before + figure + after)
+
+
+def _turns_on_the_spot(own: Real, guide: Real) -> NDArray[np.bool_]:
+    """From bending energies times length (no unit) of spline and guide."""
+    return np.asarray(
+        (own > _CUSP) | ((own > _TIGHT) & (own > _TIGHTER_THAN_GUIDE * guide)) | ~np.isfinite(own)
+    )
