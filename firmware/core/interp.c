@@ -5,6 +5,7 @@
 
 #include "core/qmath.h"
 
+#define FINE_BITS 10 /* from q32 to q42 */
 #define MOST_ENDS 2u /* piece ends and segment ends a tick may cross: protocol.md 1.2 and 1.3 */
 
 static void load_piece(struct interp *it, uint32_t i, uint64_t start_q32_s)
@@ -43,9 +44,9 @@ static void load_segment(struct interp *it, uint32_t i)
 }
 
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
-static void evaluate_feed(const struct interp *it, uint64_t time_q32_s, struct feed_point *f)
+static void evaluate_feed(const struct interp *it, uint64_t time_q42_s, struct feed_point *f)
 {
-    uint64_t t = time_q32_s - it->piece_start_q32_s;
+    uint64_t t = time_q42_s - (it->piece_start_q32_s << FINE_BITS);
     if (it->kernel == INTERP_DOUBLE) {
         kernel_double_piece_at(&it->feed.doubles, t, f);
     } else {
@@ -154,8 +155,9 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
     return 0;
 }
 
-int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
+int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out)
 {
+    uint64_t time_q32_s = time_q42_s >> FINE_BITS;
     if (time_q32_s >= it->program->header.duration_q32_s) {
         *out = it->end;
         return INTERP_END;
@@ -164,7 +166,7 @@ int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
     if (find_piece(it, time_q32_s, MOST_ENDS) != INTERP_OK) {
         return INTERP_ERR_JUMP;
     }
-    evaluate_feed(it, time_q32_s, &f);
+    evaluate_feed(it, time_q42_s, &f);
     if (find_segment(it, f.arc_length_q40_mm, MOST_ENDS) != INTERP_OK) {
         return INTERP_ERR_JUMP;
     }
@@ -177,6 +179,13 @@ int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
     return INTERP_OK;
 }
 
+int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
+{
+    uint64_t duration = it->program->header.duration_q32_s;
+    uint64_t time = time_q32_s < duration ? time_q32_s : duration;
+    return interp_at_q42(it, time << FINE_BITS, out);
+}
+
 int interp_seek(struct interp *it, uint64_t time_q32_s)
 {
     uint64_t last = it->program->header.duration_q32_s - 1u;
@@ -186,7 +195,7 @@ int interp_seek(struct interp *it, uint64_t time_q32_s)
         load_piece(it, 0, 0);
     }
     find_piece(it, time, UINT32_MAX);
-    evaluate_feed(it, time, &f);
+    evaluate_feed(it, time << FINE_BITS, &f);
     find_segment(it, f.arc_length_q40_mm, UINT32_MAX);
     return 0;
 }

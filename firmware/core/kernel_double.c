@@ -32,14 +32,14 @@ void kernel_double_piece_set(struct kernel_double_piece *k, const struct program
     for (int i = 0; i < 7; i++) {
         k->c_mm[i] = (double)piece->c_q40_mm[i] / Q40;
     }
-    k->tau_per_q32 = power_of_two(-32 - e);
+    k->tau_per_q42 = power_of_two(-42 - e);
     k->per_s = power_of_two(-e);
 }
 
-void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q32_s,
+void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_s,
                             struct feed_point *out)
 {
-    double tau = (double)t_q32_s * k->tau_per_q32;
+    double tau = (double)t_q42_s * k->tau_per_q42;
     double arc = k->c_mm[6];
     double slope = arc;
     for (int i = 5; i >= 0; i--) {

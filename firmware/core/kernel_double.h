@@ -13,7 +13,7 @@
 struct kernel_double_piece {
     int64_t start_q40_mm;
     double c_mm[7];
-    double tau_per_q32; /* 2^(-32-e) */
+    double tau_per_q42; /* 2^(-42-e) */
     double per_s;       /* 2^-e */
 };
 
@@ -24,7 +24,7 @@ struct kernel_double_segment {
 };
 
 void kernel_double_piece_set(struct kernel_double_piece *k, const struct program_piece *piece);
-void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q32_s,
+void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_s,
                             struct feed_point *out);
 
 void kernel_double_segment_set(struct kernel_double_segment *k, const struct ph_segment *ph);
