@@ -3,7 +3,8 @@
 
     python tests/data/make_golden.py
 
-Good images hold the paper's alpha and heart, the star, a line, with all profiles. Broken ones each break one rule of docs/protocol.md:
+Good images hold the alpha, the heart, the star and lines with all profiles. Broken ones each break one
+rule of docs/protocol.md:
 the table gives the code that C and Python must both answer, with its segment or piece. All are to be
 checked against LIMITS (repeated in the table). The files are committed; run this again only when the
 format changes.
@@ -18,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.pieces import FeedPieces
 from hodograph.program import Program, ProgramLimits, compile_program, encode

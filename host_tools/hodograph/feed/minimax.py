@@ -24,15 +24,18 @@ def minimax_nodes(degree: int) -> tuple[Real, Real]:
     Gauss-Legendre for m even, Gauss-Lobatto (last node 1) for m odd, m = (degree - 1) // 2.
     """
     m = (degree - 1) // 2
+    x: Real
+    w: Real
     if m % 2 == 0:
         x, w = legendre.leggauss(m + 1)
-        return x[x > 1e-9], w[x > 1e-9]
+        return np.asarray(x[x > 1e-9]), np.asarray(w[x > 1e-9])
     count = m + 2
     p = np.zeros(count)
     p[-1] = 1.0
     inner = np.sort(legendre.legroots(legendre.legder(p)).real)
     x = np.concatenate((inner[inner > 1e-9], (1.0,)))
-    return x, 2.0 / (count * (count - 1) * legendre.legval(x, p) ** 2)
+    w = np.asarray(2.0 / (count * (count - 1) * legendre.legval(x, p) ** 2), dtype=np.float64)
+    return x, w
 
 
 def minimax_peak(degree: int) -> float:
@@ -60,7 +63,7 @@ def minimax_feed(degree: int) -> Real:
     feed = chebyshev.chebint(acceleration, lbnd=-1.0, scl=0.5)
     feed[0] = 0.5
     feed[2::2] = 0.0
-    out = feed / (2.0 * feed[1::2].sum())
+    out: Real = np.asarray(feed / (2.0 * feed[1::2].sum()), dtype=np.float64)
     out[0] = 0.5
     out.flags.writeable = False
     return out

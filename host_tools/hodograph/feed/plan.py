@@ -3,34 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from math import exp, isfinite, log
+from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, PlanError
+from .lowering import Cap, choose
 from .override import override_bounds
-from .pattern_search import SearchStep, pattern_search
+from .pattern_search import SearchStep
 from .pieces import FeedPieces, derivative_bounds
-from .quantise import LONGEST_PIECE_MM, RawPieces, quantise
-from .ramp import ACCELERATION, JERK, Ramp, exponential_ramp, minimax_ramp, quintic_ramp
+from .quantise import RawPieces, quantise
+from .ramp import ACCELERATION, JERK, Ramp
 from .request import ControllerLimits, FeedRequest, Limits, check_period
 from .timeline import Timeline, timeline
 
 Real = NDArray[np.float64]
 
-N_C_START, N_C_LOW, N_C_HIGH = 5.0, 2.0, 12.0
-REVERSE_MM_S = -(2.0**-11)
-"""Feed below this counts as reverse motion (the format refuses 2^-10 mm/s)."""
-
 SHORTEST_MM, LONGEST_MM = 2.0**-10, 2.0**22 - 1.0
 LONGEST_S = 2.0**22
-_FLAT = 1.0 - 1e-9
-_CLOSE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -61,7 +55,6 @@ class FeedPlan:
     period_us: int
     line: Timeline
     history: tuple[SearchStep, ...]
-    evaluations: int
     notes: tuple[str, ...]
     excesses: tuple[Excess, ...]
 
@@ -74,6 +67,11 @@ class FeedPlan:
     def n_c(self) -> float | None:
         """Slope coefficient used; None for profiles without."""
         return self.line.ramp.n_c
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the peak jerk that the search took; 0 without one."""
+        return self.history[-1].evaluations if self.history else 0
 
     @property
     def length_mm(self) -> float:
@@ -144,28 +142,8 @@ class FeedPlan:
             self.limits,
             self.controller,
             self.period_us,
-            (_Cap(feed_mm_s, reason),),
+            (Cap(feed_mm_s, reason),),
         )
-
-
-@dataclass(frozen=True)
-class _Cap:
-    feed_mm_s: float
-    reason: str
-
-
-@dataclass(frozen=True)
-class _Bound:
-    order: int
-    limit: float
-    reason: str
-
-
-@dataclass(frozen=True, eq=False)
-class _Shape:
-    ramp: Ramp
-    history: tuple[SearchStep, ...] = ()
-    note: str | None = None
 
 
 def plan_feed(
@@ -197,11 +175,11 @@ def _plan(
     limits: Limits,
     controller: ControllerLimits | None,
     period_us: int,
-    caps: tuple[_Cap, ...],
+    caps: tuple[Cap, ...],
 ) -> FeedPlan:
     least_constant_s = 1e-6 * period_us * (1.0 + 1e-3)
     for _ in range(20):
-        shape, evaluations, reasons = _choose(
+        shape, reasons = choose(
             length, request, limits, controller, period_us, least_constant_s, caps
         )
         line = timeline(shape.ramp, length)
@@ -219,7 +197,6 @@ def _plan(
             period_us,
             line,
             shape.history,
-            evaluations,
             notes,
             _excesses(shape.ramp, limits),
         )
@@ -228,7 +205,7 @@ def _plan(
             return plan
         caps = (
             *caps,
-            _Cap(
+            Cap(
                 shape.ramp.feed_mm_s / excess * (1.0 - 1e-6),
                 "the controller bounds each piece by its Bernstein coefficients",
             ),
@@ -236,167 +213,6 @@ def _plan(
     raise PlanError(
         "feed: no feed keeps the pieces inside the limits of the controller: raise them"
     )
-
-
-def _choose(
-    length: Fraction,
-    request: FeedRequest,
-    limits: Limits,
-    controller: ControllerLimits | None,
-    period_us: int,
-    least_constant_s: float,
-    extra: tuple[_Cap, ...],
-) -> tuple[_Shape, int, tuple[str, ...]]:
-    """The ramp with the highest feed that all caps and bounds allow, evaluations, and what lowered it."""
-    counted = _Counter(request)
-    caps = [
-        _Cap(float(request.nominal_mm_s), ""),
-        *_feed_caps(limits, controller, period_us),
-        *extra,
-    ]
-    only_ramps = float(length / Fraction(request.ramp_time_s))
-    short = _Cap(
-        only_ramps,
-        f"the path of {float(length):.6g} mm is too short for two ramps of {request.ramp_time_s:g} s",
-    )
-    cap = min((*caps, short), key=lambda c: c.feed_mm_s)
-    with_constant = float(length / (Fraction(request.ramp_time_s) + Fraction(least_constant_s)))
-    too_brief = _Cap(with_constant, "the stretch of constant feed would be shorter than a period")
-    if with_constant < cap.feed_mm_s < only_ramps:
-        cap = too_brief
-    shape, bound = _lowered(counted, cap.feed_mm_s, _bounds(limits, controller))
-    if bound is not None and with_constant < shape.ramp.feed_mm_s < only_ramps:
-        shape, bound, cap = counted(with_constant), None, too_brief
-    reasons = []
-    if shape.ramp.feed_mm_s < request.nominal_mm_s:
-        why = bound.reason if bound is not None else cap.reason
-        reasons.append(
-            f"feed lowered from {request.nominal_mm_s:g} to {shape.ramp.feed_mm_s:.6g} mm/s: {why}"
-        )
-    return shape, counted.evaluations, tuple(reasons)
-
-
-class _Counter:
-    """Makes ramps for a request, and counts evaluations of the search of the last one made."""
-
-    def __init__(self, request: FeedRequest) -> None:
-        self._request = request
-        self.evaluations = 0
-
-    def __call__(self, feed_mm_s: float) -> _Shape:
-        request = self._request
-        time_s = request.ramp_time_s
-        if request.profile == "quintic":
-            return _Shape(quintic_ramp(feed_mm_s, time_s))
-        if request.profile == "minimax":
-            return _Shape(minimax_ramp(feed_mm_s, time_s, request.degree))
-        if isinstance(request.n_c, str):
-            shape = optimise_n_c(feed_mm_s, time_s)
-            self.evaluations = shape.history[-1].evaluations
-            return shape
-        ramp = exponential_ramp(feed_mm_s, time_s, request.n_c)
-        lowest = ramp.lowest_feed()
-        if lowest < REVERSE_MM_S:
-            raise PlanError(
-                f"feed: n_c = {request.n_c:g} asks for reverse motion at {feed_mm_s:.6g} mm/s within "
-                f'{time_s:g} s (the feed falls to {lowest:.3g} mm/s): give n_c = "optimise"'
-            )
-        return _Shape(ramp)
-
-
-def optimise_n_c(feed_mm_s: float, time_s: float) -> _Shape:
-    """The exponential ramp of least peak jerk, by the paper's search; plain where none is better."""
-
-    def objective(n_c: float) -> float:
-        ramp = exponential_ramp(feed_mm_s, time_s, n_c)
-        return ramp.peak(JERK) if ramp.lowest_feed() >= REVERSE_MM_S else float("inf")
-
-    history = pattern_search(objective, N_C_START, N_C_LOW, N_C_HIGH)
-    best = history[-1]
-    plain = exponential_ramp(feed_mm_s, time_s, 0.0)
-    if not best.value < plain.peak(JERK):
-        note = (
-            f"n_c = 0 (the plain quintic ramp): at {feed_mm_s:.6g} mm/s within {time_s:g} s no n_c in "
-            f"{N_C_LOW:g} … {N_C_HIGH:g} lowers the peak jerk"
-        )
-        return _Shape(plain, history, note)
-    ramp = exponential_ramp(feed_mm_s, time_s, best.best)
-    if min(best.best - N_C_LOW, N_C_HIGH - best.best) < 1e-5:
-        return _Shape(ramp, history, f"n_c = {best.best:g} is at a bound of the search")
-    return _Shape(ramp, history)
-
-
-def _feed_caps(limits: Limits, controller: ControllerLimits | None, period_us: int) -> list[_Cap]:
-    period_s = 1e-6 * period_us
-    caps = [
-        _Cap(
-            0.99 * LONGEST_PIECE_MM / period_s,
-            f"pieces of the format end within 32 mm, more than a period of {period_us} us",
-        )
-    ]
-    if limits.policy == "respect" and limits.feed_mm_s is not None:
-        caps.append(_Cap(limits.feed_mm_s, f"limits feed_mm_s = {limits.feed_mm_s:g}"))
-    if controller is not None:
-        caps.append(
-            _Cap(
-                controller.feed_mm_s * (1.0 - controller.reserve),
-                f"controller feed_mm_s = {controller.feed_mm_s:g} less its reserve",
-            )
-        )
-    return caps
-
-
-def _bounds(limits: Limits, controller: ControllerLimits | None) -> list[_Bound]:
-    names = ((ACCELERATION, "acceleration_mm_s2"), (JERK, "jerk_mm_s3"))
-    out = []
-    for order, name in names:
-        own = getattr(limits, name)
-        if limits.policy == "respect" and own is not None:
-            out.append(_Bound(order, own, f"limits {name} = {own:g}"))
-        if controller is not None:
-            limit = getattr(controller, name)
-            kept = limit * (1.0 - controller.reserve)
-            out.append(_Bound(order, kept, f"controller {name} = {limit:g} less its reserve"))
-    return out
-
-
-def _lowered(
-    make: Callable[[float], _Shape], feed_mm_s: float, bounds: list[_Bound]
-) -> tuple[_Shape, _Bound | None]:
-    """The shape at `feed_mm_s`, or at the highest feed below where no bound is broken."""
-
-    def judge(shape: _Shape) -> tuple[float, _Bound | None]:
-        if not bounds:
-            return 0.0, None
-        return max(((shape.ramp.peak(b.order) / b.limit, b) for b in bounds), key=lambda e: e[0])
-
-    shape = make(feed_mm_s)
-    high = log(feed_mm_s)
-    excess, bound = judge(shape)
-    if excess <= 1.0:
-        return shape, None
-    high_excess = log(excess)
-    best: _Shape | None = None
-    low = low_excess = 0.0
-    for _ in range(40):
-        # Peaks go about with the feed: first a step in proportion, then the secant in logarithms.
-        if best is None:
-            trial = high - high_excess + log(_FLAT)
-        else:
-            trial = low + (high - low) * max(
-                0.05, min(0.95, -low_excess / (high_excess - low_excess))
-            )
-        shape = make(exp(trial))
-        found, reason = judge(shape)
-        if found > 1.0:
-            high, high_excess = trial, log(found)
-            continue
-        best, low, low_excess, bound = shape, trial, log(found), reason
-        if found > 1.0 - _CLOSE or high - low < _CLOSE:
-            break
-    if best is None:
-        raise PlanError(f"feed: no feed obeys {bound.reason if bound else 'the limits'}: raise it")
-    return best, bound
 
 
 def _assumed(ramp: Ramp) -> ControllerLimits:

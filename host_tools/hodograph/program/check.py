@@ -8,7 +8,6 @@ sums) is decided here in exact integers.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,11 +52,6 @@ class Fault:
         return f"{'segment' if self.code > -40 else 'piece'} {self.index}"
 
 
-class _Found(NamedTuple):
-    index: int
-    code: ProgramError
-
-
 def check(program: Program, limits: ProgramLimits | None = None) -> Fault | None:
     """The first rule that `program` breaks, None when it may run; order: header, segments, pieces."""
     header = _header_fault(program, limits)
@@ -91,11 +85,10 @@ def _rank(fault: Fault) -> tuple[int, int, int]:
 
 def _first(found: list[tuple[NDArray[np.bool_], int, ProgramError]]) -> Fault | None:
     """The lowest index, then the first code, of masks whose element 0 is the item `offset`."""
-    hits = [_Found(int(mask.argmax()) + offset, code) for mask, offset, code in found if mask.any()]
+    hits = [Fault(code, int(mask.argmax()) + offset) for mask, offset, code in found if mask.any()]
     if not hits:
         return None
-    best = min(hits, key=lambda h: (h.index, -h.code))
-    return Fault(best.code, best.index)
+    return min(hits, key=lambda hit: (hit.index, -hit.code))
 
 
 def _header_fault(program: Program, limits: ProgramLimits | None) -> ProgramError | None:

@@ -38,11 +38,11 @@ def piece_faults(
     empty = duration <= 0
     if empty.any():
         return [(empty, 0, code.PIECE_DURATION)]
-    large = ((c > COEFFICIENT_Q40) | (c < -COEFFICIENT_Q40)).any(axis=1)
+    large: Bool = np.asarray(((c > COEFFICIENT_Q40) | (c < -COEFFICIENT_Q40)).any(axis=1))
     if large.any():
         return [(large, 0, code.COEFFICIENT)]
     way_q44 = _ways_q44(duration, c)
-    gaps = way_q44[:-1] - (np.diff(start) << 4)
+    gaps = way_q44[:-1].astype(object) - (np.diff(start.astype(object)) << 4)
     feed, acceleration, jerk = derivative_bounds(duration, c)
     last = len(pieces) - 1
     rest_start = (
@@ -51,13 +51,13 @@ def piece_faults(
     rest_end = (
         abs(feed[-1, -1]) > JOIN_FEED_MM_S or abs(acceleration[-1, -1]) > JOIN_ACCELERATION_MM_S2
     )
-    missed = abs(way_q44[-1] + ((int(start[-1]) - program.length_q40) << 4)) > JOIN_Q40 << 4
+    missed = abs(int(way_q44[-1]) + ((int(start[-1]) - program.length_q40) << 4)) > JOIN_Q40 << 4
     factor = pieces.override_factor_q24
     rates = (pieces.override_rate_q16_per_s == 0) | (pieces.override_second_q8_per_s2 == 0)
     out = [
         (way_q44 > PIECE_Q40 << 4, 0, code.PIECE_LONG),
-        (start[:1] != 0, 0, code.PIECE_FIRST),
-        (np.abs(gaps) > JOIN_Q40 << 4, 1, code.JOIN_LENGTH),
+        (np.asarray(start[:1] != 0, dtype=np.bool_), 0, code.PIECE_FIRST),
+        (np.asarray(np.abs(gaps) > JOIN_Q40 << 4, dtype=np.bool_), 1, code.JOIN_LENGTH),
         (np.abs(feed[:-1, -1] - feed[1:, 0]) > JOIN_FEED_MM_S, 1, code.JOIN_FEED),
         (
             np.abs(acceleration[:-1, -1] - acceleration[1:, 0]) > JOIN_ACCELERATION_MM_S2,

@@ -37,9 +37,9 @@ def segment_faults(
     code = ProgramError
     count = program.segment_count
     u, v = program.u_q44, program.v_q44
-    wide = (_beyond(u, W_LIMIT_Q44) | _beyond(v, W_LIMIT_Q44)).any(axis=1)
+    wide = _bool((_beyond(u, W_LIMIT_Q44) | _beyond(v, W_LIMIT_Q44)).any(axis=1))
     far = _beyond(program.x_q40, POINT_LIMIT_Q40) | _beyond(program.y_q40, POINT_LIMIT_Q40)
-    outside = (program.start_q40 < 0) | (program.start_q40 >= ARC_LIMIT_Q40)
+    outside = _bool((program.start_q40 < 0) | (program.start_q40 >= ARC_LIMIT_Q40))
     sigma = _sigma3(u.astype(object), v.astype(object))
     low, high = sigma.min(axis=1), sigma.max(axis=1)
     out: list[tuple[Bool, int, ProgramError]] = [
@@ -49,7 +49,7 @@ def segment_faults(
         (_bool(low <= 0), 0, code.SIGMA),
         (_bool(high > 2 * low), 0, code.SIGMA_RATIO),
         (_bool(ways[2] > 32 * (WAY_SCALE << 88)), 0, code.SEGMENT_LONG),
-        (program.start_q40[:1] != 0, 0, code.SEGMENT_FIRST),
+        (_bool(program.start_q40[:1] != 0), 0, code.SEGMENT_FIRST),
     ]
     x, y, s = (a.astype(object) * TO_Q88 for a in (program.x_q40, program.y_q40, program.start_q40))
     gap_x, gap_y = _gap(x, ways[0]), _gap(y, ways[1])
@@ -73,7 +73,7 @@ def _beyond(values: Int, limit: int) -> Bool:
     return np.asarray((values >= limit) | (values <= -limit))
 
 
-def _bool(values: Big) -> Bool:
+def _bool(values: object) -> Bool:
     return np.asarray(values, dtype=np.bool_)
 
 
@@ -112,7 +112,7 @@ def _too_short(program: Program) -> Bool:
 
 def _leaves(program: Program, limits: ProgramLimits) -> Bool:
     """The box of the six Bezier points is not within the travel."""
-    w = (program.u_q44 + 1j * program.v_q44) * 2.0**-44
+    w = np.asarray((program.u_q44 + 1j * program.v_q44) * 2.0**-44, dtype=np.complex128)
     steps = np.rint(square(w).view(np.float64).reshape(-1, 5, 2) * (2.0**40 / 5.0))
     start = np.stack((program.x_q40, program.y_q40), axis=1).astype(np.float64)
     points = np.concatenate(

@@ -16,18 +16,18 @@ def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[In
     """Pairs of neighbouring segments not longer than the way of one tick at 200 %.
 
     joints_q40  (N + 1,) arc lengths of the joints
-    Returns the first segment (K,) of each such pair, the pair's way in mm and the feed in mm/s that would be
-    slow enough. Pairs with the first or last segment of the path are free of the rule.
+    Returns the first segment (K,) of each such pair, the pair's way in mm and the feed in mm/s that
+    would be slow enough. Pairs with the first or last segment of the path are free of the rule.
     """
     count = joints_q40.size - 1
     if count < 4:
-        empty = np.zeros(0)
-        return empty.astype(np.int64), empty, empty
-    way = (joints_q40[3:-1] - joints_q40[1:-3]) * 2.0**-40
+        empty: Real = np.zeros(0)
+        return np.zeros(0, dtype=np.int64), empty, empty
+    way = (joints_q40[3:-1] - joints_q40[1:-3]).astype(np.float64) * 2.0**-40
     feed = highest_feed(joints_q40[1:-3], joints_q40[3:-1], pieces)
-    allowed = way / (2.0 * period_us * 1e-6)
+    allowed: Real = way / (2.0 * period_us * 1e-6)
     brief = np.flatnonzero(~(allowed > feed))
-    return brief + 1, way[brief], allowed[brief]
+    return np.asarray(brief + 1, dtype=np.int64), way[brief], allowed[brief]
 
 
 def highest_feed(low_q40: Int, high_q40: Int, pieces: FeedPieces) -> Real:
