@@ -37,7 +37,7 @@ bool axis_close_sync(struct axis *axis)
 
 static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
 {
-    const bool still = axis->target_counts == axis->target_sent_counts &&
+    const bool still = axis_enabled(axis) && axis->target_counts == axis->target_sent_counts &&
                        distance(axis->target_counts, axis->position_counts) <= tolerance_counts;
     if (!still) {
         axis->still_syncs = 0;

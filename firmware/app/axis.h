@@ -34,7 +34,7 @@ struct axis {
     enum cia402_goal goal;
     uint32_t answered_us; /* port_time_us() of the last answer */
     uint32_t missed_in_row;
-    uint32_t still_syncs; /* for how long it has stood still at an unchanged target */
+    uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
 void axis_init(struct axis *axis, uint8_t node);
