@@ -56,14 +56,13 @@ def halves(w: Complex) -> tuple[Complex, Complex]:
 
 
 def restricted(quadratic: Complex, low: Real, high: Real) -> Complex:
-    """Quadratics (n, 3) on [low, high] (n,) in their own [0, 1]; the values of the polar form."""
-
-    def polar(s: Real, t: Real) -> Complex:
-        q0, q1, q2 = quadratic[:, 0], quadratic[:, 1], quadratic[:, 2]
-        out: Complex = (1 - s) * (1 - t) * q0 + (s * (1 - t) + t * (1 - s)) * q1 + s * t * q2
-        return out
-
-    return np.stack((polar(low, low), polar(low, high), polar(high, high)), axis=-1)
+    """Quadratics (…, 3) on [low, high] (…,) in their own [0, 1]: values of the polar form."""
+    q0, q1, q2 = quadratic[..., 0], quadratic[..., 1], quadratic[..., 2]
+    low0, high0 = 1.0 - low, 1.0 - high
+    start = low0 * low0 * q0 + 2.0 * low * low0 * q1 + low * low * q2
+    middle = low0 * high0 * q0 + (low * high0 + high * low0) * q1 + low * high * q2
+    end = high0 * high0 * q0 + 2.0 * high * high0 * q1 + high * high * q2
+    return np.stack((start, middle, end), axis=-1)
 
 
 def factor_angles(quadratic: Complex) -> tuple[Real, Real]:

@@ -23,6 +23,7 @@ class SplineResult:
 
     newton_iterations  linear systems solved in all; steps of continuation, trials of other sides of
                        near-cusps and polishing are counted too
+    trial_iterations   those of them that were trials, on windows of 17 spans at most
     changed_sides      near-cusps passed on the other side than the guide's, for less bending
     extra_turning_rad  greatest total turning beyond the guide's within three spans that also bend
     more bending_ratio      bending energy beside the guide's (cubic B-spline or cubic spline)
@@ -31,6 +32,7 @@ class SplineResult:
 
     spline: PHSpline
     newton_iterations: int
+    trial_iterations: int = 0
     changed_sides: int = 0
     extra_turning_rad: float = 0.0
     bending_ratio: float = 1.0
@@ -103,6 +105,7 @@ def _solved(
     return SplineResult(
         spline,
         solution.newton_iterations,
+        solution.trial_iterations,
         solution.changed_sides,
         solution.verdict.extra_turning_rad,
         solution.verdict.bending_ratio,

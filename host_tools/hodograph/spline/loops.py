@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .bernstein import Complex, Real
+from .bernstein import Complex, Real, square_modulus
 from .newton import newton
-from .quality import bending, sharpest_factor, tightness, turning
+from .quality import Shape
 from .system import EndRule, System, coefficients_between
 
 _SHARP_FACTOR = 1.3 * np.pi
@@ -47,11 +47,14 @@ def suspects(w: Complex, guide_turning: Real) -> list[int]:
     turn by 90 degrees more or less than the guide or whose bending energy times length exceeds
     100 (ten times that of an even half turn).
     """
-    sharp, turned = sharpest_factor(w), np.abs(turning(w))
-    near = np.flatnonzero(sharp > _SHARP_FACTOR)
-    strayed = np.abs(turning(w[near]) - guide_turning[near]) > _STRAYED
+    shape = Shape(w, 2)
+    sharp, turned = shape.sharpest, np.abs(shape.turning)
     chosen = turned > _SHARP_SPAN
-    chosen[near] |= strayed | (tightness(w[near]) > _TIGHT)
+    near = np.flatnonzero(sharp > _SHARP_FACTOR)
+    if near.size:
+        strayed = np.abs(shape.turning[near] - guide_turning[near]) > _STRAYED
+        length = square_modulus(w[near]).mean(axis=-1)
+        chosen[near] |= strayed | (Shape(w[near], 2).bending * length > _TIGHT)
     found = np.flatnonzero(chosen)
     order = np.argsort(-np.maximum(sharp, turned)[found], kind="stable")
     return [int(k) for k in found[order]]
@@ -145,4 +148,4 @@ def _held(value: complex) -> EndRule:
 
 
 def _energy(system: System, z: Complex, low: int, high: int) -> float:
-    return float(bending(coefficients_between(_around(system, z, low, high))).sum())
+    return float(Shape(coefficients_between(_around(system, z, low, high)), 2).bending.sum())

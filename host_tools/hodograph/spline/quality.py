@@ -1,111 +1,112 @@
 # SPDX-License-Identifier: MIT
-"""How good a solution is: turning of the tangent and bending energy; docs/numerics.md 3.2."""
+"""How good a solution is: turning of the tangent and bending energy; docs/numerics.md 3.2.
+
+The same figures are wanted of the spline (hodograph w^2, w quadratic) and of its guide (quadratic
+hodograph), so `Shape` takes the quadratic and the number of times it is multiplied.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
-from .bernstein import (
-    Complex,
-    Real,
-    basis,
-    factor_angles,
-    restricted,
-    rotation,
-    square,
-    square_modulus,
-)
+import numpy as np
+
+from .bernstein import Complex, Real, basis, factor_angles, restricted, rotation
 from .extremum import curvature_numerator
 
 
 def _rule(points: int, panels: int) -> tuple[Real, Real]:
-    """Abscissae and weights on [0, 1] of composite Gauss-Legendre quadrature."""
+    """Composite Gauss-Legendre quadrature on [0, 1]: quadratic Bernstein values (3, n), weights."""
     nodes, weights = np.polynomial.legendre.leggauss(points)
     xi = (np.arange(panels)[:, None] + (nodes + 1.0) / 2.0) / panels
-    return xi.ravel(), np.tile(weights / (2.0 * panels), panels)
+    return basis(2, xi.ravel()).T, np.tile(weights / (2.0 * panels), panels)
 
 
-_SMOOTH_XI, _SMOOTH_WEIGHTS = _rule(6, 1)
-_SHARP_XI, _SHARP_WEIGHTS = _rule(16, 8)
+_SMOOTH = _rule(6, 1)
+_SHARP = _rule(16, 8)
 
 
-def turning(w: Complex) -> Real:
-    """Net tangent turning (rad, not modulo 2 pi) of each span with w (N, 3): twice that of w."""
-    first, second = factor_angles(w)
-    return 2.0 * (first + second)
+@dataclass(frozen=True)
+class Shape:
+    """Spans with hodograph quadratic^power, power 1 or 2, from coefficients (N, 3)."""
+
+    quadratic: Complex
+    power: int
+
+    @cached_property
+    def _angles(self) -> tuple[Real, Real]:
+        return factor_angles(self.quadratic)
+
+    @property
+    def turning(self) -> Real:
+        """Net turning of the tangent over each span; rad, not modulo 2 pi, left positive."""
+        return np.asarray(self.power * (self._angles[0] + self._angles[1]))
+
+    @property
+    def sharpest(self) -> Real:
+        """Greatest turning (rad) that one root causes; near power * pi close to a cusp."""
+        return np.asarray(self.power * np.maximum(np.abs(self._angles[0]), np.abs(self._angles[1])))
+
+    @property
+    def most_turning(self) -> Real:
+        """Quick upper bound (rad) of total_turning: a root turns the tangent one way only."""
+        return np.asarray(self.power * (np.abs(self._angles[0]) + np.abs(self._angles[1])))
+
+    @cached_property
+    def _numerator(self) -> Real:
+        return curvature_numerator(self.quadratic)
+
+    @cached_property
+    def total_turning(self) -> Real:
+        """Integral of |curvature| over arc length (rad): left and right both count."""
+        out = np.abs(self.turning)
+        numerator = self._numerator
+        bends = np.flatnonzero(numerator.min(axis=1) * numerator.max(axis=1) < 0.0)
+        if bends.size:
+            out[bends] = self.power * _piecewise_turning(self.quadratic[bends], numerator[bends])
+        return np.asarray(out)
+
+    @cached_property
+    def bending(self) -> Real:
+        """Integral of curvature^2 over arc length (1/mm).
+
+        Gauss quadrature of 6 points; of 8 panels of 16 where a root is so close that its factor
+        turns by more than 90 degrees. A figure of merit: good to two digits and more except next to
+        a cusp, where it is huge anyway.
+        """
+        out = self._quadrature(slice(None), _SMOOTH)
+        sharp = np.flatnonzero(self.sharpest > self.power * np.pi / 2.0)
+        if sharp.size:
+            out[sharp] = self._quadrature(sharp, _SHARP)
+        return out
+
+    def _quadrature(self, spans: Any, rule: tuple[Real, Real]) -> Real:
+        """Curvature^2 * speed is c^2 / |w|^6 for PH spans and (c / 2)^2 / |h|^5 for others."""
+        values, weights = rule
+        quadratic, numerator = self.quadratic[spans, :, None], self._numerator[spans, :, None]
+        at = quadratic[:, 0] * values[0] + quadratic[:, 1] * values[1] + quadratic[:, 2] * values[2]
+        top = (
+            numerator[:, 0] * values[0] + numerator[:, 1] * values[1] + numerator[:, 2] * values[2]
+        )
+        square_modulus = at.real * at.real + at.imag * at.imag
+        below = square_modulus * square_modulus * square_modulus
+        if self.power == 1:
+            below = 4.0 * below / np.sqrt(square_modulus)
+        with np.errstate(all="ignore"):
+            return np.asarray(np.sum(top * top / below * weights, axis=-1))
 
 
-def sharpest_factor(w: Complex) -> Real:
-    """Greatest turning (rad) that one of the two roots of w causes; near 2 pi close to a cusp."""
-    first, second = factor_angles(w)
-    return 2.0 * np.maximum(np.abs(first), np.abs(second))
-
-
-def total_turning(quadratic: Complex) -> Real:
-    """Integral of |d arg| (rad) over each span: turning to the left and to the right both count.
-
-    The direction of turning changes at the zeros of Im(conj(w) w'), a quadratic.
-    """
-    first, middle, last = np.moveaxis(curvature_numerator(quadratic), -1, 0)
+def _piecewise_turning(quadratic: Complex, numerator: Real) -> Real:
+    """Total rotation (rad) of quadratics whose direction of turning changes at zeros of `numerator`."""
+    first, middle, last = np.moveaxis(numerator, -1, 0)
     b, a = 2.0 * (middle - first), last - 2.0 * middle + first
     root = np.sqrt(np.maximum(b * b - 4.0 * a * first, 0.0))
     plus = np.where(b >= 0.0, b + root, b - root)
     with np.errstate(all="ignore"):
         zeros = np.stack((-plus / (2.0 * a), -2.0 * first / plus))
     zeros = np.sort(np.clip(np.where(np.isfinite(zeros), zeros, 0.0), 0.0, 1.0), axis=0)
-    begin, end = np.zeros_like(first), np.ones_like(first)
-    out = np.zeros_like(first)
-    for low, high in ((begin, zeros[0]), (zeros[0], zeros[1]), (zeros[1], end)):
-        out = out + np.abs(rotation(restricted(quadratic, low, high)))
-    return np.asarray(out)
-
-
-def most_turning(w: Complex) -> Real:
-    """Quick upper bound (rad) of twice total_turning: a root turns the tangent one way only."""
-    first, second = factor_angles(w)
-    return np.asarray(2.0 * (np.abs(first) + np.abs(second)))
-
-
-def bending(w: Complex) -> Real:
-    """Integral of curvature^2 over arc length (1/mm) of each PH span with w (N, 3)."""
-    return _bending(square(w), _sharp(w))
-
-
-def guide_bending(hodograph: Complex) -> Real:
-    """The same of cubic spans with hodograph (N, 3)."""
-    return _bending(hodograph, _sharp(hodograph))
-
-
-def _sharp(quadratic: Complex) -> NDArray[np.bool_]:
-    """Spans with a root so close that its factor turns by more than 45 degrees."""
-    first, second = factor_angles(quadratic)
-    return np.asarray(np.maximum(np.abs(first), np.abs(second)) > np.pi / 4.0)
-
-
-def _bending(hodograph: Complex, sharp: NDArray[np.bool_]) -> Real:
-    """Gauss quadrature of 6 points; 8 panels of 16 points for sharp spans.
-
-    A figure of merit: good to several digits except next to a cusp, where it is huge anyway.
-    """
-    out = _quadrature(hodograph, _SMOOTH_XI, _SMOOTH_WEIGHTS)
-    if sharp.any():
-        out[sharp] = _quadrature(hodograph[sharp], _SHARP_XI, _SHARP_WEIGHTS)
-    return out
-
-
-def _quadrature(hodograph: Complex, xi: Real, weights: Real) -> Real:
-    degree = hodograph.shape[1] - 1
-    slope = degree * (hodograph[:, 1:] - hodograph[:, :-1])
-    value = hodograph @ basis(degree, xi).T
-    derivative = slope @ basis(degree - 1, xi).T
-    cross = value.real * derivative.imag - value.imag * derivative.real
-    square_speed = value.real * value.real + value.imag * value.imag
-    with np.errstate(all="ignore"):
-        density = cross * cross / (square_speed * square_speed * np.sqrt(square_speed))
-    return np.asarray(density @ weights)
-
-
-def tightness(w: Complex) -> Real:
-    """Bending energy times length of spans with w (N, 3): no unit, turning^2 for a circle."""
-    return np.asarray(bending(w) * square_modulus(w).mean(axis=-1))
+    bounds = np.concatenate((np.zeros((1, first.size)), zeros, np.ones((1, first.size))))
+    parts = restricted(quadratic[None], bounds[:-1], bounds[1:])
+    return np.asarray(np.abs(rotation(parts)).sum(axis=0))

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import PlanError
-from .bernstein import Complex, rotation
+from .bernstein import Complex
 from .loops import Unlooped, without_loops, without_stubborn_loops
 from .newton import Outcome, continued, newton
+from .quality import Shape
 from .system import System
 from .verdict import Verdict, judge
 
@@ -22,11 +23,13 @@ class Solution:
     """w (M, 3) of the spline and how it was found.
 
     newton_iterations  linear systems solved in all: continuation, trials and polishing included
+    trial_iterations   those of them that were trials on windows of 17 spans at most
     changed_sides      near-cusps that were passed on the other side to get rid of a loop
     """
 
     w: Complex
     newton_iterations: int
+    trial_iterations: int
     changed_sides: int
     verdict: Verdict
 
@@ -35,8 +38,9 @@ class Solution:
 class _State:
     system: System
     z: Complex
-    spent: int
-    changes: int
+    spent: int = 0
+    trials: int = 0
+    changes: int = 0
 
 
 def solve(system: System, z: Complex, guide_hodograph: Complex) -> Solution:
@@ -44,16 +48,17 @@ def solve(system: System, z: Complex, guide_hodograph: Complex) -> Solution:
 
     Raises PlanError naming the span: nothing found, or nothing without a loop or cusp of its own.
     """
-    state = _converged(_State(system, z, 0, 0))
-    better = without_loops(state.system, state.z, rotation(guide_hodograph))
+    guide = Shape(guide_hodograph, 1)
+    state = _converged(_State(system, z))
+    better = without_loops(state.system, state.z, guide.turning)
     state = _polished(state, better)
-    verdict = _judged(state, guide_hodograph)
+    verdict = _judged(state, guide)
     for _ in range(_ROUNDS):
         if not verdict.problem:
             break
         better = without_stubborn_loops(state.system, state.z, verdict.loops + verdict.cusps)
         state = _polished(state, better)
-        verdict = _judged(state, guide_hodograph)
+        verdict = _judged(state, guide)
         if not better.changes:
             break
     if verdict.problem:
@@ -61,20 +66,21 @@ def solve(system: System, z: Complex, guide_hodograph: Complex) -> Solution:
             f"no decent spline: {verdict.problem}; move or add points around it, "
             "or make neighbouring spans more alike in length"
         )
-    return Solution(state.system.coefficients(state.z), state.spent, state.changes, verdict)
+    w = state.system.coefficients(state.z)
+    return Solution(w, state.spent, state.trials, state.changes, verdict)
 
 
-def _judged(state: _State, guide_hodograph: Complex) -> Verdict:
+def _judged(state: _State, guide: Shape) -> Verdict:
     closed = state.system.cyclic_sign != 0
-    return judge(state.system.coefficients(state.z), guide_hodograph, closed)
+    return judge(state.system.coefficients(state.z), guide, closed)
 
 
 def _polished(state: _State, better: Unlooped) -> _State:
-    state = replace(state, spent=state.spent + better.iterations)
+    spent, trials = state.spent + better.iterations, state.trials + better.iterations
     if not better.changes:
-        return state
+        return replace(state, spent=spent, trials=trials)
     changes = state.changes + better.changes
-    return _converged(_State(better.system, better.z, state.spent, changes))
+    return _converged(_State(better.system, better.z, spent, trials, changes))
 
 
 def _converged(state: _State) -> _State:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bernstein import Complex, Real, square_modulus
-from .quality import bending, guide_bending, most_turning, total_turning
+from .quality import Shape
 
 _EXTRA_TURNING = np.pi
 _TIGHT = 1e3
@@ -43,12 +43,13 @@ class Verdict:
         return ""
 
 
-def judge(w: Complex, guide_hodograph: Complex, closed: bool) -> Verdict:
-    """Compare the spline with w (M, 3) with the guide of hodograph (M, 3)."""
-    own, guide = bending(w), guide_bending(guide_hodograph)
+def judge(w: Complex, guide_shape: Shape, closed: bool) -> Verdict:
+    """Compare the spline with w (M, 3) with its guide."""
+    shape = Shape(w, 2)
+    own, guide = shape.bending, guide_shape.bending
     total = float(guide.sum())
     ratio = float(own.sum()) / total if total > 0.0 else 1.0
-    extra = _extra_turning(w, guide_hodograph, closed)
+    extra = _extra_turning(shape, guide_shape, closed)
     extra[_windows(own, closed) < _windows(guide, closed)] = 0.0
     length = square_modulus(w).mean(axis=-1)
     return Verdict(
@@ -64,12 +65,12 @@ def _worst_first(size: Real, chosen: NDArray[np.bool_]) -> tuple[int, ...]:
     return tuple(int(k) for k in found[np.argsort(-size[found], kind="stable")])
 
 
-def _extra_turning(w: Complex, guide_hodograph: Complex, closed: bool) -> Real:
+def _extra_turning(shape: Shape, guide_shape: Shape, closed: bool) -> Real:
     """Total turning (M,) beyond the guide's in windows; 0 where a bound rules loops out."""
-    bound = _windows(most_turning(w), closed)
+    bound = _windows(shape.most_turning, closed)
     if float(bound.max()) <= _EXTRA_TURNING:
         return np.zeros(bound.size)
-    return _windows(2.0 * total_turning(w) - total_turning(guide_hodograph), closed)
+    return _windows(shape.total_turning - guide_shape.total_turning, closed)
 
 
 def _windows(figure: Real, closed: bool) -> Real:
