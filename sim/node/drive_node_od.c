@@ -18,7 +18,8 @@ void drive_node_od_fill(struct drive_node *node)
 /* Counts per second, over the last period. */
 static int32_t drive_node_speed(const struct drive_node *node)
 {
-    const double mm_s = node->axis.drive.state.speed_rad_s * node->axis.config.plant.screw_mm_rad;
+    const double mm_s =
+        node->axis.drive.state.motor.speed_rad_s * node->axis.config.plant.screw_mm_rad;
     return encoder_to_i32(mm_s * (double)node->axis.config.counts_per_mm);
 }
 
@@ -31,7 +32,7 @@ void drive_node_od_refresh(struct drive_node *node)
     v->position_demand_value = node->axis.target_counts;
     v->position_actual_value = drive_position_counts(drive);
     v->position_actual_internal_value =
-        encoder_to_i32(drive->state.position_mm * drive->encoder.increments_per_mm);
+        encoder_to_i32(drive->state.motor.position_mm * drive->encoder.increments_per_mm);
     v->following_error_actual_value =
         encoder_to_i32((double)v->position_demand_value - (double)v->position_actual_value);
     v->velocity_actual_value = drive_node_speed(node);

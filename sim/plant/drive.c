@@ -126,15 +126,15 @@ int drive_init(struct drive *d, const struct drive_config *c)
 
 static void drive_rest(struct drive *d)
 {
-    d->state.speed_rad_s = 0.0;
-    d->integral_rad = 0.0;
-    d->volts = 0.0;
+    d->state.motor.speed_rad_s = 0.0;
+    d->state.integral_rad = 0.0;
+    d->state.volts = 0.0;
 }
 
 void drive_place(struct drive *d, int32_t target_counts)
 {
     drive_rest(d);
-    d->state.position_mm = (double)target_counts * d->mm_per_count;
+    d->state.motor.position_mm = (double)target_counts * d->mm_per_count;
     d->target_counts = target_counts;
     d->same_target_periods = DRIVE_PARK_PERIODS;
     d->parked = true;
@@ -150,7 +150,7 @@ void drive_hold(struct drive *d)
 
 static bool drive_near_target(const struct drive *d)
 {
-    const double away_mm = encoder_read_mm(&d->encoder, d->state.position_mm) -
+    const double away_mm = encoder_read_mm(&d->encoder, d->state.motor.position_mm) -
                            (double)d->target_counts * d->mm_per_count;
     const double most_mm = DRIVE_PARK_INCREMENTS * d->encoder.increment_mm;
     return away_mm <= most_mm && away_mm >= -most_mm;
@@ -187,24 +187,28 @@ static struct command drive_command(struct drive *d, int32_t target_counts)
     return c;
 }
 
-static inline void drive_sample(struct drive *d, const struct command *c, uint32_t i)
+static inline void drive_sample(const struct drive *d, struct drive_state *state,
+                                const struct command *c, uint32_t i)
 {
     const struct pdff_input in = {
         .command_mm = c->start_mm + (double)i * c->step_mm,
         .command_mm_s = c->speed_mm_s,
-        .position_mm = encoder_read_mm(&d->encoder, d->state.position_mm),
-        .speed_rad_s = d->state.speed_rad_s,
+        .position_mm = encoder_read_mm(&d->encoder, state->motor.position_mm),
+        .speed_rad_s = state->motor.speed_rad_s,
     };
-    d->volts = pdff_step(&d->pdff, &d->integral_rad, &in);
-    motor_step(&d->motor, &d->state, d->volts);
+    state->volts = pdff_step(&d->pdff, &state->integral_rad, &in);
+    motor_step(&d->motor, &state->motor, state->volts);
 }
 
+/* The loops work on copies of the state, which the compiler can keep in registers. */
 static void drive_run(struct drive *d, int32_t target_counts)
 {
     const struct command c = drive_command(d, target_counts);
+    struct drive_state state = d->state;
     for (uint32_t i = 0; i < d->samples; i++) {
-        drive_sample(d, &c, i);
+        drive_sample(d, &state, &c, i);
     }
+    d->state = state;
 }
 
 static void drive_run_pair(struct drive *first, struct drive *second,
@@ -212,10 +216,14 @@ static void drive_run_pair(struct drive *first, struct drive *second,
 {
     const struct command c0 = drive_command(first, target_counts[0]);
     const struct command c1 = drive_command(second, target_counts[1]);
+    struct drive_state state0 = first->state;
+    struct drive_state state1 = second->state;
     for (uint32_t i = 0; i < first->samples; i++) {
-        drive_sample(first, &c0, i);
-        drive_sample(second, &c1, i);
+        drive_sample(first, &state0, &c0, i);
+        drive_sample(second, &state1, &c1, i);
     }
+    first->state = state0;
+    second->state = state1;
 }
 
 void drive_period(struct drive *d, int32_t target_counts)
@@ -243,12 +251,13 @@ void drive_period_pair(struct drive *first, struct drive *second, const int32_t 
 
 int32_t drive_position_counts(const struct drive *d)
 {
-    return encoder_to_i32(encoder_read_mm(&d->encoder, d->state.position_mm) * d->counts_per_mm);
+    return encoder_to_i32(encoder_read_mm(&d->encoder, d->state.motor.position_mm) *
+                          d->counts_per_mm);
 }
 
 int16_t drive_volts_mv(const struct drive *d)
 {
-    return (int16_t)encoder_to_i32(d->volts * 1000.0);
+    return (int16_t)encoder_to_i32(d->state.volts * 1000.0);
 }
 
 bool drive_parked(const struct drive *d)

@@ -63,6 +63,13 @@ enum drive_error {
     DRIVE_ERR_STEP = -5, /* the time constant is shorter than one servo sample */
 };
 
+/* What changes from servo sample to servo sample. */
+struct drive_state {
+    struct motor_state motor;
+    double integral_rad;
+    double volts; /* held over the last sample */
+};
+
 /* Fields are for the module's own use; read through the functions below. */
 struct drive {
     struct motor motor;
@@ -73,9 +80,7 @@ struct drive {
     double sample_fraction; /* 1 / samples per period */
     double samples_per_s;
     uint32_t samples;
-    struct motor_state state;
-    double integral_rad;
-    double volts; /* held over the last sample */
+    struct drive_state state;
     int32_t target_counts;
     uint32_t same_target_periods; /* up to DRIVE_PARK_PERIODS */
     bool parked;

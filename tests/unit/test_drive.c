@@ -126,8 +126,10 @@ static void test_pair_gives_the_bits_of_single_drives(void)
         drive_period(&a, targets[0]);
         drive_period(&b, targets[1]);
         drive_period_pair(&c, &d, targets);
-        TEST_ASSERT_TRUE(a.state.position_mm == c.state.position_mm && a.volts == c.volts);
-        TEST_ASSERT_TRUE(b.state.position_mm == d.state.position_mm && b.volts == d.volts);
+        TEST_ASSERT_TRUE(a.state.motor.position_mm == c.state.motor.position_mm &&
+                         a.state.volts == c.state.volts);
+        TEST_ASSERT_TRUE(b.state.motor.position_mm == d.state.motor.position_mm &&
+                         b.state.volts == d.state.volts);
     }
 }
 
@@ -162,8 +164,8 @@ static void test_parks_after_250_periods_in_the_same_state(void)
     for (int k = 0; k < 50; k++) {
         drive_period(&d, 5000000 + 1000 * k);
         drive_period(&placed, 5000000 + 1000 * k);
-        TEST_ASSERT_TRUE(d.state.position_mm == placed.state.position_mm);
-        TEST_ASSERT_TRUE(d.volts == placed.volts);
+        TEST_ASSERT_TRUE(d.state.motor.position_mm == placed.state.motor.position_mm);
+        TEST_ASSERT_TRUE(d.state.volts == placed.state.volts);
     }
 }
 
