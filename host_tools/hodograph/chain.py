@@ -11,7 +11,7 @@ from .config import Machine, PathFile, load_machine, load_path_file
 from .errors import InputError
 from .feed import ControllerLimits, FeedPlan, plan_feed
 from .program import Compilation, Program, ProgramLimits, compile_path, encode
-from .spline import SplineResult, from_control_polygon
+from .spline import SplineResult, from_control_polygon, through_points
 
 
 def controller_limits(machine: Machine) -> ControllerLimits:

@@ -22,10 +22,10 @@ from ..feed.request import (
     POLICIES,
     PROFILES,
 )
+from ..spline import END_NAMES
 from .table import Table, read_toml
 
 COORDINATE_LIMIT_MM = 4096.0
-ENDS = ("natural", "not-a-knot", "tangent")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class PathSpec:
     closed: bool
     points: NDArray[np.complex128]
     through: bool
-    ends: str | None
+    ends: str
     start_tangent: complex | None
     end_tangent: complex | None
 
@@ -82,14 +82,11 @@ def _path(table: Table) -> PathSpec:
     for key in ("ends", "start_tangent", "end_tangent"):
         if table.has(key) and (closed or not through):
             raise table.error(key, "applies to open paths with through points only: remove it")
-    tangents = table.has("start_tangent") or table.has("end_tangent")
     return PathSpec(
         closed=closed,
         points=table.points("through" if through else "control_points", limit=COORDINATE_LIMIT_MM),
         through=through,
-        ends=table.choice("ends", ENDS, "tangent" if tangents else "not-a-knot")
-        if through and not closed
-        else None,
+        ends=table.choice("ends", END_NAMES, END_NAMES[0]),
         start_tangent=_tangent(table, "start_tangent"),
         end_tangent=_tangent(table, "end_tangent"),
     )

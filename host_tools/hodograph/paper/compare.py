@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""The paper's printed results beside ours (paper section 6), and what it leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..chain import Chain, load_chain
+from ..data import EXAMPLES
+from ..errors import InputError
+from ..feed import FeedPlan, FeedRequest, plan_feed
+from ..feed.ramp import JERK, exponential_ramp
+from ..simulate import simulate
+from .dynamics import constant_feed_dynamics
+from .joints import joint_disturbance
+
+CASES = ("alpha", "heart")
+PAPER_N_C = 8.12
+A_MAX_MM_S2, J_MAX_MM_S3 = 2000.0, 50000.0
+
+
+@dataclass(frozen=True)
+class Printed:
+    """Numbers that the paper prints for one curve."""
+
+    joint_acceleration_mm_s2: float
+    joint_jerk_mm_s3: float
+    contour_error_um: float
+
+
+PRINTED = {"alpha": Printed(0.5, 210.0, 10.5), "heart": Printed(0.1, 16.0, 10.8)}
+N_C, ITERATIONS, EVALUATIONS = PAPER_N_C, 56, 205
+PEAK_JERK_MM_S3, REDUCTION_PERCENT = 48500.0, 14.0
+
+
+def compare() -> dict[str, Any]:
+    """Paper and ours by curve: {curve: {quantity: {"unit", "paper", "ours"}}}; paper None: not printed."""
+    return {name: _compare_case(name) for name in CASES}
+
+
+def _compare_case(name: str) -> dict[str, Any]:
+    file = EXAMPLES / f"{name}.toml"
+    if not file.is_file():
+        raise InputError(f"{file}: the examples did not come with this installation: reinstall")
+    chain = load_chain(file)
+    rows: dict[str, Any] = {}
+
+    def row(key: str, unit: str, paper: float | None, ours: float | None) -> None:
+        rows[key] = {"unit": unit, "paper": paper, "ours": ours}
+
+    _feed_rows(chain, row)
+    _joint_rows(chain, PRINTED[name], row)
+    _contour_rows(chain, PRINTED[name], row)
+    _dynamics_rows(chain, row)
+    return rows
+
+
+def plain_plan(chain: Chain) -> FeedPlan:
+    """The plain quintic profile with the same nominal feed and ramp time."""
+    asked = chain.file.feed
+    request = FeedRequest("quintic", asked.nominal_mm_s, asked.ramp_time_s)
+    return plan_feed(
+        chain.spline_result.spline.length_mm,
+        request,
+        chain.file.limits,
+        chain.plan.controller,
+        period_us=chain.plan.period_us,
+    )
+
+
+def _feed_rows(chain: Chain, row: Any) -> None:
+    plan, plain = chain.plan, plain_plan(chain)
+    jerk, plain_jerk = plan.peak_jerk_mm_s3, plain.peak_jerk_mm_s3
+    at_paper_n_c = exponential_ramp(plan.feed_mm_s, plan.ramp_time_s, PAPER_N_C).peak(JERK)
+    row("n_c", "", N_C, plan.n_c)
+    row("search_iterations", "", ITERATIONS, len(plan.history) - 1)
+    row("search_evaluations", "", EVALUATIONS, plan.evaluations)
+    row("peak_jerk_plain_mm_s3", "mm/s^3", None, plain_jerk)
+    row("peak_jerk_modified_mm_s3", "mm/s^3", PEAK_JERK_MM_S3, jerk)
+    row("peak_jerk_reduction_percent", "%", REDUCTION_PERCENT, 100 * (1 - jerk / plain_jerk))
+    row("peak_jerk_at_paper_n_c_mm_s3", "mm/s^3", PEAK_JERK_MM_S3, at_paper_n_c)
+    row("reduction_at_paper_n_c_percent", "%", REDUCTION_PERCENT, 100 * (1 - at_paper_n_c / plain_jerk))
+    row("peak_acceleration_mm_s2", "mm/s^2", None, plan.peak_acceleration_mm_s2)
+
+
+def _joint_rows(chain: Chain, printed: Printed, row: Any) -> None:
+    found = joint_disturbance(
+        chain.spline_result.spline, chain.file.feed.nominal_mm_s, chain.plan.period_us / 1e6
+    )
+    acceleration, jerk = found.acceleration_mm_s2, found.jerk_mm_s3
+    row(
+        "joint_acceleration_mm_s2",
+        "mm/s^2",
+        printed.joint_acceleration_mm_s2,
+        found.largest_at_joints(acceleration),
+    )
+    row("joint_jerk_mm_s3", "mm/s^3", printed.joint_jerk_mm_s3, found.largest_at_joints(jerk))
+    row("chord_acceleration_mm_s2", "mm/s^2", None, found.largest(acceleration))
+    row("chord_jerk_mm_s3", "mm/s^3", None, found.largest(jerk))
+
+
+def _contour_rows(chain: Chain, printed: Printed, row: Any) -> None:
+    machine = chain.machine
+    motion = simulate(
+        chain.image,
+        [axis.drive for axis in machine.axes],
+        kernel=machine.kernel,
+        counts_per_mm=machine.counts_per_mm,
+    )
+    row("contour_error_um", "um", printed.contour_error_um, motion.max_contour_error_um)
+    row("max_volts", "V", None, motion.max_volts)
+
+
+def _dynamics_rows(chain: Chain, row: Any) -> None:
+    found = constant_feed_dynamics(chain.spline_result.spline, chain.file.feed.nominal_mm_s)
+    for key, limit, unit, maximum in (
+        ("vector_acceleration_mm_s2", A_MAX_MM_S2, "mm/s^2", found.vector_acceleration),
+        ("axis_acceleration_mm_s2", A_MAX_MM_S2, "mm/s^2", found.axis_acceleration),
+        ("vector_jerk_mm_s3", J_MAX_MM_S3, "mm/s^3", found.vector_jerk),
+        ("axis_jerk_mm_s3", J_MAX_MM_S3, "mm/s^3", found.axis_jerk),
+    ):
+        row(key, unit, None, maximum.value)
+        row(f"{key}_over_limit", "", None, maximum.value / limit)

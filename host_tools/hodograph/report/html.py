@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""The report: one HTML file that needs nothing else, and its figures as PNG files."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from ..bus.run import BusRun
+from ..chain import Chain
+from ..errors import InputError
+from ..paper import compare, quantity_name, shown
+from ..paper.compare import CASES
+from ..simulate import Motion
+from .feed_figures import feed_figure, search_figure
+from .joint_figures import joint_figure
+from .path_figures import polygon_figure
+from .run_figures import contour_figure, drive_figure
+from .style import styled
+
+Case = tuple[Chain, Motion, BusRun | None]
+
+
+@dataclass(frozen=True)
+class _Figure:
+    name: str
+    caption: str
+    png: bytes
+
+    @property
+    def base64(self) -> str:
+        return base64.b64encode(self.png).decode()
+
+
+def write_report(cases: Sequence[Case], directory: Path) -> Path:
+    """Writes report.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
+    with styled():
+        shown_cases = [_case(*case) for case in cases]
+    text = _render(cases, shown_cases)
+    report = directory / "report.html"
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for case in shown_cases:
+            for figure in case["figures"]:
+                (directory / f"{case['anchor']}_{figure.name}.png").write_bytes(figure.png)
+        report.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{directory}: cannot write the report: {error.strerror}") from None
+    return report
+
+
+def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
+    plan = chain.compilation.plan
+    source = "recorded on the bus" if run is not None else "simulated"
+    figures = [
+        _Figure(
+            "path",
+            "Control polygon, nodal points and the C2 PH quintic spline; curvature (paper, figure 1).",
+            polygon_figure(chain),
+        ),
+        _Figure(
+            "feed",
+            "Feed, tangential acceleration and jerk of the plain quintic profile and of the one used "
+            "(paper, figures 2 and 4); red: limits of the path file.",
+            feed_figure(chain, plan),
+        ),
+    ]
+    search = search_figure(plan)
+    if search is not None:
+        caption = "Progress of the pattern search for n_c (paper, figure 3)."
+        figures.append(_Figure("search", caption, search))
+    figures += [
+        _Figure(
+            "joints",
+            "First and second differences of chord speed over the period at constant feed (paper, figure 5). "
+            "The dashed curve is what the shortening of chords on a curve gives by itself.",
+            joint_figure(chain, plan),
+        ),
+        _Figure(
+            "contour",
+            f"Commanded and actual path, the worst place enlarged, and the contour error along the run, {source} "
+            "(paper, figure 7).",
+            contour_figure(chain, motion),
+        ),
+        _Figure("drives", f"Following error and voltage by axis, {source}.", drive_figure(chain, motion)),
+    ]
+    return {
+        "name": chain.file.name,
+        "anchor": re.sub(r"[^A-Za-z0-9_-]+", "-", chain.file.name).strip("-") or "path",
+        "file": str(chain.file.file),
+        "notes": chain.notes(plan),
+        "figures": figures,
+    }
+
+
+def _render(cases: Sequence[Case], shown_cases: list[dict[str, Any]]) -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("hodograph.report", "."),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    buses = sorted({run.bus for _, _, run in cases if run is not None})
+    return environment.get_template("template.html.j2").render(
+        names=", ".join(case["name"] for case in shown_cases),
+        subtitle=f"Recorded on {', '.join(buses)}." if buses else "Simulated without a bus.",
+        cases=shown_cases,
+        summary=_summary(cases),
+        comparison=_comparison(cases),
+    )
+
+
+def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
+    rows: dict[str, list[str]] = {}
+    for chain, motion, run in cases:
+        plan, spline = chain.compilation.plan, chain.spline_result.spline
+        values = {
+            "path": f"{'closed' if spline.closed else 'open'}, {spline.segment_count} segments",
+            "length, mm": f"{spline.length_mm:.4f}",
+            "profile": plan.profile,
+            "n_c": "–" if plan.n_c is None else f"{plan.n_c:.4f}",
+            "feed, mm/s": f"{plan.feed_mm_s:.4g}",
+            "duration, s": f"{plan.duration_s:.4f}",
+            "peak acceleration, mm/s²": f"{plan.peak_acceleration_mm_s2:.1f}",
+            "peak jerk, mm/s³": f"{plan.peak_jerk_mm_s3:.0f}",
+            "ticks": str(motion.ticks),
+            "kernel": motion.kernel,
+            "greatest contour error, µm": f"{motion.max_contour_error_um:.3f}",
+            "greatest following error, µm": f"{motion.max_following_error_um:.1f}",
+            "greatest voltage, V": f"{motion.max_volts:.3f}",
+            "bus": run.bus if run is not None else "none (simulated)",
+            "pace": run.pace if run is not None else "–",
+            "deadline misses": str(run.deadline_misses) if run is not None else "–",
+            "frames recorded": str(run.frames) if run is not None else "–",
+            "SHA-256 of setpoints": motion.setpoints_sha256,
+            "SHA-256 of encoder counts": motion.encoders_sha256,
+        }
+        for name, value in values.items():
+            rows.setdefault(name, []).append(value)
+    return list(rows.items())
+
+
+def _comparison(cases: Sequence[Case]) -> dict[str, Any] | None:
+    if not {chain.file.name for chain, _, _ in cases} & set(CASES):
+        return None
+    found = compare()
+    curves = list(found)
+    rows = [
+        {
+            "name": quantity_name(key),
+            "unit": found[curves[0]][key]["unit"],
+            "cells": [shown(found[c][key][side]) for c in curves for side in ("paper", "ours")],
+        }
+        for key in found[curves[0]]
+    ]
+    return {"curves": curves, "rows": rows}

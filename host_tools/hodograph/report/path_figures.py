@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""Figures of the path: polygon, nodes and curve (paper figure 1), curvature."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+
+from ..chain import Chain
+from .style import BLUE, GREEN, GREY, ORANGE, plan_axes, png
+
+_SAMPLES = 4000
+
+
+def polygon_figure(chain: Chain) -> bytes:
+    """Control polygon or given points, nodal points, PH curve, and the curvature along it."""
+    spline = chain.spline_result.spline
+    figure, (plane, curve) = pyplot.subplots(1, 2, figsize=(9.6, 4.4), width_ratios=(1.15, 1))
+    _plane(plane, chain)
+    s_mm = np.linspace(0.0, spline.length_mm, _SAMPLES)
+    curve.plot(s_mm, spline.curvature(s_mm), color=BLUE)
+    for joint in spline.segment_starts_mm:
+        curve.axvline(float(joint), color=GREY, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0)
+    curve.set_xlabel("arc length, mm")
+    curve.set_ylabel("curvature, 1/mm (left turns positive)")
+    curve.set_title("Curvature; dashed: joints")
+    curve.margins(x=0)
+    return png(figure)
+
+
+def _plane(axes: Axes, chain: Chain) -> None:
+    path, spline = chain.file.path, chain.spline_result.spline
+    given = path.points
+    if not path.through:
+        polygon = np.append(given, given[0]) if path.closed else given
+        axes.plot(polygon.real, polygon.imag, color=GREY, linewidth=1.0, linestyle=(0, (4, 2)))
+        axes.plot(
+            given.real, given.imag, "s", color=GREY, markersize=4.5, label=f"{given.size} control points"
+        )
+    points = spline.point(np.linspace(0.0, spline.length_mm, _SAMPLES))
+    axes.plot(points.real, points.imag, color=BLUE, linewidth=2.0, label="C2 PH quintic spline")
+    nodes = spline.nodal_points
+    axes.plot(
+        nodes.real,
+        nodes.imag,
+        "o",
+        color=ORANGE,
+        markersize=5,
+        markeredgecolor="white",
+        label="nodal points" if not path.through else "given points",
+    )
+    turned = np.degrees(np.angle(spline.tangent(0.0))).item() - 90.0
+    axes.plot(
+        points[0].real,
+        points[0].imag,
+        marker=(3, 0, turned),
+        linestyle="",
+        color=GREEN,
+        markersize=10,
+        label="start",
+    )
+    plan_axes(axes)
+    axes.margins(0.06)
+    axes.set_title(f"{chain.file.name}: polygon, nodes, curve")
+    axes.legend(loc="best")

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""One look for all figures, and turning them into PNG bytes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+INK, SOFT, GRID = "#22282f", "#6b7684", "#e3e7ec"
+BLUE, ORANGE, GREEN, RED, GREY = "#1f6fb4", "#e07b28", "#2a9461", "#c23b3b", "#9aa4b0"
+DPI = 144
+
+_SETTINGS = {
+    "figure.dpi": DPI,
+    "figure.facecolor": "white",
+    "figure.constrained_layout.use": True,
+    "font.size": 9.5,
+    "font.family": "DejaVu Sans",
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": SOFT,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "text.color": INK,
+    "xtick.color": SOFT,
+    "ytick.color": SOFT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.6,
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Our settings, for the figures made inside."""
+    with matplotlib.rc_context(_SETTINGS):
+        yield
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as PNG; closes it."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    pyplot.close(figure)
+    return buffer.getvalue()
+
+
+def plan_axes(axes: Axes) -> None:
+    """Axes that show the plane: equal scales, mm."""
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x, mm")
+    axes.set_ylabel("y, mm")
