@@ -236,10 +236,19 @@ static uint32_t check(const struct sdo_client *client, const uint8_t *data)
     if ((data[0] & SPECIFIER) != due[client->step]) {
         return SDO_ABORT_COMMAND;
     }
-    if (segment) {
-        return (data[0] & TOGGLE) == client->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
+    return !segment || (data[0] & TOGGLE) == client->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
+}
+
+/* Late words about an earlier transfer. Aborts of object 0 come from servers that do not know it.
+ */
+static bool is_stale(const struct sdo_client *client, const uint8_t *data)
+{
+    bool names_object = client->step == STEP_DOWNLOAD || client->step == STEP_UPLOAD;
+
+    if (data[0] == ABORT) {
+        return !is_about_object(client, data) && cob_get(data + 1, 2) != 0;
     }
-    return is_about_object(client, data) ? SDO_OK : SDO_ABORT_INCOMPATIBLE;
+    return names_object && !is_about_object(client, data);
 }
 
 static int go_on(struct sdo_client *client, const uint8_t *data, struct can_msg *out)
@@ -262,7 +271,7 @@ int sdo_client_receive(struct sdo_client *client, const struct can_msg *in, stru
     uint32_t code;
 
     if (client->status != SDO_CLIENT_BUSY || in->id != COB_SDO_ANSWER + client->node ||
-        in->len != SDO_BYTES) {
+        in->len != SDO_BYTES || is_stale(client, in->data)) {
         return 0;
     }
     if (in->data[0] == ABORT) {

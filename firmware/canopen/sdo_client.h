@@ -67,7 +67,8 @@ int sdo_client_read_number(struct sdo_client *client, uint8_t node, uint16_t ind
 uint64_t sdo_client_unsigned(const struct sdo_client *client);
 int64_t sdo_client_signed(const struct sdo_client *client);
 
-/* Takes a frame; others are ignored. Returns 1 when *out is to be sent, else 0. */
+/* Takes a frame; others, and late answers about another object, are ignored. Returns 1 when *out is
+ * to be sent, else 0. */
 int sdo_client_receive(struct sdo_client *client, const struct can_msg *in, struct can_msg *out);
 
 /* Lets time pass. Returns 1 when *out (an abort after a timeout) is to be sent, else 0. */

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: MIT */
+#include "sdo_talk.h"
+
+#include <string.h>
+
+#include "canopen/cob.h"
+#include "unity.h"
+
+void sdo_talk_init(struct sdo_talk *talk)
+{
+    memset(talk, 0, sizeof *talk);
+    small_od_init(&talk->small);
+    sdo_server_init(&talk->server, &talk->small.od, TALK_NODE, TALK_TIMEOUT_US, TALK_BLOCK);
+}
+
+bool sdo_talk_send(struct sdo_talk *talk, const uint8_t request[8])
+{
+    struct can_msg in;
+    int answers;
+
+    cob_frame(&in, COB_SDO_ASK + TALK_NODE, 8);
+    memcpy(in.data, request, 8);
+    answers = sdo_server_receive(&talk->server, &in, &talk->answer);
+    if (answers == 0) {
+        return false;
+    }
+    TEST_ASSERT_EQUAL_INT(1, answers);
+    TEST_ASSERT_EQUAL_HEX32(COB_SDO_ANSWER + TALK_NODE, talk->answer.id);
+    TEST_ASSERT_EQUAL_UINT8(8, talk->answer.len);
+    return true;
+}
+
+bool sdo_talk_ask(struct sdo_talk *talk, uint8_t command, uint16_t index, uint8_t sub,
+                  uint32_t data)
+{
+    uint8_t request[8] = {command};
+
+    cob_put(request + 1, index, 2);
+    request[3] = sub;
+    cob_put(request + 4, data, 4);
+    return sdo_talk_send(talk, request);
+}
+
+bool sdo_talk_segment(struct sdo_talk *talk, uint8_t first, const uint8_t *data, uint32_t size)
+{
+    uint8_t request[8] = {first};
+
+    memcpy(request + 1, data, size);
+    return sdo_talk_send(talk, request);
+}
+
+uint32_t sdo_talk_abort_code(const struct sdo_talk *talk)
+{
+    return talk->answer.data[0] == 0x80 ? (uint32_t)cob_get(talk->answer.data + 4, 4) : 0;
+}
