@@ -120,19 +120,29 @@ class FeedPlan:
         return self.line.jerk(t_s)
 
     @cached_property
+    def raw(self) -> RawPieces:
+        """The curve in integers, over the length rounded to 2^-40 mm."""
+        return quantise(self.line, self._length_q40, self.period_us)
+
+    @cached_property
     def pieces(self) -> FeedPieces:
-        """The plan in integers, over the length rounded to 2^-40 mm."""
-        return self.pieces_over(round(self.line.length_mm * 2**40))
+        """`raw` with the override bounds of each piece."""
+        return _with_override(self.raw, self.controller, self.limits)
 
     def pieces_over(self, length_q40: int) -> FeedPieces:
         """The plan in integers over exactly `length_q40`, which may differ a little (rounding)."""
+        if length_q40 == self._length_q40:
+            return self.pieces
         length = Fraction(length_q40, 2**40)
         ramp = self.line.ramp
         if not self.line.constant_s:
             ramp = replace(ramp, feed_mm_s=float(length / Fraction(ramp.time_s)))
-        line = self.line if length == self.line.length_mm else timeline(ramp, length)
-        raw = quantise(line, length_q40, self.period_us)
+        raw = quantise(timeline(ramp, length), length_q40, self.period_us)
         return _with_override(raw, self.controller, self.limits)
+
+    @property
+    def _length_q40(self) -> int:
+        return round(self.line.length_mm * 2**40)
 
     def with_feed_cap(self, feed_mm_s: float, reason: str) -> FeedPlan:
         """The same request planned again with the feed at most `feed_mm_s`; `reason` goes to the notes."""
@@ -158,8 +168,8 @@ def plan_feed(
 
     The feed is lowered, and n_c found again, where the path is too short for its ramps, where the limits
     of the path file bind (policy "respect") and where those of the controller do, less their
-    reserve. Without a controller (no machine file) twice what the plan needs is assumed. Raises InputError for
-    a length out of range and PlanError where no feed will do.
+    reserve. Without a controller (no machine file) roomy limits are assumed. Raises InputError for a length out
+    of range and PlanError where no feed will do.
     """
     check_period(period_us)
     if not (isfinite(length_mm) and SHORTEST_MM <= length_mm <= LONGEST_MM):
@@ -188,36 +198,38 @@ def _plan(
                 f"feed: {float(length):g} mm at {shape.ramp.feed_mm_s:g} mm/s take longer than "
                 f"{LONGEST_S:g} s: ask for a higher feed or a shorter path"
             )
-        owned = controller or _assumed(shape.ramp)
-        notes = (*reasons, *((shape.note,) if shape.note else ()))
         plan = FeedPlan(
             request,
             limits,
-            owned,
+            controller or _assumed(shape.ramp),
             period_us,
             line,
             shape.history,
-            notes,
+            (*reasons, *((shape.note,) if shape.note else ())),
             _excesses(shape.ramp, limits),
         )
         excess = _piece_excess(plan)
         if excess <= 1.0:
-            return plan
-        caps = (
-            *caps,
-            Cap(
-                shape.ramp.feed_mm_s / excess * (1.0 - 1e-6),
-                "the controller bounds each piece by its Bernstein coefficients",
-            ),
-        )
-    raise PlanError(
-        "feed: no feed keeps the pieces inside the limits of the controller: raise them"
-    )
+            return replace(plan, notes=(*plan.notes, *_fit_notes(plan.raw, period_us)))
+        reason = f"limits, as bounded by the Bernstein coefficients of pieces of {period_us} us and more"
+        caps = (*caps, Cap(shape.ramp.feed_mm_s / excess * (1.0 - 1e-6), reason))
+    raise PlanError("feed: no feed keeps the pieces inside the limits: raise them or ramp_time_s")
 
 
 def _assumed(ramp: Ramp) -> ControllerLimits:
-    return ControllerLimits(
-        2.0 * ramp.feed_mm_s, 2.0 * ramp.peak(ACCELERATION), 2.0 * ramp.peak(JERK)
+    """Limits of a controller that nobody named: roomy ones, so that they never bind."""
+    feed = ramp.feed_mm_s
+    acceleration, jerk = ramp.peak(ACCELERATION), ramp.peak(JERK)
+    return ControllerLimits(2.0 * feed, 8.0 * acceleration + 10.0 * feed, 16.0 * jerk + 100.0 * feed)
+
+
+def _fit_notes(raw: RawPieces, period_us: int) -> tuple[str, ...]:
+    if raw.faithful:
+        return ()
+    return (
+        f"the ramp has too few periods of {period_us} us for its profile: its pieces stay within "
+        f"{raw.jerk_error_mm_s3:.3g} mm/s^3 of its jerk and {raw.length_error_mm:.2g} mm of its way "
+        "(a longer ramp, or quintic, or minimax of degree 5 or 6, has none of this)",
     )
 
 
@@ -235,13 +247,22 @@ def _excesses(ramp: Ramp, limits: Limits) -> tuple[Excess, ...]:
 
 
 def _piece_excess(plan: FeedPlan) -> float:
-    """Greatest bound of a piece over the controller's limit less half its reserve (a hair at least)."""
+    """Greatest bound of a piece over the controller's limit less half its reserve (a hair at least).
+
+    Where the pieces are only near the profile, policy "respect" holds for them too; and where a bound on the
+    override would round to zero, the feed has to fall.
+    """
     pieces = plan.pieces
-    bounds = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)
-    c = plan.controller
-    keep = 1.0 - max(0.5 * c.reserve, 1e-3)
-    limits = (c.feed_mm_s, c.acceleration_mm_s2, c.jerk_mm_s3)
-    return max(float(np.abs(b).max()) / (keep * x) for b, x in zip(bounds, limits, strict=True))
+    peaks = [float(np.abs(b).max()) for b in derivative_bounds(pieces.duration_q32_s, pieces.c_q40)]
+    own = plan.controller
+    keep = 1.0 - max(0.5 * own.reserve, 1e-3)
+    bounds = [own.feed_mm_s * keep, own.acceleration_mm_s2 * keep, own.jerk_mm_s3 * keep]
+    if plan.limits.policy == "respect" and not plan.raw.faithful:
+        asked = plan.limits.acceleration_mm_s2, plan.limits.jerk_mm_s3
+        bounds[1:] = [min(b, x) if x else b for b, x in zip(bounds[1:], asked, strict=True)]
+    excess = max(peak / bound for peak, bound in zip(peaks, bounds, strict=True))
+    rates = min(pieces.override_rate_q16_per_s.min(), pieces.override_second_q8_per_s2.min())
+    return excess if rates > 0 else max(excess, 2.0)
 
 
 def _with_override(raw: RawPieces, controller: ControllerLimits, limits: Limits) -> FeedPieces:

@@ -20,8 +20,8 @@ LONGEST_PIECE_MM = 31.875
 """A hair below the 32 mm of the format."""
 
 _COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128)
-_JERK_GOAL_MM_S3 = 1.0
-_LENGTH_GOAL_MM = 2e-10
+JERK_GOAL_MM_S3 = 1.0
+LENGTH_GOAL_MM = 2e-10
 _TIGHT = 1.01
 _LEAST_FEED_MM_S = -(2.0**-11)
 
@@ -37,12 +37,21 @@ _FIT = np.linalg.pinv((_FREE * _THIRD) @ _POWERS.T)
 
 @dataclass(frozen=True, eq=False)
 class RawPieces:
-    """Durations (M,), starts (M,) and coefficients (M, 7) of pieces, and how well they fit."""
+    """Durations (M,), starts (M,) and coefficients (M, 7) of pieces, and how well they fit.
+
+    The errors are bounds, against the timeline; above the goals only where the ramp has too few periods.
+    """
 
     duration_q32_s: Int
     start_q40: Int
     c_q40: Int
     jerk_error_mm_s3: float
+    length_error_mm: float
+
+    @property
+    def faithful(self) -> bool:
+        """Within JERK_GOAL_MM_S3 and LENGTH_GOAL_MM of the timeline."""
+        return self.jerk_error_mm_s3 < JERK_GOAL_MM_S3 and self.length_error_mm < LENGTH_GOAL_MM
 
 
 def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
@@ -70,9 +79,10 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
         )
         shapes = np.concatenate((up.shape, _straight(starts, times, up, middle), down.shape))
         pieces = _round_pieces(times, starts, shapes)
-        error = max(up.jerk_error, down.jerk_error)
-        raw = RawPieces(np.diff(times), starts[:-1], pieces, error)
-        if max(up.way_error, down.way_error) < _LENGTH_GOAL_MM and _good(raw, line):
+        jerk_error = max(up.jerk_error, down.jerk_error)
+        length_error = max(up.way_error, down.way_error)
+        raw = RawPieces(np.diff(times), starts[:-1], pieces, jerk_error, length_error)
+        if raw.faithful and _tight(raw, line):
             break
     return raw
 
@@ -192,11 +202,11 @@ def _round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
     return c
 
 
-def _good(raw: RawPieces, line: Timeline) -> bool:
+def _tight(raw: RawPieces, line: Timeline) -> bool:
+    """The Bernstein bounds, by which the controller judges, are close to the true extremes."""
     feed, acceleration, jerk = derivative_bounds(raw.duration_q32_s, raw.c_q40)
     return bool(
-        raw.jerk_error_mm_s3 < _JERK_GOAL_MM_S3
-        and feed.min() > _LEAST_FEED_MM_S
+        feed.min() > _LEAST_FEED_MM_S
         and np.abs(acceleration).max() < _TIGHT * line.ramp.peak(ACCELERATION)
         and np.abs(jerk).max() < _TIGHT * line.ramp.peak(JERK)
     )
