@@ -16,8 +16,7 @@ static void add_product(const struct program_segment *g, int i, int j, int64_t w
     out_q50[PH_S] += weight * (uu + vv);
 }
 
-/* Bernstein coefficients of the derivatives; the middle one times 3. numerics.md section 9. */
-static void hodograph(const struct program_segment *g, int64_t e_q50[5][3])
+void ph_segment_hodograph(const struct program_segment *g, int64_t e_q50[5][3])
 {
     for (int k = 0; k < 5; k++) {
         e_q50[k][PH_X] = e_q50[k][PH_Y] = e_q50[k][PH_S] = 0;
@@ -87,7 +86,7 @@ static void expand_w(const int64_t b_q44[3], int64_t w_q44[3])
 void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segment)
 {
     int64_t e_q50[5][3];
-    hodograph(segment, e_q50);
+    ph_segment_hodograph(segment, e_q50);
     for (int axis = PH_X; axis <= PH_S; axis++) {
         centre(e_q50, axis, ph->c_q48_mm[axis]);
     }

@@ -21,8 +21,7 @@ enum ph_axis { PH_X = 0, PH_Y = 1, PH_S = 2 };
  * length is replaced by a straight one and w by 0, and every value is still within 2^-34 mm. */
 #define PH_LEAST_EXPONENT (-34)
 
-/* Needs a segment that keeps the rules of protocol.md 1.2; other contents give nonsense, never undefined behaviour,
- * as long as |u|, |v| < 2^50 (64 mm^(1/2)). */
+/* Needs a segment that keeps the rules of protocol.md 1.2. */
 struct ph_segment {
     int64_t origin_q40_mm[3]; /* x, y and s at its start, as in the image */
     /* Powers of z, relative to the origin, by enum ph_axis: value = sum of c[k] z^k. Each coefficient is within
@@ -35,6 +34,10 @@ struct ph_segment {
     /* even; 2^exponent is above every Bernstein coefficient of sigma, 2^(exponent-2) is not */
     int exponent;
 };
+
+/* Bernstein coefficients of dx/dxi, dy/dxi and sigma (by enum ph_axis), the middle one times 3; each within
+ * 2^-46 below the exact value. */
+void ph_segment_hodograph(const struct program_segment *segment, int64_t e_q50[5][3]);
 
 void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segment);
 

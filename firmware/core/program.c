@@ -131,6 +131,7 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
     out->override_factor_q24 = read_u32(b + 72);
     out->override_rate_q16_per_s = read_u32(b + 76);
     out->override_second_q8_per_s2 = read_u32(b + 80);
+    out->reserved = read_u32(b + 84);
 }
 
 uint32_t program_ticks(const struct program *p)

@@ -58,6 +58,7 @@ struct program_piece {
     uint32_t override_factor_q24;
     uint32_t override_rate_q16_per_s;
     uint32_t override_second_q8_per_s2;
+    uint32_t reserved;
 };
 
 struct program {

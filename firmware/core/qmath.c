@@ -16,6 +16,20 @@ uint64_t qmath_div_u64(uint64_t a, uint32_t b)
     return quotient;
 }
 
+int64_t qmath_shift_clamp(int64_t a, int shift)
+{
+    const int64_t limit = ((int64_t)1 << 62) - 1;
+    if (shift <= 0) {
+        a >>= shift < -63 ? 63 : -shift;
+        return a > limit ? limit : a < -limit ? -limit : a;
+    }
+    int64_t most = shift > 62 ? 0 : limit >> shift;
+    if (a > most || a < -most) {
+        return a > 0 ? limit : -limit;
+    }
+    return a * ((int64_t)1 << (shift > 62 ? 0 : shift));
+}
+
 /* a m / 2^64 with m = word 2^32 + word: the reciprocals 2^64/3 and 2^64/5 repeat one word. */
 static int64_t mul_reciprocal(int64_t a, uint32_t word)
 {

@@ -77,6 +77,9 @@ static inline int64_t qmath_shift(int64_t a, int shift)
     return shift >= 0 ? (int64_t)((uint64_t)a << shift) : a >> -shift;
 }
 
+/* a 2^shift, floor for negative shifts, kept within +-(2^62 - 1); any shift. */
+int64_t qmath_shift_clamp(int64_t a, int shift);
+
 /* a / 2^bits to nearest, halves up; 1 <= bits <= 62 and |a| < 2^62. */
 static inline int64_t qmath_round(int64_t a, int bits)
 {

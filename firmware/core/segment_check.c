@@ -1,0 +1,188 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/segment_check.h"
+
+#include "core/ph_segment.h"
+#include "core/qmath.h"
+#include "core/qwide.h"
+
+#define W_LIMIT_Q44 ((int64_t)1 << 50)
+#define POINT_LIMIT_Q40 ((int64_t)1 << 52)
+#define ARC_LIMIT_Q40 ((int64_t)1 << 62)
+#define JOIN_Q48 ((int64_t)1 << 14)    /* 2^-34 mm */
+#define CLOSED_Q48 ((int64_t)1 << 24)  /* 2^-24 mm */
+#define TRAVEL_Q48 ((int64_t)1 << 24)  /* rounding of a path that runs along a limit */
+#define DIRECTION_BITS 21              /* w turns by half the angle: 2^-21 rad */
+#define LONGEST_MM 32
+
+static int within(int64_t a, int64_t limit)
+{
+    return a < limit && a > -limit;
+}
+
+static int check_ranges(const struct program_segment *g)
+{
+    for (int k = 0; k < 3; k++) {
+        if (!within(g->u_q44[k], W_LIMIT_Q44) || !within(g->v_q44[k], W_LIMIT_Q44)) {
+            return PROGRAM_ERR_W_RANGE;
+        }
+    }
+    if (!within(g->x_q40_mm, POINT_LIMIT_Q40) || !within(g->y_q40_mm, POINT_LIMIT_Q40)) {
+        return PROGRAM_ERR_POINT_RANGE;
+    }
+    if (g->start_q40_mm < 0 || g->start_q40_mm >= ARC_LIMIT_Q40) {
+        return PROGRAM_ERR_ARC_RANGE;
+    }
+    return 0;
+}
+
+/* sum + weight Re(w_i conj w_j), exact */
+static struct qwide add_dot(struct qwide sum, const struct program_segment *g, int i, int j,
+                            int64_t weight)
+{
+    sum = qwide_add_product(sum, g->u_q44[i], g->u_q44[j], weight);
+    return qwide_add_product(sum, g->v_q44[i], g->v_q44[j], weight);
+}
+
+/* Speed ratio and length, exact: three times the Bernstein coefficients of sigma in q88; a fifteenth of their
+ * sum is the length. */
+static int check_speed(const struct program_segment *g)
+{
+    const struct qwide zero = {0, 0};
+    struct qwide sigma[5];
+    sigma[0] = add_dot(zero, g, 0, 0, 3);
+    sigma[1] = add_dot(zero, g, 0, 1, 3);
+    sigma[2] = add_dot(add_dot(zero, g, 0, 2, 1), g, 1, 1, 2);
+    sigma[3] = add_dot(zero, g, 1, 2, 3);
+    sigma[4] = add_dot(zero, g, 2, 2, 3);
+    struct qwide least = sigma[0];
+    struct qwide greatest = sigma[0];
+    struct qwide sum = sigma[0];
+    for (int k = 1; k < 5; k++) {
+        least = qwide_compare(sigma[k], least) < 0 ? sigma[k] : least;
+        greatest = qwide_compare(sigma[k], greatest) > 0 ? sigma[k] : greatest;
+        sum = qwide_add(sum, sigma[k]);
+    }
+    const struct qwide longest = {(int64_t)15 * LONGEST_MM << 38, 0};
+    if (qwide_compare(least, zero) <= 0) {
+        return PROGRAM_ERR_SIGMA;
+    }
+    if (qwide_compare(greatest, qwide_add(least, least)) > 0) {
+        return PROGRAM_ERR_SIGMA_RATIO;
+    }
+    return qwide_compare(sum, longest) > 0 ? PROGRAM_ERR_SEGMENT_LONG : 0;
+}
+
+static int inside(int64_t a_q48, int64_t min_q40, int64_t max_q40)
+{
+    return ((a_q48 + TRAVEL_Q48) >> 8) >= min_q40 && ((a_q48 - TRAVEL_Q48) >> 8) <= max_q40;
+}
+
+/* Bezier control points: each is the one before plus a fifth of the Bernstein coefficient of r'. */
+static int check_travel(const struct program_segment *g, const struct program_limits *limits)
+{
+    int64_t e_q50[5][3];
+    ph_segment_hodograph(g, e_q50);
+    for (int axis = PH_X; axis <= PH_Y; axis++) {
+        int64_t point_q48 = (axis == PH_X ? g->x_q40_mm : g->y_q40_mm) * 256;
+        for (int k = 0; k <= 5; k++) {
+            if (!inside(point_q48, limits->min_q40_mm[axis], limits->max_q40_mm[axis])) {
+                return PROGRAM_ERR_TRAVEL;
+            }
+            if (k < 5) {
+                int64_t fifth = qmath_fifth(e_q50[k][axis]);
+                point_q48 += (k == 2 ? qmath_third(fifth) : fifth) >> 2;
+            }
+        }
+    }
+    return 0;
+}
+
+/* w2 of one and w0 of the next segment are parallel, either sign: the curve's direction is that of w^2. */
+static int same_direction(const struct program_segment *a, const struct program_segment *b)
+{
+    const struct qwide zero = {0, 0};
+    struct qwide cross = qwide_add_product(zero, a->u_q44[2], b->v_q44[0], 1);
+    cross = qwide_add_product(cross, a->v_q44[2], b->u_q44[0], -1);
+    struct qwide dot = qwide_add_product(zero, a->u_q44[2], b->u_q44[0], 1);
+    dot = qwide_add_product(dot, a->v_q44[2], b->v_q44[0], 1);
+    return qwide_compare(qwide_abs(cross), qwide_shift_down(qwide_abs(dot), DIRECTION_BITS)) <= 0;
+}
+
+/* End of segment a against a point; end_q48 is relative to the start of a. */
+static int meets(int64_t start_q40, int64_t end_q48, int64_t target_q40, int64_t tolerance_q48)
+{
+    int64_t apart = (start_q40 - target_q40) * 256 + end_q48;
+    return apart <= tolerance_q48 && apart >= -tolerance_q48;
+}
+
+/* |a| is below 2^52 or the difference is clearly too large: no overflow in meets. */
+static int meets_arc(int64_t start_q40, int64_t end_q48, int64_t target_q40)
+{
+    int64_t apart_q40 = target_q40 - start_q40;
+    return apart_q40 > 0 && apart_q40 < ((int64_t)1 << 50) &&
+           meets(start_q40, end_q48, target_q40, JOIN_Q48);
+}
+
+static int check_join(const struct program_segment *a, const struct program_segment *b)
+{
+    struct ph_segment ph;
+    int64_t end_q48[3];
+    ph_segment_expand(&ph, a);
+    ph_segment_end(&ph, end_q48);
+    if (!meets(a->x_q40_mm, end_q48[PH_X], b->x_q40_mm, JOIN_Q48) ||
+        !meets(a->y_q40_mm, end_q48[PH_Y], b->y_q40_mm, JOIN_Q48)) {
+        return PROGRAM_ERR_JOIN_POINT;
+    }
+    if (!meets_arc(a->start_q40_mm, end_q48[PH_S], b->start_q40_mm)) {
+        return PROGRAM_ERR_JOIN_ARC;
+    }
+    return same_direction(a, b) ? 0 : PROGRAM_ERR_JOIN_DIRECTION;
+}
+
+static int check_end(const struct program *p, const struct program_segment *last)
+{
+    struct ph_segment ph;
+    struct program_segment first;
+    int64_t end_q48[3];
+    ph_segment_expand(&ph, last);
+    ph_segment_end(&ph, end_q48);
+    if (!meets_arc(last->start_q40_mm, end_q48[PH_S], p->header.length_q40_mm)) {
+        return PROGRAM_ERR_SEGMENT_END;
+    }
+    program_segment_get(p, 0, &first);
+    if ((p->header.flags & PROGRAM_FLAG_CLOSED) != 0 &&
+        (!meets(last->x_q40_mm, end_q48[PH_X], first.x_q40_mm, CLOSED_Q48) ||
+         !meets(last->y_q40_mm, end_q48[PH_Y], first.y_q40_mm, CLOSED_Q48))) {
+        return PROGRAM_ERR_NOT_CLOSED;
+    }
+    return 0;
+}
+
+static int check_one(const struct program_segment *g, const struct program_limits *limits)
+{
+    int code = check_ranges(g);
+    code = code != 0 ? code : check_speed(g);
+    return code != 0 ? code : check_travel(g, limits);
+}
+
+int segment_check_all(const struct program *p, const struct program_limits *limits,
+                      uint32_t *index)
+{
+    struct program_segment before;
+    struct program_segment g;
+    for (*index = 0; *index < p->header.segment_count; (*index)++) {
+        program_segment_get(p, *index, &g);
+        int code = check_one(&g, limits);
+        if (code == 0 && *index == 0) {
+            code = g.start_q40_mm == 0 ? 0 : PROGRAM_ERR_SEGMENT_FIRST;
+        } else if (code == 0) {
+            code = check_join(&before, &g);
+        }
+        if (code != 0) {
+            return code;
+        }
+        before = g;
+    }
+    *index = p->header.segment_count - 1u;
+    return check_end(p, &before);
+}

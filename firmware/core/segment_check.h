@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The rules of docs/protocol.md 1.2 that need segments only. Used by program_check. Main loop.
+ */
+#ifndef HODOGRAPH_CORE_SEGMENT_CHECK_H
+#define HODOGRAPH_CORE_SEGMENT_CHECK_H
+
+#include "core/program_check.h"
+
+/* All segments in order. Returns 0 or the code of the first rule broken; *index is then its segment. */
+int segment_check_all(const struct program *p, const struct program_limits *limits,
+                      uint32_t *index);
+
+#endif
