@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: MIT
+"""Bad input on the command line: documented exit status, one line on stderr, nothing on stdout."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hodograph.cli.main import main
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+ALPHA = str(EXAMPLES / "alpha.toml")
+
+PATH = """
+[path]
+closed = {closed}
+control_points = {points}
+[feed]
+profile = "quintic"
+nominal_mm_s = {feed}
+ramp_time_s = 0.1
+[machine]
+file = "{machine}"
+"""
+
+
+def path_file(
+    folder: Path,
+    points: str = "[[0, 0], [12, 18], [24, 27], [36, 9]]",
+    closed: str = "false",
+    feed: str = "100",
+) -> str:
+    file = folder / "path.toml"
+    machine = EXAMPLES / "machines" / "paper_alpha.toml"
+    file.write_text(PATH.format(points=points, closed=closed, feed=feed, machine=machine))
+    return str(file)
+
+
+def failed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
+    """Exit status and the last line on stderr; earlier lines may only be notes."""
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "Traceback" not in err
+    lines = err.splitlines()
+    assert all(line.startswith("hodograph: ") for line in lines), err
+    return status, lines[-1]
+
+
+USAGE = [
+    ((), r"COMMAND"),
+    (("simulat",), r'no command "simulat"; did you mean "simulate"\?'),
+    (("spline",), r"FILE"),
+    (("spline", ALPHA, "--jsn"), r"--jsn"),
+    (("spline", ALPHA, "--at", "x"), r'"x" is not a number'),
+    (("spline", ALPHA, "--at", "nan"), r'"nan" is not finite'),
+    (("spline", ALPHA, "--at", "1e9"), r"--at 1e\+09: must be from 0 to 99\.9"),
+    (("spline", ALPHA, "--at", "-1"), r"--at -1: must be from 0"),
+    (("feed", ALPHA, "--at", "2"), r"--at 2: must be from 0 to 1\.09"),
+    (("simulate", ALPHA, "--kernel", "quad"), r"--kernel.*quad"),
+    (("status", "--node", "200"), r'"200" is not a node number'),
+    (("status", "--bus", ":"), r'--bus ":": write interface:channel'),
+    (("run", ALPHA, ALPHA, "--trace", "x.csv"), r"--trace: takes one FILE"),
+    (("spline", "/nonexistent/x.toml"), r"/nonexistent/x\.toml: no such file"),
+    (("inspect", "/nonexistent/x.hdgp"), r"/nonexistent/x\.hdgp: no such file"),
+    (("compile", ALPHA, "-o", "/nonexistent/x.hdgp"), r"/nonexistent/x\.hdgp: cannot be written"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), USAGE, ids=[u[1] for u in USAGE])
+def test_usage(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+) -> None:
+    status, line = failed(capsys, *arguments)
+    assert status == 2
+    assert re.search(message, line), line
+
+
+PATHS = [
+    ({"points": "[[0, 0], [1, 1], [2, 0]]"}, 2, r"3 control points.*at least 4"),
+    ({"points": "[[0, 0], [1, 1], [1, 1], [2, 0], [3, 3]]"}, 2, r"control point 2 repeats"),
+    ({"points": "[[0, 0], [1, 1], [2, 0], [3, nan]]"}, 2, r"point 3 holds nan"),
+    ({"feed": "1e9"}, 2, r"nominal_mm_s must be from"),
+    ({"points": "[[0, 0], [300, 0], [600, 0], [900, 10]]"}, 3, r"travel"),
+]
+
+
+@pytest.mark.parametrize(("change", "status", "message"), PATHS, ids=[p[2] for p in PATHS])
+def test_paths(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: dict[str, str],
+    status: int,
+    message: str,
+) -> None:
+    output = tmp_path / "out.hdgp"
+    found, line = failed(capsys, "compile", path_file(tmp_path, **change), "-o", str(output))
+    assert (found, bool(re.search(message, line))) == (status, True), line
+    assert list(tmp_path.iterdir()) == [tmp_path / "path.toml"]
+
+
+def test_no_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = Path(path_file(tmp_path))
+    file.write_text(file.read_text().partition("[machine]")[0])
+    status, line = failed(capsys, "compile", str(file))
+    assert status == 2
+    assert "names no machine" in line
+    assert main(["feed", str(file)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda image: image[:100], "truncated"),
+        (lambda image: image[:-1], "truncated"),
+        (lambda image: b"NOPE" + image[4:], "HDGP"),
+        (lambda image: image[:4] + b"\x63" + image[5:], "version"),
+        (lambda image: image[:200] + bytes([image[200] ^ 1]) + image[201:], "CRC"),
+        (lambda image: b"", "truncated"),
+    ],
+    ids=["header cut", "one byte short", "magic", "version", "one bit", "empty"],
+)
+def test_spoilt_images(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: object, message: str
+) -> None:
+    file = tmp_path / "program.hdgp"
+    assert main(["compile", path_file(tmp_path), "-o", str(file)]) == 0
+    capsys.readouterr()
+    assert callable(spoil)
+    file.write_bytes(spoil(file.read_bytes()))
+    status, line = failed(capsys, "inspect", str(file))
+    assert status == 2
+    assert message in line
+    assert str(file) in line
+
+
+def test_no_bus(capsys: pytest.CaptureFixture[str]) -> None:
+    status, line = failed(capsys, "status", "--bus", "socketcan:nocan7")
+    assert status == 4
+    assert "tools/with-vcan" in line
+
+
+def test_unknown_interface(capsys: pytest.CaptureFixture[str]) -> None:
+    status, line = failed(capsys, "status", "--bus", "nocan:7")
+    assert status == 4
+    assert "nocan:7: cannot be opened" in line
+
+
+def test_no_node(capsys: pytest.CaptureFixture[str]) -> None:
+    """On python-can's own virtual bus nobody answers."""
+    status, line = failed(capsys, "status", "--bus", "virtual:empty", "--wait", "0.3")
+    assert status == 4
+    assert re.search(r"no answer from node 1 on virtual:empty in 0\.3 s: start the controller", line)
+
+
+def test_module_and_debug(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hodograph", "spline", str(tmp_path / "none.toml")]
+    plain = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert plain.returncode == 2
+    assert plain.stderr.count("\n") == 1
+    debug = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"HODOGRAPH_DEBUG": "1"},
+    )
+    assert debug.returncode == 2
+    assert "Traceback" in debug.stderr
+
+
+def test_closed_pipe() -> None:
+    """`hodograph ... | head -0` ends quietly."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "hodograph", "spline", ALPHA, "--json"],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writing)
+    assert done.stderr == ""
+    assert done.returncode == 1

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""--json: exactly the promised keys, and values that agree with each other."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hodograph.cli.main import main
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+NAMES = ["alpha", "heart", "star"]
+
+SPLINE_KEYS = {
+    "closed", "segments", "nodal_points", "length_mm", "segment_lengths_mm", "newton_iterations",
+    "max_curvature_per_mm",
+}  # fmt: skip
+FEED_KEYS = {
+    "profile", "n_c", "evaluations", "ramp_time_s", "duration_s", "peak_acceleration_mm_s2",
+    "peak_jerk_mm_s3",
+}  # fmt: skip
+SIMULATE_KEYS = {
+    "ticks", "setpoints_sha256", "encoders_sha256", "max_contour_error_um", "max_following_error_um",
+    "max_volts", "kernel",
+}  # fmt: skip
+TRACE_HEADER = (
+    "tick,t_s,arc_length_mm,feed_mm_s,x_cmd_mm,y_cmd_mm,x_set_counts,y_set_counts,x_act_mm,y_act_mm,"
+    "contour_error_um,x_volts,y_volts"
+)
+
+
+def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
+    assert main(arguments) == 0
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1
+    return json.loads(out)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_spline(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    file = str(EXAMPLES / f"{name}.toml")
+    found = result(capsys, "spline", file, "--json")
+    assert set(found) == SPLINE_KEYS
+    assert found["closed"] == (name != "alpha")
+    assert len(found["segment_lengths_mm"]) == found["segments"]
+    assert len(found["nodal_points"]) == found["segments"] + 1
+    assert sum(found["segment_lengths_mm"]) == pytest.approx(found["length_mm"], rel=1e-12)
+
+
+def test_spline_at(capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(EXAMPLES / "alpha.toml")
+    plain = result(capsys, "spline", file, "--json")
+    joints = np.concatenate(([0], np.cumsum(plain["segment_lengths_mm"])))
+    found = result(capsys, "spline", file, "--json", "--at", *(repr(float(s)) for s in joints))
+    assert set(found) == SPLINE_KEYS | {"points", "tangents", "curvatures"}
+    np.testing.assert_allclose(found["points"], plain["nodal_points"], atol=1e-9)
+    np.testing.assert_allclose(np.hypot(*np.transpose(found["tangents"])), 1, atol=1e-12)
+    assert max(map(abs, found["curvatures"])) <= plain["max_curvature_per_mm"] * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_feed(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    file = str(EXAMPLES / f"{name}.toml")
+    found = result(capsys, "feed", file, "--json")
+    assert set(found) == FEED_KEYS
+    assert (found["n_c"] is None) == (name == "star")
+    length = result(capsys, "spline", file, "--json")["length_mm"]
+    at = result(capsys, "feed", file, "--json", "--at", "0", repr(found["duration_s"]))
+    assert set(at) == FEED_KEYS | {"arc_length_mm", "feed_mm_s"}
+    np.testing.assert_allclose(at["arc_length_mm"], [0, length], atol=1e-9)
+    np.testing.assert_allclose(at["feed_mm_s"], [0, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kernel", ["fixed", "float", "double"])
+def test_simulate(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, kernel: str
+) -> None:
+    file, trace = str(EXAMPLES / f"{name}.toml"), tmp_path / "trace.csv"
+    found = result(capsys, "simulate", file, "--json", "--kernel", kernel, "--trace", str(trace))
+    assert set(found) == SIMULATE_KEYS
+    assert found["kernel"] == kernel
+    assert 0 < found["max_contour_error_um"] < 60
+    assert 0 < found["max_volts"] <= 5
+    lines = trace.read_text().splitlines()
+    assert lines[0] == TRACE_HEADER
+    rows = list(csv.DictReader(lines))
+    assert len(rows) == found["ticks"]
+    setpoints = np.array([[int(r["x_set_counts"]), int(r["y_set_counts"])] for r in rows], "<i4")
+    assert hashlib.sha256(setpoints.tobytes()).hexdigest() == found["setpoints_sha256"]
+    actual = np.array([[float(r["x_act_mm"]), float(r["y_act_mm"])] for r in rows])
+    counts = np.rint(actual * 1e6).astype("<i4")
+    assert hashlib.sha256(counts.tobytes()).hexdigest() == found["encoders_sha256"]
+
+
+def test_simulate_needs_no_given_folder(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Relative names in files are relative to the file, not to where one stands."""
+    monkeypatch.chdir(tmp_path)
+    assert result(capsys, "simulate", str(EXAMPLES / "alpha.toml"), "--json")["ticks"] > 1000
+
+
+def test_compile_and_inspect(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    output = tmp_path / "heart.hdgp"
+    made = result(capsys, "compile", str(EXAMPLES / "heart.toml"), "-o", str(output), "--json")
+    assert made["bytes"] == output.stat().st_size
+    read = result(capsys, "inspect", str(output), "--json")
+    assert read == result(capsys, "inspect", str(EXAMPLES / "heart.toml"), "--json")
+    assert read["closed"]
+    assert main(["inspect", str(output), "--full"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) > read["segments"] + read["pieces"]
+
+
+def test_human_output(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("spline", "feed", "simulate"):
+        assert main([command, str(EXAMPLES / "alpha.toml")]) == 0
+        assert "{" not in capsys.readouterr().out
+
+
+def test_repeated_tail_is_dropped_with_a_note(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = (EXAMPLES / "heart.toml").read_text()
+    head, tail = text.split("[40, -50],", 1)
+    file = tmp_path / "heart.toml"
+    repeated = "[40, -50], [-20, -50], [0, 5], [0, -5],"
+    file.write_text((head + repeated + tail).partition("[machine]")[0])
+    assert main(["spline", str(file), "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert "repeat" in err
+    plain = result(capsys, "spline", str(EXAMPLES / "heart.toml"), "--json")
+    assert json.loads(out) == plain
+
+
+def test_paper(capsys: pytest.CaptureFixture[str]) -> None:
+    found = result(capsys, "paper", "--json")
+    assert set(found) == {"alpha", "heart"}
+    for curve in found.values():
+        assert curve["n_c"]["paper"] == 8.12
+        assert curve["n_c"]["ours"] == pytest.approx(8.35, abs=0.01)
+        assert curve["peak_jerk_plain_mm_s3"]["ours"] == pytest.approx(1e5 / 3**0.5, rel=1e-6)
+        assert curve["peak_jerk_modified_mm_s3"]["ours"] < 48200
+    assert found["heart"]["vector_jerk_mm_s3_over_limit"]["ours"] > 1.3
+    assert found["alpha"]["vector_jerk_mm_s3_over_limit"]["ours"] < 0.5
+
+
+def test_report(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    folder = tmp_path / "report"
+    assert main(["report", str(EXAMPLES / "alpha.toml"), "-o", str(folder)]) == 0
+    html = (folder / "report.html").read_text()
+    names = {file.name for file in folder.glob("*.png")}
+    assert names == {
+        f"alpha_{figure}.png" for figure in ("path", "feed", "search", "joints", "contour", "drives")
+    }
+    assert html.count("data:image/png;base64,") == len(names)
+    for outside in ("http://", "https://", "<script", "<link", "src=\"alpha"):
+        assert outside not in html
+    assert capsys.readouterr().out.strip() == str(folder / "report.html")

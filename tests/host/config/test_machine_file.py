@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""Machine and drive files: the shipped ones, and every mistake in one line."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from hodograph.config import load_drive, load_machine
+from hodograph.errors import InputError
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+
+# The paper's Table 2 and plant (shared with nobody: typed from the paper).
+GAINS = {
+    "alpha_x": (97.38, 1.19, 252.8),
+    "alpha_y": (97.38, 1.53, 253.2),
+    "heart_x": (109.95, 1.2, 252.0),
+    "heart_y": (109.95, 1.5, 253.0),
+}
+PLANT = {"x": (83.0089, 0.19936), "y": (50.4977, 0.15641)}
+
+
+@pytest.mark.parametrize("name", GAINS)
+def test_drives_of_the_paper(name: str) -> None:
+    drive = load_drive(EXAMPLES / "drives" / f"{name}.toml")
+    assert (drive.k_pp_rad_s_mm, drive.k_pv_nm_s_rad, drive.k_iv_per_s) == GAINS[name]
+    assert (drive.gain_rad_s_v, drive.time_constant_s) == PLANT[name[-1]]
+    assert (drive.k_pf_rad_mm, drive.k_vf, drive.screw_mm_rad) == (0.8, 0.85, 1.59)
+    assert drive.torque_to_volts == 1 / 0.716
+    assert drive.volts_limit == 5.0
+
+
+@pytest.mark.parametrize("name", ["paper_alpha", "paper_heart"])
+def test_machines_of_the_paper(name: str) -> None:
+    machine = load_machine(EXAMPLES / "machines" / f"{name}.toml")
+    assert [axis.node for axis in machine.axes] == [2, 3]
+    assert machine.period_us == 1000
+    assert machine.counts_per_mm == 1_000_000
+    assert machine.start_tolerance_counts == 5000
+    assert machine.offset_mm == 0
+
+
+def machine_with(folder: Path, old: str, new: str) -> Path:
+    shutil.copytree(EXAMPLES, folder / "examples")
+    file = folder / "examples" / "machines" / "paper_alpha.toml"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    return file
+
+
+MISTAKES = [
+    ("period_us = 1000", "period_us = 3000", r"period_us must be 1000, 2000, 4000 or 8000"),
+    ("period_us = 1000", "period = 1000", r'did you mean "period_us"\?'),
+    ("node = 1\n", "node = 0\n", r"\[controller\] node must be from 1 to 127"),
+    ("node = 1\n", "node = 2\n", r"\[axis 1\] node 2 is taken by the controller"),
+    ("node = 3", "node = 2", r"\[axis 2\] node 2 is taken by axis x"),
+    ('kernel = "fixed"', 'kernel = "fxed"', r'kernel.*did you mean "fixed"\?'),
+    ("feed_mm_s = 500", "feed_mm_s = nan", r"feed_mm_s must be a finite number"),
+    ("reserve = 0.1", "reserve = 1", r"reserve must be from 0 to 0\.9"),
+    ("travel_mm = [-200, 200]", "travel_mm = [200, -200]", r"travel_mm must be \[least, greatest\]"),
+    ("travel_mm = [-200, 200]", "travel_mm = [-200]", r"travel_mm must be two numbers"),
+    ("travel_mm = [-200, 200]", "travel_mm = [-3000, 200]", r"leaves the ±2147\.5 mm"),
+    ("counts_per_mm = 1000000", "counts_per_mm = 100000", r"counts_per_mm must be the same for all"),
+    ("../drives/alpha_x.toml", "../drives/alpha_z.toml", r"drive names .*alpha_z\.toml, which is not there"),
+    ("offset_mm = [0, 0]", "offset_mm = [0, inf]", r"offset_mm must be a finite number"),
+    ("[[axis]]", "[axis]", r"not valid TOML|\[\[axis\]\]"),
+    ("[work]", "[wrk]", r'did you mean "work"\?'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES, ids=[m[2] for m in MISTAKES])
+def test_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_machine(machine_with(tmp_path, old, new))
+    text = str(caught.value)
+    assert re.search(message, text), text
+    assert "paper_alpha.toml" in text
+    assert "\n" not in text
+
+
+DRIVE_MISTAKES = [
+    ("gain_rad_s_v = 83.0089", "gain_rad_s_v = 0", r"gain_rad_s_v must be from"),
+    ("gain_rad_s_v = 83.0089", "gain = 83.0089", r'unknown key; did you mean "gain_rad_s_v"\?|use one of'),
+    ("volts_limit = 5.0", "volts_limit = 50", r"volts_limit must be from"),
+    ("counts_per_rev = 1048576", "counts_per_rev = 1.5", r"counts_per_rev must be a whole number"),
+    ("loop_rate_hz = 16000", "loop_rate_hz = 1500", r"loop_rate_hz must be a multiple of 1000"),
+    ("k_vf = 0.85\n", "", r"\[pdff\] k_vf is missing"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), DRIVE_MISTAKES, ids=[m[2] for m in DRIVE_MISTAKES])
+def test_drive_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
+    text = (EXAMPLES / "drives" / "alpha_x.toml").read_text()
+    assert old in text
+    file = tmp_path / "drive.toml"
+    file.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        load_drive(file)
+    assert re.search(message, str(caught.value)), str(caught.value)
+    assert str(caught.value).startswith(f"{file}: ")

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Path files: what they mean, and that every mistake gets one line naming file, key and remedy."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.config import load_path_file
+from hodograph.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[3]
+
+GOOD = """
+[path]
+closed = false
+control_points = [[0, 0], [12, 18], [24, 27], [36, 9]]
+[feed]
+profile = "exponential"
+nominal_mm_s = 100
+ramp_time_s = 0.1
+n_c = 5
+[limits]
+jerk_mm_s3 = 5e4
+policy = "report"
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    file = folder / "path.toml"
+    file.write_text(text)
+    return file
+
+
+def test_good_file(tmp_path: Path) -> None:
+    found = load_path_file(write(tmp_path, GOOD))
+    assert found.name == "path"
+    assert not found.path.closed
+    assert not found.path.through
+    np.testing.assert_array_equal(found.path.points, [0, 12 + 18j, 24 + 27j, 36 + 9j])
+    assert (found.feed.profile, found.feed.nominal_mm_s, found.feed.ramp_time_s) == ("exponential", 100.0, 0.1)
+    assert found.feed.n_c == 5.0
+    assert (found.limits.jerk_mm_s3, found.limits.acceleration_mm_s2) == (5e4, None)
+    assert found.limits.policy == "report"
+    assert found.machine_file is None
+
+
+def test_defaults(tmp_path: Path) -> None:
+    text = '[path]\nclosed = true\nthrough = [[0,0],[1,0],[1,1]]\n[feed]\nnominal_mm_s=1\nramp_time_s=1\n'
+    found = load_path_file(write(tmp_path, text))
+    assert found.path.through
+    assert found.path.ends == "cubic"
+    assert found.feed.n_c == "optimise"
+    assert found.limits.policy == "respect"
+
+
+@pytest.mark.parametrize("name", ["alpha", "heart", "star"])
+def test_examples_load(name: str) -> None:
+    found = load_path_file(ROOT / "examples" / f"{name}.toml")
+    assert found.machine_file is not None
+    assert found.machine_file.is_file()
+
+
+def test_machine_file_is_relative_to_the_path_file(tmp_path: Path) -> None:
+    (tmp_path / "machines").mkdir()
+    (tmp_path / "machines" / "m.toml").write_text("")
+    found = load_path_file(write(tmp_path, GOOD + '[machine]\nfile = "machines/m.toml"\n'))
+    assert found.machine_file == tmp_path / "machines" / "m.toml"
+
+
+MISTAKES = [
+    ("[path", "", r"not valid TOML"),
+    ("closed = false", "closed = 1", r"\[path\] closed must be true or false"),
+    ("closed = false\n", "", r"\[path\] closed is missing: add closed = true or false"),
+    ("closed = false", "closd = false", r'closd.*unknown key; did you mean "closed"\?'),
+    ("[limits]", "[limit]", r'\[limit\]: unknown key; did you mean "limits"\?'),
+    ("[36, 9]]", "[36, 9, 1]]", r"control_points point 3 must be \[x, y\]"),
+    ("[36, 9]]", "[36, nan]]", r"control_points point 3 holds nan"),
+    ("[36, 9]]", "[36, inf]]", r"control_points point 3 holds inf"),
+    ("[36, 9]]", '[36, "9"]]', r'control_points point 3 holds "9"'),
+    ("[36, 9]]", "[36, true]]", r"control_points point 3 holds True"),
+    ("[36, 9]]", "[36, 1e9]]", r"point 3 holds 1e\+09: at most 4096 mm"),
+    ("control_points = [[0, 0], [12, 18], [24, 27], [36, 9]]", "control_points = []", r"must be a list"),
+    ("control_points = [[0, 0], [12, 18], [24, 27], [36, 9]]", "", r"control_points is missing"),
+    ("closed = false", "closed = false\nthrough = [[0, 0]]", r"through is given beside control_points"),
+    ("closed = false", "closed = false\nends = 'natural'", r"ends applies to open paths with through"),
+    ('"exponential"', '"exponentail"', r'profile.*did you mean "exponential"\?'),
+    ('"exponential"', "3", r"profile cannot be 3; use one of: quintic, exponential, minimax"),
+    ("nominal_mm_s = 100", "nominal_mms = 100", r'did you mean "nominal_mm_s"\?'),
+    ("nominal_mm_s = 100", 'nominal_mm_s = "fast"', r'nominal_mm_s must be a number, but is "fast"'),
+    ("nominal_mm_s = 100", "nominal_mm_s = nan", r"nominal_mm_s must be a finite number, but is nan"),
+    ("nominal_mm_s = 100", "nominal_mm_s = -1", r"nominal_mm_s must be from 0\.001 to 4000"),
+    ("nominal_mm_s = 100", "nominal_mm_s = 1e300", r"nominal_mm_s must be from 0\.001 to 4000"),
+    ("nominal_mm_s = 100\n", "", r"nominal_mm_s is missing: add nominal_mm_s = a number"),
+    ("ramp_time_s = 0.1", "ramp_time_s = 0", r"ramp_time_s must be from 0\.002 to 1000"),
+    ("n_c = 5", 'n_c = "optimize"', r'n_c cannot be "optimize"; did you mean "optimise"\?'),
+    ("n_c = 5", "n_c = []", r"n_c must be a number"),
+    ("n_c = 5", "degree = 5.5", r"degree must be a whole number"),
+    ('policy = "report"', 'policy = "ignore"', r'policy cannot be "ignore"'),
+    ("jerk_mm_s3 = 5e4", "jerk_mm_s3 = 0", r"jerk_mm_s3 must be from 0\.1"),
+    ("[limits]", "[machine]\nfile = 'no.toml'\n[limits]", r"\[machine\] file names .*no\.toml, which is not there"),
+    ("[limits]", "[machine]\nfile = 3\n[limits]", r"\[machine\] file must be a text"),
+    ("[limits]", "feed = 3\n[limits]", r"unknown key"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES, ids=[m[2] for m in MISTAKES])
+def test_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in GOOD
+    file = write(tmp_path, GOOD.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        load_path_file(file)
+    text = str(caught.value)
+    assert re.search(message, text), text
+    assert text.startswith(f"{file}: ")
+    assert "\n" not in text
+
+
+def test_sections_that_are_no_sections(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\[path\] must be a section, but is 3"):
+        load_path_file(write(tmp_path, "path = 3\n"))
+    with pytest.raises(InputError, match=r"the section \[path\] is missing"):
+        load_path_file(write(tmp_path, ""))
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        load_path_file(tmp_path / "none.toml")
+    with pytest.raises(InputError, match="is a directory"):
+        load_path_file(tmp_path)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not UTF-8"):
+        load_path_file(binary)
+    deep = tmp_path / "deep.toml"
+    deep.write_text("a = " + "[" * 20000)
+    with pytest.raises(InputError, match="not valid TOML"):
+        load_path_file(deep)
