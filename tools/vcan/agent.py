@@ -105,6 +105,7 @@ class Agent:
         self.line = line
         self.jobs: dict[int, Job] = {}
         self.decoder = frames.Decoder()
+        self.unacknowledged = 0
         self.wake, wake_in = os.pipe()
         os.set_blocking(self.wake, False)
         os.set_blocking(wake_in, False)
@@ -113,6 +114,8 @@ class Agent:
 
     def send(self, kind: int, channel: int, payload: bytes = b"") -> None:
         view = memoryview(frames.encode(kind, channel, payload))
+        if kind == frames.DATA:
+            self.unacknowledged += len(view)
         while view:
             view = view[os.write(self.line, view) :]
 
@@ -127,7 +130,7 @@ class Agent:
         writers: dict[int, Job] = {}
         for job in self.jobs.values():
             for fd, stream in job.outputs.items():
-                if job.credit[stream] > 0:
+                if job.credit[stream] > 0 and self.unacknowledged < frames.LINE_OUT:
                     readers[fd] = job
             if job.stdin_queue:
                 writers[job.stdin] = job
@@ -147,8 +150,11 @@ class Agent:
             data = os.read(self.line, 65536)
         except OSError:
             return False
+        self.send(frames.LINE_ACK, 0, frames.ACK.pack(len(data)))
         for kind, channel, payload in self.decoder.feed(data):
-            if kind == frames.OPEN:
+            if kind == frames.LINE_ACK:
+                self.unacknowledged -= frames.ACK.unpack(payload)[0]
+            elif kind == frames.OPEN:
                 self.jobs[channel] = Job(channel, json.loads(payload))
             elif channel in self.jobs:
                 self._order(self.jobs[channel], kind, payload)

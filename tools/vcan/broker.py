@@ -53,6 +53,8 @@ class Broker:
         self._clients: dict[int, Client] = {}
         self._channels = 0
         self._line_queue = bytearray()
+        self._line_room = frames.LINE_IN
+        self._line_taken = 0
         self._ready = False
         self._lock = registry.create(bus)
         self._listener = socket.socket(socket.AF_UNIX)
@@ -88,7 +90,7 @@ class Broker:
     def _watch(self) -> None:
         """Asks for readiness to write only where something waits."""
         both = selectors.EVENT_READ | selectors.EVENT_WRITE
-        waiting = self._ready and bool(self._line_queue)
+        waiting = self._ready and bool(self._line_queue) and self._line_room > 0
         self._selector.modify(
             self._line, both if waiting else selectors.EVENT_READ, self._line_turn
         )
@@ -139,7 +141,9 @@ class Broker:
 
     def _line_turn(self, events: int) -> None:
         if events & selectors.EVENT_WRITE and self._line_queue:
-            del self._line_queue[: self._line.send(self._line_queue)]
+            count = self._line.send(self._line_queue[: self._line_room])
+            del self._line_queue[:count]
+            self._line_room -= count
         if not events & selectors.EVENT_READ:
             return
         try:
@@ -151,12 +155,23 @@ class Broker:
                 "user-mode Linux has ended" if self._ready else "user-mode Linux did not start"
             )
         for kind, channel, payload in self._decoder.feed(data):
-            if kind == frames.READY:
+            if kind == frames.LINE_ACK:
+                self._line_room += frames.ACK.unpack(payload)[0]
+            elif kind == frames.READY:
                 self._ready = True
                 for client in self._clients.values():
                     client.queue += frames.encode(frames.READY, 0)
-            elif channel in self._clients:
+            elif kind == frames.DATA:
+                self._acknowledge(frames.HEADER.size + len(payload))
+            if kind != frames.LINE_ACK and channel in self._clients:
                 self._clients[channel].queue += frames.encode(kind, 0, payload)
+
+    def _acknowledge(self, count: int) -> None:
+        """In few frames, so that they take little of the line."""
+        self._line_taken += count
+        if self._line_taken >= frames.LINE_OUT // 4:
+            self._line_queue += frames.encode(frames.LINE_ACK, 0, frames.ACK.pack(self._line_taken))
+            self._line_taken = 0
 
     def _log_end(self) -> str:
         with contextlib.suppress(OSError):

@@ -24,6 +24,10 @@ _FORWARDED = (
 )
 
 
+_PATIENCE = 5
+"""A command that has not ended when the fifth signal comes is ended with its bus, or left, if it only joined."""
+
+
 class Client:
     """One command; `run` returns its exit status."""
 
@@ -34,6 +38,7 @@ class Client:
         self._queues = {frames.STDOUT: bytearray(), frames.STDERR: bytearray()}
         self._stdin_open = True
         self._started = False
+        self._signals = 0
         self._status: int | None = None
         self._wake, wake_in = os.pipe()
         os.set_blocking(self._wake, False)
@@ -69,9 +74,10 @@ class Client:
             self._read_stdin()
 
     def _signal(self, number: int) -> None:
-        if self._started:
+        self._signals += 1
+        if self._started and self._signals < _PATIENCE:
             self._send(frames.SIGNAL, frames.STATUS.pack(number))
-        else:  # still booting: there is no command that could have an opinion
+        else:  # there is no command yet that could have an opinion, or it has none
             self._status = 128 + number
 
     def _send(self, kind: int, payload: bytes) -> None:

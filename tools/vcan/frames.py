@@ -2,8 +2,12 @@
 """Frames of the multiplexed channel between client, broker and agent.
 
 A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command
-inside (later perhaps one TCP connection). Data flows against credit, so that a slow reader holds up only itself:
-each side may send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
+inside (later perhaps one TCP connection). Data flows against credit, so that a slow reader holds up only
+itself: each side may send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
+
+The line itself needs the same once more: a serial line of user-mode Linux whose 4096-byte input buffer
+has once been full may stay deaf (6.1). So the broker keeps at most LINE_IN bytes unacknowledged, of whatever
+kind, and the agent LINE_OUT bytes of DATA.
 """
 
 from __future__ import annotations
@@ -16,6 +20,9 @@ STATUS = struct.Struct("<i")  # EXIT: status; SIGNAL: number
 WINDOW = 64 * 1024
 CHUNK = 4096
 LONGEST = 4 * 1024 * 1024
+LINE_IN = 2048
+LINE_OUT = 64 * 1024
+ACK = struct.Struct("<I")  # LINE_ACK: bytes taken from the line
 
 READY = 1  # agent to broker, broker to clients: booted, the bus is up
 OPEN = 2  # client: JSON of the command: argv, env, cwd, umask, uid, gid, groups
@@ -25,6 +32,7 @@ SIGNAL = 5  # client: send this signal to the command's process group
 EXIT = 6  # agent: exit status of the command (128 + number when a signal ended it)
 FAIL = 7  # broker: text; there is no bus (any more)
 CLOSE = 8  # broker: the client of this channel is gone
+LINE_ACK = 9  # broker and agent to each other
 
 STDIN, STDOUT, STDERR = 0, 1, 2
 
@@ -47,7 +55,7 @@ class Decoder:
         start = 0
         while len(self._buffer) - start >= HEADER.size:
             kind, channel, length = HEADER.unpack_from(self._buffer, start)
-            if not READY <= kind <= CLOSE or length > LONGEST:
+            if not READY <= kind <= LINE_ACK or length > LONGEST:
                 raise ValueError(f"frame of type {kind} and length {length}")
             end = start + HEADER.size + length
             if len(self._buffer) < end:
