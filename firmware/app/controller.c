@@ -59,12 +59,12 @@ void controller_init(struct controller *controller, uint8_t node)
 }
 
 /* Receive: process data at once, the rest waits for the mainline. */
-static void on_receive(void *self, const struct can_msg *message)
+static void on_receive(void *self, const struct can_msg *message, uint32_t now_us)
 {
     struct controller *controller = self;
     struct pdo_actual unused;
     if (pdo_decode_actual(message, &unused) != 0) {
-        if (machine_receive(&controller->machine, message, port_time_us())) {
+        if (machine_receive(&controller->machine, message, now_us)) {
             port_tick_ready();
         }
     } else if (frame_queue_put(&controller->queue, message)) {
@@ -72,10 +72,10 @@ static void on_receive(void *self, const struct can_msg *message)
     }
 }
 
-static void on_tick(void *self, uint32_t late_ns)
+static void on_tick(void *self, uint32_t now_us, uint32_t late_ns)
 {
     struct controller *controller = self;
-    tick_run(&controller->tick, late_ns);
+    tick_run(&controller->tick, now_us, late_ns);
 }
 
 int controller_start(struct controller *controller)

@@ -26,12 +26,24 @@ static void gone(struct machine *machine, uint16_t code, uint8_t node)
     port_unlock();
 }
 
+/* A drive that still answers SYNCs is alive, whatever became of its heartbeat on a busy host. When
+ * it stops answering too, the supervision in the tick finds out. */
+static bool answers(struct machine *machine, uint8_t node)
+{
+    port_lock();
+    const struct axis *axis = machine_axis(machine, node);
+    const bool result =
+        axis != NULL && axis->present && port_time_us() - axis->answered_us <= AXIS_SILENCE_MAX_US;
+    port_unlock();
+    return result;
+}
+
 static void take_event(struct machine *machine, const struct heartbeat_consumer *consumer,
                        enum heartbeat_event event)
 {
     if (event == HEARTBEAT_BOOTED) {
         gone(machine, FAULT_REBOOTED, consumer->node);
-    } else if (event == HEARTBEAT_LOST) {
+    } else if (event == HEARTBEAT_LOST && !answers(machine, consumer->node)) {
         gone(machine, EMCY_HEARTBEAT, consumer->node);
     }
 }

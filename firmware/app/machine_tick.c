@@ -32,7 +32,7 @@ void machine_supervise(struct machine *machine, uint32_t now_us)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
-        if (axis_close_sync(axis)) {
+        if (axis_close_sync(axis) && machine_moving(machine)) {
             machine->statistics.missed_tpdos++;
         }
         if (machine->state != MACHINE_BOOT) {

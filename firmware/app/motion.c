@@ -44,5 +44,6 @@ int32_t motion_feed_um_s(const struct motion *motion)
         return 0;
     }
     const int64_t feed_um_s = motion->point.feed_q32_mm_s * 1000 / INT64_C(4294967296);
-    return (int32_t)(feed_um_s * (int64_t)timebase_rate_q30(&motion->timebase) / INT64_C(1073741824));
+    return (int32_t)(feed_um_s * (int64_t)timebase_rate_q30(&motion->timebase) /
+                     INT64_C(1073741824));
 }

@@ -13,7 +13,7 @@ void tick_init(struct tick *tick, struct machine *machine)
 
 static void send(struct machine *machine, const struct can_msg *message)
 {
-    if (port_can_send(message) != 0) {
+    if (port_can_send(message) != 0 && machine_moving(machine)) {
         machine->statistics.frames_not_sent++;
     }
 }
@@ -39,17 +39,19 @@ static void send_setpoints(struct machine *machine)
     }
 }
 
-void tick_run(struct tick *tick, uint32_t late_ns)
+void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns)
 {
     struct machine *machine = tick->machine;
     const uint32_t started_ns = port_time_ns();
     send_sync(tick);
-    machine_supervise(machine, port_time_us());
+    machine_supervise(machine, now_us);
     machine_step(machine);
     send_setpoints(machine);
     if (machine_busy(machine)) {
         port_tick_await(TICK_GUARD_US);
     }
-    statistics_tick(&machine->statistics, late_ns, port_time_ns() - started_ns,
-                    machine->config.period_us);
+    if (machine_moving(machine)) {
+        statistics_tick(&machine->statistics, late_ns, port_time_ns() - started_ns,
+                        machine->config.period_us);
+    }
 }

@@ -22,6 +22,6 @@ void tick_init(struct tick *tick, struct machine *machine);
 
 /* One period: send SYNC k; look at what the drives answered to the last one; move the machine on;
  * send setpoints k. Timer. */
-void tick_run(struct tick *tick, uint32_t late_ns);
+void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns);
 
 #endif

@@ -70,10 +70,11 @@ int port_can_send(const struct can_msg *message);
 
 struct port_handlers {
     void *self; /* handed to both */
-    void (*receive)(void *self, const struct can_msg *message);
+    /* now_us: port_time_us() of this interrupt, so that the clock is read once only. */
+    void (*receive)(void *self, const struct can_msg *message, uint32_t now_us);
     /* late_ns: how long after its due time the tick began (4.29 s at most are told). A late tick is
      * called late, never skipped; two ticks are never closer than three quarters of a period. */
-    void (*tick)(void *self, uint32_t late_ns);
+    void (*tick)(void *self, uint32_t now_us, uint32_t late_ns);
 };
 
 /* Monotonic clocks that wrap round: only differences mean anything. */

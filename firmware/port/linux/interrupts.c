@@ -25,6 +25,7 @@ static struct {
     struct can_socket *socket;
     struct port_handlers handlers;
     struct schedule schedule;
+    uint64_t now_ns; /* of the present interrupt */
     bool lock_step;
 } self;
 
@@ -50,15 +51,22 @@ void port_tick_await(uint32_t guard_us)
 
 void port_tick_ready(void)
 {
-    schedule_ready(&self.schedule, clock_ns());
+    schedule_ready(&self.schedule, self.now_ns);
 }
 
-static void run_tick(uint64_t now_ns)
+static uint32_t now_us(void)
+{
+    return (uint32_t)(self.now_ns / 1000u);
+}
+
+static void run_tick(void)
 {
     port_lock();
-    const uint64_t late_ns = schedule_start(&self.schedule, now_ns);
-    self.handlers.tick(self.handlers.self, late_ns < UINT32_MAX ? (uint32_t)late_ns : UINT32_MAX);
-    schedule_finish(&self.schedule, now_ns);
+    const uint64_t started_ns = self.now_ns;
+    const uint64_t late_ns = schedule_start(&self.schedule, started_ns);
+    self.handlers.tick(self.handlers.self, now_us(),
+                       late_ns < UINT32_MAX ? (uint32_t)late_ns : UINT32_MAX);
+    schedule_finish(&self.schedule, started_ns);
     port_unlock();
 }
 
@@ -66,7 +74,7 @@ static void hand_over(const struct can_msg *messages, int count)
 {
     port_lock();
     for (int i = 0; i < count; ++i) {
-        self.handlers.receive(self.handlers.self, &messages[i]);
+        self.handlers.receive(self.handlers.self, &messages[i], now_us());
     }
     port_unlock();
 }
@@ -84,28 +92,28 @@ static void receive_waiting(void)
     }
 }
 
-static void sleep_until(uint64_t due_ns)
+/* The clock is a system call where the kernel itself is a process, and there the pace counts: so at
+ * lock step the time of the last interrupt is near enough for a guard time. */
+static uint64_t time_to_sleep_ns(void)
 {
-    struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
-    const uint64_t now_ns = clock_ns();
-    uint64_t wait_ns = due_ns > now_ns ? due_ns - now_ns : 0u;
-    if (wait_ns > LONGEST_SLEEP_NS) {
-        wait_ns = LONGEST_SLEEP_NS;
-    }
-    const struct timespec timeout = clock_timespec(wait_ns);
-    if (ppoll(&waited, 1, &timeout, NULL) > 0) {
-        receive_waiting();
-    }
+    const uint64_t since_ns = self.schedule.awaiting ? self.now_ns : clock_ns();
+    const uint64_t wait_ns = self.schedule.due_ns > since_ns ? self.schedule.due_ns - since_ns : 0u;
+    return wait_ns < LONGEST_SLEEP_NS ? wait_ns : LONGEST_SLEEP_NS;
 }
 
 static void *run(void *unused)
 {
     (void)unused;
     while (!self.ending && self.error == 0) {
-        sleep_until(self.schedule.due_ns);
-        const uint64_t now_ns = clock_ns();
-        if (now_ns >= self.schedule.due_ns) {
-            run_tick(now_ns);
+        struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
+        const struct timespec timeout = clock_timespec(time_to_sleep_ns());
+        const int ready = ppoll(&waited, 1, &timeout, NULL);
+        self.now_ns = clock_ns();
+        if (ready > 0) {
+            receive_waiting();
+        }
+        if (self.now_ns >= self.schedule.due_ns) {
+            run_tick();
         }
     }
     port_wake();
@@ -136,34 +144,50 @@ int interrupts_begin(struct can_socket *socket, bool lock_step)
     return make_lock() == 0 ? 0 : PORT_ERR_SYSTEM;
 }
 
-static int create_thread(bool real_time)
+static int create_thread(int policy, int priority)
 {
     pthread_attr_t attributes;
+    const struct sched_param parameters = {.sched_priority = priority};
     (void)pthread_attr_init(&attributes);
-    if (real_time) {
-        const struct sched_param priority = {.sched_priority = PRIORITY};
-        (void)pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-        (void)pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
-        (void)pthread_attr_setschedparam(&attributes, &priority);
-    }
+    (void)pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+    (void)pthread_attr_setschedpolicy(&attributes, policy);
+    (void)pthread_attr_setschedparam(&attributes, &parameters);
     const int error = pthread_create(&self.thread, &attributes, run, NULL);
     (void)pthread_attr_destroy(&attributes);
     return error;
 }
 
+static int create_real_time_thread(void)
+{
+    if (mlockall(MCL_CURRENT) != 0) {
+        port_log(PORT_NOTE, "memory is not locked, page faults can delay ticks: errno", errno);
+    }
+    const int error = create_thread(SCHED_FIFO, PRIORITY);
+    if (error != EPERM) {
+        return error;
+    }
+    port_log(PORT_NOTE, "no permission for SCHED_FIFO, ticks come as the scheduler likes: errno",
+             error);
+    return create_thread(SCHED_OTHER, 0);
+}
+
+/* A batch thread does not interrupt the simulated drives when the first of them has answered: it is
+ * woken once for all answers. glibc refuses SCHED_BATCH as a thread attribute, so the thread sets
+ * it itself. */
+static void *run_lock_step(void *unused)
+{
+    const struct sched_param none = {.sched_priority = 0};
+    (void)sched_setscheduler(0, SCHED_BATCH, &none);
+    return run(unused);
+}
+
 int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
 {
     self.handlers = *handlers;
-    schedule_begin(&self.schedule, clock_ns(), (uint64_t)period_us * 1000u, self.lock_step);
-    if (!self.lock_step && mlockall(MCL_CURRENT) != 0) {
-        port_log(PORT_NOTE, "memory is not locked, page faults can delay ticks: errno", errno);
-    }
-    int error = create_thread(!self.lock_step);
-    if (error != 0 && !self.lock_step) {
-        port_log(PORT_NOTE,
-                 "no permission for SCHED_FIFO, ticks come as the scheduler likes: errno", error);
-        error = create_thread(false);
-    }
+    self.now_ns = clock_ns();
+    schedule_begin(&self.schedule, self.now_ns, (uint64_t)period_us * 1000u, self.lock_step);
+    const int error = self.lock_step ? pthread_create(&self.thread, NULL, run_lock_step, NULL)
+                                     : create_real_time_thread();
     self.started = error == 0;
     return error == 0 ? 0 : PORT_ERR_SYSTEM;
 }

@@ -6,8 +6,8 @@
  * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the
  * tick. Both handlers run with the lock of port_lock() held. At real-time pace it asks for
  * SCHED_FIFO and locked memory; where that is not permitted it says so once and runs as an ordinary
- * thread. At fast pace it stays ordinary: it shall not take the processor from the simulated drives
- * it waits for.
+ * thread. At fast pace it is a batch thread: it shall not take the processor from the simulated
+ * drives it waits for.
  */
 #ifndef PORT_LINUX_INTERRUPTS_H
 #define PORT_LINUX_INTERRUPTS_H
