@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define COEFFICIENTS (BERNSTEIN_MOST_DEGREE + 1)
-#define MOST_DEPTH 9
+#define MOST_DEPTH   9
 
 /* scale / C(n,k) for n = 4, 5, 6 */
 static const int64_t scaled_inverse[3][COEFFICIENTS] = {

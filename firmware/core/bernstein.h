@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Bounds of a polynomial from its Bernstein coefficients: on the interval it lies between the least and
- * the greatest coefficient, and halving the interval brings them together quadratically (Farouki, "The Bernstein
- * polynomial basis", 2012, section 5). Integer arithmetic. Main loop.
+ * Bounds of a polynomial from its Bernstein coefficients: on the interval it lies between the least
+ * and the greatest coefficient, and halving the interval brings them together quadratically
+ * (Farouki, "The Bernstein polynomial basis", 2012, section 5). Integer arithmetic. Main loop.
  */
 #ifndef HODOGRAPH_CORE_BERNSTEIN_H
 #define HODOGRAPH_CORE_BERNSTEIN_H
@@ -11,13 +11,14 @@
 
 #define BERNSTEIN_MOST_DEGREE 6
 
-/* Coefficients on [0, 1] from powers: b[j] = scale * sum over k <= j of C(j,k)/C(n,k) a[k], with the scale that
- * makes every factor an integer; returned: 60 for degree 6, 10 for 5, 12 for 4. Others are not supported (returns 0). */
+/* Coefficients on [0, 1] from powers: b[j] = scale * sum over k <= j of C(j,k)/C(n,k) a[k], with
+ * the scale that makes every factor an integer; returned: 60 for degree 6, 10 for 5, 12 for 4.
+ * Others are not supported (returns 0). */
 int64_t bernstein_from_powers(const int64_t *a, int degree, int64_t *b);
 
-/* 1 when the polynomial stays in [low, high] on the interval, 0 when it does not or exceeds by so little
- * that nine halvings cannot tell (about 1e-5 of its variation). |b|, |low|, |high| < 2^62. Explicit stack, at most
- * 1023 intervals. */
+/* 1 when the polynomial stays in [low, high] on the interval, 0 when it does not or exceeds by so
+ * little that nine halvings cannot tell (about 1e-5 of its variation). |b|, |low|, |high| < 2^62.
+ * Explicit stack, at most 1023 intervals. */
 int bernstein_within(const int64_t *b, int degree, int64_t low, int64_t high);
 
 #endif

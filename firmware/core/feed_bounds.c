@@ -21,7 +21,8 @@ static int64_t times_tau(int64_t a, uint64_t tau_q64)
            (qmath_mul_unsigned(a, (uint32_t)tau_q64) >> 32);
 }
 
-/* Coefficients in tau of a derivative of F of order 0 ... 3, in the units of c; returns the degree. */
+/* Coefficients in tau of a derivative of F of order 0 ... 3, in the units of c; returns the degree.
+ */
 static int derive(const struct program_piece *piece, int order, int64_t a[8])
 {
     for (int k = order; k <= 7; k++) {

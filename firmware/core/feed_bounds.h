@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Feed, acceleration and jerk of a piece: values at its ends and bounds over it, in integers of physical
- * units. Derivation: docs/numerics.md section 9, "Checking". Main loop.
+ * Feed, acceleration and jerk of a piece: values at its ends and bounds over it, in integers of
+ * physical units. Derivation: docs/numerics.md section 9, "Checking". Main loop.
  */
 #ifndef HODOGRAPH_CORE_FEED_BOUNDS_H
 #define HODOGRAPH_CORE_FEED_BOUNDS_H
@@ -23,8 +23,8 @@ void feed_bounds_end(const struct program_piece *piece, struct feed_state *out);
 
 enum feed_derivative { FEED_VELOCITY = 1, FEED_ACCELERATION = 2, FEED_JERK = 3 };
 
-/* 1 when that derivative of F stays within [low, high] over the whole piece, in 2^-24 mm/s, mm/s^2 or
- * mm/s^3; 0 when it does not (or by less than about 1e-5 of its variation cannot be told). */
+/* 1 when that derivative of F stays within [low, high] over the whole piece, in 2^-24 mm/s, mm/s^2
+ * or mm/s^3; 0 when it does not (or by less than about 1e-5 of its variation cannot be told). */
 int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24, int64_t high_q24);
 

@@ -12,8 +12,8 @@ void feed_piece_set(struct feed_piece *f, const struct program_piece *piece)
     f->exponent = program_piece_exponent(piece->duration_q32_s);
 }
 
-/* tau in q64, below 1. Its upper word drives the Horner steps; what is left is below 2^-32, where the
- * slope suffices. */
+/* tau in q64, below 1. Its upper word drives the Horner steps; what is left is below 2^-32, where
+ * the slope suffices. */
 static uint64_t scaled_time(uint64_t t_q42_s, int exponent)
 {
     int shift = 22 - exponent;

@@ -23,9 +23,9 @@ struct feed_point {
 
 void feed_piece_set(struct feed_piece *f, const struct program_piece *piece);
 
-/* At local time t, 0 <= t < duration. Arc length within 2^-40.4 mm of the polynomial (half a unit and
- * the Horner steps), feed within 2^-40 mm / 2^exponent s + 2^-32 mm/s. Fourteen wide products, no
- * division. */
+/* At local time t, 0 <= t < duration. Arc length within 2^-40.4 mm of the polynomial (half a unit
+ * and the Horner steps), feed within 2^-40 mm / 2^exponent s + 2^-32 mm/s. Fourteen wide products,
+ * no division. */
 void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_point *out);
 
 #endif

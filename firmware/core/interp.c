@@ -73,8 +73,8 @@ static void evaluate_path(const struct interp *it, int64_t arc_length_q40_mm, in
     }
 }
 
-/* Makes the piece of this time the loaded one, crossing `most` ends at most. The last piece has no end
- * here: beyond the duration nothing is evaluated. */
+/* Makes the piece of this time the loaded one, crossing `most` ends at most. The last piece has no
+ * end here: beyond the duration nothing is evaluated. */
 static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
 {
     uint32_t i = it->piece;
@@ -98,8 +98,8 @@ static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
     return INTERP_OK;
 }
 
-/* Makes the segment of this arc length the loaded one: the last that starts at or before it. Steps back only where the
- * feed dips below zero by rounding. */
+/* Makes the segment of this arc length the loaded one: the last that starts at or before it. Steps
+ * back only where the feed dips below zero by rounding. */
 static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
 {
     const struct program *p = it->program;

@@ -2,11 +2,12 @@
 /*
  * The interpolator: program time in, point on the path out.
  *
- * The point is a pure function of (program, time, kernel): the cursor inside struct interp only remembers
- * which segment and piece are expanded. So a run, a seek and a run backwards by seeks give the same bits.
- * Kernels: docs/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12 (the inverse of arc length).
- * The program must have passed program_check with any limits; the image must outlive the struct.
- * interp_at is meant for the tick (interrupt); the other functions for the main loop.
+ * The point is a pure function of (program, time, kernel): the cursor inside struct interp only
+ * remembers which segment and piece are expanded. So a run, a seek and a run backwards by seeks
+ * give the same bits. Kernels: docs/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
+ * (the inverse of arc length). The program must have passed program_check with any limits; the
+ * image must outlive the struct. interp_at is meant for the tick (interrupt); the other functions
+ * for the main loop.
  */
 #ifndef HODOGRAPH_CORE_INTERP_H
 #define HODOGRAPH_CORE_INTERP_H
@@ -30,7 +31,7 @@ enum interp_result {
     INTERP_END = 1,          /* time is at or beyond the end: the point is the exact end point */
     INTERP_ERR_KERNEL = -1,  /* no such kernel */
     INTERP_ERR_PROGRAM = -2, /* no program */
-    INTERP_ERR_JUMP = -3,    /* time is before the cursor, or more than two ends ahead: seek first */
+    INTERP_ERR_JUMP = -3, /* time is before the cursor, or more than two ends ahead: seek first */
 };
 
 /* Unrounded output of a tick, the same units for all kernels. */
@@ -64,15 +65,15 @@ struct interp {
 /* Starts at time 0. Returns 0 or INTERP_ERR_... Main loop. */
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
 
-/* The point at a program time in 2^-42 s, below 2^22 s. Crosses at most two piece ends forwards and two
- * segment ends either way, which program_check guarantees to suffice for steps up to two periods;
- * otherwise INTERP_ERR_JUMP: *out is unchanged, seek before going on. At or beyond the duration *out is
- * the exact end point and the cursor stays. Returns INTERP_OK, INTERP_END or INTERP_ERR_JUMP. Tick
- * context; bounded time. */
+/* The point at a program time in 2^-42 s, below 2^22 s. Crosses at most two piece ends forwards and
+ * two segment ends either way, which program_check guarantees to suffice for steps up to two
+ * periods; otherwise INTERP_ERR_JUMP: *out is unchanged, seek before going on. At or beyond the
+ * duration *out is the exact end point and the cursor stays. Returns INTERP_OK, INTERP_END or
+ * INTERP_ERR_JUMP. Tick context; bounded time. */
 int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
 
-/* The same at a time in 2^-32 s, for tools. A tick uses the finer one: at 100 mm/s, 2^-33 s of rounding is
- * 1e-8 mm, some 50 mm/s^3 in the third difference at 1 kHz. */
+/* The same at a time in 2^-32 s, for tools. A tick uses the finer one: at 100 mm/s, 2^-33 s of
+ * rounding is 1e-8 mm, some 50 mm/s^3 in the third difference at 1 kHz. */
 int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out);
 
 /* Moves the cursor to any time, forward or back; linear in the number of segments and pieces.

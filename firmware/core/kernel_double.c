@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/kernel_double.h"
 
-#define Q40 1099511627776.0
-#define Q48 281474976710656.0
-#define Q50 1125899906842624.0
+#define Q40   1099511627776.0
+#define Q48   281474976710656.0
+#define Q50   1125899906842624.0
 #define STEPS 3
 
 static double power_of_two(int n)
@@ -50,7 +50,8 @@ void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_
     out->feed_q32_mm_s = round_scaled(slope * k->per_s, 4294967296.0);
 }
 
-/* Cubic with z(0) = 0, z(1) = 1 and the slopes of the inverse of s(z) there; numerics.md section 12. */
+/* Cubic with z(0) = 0, z(1) = 1 and the slopes of the inverse of s(z) there; numerics.md
+ * section 12. */
 static void set_inverse(double g[4], double half, double sigma_middle, double sigma_end)
 {
     double first = 2.0 * half / sigma_middle;
@@ -115,7 +116,6 @@ void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc
         z = newton_step(k->c_mm[PH_S], s, z);
     }
     for (int axis = PH_X; axis <= PH_Y; axis++) {
-        point_q40_mm[axis] =
-            k->origin_q40_mm[axis] + round_scaled(horner(k->c_mm[axis], z), Q40);
+        point_q40_mm[axis] = k->origin_q40_mm[axis] + round_scaled(horner(k->c_mm[axis], z), Q40);
     }
 }

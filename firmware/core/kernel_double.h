@@ -29,8 +29,8 @@ void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_
 
 void kernel_double_segment_set(struct kernel_double_segment *k, const struct ph_segment *ph);
 
-/* Point at an arc length of this segment (counted from the start of the program; a little outside is allowed:
- * the curve is continued). Within 1e-9 mm. Three Newton steps, always. */
+/* Point at an arc length of this segment (counted from the start of the program; a little outside
+ * is allowed: the curve is continued). Within 1e-9 mm. Three Newton steps, always. */
 void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc_length_q40_mm,
                               int64_t point_q40_mm[2]);
 

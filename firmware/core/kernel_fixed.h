@@ -4,8 +4,9 @@
  * Derivation, ranges and the error bound: docs/numerics.md sections 9 and 12. Feed pieces are
  * core/feed_piece.h. Pure, tick context.
  *
- * "Normalised" is divided by 2^exponent of the segment, so that sigma lies in [1/8, 1). Polynomials in z keep their coefficient k
- * times 2^k, because a product of the upper halves with z in q31 is half the product: no shift in the Horner step.
+ * "Normalised" is divided by 2^exponent of the segment, so that sigma lies in [1/8, 1). Polynomials
+ * in z keep their coefficient k times 2^k, because a product of the upper halves with z in q31 is
+ * half the product: no shift in the Horner step.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_FIXED_H
 #define HODOGRAPH_CORE_KERNEL_FIXED_H
@@ -31,9 +32,9 @@ struct kernel_fixed_segment {
 
 void kernel_fixed_segment_set(struct kernel_fixed_segment *k, const struct ph_segment *ph);
 
-/* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside is
- * allowed: the curve is continued by its tangent). Within 2^-32 mm by the bound that needs no numerics, 2^-37 mm measured. Two Newton steps with one 32-bit
- * division each, 15 wide products. */
+/* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside
+ * is allowed: the curve is continued by its tangent). Within 2^-32 mm by the bound that needs no
+ * numerics, 2^-37 mm measured. Two Newton steps with one 32-bit division each, 15 wide products. */
 void kernel_fixed_segment_at(const struct kernel_fixed_segment *k, int64_t arc_length_q40_mm,
                              int64_t point_q40_mm[2]);
 

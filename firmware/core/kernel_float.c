@@ -4,8 +4,8 @@
 #include "core/qmath.h"
 
 #define STEPS 2
-#define Q30 1073741824.0f
-#define Q24 16777216.0f
+#define Q30   1073741824.0f
+#define Q24   16777216.0f
 
 static float from_q30(int64_t a)
 {

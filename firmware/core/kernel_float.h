@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The float kernel: single precision where it pays, integers for arc length, origins and the two lowest powers of z.
- * No double, no 64-bit conversion: int32 to float and back only. Derivation and error bound:
- * docs/numerics.md section 10. Feed pieces are core/feed_piece.h. Only + - * / : with -ffp-contract=off the
- * same bits on every target with IEEE single. Pure, tick context.
+ * The float kernel: single precision where it pays, integers for arc length, origins and the two
+ * lowest powers of z. No double, no 64-bit conversion: int32 to float and back only. Derivation and
+ * error bound: docs/numerics.md section 10. Feed pieces are core/feed_piece.h. Only + - * / : with
+ * -ffp-contract=off the same bits on every target with IEEE single. Pure, tick context.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_FLOAT_H
 #define HODOGRAPH_CORE_KERNEL_FLOAT_H
@@ -18,7 +18,7 @@ struct kernel_float_segment {
     float s[6];             /* normalised arc length from the middle */
     float u[3];             /* normalised w */
     float v[3];
-    float inverse[2][4];    /* first guess, before and behind the middle: scale, then cubic */
+    float inverse[2][4]; /* first guess, before and behind the middle: scale, then cubic */
     int exponent;
 };
 

@@ -2,9 +2,10 @@
 /*
  * A PH segment expanded for evaluation: the one exact-integer step that all kernels start from.
  *
- * The image holds w in Bernstein form. Products of its coefficients are formed exactly (25-bit limbs) and
- * give x, y and the arc length s as polynomials in z = 2 xi - 1, z from -1 to 1: centred, so that the rounding of a
- * Horner step never grows. docs/numerics.md section 9, "Expansion".
+ * The image holds w in Bernstein form. Products of its coefficients are formed exactly (25-bit
+ * limbs) and give x, y and the arc length s as polynomials in z = 2 xi - 1, z from -1 to 1:
+ * centred, so that the rounding of a Horner step never grows. docs/numerics.md section 9,
+ * "Expansion".
  *
  * Pure; about 10^3 instructions on a 32-bit target. Main loop or tick.
  */
@@ -17,26 +18,28 @@
 
 enum ph_axis { PH_X = 0, PH_Y = 1, PH_S = 2 };
 
-/* A segment with sigma below 2^PH_LEAST_EXPONENT mm, so shorter than 2^-34 mm, is far below the resolution: its arc
- * length is replaced by a straight one and w by 0, and every value is still within 2^-34 mm. */
+/* A segment with sigma below 2^PH_LEAST_EXPONENT mm, so shorter than 2^-34 mm, is far below the
+ * resolution: its arc length is replaced by a straight one and w by 0, and every value is still
+ * within 2^-34 mm. */
 #define PH_LEAST_EXPONENT (-34)
 
 /* Needs a segment that keeps the rules of protocol.md 1.2. */
 struct ph_segment {
     int64_t origin_q40_mm[3]; /* x, y and s at its start, as in the image */
-    /* Powers of z, relative to the origin, by enum ph_axis: value = sum of c[k] z^k. Each coefficient is within
-     * 2^-47 mm of the exact one. */
+    /* Powers of z, relative to the origin, by enum ph_axis: value = sum of c[k] z^k. Each
+     * coefficient is within 2^-47 mm of the exact one. */
     int64_t c_q48_mm[3][6];
     int64_t sigma_q50_mm[3]; /* parametric speed ds/dxi at xi = 0, 1/2, 1; within 2^-47 */
-    /* w in powers of z, times 4: (4 w = w[0] + w[1] z + w[2] z^2), exact; real and imaginary parts */
+    /* w in powers of z, times 4: (4 w = w[0] + w[1] z + w[2] z^2), exact; real and imaginary parts
+     */
     int64_t u_q44[3];
     int64_t v_q44[3];
     /* even; 2^exponent is above every Bernstein coefficient of sigma, 2^(exponent-2) is not */
     int exponent;
 };
 
-/* Bernstein coefficients of dx/dxi, dy/dxi and sigma (by enum ph_axis), the middle one times 3; each within
- * 2^-46 below the exact value. */
+/* Bernstein coefficients of dx/dxi, dy/dxi and sigma (by enum ph_axis), the middle one times 3;
+ * each within 2^-46 below the exact value. */
 void ph_segment_hodograph(const struct program_segment *segment, int64_t e_q50[5][3]);
 
 void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segment);

@@ -5,15 +5,15 @@
 #include "core/qmath.h"
 
 #define COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 54)
-#define ARC_LIMIT_Q40 ((int64_t)1 << 62)
-#define LONGEST_Q44 ((int64_t)32 << 44)
-#define MOST_DURATION_Q32 ((uint64_t)1 << 54)
-#define JOIN_Q44 ((int64_t)1 << 10)              /* 2^-34 mm */
-#define JOIN_FEED_Q24 ((int64_t)1 << 8)          /* 2^-16 mm/s */
+#define ARC_LIMIT_Q40         ((int64_t)1 << 62)
+#define LONGEST_Q44           ((int64_t)32 << 44)
+#define MOST_DURATION_Q32     ((uint64_t)1 << 54)
+#define JOIN_Q44              ((int64_t)1 << 10) /* 2^-34 mm */
+#define JOIN_FEED_Q24         ((int64_t)1 << 8)  /* 2^-16 mm/s */
 #define JOIN_ACCELERATION_Q16 ((int64_t)1 << 10) /* 2^-6 mm/s^2 */
-#define LEAST_FEED_Q24 ((int64_t)1 << 14)        /* 2^-10 mm/s */
-#define OVERRIDE_ONE (1u << 24)
-#define NO_BOUND_Q24 (INT64_MAX / 64)
+#define LEAST_FEED_Q24        ((int64_t)1 << 14) /* 2^-10 mm/s */
+#define OVERRIDE_ONE          (1u << 24)
+#define NO_BOUND_Q24          (INT64_MAX / 64)
 
 static int within(int64_t a, int64_t tolerance)
 {
@@ -82,7 +82,8 @@ static int check_one(const struct program_piece *c, const struct program_limits 
     return code != 0 ? code : check_override(c);
 }
 
-/* End of one piece (absolute start and state) against the start of the next; a piece may not end behind its start. */
+/* End of one piece (absolute start and state) against the start of the next; a piece may not end
+ * behind its start. */
 static int check_join(const struct program_piece *a, const struct program_piece *b)
 {
     struct feed_state end;
@@ -125,12 +126,13 @@ static int check_last(const struct program *p, const struct program_piece *c)
 {
     struct feed_state end;
     feed_bounds_end(c, &end);
-    int64_t advance_q40 = p->header.length_q40_mm - c->start_q40_mm;
-    if (!within(advance_q40, (int64_t)1 << 50) ||
-        !within(end.arc_length_q44_mm - advance_q40 * 16, JOIN_Q44)) {
-        return PROGRAM_ERR_PIECE_END;
+    if (!at_rest(&end)) {
+        return PROGRAM_ERR_END_MOVING;
     }
-    return at_rest(&end) ? 0 : PROGRAM_ERR_END_MOVING;
+    int64_t advance_q40 = p->header.length_q40_mm - c->start_q40_mm;
+    int good = within(advance_q40, (int64_t)1 << 50) &&
+               within(end.arc_length_q44_mm - advance_q40 * 16, JOIN_Q44);
+    return good ? 0 : PROGRAM_ERR_PIECE_END;
 }
 
 /* Two whole pieces between others last longer than two periods: 15625 d > 2 period_us 2^26. */
@@ -191,12 +193,13 @@ static int64_t piece_end_arc(const struct program *p, uint32_t i)
 /* Feed at which a tick of twice the period covers this length: length 10^6 / (2 period_us). */
 static int64_t crossing_feed_q24(const struct program *p, int64_t length_q40)
 {
-    uint32_t half_frequency = 4000000u / p->header.period_us; /* times 8: an integer for each period */
+    uint32_t half_frequency =
+        4000000u / p->header.period_us; /* times 8: an integer for each period */
     return (length_q40 >> 16) * (int64_t)half_frequency / 8 - 1;
 }
 
-/* Pieces from *first on that touch the stretch [from, to] stay below the feed; *first moves on past those
- * that end before it. */
+/* Pieces from *first on that touch the stretch [from, to] stay below the feed; *first moves on past
+ * those that end before it. */
 static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32_t *first)
 {
     int64_t feed = crossing_feed_q24(p, to - from);
@@ -226,6 +229,7 @@ int piece_check_crossings(const struct program *p, uint32_t *index)
         int64_t from = program_segment_start(p, *index);
         int64_t to = program_segment_start(p, *index + 2u);
         if (!slow_enough(p, from, to, &piece)) {
+            (*index)++;
             return PROGRAM_ERR_SEGMENT_SHORT;
         }
     }

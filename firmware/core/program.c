@@ -136,7 +136,8 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
 
 uint32_t program_ticks(const struct program *p)
 {
-    /* duration / period = (duration / 2^26) * 15625 / period_us, since 2^32 / 10^6 = 2^26 / 15625 */
+    /* duration / period = (duration / 2^26) * 15625 / period_us, since 2^32 / 10^6 = 2^26 / 15625
+     */
     uint64_t d = p->header.duration_q32_s;
     uint64_t low = (d & ((1u << 26) - 1u)) * 15625u;
     uint64_t us = (d >> 26) * 15625u + ((low + (1u << 26) - 1u) >> 26);

@@ -4,9 +4,9 @@
  *
  * The format is docs/protocol.md section 1: little-endian scaled integers at any alignment. The
  * image is never copied; it must stay unchanged as long as a struct program or a struct interp
- * refers to it. `program_open` checks what is needed to read without leaving the image (sizes, counts,
- * CRC); everything else is the business of `program_check` (core/program_check.h), which has to pass
- * before a program is interpolated.
+ * refers to it. `program_open` checks what is needed to read without leaving the image (sizes,
+ * counts, CRC); everything else is the business of `program_check` (core/program_check.h), which
+ * has to pass before a program is interpolated.
  *
  * No heap, no globals; every function may be called from any context.
  */
@@ -15,11 +15,11 @@
 
 #include <stdint.h>
 
-#define PROGRAM_HEADER_SIZE 128u
+#define PROGRAM_HEADER_SIZE  128u
 #define PROGRAM_SEGMENT_SIZE 72u
-#define PROGRAM_PIECE_SIZE 88u
-#define PROGRAM_VERSION 1u
-#define PROGRAM_FLAG_CLOSED 1u
+#define PROGRAM_PIECE_SIZE   88u
+#define PROGRAM_VERSION      1u
+#define PROGRAM_FLAG_CLOSED  1u
 
 /* Header of the image, protocol.md 1.1; field names carry the units. */
 struct program_header {
@@ -68,8 +68,9 @@ struct program {
 };
 
 /* Opens an image of `size` bytes: magic, version, header size, counts against the size, CRC. The
- * buffer may be longer than the image says (a fixed store); never shorter. Cost: the CRC, linear in the
- * size. Returns 0 or a negative PROGRAM_ERR_... of core/program_check.h; *p is then not usable. */
+ * buffer may be longer than the image says (a fixed store); never shorter. Cost: the CRC, linear in
+ * the size. Returns 0 or a negative PROGRAM_ERR_... of core/program_check.h; *p is then not usable.
+ */
 int program_open(struct program *p, const uint8_t *image, uint32_t size);
 
 /* Reads segment or piece number i; i must be below the count of the header. Constant time. */

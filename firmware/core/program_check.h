@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Checks a program before it may run: every rule of docs/protocol.md 1.1 to 1.3 and the limits of
- * the controller. Integer arithmetic only, so every target and compiler refuses the same programs with
- * the same code. One pass over the image, constant memory, no recursion; about 10^3 to 10^4 instructions per segment
- * and piece. Call it from the main loop, not from an interrupt.
+ * the controller. Integer arithmetic only, so every target and compiler refuses the same programs
+ * with the same code. One pass over the image, constant memory, no recursion; about 10^3 to 10^4
+ * instructions per segment and piece. Call it from the main loop, not from an interrupt.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_CHECK_H
 #define HODOGRAPH_CORE_PROGRAM_CHECK_H
@@ -15,44 +15,45 @@
 /* Refusals. The numbers are part of the protocol (object 0x2000 sub 3): never renumber. */
 enum program_error {
     /* found by program_open */
-    PROGRAM_ERR_SIZE = -1,        /* truncated, or sizes and counts do not fit each other */
-    PROGRAM_ERR_MAGIC = -2,       /* does not begin with "HDGP" */
-    PROGRAM_ERR_VERSION = -3,     /* version or header size unknown */
-    PROGRAM_ERR_CRC = -4,         /* CRC-32 of the contents is wrong */
-    PROGRAM_ERR_COUNT = -5,       /* no segment or no piece */
+    PROGRAM_ERR_SIZE = -1,    /* truncated, or sizes and counts do not fit each other */
+    PROGRAM_ERR_MAGIC = -2,   /* does not begin with "HDGP" */
+    PROGRAM_ERR_VERSION = -3, /* version or header size unknown */
+    PROGRAM_ERR_CRC = -4,     /* CRC-32 of the contents is wrong */
+    PROGRAM_ERR_COUNT = -5,   /* no segment or no piece */
     /* header */
-    PROGRAM_ERR_PERIOD = -10,     /* period not 1000, 2000, 4000 or 8000 us */
+    PROGRAM_ERR_PERIOD = -10,      /* period not 1000, 2000, 4000 or 8000 us */
     PROGRAM_ERR_PERIOD_USED = -11, /* period is not the one configured in the controller */
-    PROGRAM_ERR_FLAGS = -12,      /* unknown flag, or a reserved field of the header is not 0 */
-    PROGRAM_ERR_AXES = -13,       /* axis count is not 2 */
-    PROGRAM_ERR_DURATION = -14,   /* not the sum of the pieces, or above 2^22 s */
-    PROGRAM_ERR_LENGTH = -15,     /* length not in (0, 2^22) mm */
-    PROGRAM_ERR_NAME = -16,       /* name not padded with zeros */
+    PROGRAM_ERR_FLAGS = -12,       /* unknown flag, or a reserved field of the header is not 0 */
+    PROGRAM_ERR_AXES = -13,        /* axis count is not 2 */
+    PROGRAM_ERR_DURATION = -14,    /* not the sum of the pieces, or above 2^22 s */
+    PROGRAM_ERR_LENGTH = -15,      /* length not in (0, 2^22) mm */
+    PROGRAM_ERR_NAME = -16,        /* name not padded with zeros */
     /* segments: index = the segment (of a joint: the later one) */
-    PROGRAM_ERR_W_RANGE = -20,      /* |u| or |v| is 64 or more */
-    PROGRAM_ERR_POINT_RANGE = -21,  /* coordinate is 4096 mm or more */
-    PROGRAM_ERR_ARC_RANGE = -22,    /* arc length is negative or 2^22 mm or more */
-    PROGRAM_ERR_SIGMA = -23,        /* a Bernstein coefficient of the parametric speed is not positive */
-    PROGRAM_ERR_SIGMA_RATIO = -24,  /* the largest is more than twice the smallest */
-    PROGRAM_ERR_SEGMENT_LONG = -25, /* longer than 32 mm */
-    PROGRAM_ERR_SEGMENT_FIRST = -26, /* the first segment does not start at arc length 0 */
-    PROGRAM_ERR_JOIN_POINT = -27,   /* points differ by more than 2^-34 mm */
-    PROGRAM_ERR_JOIN_ARC = -28,     /* arc lengths differ by more than 2^-34 mm */
+    PROGRAM_ERR_W_RANGE = -20,     /* |u| or |v| is 64 or more */
+    PROGRAM_ERR_POINT_RANGE = -21, /* coordinate is 4096 mm or more */
+    PROGRAM_ERR_ARC_RANGE = -22,   /* arc length is negative or 2^22 mm or more */
+    PROGRAM_ERR_SIGMA = -23, /* a Bernstein coefficient of the parametric speed is not positive */
+    PROGRAM_ERR_SIGMA_RATIO = -24,    /* the largest is more than twice the smallest */
+    PROGRAM_ERR_SEGMENT_LONG = -25,   /* longer than 32 mm */
+    PROGRAM_ERR_SEGMENT_FIRST = -26,  /* the first segment does not start at arc length 0 */
+    PROGRAM_ERR_JOIN_POINT = -27,     /* points differ by more than 2^-34 mm */
+    PROGRAM_ERR_JOIN_ARC = -28,       /* arc lengths differ by more than 2^-34 mm */
     PROGRAM_ERR_JOIN_DIRECTION = -29, /* directions differ by more than 2^-20 rad */
-    PROGRAM_ERR_SEGMENT_END = -30,  /* the last segment does not end at the length of the header */
-    PROGRAM_ERR_NOT_CLOSED = -31,   /* flag "closed", but end and start are more than 2^-24 mm apart */
+    PROGRAM_ERR_SEGMENT_END = -30, /* the last segment does not end at the length of the header */
+    PROGRAM_ERR_NOT_CLOSED =
+        -31, /* flag "closed", but end and start are more than 2^-24 mm apart */
     PROGRAM_ERR_SEGMENT_SHORT = -32, /* a tick at 200 % could cross more than two segment ends */
-    PROGRAM_ERR_TRAVEL = -33,       /* leaves the travel limits */
+    PROGRAM_ERR_TRAVEL = -33,        /* leaves the travel limits */
     /* pieces: index = the piece (of a joint: the later one) */
-    PROGRAM_ERR_PIECE_DURATION = -40, /* duration 0 */
-    PROGRAM_ERR_COEFFICIENT = -41,  /* a coefficient is above 2^14 mm */
-    PROGRAM_ERR_PIECE_LONG = -42,   /* longer than 32 mm */
-    PROGRAM_ERR_PIECE_FIRST = -43,  /* the first piece does not start at arc length 0 */
-    PROGRAM_ERR_JOIN_LENGTH = -44,  /* F differs by more than 2^-34 mm */
-    PROGRAM_ERR_JOIN_FEED = -45,    /* F' differs by more than 2^-16 mm/s */
+    PROGRAM_ERR_PIECE_DURATION = -40,    /* duration 0 */
+    PROGRAM_ERR_COEFFICIENT = -41,       /* a coefficient is above 2^14 mm */
+    PROGRAM_ERR_PIECE_LONG = -42,        /* longer than 32 mm */
+    PROGRAM_ERR_PIECE_FIRST = -43,       /* the first piece does not start at arc length 0 */
+    PROGRAM_ERR_JOIN_LENGTH = -44,       /* F differs by more than 2^-34 mm */
+    PROGRAM_ERR_JOIN_FEED = -45,         /* F' differs by more than 2^-16 mm/s */
     PROGRAM_ERR_JOIN_ACCELERATION = -46, /* F'' differs by more than 2^-6 mm/s^2 */
-    PROGRAM_ERR_START_MOVING = -47, /* the program does not begin at rest */
-    PROGRAM_ERR_END_MOVING = -48,   /* the program does not end at rest */
+    PROGRAM_ERR_START_MOVING = -47,      /* the program does not begin at rest */
+    PROGRAM_ERR_END_MOVING = -48,        /* the program does not end at rest */
     PROGRAM_ERR_PIECE_END = -49,    /* the last piece does not end at the length of the header */
     PROGRAM_ERR_PIECE_SHORT = -50,  /* two neighbouring pieces last no longer than two periods */
     PROGRAM_ERR_BACKWARDS = -51,    /* feed below -2^-10 mm/s */
@@ -65,11 +66,11 @@ enum program_error {
 
 /* What this controller allows. */
 struct program_limits {
-    uint32_t period_us;         /* configured period; 0: any allowed one */
-    uint32_t feed_um_s;         /* 0: no limit; the same for the next two */
+    uint32_t period_us; /* configured period; 0: any allowed one */
+    uint32_t feed_um_s; /* 0: no limit; the same for the next two */
     uint32_t acceleration_um_s2;
     uint32_t jerk_mm_s3;
-    int64_t min_q40_mm[2];      /* travel, x and y */
+    int64_t min_q40_mm[2]; /* travel, x and y */
     int64_t max_q40_mm[2];
 };
 
@@ -78,8 +79,8 @@ struct program_fault {
     uint32_t index; /* segment or piece, 0 for the header */
 };
 
-/* Checks an opened program against all rules. Returns 0, or the code of the first rule broken (header,
- * then segments, then pieces, in order); *fault gets the same code and its index. */
+/* Checks an opened program against all rules. Returns 0, or the code of the first rule broken
+ * (header, then segments, then pieces, in order); *fault gets the same code and its index. */
 int program_check(const struct program *p, const struct program_limits *limits,
                   struct program_fault *fault);
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/qwide.h"
 
-#define LOW_BITS 50
-#define LOW_MASK (((int64_t)1 << LOW_BITS) - 1)
+#define LOW_BITS  50
+#define LOW_MASK  (((int64_t)1 << LOW_BITS) - 1)
 #define LIMB_MASK 0x1FFFFFF
 
 static struct qwide normal(int64_t high, int64_t low)

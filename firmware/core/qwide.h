@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Exact sums of products of 50-bit numbers, for decisions that must not depend on rounding: the speed
- * ratio and the direction at joints. A value is high 2^50 + low. Pure.
+ * Exact sums of products of 50-bit numbers, for decisions that must not depend on rounding: the
+ * speed ratio and the direction at joints. A value is high 2^50 + low. Pure.
  */
 #ifndef HODOGRAPH_CORE_QWIDE_H
 #define HODOGRAPH_CORE_QWIDE_H
 
 #include <stdint.h>
 
-/* Normal form: 0 <= low < 2^50. |high| stays below 2^62 for any sum used here (at most 2^10 products). */
+/* Normal form: 0 <= low < 2^50. |high| stays below 2^62 for any sum used here (at most 2^10
+ * products). */
 struct qwide {
     int64_t high;
     int64_t low;

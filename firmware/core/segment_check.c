@@ -5,14 +5,14 @@
 #include "core/qmath.h"
 #include "core/qwide.h"
 
-#define W_LIMIT_Q44 ((int64_t)1 << 50)
+#define W_LIMIT_Q44     ((int64_t)1 << 50)
 #define POINT_LIMIT_Q40 ((int64_t)1 << 52)
-#define ARC_LIMIT_Q40 ((int64_t)1 << 62)
-#define JOIN_Q48 ((int64_t)1 << 14)    /* 2^-34 mm */
-#define CLOSED_Q48 ((int64_t)1 << 24)  /* 2^-24 mm */
-#define TRAVEL_Q48 ((int64_t)1 << 24)  /* rounding of a path that runs along a limit */
-#define DIRECTION_BITS 21              /* w turns by half the angle: 2^-21 rad */
-#define LONGEST_MM 32
+#define ARC_LIMIT_Q40   ((int64_t)1 << 62)
+#define JOIN_Q48        ((int64_t)1 << 14) /* 2^-34 mm */
+#define CLOSED_Q48      ((int64_t)1 << 24) /* 2^-24 mm */
+#define TRAVEL_Q48      ((int64_t)1 << 24) /* rounding of a path that runs along a limit */
+#define DIRECTION_BITS  21                 /* w turns by half the angle: 2^-21 rad */
+#define LONGEST_MM      32
 
 static int within(int64_t a, int64_t limit)
 {
@@ -43,8 +43,8 @@ static struct qwide add_dot(struct qwide sum, const struct program_segment *g, i
     return qwide_add_product(sum, g->v_q44[i], g->v_q44[j], weight);
 }
 
-/* Speed ratio and length, exact: three times the Bernstein coefficients of sigma in q88; a fifteenth of their
- * sum is the length. */
+/* Speed ratio and length, exact: three times the Bernstein coefficients of sigma in q88; a
+ * fifteenth of their sum is the length. */
 static int check_speed(const struct program_segment *g)
 {
     const struct qwide zero = {0, 0};
@@ -97,7 +97,8 @@ static int check_travel(const struct program_segment *g, const struct program_li
     return 0;
 }
 
-/* w2 of one and w0 of the next segment are parallel, either sign: the curve's direction is that of w^2. */
+/* w2 of one and w0 of the next segment are parallel, either sign: the curve's direction is that of
+ * w^2. */
 static int same_direction(const struct program_segment *a, const struct program_segment *b)
 {
     const struct qwide zero = {0, 0};
@@ -165,8 +166,7 @@ static int check_one(const struct program_segment *g, const struct program_limit
     return code != 0 ? code : check_travel(g, limits);
 }
 
-int segment_check_all(const struct program *p, const struct program_limits *limits,
-                      uint32_t *index)
+int segment_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
 {
     struct program_segment before;
     struct program_segment g;

@@ -7,7 +7,8 @@
 
 #include "core/program_check.h"
 
-/* All segments in order. Returns 0 or the code of the first rule broken; *index is then its segment. */
+/* All segments in order. Returns 0 or the code of the first rule broken; *index is then its
+ * segment. */
 int segment_check_all(const struct program *p, const struct program_limits *limits,
                       uint32_t *index);
 

@@ -3,8 +3,8 @@
 
 #include "core/qmath.h"
 
-#define REST_UNIT 15625u /* 10^6 = 15625 * 2^6: periods in 2^-42 s are multiples of 1/15625 */
-#define ONE_Q30 (1u << 30)
+#define REST_UNIT  15625u /* 10^6 = 15625 * 2^6: periods in 2^-42 s are multiples of 1/15625 */
+#define ONE_Q30    (1u << 30)
 #define MOST_TICKS (1u << 20)
 
 static uint32_t divide_up(uint64_t a, uint32_t b)
@@ -28,7 +28,8 @@ static uint32_t at_least(uint32_t a, uint32_t least)
     return a < least ? least : a;
 }
 
-/* slope >= 1/(rate h) and slope^2 >= 1/(second h^2); corner >= 1/(second h^2 slope): numerics.md section 12. */
+/* slope >= 1/(rate h) and slope^2 >= 1/(second h^2); corner >= 1/(second h^2 slope): numerics.md
+ * section 12. */
 static void plan_stop(struct timebase *tb, uint32_t rate_q16, uint32_t second_q8,
                       uint32_t period_us)
 {
@@ -53,7 +54,8 @@ void timebase_begin(struct timebase *tb, const struct program *p, uint32_t perio
     for (uint32_t i = 0; i < p->header.piece_count; i++) {
         program_piece_get(p, i, &piece);
         rate = piece.override_rate_q16_per_s < rate ? piece.override_rate_q16_per_s : rate;
-        second = piece.override_second_q8_per_s2 < second ? piece.override_second_q8_per_s2 : second;
+        second =
+            piece.override_second_q8_per_s2 < second ? piece.override_second_q8_per_s2 : second;
     }
     tb->duration_q42_s = p->header.duration_q32_s << 10;
     tb->time_q42_s = 0;
