@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * app_bench: a whole controller on the fake port, with two fake drives and an SDO client as host,
+ * on a bus without delays.
+ */
+#ifndef TESTS_UNIT_APP_BENCH_H
+#define TESTS_UNIT_APP_BENCH_H
+
+#include <stdint.h>
+
+#include "app/controller.h"
+#include "canopen/sdo_client.h"
+#include "fake_drive.h"
+
+#define BENCH_DRIVES 2u
+
+struct app_bench {
+    struct controller controller;
+    struct fake_drive drives[BENCH_DRIVES];
+    struct sdo_client host;
+    uint32_t ticks;
+    uint32_t frames;          /* seen on the bus */
+    uint16_t emergency;       /* code of the controller's last EMCY */
+    uint32_t starts;          /* NMT start commands seen */
+    int32_t targets[2][2048]; /* setpoints sent while a program ran, by axis */
+    uint32_t recorded;
+};
+
+/* Controller and drives at power-on; drives stand at the positions. */
+void app_bench_init(struct app_bench *bench, int32_t x_counts, int32_t y_counts);
+
+/* One period: tick, answers, mainline. */
+void app_bench_period(struct app_bench *bench);
+void app_bench_periods(struct app_bench *bench, uint32_t count);
+
+/* Periods until the state; fails the test when it takes more than `most`. Returns how many. */
+uint32_t app_bench_until(struct app_bench *bench, enum machine_state state, uint32_t most);
+
+/* Delivers all frames that are under way, and lets the mainline do what they ask for. */
+void app_bench_settle(struct app_bench *bench);
+
+/* The host. Results: abort codes. */
+uint32_t app_bench_write(struct app_bench *bench, uint16_t index, uint8_t sub, uint64_t value,
+                         uint8_t size);
+uint32_t app_bench_command(struct app_bench *bench, unsigned command);
+uint32_t app_bench_upload(struct app_bench *bench, const uint8_t *image, uint32_t size);
+/* Fails the test when the object cannot be read. */
+int64_t app_bench_read(struct app_bench *bench, uint16_t index, uint8_t sub);
+
+#endif

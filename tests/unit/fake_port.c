@@ -1,0 +1,235 @@
+/* SPDX-License-Identifier: MIT */
+#include "fake_port.h"
+
+#include <string.h>
+
+#include "unity.h"
+
+#define SENT_MAX 1024u
+
+static struct {
+    struct port_handlers handlers;
+    uint64_t now_ns;
+    uint32_t period_us;
+    uint32_t awaited_us;
+    bool ready;
+    bool locked;
+    bool fail_send;
+    bool fail_store;
+    unsigned wakes;
+    uint32_t sent_head;
+    uint32_t sent_tail;
+    struct can_msg sent[SENT_MAX];
+    uint8_t banks[PORT_STORE_BANKS][FAKE_PORT_BANK_BYTES];
+    void (*wait_hook)(void *context);
+    void *wait_context;
+} self;
+
+void fake_port_reset(void)
+{
+    memset(&self, 0, sizeof self);
+    self.now_ns = UINT64_C(4294000000); /* soon to wrap, as clocks do */
+}
+
+void fake_port_advance_us(uint32_t us)
+{
+    self.now_ns += (uint64_t)us * 1000u;
+}
+
+bool fake_port_take(struct can_msg *message)
+{
+    if (self.sent_head == self.sent_tail) {
+        return false;
+    }
+    *message = self.sent[self.sent_tail++ % SENT_MAX];
+    return true;
+}
+
+void fake_port_tick(uint32_t late_ns)
+{
+    self.awaited_us = 0;
+    self.ready = false;
+    port_lock();
+    self.handlers.tick(self.handlers.self, port_time_us(), late_ns);
+    port_unlock();
+}
+
+void fake_port_receive(const struct can_msg *message)
+{
+    port_lock();
+    self.handlers.receive(self.handlers.self, message, port_time_us());
+    port_unlock();
+}
+
+uint32_t fake_port_period_us(void)
+{
+    return self.period_us;
+}
+
+uint32_t fake_port_awaited_us(void)
+{
+    return self.awaited_us;
+}
+
+bool fake_port_ready(void)
+{
+    return self.ready;
+}
+
+unsigned fake_port_wakes(void)
+{
+    return self.wakes;
+}
+
+void fake_port_fail_send(bool fail)
+{
+    self.fail_send = fail;
+}
+
+void fake_port_fail_store(bool fail)
+{
+    self.fail_store = fail;
+}
+
+void fake_port_on_wait(void (*hook)(void *context), void *context)
+{
+    self.wait_hook = hook;
+    self.wait_context = context;
+}
+
+int port_begin(int argc, char **argv)
+{
+    (void)argc;
+    (void)argv;
+    return 0;
+}
+
+int port_end(void)
+{
+    return 0;
+}
+
+bool port_stop_requested(void)
+{
+    return false;
+}
+
+uint8_t port_node_id(void)
+{
+    return 1;
+}
+
+int port_can_accept(const struct port_filter *filters, size_t count)
+{
+    (void)filters;
+    return count <= PORT_FILTERS ? 0 : PORT_ERR_SYSTEM;
+}
+
+int port_can_send(const struct can_msg *message)
+{
+    if (self.fail_send) {
+        return PORT_ERR_FULL;
+    }
+    TEST_ASSERT_TRUE_MESSAGE(self.sent_head - self.sent_tail < SENT_MAX, "nobody takes the frames");
+    TEST_ASSERT_TRUE(message->id <= CAN_ID_MAX && message->len <= CAN_DATA_MAX);
+    self.sent[self.sent_head++ % SENT_MAX] = *message;
+    return 0;
+}
+
+uint32_t port_time_ns(void)
+{
+    return (uint32_t)self.now_ns;
+}
+
+uint32_t port_time_us(void)
+{
+    return (uint32_t)(self.now_ns / 1000u);
+}
+
+int port_start(const struct port_handlers *handlers, uint32_t period_us)
+{
+    self.handlers = *handlers;
+    self.period_us = period_us;
+    return 0;
+}
+
+void port_tick_period(uint32_t period_us)
+{
+    self.period_us = period_us;
+}
+
+void port_tick_await(uint32_t guard_us)
+{
+    self.awaited_us = guard_us;
+}
+
+void port_tick_ready(void)
+{
+    self.ready = true;
+}
+
+void port_lock(void)
+{
+    TEST_ASSERT_FALSE_MESSAGE(self.locked, "the lock does not nest");
+    self.locked = true;
+}
+
+void port_unlock(void)
+{
+    TEST_ASSERT_TRUE_MESSAGE(self.locked, "unlocked twice");
+    self.locked = false;
+}
+
+void port_wait(uint32_t timeout_us)
+{
+    TEST_ASSERT_FALSE_MESSAGE(self.locked, "waits inside a critical section");
+    fake_port_advance_us(timeout_us);
+    if (self.wait_hook != NULL) {
+        self.wait_hook(self.wait_context);
+    }
+}
+
+void port_wake(void)
+{
+    self.wakes++;
+}
+
+uint32_t port_store_size(void)
+{
+    return FAKE_PORT_BANK_BYTES;
+}
+
+int port_store_erase(unsigned bank)
+{
+    TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS);
+    memset(self.banks[bank], 0xFF, FAKE_PORT_BANK_BYTES);
+    return 0;
+}
+
+int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
+{
+    TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS);
+    if (self.fail_store || offset > FAKE_PORT_BANK_BYTES || size > FAKE_PORT_BANK_BYTES - offset) {
+        return PORT_ERR_STORE;
+    }
+    memcpy(&self.banks[bank][offset], data, size);
+    return 0;
+}
+
+const uint8_t *port_store_data(unsigned bank)
+{
+    return self.banks[bank];
+}
+
+void port_log(enum port_level level, const char *text, int32_t value)
+{
+    (void)level;
+    (void)text;
+    (void)value;
+    TEST_ASSERT_FALSE_MESSAGE(self.locked, "logs inside a critical section");
+}
+
+void port_fatal(const char *text)
+{
+    TEST_FAIL_MESSAGE(text);
+}

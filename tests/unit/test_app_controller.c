@@ -1,0 +1,457 @@
+/* SPDX-License-Identifier: MIT */
+/* The whole controller against fake drives: finding them, switching on, running, stopping, faults.
+ */
+#include "app/commands.h"
+#include "canopen/cob.h"
+#include "canopen/sdo_abort.h"
+#include "core/counts.h"
+#include "core/interp.h"
+
+#include "app_bench.h"
+#include "app_image.h"
+#include "fake_port.h"
+#include "unity.h"
+
+#define X_COUNTS 10000000
+#define Y_COUNTS (-5000000)
+
+static struct app_bench bench;
+static uint8_t image[APP_IMAGE_SIZE];
+
+void setUp(void)
+{
+    app_bench_init(&bench, X_COUNTS, Y_COUNTS);
+    app_image_make(image, 10, -5);
+}
+
+void tearDown(void)
+{
+}
+
+static struct machine *machine(void)
+{
+    return &bench.controller.machine;
+}
+
+static void switch_on(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    app_bench_periods(&bench, 3);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_ENABLE));
+    (void)app_bench_until(&bench, MACHINE_READY, 100);
+}
+
+static void load(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
+}
+
+static void start(void)
+{
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
+}
+
+static void expect_refusal(unsigned command, enum machine_refusal refusal)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, command));
+    TEST_ASSERT_EQUAL_INT(refusal, app_bench_read(&bench, 0x2003, 4));
+}
+
+static void test_boot_configures_each_drive_then_starts_it(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_UINT32(2, bench.starts);
+    for (uint32_t i = 0; i < BENCH_DRIVES; ++i) {
+        const struct fake_drive *drive = &bench.drives[i];
+        TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, drive->nmt.state);
+        TEST_ASSERT_EQUAL_INT(8, drive->values.modes_of_operation);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_HEARTBEAT_MS, drive->values.producer_heartbeat_time);
+        TEST_ASSERT_EQUAL_UINT32(1000, drive->values.communication_cycle_period);
+    }
+}
+
+static void test_travel_limits_reach_the_drives(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, (uint32_t)-7, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2007, 2, 20000000, 4));
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_INT32(-7, bench.drives[0].values.software_position_limit[0]);
+    TEST_ASSERT_EQUAL_INT32(20000000, bench.drives[1].values.software_position_limit[1]);
+}
+
+static void test_a_missing_drive_is_named_and_found_later(void)
+{
+    bench.drives[1].dead = true;
+    app_bench_periods(&bench, 1200);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, app_bench_read(&bench, 0x2002, 0));
+    TEST_ASSERT_EQUAL_INT(3, app_bench_read(&bench, 0x2003, 2));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TIMEOUT, app_bench_read(&bench, 0x2003, 3));
+    expect_refusal(COMMAND_ENABLE, MACHINE_DRIVES_MISSING);
+    bench.drives[1].dead = false;
+    (void)app_bench_until(&bench, MACHINE_OFF, 2000);
+}
+
+static void test_a_device_that_is_no_drive_is_refused(void)
+{
+    bench.drives[0].values.device_type = 401;
+    app_bench_periods(&bench, 1200);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, machine()->state);
+    TEST_ASSERT_EQUAL_INT(2, app_bench_read(&bench, 0x2003, 2));
+}
+
+static void test_switching_on_moves_nothing(void)
+{
+    switch_on();
+    app_bench_periods(&bench, 20);
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS, bench.drives[0].position_counts);
+    TEST_ASSERT_EQUAL_INT32(Y_COUNTS, bench.drives[1].position_counts);
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS, app_bench_read(&bench, 0x200D, 1));
+    TEST_ASSERT_EQUAL_INT32(Y_COUNTS, app_bench_read(&bench, 0x200B, 2));
+}
+
+static void test_each_start_condition(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    expect_refusal(COMMAND_START, MACHINE_NO_PROGRAM);
+    load();
+    expect_refusal(COMMAND_START, MACHINE_DRIVES_OFF);
+    switch_on();
+    expect_refusal(COMMAND_START, MACHINE_MOVING); /* not yet 250 periods of standstill */
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS - 5u);
+    expect_refusal(COMMAND_START, MACHINE_MOVING);
+    app_bench_periods(&bench, 6);
+    app_image_make(image, 11, -5);
+    load();
+    expect_refusal(COMMAND_START, MACHINE_AWAY_FROM_START);
+    app_image_make(image, 10, -5);
+    load();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
+    expect_refusal(COMMAND_START, MACHINE_MOVING);
+    expect_refusal(COMMAND_DISABLE, MACHINE_MOVING);
+}
+
+static void test_limits_tightened_after_the_upload_refuse_the_start(void)
+{
+    load();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2004, 2, 14000, 4));
+    switch_on();
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    expect_refusal(COMMAND_START, MACHINE_OUTSIDE_LIMITS);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_FEED, app_bench_read(&bench, 0x2000, 3));
+}
+
+/* The setpoints on the bus are those of the interpolator, from tick 0, one each period. */
+static void test_setpoints_are_those_of_the_interpolator(void)
+{
+    load();
+    switch_on();
+    start();
+    const uint32_t ticks = app_bench_until(&bench, MACHINE_READY, 2000);
+    TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS + MACHINE_SETTLE_TICKS, ticks);
+    struct program program;
+    struct interp interp;
+    struct interp_point point;
+    TEST_ASSERT_EQUAL_INT(0, program_open(&program, image, sizeof image));
+    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &program, INTERP_FIXED));
+    for (uint32_t k = 0; k < APP_IMAGE_TICKS; ++k) {
+        const uint64_t time_q32_s = ((uint64_t)k * 1000u * 4294967296u + 500000u) / 1000000u;
+        TEST_ASSERT_TRUE(interp_at(&interp, time_q32_s, &point) >= 0);
+        TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.x_q40_mm, 1000000), bench.targets[0][k]);
+        TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.y_q40_mm, 1000000), bench.targets[1][k]);
+    }
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, bench.drives[0].position_counts);
+    TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS - 1u, app_bench_read(&bench, 0x2008, 2));
+    TEST_ASSERT_EQUAL_UINT32(0, app_bench_read(&bench, 0x2008, 6));
+    TEST_ASSERT_EQUAL_INT64(INT64_C(4) << 40, app_bench_read(&bench, 0x2009, 1));
+}
+
+static void test_stop_ends_on_the_path_and_runs_again_only_from_the_start(void)
+{
+    load();
+    switch_on();
+    start();
+    app_bench_periods(&bench, 250);
+    TEST_ASSERT_TRUE(app_bench_read(&bench, 0x2009, 2) > 14900);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_STOP));
+    TEST_ASSERT_EQUAL_INT(MACHINE_STOPPING, machine()->state);
+    (void)app_bench_until(&bench, MACHINE_READY, 2000);
+    TEST_ASSERT_EQUAL_INT32(Y_COUNTS, bench.drives[1].position_counts);
+    TEST_ASSERT_TRUE(bench.drives[0].position_counts > X_COUNTS + 2000000);
+    TEST_ASSERT_TRUE(bench.drives[0].position_counts < X_COUNTS + 4000000);
+    TEST_ASSERT_TRUE(bench.drives[0].worst_step_counts <= 15001);
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    expect_refusal(COMMAND_START, MACHINE_AWAY_FROM_START);
+}
+
+static void test_disable_and_stop_when_there_is_nothing_to_do(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_STOP));
+    switch_on();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_ENABLE));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_DISABLE));
+    app_bench_periods(&bench, 5);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
+}
+
+static void test_upload_while_running_changes_nothing(void)
+{
+    load();
+    switch_on();
+    start();
+    app_bench_periods(&bench, 10);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_upload(&bench, image, sizeof image));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2004, 2, 50000, 4));
+    (void)app_bench_until(&bench, MACHINE_READY, 2000);
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, bench.drives[0].position_counts);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_READY, app_bench_read(&bench, 0x2000, 2));
+}
+
+static void test_a_refused_image_leaves_the_old_program(void)
+{
+    load();
+    const int64_t crc = app_bench_read(&bench, 0x2000, 5);
+    image[150] ^= 1u;
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, app_bench_upload(&bench, image, sizeof image));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CRC, app_bench_read(&bench, 0x2000, 3));
+    TEST_ASSERT_EQUAL_INT64(crc, app_bench_read(&bench, 0x2000, 5));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_READY, app_bench_read(&bench, 0x2000, 2));
+    TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS, app_bench_read(&bench, 0x2000, 9));
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS, app_bench_read(&bench, 0x2000, 12));
+    TEST_ASSERT_EQUAL_INT32(Y_COUNTS, app_bench_read(&bench, 0x2000, 15));
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, app_bench_read(&bench, 0x2000, 14));
+}
+
+static void test_the_active_image_can_be_read_back(void)
+{
+    static uint8_t back[APP_IMAGE_SIZE];
+    struct can_msg out;
+    load();
+    TEST_ASSERT_EQUAL_INT(1, sdo_client_read(&bench.host, 1, 0x2000, 1, back, sizeof back, &out));
+    fake_port_receive(&out);
+    app_bench_settle(&bench);
+    TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
+    TEST_ASSERT_EQUAL_UINT32(sizeof image, bench.host.size);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(image, back, sizeof image);
+}
+
+static void test_configuration_only_while_off_and_same_values_cost_nothing(void)
+{
+    switch_on();
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2004, 2, 50000, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2006, 1, 0, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_DISABLE));
+    const uint64_t same = (uint64_t)app_bench_read(&bench, 0x2006, 1);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, same, 4));
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, same + 1u, 4));
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, machine()->state);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+}
+
+static void test_the_period_changes_everywhere(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, app_bench_write(&bench, 0x1006, 0, 3000, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1006, 0, 2000, 4));
+    TEST_ASSERT_EQUAL_UINT32(2000, fake_port_period_us());
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_UINT32(2000, bench.drives[1].values.communication_cycle_period);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, app_bench_upload(&bench, image, sizeof image));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_PERIOD_USED, app_bench_read(&bench, 0x2000, 3));
+}
+
+static void run_some(uint32_t periods)
+{
+    load();
+    switch_on();
+    start();
+    app_bench_periods(&bench, periods);
+}
+
+static void test_a_drive_fault_stops_the_other_on_the_path(void)
+{
+    run_some(250);
+    (void)cia402_device_fault(&bench.drives[1].state);
+    (void)cia402_device_stopped(&bench.drives[1].state);
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, app_bench_read(&bench, 0x2002, 0));
+    TEST_ASSERT_EQUAL_INT(3, app_bench_read(&bench, 0x2003, 2));
+    TEST_ASSERT_EQUAL_HEX16(EMCY_GENERIC, bench.emergency);
+    expect_refusal(COMMAND_ENABLE, MACHINE_FAULT_PRESENT);
+    app_bench_periods(&bench, 1000);
+    TEST_ASSERT_TRUE(bench.drives[0].worst_step_counts <= 15001);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_RESET));
+    (void)app_bench_until(&bench, MACHINE_OFF, 2000);
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
+    TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, bench.emergency);
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x1001, 0));
+}
+
+static void test_the_drives_own_error_code_becomes_the_fault(void)
+{
+    run_some(100);
+    struct can_msg emcy;
+    cob_frame(&emcy, COB_EMCY + 2u, 8);
+    cob_put(emcy.data, 0x7300, 2);
+    (void)cia402_device_fault(&bench.drives[0].state);
+    app_bench_period(&bench);
+    fake_port_receive(&emcy);
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_HEX16(0x7300, app_bench_read(&bench, 0x2003, 1));
+    TEST_ASSERT_EQUAL_HEX16(0x7300, app_bench_read(&bench, 0x200C, 1));
+}
+
+static void test_one_missed_answer_is_counted_and_tolerated(void)
+{
+    run_some(100);
+    bench.drives[0].mute = true;
+    app_bench_period(&bench);
+    bench.drives[0].mute = false;
+    (void)app_bench_until(&bench, MACHINE_READY, 2000);
+    TEST_ASSERT_EQUAL_INT(1, app_bench_read(&bench, 0x2008, 6));
+}
+
+static void test_a_silent_drive_is_a_fault_after_ten_syncs_and_the_wall_time(void)
+{
+    run_some(100);
+    bench.drives[0].mute = true;
+    app_bench_periods(&bench, 99);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    app_bench_periods(&bench, 5);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, machine()->state);
+    TEST_ASSERT_EQUAL_HEX16(EMCY_RPDO_TIMEOUT, bench.emergency);
+}
+
+static void test_a_lost_heartbeat_is_a_fault(void)
+{
+    switch_on();
+    bench.drives[0].dead = true;
+    (void)app_bench_until(&bench, MACHINE_FAULT, 1200);
+}
+
+static void test_a_drive_that_restarts_while_off_is_configured_again(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    app_bench_periods(&bench, 200);
+    fake_drive_init(&bench.drives[0], 2, X_COUNTS);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, machine()->state);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_INT(8, bench.drives[0].values.modes_of_operation);
+}
+
+static void test_lock_step_is_wished_only_while_something_moves(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT32(0, fake_port_awaited_us());
+    switch_on();
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT32(TICK_GUARD_US, fake_port_awaited_us());
+    TEST_ASSERT_TRUE(fake_port_ready());
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    TEST_ASSERT_EQUAL_UINT32(0, fake_port_awaited_us());
+    bench.drives[0].mute = true;
+    app_bench_period(&bench);
+    TEST_ASSERT_FALSE(fake_port_ready());
+}
+
+static void test_late_ticks_of_a_run_are_counted(void)
+{
+    run_some(1);
+    fake_port_tick(5000000);
+    TEST_ASSERT_EQUAL_INT(1, app_bench_read(&bench, 0x2008, 3));
+    TEST_ASSERT_EQUAL_INT(5000, app_bench_read(&bench, 0x2008, 4));
+    fake_port_tick(1000000);
+    TEST_ASSERT_EQUAL_INT(1, app_bench_read(&bench, 0x2008, 3));
+    fake_port_tick(1000001);
+    TEST_ASSERT_EQUAL_INT(2, app_bench_read(&bench, 0x2008, 3));
+    (void)app_bench_until(&bench, MACHINE_READY, 2000);
+    fake_port_tick(9000000);
+    TEST_ASSERT_EQUAL_INT(2, app_bench_read(&bench, 0x2008, 3));
+}
+
+static void tick_in_wait(void *context)
+{
+    (void)context;
+    app_bench_period(&bench);
+}
+
+static void test_shutting_down_while_running_stops_on_the_path(void)
+{
+    run_some(250);
+    fake_port_on_wait(tick_in_wait, NULL);
+    TEST_ASSERT_TRUE(controller_shut_down(&bench.controller));
+    app_bench_settle(&bench);
+    TEST_ASSERT_TRUE(bench.drives[0].worst_step_counts <= 15001);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
+    TEST_ASSERT_EQUAL_INT(NMT_PRE_OPERATIONAL, bench.drives[1].nmt.state);
+}
+
+static void test_shutting_down_is_bounded_when_ticks_do_not_come(void)
+{
+    run_some(250);
+    const uint32_t began_us = port_time_us();
+    TEST_ASSERT_FALSE(controller_shut_down(&bench.controller));
+    TEST_ASSERT_TRUE(port_time_us() - began_us < 7000000u);
+}
+
+static void test_a_full_port_is_counted(void)
+{
+    run_some(10);
+    fake_port_fail_send(true);
+    fake_port_tick(0);
+    fake_port_fail_send(false);
+    TEST_ASSERT_EQUAL_INT(3, app_bench_read(&bench, 0x2008, 7));
+}
+
+static void test_nmt_reset_is_obeyed_only_while_off(void)
+{
+    struct can_msg reset;
+    nmt_master_command(NMT_RESET_NODE, 1, &reset);
+    switch_on();
+    fake_port_receive(&reset);
+    app_bench_periods(&bench, 5);
+    TEST_ASSERT_EQUAL_INT(MACHINE_READY, machine()->state);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_DISABLE));
+    fake_port_receive(&reset);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, machine()->state);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_boot_configures_each_drive_then_starts_it);
+    RUN_TEST(test_travel_limits_reach_the_drives);
+    RUN_TEST(test_a_missing_drive_is_named_and_found_later);
+    RUN_TEST(test_a_device_that_is_no_drive_is_refused);
+    RUN_TEST(test_switching_on_moves_nothing);
+    RUN_TEST(test_each_start_condition);
+    RUN_TEST(test_limits_tightened_after_the_upload_refuse_the_start);
+    RUN_TEST(test_setpoints_are_those_of_the_interpolator);
+    RUN_TEST(test_stop_ends_on_the_path_and_runs_again_only_from_the_start);
+    RUN_TEST(test_disable_and_stop_when_there_is_nothing_to_do);
+    RUN_TEST(test_upload_while_running_changes_nothing);
+    RUN_TEST(test_a_refused_image_leaves_the_old_program);
+    RUN_TEST(test_the_active_image_can_be_read_back);
+    RUN_TEST(test_configuration_only_while_off_and_same_values_cost_nothing);
+    RUN_TEST(test_the_period_changes_everywhere);
+    RUN_TEST(test_a_drive_fault_stops_the_other_on_the_path);
+    RUN_TEST(test_the_drives_own_error_code_becomes_the_fault);
+    RUN_TEST(test_one_missed_answer_is_counted_and_tolerated);
+    RUN_TEST(test_a_silent_drive_is_a_fault_after_ten_syncs_and_the_wall_time);
+    RUN_TEST(test_a_lost_heartbeat_is_a_fault);
+    RUN_TEST(test_a_drive_that_restarts_while_off_is_configured_again);
+    RUN_TEST(test_lock_step_is_wished_only_while_something_moves);
+    RUN_TEST(test_late_ticks_of_a_run_are_counted);
+    RUN_TEST(test_shutting_down_while_running_stops_on_the_path);
+    RUN_TEST(test_shutting_down_is_bounded_when_ticks_do_not_come);
+    RUN_TEST(test_a_full_port_is_counted);
+    RUN_TEST(test_nmt_reset_is_obeyed_only_while_off);
+    return UNITY_END();
+}
