@@ -40,6 +40,7 @@ static void drive_node_reset(void *context)
     axis_motion_hold(&node->axis);
     node->sync_lost = false;
     node->setpoint_fresh = false;
+    node->received_new = false;
     drive_node_begin(node);
 }
 
@@ -108,6 +109,17 @@ static void drive_node_sync_back(struct drive_node *node)
     sync_consumer_init(&node->sync, node->values.synchronous_counter_overflow_value);
 }
 
+static void drive_node_latch(struct drive_node *node)
+{
+    if (node->received_new) {
+        node->values.controlword = node->received.controlword;
+        node->values.target_position = node->received.target_counts;
+        node->setpoint_fresh = true;
+        node->received_new = false;
+    }
+    drive_node_control(node, node->values.controlword);
+}
+
 static void drive_node_sync(struct drive_node *node, const struct can_msg *in)
 {
     if (node->sync_lost) {
@@ -127,16 +139,9 @@ static void drive_node_sync(struct drive_node *node, const struct can_msg *in)
     }
     drive_node_report(node);
     if (periods > 0) {
-        drive_node_control(node, node->values.controlword);
+        drive_node_latch(node);
         drive_node_step(node);
     }
-}
-
-static void drive_node_setpoint(struct drive_node *node, const struct pdo_setpoint *setpoint)
-{
-    node->values.controlword = setpoint->controlword;
-    node->values.target_position = setpoint->target_counts;
-    node->setpoint_fresh = true;
 }
 
 static void drive_node_receive_pdo(struct drive_node *node, const struct can_msg *in)
@@ -145,7 +150,8 @@ static void drive_node_receive_pdo(struct drive_node *node, const struct can_msg
     if (in->id == COB_SYNC) {
         drive_node_sync(node, in);
     } else if (pdo_decode_setpoint(in, &setpoint) == node->id) {
-        drive_node_setpoint(node, &setpoint);
+        node->received = setpoint;
+        node->received_new = true;
     }
 }
 

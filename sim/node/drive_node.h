@@ -55,6 +55,8 @@ struct drive_node {
     bool sync_seen;      /* since the last drive_node_process */
     bool sync_lost;      /* running on the own clock */
     bool setpoint_fresh; /* a target came since the last period */
+    bool received_new;   /* `received` waits for the next SYNC */
+    struct pdo_setpoint received;
     uint8_t id;
 };
 

@@ -72,11 +72,12 @@ static bool read_whole(const char *text, unsigned long most, unsigned long *out)
     return *text >= '0' && *text <= '9' && *end == '\0' && errno == 0 && *out <= most;
 }
 
+/* Finite, and of a size that any key may have. */
 static bool read_number(const char *text, double *out)
 {
     char *end = NULL;
     *out = strtod(text, &end);
-    return end != text && *end == '\0';
+    return end != text && *end == '\0' && *out >= -1e12 && *out <= 1e12;
 }
 
 static bool store(struct node_options_axis *axis, const struct key *key, const char *text)

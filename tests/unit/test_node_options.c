@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: MIT */
+#include "node/node_options.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "unity.h"
+
+#define FIGURES                                                                                    \
+    "gain_rad_s_v=83.0089,time_constant_s=0.19936,screw_mm_rad=1.59,torque_to_volts=1.4,"          \
+    "volts_limit=5,k_pp_rad_s_mm=97.38,k_pv_nm_s_rad=1.19,k_iv_per_s=252.8,k_pf_rad_mm=0.8,"       \
+    "k_vf=0.85"
+
+static struct node_options options;
+static char reason[256];
+
+void setUp(void)
+{
+    reason[0] = '\0';
+}
+
+void tearDown(void)
+{
+}
+
+/* Parses `--bus vcan0` and the axes given, up to a NULL. */
+static enum node_options_result parse(const char *first, const char *second)
+{
+    static char texts[2][600];
+    char *argv[] = {"hodograph-drive", "--bus", "vcan0", "--axis", texts[0], "--axis", texts[1]};
+    (void)snprintf(texts[0], sizeof texts[0], "%s", first);
+    (void)snprintf(texts[1], sizeof texts[1], "%s", second == NULL ? "" : second);
+    return node_options_parse(&options, second == NULL ? 5 : 7, argv, reason, sizeof reason);
+}
+
+static void refused(const char *axis, const char *part)
+{
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG, parse(axis, NULL));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, part), reason);
+    TEST_ASSERT_NULL(strchr(reason, '\n'));
+}
+
+static void test_two_axes_with_defaults_and_without(void)
+{
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_OK, parse("node=2," FIGURES, FIGURES
+                                                 ",node=127,position_mm=-1.25,counts_per_mm=1000,"
+                                                 "loop_rate_hz=8000,encoder_counts_per_rev=4096"));
+    TEST_ASSERT_EQUAL_STRING("vcan0", options.bus);
+    TEST_ASSERT_EQUAL_UINT(2, options.axis_count);
+    const struct node_options_axis *a = &options.axes[0], *b = &options.axes[1];
+    TEST_ASSERT_EQUAL_UINT8(2, a->node);
+    TEST_ASSERT_TRUE(a->config.plant.gain_rad_s_v == 83.0089 && a->config.pdff.k_vf == 0.85);
+    TEST_ASSERT_EQUAL_UINT32(1048576, a->config.encoder_counts_per_rev);
+    TEST_ASSERT_EQUAL_UINT32(16000, a->config.loop_rate_hz);
+    TEST_ASSERT_EQUAL_UINT32(1000000, a->config.counts_per_mm);
+    TEST_ASSERT_EQUAL_UINT32(1000, a->config.period_us);
+    TEST_ASSERT_TRUE(a->position_mm == 0.0);
+    TEST_ASSERT_EQUAL_UINT8(127, b->node);
+    TEST_ASSERT_TRUE(b->position_mm == -1.25);
+    TEST_ASSERT_EQUAL_UINT32(4096, b->config.encoder_counts_per_rev);
+}
+
+static void test_faults_are_named(void)
+{
+    refused("node=2", "'gain_rad_s_v'");
+    refused(FIGURES, "'node'");
+    refused("node=2," FIGURES ",k_vg=1", "'k_vg'");
+    refused("node=2," FIGURES ",node=3", "'node'");
+    refused("node=2," FIGURES ",position_mm=1x", "'position_mm=1x'");
+    refused("node=2," FIGURES ",position_mm=", "'position_mm='");
+    refused("node=2," FIGURES ",position_mm=nan", "'position_mm=nan'");
+    refused("node=2," FIGURES ",loop_rate_hz=-1", "'loop_rate_hz=-1'");
+    refused("node=2," FIGURES ",loop_rate_hz=4294967296", "'loop_rate_hz=4294967296'");
+    refused("node=1," FIGURES, "'1'");
+    refused("node=0," FIGURES, "'0'");
+    refused("node=128," FIGURES, "'node=128'");
+    refused("node=2,,", "''");
+}
+
+static void test_a_node_may_appear_once(void)
+{
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG, parse("node=2," FIGURES, "node=2," FIGURES));
+    TEST_ASSERT_NOT_NULL(strstr(reason, "same"));
+}
+
+static void test_options_themselves(void)
+{
+    char *help[] = {"hodograph-drive", "--help"};
+    char *unknown[] = {"hodograph-drive", "--bos", "vcan0"};
+    char *lacking[] = {"hodograph-drive", "--bus"};
+    char *none[] = {"hodograph-drive", "--bus", "vcan0"};
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_HELP,
+                          node_options_parse(&options, 2, help, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
+                          node_options_parse(&options, 3, unknown, reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL(strstr(reason, "'--bos'"));
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
+                          node_options_parse(&options, 2, lacking, reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL(strstr(reason, "'--bus'"));
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
+                          node_options_parse(&options, 3, none, reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL(strstr(reason, "'--axis'"));
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
+                          node_options_parse(&options, 1, none, reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL(strstr(node_options_help, "Exit status"));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_two_axes_with_defaults_and_without);
+    RUN_TEST(test_faults_are_named);
+    RUN_TEST(test_a_node_may_appear_once);
+    RUN_TEST(test_options_themselves);
+    return UNITY_END();
+}
