@@ -277,7 +277,7 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
         "join_feed": (encode(_bent(p, 4, 1)), "JOIN_FEED", 5),
         "join_acceleration": (encode(_bent(p, 4, 2)), "JOIN_ACCELERATION", 5),
         "start_moving": (encode(_cut_front(p)), "START_MOVING", 0),
-        "end_moving": (encode(_cut_back(p)), "END_MOVING", m - 2),
+        "end_moving": (encode(_bent(p, m - 1, 1)), "END_MOVING", m - 1),
         "piece_end": (encode(_piece_end(p)), "PIECE_END", m - 1),
         "piece_short": (encode(split_short(p, middle)), "PIECE_SHORT", middle + 1),
         "backwards": (encode(_backwards(p, 1)), "BACKWARDS", 1),
@@ -369,11 +369,6 @@ def _cut_front(p: Program) -> Program:
     cut = without_piece(p, 0)
     first = int(p.pieces.start_q40[1])
     return pieces(cut, start_q40=lambda a: a.__isub__(first))
-
-
-def _cut_back(p: Program) -> Program:
-    """The last piece left out: it ends in motion."""
-    return without_piece(p, p.piece_count - 1)
 
 
 def _piece_end(p: Program) -> Program:

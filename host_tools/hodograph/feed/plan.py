@@ -15,7 +15,7 @@ from ..errors import InputError, PlanError
 from .lowering import Cap, choose
 from .override import override_bounds
 from .pattern_search import SearchStep
-from .pieces import FeedPieces, derivative_bounds
+from .pieces import FeedPieces, derivative_peaks
 from .quantise import RawPieces, quantise
 from .ramp import ACCELERATION, JERK, Ramp
 from .request import ControllerLimits, FeedRequest, Limits, check_period
@@ -211,7 +211,9 @@ def _plan(
         excess = _piece_excess(plan)
         if excess <= 1.0:
             return replace(plan, notes=(*plan.notes, *_fit_notes(plan.raw, period_us)))
-        reason = f"limits, as bounded by the Bernstein coefficients of pieces of {period_us} us and more"
+        reason = (
+            f"limits, as bounded by the Bernstein coefficients of pieces of {period_us} us and more"
+        )
         caps = (*caps, Cap(shape.ramp.feed_mm_s / excess * (1.0 - 1e-6), reason))
     raise PlanError("feed: no feed keeps the pieces inside the limits: raise them or ramp_time_s")
 
@@ -220,7 +222,9 @@ def _assumed(ramp: Ramp) -> ControllerLimits:
     """Limits of a controller that nobody named: roomy ones, so that they never bind."""
     feed = ramp.feed_mm_s
     acceleration, jerk = ramp.peak(ACCELERATION), ramp.peak(JERK)
-    return ControllerLimits(2.0 * feed, 8.0 * acceleration + 10.0 * feed, 16.0 * jerk + 100.0 * feed)
+    return ControllerLimits(
+        2.0 * feed, 8.0 * acceleration + 10.0 * feed, 16.0 * jerk + 100.0 * feed
+    )
 
 
 def _fit_notes(raw: RawPieces, period_us: int) -> tuple[str, ...]:
@@ -253,7 +257,7 @@ def _piece_excess(plan: FeedPlan) -> float:
     override would round to zero, the feed has to fall.
     """
     pieces = plan.pieces
-    peaks = [float(np.abs(b).max()) for b in derivative_bounds(pieces.duration_q32_s, pieces.c_q40)]
+    peaks = [float(p.max()) for p in derivative_peaks(pieces.duration_q32_s, pieces.c_q40)]
     own = plan.controller
     keep = 1.0 - max(0.5 * own.reserve, 1e-3)
     bounds = [own.feed_mm_s * keep, own.acceleration_mm_s2 * keep, own.jerk_mm_s3 * keep]
@@ -266,9 +270,8 @@ def _piece_excess(plan: FeedPlan) -> float:
 
 
 def _with_override(raw: RawPieces, controller: ControllerLimits, limits: Limits) -> FeedPieces:
-    bounds = derivative_bounds(raw.duration_q32_s, raw.c_q40)
-    v, a, j = (np.abs(b).max(axis=1) for b in bounds)
-    override = override_bounds(v, a, j, controller, limits)
+    peaks = derivative_peaks(raw.duration_q32_s, raw.c_q40)
+    override = override_bounds(*peaks, controller, limits)
     return FeedPieces(
         raw.duration_q32_s,
         raw.start_q40,

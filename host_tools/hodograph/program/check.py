@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .check_pieces import piece_faults
-from .check_segments import segment_faults
+from .check_pieces import last_piece_faults, piece_faults
+from .check_segments import Rule, end_faults, segment_faults, too_short
 from .codes import ProgramError
 from .exactmath import segment_ways
-from .image import NAME_SIZE, Program, decode, open_fault, reserved_faults
+from .image import Program, ReservedFields, decode, open_fault, reserved_fields
 
 Int = NDArray[np.int64]
 
@@ -53,12 +53,12 @@ class Fault:
 
 
 def check(program: Program, limits: ProgramLimits | None = None) -> Fault | None:
-    """The first rule that `program` breaks, None when it may run; order: header, segments, pieces."""
-    header = _header_fault(program, limits)
-    if header is not None:
-        return Fault(header, 0)
-    ways = segment_ways(program.u_q44, program.v_q44)
-    return _first(segment_faults(program, ways, limits)) or _first(piece_faults(program, limits))
+    """The first rule that `program` breaks, None when it may run.
+
+    The order is that of the controller: header, segments one by one, their end, pieces one by one, their
+    end and sum, and last what two segments have to do with the pieces over them.
+    """
+    return _check(program, limits, _CLEAN)
 
 
 def check_image(image: bytes, limits: ProgramLimits | None = None) -> Fault | None:
@@ -66,41 +66,62 @@ def check_image(image: bytes, limits: ProgramLimits | None = None) -> Fault | No
     broken = open_fault(image)
     if broken is not None:
         return Fault(broken, 0)
-    flags, axes, name, reserved_piece = reserved_faults(image)
-    program = decode(image)
-    own = check(program, limits)
-    found = [] if own is None else [own]
-    for wrong, code in ((flags, "FLAGS"), (axes, "AXES"), (name, "NAME")):
-        if wrong:
-            found.append(Fault(ProgramError[code], 0))
-    if reserved_piece >= 0:
-        found.append(Fault(ProgramError.PIECE_RESERVED, reserved_piece))
-    return min(found, key=_rank, default=None)
+    return _check(decode(image), limits, reserved_fields(image))
 
 
-def _rank(fault: Fault) -> tuple[int, int, int]:
-    group = 0 if fault.code > -20 else 1 if fault.code > -40 else 2
-    return group, fault.index, -fault.code
+_CLEAN = ReservedFields(flags=True, axes=True, name=True, pieces=None)
 
 
-def _first(found: list[tuple[NDArray[np.bool_], int, ProgramError]]) -> Fault | None:
-    """The lowest index, then the first code, of masks whose element 0 is the item `offset`."""
-    hits = [Fault(code, int(mask.argmax()) + offset) for mask, offset, code in found if mask.any()]
+def _check(
+    program: Program, limits: ProgramLimits | None, reserved: ReservedFields
+) -> Fault | None:
+    header = _header_fault(program, limits, reserved)
+    if header is not None:
+        return Fault(header, 0)
+    ways = segment_ways(program.u_q44, program.v_q44)
+    return (
+        _first(segment_faults(program, ways, limits))
+        or _first(end_faults(program, ways))
+        or _first(piece_faults(program, limits, reserved.pieces))
+        or _first(last_piece_faults(program))
+        or _duration_fault(program)
+        or _first([(too_short(program), 0, ProgramError.SEGMENT_SHORT)])
+    )
+
+
+def _first(rules: list[Rule]) -> Fault | None:
+    """The lowest index, then the first rule in order, of the masks."""
+    hits = [
+        (int(mask.argmax()) + offset, rank, code)
+        for rank, (mask, offset, code) in enumerate(rules)
+        if mask.any()
+    ]
     if not hits:
         return None
-    return min(hits, key=lambda hit: (hit.index, -hit.code))
+    index, _, code = min(hits)
+    return Fault(code, index)
 
 
-def _header_fault(program: Program, limits: ProgramLimits | None) -> ProgramError | None:
-    total = sum(int(d) for d in program.pieces.duration_q32_s)
+def _header_fault(
+    program: Program, limits: ProgramLimits | None, reserved: ReservedFields
+) -> ProgramError | None:
     if program.period_us not in PERIODS_US:
         return ProgramError.PERIOD
     if limits is not None and limits.period_us not in (0, program.period_us):
         return ProgramError.PERIOD_USED
-    if not 0 < program.duration_q32_s <= LONGEST_Q32_S or total != program.duration_q32_s:
-        return ProgramError.DURATION
+    if not reserved.flags:
+        return ProgramError.FLAGS
+    if not reserved.axes:
+        return ProgramError.AXES
     if not 0 < program.length_q40 < LONGEST_Q40_MM:
         return ProgramError.LENGTH
-    if len(program.name.encode()) > NAME_SIZE:
+    if not reserved.name:
         return ProgramError.NAME
     return None
+
+
+def _duration_fault(program: Program) -> Fault | None:
+    total = sum(int(d) for d in program.pieces.duration_q32_s)
+    if total == program.duration_q32_s and total <= LONGEST_Q32_S:
+        return None
+    return Fault(ProgramError.DURATION, 0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed.pieces import DEGREE, derivative_bounds, exponents
+from ..feed.pieces import DEGREE, derivative_bounds, derivative_extremes, exponents
 from .codes import ProgramError
 from .image import Program
 
@@ -16,12 +16,15 @@ if TYPE_CHECKING:
     from .check import ProgramLimits
 
 Bool = NDArray[np.bool_]
+Rule = tuple[Bool, int, ProgramError]
 Int = NDArray[np.int64]
 Real = NDArray[np.float64]
 
 COEFFICIENT_Q40 = 1 << 54
 PIECE_Q40 = 32 << 40
 JOIN_Q40 = 1 << 6
+ARC_LIMIT_Q40 = 1 << 62
+LONGEST_Q32 = 1 << 54
 JOIN_FEED_MM_S = 2.0**-16
 JOIN_ACCELERATION_MM_S2 = 2.0**-6
 BACKWARDS_MM_S = -(2.0**-10)
@@ -29,34 +32,65 @@ ONE_Q24 = 1 << 24
 
 
 def piece_faults(
-    program: Program, limits: ProgramLimits | None
-) -> list[tuple[Bool, int, ProgramError]]:
-    """Masks of what is wrong: (mask, index of its first element, code)."""
+    program: Program, limits: ProgramLimits | None, reserved: Bool | None = None
+) -> list[Rule]:
+    """What is wrong with the pieces and their joints, in the order of the controller.
+
+    reserved  where the reserved field is not 0
+    """
     code = ProgramError
     pieces = program.pieces
     duration, start, c = pieces.duration_q32_s, pieces.start_q40, pieces.c_q40
-    empty = duration <= 0
-    if empty.any():
-        return [(empty, 0, code.PIECE_DURATION)]
     large: Bool = np.asarray(((c > COEFFICIENT_Q40) | (c < -COEFFICIENT_Q40)).any(axis=1))
-    if large.any():
-        return [(large, 0, code.COEFFICIENT)]
-    way_q44 = _ways_q44(duration, c)
-    gaps = way_q44[:-1].astype(object) - (np.diff(start.astype(object)) << 4)
-    feed, acceleration, jerk = derivative_bounds(duration, c)
-    last = len(pieces) - 1
-    rest_start = (
-        abs(feed[0, 0]) > JOIN_FEED_MM_S or abs(acceleration[0, 0]) > JOIN_ACCELERATION_MM_S2
+    outside: Bool = np.asarray((start < 0) | (start >= ARC_LIMIT_Q40))
+    ranges: list[Rule] = [
+        (np.asarray((duration <= 0) | (duration > LONGEST_Q32)), 0, code.PIECE_DURATION),
+        (large, 0, code.COEFFICIENT),
+        (outside, 0, code.ARC_RANGE),
+    ]
+    if reserved is not None:
+        ranges.append((reserved, 0, code.PIECE_RESERVED))
+    whole = _before_first(ranges, len(pieces))
+    if whole == 0:
+        return ranges
+    return ranges + _shape_faults(program, limits, whole)
+
+
+def _before_first(rules: list[Rule], count: int) -> int:
+    """How many pieces from the first are in range; the others cannot be looked into."""
+    return min([int(mask.argmax()) for mask, _, _ in rules if mask.any()], default=count)
+
+
+def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) -> list[Rule]:
+    code = ProgramError
+    pieces = program.pieces
+    duration, start, c = (
+        a[:count] for a in (pieces.duration_q32_s, pieces.start_q40, pieces.c_q40)
     )
-    rest_end = (
-        abs(feed[-1, -1]) > JOIN_FEED_MM_S or abs(acceleration[-1, -1]) > JOIN_ACCELERATION_MM_S2
-    )
-    missed = abs(int(way_q44[-1]) + ((int(start[-1]) - program.length_q40) << 4)) > JOIN_Q40 << 4
+    way = _ways_q44(duration, c)
+    advance = np.diff(start.astype(object))
+    gaps = way[:-1].astype(object) - 16 * advance
+    feed, acceleration, _ = derivative_bounds(duration, c)
+    lows, highs = derivative_extremes(duration, c)
     factor = pieces.override_factor_q24
     rates = (pieces.override_rate_q16_per_s == 0) | (pieces.override_second_q8_per_s2 == 0)
-    out = [
-        (way_q44 > PIECE_Q40 << 4, 0, code.PIECE_LONG),
+    out: list[Rule] = [
+        (np.asarray(np.abs(way) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
+        (np.asarray(lows[0] < BACKWARDS_MM_S), 0, code.BACKWARDS),
+    ]
+    if limits is not None:
+        asked = (limits.feed_um_s * 1e-3, limits.acceleration_um_s2 * 1e-3, limits.jerk_mm_s3)
+        codes = (code.FEED, code.ACCELERATION, code.JERK)
+        for low, high, limit, which in zip(lows, highs, asked, codes, strict=True):
+            over = high > limit if which == code.FEED else np.maximum(-low, high) > limit
+            out.append((np.asarray(over & (limit > 0.0)), 0, which))
+    start_moving = np.array([_moving(feed[0, 0], acceleration[0, 0])])
+    return [
+        *out,
+        (np.asarray((factor < ONE_Q24) | (factor > 2 * ONE_Q24) | rates), 0, code.OVERRIDE),
         (np.asarray(start[:1] != 0, dtype=np.bool_), 0, code.PIECE_FIRST),
+        (start_moving, 0, code.START_MOVING),
+        (np.asarray(advance < 0, dtype=np.bool_), 1, code.BACKWARDS),
         (np.asarray(np.abs(gaps) > JOIN_Q40 << 4, dtype=np.bool_), 1, code.JOIN_LENGTH),
         (np.abs(feed[:-1, -1] - feed[1:, 0]) > JOIN_FEED_MM_S, 1, code.JOIN_FEED),
         (
@@ -64,20 +98,28 @@ def piece_faults(
             1,
             code.JOIN_ACCELERATION,
         ),
-        (np.array([rest_start]), 0, code.START_MOVING),
-        (np.array([rest_end]), last, code.END_MOVING),
-        (np.array([missed]), last, code.PIECE_END),
-        (_brief(duration, program.period_us), 2, code.PIECE_SHORT),
-        (feed.min(axis=1) < BACKWARDS_MM_S, 0, code.BACKWARDS),
-        ((factor < ONE_Q24) | (factor > 2 * ONE_Q24) | rates, 0, code.OVERRIDE),
+        (_brief(pieces.duration_q32_s, program.period_us), 2, code.PIECE_SHORT),
     ]
-    if limits is not None:
-        out += [
-            (_above(feed, limits.feed_um_s * 1e-3), 0, code.FEED),
-            (_above(acceleration, limits.acceleration_um_s2 * 1e-3), 0, code.ACCELERATION),
-            (_above(jerk, float(limits.jerk_mm_s3)), 0, code.JERK),
-        ]
-    return out
+
+
+def last_piece_faults(program: Program) -> list[Rule]:
+    """What is wrong with the end of the feed."""
+    pieces = program.pieces
+    last = len(pieces) - 1
+    duration, c = pieces.duration_q32_s[last:], pieces.c_q40[last:]
+    way = int(_ways_q44(duration, c)[0])
+    missed = abs(way + ((int(pieces.start_q40[last]) - program.length_q40) << 4)) > JOIN_Q40 << 4
+    feed, acceleration, _ = derivative_bounds(duration, c)
+    return [
+        (np.array([missed]), last, ProgramError.PIECE_END),
+        (np.array([_moving(feed[0, -1], acceleration[0, -1])]), last, ProgramError.END_MOVING),
+    ]
+
+
+def _moving(feed_mm_s: float, acceleration_mm_s2: float) -> bool:
+    return bool(
+        abs(feed_mm_s) > JOIN_FEED_MM_S or abs(acceleration_mm_s2) > JOIN_ACCELERATION_MM_S2
+    )
 
 
 def _ways_q44(duration: Int, c: Int) -> Int:
@@ -101,9 +143,3 @@ def _brief(duration: Int, period_us: int) -> Bool:
     """Neighbours (without first and last piece) that last no longer than two periods together."""
     pairs = duration[1:-2] + duration[2:-1]
     return np.asarray(pairs.astype(object) * 1_000_000 <= 2 * period_us << 32, dtype=np.bool_)
-
-
-def _above(values: Real, limit: float) -> Bool:
-    if limit == 0.0:
-        return np.zeros(values.shape[0], dtype=np.bool_)
-    return np.asarray(np.abs(values).max(axis=1) > limit)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .check import ProgramLimits
 
 Bool = NDArray[np.bool_]
+Rule = tuple[Bool, int, ProgramError]
 Int = NDArray[np.int64]
 Big = NDArray[np.object_]
 
@@ -28,45 +29,63 @@ JOIN_Q88 = WAY_SCALE << (88 - 34)
 CLOSE_Q88 = WAY_SCALE << (88 - 24)
 DIRECTION_RAD = 2.0**-20
 TO_Q88 = WAY_SCALE << 48
+TRAVEL_SLACK_Q40 = 2.0**16
+"""A path may run along a travel limit: 2^-24 mm of rounding are allowed."""
 
 
 def segment_faults(
     program: Program, ways: tuple[Big, Big, Big], limits: ProgramLimits | None
-) -> list[tuple[Bool, int, ProgramError]]:
-    """Masks of what is wrong: (mask, index of its first element, code)."""
+) -> list[Rule]:
+    """What is wrong with the segments and their joints, in the order of the controller."""
     code = ProgramError
-    count = program.segment_count
     u, v = program.u_q44, program.v_q44
     wide = _bool((_beyond(u, W_LIMIT_Q44) | _beyond(v, W_LIMIT_Q44)).any(axis=1))
     far = _beyond(program.x_q40, POINT_LIMIT_Q40) | _beyond(program.y_q40, POINT_LIMIT_Q40)
     outside = _bool((program.start_q40 < 0) | (program.start_q40 >= ARC_LIMIT_Q40))
     sigma = _sigma3(u.astype(object), v.astype(object))
     low, high = sigma.min(axis=1), sigma.max(axis=1)
-    out: list[tuple[Bool, int, ProgramError]] = [
+    x, y, s = (a.astype(object) * TO_Q88 for a in (program.x_q40, program.y_q40, program.start_q40))
+    gap_x, gap_y, gap_s = _gap(x, ways[0]), _gap(y, ways[1]), _gap(s, ways[2])
+    apart = (np.abs(gap_x) > JOIN_Q88) | (np.abs(gap_y) > JOIN_Q88)
+    arc = (np.abs(gap_s) > JOIN_Q88) | (np.diff(program.start_q40.astype(object)) <= 0)
+    out: list[Rule] = [
         (wide, 0, code.W_RANGE),
         (far, 0, code.POINT_RANGE),
         (outside, 0, code.ARC_RANGE),
         (_bool(low <= 0), 0, code.SIGMA),
         (_bool(high > 2 * low), 0, code.SIGMA_RATIO),
         (_bool(ways[2] > 32 * (WAY_SCALE << 88)), 0, code.SEGMENT_LONG),
-        (_bool(program.start_q40[:1] != 0), 0, code.SEGMENT_FIRST),
     ]
-    x, y, s = (a.astype(object) * TO_Q88 for a in (program.x_q40, program.y_q40, program.start_q40))
-    gap_x, gap_y = _gap(x, ways[0]), _gap(y, ways[1])
-    apart = _bool((np.abs(gap_x) > JOIN_Q88) | (np.abs(gap_y) > JOIN_Q88))
-    out.append((apart, 1, code.JOIN_POINT))
-    out.append((_bool(np.abs(_gap(s, ways[2])) > JOIN_Q88), 1, code.JOIN_ARC))
-    out.append((_turned(u, v), 1, code.JOIN_DIRECTION))
-    end = s[-1] + ways[2][-1] - program.length_q40 * TO_Q88
-    out.append((np.array([abs(end) > JOIN_Q88]), count - 1, code.SEGMENT_END))
-    if program.closed:
-        open_x, open_y = x[-1] + ways[0][-1] - x[0], y[-1] + ways[1][-1] - y[0]
-        gap = max(abs(open_x), abs(open_y)) > CLOSE_Q88
-        out.append((np.array([gap]), count - 1, code.NOT_CLOSED))
-    out.append((_too_short(program), 0, code.SEGMENT_SHORT))
     if limits is not None:
         out.append((_leaves(program, limits), 0, code.TRAVEL))
-    return out
+    return [
+        *out,
+        (_bool(program.start_q40[:1] != 0), 0, code.SEGMENT_FIRST),
+        (_bool(apart), 1, code.JOIN_POINT),
+        (_bool(arc), 1, code.JOIN_ARC),
+        (_turned(u, v), 1, code.JOIN_DIRECTION),
+    ]
+
+
+def end_faults(program: Program, ways: tuple[Big, Big, Big]) -> list[Rule]:
+    """What is wrong with the end of the path."""
+    last = program.segment_count - 1
+    x, y = int(program.x_q40[last] - program.x_q40[0]), int(program.y_q40[last] - program.y_q40[0])
+    missing = (program.length_q40 - int(program.start_q40[last])) * TO_Q88
+    off = abs(missing - ways[2][last]) > JOIN_Q88 or missing <= 0
+    open_by = max(abs(x * TO_Q88 + ways[0][last]), abs(y * TO_Q88 + ways[1][last]))
+    return [
+        (np.array([off]), last, ProgramError.SEGMENT_END),
+        (np.array([program.closed and open_by > CLOSE_Q88]), last, ProgramError.NOT_CLOSED),
+    ]
+
+
+def too_short(program: Program) -> Bool:
+    """Later segments of neighbouring pairs that a tick at 200 % could pass whole."""
+    joints = np.append(program.start_q40, program.length_q40)
+    mask = np.zeros(program.segment_count, dtype=np.bool_)
+    mask[brief_pairs(joints, program.pieces, program.period_us)[0] + 1] = True
+    return mask
 
 
 def _beyond(values: Int, limit: int) -> Bool:
@@ -100,16 +119,6 @@ def _turned(u: Int, v: Int) -> Bool:
     return np.asarray(np.abs(np.angle((np.conj(end) * start) ** 2)) > DIRECTION_RAD)
 
 
-def _too_short(program: Program) -> Bool:
-    joints = np.append(program.start_q40, program.length_q40)
-    mask = np.zeros(program.segment_count, dtype=np.bool_)
-    pieces = program.pieces
-    rising = np.all(np.diff(joints) > 0) and np.all(np.diff(pieces.start_q40) >= 0)
-    if rising and np.all(pieces.duration_q32_s > 0):
-        mask[brief_pairs(joints, pieces, program.period_us)[0] + 1] = True
-    return mask
-
-
 def _leaves(program: Program, limits: ProgramLimits) -> Bool:
     """The box of the six Bezier points is not within the travel."""
     w = np.asarray((program.u_q44 + 1j * program.v_q44) * 2.0**-44, dtype=np.complex128)
@@ -118,6 +127,6 @@ def _leaves(program: Program, limits: ProgramLimits) -> Bool:
     points = np.concatenate(
         (start[:, None, :], start[:, None, :] + np.cumsum(steps, axis=1)), axis=1
     )
-    low = np.array(limits.min_q40_mm, dtype=np.float64)
-    high = np.array(limits.max_q40_mm, dtype=np.float64)
+    low = np.array(limits.min_q40_mm, dtype=np.float64) - TRAVEL_SLACK_Q40
+    high = np.array(limits.max_q40_mm, dtype=np.float64) + TRAVEL_SLACK_Q40
     return np.asarray(((points.min(axis=1) < low) | (points.max(axis=1) > high)).any(axis=1))

@@ -214,15 +214,27 @@ def open_fault(image: bytes) -> ProgramError | None:
     return None
 
 
-def reserved_faults(image: bytes) -> tuple[bool, bool, bool, int]:
-    """Of an image that opens, what `Program` does not hold: flags or reserved fields of the header wrong,
-    axis count wrong, name badly padded, and the first piece whose reserved field is not 0 (-1: none).
+@dataclass(frozen=True, eq=False)
+class ReservedFields:
+    """What an image says beside a `Program`: whether flags and reserved bytes of the header, the axis count
+    and the padding of the name are as they must be, and where reserved fields of pieces are not 0 (None: nowhere).
     """
+
+    flags: bool
+    axes: bool
+    name: bool
+    pieces: NDArray[np.bool_] | None
+
+
+def reserved_fields(image: bytes) -> ReservedFields:
+    """The same of an image that opens."""
     head = _HEADER.unpack_from(image)
-    flags = bool(head[8] & ~FLAG_CLOSED or head[17] or any(head[19]))
     name = head[18]
-    padded = b"\0" in name and any(name[name.index(b"\0") :])
     after = HEADER_SIZE + SEGMENT_SIZE * head[6]
     reserved = np.frombuffer(image, _PIECE, head[7], after)["reserved"]
-    wrong = np.flatnonzero(reserved)
-    return flags, head[9] != 2, padded, int(wrong[0]) if wrong.size else -1
+    return ReservedFields(
+        flags=not (head[8] & ~FLAG_CLOSED or head[17] or any(head[19])),
+        axes=head[9] == 2,
+        name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
+        pieces=reserved != 0,
+    )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..feed.pieces import derivative_bounds
+from ..feed.pieces import derivative_peaks
 from .exactmath import segment_ways, way_to_q40
 from .image import Program
 
@@ -17,7 +17,7 @@ _ROWS = 12
 def inspect_dict(program: Program) -> dict[str, Any]:
     """What a program holds, as plain numbers in mm and s, for JSON."""
     pieces = program.pieces
-    feed, acceleration, jerk = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)
+    feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)
     dx, dy, _ = (way_to_q40(way) for way in segment_ways(program.u_q44, program.v_q44))
     return {
         "name": program.name,
@@ -40,8 +40,8 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "acceleration_limit_mm_s2": program.acceleration_limit_um_s2 / 1000 or None,
         "jerk_limit_mm_s3": float(program.jerk_limit_mm_s3) or None,
         "peak_feed_mm_s": float(feed.max()),
-        "peak_acceleration_mm_s2": float(np.abs(acceleration).max()),
-        "peak_jerk_mm_s3": float(np.abs(jerk).max()),
+        "peak_acceleration_mm_s2": float(acceleration.max()),
+        "peak_jerk_mm_s3": float(jerk.max()),
         "override_factor_least": float(pieces.override_factor_q24.min()) * 2.0**-24,
         "override_rate_least_per_s": float(pieces.override_rate_q16_per_s.min()) * 2.0**-16,
         "override_second_least_per_s2": float(pieces.override_second_q8_per_s2.min()) * 2.0**-8,
@@ -93,10 +93,10 @@ def _segment_rows(program: Program) -> list[str]:
 
 def _piece_rows(program: Program) -> list[str]:
     pieces = program.pieces
-    feed, acceleration, jerk = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)
+    feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)
     return [
         f"{i:8d} {pieces.duration_q32_s[i] * 2.0**-32:14.9f} {pieces.start_q40[i] * 2.0**-40:14.6f} "
-        f"{feed[i].max():10.4f} {np.abs(acceleration[i]).max():9.2f} {np.abs(jerk[i]).max():10.1f} "
+        f"{feed[i]:10.4f} {acceleration[i]:9.2f} {jerk[i]:10.1f} "
         f"{pieces.override_factor_q24[i] * 2.0**-24:7.4f} "
         f"{pieces.override_rate_q16_per_s[i] * 2.0**-16:7.4g} "
         f"{pieces.override_second_q8_per_s2[i] * 2.0**-8:7.4g}"

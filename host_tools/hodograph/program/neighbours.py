@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed.pieces import FeedPieces, derivative_bounds
+from ..feed.pieces import FeedPieces, derivative_extremes
 
 Int = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -32,7 +32,7 @@ def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[In
 
 def highest_feed(low_q40: Int, high_q40: Int, pieces: FeedPieces) -> Real:
     """Bound of the feed (K,) over stretches low … high of arc length, from the pieces over them."""
-    peak = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)[0].max(axis=1)
+    peak = derivative_extremes(pieces.duration_q32_s, pieces.c_q40)[1][0]
     first = np.clip(np.searchsorted(pieces.start_q40, low_q40, side="right") - 1, 0, None)
     last = np.searchsorted(pieces.start_q40, high_q40, side="left")
     ranges = np.column_stack((first, np.maximum(last, first + 1))).ravel()
