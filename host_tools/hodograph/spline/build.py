@@ -21,9 +21,10 @@ from .system import EndRule, System, clamped_end
 class SplineResult:
     """A spline, how it was found and how good it is; docs/numerics.md 3.5.
 
-    newton_iterations  linear systems solved in all; steps of continuation, trials of other sides of
-                       near-cusps and polishing are counted too
-    trial_iterations   those of them that were trials, on windows of 17 spans at most
+    newton_iterations  linear systems of the whole spline solved, those of continuation and of
+                       polishing after changes included
+    trial_iterations   linear systems solved beside those in trials of the other side of near-cusps,
+                       on windows of 17 spans at most; 0 for smooth input
     changed_sides      near-cusps passed on the other side than the guide's, for less bending
     extra_turning_rad  greatest total turning beyond the guide's within three spans that also bend
     more bending_ratio      bending energy beside the guide's (cubic B-spline or cubic spline)

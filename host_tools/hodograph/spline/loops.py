@@ -32,7 +32,7 @@ _MOST_STEPS = 12
 
 @dataclass(frozen=True)
 class Unlooped:
-    """System (its end signs may have changed), solution, changes made, linear systems solved."""
+    """System (its end signs may have changed), solution, changes made, trial steps."""
 
     system: System
     z: Complex

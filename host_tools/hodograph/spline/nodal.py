@@ -15,6 +15,9 @@ import numpy as np
 from ..errors import InputError
 from .bernstein import Complex, Real
 
+_REPEATED = 1e-12
+"""Points nearer than this share of the largest coordinate are the same."""
+
 
 @dataclass(frozen=True)
 class Guide:
@@ -45,11 +48,12 @@ def checked_points(
     if p.size < minimum:
         kind = "closed" if closed else "open"
         raise InputError(f"{p.size} {what}s: a {kind} path needs at least {minimum}")
-    same = np.flatnonzero(p[1:] == p[:-1])
+    near = _REPEATED * float(np.abs(p).max())
+    same = np.flatnonzero(np.abs(p[1:] - p[:-1]) <= near)
     if same.size:
         k = int(same[0])
         raise InputError(f"{what} {k + 1} repeats {what} {k} at ({_xy(p[k])}): remove one of them")
-    if closed and p[0] == p[-1]:
+    if closed and abs(p[0] - p[-1]) <= near:
         raise InputError(f"the last {what} repeats the first at ({_xy(p[0])}): remove it")
     return p, notes
 
@@ -58,8 +62,8 @@ def _as_complex(points: object, what: str) -> Complex:
     try:
         p = np.asarray(points)
         if p.ndim == 2 and p.shape[1] == 2 and not np.iscomplexobj(p):
-            p = np.asarray(p, dtype=np.float64)
-            p = p[:, 0] + 1j * p[:, 1]
+            pairs = np.ascontiguousarray(p, dtype=np.float64)
+            p = pairs.view(np.complex128)[:, 0]
         p = np.array(p, dtype=np.complex128)
     except (TypeError, ValueError) as error:
         raise InputError(f"{what}s must be a list of [x, y] pairs of numbers") from error

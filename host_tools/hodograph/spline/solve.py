@@ -22,8 +22,8 @@ _ROUNDS = 3
 class Solution:
     """w (M, 3) of the spline and how it was found.
 
-    newton_iterations  linear systems solved in all: continuation, trials and polishing included
-    trial_iterations   those of them that were trials on windows of 17 spans at most
+    newton_iterations  linear systems of the whole spline solved, continuation and polishing included
+    trial_iterations   linear systems solved in trials on windows of 17 spans at most, not among those
     changed_sides      near-cusps that were passed on the other side to get rid of a loop
     """
 
@@ -76,11 +76,11 @@ def _judged(state: _State, guide: Shape) -> Verdict:
 
 
 def _polished(state: _State, better: Unlooped) -> _State:
-    spent, trials = state.spent + better.iterations, state.trials + better.iterations
+    trials = state.trials + better.iterations
     if not better.changes:
-        return replace(state, spent=spent, trials=trials)
+        return replace(state, trials=trials)
     changes = state.changes + better.changes
-    return _converged(_State(better.system, better.z, spent, trials, changes))
+    return _converged(_State(better.system, better.z, state.spent, trials, changes))
 
 
 def _converged(state: _State) -> _State:

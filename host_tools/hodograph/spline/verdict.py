@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .bernstein import Complex, Real, square_modulus
 from .quality import Shape
 
-_EXTRA_TURNING = np.pi
+EXTRA_TURNING_RAD = 1.25 * np.pi
 _TIGHT = 1e3
 _TIGHTER_THAN_GUIDE = 1e2
 _CUSP = 1e6
@@ -55,7 +55,7 @@ def judge(w: Complex, guide_shape: Shape, closed: bool) -> Verdict:
     return Verdict(
         max(float(extra.max()), 0.0),
         ratio,
-        _worst_first(extra, extra > _EXTRA_TURNING),
+        _worst_first(extra, extra > EXTRA_TURNING_RAD),
         _worst_first(own, _turns_on_the_spot(own * length, guide * length)),
     )
 
@@ -68,7 +68,7 @@ def _worst_first(size: Real, chosen: NDArray[np.bool_]) -> tuple[int, ...]:
 def _extra_turning(shape: Shape, guide_shape: Shape, closed: bool) -> Real:
     """Total turning (M,) beyond the guide's in windows; 0 where a bound rules loops out."""
     bound = _windows(shape.most_turning, closed)
-    if float(bound.max()) <= _EXTRA_TURNING:
+    if float(bound.max()) <= EXTRA_TURNING_RAD:
         return np.zeros(bound.size)
     return _windows(shape.total_turning - guide_shape.total_turning, closed)
 
