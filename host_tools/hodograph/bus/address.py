@@ -48,7 +48,9 @@ def check_socketcan(address: BusAddress) -> None:
     try:
         probe = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     except PermissionError:
-        raise BusError(f"{address}: no permission to open CAN sockets: run as another user") from None
+        raise BusError(
+            f"{address}: no permission to open CAN sockets: run as another user"
+        ) from None
     except OSError:
         raise BusError(
             f"{address}: this kernel has no CAN: put tools/with-vcan in front of the command"

@@ -15,7 +15,7 @@ from typing import Any
 
 import can
 import canopen
-from canopen.sdo import SdoAbortedError, SdoCommunicationError
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ..config import KERNELS, Machine
 from ..data import CONTROLLER_EDS
@@ -43,10 +43,10 @@ POLL_S = 0.02
 class Controller:
     """A connection to the controller node; made by `connect`."""
 
-    def __init__(self, address: BusAddress, node: canopen.RemoteNode) -> None:
+    def __init__(self, address: BusAddress, node_id: int, node: canopen.RemoteNode) -> None:
         self.address = address
-        self.node_id = int(node.id)
-        self._sdo = node.sdo
+        self.node_id = node_id
+        self._sdo: Any = node.sdo
         self._sdo.RESPONSE_TIMEOUT = 1.0
 
     def read(self, index: int, sub: int | None = None) -> int:
@@ -68,14 +68,18 @@ class Controller:
         try:
             return action()
         except SdoAbortedError as error:
-            raise RefusedError(f"{self._who()} refused object {_name(index, sub)}: {error}") from error
+            raise RefusedError(
+                f"{self._who()} refused object {_name(index, sub)}: {error}"
+            ) from error
         except SdoCommunicationError as error:
             raise BusError(
                 f"{self._who()} stopped answering (object {_name(index, sub)}): "
                 "is its process or its power gone?"
             ) from error
         except KeyError as error:
-            raise BusError(f"the EDS file has no object {_name(index, sub)}: wrong version?") from error
+            raise BusError(
+                f"the EDS file has no object {_name(index, sub)}: wrong version?"
+            ) from error
         except (can.CanError, OSError) as error:
             raise BusError(f"{self.address}: cannot send: {_one_line(error)}") from error
 
@@ -92,7 +96,9 @@ class Controller:
                     self._variable(STATE, None).raw  # noqa: B018
                     return True
                 except SdoAbortedError as error:
-                    raise BusError(f"{self._who()} is not a Hodograph controller: {error}") from error
+                    raise BusError(
+                        f"{self._who()} is not a Hodograph controller: {error}"
+                    ) from error
                 except SdoCommunicationError:
                     if time.monotonic() >= deadline:
                         return False
@@ -156,9 +162,7 @@ class Controller:
             self._sdo.RESPONSE_TIMEOUT = patience
 
     def _block_download(self, image: bytes, progress: Callable[[int], None] | None) -> None:
-        stream = self._sdo.open(
-            PROGRAM, 1, "wb", buffering=0, size=len(image), block_transfer=True
-        )
+        stream = self._sdo.open(PROGRAM, 1, "wb", buffering=0, size=len(image), block_transfer=True)
         try:
             while stream.pos < len(image):
                 stream.write(image[stream.pos : stream.pos + 7])
@@ -338,7 +342,7 @@ def connect(
             remote = network.add_node(node, str(eds))
         except Exception as error:
             raise BusError(f"{eds}: not a usable EDS file: {_one_line(error)}") from error
-        yield Controller(address, remote)
+        yield Controller(address, node, remote)
 
 
 def _configuration(machine: Machine, kernel: str) -> list[tuple[tuple[int, int | None], int]]:

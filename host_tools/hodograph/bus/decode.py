@@ -19,9 +19,10 @@ from .recorder import Frames
 
 SYNC_ID, RPDO1, TPDO1, TPDO2 = 0x080, 0x200, 0x180, 0x280
 SYNC_OVERFLOW = 240
-_LONGEST_LAG = 2
-_LEAD_IN = 100
-"""SYNCs at the beginning of a recording (standstill) within which a late answer must have shown itself."""
+_LONGEST_LAG = 250
+"""SYNCs by which an answer may be late: a slow host delays drives, but frames keep their order."""
+_LEAD_IN = 200
+"""SYNCs at both ends of a recording (standstill) within which lateness shows itself or is made up for."""
 
 Int32 = NDArray[np.int32]
 
@@ -60,7 +61,7 @@ def decode_ticks(frames: Frames, nodes: Sequence[int]) -> Ticks:
         volts = [_by_sync(frames, sync_at, TPDO2 + n, f"volts of node {n}") for n in nodes]
         streams = streams + volts
     count = min(len(stream) for stream in streams)
-    if count < sync_at.size - _LONGEST_LAG:
+    if count < sync_at.size - _LEAD_IN:
         raise RunError(f"recording ends in the middle: {count} of {sync_at.size} ticks are whole")
     return Ticks(
         targets=np.stack([_integers(d[:count], 2, "<i4") for d in targets], axis=1),
@@ -91,19 +92,17 @@ def _by_sync(
     interval = np.searchsorted(sync_at, at) - 1
     at, interval = at[interval >= 0], interval[interval >= 0]
     lag = interval - np.arange(at.size)
-    # A late answer to a SYNC before the recording shifts all others by one, until the first is dropped.
-    for _ in range(_LONGEST_LAG):
-        early = np.flatnonzero(lag < 0)
-        if not early.size or early[0] > _LEAD_IN:
-            break
-        at, interval = at[1:], interval[1:]
-        lag = interval - np.arange(at.size)
+    # Late answers to SYNCs before the recording shift all others, which shows when the drive has caught up.
+    foreign = -int(lag[:_LEAD_IN].min(initial=0))
+    at, interval = at[foreign:], interval[foreign:]
+    lag = interval - np.arange(at.size)
     early = np.flatnonzero(lag < 0)
     if early.size:
         raise RunError(f"{what}: more than one frame for SYNC {int(interval[early[0]])}")
     late = np.flatnonzero(lag > _LONGEST_LAG)
-    if late.size:
-        raise RunError(f"{what}: no frame for SYNC {int(late[0])}: the recording is incomplete")
+    if late.size or lag[-_LEAD_IN:].min(initial=_LONGEST_LAG) > 0:  # a lost frame is never made up for
+        lost = int(late[0]) if late.size else int(np.flatnonzero(lag == 0)[-1:].sum()) + 1
+        raise RunError(f"{what}: no frame for SYNC {lost}: the recording is incomplete")
     return np.asarray(frames["data"][at])
 
 

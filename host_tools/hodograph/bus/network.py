@@ -24,7 +24,7 @@ for _name in ("canopen", "can"):
     logging.getLogger(_name).propagate = False
 
 
-class _Network(canopen.Network):  # type: ignore[misc]
+class _Network(canopen.Network):
     """canopen's network, patient when the transmit queue of a slow bus is full."""
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:

@@ -81,7 +81,10 @@ class Rig:
     """
 
     def __init__(self, machine: Machine, address: BusAddress, pace: str) -> None:
-        self._commands = [drive_command(machine, address), controller_command(machine, address, pace)]
+        self._commands = [
+            drive_command(machine, address),
+            controller_command(machine, address, pace),
+        ]
         self._children: list[tuple[subprocess.Popen[bytes], IO[bytes]]] = []
 
     def __enter__(self) -> Rig:
@@ -142,7 +145,9 @@ class Rig:
 
 
 def _program(child: subprocess.Popen[bytes]) -> str:
-    words = [str(word) for word in child.args] if isinstance(child.args, list) else [str(child.args)]
+    words = (
+        [str(word) for word in child.args] if isinstance(child.args, list) else [str(child.args)]
+    )
     return words[4] if words[0].endswith("setpriv") else words[0]
 
 

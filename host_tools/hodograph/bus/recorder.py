@@ -157,9 +157,9 @@ class Recorder:
                     self._bytes += count * _FRAME_BYTES
                     self._dropped = batch.dropped(count - 1) or self._dropped
                     batch.rearm(count)
-                elif ending:
-                    return
                 if count < _BATCH:
+                    if ending:
+                        return
                     time.sleep(_PAUSE_S)
         except OSError as error:
             self._error = error

@@ -7,13 +7,13 @@ from typing import Any
 
 from .controller import (
     ACTUAL,
+    AXIS_NODE,
     CONFIGURATION,
     DRIVE_ERROR,
     FAULT,
     MOTION,
     STATUSWORD,
     TARGET,
-    AXIS_NODE,
     Controller,
 )
 from .texts import REFUSALS, STATES, drive_state, fault_text

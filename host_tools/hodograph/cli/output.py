@@ -47,9 +47,7 @@ def number(value: float) -> str:
 
 
 @contextmanager
-def progress(
-    title: str, unit: str, total: int | None = None
-) -> Iterator[Callable[[int], None]]:
+def progress(title: str, unit: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
     """A progress bar on stderr while it is a terminal; call the result with what is done so far."""
     if not sys.stderr.isatty():
         yield lambda done: None
@@ -57,7 +55,11 @@ def progress(
     from tqdm import tqdm
 
     with tqdm(total=total, desc=title, unit=unit, leave=False, delay=0.3) as bar:
-        yield lambda done: bar.update(done - bar.n)
+
+        def advance(done: int) -> None:
+            bar.update(done - bar.n)
+
+        yield advance
 
 
 def write_file(file: Path, data: bytes) -> None:

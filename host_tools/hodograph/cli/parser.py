@@ -16,7 +16,9 @@ from ..bus.processes import PACES
 from ..config import KERNELS
 from ..errors import InputError
 
-DESCRIPTION = "From a control polygon to encoder counts: jerk-limited motion on PH splines over CAN."
+DESCRIPTION = (
+    "From a control polygon to encoder counts: jerk-limited motion on PH splines over CAN."
+)
 EPILOG = (
     "exit status: 0 done, 1 internal or build, 2 wrong input, 3 path or feed not possible, 4 bus or node, "
     "5 refused by the controller, 6 run failed, 130 interrupted (docs/cli.md)"
@@ -101,7 +103,9 @@ def make_parser() -> argparse.ArgumentParser:
     """The whole command line."""
     parser = _Parser(prog="hodograph", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action="version", version=f"hodograph {__version__}")
-    parser.add_argument("--debug", action="store_true", help="show tracebacks (or HODOGRAPH_DEBUG=1)")
+    parser.add_argument(
+        "--debug", action="store_true", help="show tracebacks (or HODOGRAPH_DEBUG=1)"
+    )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
 
     def command(name: str, text: str) -> argparse.ArgumentParser:
@@ -141,7 +145,9 @@ def make_parser() -> argparse.ArgumentParser:
     _json(upload)
 
     goto = command("goto", "move straight to a program's start and load the program")
-    goto.add_argument("file", metavar="FILE", type=Path, help="path file, or a machine file with --to")
+    goto.add_argument(
+        "file", metavar="FILE", type=Path, help="path file, or a machine file with --to"
+    )
     goto.add_argument(
         "--to", type=finite, nargs=2, metavar=("X", "Y"), help="move there instead (machine mm)"
     )
@@ -181,8 +187,12 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--pace", choices=PACES, help="of a controller started here (default real-time)"
     )
-    run.add_argument("--trace", type=Path, metavar="CSV", help="write one row a tick (one FILE only)")
-    run.add_argument("--report", type=Path, metavar="DIR", help="write report.html and figures there")
+    run.add_argument(
+        "--trace", type=Path, metavar="CSV", help="write one row a tick (one FILE only)"
+    )
+    run.add_argument(
+        "--report", type=Path, metavar="DIR", help="write report.html and figures there"
+    )
 
     report = command("report", "simulate paths and write a report with figures")
     _file(report, many=True)
@@ -196,7 +206,9 @@ def make_parser() -> argparse.ArgumentParser:
     _json(paper)
 
     rig = command("rig", "bring up a simulated machine on a virtual bus until Ctrl-C")
-    rig.add_argument("file", metavar="FILE", type=Path, help="machine file, or a path file that names one")
+    rig.add_argument(
+        "file", metavar="FILE", type=Path, help="machine file, or a path file that names one"
+    )
     _bus(rig)
     _kernel(rig)
     rig.add_argument("--pace", choices=PACES, default="real-time")

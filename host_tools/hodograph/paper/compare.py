@@ -80,7 +80,12 @@ def _feed_rows(chain: Chain, row: Any) -> None:
     row("peak_jerk_modified_mm_s3", "mm/s^3", PEAK_JERK_MM_S3, jerk)
     row("peak_jerk_reduction_percent", "%", REDUCTION_PERCENT, 100 * (1 - jerk / plain_jerk))
     row("peak_jerk_at_paper_n_c_mm_s3", "mm/s^3", PEAK_JERK_MM_S3, at_paper_n_c)
-    row("reduction_at_paper_n_c_percent", "%", REDUCTION_PERCENT, 100 * (1 - at_paper_n_c / plain_jerk))
+    row(
+        "reduction_at_paper_n_c_percent",
+        "%",
+        REDUCTION_PERCENT,
+        100 * (1 - at_paper_n_c / plain_jerk),
+    )
     row("peak_acceleration_mm_s2", "mm/s^2", None, plan.peak_acceleration_mm_s2)
 
 

@@ -51,7 +51,7 @@ class JointDisturbance:
 def joint_disturbance(spline: PHSpline, feed_mm_s: float, period_s: float) -> JointDisturbance:
     """Samples the exact curve every period at constant feed and takes the differences."""
     step_mm = feed_mm_s * period_s
-    s_mm = np.arange(int(spline.length_mm / step_mm) + 1) * step_mm
+    s_mm: Real = np.arange(int(spline.length_mm / step_mm) + 1, dtype=np.float64) * step_mm
     speed = np.abs(np.diff(spline.point(s_mm))) / period_s
     ends = spline.segment_starts_mm
     return JointDisturbance(
@@ -64,7 +64,9 @@ def joint_disturbance(spline: PHSpline, feed_mm_s: float, period_s: float) -> Jo
     )
 
 
-def chord_acceleration_mm_s2(spline: PHSpline, s_mm: Real, feed_mm_s: float, period_s: float) -> Real:
+def chord_acceleration_mm_s2(
+    spline: PHSpline, s_mm: Real, feed_mm_s: float, period_s: float
+) -> Real:
     """What the shortening of chords alone gives: d/dt of -V^3 dt^2 kappa(s)^2 / 24, at arc lengths `s_mm`."""
     shortening = -(feed_mm_s**3) * period_s**2 / 24.0 * spline.curvature(s_mm) ** 2
     return np.asarray(np.gradient(shortening, s_mm) * feed_mm_s)

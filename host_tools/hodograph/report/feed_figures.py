@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from ..chain import Chain
 from ..feed import FeedPlan
-from ..feed.shapes import N_C_HIGH, N_C_LOW
 from ..feed.ramp import JERK, exponential_ramp
+from ..feed.shapes import N_C_HIGH, N_C_LOW
 from ..paper import plain_plan
 from .style import BLUE, GREEN, GREY, ORANGE, RED, png
 
@@ -74,7 +74,9 @@ def search_figure(plan: FeedPlan) -> bytes | None:
         markersize=3.5,
         label="best so far",
     )
-    function.plot(best.best, best.value, "*", color=GREEN, markersize=12, label=f"n_c {best.best:.4f}")
+    function.plot(
+        best.best, best.value, "*", color=GREEN, markersize=12, label=f"n_c {best.best:.4f}"
+    )
     top = 1.25 * plan.history[0].value
     function.set_ylim(0.95 * best.value, min(max(jerk), top))
     function.set_xlabel("slope coefficient n_c")

@@ -88,7 +88,9 @@ def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
             "(paper, figure 7).",
             contour_figure(chain, motion),
         ),
-        _Figure("drives", f"Following error and voltage by axis, {source}.", drive_figure(chain, motion)),
+        _Figure(
+            "drives", f"Following error and voltage by axis, {source}.", drive_figure(chain, motion)
+        ),
     ]
     return {
         "name": chain.file.name,

@@ -33,7 +33,9 @@ def joint_figure(chain: Chain, plan: FeedPlan) -> bytes:
         axes.margins(x=0)
         for joint in found.joints_mm:
             axes.axvline(float(joint), color=GREY, linewidth=0.8, linestyle=(0, (2, 3)), zorder=0)
-    top.set_title(f"{chain.file.name}: disturbance at constant {plan.feed_mm_s:.4g} mm/s; dashed: joints")
+    top.set_title(
+        f"{chain.file.name}: disturbance at constant {plan.feed_mm_s:.4g} mm/s; dashed: joints"
+    )
     top.legend(loc="best")
     bottom.set_xlabel("arc length, mm")
     return png(figure)

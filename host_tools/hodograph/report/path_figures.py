@@ -36,7 +36,12 @@ def _plane(axes: Axes, chain: Chain) -> None:
         polygon = np.append(given, given[0]) if path.closed else given
         axes.plot(polygon.real, polygon.imag, color=GREY, linewidth=1.0, linestyle=(0, (4, 2)))
         axes.plot(
-            given.real, given.imag, "s", color=GREY, markersize=4.5, label=f"{given.size} control points"
+            given.real,
+            given.imag,
+            "s",
+            color=GREY,
+            markersize=4.5,
+            label=f"{given.size} control points",
         )
     points = spline.point(np.linspace(0.0, spline.length_mm, _SAMPLES))
     axes.plot(points.real, points.imag, color=BLUE, linewidth=2.0, label="C2 PH quintic spline")

@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import matplotlib
 
@@ -19,7 +20,7 @@ INK, SOFT, GRID = "#22282f", "#6b7684", "#e3e7ec"
 BLUE, ORANGE, GREEN, RED, GREY = "#1f6fb4", "#e07b28", "#2a9461", "#c23b3b", "#9aa4b0"
 DPI = 144
 
-_SETTINGS = {
+_SETTINGS: Any = {
     "figure.dpi": DPI,
     "figure.facecolor": "white",
     "figure.constrained_layout.use": True,
