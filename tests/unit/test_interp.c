@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/interp.h"
+
+#include "core/timebase.h"
+#include "golden.h"
+#include "unity.h"
+
+#define NANOMETRE_Q40 ((int64_t)1099512) /* 1e-6 mm */
+
+static const char *const names[] = {"alpha_exponential.hdgp", "heart_minimax.hdgp",
+                                    "star_minimax.hdgp",      "line_tiny.hdgp",
+                                    "line_slow.hdgp",         "alpha_offset.hdgp"};
+#define NAMES (sizeof names / sizeof names[0])
+
+static struct program p;
+static struct interp it;
+static struct interp_point a, b;
+
+void setUp(void)
+{
+    golden_open(&p, "alpha_minimax.hdgp");
+}
+
+void tearDown(void)
+{
+    golden_close(&p);
+}
+
+static void assert_same_point(void)
+{
+    TEST_ASSERT_EQUAL_INT64(a.arc_length_q40_mm, b.arc_length_q40_mm);
+    TEST_ASSERT_EQUAL_INT64(a.x_q40_mm, b.x_q40_mm);
+    TEST_ASSERT_EQUAL_INT64(a.y_q40_mm, b.y_q40_mm);
+    TEST_ASSERT_EQUAL_INT64(a.feed_q32_mm_s, b.feed_q32_mm_s);
+}
+
+static void test_refuses_nonsense(void)
+{
+    TEST_ASSERT_EQUAL_INT(INTERP_ERR_PROGRAM, interp_begin(&it, NULL, INTERP_FIXED));
+    TEST_ASSERT_EQUAL_INT(INTERP_ERR_KERNEL, interp_begin(&it, &p, (enum interp_kernel)3));
+}
+
+static void test_begins_at_the_start(void)
+{
+    struct program_segment first;
+    program_segment_get(&p, 0, &first);
+    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
+        interp_begin(&it, &p, (enum interp_kernel)kernel);
+        TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(&it, 0, &a));
+        TEST_ASSERT_EQUAL_INT64(0, a.arc_length_q40_mm);
+        TEST_ASSERT_INT64_WITHIN(10 * NANOMETRE_Q40, first.x_q40_mm, a.x_q40_mm);
+        TEST_ASSERT_INT64_WITHIN(10 * NANOMETRE_Q40, first.y_q40_mm, a.y_q40_mm);
+    }
+}
+
+/* The end is the same bits in every kernel, and the alpha ends at its last control point, 18i. */
+static void test_ends_exactly(void)
+{
+    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
+        interp_begin(&it, &p, (enum interp_kernel)kernel);
+        TEST_ASSERT_EQUAL_INT(INTERP_END, interp_at(&it, p.header.duration_q32_s, &a));
+        TEST_ASSERT_EQUAL_INT(INTERP_END, interp_at(&it, UINT64_MAX, &b));
+        assert_same_point();
+        TEST_ASSERT_EQUAL_INT64(p.header.length_q40_mm, a.arc_length_q40_mm);
+        TEST_ASSERT_INT64_WITHIN(64, 0, a.x_q40_mm);
+        TEST_ASSERT_INT64_WITHIN(64, (int64_t)18 << 40, a.y_q40_mm);
+        TEST_ASSERT_EQUAL_INT64(0, a.feed_q32_mm_s);
+    }
+}
+
+/* A run, and single points reached by seeks in random order, give the same bits. */
+static void test_point_depends_on_time_only(void)
+{
+    static struct interp other;
+    uint64_t random = 1;
+    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
+        interp_begin(&it, &p, (enum interp_kernel)kernel);
+        interp_begin(&other, &p, (enum interp_kernel)kernel);
+        uint64_t duration = p.header.duration_q32_s << 10;
+        uint64_t time = 0;
+        while (time < duration) {
+            TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(&it, time, &a));
+            interp_seek(&other, golden_random(&random) % duration >> 10);
+            interp_seek(&other, time >> 10);
+            TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(&other, time, &b));
+            assert_same_point();
+            time += golden_random(&random) % ((uint64_t)8 << 32);
+        }
+    }
+}
+
+static void test_jumps_are_refused(void)
+{
+    interp_begin(&it, &p, INTERP_FIXED);
+    TEST_ASSERT_EQUAL_INT(INTERP_ERR_JUMP, interp_at(&it, p.header.duration_q32_s - 1u, &a));
+    TEST_ASSERT_EQUAL_INT(0, interp_seek(&it, p.header.duration_q32_s - 1u));
+    TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at(&it, p.header.duration_q32_s - 1u, &a));
+    TEST_ASSERT_EQUAL_INT(INTERP_ERR_JUMP, interp_at(&it, 0, &a));
+    TEST_ASSERT_EQUAL_INT(0, interp_seek(&it, 0));
+    TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at(&it, 0, &a));
+}
+
+static int64_t distance(int64_t u, int64_t v)
+{
+    return u > v ? u - v : v - u;
+}
+
+/* All kernels agree on every tick of every golden program: fixed within 1 nm / 1000 of double, float
+ * within 10 nm. */
+static void compare_kernels(void)
+{
+    static struct interp floating, exact;
+    struct interp_point c;
+    struct timebase tb;
+    interp_begin(&it, &p, INTERP_FIXED);
+    interp_begin(&floating, &p, INTERP_FLOAT);
+    interp_begin(&exact, &p, INTERP_DOUBLE);
+    timebase_begin(&tb, &p, p.header.period_us);
+    for (uint32_t tick = 0; tick < program_ticks(&p); tick++) {
+        timebase_step(&tb);
+        uint64_t time = timebase_time_q42(&tb);
+        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&it, time, &a));
+        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&floating, time, &b));
+        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&exact, time, &c));
+        TEST_ASSERT_LESS_THAN_INT64(NANOMETRE_Q40 / 1000, distance(a.x_q40_mm, c.x_q40_mm));
+        TEST_ASSERT_LESS_THAN_INT64(NANOMETRE_Q40 / 1000, distance(a.y_q40_mm, c.y_q40_mm));
+        TEST_ASSERT_LESS_THAN_INT64(10 * NANOMETRE_Q40, distance(b.x_q40_mm, c.x_q40_mm));
+        TEST_ASSERT_LESS_THAN_INT64(10 * NANOMETRE_Q40, distance(b.y_q40_mm, c.y_q40_mm));
+    }
+    TEST_ASSERT_EQUAL_INT(TIMEBASE_ENDED, timebase_state(&tb));
+    TEST_ASSERT_EQUAL_INT64(p.header.length_q40_mm, a.arc_length_q40_mm);
+}
+
+static void test_kernels_agree(void)
+{
+    for (unsigned i = 0; i < NAMES; i++) {
+        golden_close(&p);
+        golden_open(&p, names[i]);
+        compare_kernels();
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_refuses_nonsense);
+    RUN_TEST(test_begins_at_the_start);
+    RUN_TEST(test_ends_exactly);
+    RUN_TEST(test_point_depends_on_time_only);
+    RUN_TEST(test_jumps_are_refused);
+    RUN_TEST(test_kernels_agree);
+    return UNITY_END();
+}

@@ -1,0 +1,174 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The kernels on random segments that reach the limit of the speed ratio, from 32 mm to 1e-10 mm long: the bounds of
+ * docs/numerics.md sections 9 to 12. (Against 50-digit arithmetic: benchmarks/kernels.py.)
+ */
+#include "core/kernel_double.h"
+#include "core/kernel_fixed.h"
+#include "core/kernel_float.h"
+#include "core/qmath.h"
+#include "golden.h"
+#include "unity.h"
+
+#define SEGMENTS 20000
+#define POINTS   8
+
+static uint64_t seed;
+static struct ph_segment ph;
+static struct kernel_fixed_segment fixed;
+static struct kernel_float_segment floats;
+static struct kernel_double_segment doubles;
+
+void setUp(void)
+{
+    seed = 11;
+}
+
+void tearDown(void)
+{
+}
+
+static double uniform(double from, double to)
+{
+    return from + (to - from) * ((double)(golden_random(&seed) >> 11) / 9007199254740992.0);
+}
+
+static double ratio_of_speed(const double u[3], const double v[3])
+{
+    double b[5] = {u[0] * u[0] + v[0] * v[0], u[0] * u[1] + v[0] * v[1],
+                   (u[0] * u[2] + v[0] * v[2] + 2 * (u[1] * u[1] + v[1] * v[1])) / 3,
+                   u[1] * u[2] + v[1] * v[2], u[2] * u[2] + v[2] * v[2]};
+    double least = b[0];
+    double greatest = b[0];
+    for (int k = 1; k < 5; k++) {
+        least = b[k] < least ? b[k] : least;
+        greatest = b[k] > greatest ? b[k] : greatest;
+    }
+    return least > 0 ? greatest / least : 1e30;
+}
+
+/* w0 = 1 up to scale and rotation, which random_segment adds. */
+static void draw(double u[3], double v[3])
+{
+    u[0] = 1;
+    v[0] = 0;
+    do {
+        u[1] = uniform(-2.5, 2.5);
+        v[1] = uniform(-2.5, 2.5);
+        u[2] = uniform(-1.5, 1.5);
+        v[2] = uniform(-1.5, 1.5);
+    } while (ratio_of_speed(u, v) > 1.999);
+}
+
+static void random_segment(struct program_segment *g, int binary_exponent)
+{
+    double u[3];
+    double v[3];
+    double c = uniform(-1, 1);
+    double s = uniform(-1, 1);
+    double scale = 17592186044416.0;
+    draw(u, v);
+    for (int i = binary_exponent; i < 0; i++) {
+        scale *= 0.5;
+    }
+    for (int i = binary_exponent; i > 0; i--) {
+        scale *= 2;
+    }
+    for (int k = 0; k < 3; k++) {
+        g->u_q44[k] = (int64_t)(scale * (c * u[k] - s * v[k]));
+        g->v_q44[k] = (int64_t)(scale * (c * v[k] + s * u[k]));
+    }
+    g->start_q40_mm = (int64_t)(golden_random(&seed) >> 3);
+    g->x_q40_mm = (int64_t)golden_random(&seed) >> 12;
+    g->y_q40_mm = (int64_t)golden_random(&seed) >> 12;
+}
+
+static int64_t worst_of(const int64_t a[2], const int64_t b[2])
+{
+    int64_t x = a[0] > b[0] ? a[0] - b[0] : b[0] - a[0];
+    int64_t y = a[1] > b[1] ? a[1] - b[1] : b[1] - a[1];
+    return x > y ? x : y;
+}
+
+static void compare_at(int64_t arc_q40)
+{
+    int64_t a[2];
+    int64_t b[2];
+    int64_t c[2];
+    kernel_fixed_segment_at(&fixed, arc_q40, a);
+    kernel_float_segment_at(&floats, arc_q40, b);
+    kernel_double_segment_at(&doubles, arc_q40, c);
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(8, worst_of(a, c));                /* 2^-37 mm */
+    TEST_ASSERT_LESS_OR_EQUAL_INT64((int64_t)1 << 22, worst_of(b, c)); /* 2^-18 mm = 3.8 nm */
+}
+
+static void test_kernels_agree_at_the_limit_of_the_ratio(void)
+{
+    for (int i = 0; i < SEGMENTS; i++) {
+        struct program_segment g;
+        int64_t end_q48[3];
+        random_segment(&g, (int)(golden_random(&seed) % 19u) - 17);
+        ph_segment_expand(&ph, &g);
+        ph_segment_end(&ph, end_q48);
+        if (end_q48[PH_S] > (int64_t)32 << 48) {
+            continue;
+        }
+        kernel_fixed_segment_set(&fixed, &ph);
+        kernel_float_segment_set(&floats, &ph);
+        kernel_double_segment_set(&doubles, &ph);
+        int64_t length_q40 = end_q48[PH_S] >> 8;
+        compare_at(g.start_q40_mm);
+        compare_at(g.start_q40_mm + length_q40);
+        for (int k = 0; k < POINTS; k++) {
+            compare_at(g.start_q40_mm + (int64_t)(uniform(0, 1) * (double)length_q40));
+        }
+    }
+}
+
+/* At the two ends the fixed kernel is at the end points of the segment. */
+static void test_ends_are_met(void)
+{
+    for (int i = 0; i < SEGMENTS; i++) {
+        struct program_segment g;
+        int64_t end_q48[3];
+        int64_t a[2];
+        random_segment(&g, 1);
+        ph_segment_expand(&ph, &g);
+        ph_segment_end(&ph, end_q48);
+        if (end_q48[PH_S] > (int64_t)32 << 48) {
+            continue;
+        }
+        kernel_fixed_segment_set(&fixed, &ph);
+        kernel_fixed_segment_at(&fixed, g.start_q40_mm, a);
+        TEST_ASSERT_INT64_WITHIN(4, g.x_q40_mm, a[0]);
+        TEST_ASSERT_INT64_WITHIN(4, g.y_q40_mm, a[1]);
+        kernel_fixed_segment_at(&fixed, g.start_q40_mm + qmath_round(end_q48[PH_S], 8), a);
+        TEST_ASSERT_INT64_WITHIN(4, g.x_q40_mm + qmath_round(end_q48[PH_X], 8), a[0]);
+        TEST_ASSERT_INT64_WITHIN(4, g.y_q40_mm + qmath_round(end_q48[PH_Y], 8), a[1]);
+    }
+}
+
+/* A straight line along x of sigma = 4 mm: every coefficient is known. */
+static void test_expansion_of_a_line(void)
+{
+    const int64_t two = (int64_t)2 << 44;
+    struct program_segment g = {0, 0, 0, {two, two, two}, {0, 0, 0}};
+    ph_segment_expand(&ph, &g);
+    TEST_ASSERT_INT64_WITHIN(4, (int64_t)2 << 48, ph.c_q48_mm[PH_X][0]);
+    TEST_ASSERT_INT64_WITHIN(4, (int64_t)2 << 48, ph.c_q48_mm[PH_X][1]);
+    TEST_ASSERT_INT64_WITHIN(4, (int64_t)2 << 48, ph.c_q48_mm[PH_S][1]);
+    for (int k = 0; k < 6; k++) {
+        TEST_ASSERT_EQUAL_INT64(0, ph.c_q48_mm[PH_Y][k]);
+    }
+    TEST_ASSERT_EQUAL_INT(4, ph.exponent);
+    TEST_ASSERT_INT64_WITHIN(32, (int64_t)4 << 50, ph.sigma_q50_mm[1]);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_kernels_agree_at_the_limit_of_the_ratio);
+    RUN_TEST(test_ends_are_met);
+    RUN_TEST(test_expansion_of_a_line);
+    return UNITY_END();
+}

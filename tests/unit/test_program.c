@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/program.h"
+
+#include "core/counts.h"
+#include "core/crc32.h"
+#include "golden.h"
+#include "unity.h"
+
+static struct program p;
+
+void setUp(void)
+{
+    golden_open(&p, "heart_exponential.hdgp");
+}
+
+void tearDown(void)
+{
+    golden_close(&p);
+}
+
+static void test_crc_of_the_standard_check_string(void)
+{
+    const uint8_t check[] = "123456789";
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926u, crc32_update(0, check, 9));
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926u, crc32_update(crc32_update(0, check, 4), check + 4, 5));
+    TEST_ASSERT_EQUAL_HEX32(0, crc32_update(0, check, 0));
+}
+
+static void test_header_is_read(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(1000, p.header.period_us);
+    TEST_ASSERT_EQUAL_UINT32(PROGRAM_FLAG_CLOSED, p.header.flags);
+    TEST_ASSERT_EQUAL_UINT32(p.size, PROGRAM_HEADER_SIZE +
+                                         p.header.segment_count * PROGRAM_SEGMENT_SIZE +
+                                         p.header.piece_count * PROGRAM_PIECE_SIZE);
+    TEST_ASSERT_EQUAL_CHAR('\0', p.header.name[32]);
+}
+
+/* The first segment starts at (-20 - 35i)/6, the paper's first nodal point of the heart. */
+static void test_segment_is_read(void)
+{
+    struct program_segment g;
+    program_segment_get(&p, 0, &g);
+    TEST_ASSERT_EQUAL_INT64(0, g.start_q40_mm);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -20.0 / 6.0, (double)g.x_q40_mm / 1099511627776.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -35.0 / 6.0, (double)g.y_q40_mm / 1099511627776.0);
+    program_segment_get(&p, 1, &g);
+    TEST_ASSERT_EQUAL_INT64(program_segment_start(&p, 1), g.start_q40_mm);
+}
+
+static void test_pieces_sum_up(void)
+{
+    uint64_t sum = 0;
+    struct program_piece c;
+    for (uint32_t i = 0; i < p.header.piece_count; i++) {
+        program_piece_get(&p, i, &c);
+        TEST_ASSERT_EQUAL_UINT64(program_piece_duration(&p, i), c.duration_q32_s);
+        TEST_ASSERT_EQUAL_UINT32(0, c.reserved);
+        sum += c.duration_q32_s;
+    }
+    TEST_ASSERT_EQUAL_UINT64(p.header.duration_q32_s, sum);
+}
+
+static void test_ticks(void)
+{
+    p.header.period_us = 8000;
+    p.header.duration_q32_s = (uint64_t)1 << 32; /* 125 periods exactly */
+    TEST_ASSERT_EQUAL_UINT32(126, program_ticks(&p));
+    p.header.duration_q32_s++;
+    TEST_ASSERT_EQUAL_UINT32(127, program_ticks(&p));
+    p.header.duration_q32_s -= 2;
+    TEST_ASSERT_EQUAL_UINT32(126, program_ticks(&p));
+    p.header.period_us = 1000;
+    p.header.duration_q32_s = 1;
+    TEST_ASSERT_EQUAL_UINT32(2, program_ticks(&p));
+    p.header.duration_q32_s = (uint64_t)1 << 54;
+    TEST_ASSERT_EQUAL_UINT32(4194304001u, program_ticks(&p));
+}
+
+static void test_exponent(void)
+{
+    TEST_ASSERT_EQUAL_INT(-32, program_piece_exponent(1));
+    TEST_ASSERT_EQUAL_INT(-31, program_piece_exponent(2));
+    TEST_ASSERT_EQUAL_INT(-30, program_piece_exponent(3));
+    TEST_ASSERT_EQUAL_INT(0, program_piece_exponent((uint64_t)1 << 32));
+    TEST_ASSERT_EQUAL_INT(1, program_piece_exponent(((uint64_t)1 << 32) + 1));
+    TEST_ASSERT_EQUAL_INT(22, program_piece_exponent((uint64_t)1 << 54));
+    TEST_ASSERT_EQUAL_INT(31, program_piece_exponent(UINT64_MAX));
+}
+
+static void test_counts(void)
+{
+    const int64_t half = (int64_t)1 << 39;
+    TEST_ASSERT_EQUAL_INT32(0, counts_from_q40_mm(0, 1000000));
+    TEST_ASSERT_EQUAL_INT32(1000000, counts_from_q40_mm(2 * half, 1000000));
+    TEST_ASSERT_EQUAL_INT32(1, counts_from_q40_mm(half, 1));
+    TEST_ASSERT_EQUAL_INT32(0, counts_from_q40_mm(half - 1, 1));
+    TEST_ASSERT_EQUAL_INT32(0, counts_from_q40_mm(-half, 1));
+    TEST_ASSERT_EQUAL_INT32(-1, counts_from_q40_mm(-half - 1, 1));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, counts_from_q40_mm((int64_t)3000 << 40, 1000000));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, counts_from_q40_mm(-((int64_t)3000 << 40), 1000000));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, counts_from_q40_mm(INT64_MAX, UINT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, counts_from_q40_mm(INT64_MIN, UINT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(0, counts_from_q40_mm(INT64_MAX, 0));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_crc_of_the_standard_check_string);
+    RUN_TEST(test_header_is_read);
+    RUN_TEST(test_segment_is_read);
+    RUN_TEST(test_pieces_sum_up);
+    RUN_TEST(test_ticks);
+    RUN_TEST(test_exponent);
+    RUN_TEST(test_counts);
+    return UNITY_END();
+}

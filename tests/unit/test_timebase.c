@@ -1,0 +1,163 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/timebase.h"
+
+#include <string.h>
+
+#include "golden.h"
+#include "unity.h"
+
+static struct program p;
+static struct timebase tb;
+
+void setUp(void)
+{
+    golden_open(&p, "alpha_minimax.hdgp");
+}
+
+void tearDown(void)
+{
+    golden_close(&p);
+}
+
+/* floor(k period_us 2^bits / 10^6 + 1/2), for products below 2^64 */
+static uint64_t exact_tick(uint64_t k, uint64_t period_us, int bits)
+{
+    uint64_t us = k * period_us;
+    uint64_t whole = us / 1000000u;
+    uint64_t rest = us % 1000000u;
+    return (whole << bits) + ((rest << bits) + 500000u) / 1000000u;
+}
+
+static void test_ticks_are_exact(void)
+{
+    const uint32_t periods[] = {1000, 2000, 4000, 8000};
+    for (int i = 0; i < 4; i++) {
+        timebase_begin(&tb, &p, periods[i]);
+        for (uint32_t k = 0; timebase_state(&tb) == TIMEBASE_RUNNING; k++) {
+            uint64_t time = timebase_step(&tb);
+            if (timebase_state(&tb) == TIMEBASE_RUNNING) {
+                TEST_ASSERT_EQUAL_UINT64(exact_tick(k, periods[i], 32), time);
+                TEST_ASSERT_EQUAL_UINT64(exact_tick(k, periods[i], 42), timebase_time_q42(&tb));
+            }
+        }
+        TEST_ASSERT_EQUAL_UINT64(p.header.duration_q32_s << 10, timebase_time_q42(&tb));
+    }
+}
+
+static void test_ends_with_the_last_tick(void)
+{
+    timebase_begin(&tb, &p, 1000);
+    for (uint32_t k = 1; k < program_ticks(&p); k++) {
+        timebase_step(&tb);
+        TEST_ASSERT_EQUAL_INT(TIMEBASE_RUNNING, timebase_state(&tb));
+    }
+    TEST_ASSERT_EQUAL_UINT64(p.header.duration_q32_s, timebase_step(&tb));
+    TEST_ASSERT_EQUAL_INT(TIMEBASE_ENDED, timebase_state(&tb));
+    TEST_ASSERT_EQUAL_UINT64(p.header.duration_q32_s, timebase_step(&tb));
+    timebase_stop(&tb);
+    TEST_ASSERT_EQUAL_INT(TIMEBASE_ENDED, timebase_state(&tb));
+}
+
+static void tightest(double *rate, double *second)
+{
+    struct program_piece piece;
+    *rate = *second = 1e30;
+    for (uint32_t i = 0; i < p.header.piece_count; i++) {
+        program_piece_get(&p, i, &piece);
+        double r = piece.override_rate_q16_per_s / 65536.0;
+        double s = piece.override_second_q8_per_s2 / 256.0;
+        *rate = r < *rate ? r : *rate;
+        *second = s < *second ? s : *second;
+    }
+}
+
+/* Mean rates per tick are within the bounds of the rate's derivatives, as its mean values must be. */
+static void check_stop(uint32_t at, uint32_t period_us)
+{
+    double rate_limit = 0;
+    double second_limit = 0;
+    double h = period_us * 1e-6;
+    double rate[3] = {1, 1, 1};
+    tightest(&rate_limit, &second_limit);
+    timebase_begin(&tb, &p, period_us);
+    for (uint32_t k = 0; k <= at; k++) {
+        timebase_step(&tb);
+    }
+    timebase_stop(&tb);
+    for (int rest = 3; rest > 0;) {
+        uint64_t before = timebase_time_q42(&tb);
+        timebase_step(&tb);
+        if (timebase_state(&tb) == TIMEBASE_ENDED) {
+            return;
+        }
+        rate[2] = rate[1];
+        rate[1] = rate[0];
+        rate[0] = (double)(timebase_time_q42(&tb) - before) / 4398046511104.0 / h;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, rate[0], timebase_rate_q30(&tb) / 1073741824.0);
+        TEST_ASSERT_TRUE(rate[0] <= rate[1] + 1e-8);
+        TEST_ASSERT_TRUE(rate[1] - rate[0] <= rate_limit * h + 1e-8);
+        double second = rate[0] - 2 * rate[1] + rate[2];
+        TEST_ASSERT_TRUE((second < 0 ? -second : second) <= second_limit * h * h + 1e-8);
+        rest -= timebase_state(&tb) == TIMEBASE_STOPPED;
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, rate[0]);
+}
+
+static void test_stop_keeps_the_bounds(void)
+{
+    const uint32_t periods[] = {1000, 2000, 4000, 8000};
+    for (int i = 0; i < 4; i++) {
+        for (uint32_t at = 0; at < 900; at += 37) {
+            check_stop(at, periods[i]);
+        }
+    }
+}
+
+static void set_override(uint32_t rate_q16, uint32_t second_q8)
+{
+    uint8_t *image = (uint8_t *)(uintptr_t)p.image;
+    for (uint32_t i = 0; i < p.header.piece_count; i++) {
+        uint8_t *piece = image + PROGRAM_HEADER_SIZE +
+                         (size_t)p.header.segment_count * PROGRAM_SEGMENT_SIZE +
+                         (size_t)i * PROGRAM_PIECE_SIZE;
+        for (int k = 0; k < 4; k++) {
+            piece[76 + k] = (uint8_t)(rate_q16 >> (8 * k));
+            piece[80 + k] = (uint8_t)(second_q8 >> (8 * k));
+        }
+    }
+}
+
+static void test_stop_for_any_bounds(void)
+{
+    uint64_t random = 3;
+    for (int i = 0; i < 300; i++) {
+        uint32_t rate = (uint32_t)golden_random(&random) >> (golden_random(&random) % 16u);
+        uint32_t second = (uint32_t)golden_random(&random) >> (golden_random(&random) % 16u);
+        set_override(rate | 1u, second | 1u);
+        check_stop((uint32_t)(golden_random(&random) % 300u), 1000u << (i % 4));
+    }
+}
+
+static void test_stop_as_slow_as_can_be_ends_with_the_program(void)
+{
+    set_override(1, 1);
+    timebase_begin(&tb, &p, 1000);
+    timebase_step(&tb);
+    timebase_stop(&tb);
+    for (uint32_t k = 1; k < program_ticks(&p) + 2u; k++) {
+        timebase_step(&tb);
+    }
+    TEST_ASSERT_EQUAL_INT(TIMEBASE_ENDED, timebase_state(&tb));
+    TEST_ASSERT_EQUAL_UINT64(p.header.duration_q32_s << 10, timebase_time_q42(&tb));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_ticks_are_exact);
+    RUN_TEST(test_ends_with_the_last_tick);
+    RUN_TEST(test_stop_keeps_the_bounds);
+    RUN_TEST(test_stop_for_any_bounds);
+    RUN_TEST(test_stop_as_slow_as_can_be_ends_with_the_program);
+    return UNITY_END();
+}
