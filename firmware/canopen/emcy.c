@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "canopen/emcy.h"
 
+#include <assert.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -12,6 +13,7 @@
 void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *error_register,
                         uint32_t *history, uint8_t *history_count, uint8_t history_size)
 {
+    assert(history_size >= 1);
     memset(producer, 0, sizeof *producer);
     producer->error_register = error_register;
     producer->history = history;

@@ -60,7 +60,7 @@ struct emcy_producer {
     struct emcy queue[4];
 };
 
-/* All three pointers must stay valid; they are cleared. */
+/* All three pointers must stay valid; what they point to is cleared. `history_size` at least 1. */
 void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *error_register,
                         uint32_t *history, uint8_t *history_count, uint8_t history_size);
 

@@ -28,8 +28,17 @@ enum sdo_client_status {
 #define SDO_CLIENT_ERR_BUSY     (-1)
 #define SDO_CLIENT_ERR_ARGUMENT (-2)
 
+/* The answer that is due. */
+enum sdo_client_step {
+    SDO_CLIENT_DOWNLOAD,
+    SDO_CLIENT_DOWNLOAD_SEGMENT,
+    SDO_CLIENT_UPLOAD,
+    SDO_CLIENT_UPLOAD_SEGMENT
+};
+
 struct sdo_client {
     enum sdo_client_status status;
+    enum sdo_client_step step;
     uint32_t abort_code; /* of REFUSED and FAILED */
     uint32_t size;       /* bytes of the value; read: known when DONE */
     uint32_t timeout_us; /* for each answer */
@@ -42,7 +51,6 @@ struct sdo_client {
     uint8_t sub;
     uint8_t node;
     uint8_t toggle;
-    uint8_t step;      /* which answer is due; internal */
     uint8_t number[8]; /* of the _number calls */
 };
 

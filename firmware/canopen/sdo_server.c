@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "canopen/sdo_server.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "canopen/cob.h"
@@ -29,6 +30,7 @@ void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uin
     server->od = od;
     server->node = node;
     server->timeout_us = timeout_us;
+    assert(block_segments >= 1 && block_segments <= SDO_BLOCK_SEGMENTS_MAX);
     server->block_size = block_segments;
     server->state = SDO_SERVER_IDLE;
 }
@@ -155,10 +157,11 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
     return go_on(server, in->data, out);
 }
 
-/* A block whose last segment was lost is answered before the client gives up. */
+/* A block whose last segment was lost is answered before the client gives up. Not when no segment of
+ * it has come: an answer that names none could not be told from one to the block as a whole. */
 static int acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
-    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || s->acknowledged_early ||
+    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || s->sequence == 0 ||
         s->silence_us < s->timeout_us / 2) {
         return 0;
     }

@@ -11,8 +11,9 @@
  * segments of a block download is each frame a segment, and the client has to abort first.
  *
  * Loss within a block: segments after a gap are ignored and the answer at the block's end names the
- * last good one, from where the client repeats. When the block's last segment itself is lost the
- * server gives that answer after half of the timeout.
+ * last good one, from where the client repeats. When the block's last segment itself is lost, the
+ * server gives that answer after half of the timeout; a client that only paused repeats a few segments. Loss of
+ * a whole block ends in the timeout.
  *
  * Frames in, frames out. All functions: mainline (the hooks may take long); the receive interrupt
  * only queues.
@@ -62,7 +63,7 @@ struct sdo_server {
     uint8_t held;        /* block download: bytes in `last` */
     bool use_crc;
     bool domain_open;        /* domain_begin succeeded, domain_end or domain_abort still due */
-    bool acknowledged_early; /* the answer after half of the timeout has been given */
+    bool acknowledged_early; /* the answer after half of the timeout is the last thing said */
     uint8_t last[7]; /* block download: the newest segment: its padding is known only at the end */
     uint8_t value[SDO_VALUE_MAX];
 };

@@ -77,6 +77,9 @@ int sdo_server_block_download_segment(struct sdo_server *s, const uint8_t *data,
     if (!last && sequence < s->block_limit) {
         return 0;
     }
+    if (!in_order && s->acknowledged_early) {
+        return 0; /* the rest of a block that only paused: it has its answer, and will be repeated */
+    }
     if (in_order && last) {
         s->state = SDO_SERVER_BLOCK_DOWNLOAD_END;
     }

@@ -29,7 +29,8 @@ void tearDown(void)
 
 /* ---- download: a client that repeats what was lost ---- */
 
-/* Which transmission of a segment (counted from 0 over the whole transfer) is lost. */
+/* Which transmission of a segment (counted from 0 over the whole transfer) is lost. In downloads the
+ * first of a block always comes: when all of a block is lost the server can but time out. */
 static bool never(uint32_t transmission)
 {
     (void)transmission;
@@ -69,7 +70,7 @@ static uint32_t send_block(uint32_t at, uint32_t size, bool (*lost)(uint32_t), u
         uint32_t now = left < 7 ? left : 7;
         uint8_t first = (uint8_t)(sequence | (now == left ? 0x80u : 0u));
 
-        if (!lost((*sent)++)) {
+        if (!lost((*sent)++) || sequence == 1) {
             answered = sdo_talk_segment(&talk, first, image + at, now);
         }
         at += now;
@@ -246,6 +247,38 @@ static void test_abort_by_the_client_inside_a_block(void)
     TEST_ASSERT_EQUAL_INT(2, talk.small.begun);
 }
 
+/* The client is slow, nothing is lost: the early answer makes it repeat, and no second one confuses it. */
+static void test_a_pause_inside_a_block_is_no_loss(void)
+{
+    initiate(100);
+    sdo_talk_segment(&talk, 1, image, 7);
+    sdo_talk_segment(&talk, 2, image + 7, 7);
+    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
+    TEST_ASSERT_EQUAL_UINT8(2, talk.answer.data[1]);
+    for (uint8_t sequence = 3; sequence <= 15; sequence++) {
+        uint8_t first = (uint8_t)(sequence | (sequence == 15 ? 0x80u : 0u));
+        TEST_ASSERT_FALSE(sdo_talk_segment(&talk, first, image, 2));
+    }
+    for (uint8_t sequence = 1; sequence <= 13; sequence++) {
+        uint8_t first = (uint8_t)(sequence | (sequence == 13 ? 0x80u : 0u));
+        uint32_t at = 7u * (sequence + 1u);
+        sdo_talk_segment(&talk, first, image + at, at + 7 <= 100 ? 7 : 100 - at);
+    }
+    TEST_ASSERT_EQUAL_HEX8(0xA2, talk.answer.data[0]);
+    TEST_ASSERT_EQUAL_UINT8(13, talk.answer.data[1]);
+    finish(100, crc16_update(0, image, 100));
+    TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
+    TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, 100);
+}
+
+static void test_no_early_answer_before_the_first_segment(void)
+{
+    initiate(100);
+    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, 1, &talk.answer));
+    expect_abort(SDO_ABORT_TIMEOUT);
+}
+
 static void test_silence_inside_a_block(void)
 {
     initiate(100);
@@ -386,6 +419,8 @@ int main(void)
     RUN_TEST(test_sequence_numbers_out_of_range);
     RUN_TEST(test_domain_refuses_in_the_middle);
     RUN_TEST(test_abort_by_the_client_inside_a_block);
+    RUN_TEST(test_a_pause_inside_a_block_is_no_loss);
+    RUN_TEST(test_no_early_answer_before_the_first_segment);
     RUN_TEST(test_silence_inside_a_block);
     RUN_TEST(test_upload_of_every_size);
     RUN_TEST(test_upload_repeats_what_was_lost);

@@ -66,9 +66,9 @@ static void test_expedited_download_without_size_takes_the_dictionarys(void)
 static void test_abort_codes_of_initiates(void)
 {
     struct {
-        uint8_t command;
+        uint32_t command;
         uint16_t index;
-        uint8_t sub;
+        uint16_t sub;
         uint32_t data;
         uint32_t code;
     } cases[] = {
@@ -91,11 +91,11 @@ static void test_abort_codes_of_initiates(void)
     };
 
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        TEST_ASSERT_TRUE(
-            sdo_talk_ask(&talk, cases[i].command, cases[i].index, cases[i].sub, cases[i].data));
+        TEST_ASSERT_TRUE(sdo_talk_ask(&talk, (uint8_t)cases[i].command, cases[i].index,
+                                      (uint8_t)cases[i].sub, cases[i].data));
         expect_abort(cases[i].code);
         TEST_ASSERT_EQUAL_HEX32(cases[i].index, cob_get(talk.answer.data + 1, 2));
-        TEST_ASSERT_EQUAL_HEX8(cases[i].sub, talk.answer.data[3]);
+        TEST_ASSERT_EQUAL_HEX16(cases[i].sub, talk.answer.data[3]);
     }
     TEST_ASSERT_EQUAL_INT(0, talk.small.written);
 }
