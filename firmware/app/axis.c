@@ -62,8 +62,8 @@ void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg 
 
 bool axis_lost(const struct axis *axis, uint32_t now_us)
 {
-    return axis->missed_in_row > AXIS_MISSED_MAX &&
-           now_us - axis->answered_us > AXIS_SILENCE_MAX_US;
+    const bool silent = now_us - axis->answered_us > AXIS_SILENCE_MAX_US;
+    return axis->missed_in_row > (silent ? AXIS_MISSED_MAX : AXIS_MISSED_LOST);
 }
 
 bool axis_in_fault(const struct axis *axis)

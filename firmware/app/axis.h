@@ -15,10 +15,11 @@
 #include "canopen/cia402_master.h"
 #include "canopen/pdo.h"
 
-/* A drive is taken as lost when more SYNCs in a row than this had no answer and the last answer is
- * also older than the wall time: a host that is merely slow loses no drive. */
+/* A drive is lost after so many SYNCs in a row without an answer; or after fewer, when they took long: so at lock
+ * step, where every one of them is waited for. A host that stalls sends no SYNCs, so it loses no drive. */
+#define AXIS_MISSED_LOST      100u
 #define AXIS_MISSED_MAX       10u
-#define AXIS_SILENCE_MAX_US   100000u
+#define AXIS_SILENCE_MAX_US   1000000u
 #define AXIS_STANDSTILL_SYNCS 250u
 
 struct axis {

@@ -32,8 +32,7 @@ static bool answers(struct machine *machine, uint8_t node)
 {
     port_lock();
     const struct axis *axis = machine_axis(machine, node);
-    const bool result =
-        axis != NULL && axis->present && port_time_us() - axis->answered_us <= AXIS_SILENCE_MAX_US;
+    const bool result = axis != NULL && axis->present && axis->missed_in_row <= AXIS_MISSED_MAX;
     port_unlock();
     return result;
 }

@@ -28,7 +28,7 @@ void schedule_ready(struct schedule *schedule, uint64_t now_ns)
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns)
 {
     schedule->awaiting = false;
-    return now_ns > schedule->due_ns ? now_ns - schedule->due_ns : 0u;
+    return !schedule->lock_step && now_ns > schedule->due_ns ? now_ns - schedule->due_ns : 0u;
 }
 
 void schedule_finish(struct schedule *schedule, uint64_t started_ns)

@@ -27,7 +27,7 @@ void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_
 void schedule_await(struct schedule *schedule, uint64_t guard_ns);
 void schedule_ready(struct schedule *schedule, uint64_t now_ns);
 
-/* A tick starts: returns its lateness in ns. Clears the wishes of the last one. */
+/* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the wishes of the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);
 
 /* The tick that started at started_ns is over: sets due_ns of the next one. */
