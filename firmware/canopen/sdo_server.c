@@ -157,8 +157,8 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
     return go_on(server, in->data, out);
 }
 
-/* A block whose last segment was lost is answered before the client gives up. Not when no segment of
- * it has come: an answer that names none could not be told from one to the block as a whole. */
+/* A block whose last segment was lost is answered before the client gives up. Not when no segment
+ * of it has come: a client that only paused would then send the whole block twice. */
 static int acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
     if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || s->sequence == 0 ||

@@ -12,8 +12,8 @@
  *
  * Loss within a block: segments after a gap are ignored and the answer at the block's end names the
  * last good one, from where the client repeats. When the block's last segment itself is lost, the
- * server gives that answer after half of the timeout; a client that only paused repeats a few segments. Loss of
- * a whole block ends in the timeout.
+ * server gives that answer after half of the timeout; a client that only paused repeats a few
+ * segments. Loss of a whole block ends in the timeout.
  *
  * Frames in, frames out. All functions: mainline (the hooks may take long); the receive interrupt
  * only queues.

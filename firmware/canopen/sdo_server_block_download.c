@@ -78,7 +78,7 @@ int sdo_server_block_download_segment(struct sdo_server *s, const uint8_t *data,
         return 0;
     }
     if (!in_order && s->acknowledged_early) {
-        return 0; /* the rest of a block that only paused: it has its answer, and will be repeated */
+        return 0; /* the rest of a block that paused: it has its answer */
     }
     if (in_order && last) {
         s->state = SDO_SERVER_BLOCK_DOWNLOAD_END;

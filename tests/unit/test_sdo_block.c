@@ -29,8 +29,8 @@ void tearDown(void)
 
 /* ---- download: a client that repeats what was lost ---- */
 
-/* Which transmission of a segment (counted from 0 over the whole transfer) is lost. In downloads the
- * first of a block always comes: when all of a block is lost the server can but time out. */
+/* Which transmission of a segment (counted from 0 over the whole transfer) is lost. In downloads
+ * the first of a block always comes: when all of a block is lost the server can but time out. */
 static bool never(uint32_t transmission)
 {
     (void)transmission;
@@ -179,6 +179,10 @@ static void test_download_refusals(void)
     expect_abort(SDO_ABORT_READ_ONLY);
     sdo_talk_ask(&talk, 0xC6, 0x2003, 0, 5);
     expect_abort(SDO_ABORT_TOO_LONG);
+    talk.small.begin_refusal = SDO_ABORT_STATE;
+    sdo_talk_ask(&talk, 0xC6, 0x2005, 0, 4);
+    expect_abort(SDO_ABORT_STATE);
+    talk.small.begin_refusal = SDO_OK;
     sdo_talk_ask(&talk, 0xC6, 0x2005, 0, UINT32_MAX);
     expect_abort(SDO_ABORT_MEMORY);
     TEST_ASSERT_EQUAL_INT(0, talk.small.begun);
@@ -247,7 +251,7 @@ static void test_abort_by_the_client_inside_a_block(void)
     TEST_ASSERT_EQUAL_INT(2, talk.small.begun);
 }
 
-/* The client is slow, nothing is lost: the early answer makes it repeat, and no second one confuses it. */
+/* The client is slow, nothing is lost: the early answer makes it repeat; no second one confuses. */
 static void test_a_pause_inside_a_block_is_no_loss(void)
 {
     initiate(100);

@@ -139,6 +139,8 @@ static void test_arguments(void)
     TEST_ASSERT_EQUAL_INT(1, sdo_client_read_number(&client, 5, 0x2003, 0, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_ERR_BUSY,
                           sdo_client_write_number(&client, 5, 0x2003, 0, 1, 4, &frame));
+    TEST_ASSERT_EQUAL_INT(SDO_CLIENT_ERR_BUSY,
+                          sdo_client_read(&client, 5, 0x2003, 0, &byte, 1, &frame));
 }
 
 static void test_ignores_late_and_foreign_frames(void)

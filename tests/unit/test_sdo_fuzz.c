@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Random and half-right frames at the SDO server: it must keep to the rules of its hooks (checked
+/* Random and half-right frames. The SDO server must keep to the rules of its hooks (checked
  * in small_od.c), touch no byte that is not its own (sanitizers), leave constants alone, and serve
  * the next honest client. */
+#include "canopen/sdo_client.h"
 #include "canopen/sdo_server.h"
 
 #include <string.h>
@@ -160,9 +161,57 @@ static void test_random_frames(void)
     TEST_ASSERT_GREATER_THAN_INT((int)SEEDS, stored);
 }
 
+/* An answer to the client: often of the right kind, with random sizes, toggles and contents. */
+static void random_answer(const struct sdo_client *client, struct can_msg *answer)
+{
+    static const uint8_t kinds[] = {0x60, 0x20, 0x41, 0x43, 0x4F, 0x42, 0x00, 0x10, 0x01, 0x80};
+
+    cob_frame(answer, COB_SDO_ANSWER + TALK_NODE, 8);
+    random_bytes(answer->data, 8);
+    if (random_below(10) != 0) {
+        answer->data[0] = kinds[random_below(sizeof kinds)];
+        answer->data[0] ^= (uint8_t)(random_below(4) == 0 ? random_below(16) : 0);
+    }
+    if (random_below(3) != 0) {
+        cob_put(answer->data + 1, client->index, 2);
+        answer->data[3] = client->sub;
+    }
+}
+
+static void test_random_answers_to_the_client(void)
+{
+    struct sdo_client client;
+    struct can_msg in;
+    struct can_msg out;
+    uint8_t value[30] = {0}; /* the sanitizer watches its end */
+    int done = 0;
+
+    random_state = 20260101;
+    sdo_client_init(&client, 1000);
+    for (uint32_t i = 0; i < 200000; i++) {
+        uint32_t size = 1 + random_below(sizeof value);
+
+        if (client.status != SDO_CLIENT_BUSY) {
+            done += client.status == SDO_CLIENT_DONE;
+            int begun = random_below(2) == 0
+                            ? sdo_client_write(&client, TALK_NODE, 0x2003, 0, value, size, &out)
+                            : sdo_client_read(&client, TALK_NODE, 0x2003, 0, value, size, &out);
+            TEST_ASSERT_EQUAL_INT(1, begun);
+        }
+        random_answer(&client, &in);
+        sdo_client_receive(&client, &in, &out);
+        if (client.status == SDO_CLIENT_DONE) {
+            TEST_ASSERT_TRUE(client.size >= 1 && client.size <= sizeof value);
+        }
+        sdo_client_process(&client, random_below(100), &out);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(1000, done);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_random_frames);
+    RUN_TEST(test_random_answers_to_the_client);
     return UNITY_END();
 }

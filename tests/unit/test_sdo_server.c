@@ -114,6 +114,17 @@ static void test_hooks_can_refuse(void)
     TEST_ASSERT_EQUAL_INT(0, talk.small.aborted);
 }
 
+static void test_a_domain_without_hooks_is_out_of_reach(void)
+{
+    od_init(&talk.small.od, talk.small.od.table, &talk.small.values, NULL, NULL);
+    sdo_talk_ask(&talk, 0x21, 0x2005, 0, 10);
+    expect_abort(SDO_ABORT_ACCESS);
+    sdo_talk_ask(&talk, 0x40, 0x2005, 0, 0);
+    expect_abort(SDO_ABORT_ACCESS);
+    sdo_talk_ask(&talk, 0x23, 0x2003, 0, 7);
+    TEST_ASSERT_EQUAL_UINT32(7, talk.small.values.word);
+}
+
 static void test_unknown_commands(void)
 {
     static const uint8_t commands[] = {0x00, 0x10, 0x60, 0x70, 0xA1, 0xA2, 0xA3, 0xC1, 0xE0, 0xFF};
@@ -340,6 +351,7 @@ int main(void)
     RUN_TEST(test_expedited_download_without_size_takes_the_dictionarys);
     RUN_TEST(test_abort_codes_of_initiates);
     RUN_TEST(test_hooks_can_refuse);
+    RUN_TEST(test_a_domain_without_hooks_is_out_of_reach);
     RUN_TEST(test_unknown_commands);
     RUN_TEST(test_ignores_what_is_not_for_it);
     RUN_TEST(test_segmented_upload_of_a_string);
