@@ -205,9 +205,9 @@ static enum node_options_result set_option(struct node_options *options, const c
 }
 
 enum node_options_result node_options_parse(struct node_options *options, int argc, char **argv,
-                                            char *text, size_t size)
+                                            char *reason_text, size_t size)
 {
-    const struct reason reason = {text, size};
+    const struct reason reason = {reason_text, size};
     options->bus = NULL;
     options->axis_count = 0;
     for (int i = 1; i < argc; i += 2) {

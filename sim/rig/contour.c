@@ -196,8 +196,11 @@ static bool contour_cross(const struct contour *c, struct place *p)
     }
     const double *speed = c->segments[p->segment].end_speed;
     const double beyond_mm = forward ? (p->xi - 1.0) * speed[1] : -p->xi * speed[0];
-    const uint32_t count = c->count;
-    p->segment = forward ? (p->segment + 1) % count : (p->segment + count - 1) % count;
+    if (outermost) {
+        p->segment = forward ? 0 : c->count - 1;
+    } else {
+        p->segment = forward ? p->segment + 1 : p->segment - 1;
+    }
     speed = c->segments[p->segment].end_speed;
     const double inside = beyond_mm / (forward ? speed[0] : speed[1]);
     const double kept = inside < 1.0 ? inside : 1.0;
