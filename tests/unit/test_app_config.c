@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/config.h"
+
+#include "unity.h"
+
+#define Q40 (INT64_C(1) << 40)
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+static struct program_limits limits_of(int32_t min_counts, int32_t max_counts,
+                                       uint32_t counts_per_mm)
+{
+    const struct config config = {
+        .period_us = 2000,
+        .feed_limit_um_s = 1,
+        .acceleration_limit_um_s2 = 2,
+        .jerk_limit_mm_s3 = 3,
+        .counts_per_mm = counts_per_mm,
+        .travel_min_counts = {min_counts, min_counts},
+        .travel_max_counts = {max_counts, max_counts},
+    };
+    struct program_limits limits;
+    config_limits(&config, &limits);
+    return limits;
+}
+
+static void test_whole_millimetres_are_exact(void)
+{
+    const struct program_limits limits = limits_of(-200000000, 150000000, 1000000);
+    TEST_ASSERT_EQUAL_INT64(-200 * Q40, limits.min_q40_mm[0]);
+    TEST_ASSERT_EQUAL_INT64(150 * Q40, limits.max_q40_mm[1]);
+    const struct program_limits positive = limits_of(3000000, 4000000, 1000000);
+    TEST_ASSERT_EQUAL_INT64(3 * Q40, positive.min_q40_mm[0]);
+    TEST_ASSERT_EQUAL_UINT32(2000, positive.period_us);
+    TEST_ASSERT_EQUAL_UINT32(3, positive.jerk_mm_s3);
+}
+
+/* 2^40 / 3 = 366503875925.33...: limits never let more through than was asked for. */
+static void test_fractions_are_rounded_inwards(void)
+{
+    const struct program_limits limits = limits_of(1, 2, 3);
+    TEST_ASSERT_EQUAL_INT64(INT64_C(366503875926), limits.min_q40_mm[0]);
+    TEST_ASSERT_EQUAL_INT64(INT64_C(733007751850), limits.max_q40_mm[0]);
+    const struct program_limits negative = limits_of(-2, -1, 3);
+    TEST_ASSERT_EQUAL_INT64(INT64_C(-733007751850), negative.min_q40_mm[0]);
+    TEST_ASSERT_EQUAL_INT64(INT64_C(-366503875926), negative.max_q40_mm[0]);
+}
+
+static void test_the_ends_of_the_range(void)
+{
+    const struct program_limits coarse = limits_of(INT32_MIN, INT32_MAX, 1024);
+    TEST_ASSERT_EQUAL_INT64(-2097152 * Q40, coarse.min_q40_mm[0]);
+    const struct program_limits fine = limits_of(INT32_MIN, INT32_MAX, CONFIG_COUNTS_PER_MM_MAX);
+    TEST_ASSERT_EQUAL_INT64(-256 * Q40, fine.min_q40_mm[0]);
+    TEST_ASSERT_EQUAL_INT64(256 * Q40 - (Q40 >> 23), fine.max_q40_mm[0]);
+}
+
+static void test_values_that_make_no_sense(void)
+{
+    TEST_ASSERT_TRUE(config_value_allowed(0x1006, 0, 4000));
+    TEST_ASSERT_FALSE(config_value_allowed(0x1006, 0, 3000));
+    TEST_ASSERT_FALSE(config_value_allowed(0x2004, 7, 0));
+    TEST_ASSERT_TRUE(config_value_allowed(0x2004, 7, CONFIG_COUNTS_PER_MM_MAX));
+    TEST_ASSERT_FALSE(config_value_allowed(0x2004, 7, CONFIG_COUNTS_PER_MM_MAX + 1u));
+}
+
+static void test_which_objects_concern_the_drives(void)
+{
+    TEST_ASSERT_TRUE(config_concerns_drives(0x1006, 0));
+    TEST_ASSERT_TRUE(config_concerns_drives(0x2004, 1));
+    TEST_ASSERT_FALSE(config_concerns_drives(0x2004, 2));
+    TEST_ASSERT_TRUE(config_concerns_drives(0x2007, 6));
+    TEST_ASSERT_TRUE(config_contains(0x2005));
+    TEST_ASSERT_FALSE(config_contains(0x2008));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_whole_millimetres_are_exact);
+    RUN_TEST(test_fractions_are_rounded_inwards);
+    RUN_TEST(test_the_ends_of_the_range);
+    RUN_TEST(test_values_that_make_no_sense);
+    RUN_TEST(test_which_objects_concern_the_drives);
+    return UNITY_END();
+}

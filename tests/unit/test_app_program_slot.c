@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+/* Uploads that break off, are refused or do not fit leave the active program whole. */
+#include "app/program_slot.h"
+
+#include <string.h>
+
+#include "app_image.h"
+#include "fake_port.h"
+#include "unity.h"
+
+static const struct config config = {
+    .period_us = 1000,
+    .feed_limit_um_s = 20000,
+    .acceleration_limit_um_s2 = 100000,
+    .jerk_limit_mm_s3 = 2000,
+    .counts_per_mm = 1000000,
+    .travel_min_counts = {-100000000, -100000000},
+    .travel_max_counts = {100000000, 100000000},
+};
+static struct program_slot slot;
+static uint8_t image[APP_IMAGE_SIZE];
+
+void setUp(void)
+{
+    fake_port_reset();
+    program_slot_init(&slot);
+    app_image_make(image, 10, 20);
+}
+
+void tearDown(void)
+{
+}
+
+static int upload(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, sizeof image));
+    for (uint32_t k = 0; k < sizeof image; k += 8u) {
+        TEST_ASSERT_EQUAL_INT(0, program_slot_write(&slot, k, &image[k], 8));
+    }
+    return program_slot_finish(&slot, sizeof image, &config);
+}
+
+static void expect_active(const uint8_t *expected)
+{
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_READY, program_slot_state(&slot));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, slot.program.image, APP_IMAGE_SIZE);
+}
+
+static void test_a_good_image_becomes_the_program(void)
+{
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    expect_active(image);
+    TEST_ASSERT_TRUE(slot.acceptable);
+    TEST_ASSERT_EQUAL_INT32(10000000, slot.start_counts[0]);
+    TEST_ASSERT_EQUAL_INT32(14000000, slot.end_counts[0]);
+    TEST_ASSERT_EQUAL_INT32(20000000, slot.end_counts[1]);
+}
+
+/* At every byte: the old program is whole, and the next upload works. */
+static void test_an_upload_may_break_off_anywhere(void)
+{
+    static uint8_t first[APP_IMAGE_SIZE];
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    memcpy(first, image, sizeof first);
+    app_image_make(image, -10, 0);
+    for (uint32_t length = 0; length < sizeof image; ++length) {
+        TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, sizeof image));
+        TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_RECEIVING, program_slot_state(&slot));
+        TEST_ASSERT_EQUAL_INT(0, program_slot_write(&slot, 0, image, length));
+        program_slot_abandon(&slot);
+        expect_active(first);
+    }
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    expect_active(image);
+}
+
+static void test_a_truncated_image_is_refused_though_the_bank_holds_more(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    const unsigned bank = slot.bank;
+    TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, 0));
+    TEST_ASSERT_EQUAL_INT(0, program_slot_write(&slot, 0, image, sizeof image));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SIZE, program_slot_finish(&slot, sizeof image - 1u, &config));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SIZE, program_slot_finish(&slot, sizeof image + 1u, &config));
+    TEST_ASSERT_EQUAL_UINT(bank, slot.bank);
+    expect_active(image);
+}
+
+static void test_a_refusal_says_what_and_where(void)
+{
+    image[200 + 28] = 1; /* c2 of piece 0 is 2^-8 mm: it does not begin at rest */
+    app_image_seal(image);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_START_MOVING, upload());
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_START_MOVING, slot.refused.code);
+    TEST_ASSERT_EQUAL_UINT32(0, slot.refused.index);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+    app_image_make(image, 10, 20);
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    TEST_ASSERT_EQUAL_INT(0, slot.refused.code);
+}
+
+static void test_what_the_store_cannot_take(void)
+{
+    TEST_ASSERT_EQUAL_INT(PORT_ERR_STORE, program_slot_begin(&slot, FAKE_PORT_BANK_BYTES + 1u));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+    TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, 0));
+    TEST_ASSERT_EQUAL_INT(PORT_ERR_STORE,
+                          program_slot_write(&slot, FAKE_PORT_BANK_BYTES - 7u, image, 8));
+    fake_port_fail_store(true);
+    TEST_ASSERT_EQUAL_INT(PORT_ERR_STORE, program_slot_write(&slot, 0, image, 8));
+}
+
+static void test_a_new_configuration_is_applied_to_the_old_program(void)
+{
+    struct config other = config;
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    other.jerk_limit_mm_s3 = 1900;
+    other.counts_per_mm = 1000;
+    other.travel_max_counts[0] = 100000;
+    other.travel_max_counts[1] = 100000;
+    program_slot_refresh(&slot, &other);
+    TEST_ASSERT_TRUE_MESSAGE(slot.acceptable, "nobody said that it is stale");
+    program_slot_stale(&slot);
+    program_slot_refresh(&slot, &other);
+    TEST_ASSERT_FALSE(slot.acceptable);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_JERK, slot.refused.code);
+    TEST_ASSERT_EQUAL_INT32(10000, slot.start_counts[0]);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_a_good_image_becomes_the_program);
+    RUN_TEST(test_an_upload_may_break_off_anywhere);
+    RUN_TEST(test_a_truncated_image_is_refused_though_the_bank_holds_more);
+    RUN_TEST(test_a_refusal_says_what_and_where);
+    RUN_TEST(test_what_the_store_cannot_take);
+    RUN_TEST(test_a_new_configuration_is_applied_to_the_old_program);
+    return UNITY_END();
+}

@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: MIT */
+#include "port/linux/schedule.h"
+
+#include "unity.h"
+
+#define MS 1000000u
+
+static struct schedule schedule;
+
+void setUp(void)
+{
+    schedule_begin(&schedule, 100u * MS, MS, false);
+}
+
+void tearDown(void)
+{
+}
+
+/* Runs the tick that is due, late_ns late; returns the lateness told. */
+static uint64_t tick(uint64_t late_ns)
+{
+    const uint64_t now_ns = schedule.due_ns + late_ns;
+    const uint64_t told_ns = schedule_start(&schedule, now_ns);
+    schedule_finish(&schedule, now_ns);
+    return told_ns;
+}
+
+static void test_small_lateness_does_not_add_up(void)
+{
+    for (unsigned k = 0; k < 1000; ++k) {
+        TEST_ASSERT_EQUAL_UINT64(200000, tick(200000));
+    }
+    TEST_ASSERT_EQUAL_UINT64(1101u * (uint64_t)MS, schedule.due_ns);
+}
+
+static void test_a_late_tick_is_followed_at_three_quarters_of_a_period_at_least(void)
+{
+    const uint64_t start_ns = schedule.due_ns + 3u * MS;
+    (void)tick(3u * MS);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + 3u * MS / 4u, schedule.due_ns);
+}
+
+/* 0.9 ms late: 0.65 ms of it remain after one tick, 0.4 after two, 0.15, none. */
+static void test_lateness_is_made_up(void)
+{
+    const uint64_t due_ns = schedule.due_ns;
+    (void)tick(900000);
+    TEST_ASSERT_EQUAL_UINT64(due_ns + MS + 650000u, schedule.due_ns);
+    (void)tick(0);
+    (void)tick(0);
+    (void)tick(0);
+    TEST_ASSERT_EQUAL_UINT64(due_ns + 4u * MS, schedule.due_ns);
+}
+
+static void test_real_time_ignores_lock_step(void)
+{
+    const uint64_t due_ns = schedule.due_ns;
+    schedule_await(&schedule, 100u * MS);
+    schedule_ready(&schedule, due_ns - 500000u);
+    TEST_ASSERT_EQUAL_UINT64(due_ns, schedule.due_ns);
+}
+
+static void lock_step_tick(bool await)
+{
+    const uint64_t now_ns = schedule.due_ns;
+    (void)schedule_start(&schedule, now_ns);
+    if (await) {
+        schedule_await(&schedule, 100u * MS);
+    }
+    schedule_finish(&schedule, now_ns);
+}
+
+static void test_lock_step_ticks_when_ready_else_after_the_guard(void)
+{
+    schedule_begin(&schedule, 0, MS, true);
+    lock_step_tick(true);
+    TEST_ASSERT_EQUAL_UINT64(101u * (uint64_t)MS, schedule.due_ns);
+    schedule_ready(&schedule, 1100000);
+    TEST_ASSERT_EQUAL_UINT64(1100000, schedule.due_ns);
+    lock_step_tick(false);
+    TEST_ASSERT_EQUAL_UINT64(2100000, schedule.due_ns);
+    schedule_ready(&schedule, 1200000);
+    TEST_ASSERT_EQUAL_UINT64(2100000, schedule.due_ns);
+    TEST_ASSERT_EQUAL_UINT64(0, tick(5u * MS));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_small_lateness_does_not_add_up);
+    RUN_TEST(test_a_late_tick_is_followed_at_three_quarters_of_a_period_at_least);
+    RUN_TEST(test_lateness_is_made_up);
+    RUN_TEST(test_real_time_ignores_lock_step);
+    RUN_TEST(test_lock_step_ticks_when_ready_else_after_the_guard);
+    return UNITY_END();
+}
