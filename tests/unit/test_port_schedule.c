@@ -35,21 +35,29 @@ static void test_small_lateness_does_not_add_up(void)
 
 static void test_a_late_tick_is_followed_at_three_quarters_of_a_period_at_least(void)
 {
-    const uint64_t start_ns = schedule.due_ns + 3u * MS;
-    (void)tick(3u * MS);
+    const uint64_t start_ns = schedule.due_ns + 600000u;
+    TEST_ASSERT_EQUAL_UINT64(600000, tick(600000));
     TEST_ASSERT_EQUAL_UINT64(start_ns + 3u * MS / 4u, schedule.due_ns);
 }
 
-/* 0.9 ms late: 0.65 ms of it remain after one tick, 0.4 after two, 0.15, none. */
+/* 0.9 ms late: 0.65 ms of it remain after one tick, then 0.4, 0.15, none. */
 static void test_lateness_is_made_up(void)
 {
     const uint64_t due_ns = schedule.due_ns;
-    (void)tick(900000);
-    TEST_ASSERT_EQUAL_UINT64(due_ns + MS + 650000u, schedule.due_ns);
-    (void)tick(0);
-    (void)tick(0);
-    (void)tick(0);
-    TEST_ASSERT_EQUAL_UINT64(due_ns + 4u * MS, schedule.due_ns);
+    TEST_ASSERT_EQUAL_UINT64(900000, tick(900000));
+    TEST_ASSERT_EQUAL_UINT64(650000, tick(0));
+    TEST_ASSERT_EQUAL_UINT64(400000, tick(0));
+    TEST_ASSERT_EQUAL_UINT64(150000, tick(0));
+    TEST_ASSERT_EQUAL_UINT64(0, tick(0));
+    TEST_ASSERT_EQUAL_UINT64(due_ns + 5u * MS, schedule.due_ns);
+}
+
+static void test_after_a_miss_the_clock_is_set_anew(void)
+{
+    const uint64_t start_ns = schedule.due_ns + 3u * MS;
+    TEST_ASSERT_EQUAL_UINT64(3u * MS, tick(3u * MS));
+    TEST_ASSERT_EQUAL_UINT64(start_ns + MS, schedule.due_ns);
+    TEST_ASSERT_EQUAL_UINT64(0, tick(0));
 }
 
 static void test_real_time_ignores_lock_step(void)
@@ -90,6 +98,7 @@ int main(void)
     RUN_TEST(test_small_lateness_does_not_add_up);
     RUN_TEST(test_a_late_tick_is_followed_at_three_quarters_of_a_period_at_least);
     RUN_TEST(test_lateness_is_made_up);
+    RUN_TEST(test_after_a_miss_the_clock_is_set_anew);
     RUN_TEST(test_real_time_ignores_lock_step);
     RUN_TEST(test_lock_step_ticks_when_ready_else_after_the_guard);
     return UNITY_END();

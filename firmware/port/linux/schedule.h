@@ -4,8 +4,11 @@
  *
  * Real time: ticks are due a period apart on the clock. A tick that started late is not skipped and
  * the following ones are not bunched: two starts are at least three quarters of a period apart, so
- * lateness is made up over some ticks. Lock step (schedule_await): the next tick is due when
- * schedule_ready() is called, else after the guard time.
+ * that a small lateness is made up over some ticks. After one of more than a period the clock of
+ * the ticks is set anew.
+ *
+ * Lock step (schedule_await): the next tick is due when schedule_ready() is called, else after the
+ * guard time.
  */
 #ifndef PORT_LINUX_SCHEDULE_H
 #define PORT_LINUX_SCHEDULE_H
@@ -15,10 +18,11 @@
 
 struct schedule {
     uint64_t period_ns;
-    uint64_t due_ns;
-    uint64_t guard_ns; /* lock step wished by the present tick; 0: none */
-    bool awaiting;     /* the next tick may come before due_ns */
-    bool lock_step;    /* whether wishes count */
+    uint64_t nominal_ns; /* of the next tick, on the clock of the ticks */
+    uint64_t due_ns;     /* when it may start: not before nominal_ns */
+    uint64_t guard_ns;   /* lock step wished by the present tick; 0: none */
+    bool awaiting;       /* the next tick may come before due_ns */
+    bool lock_step;      /* whether wishes count */
 };
 
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step);
