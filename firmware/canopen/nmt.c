@@ -91,6 +91,16 @@ int nmt_slave_process(struct nmt_slave *slave, struct can_msg *out)
     return 1;
 }
 
+void nmt_slave_error(struct nmt_slave *slave, uint8_t behaviour)
+{
+    if (behaviour == 0 && slave->state == NMT_OPERATIONAL) {
+        slave->state = NMT_PRE_OPERATIONAL;
+    }
+    if (behaviour == 2 && slave->state != NMT_INITIALISING) {
+        slave->state = NMT_STOPPED;
+    }
+}
+
 bool nmt_permits_sdo(enum nmt_state state)
 {
     return state == NMT_PRE_OPERATIONAL || state == NMT_OPERATIONAL;

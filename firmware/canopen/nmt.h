@@ -55,6 +55,10 @@ bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in);
  * enters PRE-OPERATIONAL. Returns 1 when *out is to be sent, else 0. Mainline. */
 int nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
 
+/* A communication error (heartbeat of the master lost, bus off): what 0x1029 sub 1 says. 0: from
+ * OPERATIONAL to PRE-OPERATIONAL; 1: nothing; 2: to STOPPED; other values as 1. Mainline. */
+void nmt_slave_error(struct nmt_slave *slave, uint8_t behaviour);
+
 /* Which services a state permits (CiA 301, table 39). Pure. */
 bool nmt_permits_sdo(enum nmt_state state); /* SDO, also SYNC, EMCY: pre-operational, operational */
 bool nmt_permits_pdo(enum nmt_state state); /* operational only */

@@ -147,6 +147,30 @@ static void test_works_without_hooks(void)
     TEST_ASSERT_EQUAL_INT(0, node_resets);
 }
 
+static void test_communication_errors(void)
+{
+    static const struct {
+        enum nmt_state before;
+        uint8_t behaviour;
+        enum nmt_state after;
+    } cases[] = {
+        {NMT_OPERATIONAL, 0, NMT_PRE_OPERATIONAL},
+        {NMT_PRE_OPERATIONAL, 0, NMT_PRE_OPERATIONAL},
+        {NMT_STOPPED, 0, NMT_STOPPED},
+        {NMT_OPERATIONAL, 1, NMT_OPERATIONAL},
+        {NMT_OPERATIONAL, 2, NMT_STOPPED},
+        {NMT_PRE_OPERATIONAL, 2, NMT_STOPPED},
+        {NMT_INITIALISING, 2, NMT_INITIALISING},
+        {NMT_OPERATIONAL, 3, NMT_OPERATIONAL},
+    };
+
+    for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        slave.state = cases[i].before;
+        nmt_slave_error(&slave, cases[i].behaviour);
+        TEST_ASSERT_EQUAL_HEX8(cases[i].after, slave.state);
+    }
+}
+
 static void test_services_of_the_states(void)
 {
     TEST_ASSERT_TRUE(nmt_permits_sdo(NMT_PRE_OPERATIONAL));
@@ -167,6 +191,7 @@ int main(void)
     RUN_TEST(test_a_reset_is_not_overtaken);
     RUN_TEST(test_nothing_starts_before_the_boot_up);
     RUN_TEST(test_works_without_hooks);
+    RUN_TEST(test_communication_errors);
     RUN_TEST(test_services_of_the_states);
     return UNITY_END();
 }
