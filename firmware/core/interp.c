@@ -29,6 +29,10 @@ static void load_segment(struct interp *it, uint32_t i)
     program_segment_get(it->program, i, &segment);
     ph_segment_expand(&ph, &segment);
     it->segment = i;
+    it->segment_start_q40_mm = i == 0 ? INT64_MIN : segment.start_q40_mm;
+    it->segment_end_q40_mm = i + 1 == it->program->header.segment_count
+                                 ? INT64_MAX
+                                 : program_segment_start(it->program, i + 1);
     switch (it->kernel) {
     case INTERP_FIXED:
         kernel_fixed_segment_set(&it->path.fixed, &ph);
@@ -104,6 +108,10 @@ static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t m
 {
     const struct program *p = it->program;
     uint32_t i = it->segment;
+    if (arc_length_q40_mm >= it->segment_start_q40_mm &&
+        arc_length_q40_mm < it->segment_end_q40_mm) {
+        return INTERP_OK;
+    }
     while (i + 1 < p->header.segment_count &&
            program_segment_start(p, i + 1) <= arc_length_q40_mm) {
         if (most == 0) {
@@ -119,9 +127,7 @@ static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t m
         most--;
         i--;
     }
-    if (i != it->segment) {
-        load_segment(it, i);
-    }
+    load_segment(it, i);
     return INTERP_OK;
 }
 

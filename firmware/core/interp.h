@@ -50,7 +50,9 @@ struct interp {
     uint32_t segment;
     uint64_t piece_start_q32_s;
     uint64_t piece_end_q32_s;
-    struct interp_point end; /* the exact end point */
+    int64_t segment_start_q40_mm; /* arc lengths that belong to the segment: from here ... */
+    int64_t segment_end_q40_mm;   /* ... to below here; without end at both ends of the path */
+    struct interp_point end;      /* the exact end point */
     union {
         struct feed_piece integers; /* fixed and float */
         struct kernel_double_piece doubles;

@@ -5,6 +5,7 @@
 
 #define STEPS 2
 #define Q30   1073741824.0f
+#define Q31   2147483648.0f
 #define Q24   16777216.0f
 
 static float from_q30(int64_t a)
@@ -43,9 +44,11 @@ void kernel_float_segment_set(struct kernel_float_segment *k, const struct ph_se
     int n = ph->exponent;
     for (int axis = PH_X; axis <= PH_S; axis++) {
         k->origin_q40_mm[axis] = ph->origin_q40_mm[axis];
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < 4; i++) {
             k->c_q48_mm[axis][i] = ph->c_q48_mm[axis][i] * (1 << i);
-            k->high[axis][i] = from_q30(qmath_shift(ph->c_q48_mm[axis][i + 3], -18 - n));
+        }
+        for (int i = 0; i < 2; i++) {
+            k->high[axis][i] = from_q30(qmath_shift(ph->c_q48_mm[axis][i + 4], -18 - n));
         }
     }
     for (int i = 0; i < 6; i++) {
@@ -94,9 +97,11 @@ static int64_t polynomial(const struct kernel_float_segment *k, int axis, int32_
 {
     const int64_t *low = k->c_q48_mm[axis];
     const float *high = k->high[axis];
-    int64_t value = qmath_mul_wide(qmath_mul_wide(low[2], z_q31) + low[1], z_q31) + low[0];
-    float rest = z * z * z * (high[0] + z * (high[1] + z * high[2]));
-    return value + qmath_shift((int32_t)(rest * Q30), 18 + k->exponent);
+    int64_t value = qmath_mul_wide(low[3], z_q31) + low[2];
+    value = qmath_mul_wide(qmath_mul_wide(value, z_q31) + low[1], z_q31) + low[0];
+    float squared = z * z;
+    float rest = squared * squared * (high[0] + z * high[1]);
+    return value + qmath_shift((int32_t)(rest * Q31), 17 + k->exponent);
 }
 
 /* rest times the unit tangent w^2 / |w|^2. */

@@ -13,8 +13,8 @@
 /* "Normalised" as in core/kernel_fixed.h. */
 struct kernel_float_segment {
     int64_t origin_q40_mm[3];
-    int64_t c_q48_mm[3][3]; /* powers 0 ... 2 of z, power k times 2^k */
-    float high[3][3];       /* powers 3 ... 5, normalised */
+    int64_t c_q48_mm[3][4]; /* powers 0 ... 3 of z, power k times 2^k */
+    float high[3][2];       /* powers 4 and 5, normalised */
     float s[6];             /* normalised arc length from the middle */
     float u[3];             /* normalised w */
     float v[3];
@@ -24,7 +24,7 @@ struct kernel_float_segment {
 
 void kernel_float_segment_set(struct kernel_float_segment *k, const struct ph_segment *ph);
 
-/* As kernel_fixed_segment_at; within 10 nm. Two Newton steps, three divisions, 6 wide products. */
+/* As kernel_fixed_segment_at; within 10 nm. Two Newton steps, three divisions, 9 wide products. */
 void kernel_float_segment_at(const struct kernel_float_segment *k, int64_t arc_length_q40_mm,
                              int64_t point_q40_mm[2]);
 

@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: MIT
+"""Accuracy, noise and speed of the three number kernels.
+
+    python benchmarks/kernels.py [--json OUT] [--points N] [--compiler CC]
+
+Compiles firmware/core as a shared object of its own. Prints the figures and writes them as one JSON object:
+
+- accuracy: largest distance from the program as uploaded in 50-digit arithmetic, on random segments at the
+  limit of the speed ratio (31 mm to 1e-6 mm) and on the golden programs;
+- noise: third differences of the unrounded output at 1 kHz minus those of the exact points, mm/s^3, and the
+  same for the feed (first differences of the chord);
+- speed: time of a tick relative to the double kernel, and instructions of a tick where `valgrind` is there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "benchmarks" / "support"))
+
+from image import Piece, Segment, encode, exponent, random_segment  # noqa: E402
+
+CORE = ROOT / "firmware" / "core"
+PROGRAMS = ROOT / "tests" / "data" / "programs"
+GOLDEN = ("alpha_exponential", "alpha_minimax", "heart_exponential", "star_minimax", "line_slow")
+KERNELS = ("fixed", "float", "double")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+DIGITS = 50
+LENGTHS_MM = (31.0, 20.0, 5.0, 1.0, 0.1, 1e-3, 1e-6)
+
+
+class Point(ctypes.Structure):
+    """struct interp_point."""
+
+    _fields_ = [(name, ctypes.c_int64) for name in ("arc", "x", "y", "feed")]
+
+
+class Core:
+    """The compiled core."""
+
+    def __init__(self, compiler: str, folder: Path) -> None:
+        target = folder / "core.so"
+        sources = sorted(str(p) for p in CORE.glob("*.c"))
+        command = [compiler, *FLAGS, "-fPIC", "-shared", f"-I{CORE.parent}", *sources, "-o", target]
+        subprocess.run(command, check=True)
+        self.lib = ctypes.CDLL(str(target))
+        self.lib.timebase_time_q42.restype = ctypes.c_uint64
+
+    def open(self, image: bytes) -> tuple[Any, Any]:
+        """struct program and the buffer that it refers to."""
+        program = ctypes.create_string_buffer(256)
+        buffer = ctypes.create_string_buffer(image, len(image))
+        if self.lib.program_open(program, buffer, len(image)) != 0:
+            raise SystemExit("an image cannot be opened")
+        return program, buffer
+
+    def points(self, image: bytes, times_q42: Sequence[int], kernel: int) -> list[Point]:
+        """Points at program times in 2^-42 s."""
+        program, _buffer = self.open(image)
+        cursor = ctypes.create_string_buffer(4096)
+        self.lib.interp_begin(cursor, program, kernel)
+        out = []
+        for time in times_q42:
+            point = Point()
+            self.lib.interp_seek(cursor, ctypes.c_uint64(time >> 10))
+            if self.lib.interp_at_q42(cursor, ctypes.c_uint64(time), ctypes.byref(point)) < 0:
+                raise SystemExit("a point was refused")
+            out.append(point)
+        return out
+
+
+@dataclass(frozen=True)
+class Program:
+    """An image and what is in it."""
+
+    image: bytes
+    segments: list[Segment]
+    pieces: list[Piece]
+
+    @property
+    def duration_q42(self) -> int:
+        """Duration in 2^-42 s."""
+        return sum(p.duration for p in self.pieces) << 10
+
+
+def decode(image: bytes) -> Program:
+    """Segments and pieces of an image."""
+    count = int.from_bytes(image[20:24], "little")
+    pieces_at = 128 + 72 * count
+    words = np.frombuffer(image, "<i8", 9 * count, 128).reshape(count, 9)
+    rows = np.frombuffer(image, "<i8", (len(image) - pieces_at) // 8, pieces_at).reshape(-1, 11)
+    segments = [Segment(int(r[0]), int(r[1]), int(r[2]), tuple(int(v) for v in r[3:])) for r in words]
+    pieces = [Piece(int(r[0]), int(r[1]), tuple(int(v) for v in r[2:9])) for r in rows]
+    return Program(image, segments, pieces)
+
+
+def exact(program: Program, time_q42: int) -> tuple[Any, Any, Any, Any]:
+    """(arc length, x, y, feed) of the program in 50 digits, mm and mm/s."""
+    with mpmath.workdps(DIGITS):
+        arc, feed = exact_feed(program, time_q42)
+        arc = max(arc, mpmath.mpf(0))
+        key = int(mpmath.floor(mpmath.ldexp(arc, 40)))
+        segment = [s for s in program.segments if s.start <= key][-1]
+        x, y = exact_point(segment, arc)
+        return arc, x, y, feed
+
+
+def exact_feed(program: Program, time_q42: int) -> tuple[Any, Any]:
+    """Arc length and feed."""
+    for piece in program.pieces:
+        if time_q42 < piece.duration << 10:
+            break
+        time_q42 -= piece.duration << 10
+    e = exponent(piece.duration)
+    tau = mpmath.ldexp(mpmath.mpf(time_q42), -42 - e)
+    c = [mpmath.ldexp(mpmath.mpf(v), -40) for v in (piece.start, *piece.c)]
+    feed = sum(k * v * tau ** (k - 1) for k, v in enumerate(c) if k > 0)
+    return sum(v * tau**k for k, v in enumerate(c)), mpmath.ldexp(feed, -e)
+
+
+def exact_point(segment: Segment, arc: Any) -> tuple[Any, Any]:
+    """Point at an arc length, by Newton's iteration in 50 digits."""
+    w0, w1, w2 = (
+        mpmath.mpc(mpmath.ldexp(u, -44), mpmath.ldexp(v, -44))
+        for u, v in zip(segment.w[0::2], segment.w[1::2], strict=True)
+    )
+    a, b, c = w0, 2 * (w1 - w0), w0 - 2 * w1 + w2
+    ca, cb, cc = mpmath.conj(a), mpmath.conj(b), mpmath.conj(c)
+    way = [a * ca, a * cb, (b * cb + 2 * a * cc) / 3, b * cc / 2, c * cc / 5]
+    way = [mpmath.re(v) for v in way]
+    curve = [a * a, a * b, (b * b + 2 * a * c) / 3, b * c / 2, c * c / 5]
+    local = arc - mpmath.ldexp(mpmath.mpf(segment.start), -40)
+    xi = local / sum(way)
+    for _ in range(12):
+        rest = sum(v * xi ** (k + 1) for k, v in enumerate(way)) - local
+        xi -= rest / abs(a + b * xi + c * xi * xi) ** 2
+    r = sum(v * xi ** (k + 1) for k, v in enumerate(curve))
+    x = mpmath.ldexp(mpmath.mpf(segment.x), -40) + mpmath.re(r)
+    return x, mpmath.ldexp(mpmath.mpf(segment.y), -40) + mpmath.im(r)
+
+
+def extreme_program(rng: np.random.Generator, length_mm: float) -> Program:
+    """Three segments at the limit of the speed ratio under one piece of constant feed."""
+    segments: list[Segment] = []
+    start, x, y = 0, int(rng.integers(-4000, 4000)) << 40, int(rng.integers(-4000, 4000)) << 40
+    for _ in range(3):
+        segments.append(random_segment(rng, start, x, y, length_mm))
+        x, y, start = segments[-1].next_start()
+    duration = int(rng.integers(1 << 20, 5 << 32))
+    slope = int(0.999 * start * 2.0 ** (32 + exponent(duration)) / duration)
+    pieces = [Piece(duration, 0, (slope, 0, 0, 0, 0, 0, 0))]
+    return Program(encode(segments, pieces), segments, pieces)
+
+
+def largest_errors(core: Core, program: Program, times: Sequence[int]) -> np.ndarray:
+    """Largest error of a coordinate in mm by kernel, (3,)."""
+    truth = [exact(program, t) for t in times]
+    errors = np.zeros(3)
+    for kernel in range(3):
+        for got, want in zip(core.points(program.image, times, kernel), truth, strict=True):
+            for value, right in ((got.x, want[1]), (got.y, want[2])):
+                error = abs(mpmath.ldexp(mpmath.mpf(value), -40) - right)
+                errors[kernel] = max(errors[kernel], float(error))
+    return errors
+
+
+def accuracy(core: Core, points: int) -> dict[str, Any]:
+    """Largest errors in mm, by case and kernel."""
+    rng = np.random.default_rng(2024)
+    out: dict[str, Any] = {}
+    for length_mm in LENGTHS_MM:
+        errors = np.zeros(3)
+        for _ in range(max(1, points // 20)):
+            program = extreme_program(rng, length_mm)
+            times = sorted(int(t) for t in rng.integers(0, program.duration_q42, 20))
+            errors = np.maximum(errors, largest_errors(core, program, times))
+        out[f"extreme_{length_mm:g}_mm"] = dict(zip(KERNELS, errors.tolist(), strict=True))
+    for name in GOLDEN:
+        program = decode((PROGRAMS / f"{name}.hdgp").read_bytes())
+        times = sorted(int(t) for t in rng.integers(0, program.duration_q42, points))
+        errors = largest_errors(core, program, times)
+        out[name] = dict(zip(KERNELS, errors.tolist(), strict=True))
+    return out
+
+
+def noise(core: Core, name: str, ticks: int) -> dict[str, Any]:
+    """Third differences and chord feed of the error in the middle of a program, at 1 kHz."""
+    program = decode((PROGRAMS / f"{name}.hdgp").read_bytes())
+    count = min(ticks, int(program.duration_q42 / 2**42 * 1000) - 1)
+    first = (int(program.duration_q42 / 2**42 * 1000) - count) // 2
+    times = [(2 * (first + k) * 2**42 + 1000) // 2000 for k in range(count)]
+    truth = [exact(program, t) for t in times]
+    out = {}
+    for kernel, label in enumerate(KERNELS):
+        got = core.points(program.image, times, kernel)
+        x = np.array([mpmath.ldexp(mpmath.mpf(g.x), -40) - t[1] for g, t in zip(got, truth, strict=True)])
+        y = np.array([mpmath.ldexp(mpmath.mpf(g.y), -40) - t[2] for g, t in zip(got, truth, strict=True)])
+        third = np.diff(np.array([x, y], dtype=float), 3) * 1e9
+        ripple = np.diff(np.array([x, y], dtype=float), 1) * 1e3
+        out[label] = {
+            "third_difference_rms_mm_s3": float(np.sqrt(np.mean(third**2))),
+            "third_difference_peak_mm_s3": float(np.abs(third).max()),
+            "feed_ripple_peak_mm_s": float(np.hypot(*ripple).max()),
+        }
+    return out
+
+
+DRIVER = r"""
+#include <stdio.h>
+#include <stdlib.h>
+#include "core/interp.h"
+#include "core/timebase.h"
+static unsigned char image[1 << 20];
+int main(int argc, char **argv)
+{
+    static struct program p;
+    static struct interp it;
+    static struct timebase tb;
+    struct interp_point point;
+    volatile long long sum = 0;
+    FILE *f = fopen(argv[1], "rb");
+    size_t size = fread(image, 1, sizeof image, f);
+    program_open(&p, image, (unsigned)size);
+    for (int run = atoi(argv[3]); run > 0 && argc == 4; run--) {
+        interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2]));
+        timebase_begin(&tb, &p, p.header.period_us);
+        do {
+            timebase_step(&tb);
+            interp_at_q42(&it, timebase_time_q42(&tb), &point);
+            sum += point.x_q40_mm + point.y_q40_mm;
+        } while (timebase_state(&tb) != TIMEBASE_ENDED);
+    }
+    return 0;
+}
+"""
+
+
+def build_driver(compiler: str, folder: Path) -> Path:
+    """A program that runs an image: FILE KERNEL RUNS."""
+    source, target = folder / "driver.c", folder / "driver"
+    source.write_text(DRIVER)
+    sources = sorted(str(p) for p in CORE.glob("*.c"))
+    subprocess.run(
+        [compiler, *FLAGS, f"-I{CORE.parent}", str(source), *sources, "-o", str(target)], check=True
+    )
+    return target
+
+
+def instructions(driver: Path, name: str, kernel: int, runs: int) -> int:
+    """Instructions of so many runs, counted by callgrind."""
+    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(driver),
+               str(PROGRAMS / f"{name}.hdgp"), str(kernel), str(runs)]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stderr
+    found = re.search(r"Collected : (\d+)", text)
+    if found is None:
+        raise SystemExit("callgrind gave no count")
+    return int(found.group(1))
+
+
+def speed(compiler: str, folder: Path) -> dict[str, Any]:
+    """Time of a tick relative to the double kernel, ns and instructions."""
+    driver = build_driver(compiler, folder)
+    name = "heart_exponential"
+    ticks = int(decode((PROGRAMS / f"{name}.hdgp").read_bytes()).duration_q42 / 2**42 * 1000) + 2
+    out: dict[str, Any] = {}
+    for kernel, label in enumerate(KERNELS):
+        best = min(run_time(driver, name, kernel, 300) for _ in range(3))
+        out[label] = {"tick_ns": 1e9 * best / 300 / ticks}
+        if shutil.which("valgrind"):
+            many = instructions(driver, name, kernel, 3) - instructions(driver, name, kernel, 1)
+            out[label]["tick_instructions"] = many / 2 / ticks
+    for label in KERNELS:
+        out[label]["time_ratio_to_double"] = out[label]["tick_ns"] / out["double"]["tick_ns"]
+    return out
+
+
+def run_time(driver: Path, name: str, kernel: int, runs: int) -> float:
+    """User seconds of so many runs."""
+    import resource
+
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    subprocess.run(
+        [str(driver), str(PROGRAMS / f"{name}.hdgp"), str(kernel), str(runs)], check=True
+    )
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def main() -> None:
+    """See the head of the file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--points", type=int, default=60, help="points per program")
+    parser.add_argument("--compiler", default="gcc")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        core = Core(options.compiler, folder)
+        figures = {
+            "accuracy_mm": accuracy(core, options.points),
+            "noise_1khz": {n: noise(core, n, 400) for n in ("alpha_exponential", "heart_exponential")},
+            "speed": speed(options.compiler, folder),
+        }
+    report(figures)
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+def report(figures: dict[str, Any]) -> None:
+    """Print the figures, one line for each case."""
+    print("largest error of a coordinate, nm           fixed       float      double")
+    for case, errors in figures["accuracy_mm"].items():
+        print(f"  {case:38}" + "".join(f"{1e6 * errors[k]:12.2e}" for k in KERNELS))
+    for case, kernels in figures["noise_1khz"].items():
+        for kernel, values in kernels.items():
+            print(f"  {case} {kernel}: third difference rms {values['third_difference_rms_mm_s3']:.2g}, "
+                  f"peak {values['third_difference_peak_mm_s3']:.2g} mm/s^3; "
+                  f"feed ripple {values['feed_ripple_peak_mm_s']:.1e} mm/s")
+    for kernel, values in figures["speed"].items():
+        count = values.get("tick_instructions")
+        counted = f", {count:.0f} instructions" if count else ""
+        print(f"  {kernel}: {values['tick_ns']:.0f} ns a tick{counted}, "
+              f"{values['time_ratio_to_double']:.2f} of double")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Spline figures: convergence over random polygons, time per point, accuracy of the inverse.
+
+    python benchmarks/spline.py [--json OUT] [--polygons N]
+
+Campaigns: N (10^4) smooth and N uniformly random polygons, seeds 0 … N - 1 of
+tests/host/spline/polygons.py. Prints the figures and writes them as one JSON object.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "tests/host/spline"), str(ROOT / "host_tools")]
+
+from polygons import ALPHA, HEART, Polygon, smooth, uniform  # noqa: E402
+
+from hodograph.errors import PlanError  # noqa: E402
+from hodograph.spline import PHSpline, from_control_polygon  # noqa: E402
+from hodograph.spline.verdict import EXTRA_TURNING_RAD  # noqa: E402
+
+
+def campaign(polygon: Callable[[int], Polygon], count: int) -> dict[str, Any]:
+    """Convergence and quality over seeds 0 … count - 1."""
+    results, refused = [], []
+    for seed in range(count):
+        try:
+            results.append(from_control_polygon(*polygon(seed)))
+        except PlanError as error:
+            refused.append(f"seed {seed}: {error}")
+    iterations = np.array([r.newton_iterations for r in results])
+    trials = np.array([r.trial_iterations for r in results])
+    extra = np.array([r.extra_turning_rad for r in results])
+    bending = np.array([r.bending_ratio for r in results])
+    return {
+        "polygons": count,
+        "seeds": f"0 to {count - 1}",
+        "decent": len(results),
+        "rate_percent": 100 * len(results) / count,
+        "refused": refused[:10],
+        "iterations_median": float(np.median(iterations)),
+        "iterations_worst": int(iterations.max()),
+        "with_trials_percent": float(100 * np.mean(trials > 0)),
+        "trial_iterations_worst": int(trials.max()),
+        "changed_sides": sum(r.changed_sides for r in results),
+        "extra_turning_worst_rad": float(extra.max()),
+        "extra_loops": int((extra > EXTRA_TURNING_RAD).sum()),
+        "bending_ratio_median": float(np.median(bending)),
+        "bending_ratio_worst": float(bending.max()),
+    }
+
+
+def wavy(count: int) -> np.ndarray[Any, np.dtype[np.complex128]]:
+    """A long smooth polygon with legs of about 6 mm."""
+    t = np.arange(count) / count
+    return count * (1 + 0.3 * np.cos(14 * np.pi * t)) * np.exp(2j * np.pi * t)
+
+
+def seconds(work: Callable[[], object], repeats: int) -> float:
+    """Least wall time of `repeats` runs, after one to warm up."""
+    work()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def speed() -> dict[str, Any]:
+    """Wall times; per point for 10^3 … 10^5."""
+    out: dict[str, Any] = {
+        "alpha_ms": 1e3 * seconds(lambda: from_control_polygon(ALPHA, False), 50),
+        "heart_ms": 1e3 * seconds(lambda: from_control_polygon(HEART, True), 50),
+    }
+    for count in (1000, 10_000, 100_000):
+        p = wavy(count)
+        for closed in (False, True):
+            name = "closed" if closed else "open"
+            took = seconds(lambda p=p, closed=closed: from_control_polygon(p, closed), 3)
+            out[f"{name}_{count}_s"] = took
+            out[f"{name}_{count}_us_per_point"] = 1e6 * took / count
+    p, _ = uniform_long(100_000)
+    begin = time.perf_counter()
+    try:
+        out["uniform_100000_newton_iterations"] = from_control_polygon(p, False).newton_iterations
+    except PlanError as error:
+        out["uniform_100000_refused"] = str(error)
+    out["uniform_100000_s"] = time.perf_counter() - begin
+    return out
+
+
+def uniform_long(count: int) -> Polygon:
+    """Uniformly random points, far beyond the 200 of the campaign."""
+    rng = np.random.default_rng([count, 3])
+    return rng.uniform(0, 100, count) + 1j * rng.uniform(0, 100, count), False
+
+
+def evaluation() -> dict[str, Any]:
+    """Inverse of arc length and splitting on a spline of 10^4 spans."""
+    spline: PHSpline = from_control_polygon(wavy(10_000), True).spline
+    s = np.random.default_rng(7).uniform(0, spline.length_mm, 1_000_000)
+    spline.locate(s[:10])
+    begin = time.perf_counter()
+    segment, xi = spline.locate(s)
+    took = time.perf_counter() - begin
+    error = spline.arc_length(segment, xi) - (s - spline.segment_starts_mm[segment])
+    heart = from_control_polygon(HEART, True).spline
+    return {
+        "locate_us_per_point": 1e6 * took / s.size,
+        "locate_error_relative_to_segment": float(
+            np.abs(error / spline.segment_lengths_mm[segment]).max()
+        ),
+        "split_10000_ms": 1e3 * seconds(lambda: spline.split(32.0), 3),
+        "max_curvature_10000_ms": 1e3 * seconds(spline.max_curvature_per_mm, 3),
+        "heart_split_segments": heart.split(32.0).segment_count,
+    }
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description="spline figures")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--polygons", type=int, default=10_000)
+    options = parser.parse_args()
+    figures = {
+        "speed": speed(),
+        "evaluation": evaluation(),
+        "smooth": campaign(smooth, options.polygons),
+        "uniform": campaign(uniform, options.polygons),
+    }
+    for group, values in figures.items():
+        for name, value in values.items():
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            print(f"spline.{group}.{name}: {shown}")
+    if options.json:
+        options.json.write_text(json.dumps({"spline": figures}, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
