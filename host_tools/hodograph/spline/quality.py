@@ -25,7 +25,7 @@ def _rule(points: int, panels: int) -> tuple[Real, Real]:
 
 
 _SMOOTH = _rule(6, 1)
-_SHARP = _rule(16, 8)
+_SHARPER = ((0.5 * np.pi, _rule(12, 2)), (0.75 * np.pi, _rule(16, 8)))
 
 
 @dataclass(frozen=True)
@@ -72,14 +72,15 @@ class Shape:
     def bending(self) -> Real:
         """Integral of curvature^2 over arc length (1/mm).
 
-        Gauss quadrature of 6 points; of 8 panels of 16 where a root is so close that its factor
-        turns by more than 90 degrees. A figure of merit: good to two digits and more except next to
-        a cusp, where it is huge anyway.
+        Gauss quadrature of 6 points; of 2 panels of 12, or 8 of 16, where a root is so close that its
+        factor turns by more than 90, or 135, degrees. A figure of merit: good to two digits and more
+        except next to a cusp, where it is huge anyway.
         """
         out = self._quadrature(slice(None), _SMOOTH)
-        sharp = np.flatnonzero(self.sharpest > self.power * np.pi / 2.0)
-        if sharp.size:
-            out[sharp] = self._quadrature(sharp, _SHARP)
+        for angle, rule in _SHARPER:
+            sharp = np.flatnonzero(self.sharpest > self.power * angle)
+            if sharp.size:
+                out[sharp] = self._quadrature(sharp, rule)
         return out
 
     def _quadrature(self, spans: Any, rule: tuple[Real, Real]) -> Real:
