@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""hodograph-drive as a process: its command line, its objects seen by python canopen, its end."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import struct
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import canopen
+import pytest
+
+DRIVE = "build/bin/hodograph-drive"
+EDS = "sim/node/drive.eds"
+FIGURES = (
+    "gain_rad_s_v=83.0089,time_constant_s=0.19936,screw_mm_rad=1.59,torque_to_volts=1.39664804469,"
+    "volts_limit=5,k_pp_rad_s_mm=97.38,k_pv_nm_s_rad=1.19,k_iv_per_s=252.8,k_pf_rad_mm=0.8,k_vf=0.85"
+)
+MODELLED = {0x1018, 0x6041, 0x6062, 0x6063, 0x6064, 0x607A, 0x6092, 0x2101}
+"""Objects whose value is the model's, not the default of the EDS."""
+
+
+def run(root: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(root / DRIVE), *words], capture_output=True, text=True, timeout=20, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "part"),
+    [
+        ((), 2, "--bus"),
+        (("--bus", "vcan0"), 2, "--axis"),
+        (("--bus", "vcan0", "--axis", "node=2"), 2, "gain_rad_s_v"),
+        (("--bus", "vcan0", "--axis", f"node=2,{FIGURES},loop_rate_hz=1001"), 2, "servo samples"),
+        (("--bus", "nobus9", "--axis", f"node=2,{FIGURES}"), 4, "nobus9"),
+    ],
+)
+def test_faults_are_one_line_and_a_status(
+    root: Path, words: tuple[str, ...], status: int, part: str
+) -> None:
+    done = run(root, *words)
+    assert done.returncode == status
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert part in done.stderr
+
+
+def test_help(root: Path) -> None:
+    done = run(root, "--help")
+    assert done.returncode == 0
+    assert "Exit status" in done.stdout
+
+
+@pytest.fixture
+def drives(root: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Two drives: node 42 at 1.5 mm, node 43 at 0."""
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        words = [str(root / DRIVE), "--bus", "vcan0"]
+        for axis in ("node=42,position_mm=1.5", "node=43"):
+            words += ["--axis", f"{axis},{FIGURES}"]
+        process = subprocess.Popen(words, stderr=subprocess.PIPE)
+        missing = {0x700 + 42, 0x700 + 43}
+        limit = time.monotonic() + 10
+        while missing and time.monotonic() < limit:
+            frame = bus.recv(0.1)
+            missing -= {frame.arbitration_id} if frame else set()
+        assert not missing
+    yield process
+    with contextlib.suppress(ProcessLookupError):
+        process.kill()
+    process.communicate()
+
+
+@pytest.fixture
+def network(root: Path, drives: subprocess.Popen[bytes]) -> Iterator[canopen.Network]:
+    network = canopen.Network()
+    network.connect(interface="socketcan", channel="vcan0")
+    for node in (42, 43):
+        network.add_node(node, str(root / EDS)).sdo.RESPONSE_TIMEOUT = 2.0
+    yield network
+    network.disconnect()
+
+
+@pytest.mark.bus
+def test_every_object_reads_back_as_the_eds_says(network: canopen.Network) -> None:
+    node = network[42]
+    entries = 0
+    for entry in node.object_dictionary.values():
+        parts = (
+            [entry] if isinstance(entry, canopen.objectdictionary.ODVariable) else entry.values()
+        )
+        for part in parts:
+            if not part.readable:
+                with pytest.raises(canopen.SdoAbortedError):
+                    node.sdo.upload(part.index, part.subindex)
+                continue
+            data = node.sdo.upload(part.index, part.subindex)
+            value = part.decode_raw(data)
+            entries += 1
+            if part.index not in MODELLED and part.default is not None:
+                assert value == part.default, f"{part.index:#x} sub {part.subindex}"
+    assert entries > 60
+    position, feed = node.sdo.upload(0x6064, 0), node.sdo.upload(0x6092, 1)
+    assert int.from_bytes(position, "little") == 1_500_003  # nearest encoder increment
+    assert int.from_bytes(feed, "little") == 9_990_265
+
+
+@pytest.mark.bus
+def test_two_nodes_answer_a_sync_each(network: canopen.Network) -> None:
+    network.nmt.send_command(1)
+    time.sleep(0.1)
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        for counter in range(1, 6):
+            bus.send(can.Message(arbitration_id=0x80, data=[counter], is_extended_id=False))
+            found: dict[tuple[int, int], bytes] = {}
+            limit = time.monotonic() + 2
+            while len(found) < 4 and time.monotonic() < limit:
+                frame = bus.recv(0.1)
+                if frame is not None and frame.arbitration_id & 0x7F in (42, 43):
+                    found[frame.arbitration_id & 0x780, frame.arbitration_id & 0x7F] = bytes(
+                        frame.data
+                    )
+            word, position = struct.unpack("<Hi", found[0x180, 42])
+            assert (word & 0x6F, position) == (0x40, 1_500_003)
+            assert struct.unpack("<Hi", found[0x180, 43])[1] == 0
+            assert struct.unpack("<h", found[0x280, 43]) == (0,)
+
+
+@pytest.mark.bus
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
+def test_ends_cleanly(drives: subprocess.Popen[bytes], end: signal.Signals) -> None:
+    drives.send_signal(end)
+    _, stderr = drives.communicate(timeout=5)
+    assert (drives.returncode, stderr) == (0, b"")
