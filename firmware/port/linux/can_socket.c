@@ -40,7 +40,7 @@ static int check_interface(int fd, const char *interface, char *reason, size_t s
     int error = interface_request(fd, interface, SIOCGIFHWADDR, &answer);
     if (error == ENODEV) {
         return fail(reason, size, error,
-                    "no interface %s: create it (ip link add dev vcan0 type vcan) or run under "
+                    "no interface %s: create it (ip link add dev NAME type vcan) or run under "
                     "tools/with-vcan",
                     interface);
     }
