@@ -19,7 +19,7 @@ FACTOR_SHARE = 0.5
 
 _HAIR = 1.0 - 1e-9
 _U32_MAX = 2.0**32 - 1.0
-_TINY = 1e-300
+_TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)

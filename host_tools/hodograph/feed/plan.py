@@ -195,8 +195,9 @@ def _plan(
         line = timeline(shape.ramp, length)
         if line.duration_s >= LONGEST_S:
             raise PlanError(
-                f"feed: {float(length):g} mm at {shape.ramp.feed_mm_s:g} mm/s take longer than "
-                f"{LONGEST_S:g} s: ask for a higher feed or a shorter path"
+                f"feed: {float(length):g} mm at {shape.ramp.feed_mm_s:.3g} mm/s would take longer than "
+                f"{LONGEST_S:.7g} s ({'; '.join(reasons) or 'as asked'}): raise the feed, that limit or "
+                "ramp_time_s"
             )
         plan = FeedPlan(
             request,
@@ -211,9 +212,7 @@ def _plan(
         excess = _piece_excess(plan)
         if excess <= 1.0:
             return replace(plan, notes=(*plan.notes, *_fit_notes(plan.raw, period_us)))
-        reason = (
-            f"limits, as bounded by the Bernstein coefficients of pieces of {period_us} us and more"
-        )
+        reason = f"pieces of more than a period of {period_us} us exceed the limits"
         caps = (*caps, Cap(shape.ramp.feed_mm_s / excess * (1.0 - 1e-6), reason))
     raise PlanError("feed: no feed keeps the pieces inside the limits: raise them or ramp_time_s")
 

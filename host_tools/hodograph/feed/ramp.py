@@ -79,11 +79,17 @@ class Ramp:
         return float(max(values.max(), self._refined(order, values)))
 
     def lowest_feed(self) -> float:
-        """Least feed of the ramp, mm/s: 0, or a hair below where (18) dips under it."""
+        """Least feed of the ramp, mm/s: 0, or below where (18) makes it dip under 0 or, which by the
+        symmetry is the same, rise over the end feed.
+        """
         values = self._first_half(FEED, _LOW_GRID)
-        worst = int(values.argmin())
-        ends = _LOW_GRID[max(worst - 1, 0)], _LOW_GRID[min(worst + 1, _LOW_GRID.size - 1)]
-        return min(0.0, float(self._first_half(FEED, np.linspace(*ends, 33)).min()))
+        lowest = 0.0
+        for sign, base in ((1.0, 0.0), (-1.0, self.feed_mm_s)):
+            worst = int((sign * values).argmin())
+            ends = _LOW_GRID[max(worst - 1, 0)], _LOW_GRID[min(worst + 1, _LOW_GRID.size - 1)]
+            near = sign * self._first_half(FEED, np.linspace(*ends, 33))
+            lowest = min(lowest, base + float(near.min()))
+        return lowest
 
     def _first_half(self, order: int, tau: Real) -> Real:
         out = self.feed_mm_s / self.time_s**order * self.series.value(order, tau)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""The override bounds: docs/numerics.md section 7, its inequality at random instants."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.sampled_from(("quintic", "exponential", "minimax")),
+    st.floats(1.0, 450.0),
+    st.floats(0.03, 1.0),
+    st.floats(0.0, 0.3),
+    st.integers(0, 2**32 - 1),
+)
+def test_no_motion_of_the_override_breaks_a_limit(profile, feed, time, reserve, seed) -> None:
+    controller = ControllerLimits(500.0, 5000.0, 200000.0, reserve)
+    limits = Limits(450.0, 4500.0, 150000.0)
+    plan = plan_feed(300.0, FeedRequest(profile, feed, time), limits, controller)
+    pieces = plan.pieces
+    rng = np.random.default_rng(seed)
+    ends = np.cumsum(pieces.duration_q32_s) * 2.0**-32
+    t = np.sort(rng.uniform(0.0, plan.duration_s, 2000))
+    i = np.minimum(np.searchsorted(ends, t), len(pieces) - 1)
+    factor = pieces.override_factor_q24[i] * 2.0**-24
+    rate = pieces.override_rate_q16_per_s[i] * 2.0**-16
+    second = pieces.override_second_q8_per_s2[i] * 2.0**-8
+    v, a, j = plan.feed(t), plan.acceleration(t), plan.jerk(t)
+    # The extremes of the bounded set, and points within.
+    for corner in range(16):
+        pull = rng.uniform(-1.0, 1.0, (3, t.size)) if corner >= 8 else np.ones((3, t.size))
+        signs = [1.0 if corner >> bit & 1 else -1.0 for bit in range(3)]
+        lam, d1, d2 = (
+            s * p * b for s, p, b in zip(signs, pull, (factor, rate, second), strict=True)
+        )
+        slack = 1.0 + 1e-6
+        assert np.all(np.abs(lam * v) <= 500.0 * slack)
+        assert np.all(np.abs(d1 * v + lam**2 * a) <= 5000.0 * slack)
+        # The piece's jerk may be off the profile's by the 5 mm/s^3 of the format.
+        assert np.all(np.abs(d2 * v + 3.0 * lam * d1 * a + lam**3 * j) <= 200000.0 * slack + 10.0)
+        # At a constant override the program's own limits hold too.
+        assert np.all(factor * v <= 450.0 * slack)
+        assert np.all(factor**2 * np.abs(a) <= 4500.0 * slack)
+        assert np.all(factor**3 * np.abs(j) <= 150000.0 * slack + 10.0)
+    assert factor.min() >= 1.0
+    assert factor.max() <= 2.0
+    assert rate.min() > 0.0
+    assert second.min() > 0.0
+
+
+def test_constant_feed_has_generous_bounds() -> None:
+    controller = ControllerLimits(500.0, 5000.0, 200000.0, 0.1)
+    plan = plan_feed(300.0, FeedRequest("minimax", 100.0, 0.1), None, controller)
+    middle = plan.pieces[len(plan.pieces) // 2]
+    assert middle.override_factor_q24 == 2 << 24
+    assert middle.override_rate_q16_per_s >> 16 >= 49
+    assert middle.override_second_q8_per_s2 >> 8 >= 1999
+
+
+def test_under_report_an_exceeded_limit_leaves_no_factor() -> None:
+    controller = ControllerLimits(500.0, 5000.0, 200000.0, 0.1)
+    limits = Limits(None, None, 40000.0, "report")
+    plan = plan_feed(300.0, FeedRequest("quintic", 100.0, 0.1), limits, controller)
+    assert plan.pieces.override_factor_q24.min() == 1 << 24
