@@ -56,7 +56,7 @@ class ExactProgram:
         c = [mpmath.ldexp(v, -40) for v in (piece.start_q40, *piece.c_q40)]
         values = []
         for order in range(4):
-            values.append(mpmath.polyval(c[::-1], tau) / scale**order)
+            values.append(_horner(c, tau) / scale**order)
             c = [k * v for k, v in enumerate(c)][1:]
         return values[0], values[1], values[2], values[3]
 
@@ -81,6 +81,14 @@ class ExactProgram:
             mpmath.ldexp(int(p.x_q40[i]), -40) + mpmath.re(r),
             mpmath.ldexp(int(p.y_q40[i]), -40) + mpmath.im(r),
         )
+
+
+def _horner(c: list[Any], tau: Any) -> Any:
+    """Of the polynomial with coefficients c, lowest power first."""
+    value = mpmath.mpf(0)
+    for v in reversed(c):
+        value = value * tau + v
+    return value
 
 
 def _square(a: list[Any], b: list[Any]) -> list[Any]:

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Golden images: the table of tests/data/manifest.txt, which the C tests read as well."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from hodograph.errors import InputError
+from hodograph.program import ProgramLimits, decode, encode, inspect_dict, inspect_text
+from hodograph.program.check import check_image
+from hodograph.program.codes import ProgramError
+
+ROOT = Path(__file__).parents[3]
+DATA = ROOT / "tests" / "data"
+LINES = [line for line in (DATA / "manifest.txt").read_text().splitlines() if line[0] != "#"]
+ROWS = [line.split() for line in LINES if not line.startswith("limits")]
+GOOD = [row[0] for row in ROWS if row[1] == "OK"]
+
+
+def limits() -> ProgramLimits:
+    numbers = [int(v) for v in re.findall(r"-?\b\d{4,}\b", LINES[0])]
+    return ProgramLimits(*numbers[:4], (numbers[4], numbers[5]), (numbers[6], numbers[7]))
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
+def test_check_says_what_the_table_says(row: list[str]) -> None:
+    name, code, number, index = row
+    fault = check_image((DATA / "programs" / name).read_bytes(), limits())
+    if code == "OK":
+        assert fault is None
+    else:
+        assert fault is not None
+        assert (fault.code.name, int(fault.code), fault.index) == (code, int(number), int(index))
+
+
+def test_every_file_is_in_the_table_and_every_code_in_a_file() -> None:
+    assert {row[0] for row in ROWS} == {p.name for p in (DATA / "programs").glob("*.hdgp")}
+    assert {row[1] for row in ROWS} - {"OK"} == {code.name for code in ProgramError}
+
+
+def test_codes_are_those_of_the_controller() -> None:
+    header = (ROOT / "firmware" / "core" / "program_check.h").read_text()
+    pairs = re.findall(r"PROGRAM_ERR_(\w+) =\s*(-\d+)", header)
+    assert {name: int(number) for name, number in pairs} == {c.name: int(c) for c in ProgramError}
+
+
+def test_table_limits_are_read() -> None:
+    assert limits() == ProgramLimits(
+        1000, 500_000, 5_000_000, 200_000, (-200 << 40,) * 2, (200 << 40,) * 2
+    )
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_decode_and_encode_are_inverse(name: str) -> None:
+    image = (DATA / "programs" / name).read_bytes()
+    assert encode(decode(image)) == image
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_inspection(name: str) -> None:
+    program = decode((DATA / "programs" / name).read_bytes())
+    text, data = inspect_text(program, full=True), inspect_dict(program)
+    assert data["segments"] + data["pieces"] < len(text.splitlines())
+    assert f"{data['ticks']} ticks" in text
+    assert data["length_mm"] == program.length_mm
+    assert data["peak_feed_mm_s"] <= 500.0
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if -5 <= int(row[2]) < 0], ids=lambda r: r[0])
+def test_images_that_do_not_open_are_input_errors(row: list[str]) -> None:
+    with pytest.raises(InputError, match=row[1]):
+        decode((DATA / "programs" / row[0]).read_bytes())
