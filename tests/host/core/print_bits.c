@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: MIT */
+/* Prints the CRC-32 of all points of a program, tick by tick with a stop near the end: FILE KERNEL. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "core/crc32.h"
+#include "core/interp.h"
+#include "core/program_check.h"
+#include "core/timebase.h"
+
+static uint8_t image[1 << 20];
+
+static uint32_t add(uint32_t crc, int64_t value)
+{
+    uint8_t bytes[8];
+    for (int i = 0; i < 8; i++) {
+        bytes[i] = (uint8_t)((uint64_t)value >> (8 * i));
+    }
+    return crc32_update(crc, bytes, 8);
+}
+
+int main(int argc, char **argv)
+{
+    static struct program p;
+    static struct interp it;
+    static struct timebase tb;
+    struct interp_point point;
+    FILE *file = argc == 3 ? fopen(argv[1], "rb") : NULL;
+    if (file == NULL) {
+        return 2;
+    }
+    uint32_t size = (uint32_t)fread(image, 1, sizeof image, file);
+    fclose(file);
+    if (program_open(&p, image, size) != 0 ||
+        interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2])) != 0) {
+        return 2;
+    }
+    uint32_t crc = 0;
+    uint32_t ticks = program_ticks(&p);
+    timebase_begin(&tb, &p, p.header.period_us);
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        if (tick == ticks - ticks / 4) {
+            timebase_stop(&tb);
+        }
+        timebase_step(&tb);
+        if (interp_at_q42(&it, timebase_time_q42(&tb), &point) < 0) {
+            return 3;
+        }
+        crc = add(add(crc, point.x_q40_mm), point.y_q40_mm);
+        crc = add(add(crc, point.arc_length_q40_mm), point.feed_q32_mm_s);
+    }
+    printf("%08lx\n", (unsigned long)crc);
+    return 0;
+}
