@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 
 import numpy as np
@@ -14,6 +15,11 @@ from polygons import ALPHA, HEART, smooth, uniform
 from hodograph.errors import InputError, PlanError
 from hodograph.spline import from_control_polygon, through_points
 from hodograph.spline.bernstein import rotation
+from hodograph.spline.newton import newton
+from hodograph.spline.nodal import control_polygon_guide
+from hodograph.spline.quality import Shape
+from hodograph.spline.start import followed_branch, starting_values
+from hodograph.spline.system import System, clamped_end
 from hodograph.spline.verdict import EXTRA_TURNING_RAD
 
 
@@ -235,3 +241,48 @@ def test_a_hundred_thousand_points_take_linear_time():
     small, large = best(1000), best(100_000)
     assert large < 1e-5  # seconds per point
     assert large < 3 * small
+
+
+def other_solutions(p, closed):
+    """Bending energies of what Newton finds from every choice of signs of the starting values."""
+    guide = control_polygon_guide(p, closed)
+    branch = followed_branch(guide.hodograph)
+    z = starting_values(guide.hodograph, branch)
+    chords = np.diff(guide.nodal_points)
+    ends = guide.hodograph[0, 0], guide.hodograph[-1, 2]
+    for signs in itertools.product((1, -1), repeat=z.size):
+        if closed:
+            systems = [System(chords, cyclic_sign=e) for e in (1, -1)]
+        else:
+            a, b = (complex(np.sqrt(end)) for end in ends)
+            systems = [System(chords, clamped_end(a), clamped_end(e * b)) for e in (1, -1)]
+        for system in systems:
+            found = newton(system, z * signs)
+            if found.converged:
+                yield float(Shape(system.coefficients(found.z), 2).bending.sum())
+
+
+def test_no_other_choice_of_signs_bends_less():
+    tried = 0
+    for seed in range(400):
+        p, closed = smooth(seed)
+        if not 4 <= p.size <= 9 or (p.size > 7 and closed):
+            continue
+        own = float(Shape(from_control_polygon(p, closed).spline.w, 2).bending.sum())
+        energies = list(other_solutions(p, closed))
+        assert len(energies) > 4
+        assert min(energies) > own * (1 - 1e-9), seed
+        tried += 1
+    assert tried >= 8
+
+
+def test_through_points_of_random_polygons():
+    iterations = []
+    for seed in range(150):
+        for polygon, ends in ((smooth, "cubic"), (smooth, "natural"), (uniform, "cubic")):
+            result = through_points(*polygon(seed), ends)
+            assert result.extra_turning_rad <= EXTRA_TURNING_RAD
+            if polygon is smooth:
+                iterations.append(result.newton_iterations)
+    assert np.median(iterations) <= 5
+    assert max(iterations) <= 10
