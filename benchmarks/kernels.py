@@ -56,7 +56,7 @@ class Core:
     def __init__(self, compiler: str, folder: Path) -> None:
         target = folder / "core.so"
         sources = sorted(str(p) for p in CORE.glob("*.c"))
-        command = [compiler, *FLAGS, "-fPIC", "-shared", f"-I{CORE.parent}", *sources, "-o", target]
+        command = [compiler, *FLAGS, "-fPIC", "-shared", f"-I{CORE.parent}", *sources, "-o", str(target)]
         subprocess.run(command, check=True)
         self.lib = ctypes.CDLL(str(target))
         self.lib.timebase_time_q42.restype = ctypes.c_uint64
@@ -104,7 +104,9 @@ def decode(image: bytes) -> Program:
     pieces_at = 128 + 72 * count
     words = np.frombuffer(image, "<i8", 9 * count, 128).reshape(count, 9)
     rows = np.frombuffer(image, "<i8", (len(image) - pieces_at) // 8, pieces_at).reshape(-1, 11)
-    segments = [Segment(int(r[0]), int(r[1]), int(r[2]), tuple(int(v) for v in r[3:])) for r in words]
+    segments = [
+        Segment(int(r[0]), int(r[1]), int(r[2]), tuple(int(v) for v in r[3:])) for r in words
+    ]
     pieces = [Piece(int(r[0]), int(r[1]), tuple(int(v) for v in r[2:9])) for r in rows]
     return Program(image, segments, pieces)
 
@@ -208,8 +210,12 @@ def noise(core: Core, name: str, ticks: int) -> dict[str, Any]:
     out = {}
     for kernel, label in enumerate(KERNELS):
         got = core.points(program.image, times, kernel)
-        x = np.array([mpmath.ldexp(mpmath.mpf(g.x), -40) - t[1] for g, t in zip(got, truth, strict=True)])
-        y = np.array([mpmath.ldexp(mpmath.mpf(g.y), -40) - t[2] for g, t in zip(got, truth, strict=True)])
+        x = np.array(
+            [mpmath.ldexp(mpmath.mpf(g.x), -40) - t[1] for g, t in zip(got, truth, strict=True)]
+        )
+        y = np.array(
+            [mpmath.ldexp(mpmath.mpf(g.y), -40) - t[2] for g, t in zip(got, truth, strict=True)]
+        )
         third = np.diff(np.array([x, y], dtype=float), 3) * 1e9
         ripple = np.diff(np.array([x, y], dtype=float), 1) * 1e3
         out[label] = {
@@ -263,8 +269,15 @@ def build_driver(compiler: str, folder: Path) -> Path:
 
 def instructions(driver: Path, name: str, kernel: int, runs: int) -> int:
     """Instructions of so many runs, counted by callgrind."""
-    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(driver),
-               str(PROGRAMS / f"{name}.hdgp"), str(kernel), str(runs)]
+    command = [
+        "valgrind",
+        "--tool=callgrind",
+        "--callgrind-out-file=/dev/null",
+        str(driver),
+        str(PROGRAMS / f"{name}.hdgp"),
+        str(kernel),
+        str(runs),
+    ]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stderr
     found = re.search(r"Collected : (\d+)", text)
     if found is None:
@@ -312,7 +325,9 @@ def main() -> None:
         core = Core(options.compiler, folder)
         figures = {
             "accuracy_mm": accuracy(core, options.points),
-            "noise_1khz": {n: noise(core, n, 400) for n in ("alpha_exponential", "heart_exponential")},
+            "noise_1khz": {
+                n: noise(core, n, 400) for n in ("alpha_exponential", "heart_exponential")
+            },
             "speed": speed(options.compiler, folder),
         }
     report(figures)
@@ -327,15 +342,19 @@ def report(figures: dict[str, Any]) -> None:
         print(f"  {case:38}" + "".join(f"{1e6 * errors[k]:12.2e}" for k in KERNELS))
     for case, kernels in figures["noise_1khz"].items():
         for kernel, values in kernels.items():
-            print(f"  {case} {kernel}: third difference rms {values['third_difference_rms_mm_s3']:.2g}, "
-                  f"peak {values['third_difference_peak_mm_s3']:.2g} mm/s^3; "
-                  f"feed ripple {values['feed_ripple_peak_mm_s']:.1e} mm/s")
+            print(
+                f"  {case} {kernel}: third difference rms {values['third_difference_rms_mm_s3']:.2g}, "
+                f"peak {values['third_difference_peak_mm_s3']:.2g} mm/s^3; "
+                f"feed ripple {values['feed_ripple_peak_mm_s']:.1e} mm/s"
+            )
     for kernel, values in figures["speed"].items():
         count = values.get("tick_instructions")
         counted = f", {count:.0f} instructions" if count else ""
-        print(f"  {kernel}: {values['tick_ns']:.0f} ns a tick{counted}, "
-              f"{values['time_ratio_to_double']:.2f} of double")
+        print(
+            f"  {kernel}: {values['tick_ns']:.0f} ns a tick{counted}, "
+            f"{values['time_ratio_to_double']:.2f} of double"
+        )
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

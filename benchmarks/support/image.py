@@ -46,14 +46,20 @@ class Segment:
         def dot(i: int, j: int) -> int:
             return u[i] * u[j] + v[i] * v[j]
 
-        return [3 * dot(0, 0), 3 * dot(0, 1), dot(0, 2) + 2 * dot(1, 1), 3 * dot(1, 2),
-                3 * dot(2, 2)]
+        return [
+            3 * dot(0, 0),
+            3 * dot(0, 1),
+            dot(0, 2) + 2 * dot(1, 1),
+            3 * dot(1, 2),
+            3 * dot(2, 2),
+        ]
 
     def legal(self) -> bool:
         """Rules of protocol.md 1.2 about one segment."""
         sigma = self.sigma_q88()
-        return (min(sigma) > 0 and max(sigma) <= 2 * min(sigma)
-                and self.integral()[2] <= 15 * 32 << 88)
+        return (
+            min(sigma) > 0 and max(sigma) <= 2 * min(sigma) and self.integral()[2] <= 15 * 32 << 88
+        )
 
 
 @dataclass(frozen=True)
@@ -70,8 +76,9 @@ def round_half_up(a: int, b: int) -> int:
     return (2 * a + b) // (2 * b)
 
 
-def encode(segments: list[Segment], pieces: list[Piece], *, period_us: int = 1000,
-           closed: bool = False) -> bytes:
+def encode(
+    segments: list[Segment], pieces: list[Piece], *, period_us: int = 1000, closed: bool = False
+) -> bytes:
     """The image, protocol.md section 1."""
     body = b"".join(struct.pack("<9q", s.start, s.x, s.y, *s.w) for s in segments)
     for p in pieces:
@@ -79,8 +86,24 @@ def encode(segments: list[Segment], pieces: list[Piece], *, period_us: int = 100
     size = 128 + len(body)
     length = segments[-1].next_start()[2]
     duration = sum(p.duration for p in pieces)
-    tail = struct.pack("<3I2HQ3q4I32s16s", period_us, len(segments), len(pieces),
-                       int(closed), 2, duration, length, 0, 0, 0, 0, 0, 0, b"test", b"")
+    tail = struct.pack(
+        "<3I2HQ3q4I32s16s",
+        period_us,
+        len(segments),
+        len(pieces),
+        int(closed),
+        2,
+        duration,
+        length,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        b"test",
+        b"",
+    )
     tail += body
     return struct.pack("<4s2HII", b"HDGP", 1, 128, size, zlib.crc32(tail)) + tail
 
@@ -90,16 +113,25 @@ def exponent(duration: int) -> int:
     return (duration - 1).bit_length() - 32
 
 
-def random_segment(rng: np.random.Generator, start: int, x: int, y: int,
-                   length_mm: float, hard: bool = True) -> Segment:
+def random_segment(
+    rng: np.random.Generator, start: int, x: int, y: int, length_mm: float, hard: bool = True
+) -> Segment:
     """A legal segment of about this length; `hard` draws w close to the limit of the speed ratio."""
     while True:
         w = rng.normal(size=3) + 1j * rng.normal(size=3)
         if not hard:
-            w = np.exp(0.3j * rng.normal()) * (1 + 0.1 * (rng.normal(size=3) + 1j * rng.normal(size=3)))
-        b = np.array([abs(w[0]) ** 2, (w[0] * w[1].conjugate()).real,
-                      ((w[0] * w[2].conjugate()).real + 2 * abs(w[1]) ** 2) / 3,
-                      (w[1] * w[2].conjugate()).real, abs(w[2]) ** 2])
+            w = np.exp(0.3j * rng.normal()) * (
+                1 + 0.1 * (rng.normal(size=3) + 1j * rng.normal(size=3))
+            )
+        b = np.array(
+            [
+                abs(w[0]) ** 2,
+                (w[0] * w[1].conjugate()).real,
+                ((w[0] * w[2].conjugate()).real + 2 * abs(w[1]) ** 2) / 3,
+                (w[1] * w[2].conjugate()).real,
+                abs(w[2]) ** 2,
+            ]
+        )
         ratio = b.max() / b.min() if b.min() > 0 else np.inf
         if ratio > 2 or (hard and ratio < 1.8):
             continue
