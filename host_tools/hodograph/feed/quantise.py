@@ -59,29 +59,36 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
     for the first and last) shorter together than two periods.
     """
     end = round(line.duration_s * 2**32)
-    slack = float(Fraction(end, 2**32) - line.duration_s)
     up_end = round(Fraction(line.ramp.time_s) * 2**32)
     down_start = end - up_end if line.constant_s else up_end
+    middle = _constant_cuts(line, up_end, down_start)
+    middle_starts = _constant_starts(line, middle)
+    straight = np.zeros((middle.size - 1, 8))
+    straight[:, 1] = np.diff(middle_starts) * 2.0**-40
+    inner = _round_pieces(middle, middle_starts, straight)
     for cuts in _cut_counts(line, up_end, period_us):
         up_cuts = _even(0, up_end, cuts)
-        # The way down is the way up run backwards from the end, which is `slack` late.
+        # The way down is the way up run backwards from the exact end, a rounding off the last tick.
         down_cuts = end - _even(0, end - down_start, cuts)[::-1]
         up = _fit_ramp(line, up_cuts, 0.0, False)
-        down = _fit_ramp(line, down_cuts, float(Fraction(end, 2**32)) - slack, True)
-        middle = _constant_cuts(line, up_end, down_start)
-        times = np.concatenate((up_cuts[:-1], middle[:-1], down_cuts))
-        starts = np.concatenate(
-            (
-                _ramp_starts(up, 0)[:-1],
-                _constant_starts(line, middle)[:-1],
-                length_q40 + _ramp_starts(down, 1),
-            )
+        down = _fit_ramp(line, down_cuts, float(line.duration_s), True)
+        up_starts = np.append(_way_sums(up)[:-1], middle_starts[0])
+        down_starts = np.append(
+            middle_starts[-1], length_q40 - _way_sums(down)[-1] + _way_sums(down)[1:]
         )
-        shapes = np.concatenate((up.shape, _straight(starts, times, up, middle), down.shape))
-        pieces = _round_pieces(times, starts, shapes)
-        jerk_error = max(up.jerk_error, down.jerk_error)
-        length_error = max(up.way_error, down.way_error)
-        raw = RawPieces(np.diff(times), starts[:-1], pieces, jerk_error, length_error)
+        raw = RawPieces(
+            np.concatenate((np.diff(up_cuts), np.diff(middle), np.diff(down_cuts))),
+            np.concatenate((up_starts[:-1], middle_starts[:-1], down_starts[:-1])),
+            np.concatenate(
+                (
+                    _round_pieces(up_cuts, up_starts, up.shape),
+                    inner,
+                    _round_pieces(down_cuts, down_starts, down.shape),
+                )
+            ),
+            max(up.jerk_error, down.jerk_error),
+            max(up.way_error, down.way_error),
+        )
         if raw.faithful and _tight(raw, line):
             break
     return raw
@@ -148,10 +155,9 @@ def _hermite(way: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:
     return out
 
 
-def _ramp_starts(ramp: _Ramp, from_end: int) -> Int:
+def _way_sums(ramp: _Ramp) -> Int:
+    """Ways from the start of the ramp to the ends of its pieces, 0 first; 2^-40 mm."""
     total = np.concatenate((np.zeros(1), np.cumsum(ramp.way)))
-    if from_end:
-        total = -np.concatenate((np.cumsum(ramp.way[::-1])[::-1], np.zeros(1)))
     return np.rint(total * 2.0**40).astype(np.int64)
 
 
@@ -172,13 +178,6 @@ def _constant_starts(line: Timeline, cuts: Int) -> Int:
     return np.array(
         [(first + ((int(t) - base) * step >> 32) + half) >> 32 for t in cuts], dtype=np.int64
     )
-
-
-def _straight(starts: Int, times: Int, up: _Ramp, middle: Int) -> Real:
-    first, count = up.way.size, middle.size - 1
-    out = np.zeros((count, 8))
-    out[:, 1] = np.diff(starts[first : first + count + 1]) * 2.0**-40
-    return out
 
 
 def _round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
