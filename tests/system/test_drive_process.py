@@ -113,6 +113,7 @@ def test_every_object_reads_back_as_the_eds_says(network: canopen.Network) -> No
 
 @pytest.mark.bus
 def test_two_nodes_answer_a_sync_each(network: canopen.Network) -> None:
+    reports = (0x180 + 42, 0x180 + 43, 0x280 + 42, 0x280 + 43)
     network.nmt.send_command(1)
     time.sleep(0.1)
     with can.Bus(interface="socketcan", channel="vcan0") as bus:
@@ -122,7 +123,7 @@ def test_two_nodes_answer_a_sync_each(network: canopen.Network) -> None:
             limit = time.monotonic() + 2
             while len(found) < 4 and time.monotonic() < limit:
                 frame = bus.recv(0.1)
-                if frame is not None and frame.arbitration_id & 0x7F in (42, 43):
+                if frame is not None and frame.arbitration_id in reports:
                     found[frame.arbitration_id & 0x780, frame.arbitration_id & 0x7F] = bytes(
                         frame.data
                     )
