@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/feed_bounds.h"
 
+#include <assert.h>
+
 #include "core/bernstein.h"
 #include "core/qmath.h"
 
@@ -25,6 +27,7 @@ static int64_t times_tau(int64_t a, uint64_t tau_q64)
  */
 static int derive(const struct program_piece *piece, int order, int64_t a[8])
 {
+    assert(order >= 0 && order <= 3);
     for (int k = order; k <= 7; k++) {
         int64_t factor = 1;
         for (int i = 0; i < order; i++) {
@@ -37,6 +40,7 @@ static int derive(const struct program_piece *piece, int order, int64_t a[8])
 
 static int64_t horner(const int64_t *a, int degree, uint64_t tau_q64)
 {
+    assert(degree >= 0);
     int64_t value = a[degree];
     for (int k = degree - 1; k >= 0; k--) {
         value = times_tau(value, tau_q64) + a[k];
@@ -56,7 +60,7 @@ void feed_bounds_end(const struct program_piece *piece, struct feed_state *out)
 {
     int e = program_piece_exponent(piece->duration_q32_s);
     uint64_t tau = end_tau_q64(piece);
-    int64_t a[8];
+    int64_t a[8] = {0};
     int degree = derive(piece, 0, a);
     for (int k = 0; k <= degree; k++) {
         a[k] *= 16;
@@ -85,7 +89,7 @@ int feed_bounds_within(const struct program_piece *piece, enum feed_derivative d
     int order = (int)derivative;
     int e = program_piece_exponent(piece->duration_q32_s);
     uint64_t tau = end_tau_q64(piece);
-    int64_t a[8];
+    int64_t a[8] = {0};
     int64_t b[8];
     int degree = derive(piece, order, a);
     for (int k = 0; k <= degree; k++) {

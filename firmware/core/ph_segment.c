@@ -16,17 +16,17 @@ static void add_product(const struct program_segment *g, int i, int j, int64_t w
     out_q50[PH_S] += weight * (uu + vv);
 }
 
-void ph_segment_hodograph(const struct program_segment *g, int64_t e_q50[5][3])
+void ph_segment_hodograph(const struct program_segment *segment, int64_t e_q50[5][3])
 {
     for (int k = 0; k < 5; k++) {
         e_q50[k][PH_X] = e_q50[k][PH_Y] = e_q50[k][PH_S] = 0;
     }
-    add_product(g, 0, 0, 1, e_q50[0]);
-    add_product(g, 0, 1, 1, e_q50[1]);
-    add_product(g, 0, 2, 1, e_q50[2]);
-    add_product(g, 1, 1, 2, e_q50[2]);
-    add_product(g, 1, 2, 1, e_q50[3]);
-    add_product(g, 2, 2, 1, e_q50[4]);
+    add_product(segment, 0, 0, 1, e_q50[0]);
+    add_product(segment, 0, 1, 1, e_q50[1]);
+    add_product(segment, 0, 2, 1, e_q50[2]);
+    add_product(segment, 1, 1, 2, e_q50[2]);
+    add_product(segment, 1, 2, 1, e_q50[3]);
+    add_product(segment, 2, 2, 1, e_q50[4]);
 }
 
 /* Integral from z = -1 in powers of z, from the Bernstein coefficients of the derivative in xi. */

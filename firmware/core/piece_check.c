@@ -161,6 +161,7 @@ int piece_check_all(const struct program *p, const struct program_limits *limits
     struct program_piece before;
     struct program_piece c;
     uint64_t sum = 0;
+    program_piece_get(p, 0, &before);
     for (*index = 0; *index < p->header.piece_count; (*index)++) {
         program_piece_get(p, *index, &c);
         int code = check_one(&c, limits);

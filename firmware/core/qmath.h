@@ -74,7 +74,7 @@ static inline int64_t qmath_mul_q44(int64_t a, int64_t b)
 /* a 2^shift, floor for negative shifts; -63 <= shift <= 63, and the result must fit. */
 static inline int64_t qmath_shift(int64_t a, int shift)
 {
-    return shift >= 0 ? (int64_t)((uint64_t)a << shift) : a >> -shift;
+    return shift >= 0 ? (int64_t)((uint64_t)a << (shift & 63)) : a >> (-shift & 63);
 }
 
 /* a 2^shift, floor for negative shifts, kept within +-(2^62 - 1); any shift. */

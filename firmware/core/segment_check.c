@@ -170,6 +170,7 @@ int segment_check_all(const struct program *p, const struct program_limits *limi
 {
     struct program_segment before;
     struct program_segment g;
+    program_segment_get(p, 0, &before);
     for (*index = 0; *index < p->header.segment_count; (*index)++) {
         program_segment_get(p, *index, &g);
         int code = check_one(&g, limits);
