@@ -140,16 +140,16 @@ def test_the_ends_are_exact():
     assert abs(closed.point(closed.length_mm) - closed.point(0.0)) < 1e-13
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(seed=SEEDS, build=st.sampled_from([smooth_spline, uniform_spline]))
 def test_greatest_curvature_is_not_below_any_sample_and_is_reached(seed, build):
     spline = build(seed)
     greatest = spline.max_curvature_per_mm()
     i = np.arange(spline.segment_count)[:, None]
-    sampled = np.abs(spline.curvature_at(i, np.linspace(0, 1, 2001)[None]))
+    sampled = np.abs(spline.curvature_at(i, np.linspace(0, 1, 501)[None]))
     assert sampled.max() <= greatest * (1 + 1e-12)
     at = np.unravel_index(sampled.argmax(), sampled.shape)
-    near = np.clip(at[1] / 2000 + np.linspace(-1, 1, 20_001) / 2000, 0, 1)
+    near = np.clip(at[1] / 500 + np.linspace(-1, 1, 20_001) / 500, 0, 1)
     assert np.abs(spline.curvature_at(at[0], near)).max() > greatest * (1 - 1e-3)
 
 
