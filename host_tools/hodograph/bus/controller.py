@@ -7,9 +7,12 @@ Every failure is a BusError (nothing or nonsense comes back) or a RefusedError (
 
 from __future__ import annotations
 
+import os
+import queue
+import struct
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +28,7 @@ from ..program.codes import ProgramError
 from .address import BusAddress
 from .network import open_network
 from .texts import PROGRAM_STATES, REFUSALS, STATES, fault_text
+from .turns import Turns
 
 DEVICE_TYPE, PERIOD = 0x1000, 0x1006
 PROGRAM, COMMAND, STATE, FAULT = 0x2000, 0x2001, 0x2002, 0x2003
@@ -38,6 +42,8 @@ REFUSED_MOVING = 3
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
 POLL_S = 0.02
+NOWHERE = 0x5000
+LET_PASS_S = 1.0
 
 
 class Controller:
@@ -46,8 +52,34 @@ class Controller:
     def __init__(self, address: BusAddress, node_id: int, node: canopen.RemoteNode) -> None:
         self.address = address
         self.node_id = node_id
+        self._turns = Turns(address, node_id)
         self._sdo: Any = node.sdo
-        self._sdo.RESPONSE_TIMEOUT = 1.0
+        self._sdo.RESPONSE_TIMEOUT = 3.0
+
+    def close(self) -> None:
+        """Gives back what was opened for taking turns."""
+        self._turns.close()
+
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
+        with self._turns.turn() as handed_over:
+            if handed_over:
+                self._let_pass()
+            yield
+
+    def _let_pass(self) -> None:
+        """Throws away answers to another process: all that come before the answer to a question only we ask.
+
+        The question is for an object that does not exist, so the answer is an abort that names it.
+        """
+        index = NOWHERE | (os.getpid() & 0xFFF)
+        self._sdo.send_request(bytearray(struct.pack("<BHBL", 0x40, index, 0, 0)))
+        deadline = time.monotonic() + LET_PASS_S
+        with suppress(queue.Empty):
+            while (left := deadline - time.monotonic()) > 0:
+                answer = self._sdo.responses.get(timeout=left)
+                if struct.unpack_from("<H", answer, 1)[0] == index:
+                    return
 
     def read(self, index: int, sub: int | None = None) -> int:
         """An integer object."""
@@ -66,7 +98,8 @@ class Controller:
 
     def _guarded(self, action: Callable[[], Any], index: int, sub: int | None) -> Any:
         try:
-            return action()
+            with self._turn():
+                return action()
         except SdoAbortedError as error:
             raise RefusedError(
                 f"{self._who()} refused object {_name(index, sub)}: {error}"
@@ -93,7 +126,8 @@ class Controller:
         try:
             while True:
                 try:
-                    self._variable(STATE, None).raw  # noqa: B018
+                    with self._turn():
+                        self._variable(STATE, None).raw  # noqa: B018
                     return True
                 except SdoAbortedError as error:
                     raise BusError(
@@ -148,7 +182,8 @@ class Controller:
         """
         patience, self._sdo.RESPONSE_TIMEOUT = self._sdo.RESPONSE_TIMEOUT, 5.0
         try:
-            self._block_download(image, progress)
+            with self._turn():
+                self._block_download(image, progress)
         except SdoAbortedError as error:
             raise self._upload_refusal(error) from error
         except (SdoCommunicationError, RuntimeError) as error:
@@ -202,7 +237,8 @@ class Controller:
     def command(self, command: int) -> None:
         """Gives a command; raises RefusedError with the controller's reason."""
         try:
-            self._sdo[COMMAND].raw = command
+            with self._turn():
+                self._sdo[COMMAND].raw = command
         except SdoAbortedError as error:
             reason = self.read(FAULT, 4)
             text = REFUSALS.get(reason, str(error))
@@ -342,7 +378,11 @@ def connect(
             remote = network.add_node(node, str(eds))
         except Exception as error:
             raise BusError(f"{eds}: not a usable EDS file: {_one_line(error)}") from error
-        yield Controller(address, node, remote)
+        controller = Controller(address, node, remote)
+        try:
+            yield controller
+        finally:
+            controller.close()
 
 
 def _configuration(machine: Machine, kernel: str) -> list[tuple[tuple[int, int | None], int]]:

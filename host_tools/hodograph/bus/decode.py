@@ -100,7 +100,9 @@ def _by_sync(
     if early.size:
         raise RunError(f"{what}: more than one frame for SYNC {int(interval[early[0]])}")
     late = np.flatnonzero(lag > _LONGEST_LAG)
-    if late.size or lag[-_LEAD_IN:].min(initial=_LONGEST_LAG) > 0:  # a lost frame is never made up for
+    if (
+        late.size or lag[-_LEAD_IN:].min(initial=_LONGEST_LAG) > 0
+    ):  # a lost frame is never made up for
         lost = int(late[0]) if late.size else int(np.flatnonzero(lag == 0)[-1:].sum()) + 1
         raise RunError(f"{what}: no frame for SYNC {lost}: the recording is incomplete")
     return np.asarray(frames["data"][at])

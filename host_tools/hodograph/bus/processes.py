@@ -119,6 +119,11 @@ class Rig:
         with suppress(OSError):
             os.sched_setaffinity(child.pid, {max(os.sched_getaffinity(0))})
 
+    @property
+    def process_ids(self) -> list[int]:
+        """Of the drives and of the controller, in this order."""
+        return [child.pid for child, _ in self._children]
+
     def check(self) -> None:
         """Raises BusError with its last words when a child has ended."""
         for child, output in self._children:

@@ -61,8 +61,8 @@ def _zoom(axes: Axes, motion: Motion, worst: int) -> None:
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(-half_um, half_um)
     axes.set_ylim(-half_um, half_um)
-    axes.set_xlabel(f"x - {centre[0]:.4f} mm, µm")
-    axes.set_ylabel(f"y - {centre[1]:.4f} mm, µm")
+    axes.set_xlabel(f"x from {centre[0]:.4f} mm, µm")
+    axes.set_ylabel(f"y from {centre[1]:.4f} mm, µm")
     axes.set_title("worst place, enlarged")
 
 

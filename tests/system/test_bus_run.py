@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""`hodograph run` on a real SocketCAN bus: the same bits as `hodograph simulate`, at both paces."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hodograph.cli.main import main
+
+pytestmark = pytest.mark.bus
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+RUN_ONLY = {"bus", "deadline_misses", "pace", "frames"}
+
+
+def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    return json.loads(out)
+
+
+@pytest.mark.parametrize(
+    ("name", "kernel", "pace"),
+    [
+        ("alpha", "fixed", "real-time"),
+        ("alpha", "fixed", "fast"),
+        ("heart", "float", "fast"),
+        ("star", "double", "fast"),
+    ],
+)
+def test_run_equals_simulate(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, kernel: str, pace: str
+) -> None:
+    file = str(EXAMPLES / f"{name}.toml")
+    traces = [tmp_path / "simulated.csv", tmp_path / "recorded.csv"]
+    common = (file, "--json", "--kernel", kernel, "--trace")
+    simulated = result(capsys, "simulate", *common, str(traces[0]))
+    recorded = result(capsys, "run", *common, str(traces[1]), "--pace", pace)
+    assert set(recorded) == set(simulated) | RUN_ONLY
+    assert {key: recorded[key] for key in simulated} == simulated
+    assert recorded["pace"] == pace
+    assert recorded["bus"] == "socketcan:vcan0"
+    assert recorded["frames"] > 5 * recorded["ticks"]
+    assert traces[0].read_text() == traces[1].read_text()
+
+
+def test_two_files_and_a_report(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    files = [str(EXAMPLES / f"{name}.toml") for name in ("alpha", "heart")]
+    found = result(
+        capsys, "run", *files, "--json", "--pace", "fast", "--report", str(tmp_path / "report")
+    )
+    assert [run["file"] for run in found] == files
+    for run, file in zip(found, files, strict=True):
+        simulated = result(capsys, "simulate", file, "--json")
+        assert run["encoders_sha256"] == simulated["encoders_sha256"]
+    html = (tmp_path / "report" / "report.html").read_text()
+    assert "recorded on the bus" in html
+    assert found[0]["encoders_sha256"] in html
