@@ -106,7 +106,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
     if (drive_boot_finished(&controller->boot)) {
         port_lock();
         if (!controller->machine.boot_due) {
-            machine_drives_configured(&controller->machine);
+            machine_drives_configured(&controller->machine, controller->boot.simulated);
         }
         port_unlock();
     }

@@ -8,10 +8,13 @@
 #include "canopen/sdo_abort.h"
 
 #define DEVICE_PROFILE_DRIVE 402u /* low half of 0x1000 */
+#define SIMULATED_VENDOR     0u   /* no real vendor has it */
+#define SIMULATED_PRODUCT    2u   /* sim/node/drive.eds */
 
 enum step_kind {
     STEP_PRE_OPERATIONAL, /* NMT: process data off while parameters change */
     STEP_EXPECT,          /* read; the masked value must be as given */
+    STEP_IDENTIFY,        /* read; another value: not a simulated drive */
     STEP_WRITE,
     STEP_WRITE_OPTIONAL, /* a drive without the object is fine */
 };
@@ -36,6 +39,8 @@ struct step {
 /* CiA 301 and CiA 402-2; 0x60C2 is the time between setpoints as sub 1 * 10^(sub 2) s. */
 static const struct step steps[] = {
     {0x1000, 0, 2, STEP_EXPECT, VALUE_CONSTANT, DEVICE_PROFILE_DRIVE},
+    {0x1018, 1, 4, STEP_IDENTIFY, VALUE_CONSTANT, SIMULATED_VENDOR},
+    {0x1018, 2, 4, STEP_IDENTIFY, VALUE_CONSTANT, SIMULATED_PRODUCT},
     {0, 0, 0, STEP_PRE_OPERATIONAL, VALUE_CONSTANT, 0},
     {0x1006, 0, 4, STEP_WRITE_OPTIONAL, VALUE_PERIOD_US, 0},
     {0x1017, 0, 2, STEP_WRITE, VALUE_CONSTANT, DRIVE_HEARTBEAT_MS},
@@ -125,7 +130,11 @@ static bool as_expected(const struct drive_boot *boot, const struct step *step)
 static void judge(struct drive_boot *boot)
 {
     const struct step *step = &steps[boot->step];
-    if (boot->client.status == SDO_CLIENT_DONE) {
+    const bool done = boot->client.status == SDO_CLIENT_DONE;
+    if (step->kind == STEP_IDENTIFY && boot->client.status != SDO_CLIENT_FAILED) {
+        boot->simulated = boot->simulated && done && as_expected(boot, step);
+        advance(boot);
+    } else if (done) {
         if (step->kind == STEP_EXPECT && !as_expected(boot, step)) {
             give_up(boot, SDO_OK);
         } else {
@@ -148,10 +157,10 @@ static int begin_step(struct drive_boot *boot, struct can_msg *out)
         advance(boot);
         return 1;
     }
-    const int sent = step->kind == STEP_EXPECT
-                         ? sdo_client_read_number(&boot->client, node, step->index, step->sub, out)
-                         : sdo_client_write_number(&boot->client, node, step->index, step->sub,
-                                                   value_of(boot, step), step->size, out);
+    const bool read = step->kind == STEP_EXPECT || step->kind == STEP_IDENTIFY;
+    const int sent = read ? sdo_client_read_number(&boot->client, node, step->index, step->sub, out)
+                          : sdo_client_write_number(&boot->client, node, step->index, step->sub,
+                                                    value_of(boot, step), step->size, out);
     return sent > 0 ? 1 : 0;
 }
 
@@ -191,6 +200,7 @@ static void let_pause_pass(struct drive_boot *boot, uint32_t elapsed_us)
     }
     boot->axis = 0;
     boot->step = 0;
+    boot->simulated = true;
     boot->phase = DRIVE_BOOT_CONFIGURE;
 }
 

@@ -46,9 +46,10 @@ void machine_configure(struct machine *machine, const struct config *config, boo
     }
 }
 
-void machine_drives_configured(struct machine *machine)
+void machine_drives_configured(struct machine *machine, bool simulated)
 {
     if (machine->state == MACHINE_BOOT) {
+        machine->simulated = simulated;
         machine->state = MACHINE_OFF;
     }
 }
@@ -207,6 +208,19 @@ struct axis *machine_axis(struct machine *machine, uint8_t node)
         }
     }
     return NULL;
+}
+
+bool machine_awaits_drives(const struct machine *machine)
+{
+    if (machine->state == MACHINE_BOOT || !machine->simulated) {
+        return false;
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (machine->axes[i].missed_in_row <= AXIS_MISSED_MAX) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* A drive that was silent for long is not waited for: the others have to be braked in time. */

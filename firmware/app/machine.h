@@ -64,7 +64,8 @@ struct machine {
     enum machine_state state;
     enum machine_fault_phase fault_phase; /* in FAULT */
     uint32_t ticks_left;                  /* settling, enabling, resetting */
-    bool boot_due; /* the mainline shall find and configure the drives (anew) */
+    bool simulated; /* every drive is a simulated one: the port may let ticks wait for them */
+    bool boot_due;  /* the mainline shall find and configure the drives (anew) */
 };
 
 void machine_init(struct machine *machine, const struct config *config);
@@ -93,7 +94,7 @@ void machine_configure(struct machine *machine, const struct config *config, boo
 /* Forgets the drives; the mainline has to find and configure them. Under the lock. */
 void machine_enter_boot(struct machine *machine);
 /* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF. */
-void machine_drives_configured(struct machine *machine);
+void machine_drives_configured(struct machine *machine, bool simulated);
 
 /* Something is wrong: FAULT, stopping on the path first when a program runs. Only the first fault
  * counts. Any context, under the lock. */
@@ -111,6 +112,8 @@ void machine_supervise(struct machine *machine, uint32_t now_us);
 void machine_step(struct machine *machine);
 /* Whether setpoints are to be sent in this state. */
 bool machine_drives_operational(const struct machine *machine);
+/* Whether the next tick should wait for the drives' answers: they are simulated and not all lost. */
+bool machine_awaits_drives(const struct machine *machine);
 /* Whether at lock step the next tick should come as soon as the drives have answered: something
  * moves, switches or has to be waited for. */
 bool machine_busy(const struct machine *machine);

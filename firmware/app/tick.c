@@ -47,8 +47,8 @@ void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns)
     machine_supervise(machine, now_us);
     machine_step(machine);
     send_setpoints(machine);
-    if (machine_busy(machine)) {
-        port_tick_await(TICK_GUARD_US);
+    if (machine_awaits_drives(machine)) {
+        port_tick_await(TICK_GUARD_US, machine_busy(machine));
     }
     if (machine_moving(machine)) {
         statistics_tick(&machine->statistics, late_ns, port_time_ns() - started_ns,

@@ -9,8 +9,7 @@
 #include "app/machine.h"
 #include "canopen/sync.h"
 
-/* At lock step a SYNC that some drive leaves unanswered is followed by the next one after this
- * time. */
+/* A SYNC that a simulated drive leaves unanswered is followed by the next one after this time. */
 #define TICK_GUARD_US 100000u
 
 struct tick {

@@ -87,11 +87,11 @@ int port_start(const struct port_handlers *handlers, uint32_t period_us);
 /* Changes the period from the next tick on. */
 void port_tick_period(uint32_t period_us);
 
-/* Lock step, for buses that are simulated. A tick that calls port_tick_await() wishes the next tick
- * as soon as port_tick_ready() is called (from the receive handler: all drives have answered), and
- * at the latest guard_us later. A port bound to the wall clock ignores both: the next tick comes
- * after the period. */
-void port_tick_await(uint32_t guard_us);
+/* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
+ * port_tick_await() the next one waits until port_tick_ready() is called (from the receive handler:
+ * all drives have answered), for guard_us at most; then it starts late rather than on time. At lock step
+ * it starts then at once if `hurry`. A board, whose timer knows nothing but the clock, ignores both. */
+void port_tick_await(uint32_t guard_us, bool hurry);
 void port_tick_ready(void);
 
 /* --- Mainline --- */

@@ -12,6 +12,7 @@ static struct {
     uint64_t now_ns;
     uint32_t period_us;
     uint32_t awaited_us;
+    bool hurry;
     bool ready;
     bool locked;
     bool fail_send;
@@ -48,6 +49,7 @@ bool fake_port_take(struct can_msg *message)
 void fake_port_tick(uint32_t late_ns)
 {
     self.awaited_us = 0;
+    self.hurry = false;
     self.ready = false;
     port_lock();
     self.handlers.tick(self.handlers.self, port_time_us(), late_ns);
@@ -69,6 +71,11 @@ uint32_t fake_port_period_us(void)
 uint32_t fake_port_awaited_us(void)
 {
     return self.awaited_us;
+}
+
+bool fake_port_hurry(void)
+{
+    return self.hurry;
 }
 
 bool fake_port_ready(void)
@@ -158,9 +165,10 @@ void port_tick_period(uint32_t period_us)
     self.period_us = period_us;
 }
 
-void port_tick_await(uint32_t guard_us)
+void port_tick_await(uint32_t guard_us, bool hurry)
 {
     self.awaited_us = guard_us;
+    self.hurry = hurry;
 }
 
 void port_tick_ready(void)

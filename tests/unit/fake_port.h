@@ -27,6 +27,7 @@ void fake_port_receive(const struct can_msg *message);
 /* What the application asked for. */
 uint32_t fake_port_period_us(void);
 uint32_t fake_port_awaited_us(void); /* port_tick_await of the last tick; 0: not called */
+bool fake_port_hurry(void);          /* and in a hurry */
 bool fake_port_ready(void);          /* port_tick_ready since the last tick */
 unsigned fake_port_wakes(void);
 

@@ -356,20 +356,38 @@ static void test_a_drive_that_restarts_while_off_is_configured_again(void)
     TEST_ASSERT_EQUAL_INT(8, bench.drives[0].values.modes_of_operation);
 }
 
-static void test_lock_step_is_wished_only_while_something_moves(void)
+static void test_simulated_drives_are_awaited_and_hurried_while_something_moves(void)
 {
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT32(0, fake_port_awaited_us());
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     app_bench_period(&bench);
-    TEST_ASSERT_EQUAL_UINT32(0, fake_port_awaited_us());
+    TEST_ASSERT_EQUAL_UINT32(TICK_GUARD_US, fake_port_awaited_us());
+    TEST_ASSERT_FALSE(fake_port_hurry());
     switch_on();
     app_bench_period(&bench);
-    TEST_ASSERT_EQUAL_UINT32(TICK_GUARD_US, fake_port_awaited_us());
+    TEST_ASSERT_TRUE(fake_port_hurry());
     TEST_ASSERT_TRUE(fake_port_ready());
     app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
-    TEST_ASSERT_EQUAL_UINT32(0, fake_port_awaited_us());
+    TEST_ASSERT_FALSE(fake_port_hurry());
+    TEST_ASSERT_EQUAL_UINT32(TICK_GUARD_US, fake_port_awaited_us());
     bench.drives[0].mute = true;
     app_bench_period(&bench);
     TEST_ASSERT_FALSE(fake_port_ready());
+    app_bench_periods(&bench, AXIS_MISSED_MAX + 2u);
+    TEST_ASSERT_TRUE_MESSAGE(fake_port_ready(), "the other one alone keeps the pace");
+    bench.drives[1].mute = true;
+    app_bench_periods(&bench, AXIS_MISSED_MAX + 2u);
+    TEST_ASSERT_EQUAL_UINT32(0, fake_port_awaited_us());
+}
+
+static void test_real_drives_are_never_awaited(void)
+{
+    bench.drives[1].values.identity_object.vendor_id = 0x123;
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    switch_on();
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT32(0, fake_port_awaited_us());
 }
 
 static void test_late_ticks_of_a_run_are_counted(void)
@@ -462,7 +480,8 @@ int main(void)
     RUN_TEST(test_a_silent_drive_is_a_fault_after_ten_syncs_that_took_long);
     RUN_TEST(test_a_lost_heartbeat_is_a_fault);
     RUN_TEST(test_a_drive_that_restarts_while_off_is_configured_again);
-    RUN_TEST(test_lock_step_is_wished_only_while_something_moves);
+    RUN_TEST(test_simulated_drives_are_awaited_and_hurried_while_something_moves);
+    RUN_TEST(test_real_drives_are_never_awaited);
     RUN_TEST(test_late_ticks_of_a_run_are_counted);
     RUN_TEST(test_shutting_down_while_running_stops_on_the_path);
     RUN_TEST(test_shutting_down_is_bounded_when_ticks_do_not_come);

@@ -60,36 +60,56 @@ static void test_after_a_miss_the_clock_is_set_anew(void)
     TEST_ASSERT_EQUAL_UINT64(0, tick(0));
 }
 
-static void test_real_time_ignores_lock_step(void)
+static void test_who_is_not_ready_in_time_makes_the_tick_late(void)
 {
-    const uint64_t due_ns = schedule.due_ns;
-    schedule_await(&schedule, 100u * MS);
-    schedule_ready(&schedule, due_ns - 500000u);
-    TEST_ASSERT_EQUAL_UINT64(due_ns, schedule.due_ns);
+    const uint64_t start_ns = schedule.due_ns;
+    (void)schedule_start(&schedule, start_ns);
+    schedule_await(&schedule, 100u * MS, true);
+    schedule_finish(&schedule, start_ns);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + 100u * MS, schedule.due_ns);
+    schedule_ready(&schedule);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + MS, schedule.due_ns);
+    TEST_ASSERT_EQUAL_UINT64(2u * MS, tick(2u * MS));
 }
 
-static void lock_step_tick(bool await)
+static void test_whoever_is_never_ready_is_left_after_the_guard(void)
+{
+    const uint64_t start_ns = schedule.due_ns;
+    (void)schedule_start(&schedule, start_ns);
+    schedule_await(&schedule, 100u * MS, false);
+    schedule_finish(&schedule, start_ns);
+    TEST_ASSERT_EQUAL_UINT64(99u * MS, tick(0));
+    TEST_ASSERT_EQUAL_UINT64(start_ns + 101u * MS, schedule.due_ns);
+}
+
+static void lock_step_tick(bool await, bool hurry)
 {
     const uint64_t now_ns = schedule.due_ns;
     (void)schedule_start(&schedule, now_ns);
     if (await) {
-        schedule_await(&schedule, 100u * MS);
+        schedule_await(&schedule, 100u * MS, hurry);
     }
     schedule_finish(&schedule, now_ns);
 }
 
-static void test_lock_step_ticks_when_ready_else_after_the_guard(void)
+static void test_lock_step_in_a_hurry_is_due_when_all_are_ready(void)
 {
     schedule_begin(&schedule, 0, MS, true);
-    lock_step_tick(true);
+    lock_step_tick(true, true);
     TEST_ASSERT_EQUAL_UINT64(101u * (uint64_t)MS, schedule.due_ns);
-    schedule_ready(&schedule, 1100000);
-    TEST_ASSERT_EQUAL_UINT64(1100000, schedule.due_ns);
-    lock_step_tick(false);
-    TEST_ASSERT_EQUAL_UINT64(2100000, schedule.due_ns);
-    schedule_ready(&schedule, 1200000);
-    TEST_ASSERT_EQUAL_UINT64(2100000, schedule.due_ns);
+    schedule_ready(&schedule);
+    TEST_ASSERT_EQUAL_UINT64(MS, schedule.due_ns);
     TEST_ASSERT_EQUAL_UINT64(0, tick(5u * MS));
+}
+
+static void test_lock_step_without_hurry_goes_by_the_clock(void)
+{
+    schedule_begin(&schedule, 0, MS, true);
+    lock_step_tick(true, false);
+    schedule_ready(&schedule);
+    TEST_ASSERT_EQUAL_UINT64(2u * MS, schedule.due_ns);
+    lock_step_tick(false, false);
+    TEST_ASSERT_EQUAL_UINT64(3u * MS, schedule.due_ns);
 }
 
 int main(void)
@@ -99,7 +119,9 @@ int main(void)
     RUN_TEST(test_a_late_tick_is_followed_at_three_quarters_of_a_period_at_least);
     RUN_TEST(test_lateness_is_made_up);
     RUN_TEST(test_after_a_miss_the_clock_is_set_anew);
-    RUN_TEST(test_real_time_ignores_lock_step);
-    RUN_TEST(test_lock_step_ticks_when_ready_else_after_the_guard);
+    RUN_TEST(test_who_is_not_ready_in_time_makes_the_tick_late);
+    RUN_TEST(test_whoever_is_never_ready_is_left_after_the_guard);
+    RUN_TEST(test_lock_step_in_a_hurry_is_due_when_all_are_ready);
+    RUN_TEST(test_lock_step_without_hurry_goes_by_the_clock);
     return UNITY_END();
 }

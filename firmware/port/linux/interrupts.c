@@ -44,14 +44,14 @@ void port_tick_period(uint32_t period_us)
     self.schedule.period_ns = (uint64_t)period_us * 1000u;
 }
 
-void port_tick_await(uint32_t guard_us)
+void port_tick_await(uint32_t guard_us, bool hurry)
 {
-    schedule_await(&self.schedule, (uint64_t)guard_us * 1000u);
+    schedule_await(&self.schedule, (uint64_t)guard_us * 1000u, hurry);
 }
 
 void port_tick_ready(void)
 {
-    schedule_ready(&self.schedule, self.now_ns);
+    schedule_ready(&self.schedule);
 }
 
 static uint32_t now_us(void)
@@ -96,7 +96,7 @@ static void receive_waiting(void)
  * lock step the time of the last interrupt is near enough for a guard time. */
 static uint64_t time_to_sleep_ns(void)
 {
-    const uint64_t since_ns = self.schedule.awaiting ? self.now_ns : clock_ns();
+    const uint64_t since_ns = self.schedule.hurry ? self.now_ns : clock_ns();
     const uint64_t wait_ns = self.schedule.due_ns > since_ns ? self.schedule.due_ns - since_ns : 0u;
     return wait_ns < LONGEST_SLEEP_NS ? wait_ns : LONGEST_SLEEP_NS;
 }

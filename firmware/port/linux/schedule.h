@@ -7,8 +7,8 @@
  * that a small lateness is made up over some ticks. After one of more than a period the clock of
  * the ticks is set anew.
  *
- * Lock step (schedule_await): the next tick is due when schedule_ready() is called, else after the
- * guard time.
+ * A tick may wish that the next one waits until everybody is ready (schedule_await), for a guard time at
+ * most: it is then late rather than on time. At lock step it may also wish to have it as soon as that.
  */
 #ifndef PORT_LINUX_SCHEDULE_H
 #define PORT_LINUX_SCHEDULE_H
@@ -18,18 +18,20 @@
 
 struct schedule {
     uint64_t period_ns;
-    uint64_t nominal_ns; /* of the next tick, on the clock of the ticks */
-    uint64_t due_ns;     /* when it may start: not before nominal_ns */
-    uint64_t guard_ns;   /* lock step wished by the present tick; 0: none */
-    bool awaiting;       /* the next tick may come before due_ns */
-    bool lock_step;      /* whether wishes count */
+    uint64_t nominal_ns;  /* of the next tick, on the clock of the ticks */
+    uint64_t earliest_ns; /* when it may start: later than nominal_ns where ticks would bunch */
+    uint64_t due_ns;      /* when it has to start: later than that while somebody is waited for */
+    uint64_t guard_ns;    /* of the wish to wait */
+    bool awaiting;        /* the wishes of the present tick */
+    bool hurry;
+    bool lock_step; /* whether ticks may be faster than the clock */
 };
 
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step);
 
-/* Wishes of the application, from inside a tick and from the receive handler. */
-void schedule_await(struct schedule *schedule, uint64_t guard_ns);
-void schedule_ready(struct schedule *schedule, uint64_t now_ns);
+/* Wishes of the application, from inside a tick; and from the receive handler. */
+void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry);
+void schedule_ready(struct schedule *schedule);
 
 /* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the wishes of the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);
