@@ -18,6 +18,10 @@ from .bernstein import Complex, Real
 _REPEATED = 1e-12
 """Points nearer than this share of the largest coordinate are the same."""
 
+_NEAREST_MM = 1e-9
+_FARTHEST_MM = 1e9
+"""Points nearer to each other, or farther away, are no path for a machine (and would overflow)."""
+
 
 @dataclass(frozen=True)
 class Guide:
@@ -42,13 +46,16 @@ def checked_points(
     bad = np.flatnonzero(~np.isfinite(p))
     if bad.size:
         raise InputError(f"{what} {bad[0]} is not finite: give two ordinary numbers")
+    far = np.flatnonzero(np.abs(p) > _FARTHEST_MM)
+    if far.size:
+        raise InputError(f"{what} {far[0]} is beyond {_FARTHEST_MM:g} mm: are the units mm?")
     notes: tuple[str, ...] = ()
     if closed:
         p, notes = _without_tail(p, what)
     if p.size < minimum:
         kind = "closed" if closed else "open"
         raise InputError(f"{p.size} {what}s: a {kind} path needs at least {minimum}")
-    near = _REPEATED * float(np.abs(p).max())
+    near = max(_NEAREST_MM, _REPEATED * float(np.abs(p).max()))
     same = np.flatnonzero(np.abs(p[1:] - p[:-1]) <= near)
     if same.size:
         k = int(same[0])
@@ -61,11 +68,13 @@ def checked_points(
 def _as_complex(points: object, what: str) -> Complex:
     try:
         p = np.asarray(points)
+        if p.dtype.kind not in "iufcO":
+            raise TypeError
         if p.ndim == 2 and p.shape[1] == 2 and not np.iscomplexobj(p):
             pairs = np.ascontiguousarray(p, dtype=np.float64)
             p = pairs.view(np.complex128)[:, 0]
         p = np.array(p, dtype=np.complex128)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{what}s must be a list of [x, y] pairs of numbers") from error
     if p.ndim != 1:
         raise InputError(f"{what}s must be a list of [x, y] pairs of numbers")
