@@ -2,8 +2,8 @@
 """Taking turns at the one SDO channel of a controller, among the processes of one computer.
 
 CANopen gives a server one default channel and assumes one client. `hodograph status` beside `hodograph run` is two; a
-lock file per bus and node lets them alternate, transfer by transfer. Whoever gets the turn from another process is told so,
-to let pass what was still on its way to the other.
+lock file per bus and node lets them alternate, transfer by transfer. Whoever gets the turn from another process is
+told so, to let pass what was still on its way to the other.
 """
 
 from __future__ import annotations
