@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""The Python check and the controller's own (through cffi) give the same verdict on the same bytes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
+from hodograph.native.program import NativeLimits, NativeProgram
+from hodograph.program import ProgramLimits, compile_path, decode, encode
+from hodograph.program.check import check_image
+from hodograph.program.image import with_crc
+from hodograph.spline import from_control_polygon, line
+
+PROGRAMS = Path(__file__).parents[2] / "data" / "programs"
+FIELDS = (
+    1000,
+    500_000,
+    5_000_000,
+    200_000,
+    (-200 << 40, -200 << 40),
+    (200 << 40, 200 << 40),
+)
+LIMITS = ProgramLimits(*FIELDS)
+NATIVE = NativeLimits(*FIELDS)
+BASE = (PROGRAMS / "alpha_minimax.hdgp").read_bytes()
+
+
+def verdicts(image: bytes) -> tuple[tuple[int, int], tuple[int, int]]:
+    """(code, index) by Python and by C of an image that opens; (0, 0): accepted."""
+    own = check_image(image, LIMITS)
+    native = NativeProgram(image).check(NATIVE)
+    return (
+        (int(own.code), own.index) if own else (0, 0),
+        (native.code, native.index) if native else (0, 0),
+    )
+
+
+@settings(max_examples=400, deadline=None)
+@given(st.integers(28, len(BASE) - 1), st.integers(0, 255))
+def test_one_byte_changed(place: int, value: int) -> None:
+    image = with_crc(BASE[:place] + bytes([value]) + BASE[place + 1 :])
+    python, native = verdicts(image)
+    assert python == native
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(0, 7),
+    st.integers(0, 8),
+    st.integers(-12, 50).map(lambda e: 1 << max(e, 0)),
+    st.sampled_from((-1, 1)),
+)
+def test_one_number_of_a_segment_moved(segment: int, column: int, by: int, sign: int) -> None:
+    place = 128 + 72 * segment + 8 * column
+    number = np.frombuffer(BASE, "<i8", 1, place)[0] + sign * by
+    image = with_crc(BASE[:place] + np.array([number], "<i8").tobytes() + BASE[place + 8 :])
+    python, native = verdicts(image)
+    assert python == native
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from(("quintic", "exponential", "minimax")),
+    st.floats(0.05, 450.0),
+    st.floats(0.003, 2.0),
+    st.integers(3, 12),
+    st.sampled_from((1000, 2000, 4000, 8000)),
+    st.integers(0, 10**6),
+)
+def test_whatever_is_compiled_is_accepted(profile, feed, ramp, degree, period_us, seed) -> None:
+    rng = np.random.default_rng(seed)
+    if seed % 3:
+        turn = np.cumsum(rng.uniform(-0.4, 0.4, 8))
+        spline = from_control_polygon(
+            np.cumsum(rng.uniform(1, 15) * np.exp(1j * turn)), False
+        ).spline
+    else:
+        spline = line(0, rng.uniform(0.01, 90.0) * np.exp(1j * rng.uniform(0, 6)))
+    controller = ControllerLimits(500.0, 5000.0, 200000.0, 0.02)
+    request = FeedRequest(profile, feed, ramp, degree=degree)
+    plan = plan_feed(
+        spline.length_mm, request, Limits(None, 2000.0, 50000.0), controller, period_us=period_us
+    )
+    program = compile_path(spline, plan).program
+    limits = NativeLimits(period_us, *FIELDS[1:])
+    assert NativeProgram(encode(program)).check(limits) is None
+    assert np.array_equal(
+        NativeProgram(encode(program)).tick_times_q32_s(), program.tick_times_q32_s()
+    )
+
+
+@pytest.mark.parametrize("name", sorted(p.name for p in PROGRAMS.glob("broken_*.hdgp")))
+def test_golden(name: str) -> None:
+    image = (PROGRAMS / name).read_bytes()
+    fault = check_image(image, LIMITS)
+    assert fault is not None
+    if fault.code < -5:
+        python, native = verdicts(image)
+        assert python == native
+        assert decode(image).segment_count >= 1
