@@ -128,7 +128,8 @@ static void report_fault(struct controller *controller)
             fault.node, (uint8_t)fault.detail, (uint8_t)(fault.detail >> 8),
             (uint8_t)(fault.detail >> 16), (uint8_t)(fault.detail >> 24)};
         emcy_producer_raise(&controller->emcy, fault.code, EMCY_REGISTER_PROFILE, detail);
-        port_log(PORT_WARNING, emcy_text(fault.code), fault.node);
+        port_log(PORT_WARNING, "fault at node", fault.node);
+        port_log(PORT_WARNING, fault_text(fault.code), (int32_t)fault.detail);
     }
     controller->reported_fault = fault.code;
 }

@@ -20,4 +20,7 @@ struct fault {
     uint32_t detail; /* depends on the code */
 };
 
+/* One English phrase for a fault code, never NULL. Pure. */
+const char *fault_text(uint16_t code);
+
 #endif
