@@ -18,7 +18,14 @@
 
 static int fail(char *reason, size_t size, int error, const char *text, const char *interface)
 {
-    (void)snprintf(reason, size, text, interface, strerror(error));
+    (void)snprintf(reason, size, text, interface);
+    return -error;
+}
+
+/* Where nothing better is known than what the system says. */
+static int fail_plainly(char *reason, size_t size, int error, const char *interface)
+{
+    (void)snprintf(reason, size, "cannot use %s: %s", interface, strerror(error));
     return -error;
 }
 
@@ -45,7 +52,7 @@ static int check_interface(int fd, const char *interface, char *reason, size_t s
                     interface);
     }
     if (error != 0) {
-        return fail(reason, size, error, "interface %s: %s", interface);
+        return fail_plainly(reason, size, error, interface);
     }
     if (answer.ifr_hwaddr.sa_family != ARPHRD_CAN) {
         return fail(reason, size, EINVAL, "%s is not a CAN interface: name one like vcan0 or can0",
@@ -56,7 +63,7 @@ static int check_interface(int fd, const char *interface, char *reason, size_t s
         return fail(reason, size, ENETDOWN,
                     "interface %s is down: bring it up (ip link set up dev NAME)", interface);
     }
-    return error == 0 ? 0 : fail(reason, size, error, "interface %s: %s", interface);
+    return error == 0 ? 0 : fail_plainly(reason, size, error, interface);
 }
 
 static int bind_interface(int fd, const char *interface, char *reason, size_t size)
@@ -66,7 +73,7 @@ static int bind_interface(int fd, const char *interface, char *reason, size_t si
     address.can_family = AF_CAN;
     address.can_ifindex = (int)if_nametoindex(interface);
     if (bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
-        return fail(reason, size, errno, "cannot use %s: %s", interface);
+        return fail_plainly(reason, size, errno, interface);
     }
     return 0;
 }
@@ -98,7 +105,7 @@ static int open_raw(const char *interface, char *reason, size_t size)
         return fail(reason, size, errno,
                     "no permission to open a CAN socket on %s: run as root or grant it", interface);
     }
-    return fail(reason, size, errno, "cannot open a CAN socket on %s: %s", interface);
+    return fail_plainly(reason, size, errno, interface);
 }
 
 int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size)
