@@ -170,7 +170,7 @@ int piece_check_all(const struct program *p, const struct program_limits *limits
             return code;
         }
         sum += c.duration_q32_s;
-        if (sum > MOST_DURATION_Q32) {
+        if (sum >= MOST_DURATION_Q32) { /* in 2^-42 s it must fit 64 bits */
             return PROGRAM_ERR_DURATION;
         }
         before = c;
