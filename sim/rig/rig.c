@@ -7,7 +7,7 @@
 
 typedef char rig_assert_row_has_no_holes[sizeof(struct rig_row) == 64 ? 1 : -1];
 
-static int rig_start_point(struct rig *rig, const struct program *program, int32_t start[2])
+static int rig_start_point(struct rig *rig, int32_t start[2])
 {
     struct interp_point point;
     if (interp_at(&rig->interp, 0, &point) < 0) {
@@ -15,7 +15,7 @@ static int rig_start_point(struct rig *rig, const struct program *program, int32
     }
     start[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
     start[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
-    return interp_begin(&rig->interp, program, rig->interp.kernel) == 0 ? 0 : RIG_ERR_INTERP;
+    return 0;
 }
 
 static int rig_drives(struct rig *rig, const struct program *program,
@@ -46,7 +46,7 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
     if (interp_begin(&rig->interp, program, kernel) != 0) {
         return RIG_ERR_KERNEL;
     }
-    error = rig_start_point(rig, program, start);
+    error = rig_start_point(rig, start);
     if (error != 0) {
         return error;
     }

@@ -51,6 +51,18 @@ static void test_stop_is_a_ramp_of_the_deceleration(void)
     TEST_ASSERT_EQUAL_INT64(0, axis.speed_counts_period);
 }
 
+static void test_stop_works_both_ways(void)
+{
+    for (int k = 1; k <= 10; k++) {
+        axis_motion_follow(&axis, -2000000 - 5000 * k);
+    }
+    TEST_ASSERT_FALSE(axis_motion_stop(&axis, 2000000000u));
+    TEST_ASSERT_EQUAL_INT64(-3000, axis.speed_counts_period);
+    TEST_ASSERT_FALSE(axis_motion_stop(&axis, 2000000000u));
+    TEST_ASSERT_TRUE(axis_motion_stop(&axis, 2000000000u));
+    TEST_ASSERT_EQUAL_INT32(-2050000 - 3000 - 1000, axis.target_counts);
+}
+
 static void test_stop_ends_with_the_smallest_deceleration(void)
 {
     axis_motion_follow(&axis, -1999990);
@@ -93,6 +105,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_begins_parked_at_its_position);
     RUN_TEST(test_stop_is_a_ramp_of_the_deceleration);
+    RUN_TEST(test_stop_works_both_ways);
     RUN_TEST(test_stop_ends_with_the_smallest_deceleration);
     RUN_TEST(test_hold_freezes_the_axis);
     RUN_TEST(test_period_changes_at_the_same_place);

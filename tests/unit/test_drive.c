@@ -220,6 +220,23 @@ static void test_volts_saturate_on_a_jump(void)
     TEST_ASSERT_INT32_WITHIN(20, 1000000, drive_position_counts(&d));
 }
 
+/* Still on its way after 250 periods of one target: not parked, from either side. */
+static void test_far_from_the_target_is_not_parked(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        struct drive d = made();
+        for (int k = 0; k <= DRIVE_PARK_PERIODS + 20; k++) {
+            drive_period(&d, sign * 300000000);
+            TEST_ASSERT_FALSE(drive_parked(&d));
+        }
+        TEST_ASSERT_TRUE(abs(drive_position_counts(&d)) < 250000000);
+        for (int k = 0; k < 1500; k++) { /* with an overshoot: the volts are saturated */
+            drive_period(&d, sign * 300000000);
+        }
+        TEST_ASSERT_TRUE(drive_parked(&d));
+    }
+}
+
 static int init_error(void)
 {
     struct drive d;
@@ -264,6 +281,7 @@ int main(void)
     RUN_TEST(test_held_drive_starts_from_where_it_is);
     RUN_TEST(test_bits_are_the_same_everywhere);
     RUN_TEST(test_volts_saturate_on_a_jump);
+    RUN_TEST(test_far_from_the_target_is_not_parked);
     RUN_TEST(test_bad_figures_are_refused);
     return UNITY_END();
 }

@@ -347,16 +347,33 @@ static void test_objects_follow_the_model(void)
     TEST_ASSERT_EQUAL_INT64(203, read_object(0x2101, OD_DRIVE_SIMULATION_PERIODS));
 }
 
-/* Switched on by SDO alone, as by a drive's own tool: stays where it is until a target comes. */
-static void test_enabled_by_hand_stays(void)
+static void enable_by_sdo(void)
 {
     write_object(0x6040, 0, CIA402_SHUTDOWN, 2);
     write_object(0x6040, 0, CIA402_SWITCH_ON, 2);
     write_object(0x6040, 0, CIA402_ENABLE_OPERATION, 2);
+}
+
+/* Switched on by SDO alone, as by a drive's own tool: stays where it is, whatever target it had before. */
+static void test_enabled_by_hand_stays(void)
+{
+    setpoint(CIA402_SHUTDOWN, 9000000);
+    (void)sync();
+    (void)sync();
+    enable_by_sdo();
     for (int k = 0; k < 300; k++) {
         TEST_ASSERT_INT32_WITHIN(20, 1000000, sync().position_counts);
     }
     TEST_ASSERT_EQUAL_INT64(1, read_object(0x2101, OD_DRIVE_SIMULATION_PARKED));
+}
+
+/* The last controlword counts, from whichever side it came. */
+static void test_controlword_by_sdo_after_pdo(void)
+{
+    enable();
+    write_object(0x6040, 0, CIA402_DISABLE_VOLTAGE, 2);
+    (void)sync();
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.device.state);
 }
 
 static void test_reset_node_is_power_on(void)
@@ -395,6 +412,7 @@ int main(void)
     RUN_TEST(test_period_by_sdo);
     RUN_TEST(test_objects_follow_the_model);
     RUN_TEST(test_enabled_by_hand_stays);
+    RUN_TEST(test_controlword_by_sdo_after_pdo);
     RUN_TEST(test_reset_node_is_power_on);
     RUN_TEST(test_bad_figures_are_refused);
     return UNITY_END();
