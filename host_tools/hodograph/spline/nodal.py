@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .bernstein import Complex, Real
+from .bernstein import Complex
 
 _REPEATED = 1e-12
 """Points nearer than this share of the largest coordinate are the same."""
@@ -137,13 +137,3 @@ def hodograph_from_derivatives(q: Complex, derivative: Complex) -> Complex:
     """Bernstein hodograph (M, 3) of the cubic Hermite curve with these nodes and derivatives."""
     first, last = derivative[:-1], derivative[1:]
     return np.stack((first, 3.0 * (q[1:] - q[:-1]) - first - last, last), axis=-1)
-
-
-__all__ = [
-    "Guide",
-    "Real",
-    "checked_points",
-    "control_polygon_guide",
-    "hodograph_from_derivatives",
-    "open_nodal_points",
-]
