@@ -3,8 +3,8 @@
 
 Runs as a process in a session of its own, so that a Ctrl-C at the terminal does not reach it. The client
 that opened the bus is connected from the start; when that connection ends, for whatever reason, the kernel
-inside is ended and everything removed. If the broker itself is killed, the line into the kernel is cut and
-the agent stops the kernel.
+inside is ended and everything removed. If the broker itself is killed, the kernel gets SIGTERM; besides,
+its line is cut, and then the agent stops it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ from vcan.registry import Bus
 
 BOOT_LIMIT_S = 60.0
 _NICE = -10
+_PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
+_LIBC = ctypes.CDLL(None)
 _MODULES = Path("/usr/lib/uml/modules")
 _HERE = Path(__file__).resolve().parent
 
@@ -234,12 +236,16 @@ def _boot(bus: Bus, line: socket.socket, memory: str) -> subprocess.Popen[bytes]
                 "HOME": str(bus.folder),
             },
             start_new_session=True,
-            preexec_fn=lambda: _favour(bus.cpu),
+            preexec_fn=lambda: _prepare_kernel(bus.cpu),
         )
 
 
-def _favour(cpu: int | None) -> None:
-    """One core, since waking a process on another one takes long; and before ordinary work, where permitted."""
+def _prepare_kernel(cpu: int | None) -> None:
+    """One core, since waking a process on another one takes long; before ordinary work, where permitted.
+
+    And it is to end with the broker: at SIGTERM user-mode Linux ends its stub processes too.
+    """
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     if cpu is not None:
         os.sched_setaffinity(0, {cpu})
     with contextlib.suppress(PermissionError):
@@ -281,7 +287,7 @@ def main(bus: Bus, owner: socket.socket, memory: str) -> None:
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     # Stubs whose kernel has died become children of this process, which can then wait for them.
-    ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
     try:
         Broker(bus, owner, memory).serve()
     except BusUnavailable as error:
