@@ -31,6 +31,10 @@
 /* The longest the mainline may sleep without a frame: the resolution of its timeouts. */
 #define CONTROLLER_POLL_US 5000u
 
+/* The most that one round counts against the partners of the protocols: a mainline that was busy (a program check), or
+ * a host that stalled, is no silence of theirs. */
+#define CONTROLLER_ELAPSED_MAX_US 20000u
+
 struct controller {
     /* shared with the interrupts, under the port's lock */
     struct machine machine;

@@ -155,6 +155,11 @@ static void note_state(struct controller *controller)
     }
 }
 
+static uint32_t counted_us(uint32_t elapsed_us)
+{
+    return elapsed_us < CONTROLLER_ELAPSED_MAX_US ? elapsed_us : CONTROLLER_ELAPSED_MAX_US;
+}
+
 void controller_poll(struct controller *controller)
 {
     struct can_msg in;
@@ -162,7 +167,7 @@ void controller_poll(struct controller *controller)
         take_frame(controller, &in);
     }
     const uint32_t now_us = port_time_us();
-    const uint32_t elapsed_us = now_us - controller->polled_us;
+    const uint32_t elapsed_us = counted_us(now_us - controller->polled_us);
     controller->polled_us = now_us;
     poll_nmt(controller, elapsed_us);
     poll_server(controller, elapsed_us);

@@ -79,10 +79,8 @@ void drive_watch_receive(struct drive_watch *watch, struct machine *machine,
 
 void drive_watch_process(struct drive_watch *watch, struct machine *machine, uint32_t elapsed_us)
 {
-    const uint32_t counted_us =
-        elapsed_us < DRIVE_WATCH_ELAPSED_MAX_US ? elapsed_us : DRIVE_WATCH_ELAPSED_MAX_US;
     for (uint8_t i = 0; i < watch->count; ++i) {
         struct heartbeat_consumer *consumer = &watch->consumers[i];
-        take_event(machine, consumer, heartbeat_consumer_process(consumer, counted_us));
+        take_event(machine, consumer, heartbeat_consumer_process(consumer, elapsed_us));
     }
 }

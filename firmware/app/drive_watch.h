@@ -10,8 +10,6 @@
 #include "canopen/heartbeat.h"
 
 #define DRIVE_WATCH_HEARTBEAT_MS 1000u /* consumer time; the drives send ten times as often */
-/* The mainline may be busy for long (a program check); that is no silence of a drive. */
-#define DRIVE_WATCH_ELAPSED_MAX_US 20000u
 
 struct drive_watch {
     struct heartbeat_consumer consumers[AXES_MAX];

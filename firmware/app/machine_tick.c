@@ -19,7 +19,9 @@ static void supervise_axis(struct machine *machine, const struct axis *axis, uin
     if (!axis->present) {
         return;
     }
-    if (axis_lost(axis, now_us)) {
+    if (axis_lost(axis, now_us) && machine->state == MACHINE_OFF) {
+        machine_enter_boot(machine); /* with power off they may come and go */
+    } else if (axis_lost(axis, now_us)) {
         machine_raise(machine, EMCY_RPDO_TIMEOUT, axis->node, axis->missed_in_row);
     } else if (axis_in_fault(axis)) {
         machine_raise(machine, code_of_drive(axis), axis->node, axis->statusword);

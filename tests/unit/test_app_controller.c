@@ -356,6 +356,33 @@ static void test_a_drive_that_restarts_while_off_is_configured_again(void)
     TEST_ASSERT_EQUAL_INT(8, bench.drives[0].values.modes_of_operation);
 }
 
+static void test_a_drive_that_is_gone_while_off_is_looked_for_again(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    app_bench_periods(&bench, 10);
+    bench.drives[1].dead = true;
+    (void)app_bench_until(&bench, MACHINE_BOOT, AXIS_MISSED_LOST + 5u);
+    bench.drives[1].dead = false;
+    (void)app_bench_until(&bench, MACHINE_OFF, 2000);
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
+}
+
+/* A stall of the mainline counts as no silence of the client: its transfer goes on. */
+static void test_a_busy_mainline_ends_no_transfer(void)
+{
+    struct can_msg frame;
+    app_bench_settle(&bench);
+    TEST_ASSERT_EQUAL_INT(1,
+                          sdo_client_write(&bench.host, 1, 0x2000, 1, image, sizeof image, &frame));
+    fake_port_receive(&frame);
+    controller_poll(&bench.controller);
+    fake_port_advance_us(10000000);
+    controller_poll(&bench.controller);
+    TEST_ASSERT_TRUE(sdo_server_busy(&bench.controller.server));
+    app_bench_settle(&bench);
+    TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
+}
+
 static void test_simulated_drives_are_awaited_and_hurried_while_something_moves(void)
 {
     app_bench_period(&bench);
@@ -480,6 +507,8 @@ int main(void)
     RUN_TEST(test_a_silent_drive_is_a_fault_after_ten_syncs_that_took_long);
     RUN_TEST(test_a_lost_heartbeat_is_a_fault);
     RUN_TEST(test_a_drive_that_restarts_while_off_is_configured_again);
+    RUN_TEST(test_a_drive_that_is_gone_while_off_is_looked_for_again);
+    RUN_TEST(test_a_busy_mainline_ends_no_transfer);
     RUN_TEST(test_simulated_drives_are_awaited_and_hurried_while_something_moves);
     RUN_TEST(test_real_drives_are_never_awaited);
     RUN_TEST(test_late_ticks_of_a_run_are_counted);
