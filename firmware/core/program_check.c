@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/program_check.h"
 
+#include "core/crossing_check.h"
 #include "core/piece_check.h"
 #include "core/segment_check.h"
 
@@ -66,7 +67,7 @@ int program_check(const struct program *p, const struct program_limits *limits,
         fault->code = piece_check_all(p, limits, &fault->index);
     }
     if (fault->code == 0) {
-        fault->code = piece_check_crossings(p, &fault->index);
+        fault->code = crossing_check_all(p, &fault->index);
     }
     return fault->code;
 }

@@ -43,8 +43,8 @@ static inline int32_t qmath_mul_hi(int32_t a, int32_t b)
     return (int32_t)(((int64_t)a * b) >> 32);
 }
 
-/* a b / 2^32 of a 64-bit and a 32-bit number, within 1.5 units. Two SMULL: the lowest bit of a is dropped so that
- * its lower half is a signed 32-bit number. Any a and b. */
+/* a b / 2^32 of a 64-bit and a 32-bit number, within 1.5 units. Two SMULL: the lowest bit of a is
+ * dropped so that its lower half is a signed 32-bit number. Any a and b. */
 static inline int64_t qmath_mul_wide(int64_t a, int32_t b)
 {
     int32_t high = (int32_t)(a >> 32);

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/crossing_check.h"
+
+#include "core/feed_bounds.h"
+
+#define LEAST_FEED_Q24 ((int64_t)1 << 14) /* 2^-10 mm/s */
+#define NO_BOUND_Q24   (INT64_MAX / 64)
+
+static int64_t piece_end_arc(const struct program *p, uint32_t i)
+{
+    struct program_piece next;
+    if (i + 1 == p->header.piece_count) {
+        return p->header.length_q40_mm;
+    }
+    program_piece_get(p, i + 1u, &next);
+    return next.start_q40_mm;
+}
+
+/* Feed at which a tick of twice the period covers this length: length 10^6 / (2 period_us). */
+static int64_t crossing_feed_q24(const struct program *p, int64_t length_q40)
+{
+    uint32_t half_frequency =
+        4000000u / p->header.period_us; /* times 8: an integer for each period */
+    return (length_q40 >> 16) * (int64_t)half_frequency / 8 - 1;
+}
+
+/* Pieces from *first on that touch the stretch [from, to] stay below the feed; *first moves on past
+ * those that end before it. */
+static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32_t *first)
+{
+    int64_t feed = crossing_feed_q24(p, to - from);
+    if (feed < LEAST_FEED_Q24) {
+        return 0;
+    }
+    while (*first + 1 < p->header.piece_count && piece_end_arc(p, *first) < from) {
+        (*first)++;
+    }
+    for (uint32_t i = *first; i < p->header.piece_count; i++) {
+        struct program_piece c;
+        program_piece_get(p, i, &c);
+        if (c.start_q40_mm > to) {
+            break;
+        }
+        if (!feed_bounds_within(&c, FEED_VELOCITY, -NO_BOUND_Q24, feed)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+int crossing_check_all(const struct program *p, uint32_t *index)
+{
+    uint32_t piece = 0;
+    for (*index = 1; (uint64_t)*index + 2u < p->header.segment_count; (*index)++) {
+        int64_t from = program_segment_start(p, *index);
+        int64_t to = program_segment_start(p, *index + 2u);
+        if (!slow_enough(p, from, to, &piece)) {
+            (*index)++;
+            return PROGRAM_ERR_SEGMENT_SHORT;
+        }
+    }
+    *index = 0;
+    return 0;
+}

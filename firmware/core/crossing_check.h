@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The rule of docs/protocol.md 1.2 that needs segments and pieces together: no tick crosses more than two
+ * segment ends. Used by program_check. Main loop.
+ */
+#ifndef HODOGRAPH_CORE_CROSSING_CHECK_H
+#define HODOGRAPH_CORE_CROSSING_CHECK_H
+
+#include "core/program_check.h"
+
+/* Each two neighbouring segments (not the first, not the last of the program) are longer than the
+ * way of one tick at 200 % of the highest feed of the pieces over them; a feed below 2^-10 mm/s
+ * counts as that. Segments and pieces must have passed their own checks. Linear: pieces and
+ * segments advance together. Returns 0 or PROGRAM_ERR_SEGMENT_SHORT with the index of the later of
+ * the two. */
+int crossing_check_all(const struct program *p, uint32_t *index);
+
+#endif
