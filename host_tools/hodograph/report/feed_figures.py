@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullLocator
 
 from ..chain import Chain
 from ..feed import FeedPlan
@@ -14,7 +15,7 @@ from ..feed.shapes import N_C_HIGH, N_C_LOW
 from ..paper import plain_plan
 from .style import BLUE, GREEN, GREY, ORANGE, RED, png
 
-_SAMPLES = 6000
+_SAMPLES = 1600
 
 
 def feed_figure(chain: Chain, plan: FeedPlan) -> bytes:
@@ -62,7 +63,7 @@ def search_figure(plan: FeedPlan) -> bytes | None:
         return None
     figure, (progress, function) = pyplot.subplots(1, 2, figsize=(9.6, 3.8))
     _progress(progress, plan)
-    n_c = np.linspace(N_C_LOW, N_C_HIGH, 401)
+    n_c = np.linspace(N_C_LOW, N_C_HIGH, 161)
     jerk = [exponential_ramp(plan.feed_mm_s, plan.ramp_time_s, v).peak(JERK) for v in n_c]
     best = plan.history[-1]
     function.plot(n_c, jerk, color=BLUE, label="peak jerk")
@@ -95,5 +96,6 @@ def _progress(axes: Axes, plan: FeedPlan) -> None:
     mesh = axes.twinx()
     mesh.semilogy(iterations, [step.mesh for step in plan.history], color=GREY, linewidth=1.0)
     mesh.set_ylabel("mesh size", color=GREY)
+    mesh.yaxis.set_minor_locator(NullLocator())
     mesh.grid(False)
     mesh.spines["right"].set_visible(True)

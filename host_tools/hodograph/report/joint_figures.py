@@ -36,6 +36,12 @@ def joint_figure(chain: Chain, plan: FeedPlan) -> bytes:
     top.set_title(
         f"{chain.file.name}: disturbance at constant {plan.feed_mm_s:.4g} mm/s; dashed: joints"
     )
-    top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+    bottom.legend(
+        *top.get_legend_handles_labels(),
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=2,
+        borderaxespad=0.1,
+    )
     bottom.set_xlabel("arc length, mm")
     return png(figure)

@@ -8,9 +8,10 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 
 from ..chain import Chain
+from ..spline import PHSpline
 from .style import BLUE, GREEN, GREY, ORANGE, plan_axes, png
 
-_SAMPLES = 4000
+_SAMPLES = 2000
 
 
 def polygon_figure(chain: Chain) -> bytes:
@@ -55,17 +56,20 @@ def _plane(axes: Axes, chain: Chain) -> None:
         markeredgecolor="white",
         label="nodal points" if not path.through else "given points",
     )
-    turned = np.degrees(np.angle(spline.tangent(0.0))).item() - 90.0
-    axes.plot(
-        points[0].real,
-        points[0].imag,
-        marker=(3, 0, turned),
-        linestyle="",
-        color=GREEN,
-        markersize=10,
-        label="start",
-    )
+    _start(axes, spline)
     plan_axes(axes)
     axes.margins(0.06)
     axes.set_title(f"{chain.file.name}: polygon, nodes, curve")
     axes.legend(loc="best")
+
+
+def _start(axes: Axes, spline: PHSpline) -> None:
+    """The start point, and an arrow in the direction of travel."""
+    start, ahead = spline.point(np.array([0.0, 0.045 * spline.length_mm]))
+    axes.plot(start.real, start.imag, "o", color=GREEN, markersize=7, label="start")
+    axes.annotate(
+        "",
+        xy=(ahead.real, ahead.imag),
+        xytext=(start.real, start.imag),
+        arrowprops={"arrowstyle": "-|>", "color": GREEN, "linewidth": 2.2, "mutation_scale": 15},
+    )

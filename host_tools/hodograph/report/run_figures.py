@@ -51,13 +51,9 @@ def _zoom(axes: Axes, motion: Motion, worst: int) -> None:
     axes.plot(*actual_um.T, ".-", color=BLUE, linewidth=1.2, markersize=3.5, label="actual")
     foot = _foot(curve_um)
     axes.plot([0, foot[0]], [0, foot[1]], color=RED, linewidth=1.6)
-    axes.annotate(
-        f"{motion.contour_error_um[worst]:.2f} µm",
-        xy=(foot[0] / 2, foot[1] / 2),
-        xytext=(8, 8),
-        textcoords="offset points",
-        color=RED,
-    )
+    label = f"contour error {motion.contour_error_um[worst]:.2f} µm"
+    axes.text(0.97, 0.04, label, transform=axes.transAxes, ha="right", color=RED)
+    axes.legend(loc="upper right")
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(-half_um, half_um)
     axes.set_ylim(-half_um, half_um)
@@ -90,8 +86,8 @@ def _error(axes: Axes, motion: Motion, worst: int) -> None:
     if error[worst] > 0.4 * ALLOWED_UM:
         axes.axhline(ALLOWED_UM, color=ORANGE, linestyle=(0, (5, 3)), linewidth=1.0)
         axes.annotate(
-            "allowed by the paper", xy=(t_s[-1], ALLOWED_UM), xytext=(-4, 3),
-            textcoords="offset points", ha="right", color=ORANGE,
+            "allowed by the paper", xy=(0, ALLOWED_UM), xytext=(4, 3),
+            textcoords="offset points", color=ORANGE,
         )  # fmt: skip
     end_s = motion.ticks * motion.period_us / 1e6
     axes.axvline(end_s, color=SOFT, linewidth=0.9, linestyle=(0, (2, 3)))

@@ -23,7 +23,7 @@ DPI = 144
 _SETTINGS: Any = {
     "figure.dpi": DPI,
     "figure.facecolor": "white",
-    "figure.constrained_layout.use": True,
+    "figure.autolayout": True,
     "font.size": 9.5,
     "font.family": "DejaVu Sans",
     "axes.titlesize": 10.5,
