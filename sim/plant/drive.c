@@ -96,13 +96,15 @@ const char *drive_error_text(int code)
 
 static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
 {
+    const double step_s = 1.0 / (double)c->loop_rate_hz;
+    const double volts_s_rad = c->plant.torque_to_volts * c->pdff.k_pv_nm_s_rad;
     d->pdff.k_pp_rad_s_mm = c->pdff.k_pp_rad_s_mm;
     d->pdff.k_pf_rad_mm = c->pdff.k_pf_rad_mm;
-    d->pdff.k_vf = c->pdff.k_vf;
-    d->pdff.k_iv_per_s = c->pdff.k_iv_per_s;
-    d->pdff.volts_s_rad = c->plant.torque_to_volts * c->pdff.k_pv_nm_s_rad;
+    d->pdff.step_s = step_s;
+    d->pdff.volts_per_ref = volts_s_rad * (c->pdff.k_vf + c->pdff.k_iv_per_s * step_s);
+    d->pdff.volts_per_integral = volts_s_rad * c->pdff.k_iv_per_s;
+    d->pdff.volts_per_speed = volts_s_rad * (1.0 + c->pdff.k_iv_per_s * step_s);
     d->pdff.volts_limit = c->plant.volts_limit;
-    d->pdff.step_s = 1.0 / (double)c->loop_rate_hz;
 }
 
 int drive_init(struct drive *d, const struct drive_config *c)

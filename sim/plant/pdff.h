@@ -12,14 +12,16 @@
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H
 
+/* The law, sorted by what is known early in the sample, so that little has to wait for the encoder:
+ *     volts = volts_per_ref * speed_ref + (volts_per_integral * integral before - volts_per_speed * speed) */
 struct pdff {
     double k_pp_rad_s_mm;
     double k_pf_rad_mm;
-    double k_vf;
-    double k_iv_per_s;
-    double volts_s_rad; /* torque_to_volts * k_pv: V per rad/s of speed error */
-    double volts_limit;
     double step_s;
+    double volts_per_ref;      /* V per rad/s: torque_to_volts k_pv (k_vf + k_iv step) */
+    double volts_per_integral; /* V per rad:   torque_to_volts k_pv k_iv */
+    double volts_per_speed;    /* V per rad/s: torque_to_volts k_pv (1 + k_iv step) */
+    double volts_limit;
 };
 
 /* What one sample sees. */
@@ -36,16 +38,16 @@ static inline double pdff_step(const struct pdff *pdff, double *integral_rad,
 {
     const double speed_ref = pdff->k_pp_rad_s_mm * (in->command_mm - in->position_mm) +
                              pdff->k_pf_rad_mm * in->command_mm_s;
-    const double integral = *integral_rad + pdff->step_s * (speed_ref - in->speed_rad_s);
-    const double volts = pdff->volts_s_rad *
-                         (pdff->k_vf * speed_ref + pdff->k_iv_per_s * integral - in->speed_rad_s);
+    const double early =
+        pdff->volts_per_integral * *integral_rad - pdff->volts_per_speed * in->speed_rad_s;
+    const double volts = pdff->volts_per_ref * speed_ref + early;
     if (volts > pdff->volts_limit) {
         return pdff->volts_limit;
     }
     if (volts < -pdff->volts_limit) {
         return -pdff->volts_limit;
     }
-    *integral_rad = integral;
+    *integral_rad += pdff->step_s * (speed_ref - in->speed_rad_s);
     return volts;
 }
 

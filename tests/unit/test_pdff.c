@@ -3,14 +3,15 @@
 
 #include "unity.h"
 
+/* k_pp = 100, k_pf = 0.5, k_vf = 0.8, k_iv = 250, torque_to_volts k_pv = 2, 1 kHz. */
 static const struct pdff LOOP = {
     .k_pp_rad_s_mm = 100.0,
     .k_pf_rad_mm = 0.5,
-    .k_vf = 0.8,
-    .k_iv_per_s = 250.0,
-    .volts_s_rad = 2.0,
-    .volts_limit = 5.0,
     .step_s = 1e-3,
+    .volts_per_ref = 2.0 * (0.8 + 0.25),
+    .volts_per_integral = 2.0 * 250.0,
+    .volts_per_speed = 2.0 * (1.0 + 0.25),
+    .volts_limit = 5.0,
 };
 
 void setUp(void)
@@ -21,9 +22,8 @@ void tearDown(void)
 {
 }
 
-/* By hand: ref = 100 * 0.01 + 0.5 * 2 = 2; integral = 0.1 + 1e-3 * (2 - 1.5) = 0.1005;
- * volts = 2 (0.8 * 2 + 250 * 0.1005 - 1.5) = 50.45, too much; with integral 0.001: 2 (1.6 + 0.375
- * - 1.5) */
+/* By hand: ref = 100 * 0.01 + 0.5 * 2 = 2; integral = 0.001 + 1e-3 (2 - 1.5) = 0.0015;
+ * volts = 2 (0.8 * 2 + 250 * 0.0015 - 1.5) = 0.95 */
 static void test_one_sample_by_hand(void)
 {
     const struct pdff_input in = {1.01, 2.0, 1.0, 1.5};
