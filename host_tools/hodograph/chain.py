@@ -11,7 +11,7 @@ from .config import Machine, PathFile, load_machine, load_path_file
 from .errors import InputError
 from .feed import ControllerLimits, FeedPlan, plan_feed
 from .program import Compilation, Program, ProgramLimits, compile_path, encode
-from .spline import SplineResult, from_control_polygon, through_points
+from .spline import SplineResult, from_control_polygon
 
 
 def controller_limits(machine: Machine) -> ControllerLimits:
@@ -62,7 +62,7 @@ class Chain:
         """The machine; raises InputError when none is named."""
         if self.machine_or_none is None:
             raise InputError(
-                f"{self.file.file}: names no machine: add [machine] file = \"...\" or use --machine FILE"
+                f'{self.file.file}: names no machine: add [machine] file = "..." or use --machine FILE'
             )
         return self.machine_or_none
 

@@ -3,8 +3,8 @@
 
 from .drive_file import Drive, load_drive
 from .machine_file import KERNELS, Axis, Machine, load_machine
-from .table import read_toml
 from .path_file import PathFile, PathSpec, load_path_file
+from .table import read_toml
 
 __all__ = [
     "KERNELS",

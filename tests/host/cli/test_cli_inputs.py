@@ -155,7 +155,9 @@ def test_no_node(capsys: pytest.CaptureFixture[str]) -> None:
     """On python-can's own virtual bus nobody answers."""
     status, line = failed(capsys, "status", "--bus", "virtual:empty", "--wait", "0.3")
     assert status == 4
-    assert re.search(r"no answer from node 1 on virtual:empty in 0\.3 s: start the controller", line)
+    assert re.search(
+        r"no answer from node 1 on virtual:empty in 0\.3 s: start the controller", line
+    )
 
 
 def test_module_and_debug(tmp_path: Path) -> None:

@@ -157,9 +157,10 @@ def test_report(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     html = (folder / "report.html").read_text()
     names = {file.name for file in folder.glob("*.png")}
     assert names == {
-        f"alpha_{figure}.png" for figure in ("path", "feed", "search", "joints", "contour", "drives")
+        f"alpha_{figure}.png"
+        for figure in ("path", "feed", "search", "joints", "contour", "drives")
     }
     assert html.count("data:image/png;base64,") == len(names)
-    for outside in ("http://", "https://", "<script", "<link", "src=\"alpha"):
+    for outside in ("http://", "https://", "<script", "<link", 'src="alpha'):
         assert outside not in html
     assert capsys.readouterr().out.strip() == str(folder / "report.html")

@@ -85,7 +85,11 @@ def test_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
 
 DRIVE_MISTAKES = [
     ("gain_rad_s_v = 83.0089", "gain_rad_s_v = 0", r"gain_rad_s_v must be from"),
-    ("gain_rad_s_v = 83.0089", "gain = 83.0089", r'unknown key; did you mean "gain_rad_s_v"\?|use one of'),
+    (
+        "gain_rad_s_v = 83.0089",
+        "gain = 83.0089",
+        r'unknown key; did you mean "gain_rad_s_v"\?|use one of',
+    ),
     ("volts_limit = 5.0", "volts_limit = 50", r"volts_limit must be from"),
     ("counts_per_rev = 1048576", "counts_per_rev = 1.5", r"counts_per_rev must be a whole number"),
     ("loop_rate_hz = 16000", "loop_rate_hz = 1500", r"loop_rate_hz must be a multiple of 1000"),
@@ -93,7 +97,9 @@ DRIVE_MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "message"), DRIVE_MISTAKES, ids=[m[2] for m in DRIVE_MISTAKES])
+@pytest.mark.parametrize(
+    ("old", "new", "message"), DRIVE_MISTAKES, ids=[m[2] for m in DRIVE_MISTAKES]
+)
 def test_drive_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
     text = (EXAMPLES / "drives" / "alpha_x.toml").read_text()
     assert old in text

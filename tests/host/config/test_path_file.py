@@ -41,7 +41,11 @@ def test_good_file(tmp_path: Path) -> None:
     assert not found.path.closed
     assert not found.path.through
     np.testing.assert_array_equal(found.path.points, [0, 12 + 18j, 24 + 27j, 36 + 9j])
-    assert (found.feed.profile, found.feed.nominal_mm_s, found.feed.ramp_time_s) == ("exponential", 100.0, 0.1)
+    assert (found.feed.profile, found.feed.nominal_mm_s, found.feed.ramp_time_s) == (
+        "exponential",
+        100.0,
+        0.1,
+    )
     assert found.feed.n_c == 5.0
     assert (found.limits.jerk_mm_s3, found.limits.acceleration_mm_s2) == (5e4, None)
     assert found.limits.policy == "report"
@@ -49,7 +53,7 @@ def test_good_file(tmp_path: Path) -> None:
 
 
 def test_defaults(tmp_path: Path) -> None:
-    text = '[path]\nclosed = true\nthrough = [[0,0],[1,0],[1,1]]\n[feed]\nnominal_mm_s=1\nramp_time_s=1\n'
+    text = "[path]\nclosed = true\nthrough = [[0,0],[1,0],[1,1]]\n[feed]\nnominal_mm_s=1\nramp_time_s=1\n"
     found = load_path_file(write(tmp_path, text))
     assert found.path.through
     assert found.path.ends == "cubic"
@@ -83,15 +87,35 @@ MISTAKES = [
     ("[36, 9]]", '[36, "9"]]', r'control_points point 3 holds "9"'),
     ("[36, 9]]", "[36, true]]", r"control_points point 3 holds True"),
     ("[36, 9]]", "[36, 1e9]]", r"point 3 holds 1e\+09: at most 4096 mm"),
-    ("control_points = [[0, 0], [12, 18], [24, 27], [36, 9]]", "control_points = []", r"must be a list"),
+    (
+        "control_points = [[0, 0], [12, 18], [24, 27], [36, 9]]",
+        "control_points = []",
+        r"must be a list",
+    ),
     ("control_points = [[0, 0], [12, 18], [24, 27], [36, 9]]", "", r"control_points is missing"),
-    ("closed = false", "closed = false\nthrough = [[0, 0]]", r"through is given beside control_points"),
-    ("closed = false", "closed = false\nends = 'natural'", r"ends applies to open paths with through"),
+    (
+        "closed = false",
+        "closed = false\nthrough = [[0, 0]]",
+        r"through is given beside control_points",
+    ),
+    (
+        "closed = false",
+        "closed = false\nends = 'natural'",
+        r"ends applies to open paths with through",
+    ),
     ('"exponential"', '"exponentail"', r'profile.*did you mean "exponential"\?'),
     ('"exponential"', "3", r"profile cannot be 3; use one of: quintic, exponential, minimax"),
     ("nominal_mm_s = 100", "nominal_mms = 100", r'did you mean "nominal_mm_s"\?'),
-    ("nominal_mm_s = 100", 'nominal_mm_s = "fast"', r'nominal_mm_s must be a number, but is "fast"'),
-    ("nominal_mm_s = 100", "nominal_mm_s = nan", r"nominal_mm_s must be a finite number, but is nan"),
+    (
+        "nominal_mm_s = 100",
+        'nominal_mm_s = "fast"',
+        r'nominal_mm_s must be a number, but is "fast"',
+    ),
+    (
+        "nominal_mm_s = 100",
+        "nominal_mm_s = nan",
+        r"nominal_mm_s must be a finite number, but is nan",
+    ),
     ("nominal_mm_s = 100", "nominal_mm_s = -1", r"nominal_mm_s must be from 0\.001 to 4000"),
     ("nominal_mm_s = 100", "nominal_mm_s = 1e300", r"nominal_mm_s must be from 0\.001 to 4000"),
     ("nominal_mm_s = 100\n", "", r"nominal_mm_s is missing: add nominal_mm_s = a number"),
@@ -101,7 +125,11 @@ MISTAKES = [
     ("n_c = 5", "degree = 5.5", r"degree must be a whole number"),
     ('policy = "report"', 'policy = "ignore"', r'policy cannot be "ignore"'),
     ("jerk_mm_s3 = 5e4", "jerk_mm_s3 = 0", r"jerk_mm_s3 must be from 0\.1"),
-    ("[limits]", "[machine]\nfile = 'no.toml'\n[limits]", r"\[machine\] file names .*no\.toml, which is not there"),
+    (
+        "[limits]",
+        "[machine]\nfile = 'no.toml'\n[limits]",
+        r"\[machine\] file names .*no\.toml, which is not there",
+    ),
     ("[limits]", "[machine]\nfile = 3\n[limits]", r"\[machine\] file must be a text"),
     ("[limits]", "feed = 3\n[limits]", r"unknown key"),
 ]
