@@ -95,19 +95,19 @@ def derivative_bounds(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real
 
 
 def derivative_extremes(
-    duration_q32_s: Int, c_q40: Int
+    duration_q32_s: Int, c_q40: Int, halvings: int = 4
 ) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
     """Lower and upper bounds (M,) of feed, acceleration and jerk over each piece, close to the true extremes.
 
-    From Bernstein coefficients after halving the piece four times: what they overstate is 1/256 of what
-    `derivative_bounds` does (Farouki 2012, section 5).
+    From Bernstein coefficients after halving the piece n times: what they overstate is 1/4^n of what
+    `derivative_bounds` does (Farouki 2012, section 5). Memory for a curved piece: about 250 bytes times 2^n.
     """
     curved = np.flatnonzero(c_q40[:, 1:].any(axis=1))
     lows, highs = [], []
     for plain in derivative_bounds(duration_q32_s, c_q40):
         low, high = plain.min(axis=1), plain.max(axis=1)
         parts = plain[curved]
-        for _ in range(_HALVINGS):
+        for _ in range(halvings):
             parts = _halved(parts)
         axes = tuple(range(1, parts.ndim))
         low[curved], high[curved] = parts.min(axis=axes), parts.max(axis=axes)
@@ -121,9 +121,6 @@ def derivative_peaks(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]
     lows, highs = derivative_extremes(duration_q32_s, c_q40)
     v, a, j = (np.maximum(-low, high) for low, high in zip(lows, highs, strict=True))
     return v, a, j
-
-
-_HALVINGS = 4
 
 
 def _halved(coefficients: Real) -> Real:

@@ -25,8 +25,9 @@ PIECE_Q40 = 32 << 40
 JOIN_Q40 = 1 << 6
 ARC_LIMIT_Q40 = 1 << 62
 LONGEST_Q32 = 1 << 54
-JOIN_FEED_MM_S = 2.0**-16
-JOIN_ACCELERATION_MM_S2 = 2.0**-6
+JOIN_FEED_Q24 = 2.0**8
+JOIN_ACCELERATION_Q16 = 2.0**10
+"""2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
 BACKWARDS_MM_S = -(2.0**-10)
 ONE_Q24 = 1 << 24
 
@@ -70,36 +71,52 @@ def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) ->
     way = _ways_q44(duration, c)
     advance = np.diff(start.astype(object))
     gaps = way[:-1].astype(object) - 16 * advance
-    feed, acceleration, _ = derivative_bounds(duration, c)
-    lows, highs = derivative_extremes(duration, c)
+    (feed_start, feed_end), (acceleration_start, acceleration_end) = _end_values(duration, c)
+    bounds = _bound_faults(duration, c, limits)
     factor = pieces.override_factor_q24
     rates = (pieces.override_rate_q16_per_s == 0) | (pieces.override_second_q8_per_s2 == 0)
-    out: list[Rule] = [
-        (np.asarray(np.abs(way) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
-        (np.asarray(lows[0] < BACKWARDS_MM_S), 0, code.BACKWARDS),
-    ]
-    if limits is not None:
-        asked = (limits.feed_um_s * 1e-3, limits.acceleration_um_s2 * 1e-3, limits.jerk_mm_s3)
-        codes = (code.FEED, code.ACCELERATION, code.JERK)
-        for low, high, limit, which in zip(lows, highs, asked, codes, strict=True):
-            over = high > limit if which == code.FEED else np.maximum(-low, high) > limit
-            out.append((np.asarray(over & (limit > 0.0)), 0, which))
-    start_moving = np.array([_moving(feed[0, 0], acceleration[0, 0])])
+    start_moving = np.array([_moving(feed_start[0], acceleration_start[0])])
     return [
-        *out,
+        (np.asarray(np.abs(way) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
+        *bounds,
         (np.asarray((factor < ONE_Q24) | (factor > 2 * ONE_Q24) | rates), 0, code.OVERRIDE),
         (np.asarray(start[:1] != 0, dtype=np.bool_), 0, code.PIECE_FIRST),
         (start_moving, 0, code.START_MOVING),
         (np.asarray(advance < 0, dtype=np.bool_), 1, code.BACKWARDS),
         (np.asarray(np.abs(gaps) > JOIN_Q40 << 4, dtype=np.bool_), 1, code.JOIN_LENGTH),
-        (np.abs(feed[:-1, -1] - feed[1:, 0]) > JOIN_FEED_MM_S, 1, code.JOIN_FEED),
+        (np.abs(feed_end[:-1] - feed_start[1:]) > JOIN_FEED_Q24, 1, code.JOIN_FEED),
         (
-            np.abs(acceleration[:-1, -1] - acceleration[1:, 0]) > JOIN_ACCELERATION_MM_S2,
+            np.abs(acceleration_end[:-1] - acceleration_start[1:]) > JOIN_ACCELERATION_Q16,
             1,
             code.JOIN_ACCELERATION,
         ),
         (_brief(pieces.duration_q32_s, program.period_us), 2, code.PIECE_SHORT),
     ]
+
+
+def _bound_faults(duration: Int, c: Int, limits: ProgramLimits | None) -> list[Rule]:
+    """Feed, acceleration and jerk beyond what is allowed; close cases are looked at more closely."""
+    rules = _bound_masks(duration, c, limits, 4)
+    suspects = np.flatnonzero(np.logical_or.reduce([mask for mask, _, _ in rules]))
+    for first in range(0, suspects.size, 256):
+        some = suspects[first : first + 256]
+        close = _bound_masks(duration[some], c[some], limits, 9)
+        for (mask, _, _), (exact, _, _) in zip(rules, close, strict=True):
+            mask[some] = exact
+    return rules
+
+
+def _bound_masks(duration: Int, c: Int, limits: ProgramLimits | None, halvings: int) -> list[Rule]:
+    lows, highs = derivative_extremes(duration, c, halvings)
+    out: list[Rule] = [(np.asarray(lows[0] < BACKWARDS_MM_S), 0, ProgramError.BACKWARDS)]
+    if limits is None:
+        return out
+    peaks = highs[0], np.maximum(-lows[1], highs[1]), np.maximum(-lows[2], highs[2])
+    asked = (limits.feed_um_s * 1e-3, limits.acceleration_um_s2 * 1e-3, limits.jerk_mm_s3)
+    codes = (ProgramError.FEED, ProgramError.ACCELERATION, ProgramError.JERK)
+    for peak, limit, code in zip(peaks, asked, codes, strict=True):
+        out.append((np.asarray((peak > limit) & (limit > 0.0)), 0, code))
+    return out
 
 
 def last_piece_faults(program: Program) -> list[Rule]:
@@ -109,17 +126,22 @@ def last_piece_faults(program: Program) -> list[Rule]:
     duration, c = pieces.duration_q32_s[last:], pieces.c_q40[last:]
     way = int(_ways_q44(duration, c)[0])
     missed = abs(way + ((int(pieces.start_q40[last]) - program.length_q40) << 4)) > JOIN_Q40 << 4
-    feed, acceleration, _ = derivative_bounds(duration, c)
+    feed, acceleration = _end_values(duration, c)
     return [
+        (np.array([_moving(feed[1][0], acceleration[1][0])]), last, ProgramError.END_MOVING),
         (np.array([missed]), last, ProgramError.PIECE_END),
-        (np.array([_moving(feed[0, -1], acceleration[0, -1])]), last, ProgramError.END_MOVING),
     ]
 
 
-def _moving(feed_mm_s: float, acceleration_mm_s2: float) -> bool:
-    return bool(
-        abs(feed_mm_s) > JOIN_FEED_MM_S or abs(acceleration_mm_s2) > JOIN_ACCELERATION_MM_S2
-    )
+def _end_values(duration: Int, c: Int) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
+    """Feed in 2^-24 mm/s and acceleration in 2^-16 mm/s^2, each (at the start, at the end) of the pieces."""
+    feed, acceleration, _ = derivative_bounds(duration, c)
+    v, a = np.floor(feed * 2.0**24), np.floor(acceleration * 2.0**16)
+    return (v[:, 0], v[:, -1]), (a[:, 0], a[:, -1])
+
+
+def _moving(feed_q24: float, acceleration_q16: float) -> bool:
+    return abs(feed_q24) > JOIN_FEED_Q24 or abs(acceleration_q16) > JOIN_ACCELERATION_Q16
 
 
 def _ways_q44(duration: Int, c: Int) -> Int:
