@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .pieces import DEGREE, derivative_bounds, exponents
-from .ramp import ACCELERATION, FEED, JERK
+from .ramp import ACCELERATION, DISPLACEMENT, FEED, JERK
 from .timeline import Timeline
 
 Real = NDArray[np.float64]
@@ -67,9 +67,9 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
     straight[:, 1] = np.diff(middle_starts) * 2.0**-40
     inner = _round_pieces(middle, middle_starts, straight)
     for cuts in _cut_counts(line, up_end, period_us):
-        up_cuts = _even(0, up_end, cuts)
+        up_cuts = _ramp_cuts(line, up_end, cuts)
         # The way down is the way up run backwards from the exact end, a rounding off the last tick.
-        down_cuts = end - _even(0, end - down_start, cuts)[::-1]
+        down_cuts = end - _ramp_cuts(line, end - down_start, cuts)[::-1]
         up = _fit_ramp(line, up_cuts, 0.0, False)
         down = _fit_ramp(line, down_cuts, float(line.duration_s), True)
         up_starts = np.append(_way_sums(up)[:-1], middle_starts[0])
@@ -110,6 +110,17 @@ def _cut_counts(line: Timeline, ramp_q32: int, period_us: int) -> list[int]:
     if not fit:
         return [min(most, int(np.ceil(least)) if least > _COUNTS[-1] else most)]
     return fit
+
+
+def _ramp_cuts(line: Timeline, end: int, count: int) -> Int:
+    """Even cuts of the ramp, without those where a dip below zero feed (18) has not been made good yet:
+    starts of pieces have to rise.
+    """
+    cuts = _even(0, end, count)
+    way = line.ramp.value(DISPLACEMENT, cuts * 2.0**-32)
+    keep = way > 2.0**-38
+    keep[0] = keep[-1] = True
+    return cuts[keep]
 
 
 def _even(start: int, end: int, count: int) -> Int:

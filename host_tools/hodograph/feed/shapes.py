@@ -11,8 +11,8 @@ from .ramp import JERK, Ramp, exponential_ramp, minimax_ramp, quintic_ramp
 from .request import FeedRequest
 
 N_C_START, N_C_LOW, N_C_HIGH = 5.0, 2.0, 12.0
-REVERSE_MM_S = -(2.0**-11)
-"""Feed below this counts as reverse motion (the format refuses 2^-10 mm/s)."""
+REVERSE_MM_S = -(2.0**-14)
+"""Feed below this counts as reverse motion; (18) always dips a little, the format refuses 2^-10 mm/s."""
 
 
 @dataclass(frozen=True, eq=False)
