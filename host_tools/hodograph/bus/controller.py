@@ -14,21 +14,22 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import can
 import canopen
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from ..config import KERNELS, Machine
 from ..data import CONTROLLER_EDS
 from ..errors import BusError, RefusedError, RunError
-from ..program.check import Fault
-from ..program.codes import ProgramError
+from ..names import KERNELS
 from .address import BusAddress
 from .network import open_network
 from .texts import PROGRAM_STATES, REFUSALS, STATES, fault_text
 from .turns import Turns
+
+if TYPE_CHECKING:
+    from ..config import Machine
 
 DEVICE_TYPE, PERIOD = 0x1000, 0x1006
 PROGRAM, COMMAND, STATE, FAULT = 0x2000, 0x2001, 0x2002, 0x2003
@@ -406,6 +407,9 @@ def _configuration(machine: Machine, kernel: str) -> list[tuple[tuple[int, int |
 
 def program_fault_text(code: int, index: int) -> str:
     """A refusal code of program_check in words, with its place."""
+    from ..program.check import Fault
+    from ..program.codes import ProgramError
+
     try:
         fault = Fault(ProgramError(code), index)
     except ValueError:

@@ -11,14 +11,15 @@ import time
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
-from ..config import Axis, Machine
 from ..errors import BusError
 from .address import BusAddress
 
+if TYPE_CHECKING:
+    from ..config import Axis, Machine
+
 CONTROLLER, DRIVE = "hodograph-controller", "hodograph-drive"
-PACES = ("real-time", "fast")
 _REPOSITORY = Path(__file__).resolve().parents[3]
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -23,6 +22,7 @@ from .decode import Ticks, decode_ticks
 from .goto import goto
 from .processes import Rig
 from .recorder import Recorder
+from .signals import unbroken
 
 REACHED_AFTER = 2
 """Setpoint k is reached at SYNC k+2 (docs/protocol.md section 2)."""
@@ -98,20 +98,6 @@ def _await_rig(controller: Controller, rig: Rig, wait_s: float) -> None:
         rig.check()
         if time.monotonic() > deadline:
             raise BusError(f"the controller started here does not answer within {wait_s:g} s")
-
-
-@contextmanager
-def unbroken() -> Iterator[None]:
-    """Ignores Ctrl-C and SIGTERM while the axes are being stopped."""
-    kept = {}
-    with suppress(ValueError):  # only the main thread may
-        for number in (signal.SIGINT, signal.SIGTERM):
-            kept[number] = signal.signal(number, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        for number, handler in kept.items():
-            signal.signal(number, handler)
 
 
 def run_program(

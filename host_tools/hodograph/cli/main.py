@@ -9,6 +9,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib import import_module
 from types import FrameType
 
 from ..errors import INTERRUPTED_EXIT_STATUS, HodographError
@@ -17,6 +18,15 @@ from .parser import make_parser
 
 TERMINATED_EXIT_STATUS = 143
 """Exit status after SIGTERM (128 + SIGTERM)."""
+
+
+_MODULES = {
+    **dict.fromkeys(("spline", "feed", "compile", "inspect", "simulate"), "path_commands"),
+    **dict.fromkeys(("upload", "goto", "run", "rig"), "motion_commands"),
+    **dict.fromkeys(("start", "stop", "status"), "bus_commands"),
+    **dict.fromkeys(("report", "paper"), "report_commands"),
+}
+"""Where each command is; only its module is imported, since some take a second to load."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -55,10 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from . import bus_commands, path_commands, report_commands
-
-    handlers = path_commands.COMMANDS | bus_commands.COMMANDS | report_commands.COMMANDS
-    handlers[options.command](options)
+    module = import_module(f"{__package__}.{_MODULES[options.command]}")
+    module.COMMANDS[options.command](options)
 
 
 def _end(message: str, status: int, debug: bool) -> int:

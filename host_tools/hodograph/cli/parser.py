@@ -12,9 +12,8 @@ from typing import NoReturn
 
 from .. import __version__
 from ..bus.address import DEFAULT_BUS
-from ..bus.processes import PACES
-from ..config import KERNELS
 from ..errors import InputError
+from ..names import KERNELS, PACES
 
 DESCRIPTION = (
     "From a control polygon to encoder counts: jerk-limited motion on PH splines over CAN."

@@ -2,12 +2,11 @@
 """The input files (TOML) as checked, frozen dataclasses."""
 
 from .drive_file import Drive, load_drive
-from .machine_file import KERNELS, Axis, Machine, load_machine
+from .machine_file import Axis, Machine, load_machine
 from .path_file import PathFile, PathSpec, load_path_file
 from .table import read_toml
 
 __all__ = [
-    "KERNELS",
     "Axis",
     "Drive",
     "Machine",

@@ -6,11 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..names import KERNELS
 from .drive_file import Drive, load_drive
 from .table import Table, read_toml
-
-KERNELS = ("fixed", "float", "double")
-"""Number kernels, in the order of their codes in object 0x2004 sub 5."""
 
 COUNTS_LIMIT = 2**31 - 1
 

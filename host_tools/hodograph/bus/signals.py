@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""Keeping interrupts away while the axes are being stopped."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+
+@contextmanager
+def unbroken() -> Iterator[None]:
+    """Ignores Ctrl-C and SIGTERM while the axes are being stopped."""
+    kept = {}
+    with suppress(ValueError):  # only the main thread may
+        for number in (signal.SIGINT, signal.SIGTERM):
+            kept[number] = signal.signal(number, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)

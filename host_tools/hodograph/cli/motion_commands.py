@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""Commands that plan and speak to a controller: upload, goto, run, rig."""
+
+from __future__ import annotations
+
+import zlib
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from ..bus.address import BusAddress, parse_address
+from ..bus.goto import goto as goto_point
+from ..bus.run import BusRun, rig_until_interrupted, run_program, station
+from ..chain import Chain, load_chain
+from ..config import Machine, load_machine, read_toml
+from ..errors import InputError
+from ..native import NativeProgram
+from ..simulate import write_trace
+from .bus_commands import DEFAULT_BITRATE, reached, stopping
+from .output import note, print_json, print_rows, progress
+from .path_commands import motion_rows, print_notes, read_image
+
+
+def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
+    image = read_image(options.file)
+    if image is not None:
+        return image, load_machine(options.machine) if options.machine else None
+    chain = load_chain(options.file, options.machine)
+    image = chain.image
+    print_notes(chain, chain.compilation.plan)
+    return image, chain.machine
+
+
+def upload(options: Namespace) -> None:
+    """hodograph upload."""
+    address = parse_address(options.bus)
+    image, machine = _image_and_machine(options)
+    node, bitrate = (machine.node, machine.bitrate) if machine else (1, DEFAULT_BITRATE)
+    with reached(address, node, bitrate, options.wait) as controller:
+        if machine is not None:
+            controller.configure(machine, options.kernel or machine.kernel)
+        with progress("upload", "B", len(image)) as bar:
+            controller.upload(image, bar)
+        summary = controller.program_summary()
+    if options.json:
+        print_json({"bus": str(address), "bytes": len(image)} | summary)
+    else:
+        print(
+            f"{len(image)} bytes on node {node}: {summary['segments']} segments, {summary['pieces']} feed "
+            f"pieces, {summary['ticks']} ticks, CRC-32 {zlib.crc32(image[16:]):08x}"
+        )
+
+
+def goto(options: Namespace) -> None:
+    """hodograph goto."""
+    address = parse_address(options.bus)
+    image: bytes | None = None
+    if options.to is None:
+        image, named = _image_and_machine(options)
+        if named is None:
+            raise InputError(f"{options.file}: a program image needs --machine FILE")
+        machine = named
+    else:
+        machine = _machine_of(options.file, options.machine)
+    end = _end_counts(options, machine, image)
+    with reached(address, machine.node, machine.bitrate, options.wait) as controller:
+        controller.configure(machine, options.kernel or machine.kernel)
+        with stopping(controller):
+            controller.enable()
+            way_mm = goto_point(controller, machine, end)
+        if image is not None:
+            controller.upload(image)
+    place = ", ".join(f"{counts / machine.counts_per_mm:g}" for counts in end)
+    print(f"at ({place}) mm after {way_mm:.6g} mm" if way_mm else f"at ({place}) mm already")
+
+
+def _end_counts(options: Namespace, machine: Machine, image: bytes | None) -> tuple[int, int]:
+    if image is None:
+        reach = 2**31 / machine.counts_per_mm
+        if max(map(abs, options.to)) >= reach:
+            raise InputError(f"--to: must be within ±{reach:.0f} mm")
+        x, y = (round(mm * machine.counts_per_mm) for mm in options.to)
+        return x, y
+    _, setpoints = NativeProgram(image).setpoints(
+        options.kernel or machine.kernel, machine.counts_per_mm, 0, 1
+    )
+    return int(setpoints[0, 0]), int(setpoints[0, 1])
+
+
+def _machine_of(file: Path, given: Path | None) -> Machine:
+    """The machine of a machine file, or the one that a path file names."""
+    if given is not None:
+        return load_machine(given)
+    if "axis" in (data := read_toml(file)) or "path" not in data:
+        return load_machine(file)
+    return load_chain(file).machine
+
+
+def run(options: Namespace) -> None:
+    """hodograph run."""
+    address = parse_address(options.bus)
+    if options.trace is not None and len(options.files) > 1:
+        raise InputError("--trace: takes one FILE; run the others by themselves")
+    chains = [load_chain(file, options.machine) for file in options.files]
+    for chain in chains:
+        chain.image  # noqa: B018  (all that can be wrong with the input shows before anything moves)
+    runs = [_run_one(chain, address, options) for chain in chains]
+    if options.trace is not None:
+        write_trace(runs[0].motion, options.trace)
+    if options.report is not None:
+        from ..report import write_report
+
+        cases = [(chain, run.motion, run) for chain, run in zip(chains, runs, strict=True)]
+        note(f"report: {write_report(cases, options.report)}")
+    _print_runs(chains, runs, options.json)
+
+
+def _run_one(chain: Chain, address: BusAddress, options: Namespace) -> BusRun:
+    machine = chain.machine
+    print_notes(chain, chain.compilation.plan)
+    with (
+        station(machine, address, options.pace or "real-time", options.wait, note) as at,
+        progress(f"run {chain.file.name}", "tick", chain.program.ticks) as bar,
+    ):
+        if options.pace is not None and at.pace is None:
+            note("--pace has no effect on a controller that is running already")
+        return run_program(at, machine, chain.image, options.kernel or machine.kernel, bar)
+
+
+def _print_runs(chains: list[Chain], runs: list[BusRun], as_json: bool) -> None:
+    if as_json:
+        results: list[dict[str, Any]] = [run.summary() for run in runs]
+        if len(results) == 1:
+            print_json(results[0])
+        else:
+            files = [{"file": str(chain.file.file)} for chain in chains]
+            print_json([a | b for a, b in zip(files, results, strict=True)])
+        return
+    for chain, result in zip(chains, runs, strict=True):
+        motion = result.motion
+        nominal_s = motion.ticks * motion.period_us / 1e6
+        print(f"{chain.file.file}")
+        print_rows(
+            [
+                (f"  {name}", value)
+                for name, value in [
+                    ("bus", f"{result.bus}, pace {result.pace}, {result.frames} frames"),
+                    ("time", f"{result.wall_s:.2f} s for {nominal_s:.2f} s of motion"),
+                    ("deadline misses", str(result.deadline_misses)),
+                    *motion_rows(motion),
+                ]
+            ]
+        )
+
+
+def rig(options: Namespace) -> None:
+    """hodograph rig."""
+    address = parse_address(options.bus)
+    machine = _machine_of(options.file, None)
+    kernel = options.kernel or machine.kernel
+    rig_until_interrupted(machine, address, options.pace, kernel, note)
+
+
+COMMANDS = {
+    "upload": upload,
+    "goto": goto,
+    "run": run,
+    "rig": rig,
+}

@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: MIT
+"""Words that the command line, files and the bus share; no imports, so that `--help` is quick."""
+
+KERNELS = ("fixed", "float", "double")
+"""Number kernels, in the order of their codes in object 0x2004 sub 5."""
+
+PACES = ("real-time", "fast")
+"""How a controller process of a simulated machine may tick."""
