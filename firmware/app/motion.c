@@ -16,7 +16,8 @@ int motion_begin(struct motion *motion, const struct program *program, const str
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
 {
     const uint64_t time_q32_s = timebase_step(&motion->timebase);
-    const int result = interp_at(&motion->interp, time_q32_s, &motion->point);
+    const int result =
+        interp_at_q42(&motion->interp, timebase_time_q42(&motion->timebase), &motion->point);
     if (result < 0) {
         return result;
     }

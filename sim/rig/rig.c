@@ -61,7 +61,8 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
 static int rig_command(struct rig *rig, struct rig_row *row)
 {
     struct interp_point point;
-    if (interp_at(&rig->interp, timebase_step(&rig->timebase), &point) < 0) {
+    (void)timebase_step(&rig->timebase);
+    if (interp_at_q42(&rig->interp, timebase_time_q42(&rig->timebase), &point) < 0) {
         return RIG_ERR_INTERP;
     }
     row->arc_length_q40_mm = point.arc_length_q40_mm;
@@ -97,20 +98,20 @@ int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n)
     return 0;
 }
 
-static int rig_point(struct interp *interp, uint64_t time_q32_s, struct interp_point *point)
+static int rig_point(struct interp *interp, uint64_t time_q42_s, struct interp_point *point)
 {
-    int result = interp_at(interp, time_q32_s, point);
-    if (result == INTERP_ERR_JUMP && interp_seek(interp, time_q32_s) == 0) {
-        result = interp_at(interp, time_q32_s, point);
+    int result = interp_at_q42(interp, time_q42_s, point);
+    if (result == INTERP_ERR_JUMP && interp_seek(interp, time_q42_s >> 10) == 0) {
+        result = interp_at_q42(interp, time_q42_s, point);
     }
     return result < 0 ? RIG_ERR_INTERP : 0;
 }
 
-int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
+int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts)
 {
     for (uint32_t i = 0; i < n; i++) {
-        if (rig_point(interp, time_q32_s[i], &points[i]) != 0) {
+        if (rig_point(interp, time_q42_s[i], &points[i]) != 0) {
             return RIG_ERR_INTERP;
         }
         if (counts == NULL) {
@@ -122,21 +123,21 @@ int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
     return 0;
 }
 
-/* round(tick * period * 2^32 / 10^6) = round(tick * period * 2^26 / 15625), in two parts against
+/* round(tick * period * 2^42 / 10^6) = round(tick * period * 2^36 / 15625), in two parts against
  * overflow. */
 static uint64_t rig_time(uint64_t microseconds)
 {
     const uint64_t whole_s = microseconds / 1000000;
     const uint64_t rest_us = microseconds % 1000000;
-    return (whole_s << 32) + ((rest_us << 27) + 15625) / 31250;
+    return (whole_s << 42) + ((rest_us << 37) + 15625) / 31250;
 }
 
-void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q32_s)
+void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s)
 {
-    const uint64_t duration = program->header.duration_q32_s;
+    const uint64_t duration = program->header.duration_q32_s << 10;
     for (uint32_t i = 0; i < n; i++) {
         const uint64_t time = rig_time(((uint64_t)tick0 + i) * program->header.period_us);
-        time_q32_s[i] = time < duration ? time : duration;
+        time_q42_s[i] = time < duration ? time : duration;
     }
 }
 

@@ -60,14 +60,14 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
 /* The next n ticks. Returns 0 or RIG_ERR_INTERP. */
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
 
-/* Commanded points alone, for n program times in 2^-32 s, in any order (ascending is quick).
+/* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
  * counts: x, y pairs, or NULL. The interpolator has to have begun. Returns 0 or RIG_ERR_INTERP. */
-int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
+int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
 
 /* Program times of n ticks from tick0 on, as the controller's timebase gives them at rate 1, in
- * 2^-32 s. */
-void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q32_s);
+ * 2^-42 s. */
+void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 
 /* counts_from_q40_mm for n values. */
 void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);

@@ -155,8 +155,8 @@ static void test_setpoints_are_those_of_the_interpolator(void)
     TEST_ASSERT_EQUAL_INT(0, program_open(&program, image, sizeof image));
     TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &program, INTERP_FIXED));
     for (uint32_t k = 0; k < APP_IMAGE_TICKS; ++k) {
-        const uint64_t time_q32_s = ((uint64_t)k * 1000u * 4294967296u + 500000u) / 1000000u;
-        TEST_ASSERT_TRUE(interp_at(&interp, time_q32_s, &point) >= 0);
+        const uint64_t time_q42_s = ((uint64_t)k * 4398046511104u + 500u) / 1000u;
+        TEST_ASSERT_TRUE(interp_at_q42(&interp, time_q42_s, &point) >= 0);
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.x_q40_mm, 1000000), bench.targets[0][k]);
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.y_q40_mm, 1000000), bench.targets[1][k]);
     }

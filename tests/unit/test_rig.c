@@ -141,9 +141,9 @@ static void test_times_and_points(void)
     TEST_ASSERT_EQUAL_INT(0, begin());
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
     rig_times(&program, 0, TICKS + 2, times);
-    TEST_ASSERT_EQUAL_UINT64(4294967, times[1]);
-    TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 32, times[TICKS - 1]);
-    TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 32, times[TICKS + 1]);
+    TEST_ASSERT_EQUAL_UINT64(UINT64_C(4398046511), times[1]);
+    TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 42, times[TICKS - 1]);
+    TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 42, times[TICKS + 1]);
     for (int k = 0; k < TICKS / 2; k++) { /* backwards too */
         const uint64_t kept = times[k];
         times[k] = times[TICKS - 1 - k];
@@ -161,10 +161,10 @@ static void test_times_and_points(void)
 static void test_times_do_not_drift_in_long_programs(void)
 {
     uint64_t time;
-    program.header.duration_q32_s = UINT64_C(1) << 54;
+    program.header.duration_q32_s = (UINT64_C(1) << 54) - 1u;
     program.header.period_us = 8000;
     rig_times(&program, 499999999, 1, &time); /* 3 999 999.992 s */
-    TEST_ASSERT_EQUAL_UINT64((UINT64_C(3999999) << 32) + 4260607558u, time);
+    TEST_ASSERT_EQUAL_UINT64((UINT64_C(3999999) << 42) + UINT64_C(4362862139015), time);
 }
 
 int main(void)

@@ -93,8 +93,8 @@ struct rig {
 int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
               const struct drive_config drives[2], struct contour_segment *segments);
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
-int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q32_s,
+int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
-void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q32_s);
+void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
 enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };

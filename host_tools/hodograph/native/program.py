@@ -122,15 +122,15 @@ class NativeProgram:
             )
         self._accepted = True
 
-    def tick_times_q32_s(self, tick0: int = 0, count: int | None = None) -> NDArray[np.uint64]:
-        """Program times of `count` ticks from `tick0` on (default: to the last), s * 2^32, (count,)."""
+    def tick_times_q42_s(self, tick0: int = 0, count: int | None = None) -> NDArray[np.uint64]:
+        """Program times of `count` ticks from `tick0` on (default: to the last), s * 2^42, (count,)."""
         ffi, lib = library()
         n = self.ticks - tick0 if count is None else count
         times = np.empty(n, dtype=np.uint64)
         lib.rig_times(self.pointer, tick0, n, ffi.from_buffer("uint64_t[]", times))
         return times
 
-    def points(self, kernel: str, times_q32_s: NDArray[np.uint64]) -> NDArray[np.void]:
+    def points(self, kernel: str, times_q42_s: NDArray[np.uint64]) -> NDArray[np.void]:
         """Points at any program times (ascending is quick), as an array of POINT, (n,).
 
         Raises InputError for an unknown kernel and for a program that does not pass `check`.
@@ -138,7 +138,7 @@ class NativeProgram:
         ffi, lib = library()
         self.require()
         code = kernel_code(kernel)
-        times = np.ascontiguousarray(times_q32_s, dtype=np.uint64)
+        times = np.ascontiguousarray(times_q42_s, dtype=np.uint64)
         points = np.empty(times.size, dtype=POINT)
         interp = ffi.new("struct interp *")
         begun = lib.interp_begin(interp, self.pointer, code)
@@ -158,7 +158,7 @@ class NativeProgram:
         self, kernel: str, counts_per_mm: int, tick0: int = 0, count: int | None = None
     ) -> tuple[NDArray[np.void], NDArray[np.int32]]:
         """Points (n,) of POINT and setpoints in counts (n, 2) of `count` ticks from `tick0` on."""
-        points = self.points(kernel, self.tick_times_q32_s(tick0, count))
+        points = self.points(kernel, self.tick_times_q42_s(tick0, count))
         xy = np.stack([points["x_q40_mm"], points["y_q40_mm"]], axis=1)
         return points, counts_from_q40_mm(xy, counts_per_mm)
 

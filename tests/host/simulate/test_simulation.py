@@ -108,15 +108,15 @@ def test_kernels_agree_to_counts(alpha: Case) -> None:
 
 def test_times_are_exact_and_stop_at_the_duration(alpha: Case) -> None:
     program = NativeProgram(alpha.image)
-    times = program.tick_times_q32_s(0, program.ticks + 3)
-    expected = [(2 * k * 2**32 + 1000) // 2000 for k in range(program.ticks - 1)]
+    times = program.tick_times_q42_s(0, program.ticks + 3)
+    expected = [(2 * k * 2**42 + 1000) // 2000 for k in range(program.ticks - 1)]
     assert times[: program.ticks - 1].tolist() == expected
-    assert set(times[program.ticks - 1 :].tolist()) == {program.duration_q32_s}
+    assert set(times[program.ticks - 1 :].tolist()) == {program.duration_q32_s << 10}
 
 
 def test_points_at_any_time_in_any_order(alpha: Case) -> None:
     program = NativeProgram(alpha.image)
-    times = program.tick_times_q32_s()
+    times = program.tick_times_q42_s()
     order = np.random.default_rng(1).permutation(len(times))
     ordered = program.points("fixed", times)
     assert np.array_equal(program.points("fixed", times[order]), ordered[order])
