@@ -1,98 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "plant/drive.h"
 
-#include <stddef.h>
-
 /* Setpoints of one period: command at sample i is start + i * step. */
 struct command {
     double start_mm;
     double step_mm;
     double speed_mm_s;
 };
-
-/* Also false for NaN. */
-static bool in_range(double value, double above, double most)
-{
-    return value > above && value <= most;
-}
-
-static bool drive_plant_ok(const struct drive_plant *p)
-{
-    const double most = 1e9;
-    return in_range(p->gain_rad_s_v, 0.0, most) && in_range(p->time_constant_s, 0.0, most) &&
-           in_range(p->screw_mm_rad, 1e-9, 1e6) && in_range(p->torque_to_volts, 0.0, most) &&
-           in_range(p->volts_limit, 0.0, 32.767);
-}
-
-static bool drive_gains_ok(const struct drive_pdff *g)
-{
-    const double gains[] = {g->k_pp_rad_s_mm, g->k_pv_nm_s_rad, g->k_iv_per_s, g->k_pf_rad_mm,
-                            g->k_vf};
-    for (size_t i = 0; i < sizeof gains / sizeof gains[0]; i++) {
-        if (!(gains[i] >= 0.0 && gains[i] <= 1e9)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static bool drive_encoder_ok(const struct drive_config *c)
-{
-    return c->encoder_counts_per_rev >= 1 && c->encoder_counts_per_rev <= (UINT32_C(1) << 28) &&
-           c->counts_per_mm >= 1 && c->counts_per_mm <= UINT32_C(1000000000);
-}
-
-/* Servo samples per period; 0 when they are no whole number or too many. */
-static uint32_t drive_samples(const struct drive_config *c)
-{
-    const uint64_t scaled = (uint64_t)c->loop_rate_hz * c->period_us;
-    if (c->period_us < 1 || c->period_us > 1000000 || scaled % 1000000 != 0 ||
-        scaled / 1000000 > 65536) {
-        return 0;
-    }
-    return (uint32_t)(scaled / 1000000);
-}
-
-static int drive_check(const struct drive_config *c)
-{
-    if (!drive_plant_ok(&c->plant)) {
-        return DRIVE_ERR_PLANT;
-    }
-    if (!drive_gains_ok(&c->pdff)) {
-        return DRIVE_ERR_GAIN;
-    }
-    if (!drive_encoder_ok(c)) {
-        return DRIVE_ERR_ENCODER;
-    }
-    if (drive_samples(c) == 0) {
-        return DRIVE_ERR_RATE;
-    }
-    if (c->plant.time_constant_s * (double)c->loop_rate_hz < 1.0) {
-        return DRIVE_ERR_STEP;
-    }
-    return 0;
-}
-
-const char *drive_error_text(int code)
-{
-    switch (code) {
-    case 0:
-        return "no error";
-    case DRIVE_ERR_PLANT:
-        return "plant figures must be positive numbers and volts_limit at most 32.767 V";
-    case DRIVE_ERR_GAIN:
-        return "PDFF gains must be finite and not negative";
-    case DRIVE_ERR_ENCODER:
-        return "encoder counts_per_rev must be 1 to 2^28 and counts_per_mm 1 to 10^9";
-    case DRIVE_ERR_RATE:
-        return "the period must hold a whole number of servo samples, 1 to 65536 (loop_rate_hz "
-               "times period)";
-    case DRIVE_ERR_STEP:
-        return "the plant's time constant is shorter than one servo sample";
-    default:
-        return "unknown error";
-    }
-}
 
 static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
 {
@@ -109,7 +23,7 @@ static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
 
 int drive_init(struct drive *d, const struct drive_config *c)
 {
-    const int error = drive_check(c);
+    const int error = drive_config_check(c);
     if (error != 0) {
         return error;
     }
@@ -119,7 +33,7 @@ int drive_init(struct drive *d, const struct drive_config *c)
     encoder_init(&d->encoder, c->plant.screw_mm_rad, c->encoder_counts_per_rev);
     d->counts_per_mm = (double)c->counts_per_mm;
     d->mm_per_count = 1.0 / d->counts_per_mm;
-    d->samples = drive_samples(c);
+    d->samples = drive_config_samples(c);
     d->sample_fraction = 1.0 / (double)d->samples;
     d->samples_per_s = (double)c->loop_rate_hz;
     drive_place(d, 0);

@@ -23,45 +23,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "plant/drive_config.h"
 #include "plant/encoder.h"
 #include "plant/motor.h"
 #include "plant/pdff.h"
 
 #define DRIVE_PARK_PERIODS    250
 #define DRIVE_PARK_INCREMENTS 2
-
-struct drive_plant {
-    double gain_rad_s_v;    /* more than 0 */
-    double time_constant_s; /* at least one servo step */
-    double screw_mm_rad;    /* more than 0 */
-    double torque_to_volts; /* V/(N m), more than 0 */
-    double volts_limit;     /* more than 0, at most 32.767 (volts travel as i16 mV) */
-};
-
-struct drive_pdff {
-    double k_pp_rad_s_mm; /* all gains: 0 or more */
-    double k_pv_nm_s_rad;
-    double k_iv_per_s;
-    double k_pf_rad_mm;
-    double k_vf;
-};
-
-struct drive_config {
-    struct drive_plant plant;
-    struct drive_pdff pdff;
-    uint32_t encoder_counts_per_rev; /* 1 ... 2^28 */
-    uint32_t loop_rate_hz;           /* servo samples a second; a whole number of them per period */
-    uint32_t counts_per_mm;          /* of the bus, 1 ... 10^9 */
-    uint32_t period_us;              /* 1 ... 10^6 */
-};
-
-enum drive_error {
-    DRIVE_ERR_PLANT = -1,   /* a plant figure is not a number or out of its range */
-    DRIVE_ERR_GAIN = -2,    /* a gain is negative or not finite */
-    DRIVE_ERR_ENCODER = -3, /* encoder_counts_per_rev or counts_per_mm out of range */
-    DRIVE_ERR_RATE = -4, /* no whole number of servo samples per period, or too many (over 65536) */
-    DRIVE_ERR_STEP = -5, /* the time constant is shorter than one servo sample */
-};
 
 /* What changes from servo sample to servo sample. */
 struct drive_state {
@@ -89,9 +57,6 @@ struct drive {
 /* Checks the configuration and prepares the coefficients; the axis is parked at 0 counts. Returns 0
  * or a negative enum drive_error; on error the object is not to be used. */
 int drive_init(struct drive *drive, const struct drive_config *config);
-
-/* One clear English phrase for a return value of drive_init. */
-const char *drive_error_text(int code);
 
 /* Puts the axis at rest, parked at target_counts. */
 void drive_place(struct drive *drive, int32_t target_counts);
