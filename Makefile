@@ -29,11 +29,8 @@ VENV   := .venv
 PY     := $(VENV)/bin/python
 
 # A .venv that was made in another place (a moved or copied tree) is of no use: make it again.
-ifneq ($(wildcard $(VENV)/.ready),)
-ifneq ($(shell cat $(VENV)/.ready),$(CURDIR))
-$(shell rm -f $(VENV)/.ready)
-endif
-endif
+# (By the shell throughout: make remembers what a folder held when it first looked.)
+$(shell [ ! -e $(VENV)/.ready ] || [ "$$(cat $(VENV)/.ready)" = "$(CURDIR)" ] || rm -f $(VENV)/.ready)
 
 ## ---- what there is ---------------------------------------------------------------------------
 
@@ -221,7 +218,9 @@ $(BUILD)/$(1)/tests/%: $(BUILD)/$(1)/obj/tests/unit/%.o $(call object_of,$(1),$(
 $(call LINK,$(1))
 endef
 $(foreach v,$(VARIANTS),$(eval $(call VARIANT_RULES,$(v))))
-.SECONDARY:
+# Objects of tests and the marks of lint are made by chains of patterns; make would delete them.
+.SECONDARY: $(foreach v,$(VARIANTS),$(call object_of,$(v),$(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))) \
+            $(patsubst %,$(BUILD)/clang/obj/%.tidy-deps,$(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))
 
 define BIN_RULE # variant, program, file
 $(3): $(call object_of,$(1),$($(2)_MAIN)) $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a)
