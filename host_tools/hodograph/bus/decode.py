@@ -31,7 +31,8 @@ Int32 = NDArray[np.int32]
 class Ticks:
     """Rows by SYNC, columns by axis: targets sent after SYNC j, answers to SYNC j.
 
-    `volts_mv` is None when the drives send no TPDO2. Rows at both ends, which a recording cuts, are left out.
+    `volts_mv` is None when the drives send no TPDO2. Only SYNCs of which everything surely came are here:
+    up to the last one that was answered in time, since a lost frame shows as lateness for ever.
     """
 
     targets: Int32
@@ -61,8 +62,6 @@ def decode_ticks(frames: Frames, nodes: Sequence[int]) -> Ticks:
         volts = [_by_sync(frames, sync_at, TPDO2 + n, f"volts of node {n}") for n in nodes]
         streams = streams + volts
     count = min(len(stream) for stream in streams)
-    if count < sync_at.size - _LEAD_IN:
-        raise RunError(f"recording ends in the middle: {count} of {sync_at.size} ticks are whole")
     return Ticks(
         targets=np.stack([_integers(d[:count], 2, "<i4") for d in targets], axis=1),
         actual=np.stack([_integers(d[:count], 2, "<i4") for d in answers], axis=1),
@@ -87,7 +86,7 @@ def _check_counters(counters: NDArray[np.int64]) -> None:
 def _by_sync(
     frames: Frames, sync_at: NDArray[np.intp], identifier: int, what: str
 ) -> NDArray[np.uint8]:
-    """Data (n, 8) of the frames with this identifier, row n belonging to SYNC n."""
+    """Data (n, 8) of the frames with this identifier, row j belonging to SYNC j, as far as that is sure."""
     at = np.flatnonzero(frames["id"] == identifier)
     interval = np.searchsorted(sync_at, at) - 1
     at, interval = at[interval >= 0], interval[interval >= 0]
@@ -100,12 +99,13 @@ def _by_sync(
     if early.size:
         raise RunError(f"{what}: more than one frame for SYNC {int(interval[early[0]])}")
     late = np.flatnonzero(lag > _LONGEST_LAG)
-    if (
-        late.size or lag[-_LEAD_IN:].min(initial=_LONGEST_LAG) > 0
-    ):  # a lost frame is never made up for
-        lost = int(late[0]) if late.size else int(np.flatnonzero(lag == 0)[-1:].sum()) + 1
-        raise RunError(f"{what}: no frame for SYNC {lost}: the recording is incomplete")
-    return np.asarray(frames["data"][at])
+    if late.size:
+        raise RunError(f"{what}: no frame for SYNC {int(late[0])}: the recording is incomplete")
+    on_time = np.flatnonzero(lag == 0)  # a lost frame is never made up for
+    sure = int(on_time[-1]) + 1 if on_time.size else 0
+    if sure < sync_at.size - _LEAD_IN:
+        raise RunError(f"{what}: no frame for SYNC {sure}: the recording is incomplete")
+    return np.asarray(frames["data"][at[:sure]])
 
 
 def _integers(data: NDArray[np.uint8], offset: int, kind: str) -> NDArray[np.generic]:

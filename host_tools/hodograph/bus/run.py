@@ -28,7 +28,8 @@ REACHED_AFTER = 2
 """Setpoint k is reached at SYNC k+2 (docs/protocol.md section 2)."""
 
 _SYNCS, _TICK, _MISSES = 1, 2, 3
-_MARGIN_TICKS = 10
+_MARGIN_TICKS = 50
+"""Recorded beyond what is needed, so that late answers can be told from lost ones."""
 
 Progress = Callable[[int], None]
 

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Straight moves: from count to count exactly, inside the machine's limits, however short or long."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hodograph.bus.goto import SHORTEST_MOVE_MM, legs, line_image
+from hodograph.chain import program_limits
+from hodograph.config import load_machine
+from hodograph.errors import PlanError
+from hodograph.native import NativeLimits, NativeProgram
+
+MACHINE = load_machine(
+    Path(__file__).resolve().parents[3] / "examples" / "machines" / "paper_alpha.toml"
+)
+COUNTS = st.integers(-200_000_000, 200_000_000)
+
+
+@settings(max_examples=40, deadline=None)
+@given(COUNTS, COUNTS, COUNTS, COUNTS)
+def test_any_move(x0: int, y0: int, x1: int, y1: int) -> None:
+    check_moves((x0, y0), (x1, y1))
+
+
+@settings(max_examples=40, deadline=None)
+@given(COUNTS, COUNTS, st.integers(-3000, 3000), st.integers(-3000, 3000))
+def test_short_moves(x: int, y: int, dx: int, dy: int) -> None:
+    check_moves(
+        (x, y),
+        (min(max(x + dx, -200_000_000), 200_000_000), min(max(y + dy, -200_000_000), 200_000_000)),
+    )
+
+
+def check_moves(start: tuple[int, int], end: tuple[int, int]) -> None:
+    a, b = (complex(x / 1e6, y / 1e6) for x, y in (start, end))
+    moves = legs(a, b, MACHINE)
+    at = start
+    limits = NativeLimits(**vars(program_limits(MACHINE)))
+    for leg_start, leg_end in moves:
+        program = NativeProgram(line_image(leg_start, leg_end, MACHINE))
+        assert program.check(limits) is None
+        _, setpoints = program.setpoints("fixed", MACHINE.counts_per_mm)
+        assert tuple(setpoints[0].tolist()) == at
+        at = tuple(setpoints[-1].tolist())
+    assert at == end
+    assert len(moves) == (0 if start == end else 1 if abs(b - a) >= SHORTEST_MOVE_MM else 2)
+
+
+def test_outside_the_travel() -> None:
+    with pytest.raises(PlanError, match="travel"):
+        line_image(0j, 300 + 0j, MACHINE)
