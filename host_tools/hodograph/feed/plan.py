@@ -24,7 +24,7 @@ from .timeline import Timeline, timeline
 Real = NDArray[np.float64]
 
 SHORTEST_MM, LONGEST_MM = 2.0**-10, 2.0**22 - 1.0
-LONGEST_S = 2.0**22
+LONGEST_S = 2.0**22 - 1.0
 
 
 @dataclass(frozen=True)

@@ -122,6 +122,6 @@ def _header_fault(
 
 def _duration_fault(program: Program) -> Fault | None:
     total = sum(int(d) for d in program.pieces.duration_q32_s)
-    if total == program.duration_q32_s and total <= LONGEST_Q32_S:
+    if total == program.duration_q32_s and total < LONGEST_Q32_S:
         return None
     return Fault(ProgramError.DURATION, 0)

@@ -31,7 +31,7 @@ class ExactPoint:
 
 
 class ExactProgram:
-    """A program to be evaluated at any time (integers in 2^-32 s)."""
+    """A program to be evaluated at any time."""
 
     def __init__(self, program: Program) -> None:
         self._program = program
@@ -41,18 +41,22 @@ class ExactProgram:
             self._times.append(self._times[-1] + int(duration))
 
     def at(self, time_q32_s: int) -> ExactPoint:
-        """The point at a time, clipped to the program."""
+        """The point at a time in 2^-32 s, clipped to the program."""
+        return self.at_q42(time_q32_s << 10)
+
+    def at_q42(self, time_q42_s: int) -> ExactPoint:
+        """The point at a time in 2^-42 s, as ticks have it, clipped to the program."""
         with mpmath.workdps(DIGITS):
-            s, feed, acceleration, jerk = self._arc_length(time_q32_s)
+            s, feed, acceleration, jerk = self._arc_length(time_q42_s)
             x, y = self._point(s)
             return ExactPoint(s, x, y, feed, acceleration, jerk)
 
-    def _arc_length(self, time_q32_s: int) -> tuple[Any, Any, Any, Any]:
-        time = min(max(time_q32_s, 0), self._times[-1])
-        i = min(bisect_right(self._times, time) - 1, len(self._times) - 2)
+    def _arc_length(self, time_q42_s: int) -> tuple[Any, Any, Any, Any]:
+        time = min(max(int(time_q42_s), 0), self._times[-1] << 10)
+        i = min(bisect_right(self._times, time >> 10) - 1, len(self._times) - 2)
         piece = self._program.pieces[i]
         scale = mpmath.mpf(2) ** piece.exponent
-        tau = mpmath.ldexp(time - self._times[i], -32) / scale
+        tau = mpmath.ldexp(time - (self._times[i] << 10), -42) / scale
         c = [mpmath.ldexp(v, -40) for v in (piece.start_q40, *piece.c_q40)]
         values = []
         for order in range(4):

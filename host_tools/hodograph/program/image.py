@@ -94,12 +94,12 @@ class Program:
         """Arc length of the path."""
         return self.length_q40 * 2.0**-40
 
-    def tick_times_q32_s(self) -> Int:
-        """Program time (ticks,) of each setpoint: min(floor(k period + 1/2), duration) in 2^-32 s."""
-        k = np.arange(self.ticks, dtype=np.int64)
-        whole_s, rest_us = np.divmod(k * self.period_us, 1_000_000)
-        times = (whole_s << 32) + ((rest_us << 32) + 500_000) // 1_000_000
-        return np.asarray(np.minimum(times, self.duration_q32_s))
+    def tick_times_q42_s(self) -> NDArray[np.uint64]:
+        """Program time (ticks,) of each setpoint in 2^-42 s: min(floor(k period + 1/2), duration)."""
+        k = np.arange(self.ticks, dtype=np.uint64)
+        whole_s, rest_us = np.divmod(k * np.uint64(self.period_us), np.uint64(1_000_000))
+        part = ((rest_us << np.uint64(42)) + np.uint64(500_000)) // np.uint64(1_000_000)
+        return np.minimum((whole_s << np.uint64(42)) + part, np.uint64(self.duration_q32_s << 10))
 
 
 def encode(program: Program) -> bytes:

@@ -111,6 +111,13 @@ def test_reverse_motion_is_refused() -> None:
             plan_feed(10.0, FeedRequest("exponential", 0.05, 0.1, n_c=n_c))
 
 
+def test_a_dip_of_the_slow_exponential_ramp_leaves_starts_rising() -> None:
+    for feed, ramp in ((10.0, 1.5), (5.0, 0.8), (1.0, 0.1), (30.0, 3.0)):
+        plan = plan_feed(60.0, FeedRequest("exponential", feed, ramp))
+        assert np.diff(plan.pieces.start_q40).min() > 0
+        assert plan.feed(np.linspace(0.0, plan.duration_s, 100_001)).min() >= -(2.0**-14)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

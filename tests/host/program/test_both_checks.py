@@ -93,7 +93,7 @@ def test_whatever_is_compiled_is_accepted(profile, feed, ramp, degree, period_us
     limits = NativeLimits(period_us, *FIELDS[1:])
     assert NativeProgram(encode(program)).check(limits) is None
     assert np.array_equal(
-        NativeProgram(encode(program)).tick_times_q32_s(), program.tick_times_q32_s()
+        NativeProgram(encode(program)).tick_times_q42_s(), program.tick_times_q42_s()
     )
 
 

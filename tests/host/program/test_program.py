@@ -95,11 +95,11 @@ def test_drift_from_the_ideal_curve_is_nil(closed: bool) -> None:
 
 def test_ticks_and_their_times_are_exact() -> None:
     program = compiled(line(0, 50))
-    times = program.tick_times_q32_s()
+    times = program.tick_times_q42_s()
     assert times.size == program.ticks == -(-program.duration_q32_s * 1000 // 2**32) + 1
-    assert times[-1] == program.duration_q32_s
+    assert times[-1] == program.duration_q32_s << 10
     for k in (0, 1, 2, 333, program.ticks - 2):
-        assert times[k] == (k * 1000 * 2**32 * 2 + 10**6) // (2 * 10**6)
+        assert times[k] == (k * 1000 * 2**42 * 2 + 10**6) // (2 * 10**6)
 
 
 def test_work_offset_moves_everything_and_travel_is_kept() -> None:
