@@ -49,15 +49,17 @@ C_PURE_HEADERS |= {"string.h", "inttypes.h"}
 
 PYTHON_RULES: dict[str, set[str]] = {
     "errors": set(),
+    "names": {"errors"},
     "data": set(),
     "spline": {"errors"},
     "feed": {"errors"},
-    "config": {"errors", "feed", "spline"},
+    "config": {"errors", "names", "feed", "spline"},
     "native": {"errors", "config"},
     "program": {"errors", "spline", "feed", "native"},
     "simulate": {"errors", "config", "native", "program"},
     "bus": {
         "errors",
+        "names",
         "data",
         "config",
         "spline",
