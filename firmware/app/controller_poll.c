@@ -148,7 +148,9 @@ static void note_state(struct controller *controller)
     static const char *const names[] = {"state boot",  "state off",     "state enabling",
                                         "state ready", "state running", "state stopping",
                                         "state fault"};
+    port_lock();
     const enum machine_state state = controller->machine.state;
+    port_unlock();
     if (state != controller->noted_state) {
         controller->noted_state = state;
         port_log(PORT_NOTE, names[state], (int32_t)state);

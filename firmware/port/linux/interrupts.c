@@ -6,7 +6,6 @@
 #include <poll.h>
 #include <pthread.h>
 #include <sched.h>
-#include <signal.h>
 #include <string.h>
 #include <sys/mman.h>
 
@@ -20,8 +19,8 @@ static struct {
     pthread_mutex_t lock; /* port_lock(); guards schedule too */
     pthread_t thread;
     bool started;
-    volatile sig_atomic_t ending;
-    volatile sig_atomic_t error;
+    bool ending; /* these two by atomic access: C99 has none, gcc and clang have builtins */
+    int error;
     struct can_socket *socket;
     struct port_handlers handlers;
     struct schedule schedule;
@@ -86,7 +85,7 @@ static void receive_waiting(void)
     int more = 0;
     const int count = can_socket_receive(self.socket, messages, &more);
     if (count < 0) {
-        self.error = count;
+        __atomic_store_n(&self.error, count, __ATOMIC_RELEASE);
     } else if (count > 0) {
         hand_over(messages, count);
     }
@@ -104,7 +103,7 @@ static uint64_t time_to_sleep_ns(void)
 static void *run(void *unused)
 {
     (void)unused;
-    while (!self.ending && self.error == 0) {
+    while (!__atomic_load_n(&self.ending, __ATOMIC_ACQUIRE) && interrupts_error() == 0) {
         struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
         const struct timespec timeout = clock_timespec(time_to_sleep_ns());
         const int ready = ppoll(&waited, 1, &timeout, NULL);
@@ -194,7 +193,7 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
 
 void interrupts_end(void)
 {
-    self.ending = 1;
+    __atomic_store_n(&self.ending, true, __ATOMIC_RELEASE);
     if (self.started) {
         (void)pthread_join(self.thread, NULL);
         self.started = false;
@@ -203,5 +202,5 @@ void interrupts_end(void)
 
 int interrupts_error(void)
 {
-    return (int)self.error;
+    return __atomic_load_n(&self.error, __ATOMIC_ACQUIRE);
 }
