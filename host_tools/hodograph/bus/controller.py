@@ -42,6 +42,10 @@ BOOT, OFF, ENABLING, READY, RUNNING, STOPPING, FAULT_STATE = 0, 1, 2, 3, 4, 5, 6
 REFUSED_MOVING = 3
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
+IDENTITY_OBJECT = 0x1018
+IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))
+"""Sub-index, name, low bits that may differ (the minor revision)."""
+
 POLL_S = 0.02
 NOWHERE = 0x5000
 LET_PASS_S = 1.0
@@ -54,6 +58,7 @@ class Controller:
         self.address = address
         self.node_id = node_id
         self._turns = Turns(address, node_id)
+        self._identified = False
         self._sdo: Any = node.sdo
         self._sdo.RESPONSE_TIMEOUT = 3.0
 
@@ -129,6 +134,7 @@ class Controller:
                 try:
                     with self._turn():
                         self._variable(STATE, None).raw  # noqa: B018
+                    self._check_identity()
                     return True
                 except SdoAbortedError as error:
                     raise BusError(
@@ -141,6 +147,20 @@ class Controller:
                     raise BusError(f"{self.address}: cannot send: {_one_line(error)}") from error
         finally:
             self._sdo.RESPONSE_TIMEOUT = patience
+
+    def _check_identity(self) -> None:
+        """Raises BusError when the node is not what the EDS file describes."""
+        if self._identified:
+            return
+        for sub, name, kept in IDENTITY:
+            wanted = int(self._sdo.od[IDENTITY_OBJECT][sub].default or 0) >> kept
+            found = self.read(IDENTITY_OBJECT, sub)
+            if found >> kept != wanted:
+                raise BusError(
+                    f"{self._who()} has {name} {found:#x}, the EDS file of these host tools {wanted << kept:#x}: "
+                    "controller and host tools are of different versions, rebuild both"
+                )
+        self._identified = True
 
     def require(self, wait_s: float) -> None:
         """Raises BusError unless the node answers within `wait_s`."""

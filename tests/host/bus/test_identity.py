@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""A node that is not what our EDS describes is refused before anything is sent to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import canopen
+import pytest
+
+from hodograph.bus.address import BusAddress
+from hodograph.bus.controller import Controller, connect
+from hodograph.data import CONTROLLER_EDS
+from hodograph.errors import BusError
+
+BUS = BusAddress("virtual", "identity")
+
+
+@pytest.fixture
+def node() -> Iterator[canopen.LocalNode]:
+    """Python canopen's own server, with our EDS, in the controller's place."""
+    network = canopen.Network()
+    network.connect(interface=BUS.interface, channel=BUS.channel)
+    local = network.create_node(1, str(CONTROLLER_EDS))
+    local.sdo[0x2002].raw = 1
+    yield local
+    network.disconnect()
+
+
+@pytest.fixture
+def controller(node: canopen.LocalNode) -> Iterator[Controller]:
+    with connect(BUS, 1, 1_000_000) as found:
+        yield found
+
+
+def test_ours(controller: Controller) -> None:
+    controller.require(5.0)
+    assert controller.state() == 1
+
+
+@pytest.mark.parametrize(
+    ("sub", "value", "name"), [(1, 5, "vendor"), (2, 2, "product"), (3, 0x20000, "revision")]
+)
+def test_others(
+    node: canopen.LocalNode, controller: Controller, sub: int, value: int, name: str
+) -> None:
+    node.sdo[0x1018][sub].raw = value
+    with pytest.raises(BusError, match=f"{name}.*different versions"):
+        controller.require(5.0)
+
+
+def test_minor_revision_may_differ(node: canopen.LocalNode, controller: Controller) -> None:
+    node.sdo[0x1018][3].raw = 0x10007
+    controller.require(5.0)
+
+
+def test_wrong_eds_file(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.eds"
+    file.write_text("this is no EDS")
+    with (
+        pytest.raises(BusError, match=r"wrong\.eds: not a usable EDS file"),
+        connect(BUS, 1, 1_000_000, file),
+    ):
+        pass
