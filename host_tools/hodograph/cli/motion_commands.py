@@ -13,7 +13,7 @@ from ..bus.goto import goto as goto_point
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
 from ..chain import Chain, load_chain
 from ..config import Machine, load_machine, read_toml
-from ..errors import InputError
+from ..errors import BusError, InputError
 from ..native import NativeProgram
 from ..simulate import write_trace
 from .bus_commands import DEFAULT_BITRATE, reached, stopping
@@ -99,6 +99,11 @@ def _machine_of(file: Path, given: Path | None) -> Machine:
 def run(options: Namespace) -> None:
     """hodograph run."""
     address = parse_address(options.bus)
+    if not address.is_socketcan:
+        raise BusError(
+            f"{address}: run records at full bus load, which takes SocketCAN: use socketcan:CHANNEL "
+            "(slcand makes one of a serial adapter)"
+        )
     if options.trace is not None and len(options.files) > 1:
         raise InputError("--trace: takes one FILE; run the others by themselves")
     chains = [load_chain(file, options.machine) for file in options.files]

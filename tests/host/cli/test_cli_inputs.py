@@ -190,3 +190,9 @@ def test_closed_pipe() -> None:
     os.close(writing)
     assert done.stderr == ""
     assert done.returncode == 1
+
+
+def test_run_needs_socketcan(capsys: pytest.CaptureFixture[str]) -> None:
+    status, line = failed(capsys, "run", ALPHA, "--bus", "virtual:x")
+    assert status == 4
+    assert "takes SocketCAN" in line
