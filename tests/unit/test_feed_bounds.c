@@ -38,8 +38,8 @@ static double derivative(const struct program_piece *c, int order, double t)
 static void check_piece(const struct program_piece *c, int order, const char *name)
 {
     double duration = ldexp((double)c->duration_q32_s, -32);
-    double low = INFINITY;
-    double high = -INFINITY;
+    double low = HUGE_VAL;
+    double high = -HUGE_VAL;
     for (int i = 0; i <= SAMPLES; i++) {
         double value = derivative(c, order, duration * i / SAMPLES);
         low = value < low ? value : low;
