@@ -56,7 +56,16 @@ class Core:
     def __init__(self, compiler: str, folder: Path) -> None:
         target = folder / "core.so"
         sources = sorted(str(p) for p in CORE.glob("*.c"))
-        command = [compiler, *FLAGS, "-fPIC", "-shared", f"-I{CORE.parent}", *sources, "-o", str(target)]
+        command = [
+            compiler,
+            *FLAGS,
+            "-fPIC",
+            "-shared",
+            f"-I{CORE.parent}",
+            *sources,
+            "-o",
+            str(target),
+        ]
         subprocess.run(command, check=True)
         self.lib = ctypes.CDLL(str(target))
         self.lib.timebase_time_q42.restype = ctypes.c_uint64
