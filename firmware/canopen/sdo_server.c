@@ -146,10 +146,14 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
     /* A whole byte: within a block, 0x81 ... 0xFF are last segments. */
     if (in->data[0] == SDO_ABORT_COMMAND_BYTE) {
         sdo_server_drop(server);
+        server->heard = 0;
         return 0;
     }
     if (server->state == SDO_SERVER_BLOCK_DOWNLOAD) {
         return sdo_server_block_download_segment(server, in->data, out);
+    }
+    if (server->state == SDO_SERVER_IDLE && sdo_server_block_download_straggler(server, in->data)) {
+        return 0;
     }
     if (is_initiate(in->data)) {
         return initiate(server, in->data, out);

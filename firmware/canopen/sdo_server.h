@@ -15,6 +15,9 @@
  * server gives that answer after half of the timeout; a client that only paused repeats a few
  * segments. Loss of a whole block ends in the timeout.
  *
+ * A client that sends a block does not listen: after an abort by the server the rest of the block
+ * still comes. Frames whose numbers go on from the last segment are therefore no requests.
+ *
  * Frames in, frames out. All functions: mainline (the hooks may take long); the receive interrupt
  * only queues.
  */
@@ -61,6 +64,7 @@ struct sdo_server {
     uint8_t block_limit; /* segments of the present block */
     uint8_t sequence;    /* last segment received in order, or sent */
     uint8_t held;        /* block download: bytes in `last` */
+    uint8_t heard;       /* newest segment of a block that goes on or was broken off; else 0 */
     bool use_crc;
     bool domain_open;        /* domain_begin succeeded, domain_end or domain_abort still due */
     bool acknowledged_early; /* the answer after half of the timeout is the last thing said */

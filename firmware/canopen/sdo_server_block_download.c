@@ -25,6 +25,7 @@ int sdo_server_block_download_initiate(struct sdo_server *s, const uint8_t *data
     s->use_crc = (data[0] & SDO_CRC_SUPPORTED) != 0;
     s->crc = 0;
     s->held = 0;
+    s->heard = 0;
     s->sequence = 0;
     s->block_limit = s->block_size;
     s->acknowledged_early = false;
@@ -60,7 +61,9 @@ int sdo_server_block_download_segment(struct sdo_server *s, const uint8_t *data,
     uint8_t sequence = data[0] & (uint8_t)~SDO_LAST_IN_BLOCK;
     bool last = (data[0] & SDO_LAST_IN_BLOCK) != 0;
     bool in_order = sequence == s->sequence + 1;
+    bool block_ends = last || sequence == s->block_limit;
 
+    s->heard = block_ends ? 0 : sequence;
     if (sequence == 0 || sequence > s->block_limit) {
         return sdo_server_fail(s, SDO_ABORT_SEQUENCE, out);
     }
@@ -74,7 +77,7 @@ int sdo_server_block_download_segment(struct sdo_server *s, const uint8_t *data,
         s->sequence = sequence;
         s->acknowledged_early = false;
     }
-    if (!last && sequence < s->block_limit) {
+    if (!block_ends) {
         return 0;
     }
     if (!in_order && s->acknowledged_early) {
@@ -84,6 +87,16 @@ int sdo_server_block_download_segment(struct sdo_server *s, const uint8_t *data,
         s->state = SDO_SERVER_BLOCK_DOWNLOAD_END;
     }
     return sdo_server_block_download_acknowledge(s, out);
+}
+
+bool sdo_server_block_download_straggler(struct sdo_server *s, const uint8_t *data)
+{
+    uint8_t sequence = data[0] & (uint8_t)~SDO_LAST_IN_BLOCK;
+    bool straggler = s->heard != 0 && sequence == s->heard + 1;
+    bool more = straggler && sequence == data[0];
+
+    s->heard = more ? sequence : 0;
+    return straggler;
 }
 
 int sdo_server_block_download_end(struct sdo_server *s, const uint8_t *data, struct can_msg *out)

@@ -46,6 +46,8 @@ int sdo_server_block_download_segment(struct sdo_server *s, const uint8_t *data,
                                       struct can_msg *out);
 int sdo_server_block_download_end(struct sdo_server *s, const uint8_t *data, struct can_msg *out);
 int sdo_server_block_download_acknowledge(struct sdo_server *s, struct can_msg *out);
+/* While idle: true for each segment that is left of a block whose transfer the server broke off. */
+bool sdo_server_block_download_straggler(struct sdo_server *s, const uint8_t *data);
 
 /* sdo_server_block_upload.c */
 int sdo_server_block_upload_initiate(struct sdo_server *s, const uint8_t *data,

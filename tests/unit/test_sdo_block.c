@@ -240,6 +240,41 @@ static void test_domain_refuses_in_the_middle(void)
     TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
 }
 
+/* A client that sends a block does not listen. What follows the abort looks like requests: 0x23
+ * with these bytes would write to 0x2003. */
+static void test_the_rest_of_a_block_after_an_abort_is_no_request(void)
+{
+    const uint8_t bytes[7] = {0x03, 0x20, 0x00, 1, 2, 3, 4};
+
+    sdo_server_init(&talk.server, &talk.small.od, TALK_NODE, TALK_TIMEOUT_US, 127);
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0xC6, 0x2005, 0, IMAGE_MAX));
+    sdo_talk_segment(&talk, 1, bytes, 7);
+    talk.small.write_refusal = SDO_ABORT_TRANSFER;
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 2, bytes, 7));
+    expect_abort(SDO_ABORT_TRANSFER);
+    for (uint8_t sequence = 3; sequence <= 126; sequence++) {
+        TEST_ASSERT_FALSE(sdo_talk_segment(&talk, sequence, bytes, 7));
+    }
+    TEST_ASSERT_FALSE(sdo_talk_segment(&talk, 0xFF, bytes, 7));
+    TEST_ASSERT_EQUAL_HEX32(0, talk.small.values.word);
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 0x23, bytes, 7));
+    TEST_ASSERT_EQUAL_HEX32(0x04030201, talk.small.values.word);
+}
+
+static void test_a_request_after_an_abort_is_heard(void)
+{
+    initiate(100);
+    sdo_talk_segment(&talk, 1, image, 7);
+    talk.small.write_refusal = SDO_ABORT_TRANSFER;
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 2, image + 7, 7));
+    TEST_ASSERT_FALSE(sdo_talk_segment(&talk, 3, image + 14, 7));
+    talk.small.write_refusal = SDO_OK;
+    initiate(100);
+    sdo_talk_segment(&talk, 1, image, 7);
+    TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2005, 0, SDO_ABORT_GENERAL));
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 2, image, 7)); /* the client itself broke off */
+}
+
 static void test_abort_by_the_client_inside_a_block(void)
 {
     initiate(100);
@@ -422,6 +457,8 @@ int main(void)
     RUN_TEST(test_size_that_was_not_announced);
     RUN_TEST(test_sequence_numbers_out_of_range);
     RUN_TEST(test_domain_refuses_in_the_middle);
+    RUN_TEST(test_the_rest_of_a_block_after_an_abort_is_no_request);
+    RUN_TEST(test_a_request_after_an_abort_is_heard);
     RUN_TEST(test_abort_by_the_client_inside_a_block);
     RUN_TEST(test_a_pause_inside_a_block_is_no_loss);
     RUN_TEST(test_no_early_answer_before_the_first_segment);
