@@ -38,31 +38,42 @@ def checked_points(
     """`points` as a finite complex array without immediate repeats, and notes on what was dropped.
 
     `what` names the points in messages, e.g. "control point"; `points` may be complex (n,) or real
-    (n, 2). A repeated tail of a closed path (`tail_length` points) is dropped with a note.
+    (n, 2). A repeated tail of a closed path (three control points, one through point) is dropped
+    with a note.
 
-    Raises InputError: not a list of points, NaN or infinity, a repeated point, too few points.
+    Raises InputError: not a list of points, NaN or infinity, a repeated point, half a repeated
+    tail, too few points.
     """
-    p = _as_complex(points, what)
+    p = _ordinary(_as_complex(points, what), what)
+    near = max(_NEAREST_MM, _REPEATED * float(np.abs(p).max(initial=0.0)))
+    notes: tuple[str, ...] = ()
+    tail = 1 if what.startswith("through") else 3
+    if closed and p.size > tail + 2 and _repeated(p, tail, near):
+        dropped = f"the last {tail} {what}s repeat" if tail > 1 else f"the last {what} repeats"
+        p, notes = p[:-tail], (f"{dropped} the first: dropped, the path is closed",)
+    if p.size < minimum:
+        kind = "a closed" if closed else "an open"
+        raise InputError(f"{p.size} {what}s: {kind} path needs at least {minimum}")
+    same = np.flatnonzero(np.abs(p[1:] - p[:-1]) <= near)
+    if same.size:
+        k = int(same[0])
+        raise InputError(f"{what} {k + 1} repeats {what} {k} at ({_xy(p[k])}): remove one of them")
+    if closed and _repeated(p, 1, near):
+        raise InputError(f"the last {what} repeats the first at ({_xy(p[0])}): remove it")
+    if closed and tail == 3 and p.size > 4 and _repeated(p, 2, near):
+        raise InputError(f"the last two {what}s repeat the first two: remove them")
+    return p, notes
+
+
+def _ordinary(p: Complex, what: str) -> Complex:
+    """`p`; raises InputError where a number is not finite or absurdly large."""
     bad = np.flatnonzero(~np.isfinite(p))
     if bad.size:
         raise InputError(f"{what} {bad[0]} is not finite: give two ordinary numbers")
     far = np.flatnonzero(np.abs(p) > _FARTHEST_MM)
     if far.size:
         raise InputError(f"{what} {far[0]} is beyond {_FARTHEST_MM:g} mm: are the units mm?")
-    notes: tuple[str, ...] = ()
-    if closed:
-        p, notes = _without_tail(p, what)
-    if p.size < minimum:
-        kind = "closed" if closed else "open"
-        raise InputError(f"{p.size} {what}s: a {kind} path needs at least {minimum}")
-    near = max(_NEAREST_MM, _REPEATED * float(np.abs(p).max()))
-    same = np.flatnonzero(np.abs(p[1:] - p[:-1]) <= near)
-    if same.size:
-        k = int(same[0])
-        raise InputError(f"{what} {k + 1} repeats {what} {k} at ({_xy(p[k])}): remove one of them")
-    if closed and abs(p[0] - p[-1]) <= near:
-        raise InputError(f"the last {what} repeats the first at ({_xy(p[0])}): remove it")
-    return p, notes
+    return p
 
 
 def _as_complex(points: object, what: str) -> Complex:
@@ -85,12 +96,9 @@ def _xy(point: complex) -> str:
     return f"{point.real:g}, {point.imag:g}"
 
 
-def _without_tail(p: Complex, what: str) -> tuple[Complex, tuple[str, ...]]:
-    length = 1 if what.startswith("through") else 3
-    if p.size > length + 2 and np.array_equal(p[-length:], p[:length]):
-        dropped = f"the last {length} {what}s repeat" if length > 1 else f"the last {what} repeats"
-        return p[:-length], (f"{dropped} the first: dropped, the path is closed",)
-    return p, ()
+def _repeated(p: Complex, tail: int, near: float) -> bool:
+    """Whether the last `tail` points are the first ones."""
+    return bool(np.all(np.abs(p[-tail:] - p[:tail]) <= near))
 
 
 def control_polygon_guide(p: Complex, closed: bool) -> Guide:

@@ -70,11 +70,12 @@ def test_a_hundred_thousand_points():
 @pytest.mark.parametrize(
     ("points", "closed", "words"),
     [
-        ([[0, 0], [1, 0], [2, 1]], False, ["3 control points", "at least 4"]),
+        ([[0, 0], [1, 0], [2, 1]], False, ["3 control points", "an open", "at least 4"]),
         ([[0, 0], [1, 0]], True, ["2 control points", "at least 3"]),
         ([[0, 0], [1, 0], [1, 0], [2, 1], [5, 5]], False, ["control point 2", "repeats", "1"]),
         ([[0, 0], [1e-13, 0], [2, 1], [5, 5]], False, ["control point 1", "repeats", "0"]),
         ([[0, 0], [1, 0], [2, 1], [0, 0]], True, ["last control point", "first"]),
+        ([[0, 0], [1, 0], [2, 1], [0, 0], [1, 0]], True, ["last two control points", "first two"]),
         ([[0, 0], [1, 0], [float("nan"), 1], [3, 3]], False, ["control point 2", "finite"]),
         ([[0, 0], [1, 0], [1, float("inf")], [3, 3]], True, ["control point 2", "finite"]),
         ([[0, 0], [1, 0, 3], [1, 1], [3, 3]], False, ["[x, y]"]),
@@ -106,6 +107,9 @@ def test_a_repeated_tail_is_dropped_with_a_note(count, seed):
     again, notes = checked_points(np.append(p, p[0]), True, 3, "through point")
     np.testing.assert_array_equal(again, p)
     assert len(notes) == 1
+    rounded = np.concatenate((p, p[:3] + 1e-14))
+    again, notes = checked_points(rounded, True, 3, "control point")
+    assert (again.size, len(notes)) == (count, 1)
     untouched, notes = checked_points(p, True, 3, "control point")
     assert (untouched.size, notes) == (count, ())
 
