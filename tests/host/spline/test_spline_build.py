@@ -188,6 +188,12 @@ def test_end_tangents_are_obeyed_in_direction_whatever_their_length():
     assert abs(one.curvature_at(3, 1.0)) < 1e-14
 
 
+def test_a_tangent_is_obeyed_where_the_free_end_would_stand_still():
+    spline = through_points([0, 1, 4], False, start_tangent=1j).spline  # free: r'(0) = 0
+    np.testing.assert_allclose(spline.tangent(0.0), 1j, atol=1e-12)
+    assert spline.max_curvature_per_mm() < 100
+
+
 def test_closed_paths_go_through_their_points():
     p = 50 * np.exp(2j * np.pi * np.arange(7) / 7)
     spline = through_points(p, True).spline
