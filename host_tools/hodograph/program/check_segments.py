@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Bool = NDArray[np.bool_]
 Rule = tuple[Bool, int, ProgramError]
 Int = NDArray[np.int64]
+Real = NDArray[np.float64]
 Big = NDArray[np.object_]
 
 W_LIMIT_Q44 = 64 << 44
@@ -119,14 +120,20 @@ def _turned(u: Int, v: Int) -> Bool:
     return np.asarray(np.abs(np.angle((np.conj(end) * start) ** 2)) > DIRECTION_RAD)
 
 
-def _leaves(program: Program, limits: ProgramLimits) -> Bool:
-    """The box of the six Bezier points is not within the travel."""
+def boxes_q40(program: Program) -> tuple[Real, Real]:
+    """Lowest and highest corner (N, 2) of the boxes of the segments' six Bezier points."""
     w = np.asarray((program.u_q44 + 1j * program.v_q44) * 2.0**-44, dtype=np.complex128)
     steps = np.rint(square(w).view(np.float64).reshape(-1, 5, 2) * (2.0**40 / 5.0))
     start = np.stack((program.x_q40, program.y_q40), axis=1).astype(np.float64)
     points = np.concatenate(
         (start[:, None, :], start[:, None, :] + np.cumsum(steps, axis=1)), axis=1
     )
+    return points.min(axis=1), points.max(axis=1)
+
+
+def _leaves(program: Program, limits: ProgramLimits) -> Bool:
+    """The box is not within the travel."""
+    lowest, highest = boxes_q40(program)
     low = np.array(limits.min_q40_mm, dtype=np.float64) - TRAVEL_SLACK_Q40
     high = np.array(limits.max_q40_mm, dtype=np.float64) + TRAVEL_SLACK_Q40
-    return np.asarray(((points.min(axis=1) < low) | (points.max(axis=1) > high)).any(axis=1))
+    return np.asarray(((lowest < low) | (highest > high)).any(axis=1))

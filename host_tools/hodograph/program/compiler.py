@@ -14,15 +14,20 @@ from ..feed import FeedPlan
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
 from .check import Fault, ProgramLimits, check
+from .check_segments import boxes_q40
+from .codes import ProgramError
 from .exactmath import cumulative, segment_ways, way_to_q40
 from .image import NAME_SIZE, Program
-from .neighbours import brief_pairs
+from .neighbours import LEAST_FEED_MM_S, brief_pairs
 
 Int = NDArray[np.int64]
 
 LONGEST_SEGMENT_MM = 31.875
 _ANCHOR_Q40 = 16
 """Points may be moved to those of the ideal curve by this much per joint, 2^-36 mm."""
+
+_FEED_MARGIN_MM_S = 2.0**-22
+"""The controller compares feeds in 2^-24 mm/s."""
 
 _U32_MAX = 2**32 - 1
 _MOST_ROUNDS = 12
@@ -114,7 +119,7 @@ def compile_path(
     )
     fault = check(program, limits)
     if fault is not None:
-        raise PlanError(_advice(fault, program, limits))
+        raise PlanError(_advice(fault, program, limits, spline))
     return Compilation(program, plan, plan.notes, geometry.drift_mm)
 
 
@@ -156,33 +161,45 @@ def _fit_feed(plan: FeedPlan, joints_q40: Int, spline: PHSpline) -> tuple[FeedPl
         if not pairs.size:
             return plan, pieces
         worst = int(allowed_mm_s.argmin())
-        feed = float(allowed_mm_s[worst]) * (1.0 - 1e-6)
-        place_mm = float(joints_q40[pairs[worst]]) * 2.0**-40
-        span = int(np.searchsorted(spline.segment_starts_mm, place_mm + 1e-9, side="right"))
+        feed = float(allowed_mm_s[worst]) * (1.0 - 1e-6) - _FEED_MARGIN_MM_S
+        span, place_mm = _span(spline, joints_q40, int(pairs[worst]))
         where = (
             f"the path has {way_mm[worst]:.4g} mm in two neighbouring segments at arc length "
             f"{place_mm:.6g} mm (span {span}), less than one tick at 200 %"
         )
-        if plan.limits.policy == "report" or feed <= 0.0:
+        if feed < LEAST_FEED_MM_S:
+            raise PlanError(f"{where} at any feed: take points that lie further apart there")
+        if plan.limits.policy == "report":
+            # Rounded down for the user, so that it really does.
             raise PlanError(
-                f'{where}: {feed:.4g} mm/s would do; lower nominal_mm_s or set policy "respect"'
+                f"{where}: {feed * (1.0 - 5e-4):.4g} mm/s would do; "
+                'lower nominal_mm_s or set policy "respect"'
             )
         plan = plan.with_feed_cap(feed, where)
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
 
 
+def _span(spline: PHSpline, joints_q40: Int, segment: int) -> tuple[int, float]:
+    """The span of the path that a segment belongs to, and the arc length in mm where the segment starts."""
+    place_mm = float(joints_q40[segment]) * 2.0**-40
+    return int(np.searchsorted(spline.segment_starts_mm, place_mm + 1e-9, side="right")), place_mm
+
+
 def _limit(value: float | None, scale: float) -> int:
-    return 0 if value is None else max(1, min(ceil(value * scale), _U32_MAX))
+    """Rounded up, but not for the rounding of the product."""
+    return 0 if value is None else max(1, min(ceil(value * scale * (1.0 - 1e-12)), _U32_MAX))
 
 
-def _advice(fault: Fault, program: Program, limits: ProgramLimits | None) -> str:
+def _advice(fault: Fault, program: Program, limits: ProgramLimits | None, spline: PHSpline) -> str:
     text = f"program: {fault.code.text} ({fault.code.name}, {fault.place})"
-    if fault.code.name == "TRAVEL" and limits is not None:
-        low = [v * 2.0**-40 for v in limits.min_q40_mm]
-        high = [v * 2.0**-40 for v in limits.max_q40_mm]
-        point = (program.x_q40[fault.index] * 2.0**-40, program.y_q40[fault.index] * 2.0**-40)
-        text += (
-            f": its start ({point[0]:.6g}, {point[1]:.6g}) mm, travel x {low[0]:g} … {high[0]:g}, "
-            f"y {low[1]:g} … {high[1]:g}; change [work] offset_mm or the path"
+    if fault.code is not ProgramError.TRAVEL or limits is None:
+        return text
+    span, _ = _span(spline, program.start_q40, fault.index)
+    lowest, highest = (corner[fault.index] * 2.0**-40 for corner in boxes_q40(program))
+    axes = ", ".join(
+        f"{axis} {low:.6g} … {high:.6g} mm (travel {travel_low * 2.0**-40:g} … {travel_high * 2.0**-40:g})"
+        for axis, low, high, travel_low, travel_high in zip(
+            "xy", lowest, highest, limits.min_q40_mm, limits.max_q40_mm, strict=True
         )
-    return text
+    )
+    return f"{text}: in span {span} its box is {axes}; change [work] offset_mm or the path"

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hodograph.errors import PlanError
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.native.program import NativeLimits, NativeProgram
 from hodograph.program import ProgramLimits, compile_path, decode, encode
@@ -95,6 +96,30 @@ def test_whatever_is_compiled_is_accepted(profile, feed, ramp, degree, period_us
     assert np.array_equal(
         NativeProgram(encode(program)).tick_times_q42_s(), program.tick_times_q42_s()
     )
+
+
+@pytest.mark.parametrize("period_us", [1000, 8000])
+@pytest.mark.parametrize("spacing_mm", [0.002, 0.0007, 0.00037])
+def test_feeds_lowered_for_the_shortest_segments_are_accepted(spacing_mm, period_us) -> None:
+    """Where the controller's resolution of 2^-24 mm and mm/s is a visible part of way and feed."""
+    turn = 0.3 * np.sin(np.arange(24) / 3.0)
+    spline = from_control_polygon(np.cumsum(spacing_mm * np.exp(1j * turn)), False).spline
+    plan = plan_feed(spline.length_mm, FeedRequest("quintic", 100.0, 0.002), period_us=period_us)
+    result = compile_path(spline, plan)
+    assert any("two neighbouring segments" in note for note in result.notes)
+    limits = NativeLimits(period_us=period_us)
+    assert NativeProgram(encode(result.program)).check(limits) is None
+
+
+def test_segments_too_short_for_any_feed_are_refused_by_both() -> None:
+    turn = 0.3 * np.sin(np.arange(200) / 3.0)
+    spline = from_control_polygon(np.cumsum(6e-6 * np.exp(1j * turn)), False).spline
+    plan = plan_feed(spline.length_mm, FeedRequest("quintic", 1e-3, 0.1), period_us=8000)
+    with pytest.raises(PlanError, match="at any feed: take points that lie further apart"):
+        compile_path(spline, plan)
+    short = (PROGRAMS / "broken_segment_short.hdgp").read_bytes()
+    python, native = verdicts(short)
+    assert python == native == (-32, python[1])
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in PROGRAMS.glob("broken_*.hdgp")))
