@@ -91,7 +91,7 @@ def _feed_caps(limits: Limits, controller: ControllerLimits | None, period_us: i
     if controller is not None:
         caps.append(
             Cap(
-                controller.feed_mm_s * (1.0 - controller.reserve),
+                controller.feed_mm_s * (1.0 - controller.kept_free),
                 f"controller feed_mm_s = {controller.feed_mm_s:g} less its reserve",
             )
         )
@@ -107,7 +107,7 @@ def _bounds(limits: Limits, controller: ControllerLimits | None) -> list[Bound]:
             out.append(Bound(order, own, f"limits {name} = {own:g}"))
         if controller is not None:
             limit = getattr(controller, name)
-            kept = limit * (1.0 - controller.reserve)
+            kept = limit * (1.0 - controller.kept_free)
             out.append(Bound(order, kept, f"controller {name} = {limit:g} less its reserve"))
     return out
 

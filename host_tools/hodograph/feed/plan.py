@@ -174,7 +174,8 @@ def plan_feed(
     check_period(period_us)
     if not (isfinite(length_mm) and SHORTEST_MM <= length_mm <= LONGEST_MM):
         raise InputError(
-            f"path: length {length_mm:g} mm is not in {SHORTEST_MM:.3g} … {LONGEST_MM:.7g} mm"
+            f"path: its length {length_mm:g} mm must be from {SHORTEST_MM:.3g} to {LONGEST_MM:.7g} mm: "
+            "scale its points (they are in mm)"
         )
     return _plan(Fraction(length_mm), request, limits or Limits(), controller, period_us, ())
 
@@ -250,7 +251,7 @@ def _excesses(ramp: Ramp, limits: Limits) -> tuple[Excess, ...]:
 
 
 def _piece_excess(plan: FeedPlan) -> float:
-    """Greatest bound of a piece over the controller's limit less half its reserve (a hair at least).
+    """Greatest bound of a piece over the controller's limit less half of what a plan keeps free.
 
     Where the pieces are only near the profile, policy "respect" holds for them too; and where a bound on the
     override would round to zero, the feed has to fall.
@@ -258,7 +259,7 @@ def _piece_excess(plan: FeedPlan) -> float:
     pieces = plan.pieces
     peaks = [float(p.max()) for p in derivative_peaks(pieces.duration_q32_s, pieces.c_q40)]
     own = plan.controller
-    keep = 1.0 - max(0.5 * own.reserve, 1e-3)
+    keep = 1.0 - 0.5 * own.kept_free
     bounds = [own.feed_mm_s * keep, own.acceleration_mm_s2 * keep, own.jerk_mm_s3 * keep]
     if plan.limits.policy == "respect" and not plan.raw.faithful:
         asked = plan.limits.acceleration_mm_s2, plan.limits.jerk_mm_s3

@@ -16,6 +16,7 @@ LEAST_FEED_MM_S, GREATEST_FEED_MM_S = 1e-3, 4000.0
 LEAST_RAMP_S, GREATEST_RAMP_S = 2e-3, 1000.0
 LEAST_DEGREE, GREATEST_DEGREE = 3, 12
 GREATEST_N_C = 50.0
+LEAST_RESERVE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,8 @@ class Limits:
 class ControllerLimits:
     """Limits of the controller (machine file): they always bind.
 
-    A plan keeps `reserve` (a fraction) of each free for hold and override; docs/numerics.md section 7.
-    Raises InputError.
+    A plan keeps `reserve` (a fraction) of each free for hold and override, and at least LEAST_RESERVE, which
+    the pieces need; docs/numerics.md 5.5 and section 7. Raises InputError.
     """
 
     feed_mm_s: float
@@ -91,6 +92,11 @@ class ControllerLimits:
             _above_zero(f"controller: {name}", getattr(self, name))
         if not 0.0 <= self.reserve <= 0.9:
             raise InputError(f"controller: reserve {self.reserve:g} is not in 0 … 0.9")
+
+    @property
+    def kept_free(self) -> float:
+        """The fraction of each limit that a plan really keeps free."""
+        return max(self.reserve, LEAST_RESERVE)
 
 
 def check_period(period_us: int) -> None:

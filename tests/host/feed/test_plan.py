@@ -98,6 +98,14 @@ def test_controller_limits_bind_under_every_policy_with_their_reserve() -> None:
         assert "controller acceleration_mm_s2 = 1000 less its reserve" in plan.notes[0]
 
 
+def test_without_a_reserve_the_note_still_names_the_limit() -> None:
+    controller = ControllerLimits(400.0, 1000.0, 1e6, 0.0)
+    plan = plan_feed(100.0, PAPER, None, controller)
+    assert plan.peak_acceleration_mm_s2 == pytest.approx(998.0, rel=1e-5)
+    assert len(plan.notes) == 1
+    assert "controller acceleration_mm_s2 = 1000 less its reserve" in plan.notes[0]
+
+
 def test_slow_feeds_fall_back_to_the_plain_ramp_and_say_so() -> None:
     plan = plan_feed(10.0, FeedRequest("exponential", 0.05, 0.1))
     assert plan.n_c == 0.0
