@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from .config import Machine, PathFile, load_machine, load_path_file
-from .errors import InputError
+from .errors import InputError, PlanError
 from .feed import ControllerLimits, FeedPlan, plan_feed
 from .program import Compilation, Program, ProgramLimits, compile_path, encode
 from .spline import SplineResult, from_control_polygon
@@ -70,7 +72,7 @@ class Chain:
     def spline_result(self) -> SplineResult:
         """The spline and how it was found."""
         path = self.file.path
-        try:
+        with _told_by(f"{self.file.file}: [path]"):
             if not path.through:
                 return from_control_polygon(path.points, path.closed)
             from .spline import through_points
@@ -82,33 +84,35 @@ class Chain:
                 start_tangent=path.start_tangent,
                 end_tangent=path.end_tangent,
             )
-        except InputError as error:
-            raise InputError(f"{self.file.file}: [path] {error}") from error
 
     @cached_property
     def plan(self) -> FeedPlan:
         """The feed over the spline."""
         machine = self.machine_or_none
-        return plan_feed(
-            self.spline_result.spline.length_mm,
-            self.file.feed,
-            self.file.limits,
-            controller_limits(machine) if machine is not None else None,
-            period_us=machine.period_us if machine is not None else 1000,
-        )
+        length_mm = self.spline_result.spline.length_mm
+        with _told_by(f"{self.file.file}:"):
+            return plan_feed(
+                length_mm,
+                self.file.feed,
+                self.file.limits,
+                controller_limits(machine) if machine is not None else None,
+                period_us=machine.period_us if machine is not None else 1000,
+            )
 
     @cached_property
     def compilation(self) -> Compilation:
         """The program for the machine, and the plan that it really holds."""
         machine = self.machine
-        return compile_path(
-            self.spline_result.spline,
-            self.plan,
-            period_us=machine.period_us,
-            offset_mm=machine.offset_mm,
-            limits=program_limits(machine),
-            name=self.file.name,
-        )
+        spline, plan = self.spline_result.spline, self.plan
+        with _told_by(f"{self.file.file}:"):
+            return compile_path(
+                spline,
+                plan,
+                period_us=machine.period_us,
+                offset_mm=machine.offset_mm,
+                limits=program_limits(machine),
+                name=self.file.name,
+            )
 
     @property
     def program(self) -> Program:
@@ -124,6 +128,15 @@ class Chain:
         """What the user should know about the spline and about a plan for it, one line each."""
         excesses = tuple(f"feed: {excess}" for excess in plan.excesses)
         return (*self.spline_result.notes, *plan.notes, *excesses)
+
+
+@contextmanager
+def _told_by(place: str) -> Iterator[None]:
+    """Errors of the mathematics say first which file, or part of it, they are about."""
+    try:
+        yield
+    except (InputError, PlanError) as error:
+        raise type(error)(f"{place} {error}") from error
 
 
 def load_chain(file: Path, machine: Path | None = None) -> Chain:
