@@ -18,9 +18,10 @@ void drive_watch_begin(struct drive_watch *watch, const struct config *config)
 static void gone(struct machine *machine, uint16_t code, uint8_t node)
 {
     port_lock();
-    if (machine->state == MACHINE_OFF) {
+    const bool boots = machine->state == MACHINE_BOOT;
+    if (machine->state == MACHINE_OFF || (boots && machine->configured)) {
         machine_enter_boot(machine);
-    } else if (machine->state != MACHINE_BOOT) {
+    } else if (!boots) {
         machine_raise(machine, code, node, 0);
     }
     port_unlock();

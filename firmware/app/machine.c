@@ -16,6 +16,7 @@ void machine_enter_boot(struct machine *machine)
         axis_init(&machine->axes[i], machine->config.node[i]);
     }
     machine->state = MACHINE_BOOT;
+    machine->configured = false;
     machine->boot_due = true;
 }
 
@@ -50,7 +51,7 @@ void machine_drives_configured(struct machine *machine, bool simulated)
 {
     if (machine->state == MACHINE_BOOT) {
         machine->simulated = simulated;
-        machine->state = MACHINE_OFF;
+        machine->configured = true;
     }
 }
 
@@ -66,7 +67,7 @@ static enum machine_refusal not_available(const struct machine *machine)
     return machine->state == MACHINE_BOOT ? MACHINE_DRIVES_MISSING : MACHINE_ACCEPTED;
 }
 
-static bool all_present(const struct machine *machine)
+bool machine_drives_answer(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         if (!machine->axes[i].present) {
@@ -81,9 +82,6 @@ enum machine_refusal machine_enable(struct machine *machine)
     const enum machine_refusal refusal = not_available(machine);
     if (refusal != MACHINE_ACCEPTED || machine->state != MACHINE_OFF) {
         return refusal;
-    }
-    if (!all_present(machine)) {
-        return MACHINE_DRIVES_MISSING;
     }
     set_goals(machine, CIA402_GOAL_ENABLED);
     machine->ticks_left = MACHINE_ENABLE_TICKS;
@@ -240,7 +238,7 @@ bool machine_receive(struct machine *machine, const struct can_msg *in, uint32_t
     struct pdo_actual actual;
     const int node = pdo_decode_actual(in, &actual);
     struct axis *axis = node > 0 ? machine_axis(machine, (uint8_t)node) : NULL;
-    if (axis == NULL || machine->state == MACHINE_BOOT) {
+    if (axis == NULL || (machine->state == MACHINE_BOOT && !machine->configured)) {
         return false;
     }
     axis_receive(axis, &actual, now_us);

@@ -64,8 +64,9 @@ struct machine {
     enum machine_state state;
     enum machine_fault_phase fault_phase; /* in FAULT */
     uint32_t ticks_left;                  /* settling, enabling, resetting */
-    bool simulated; /* every drive is a simulated one: the port may let ticks wait for them */
-    bool boot_due;  /* the mainline shall find and configure the drives (anew) */
+    bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
+    bool configured; /* drives are configured; BOOT then waits for their first answers */
+    bool boot_due;   /* the mainline shall find and configure the drives (anew) */
 };
 
 void machine_init(struct machine *machine, const struct config *config);
@@ -93,7 +94,8 @@ bool machine_moving(const struct machine *machine);
 void machine_configure(struct machine *machine, const struct config *config, bool drives);
 /* Forgets the drives; the mainline has to find and configure them. Under the lock. */
 void machine_enter_boot(struct machine *machine);
-/* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF. */
+/* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF as soon as
+ * each has answered a SYNC. */
 void machine_drives_configured(struct machine *machine, bool simulated);
 
 /* Something is wrong: FAULT, stopping on the path first when a program runs. Only the first fault
@@ -110,6 +112,8 @@ void machine_switch_off(struct machine *machine);
 void machine_supervise(struct machine *machine, uint32_t now_us);
 /* Moves on by one tick: states, goals and targets of the axes. */
 void machine_step(struct machine *machine);
+/* Whether every drive has answered a SYNC since BOOT began. */
+bool machine_drives_answer(const struct machine *machine);
 /* Whether setpoints are to be sent in this state. */
 bool machine_drives_operational(const struct machine *machine);
 /* Whether the next tick should wait for the drives' answers: they are simulated and not all lost. */

@@ -133,6 +133,10 @@ void machine_step(struct machine *machine)
         step_fault(machine);
         break;
     case MACHINE_BOOT:
+        if (machine->configured && machine_drives_answer(machine)) {
+            machine->state = MACHINE_OFF;
+        }
+        break;
     case MACHINE_OFF:
     case MACHINE_READY:
     default:

@@ -36,7 +36,6 @@ static struct machine *machine(void)
 static void switch_on(void)
 {
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
-    app_bench_periods(&bench, 3);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_ENABLE));
     (void)app_bench_until(&bench, MACHINE_READY, 100);
 }
@@ -69,6 +68,19 @@ static void test_boot_configures_each_drive_then_starts_it(void)
         TEST_ASSERT_EQUAL_UINT16(DRIVE_HEARTBEAT_MS, drive->values.producer_heartbeat_time);
         TEST_ASSERT_EQUAL_UINT32(1000, drive->values.communication_cycle_period);
     }
+}
+
+/* Off means that `enable` would be accepted: so not before each drive has answered a SYNC. */
+static void test_configured_drives_that_do_not_answer_are_missing(void)
+{
+    bench.drives[1].mute = true;
+    app_bench_periods(&bench, 1000);
+    TEST_ASSERT_EQUAL_UINT32(2, bench.starts);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, machine()->state);
+    expect_refusal(COMMAND_ENABLE, MACHINE_DRIVES_MISSING);
+    bench.drives[1].mute = false;
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
 }
 
 static void test_travel_limits_reach_the_drives(void)
@@ -486,6 +498,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_boot_configures_each_drive_then_starts_it);
+    RUN_TEST(test_configured_drives_that_do_not_answer_are_missing);
     RUN_TEST(test_travel_limits_reach_the_drives);
     RUN_TEST(test_a_missing_drive_is_named_and_found_later);
     RUN_TEST(test_a_device_that_is_no_drive_is_refused);
