@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+# bench: bus
+"""Runs on the bus: seconds of motion for a second of wall time, deadline misses, hashes beside those of simulate.
+
+    tools/with-vcan .venv/bin/python benchmarks/bus.py --json OUT
+
+At full pace the next tick comes as soon as both drives have answered, so the ratio says how much faster than real time
+this machine's bus, controller, drives and recorder are together. The goal is 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from hodograph.bus.address import parse_address
+from hodograph.bus.run import run_program, station
+from hodograph.chain import load_chain
+from hodograph.simulate import simulate
+
+ROOT = Path(__file__).resolve().parent.parent
+RUNS = [(name, pace) for pace in ("fast", "real-time") for name in ("alpha", "heart")]
+
+
+def measure(name: str, pace: str) -> dict[str, Any]:
+    """One run of an example."""
+    chain = load_chain(ROOT / "examples" / f"{name}.toml")
+    address = parse_address("socketcan:vcan0")
+    with station(chain.machine, address, pace, 5.0, print) as at:
+        run = run_program(at, chain.machine, chain.image, chain.machine.kernel)
+    drives = [axis.drive for axis in chain.machine.axes[:2]]
+    expected = simulate(chain.image, drives, kernel=chain.machine.kernel).summary()
+    got = run.summary()
+    return {
+        "ticks": run.motion.ticks,
+        "frames": run.frames,
+        "wall_s": run.wall_s,
+        "times_real_time": run.motion.ticks * run.motion.period_us / 1e6 / run.wall_s,
+        "deadline_misses": run.deadline_misses,
+        "setpoints_as_simulated": got["setpoints_sha256"] == expected["setpoints_sha256"],
+        "encoders_as_simulated": got["encoders_sha256"] == expected["encoders_sha256"],
+    }
+
+
+def main() -> None:
+    """Measure and write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path, required=True)
+    out: Path = parser.parse_args().json
+    figures: dict[str, Any] = {}
+    for name, pace in RUNS:
+        figures.setdefault(pace, {})[name] = measure(name, pace)
+    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
