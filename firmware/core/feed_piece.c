@@ -32,5 +32,5 @@ void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_poi
     }
     arc = qmath_mul_unsigned(arc, tau) + (qmath_mul_unsigned(slope, (uint32_t)tau_q64) >> 32);
     out->arc_length_q40_mm = f->start_q40_mm + qmath_round(arc, 4);
-    out->feed_q32_mm_s = qmath_shift(slope, -12 - f->exponent);
+    out->feed_q32_mm_s = qmath_shift_clamp(slope, -12 - f->exponent);
 }

@@ -18,7 +18,7 @@ struct feed_piece {
 
 struct feed_point {
     int64_t arc_length_q40_mm; /* from the start of the program */
-    int64_t feed_q32_mm_s;
+    int64_t feed_q32_mm_s;     /* held within 2^62, which only absurd programs reach */
 };
 
 void feed_piece_set(struct feed_piece *f, const struct program_piece *piece);

@@ -6,6 +6,9 @@
 #define Q50   1125899906842624.0
 #define STEPS 3
 
+/* A feed without limit (docs/protocol.md 1.1: 0) can be beyond what 64 bits hold. */
+#define MOST 4611686018427387904.0 /* 2^62 */
+
 static double power_of_two(int n)
 {
     double p = 1.0;
@@ -18,10 +21,11 @@ static double power_of_two(int n)
     return p;
 }
 
-/* To nearest, halves away from zero: without libm, the same everywhere. */
+/* To nearest, halves away from zero, held within 2^62: without libm, the same everywhere. */
 static int64_t round_scaled(double a, double scale)
 {
     double b = a * scale;
+    b = b > MOST ? MOST : b < -MOST ? -MOST : b;
     return (int64_t)(b < 0.0 ? b - 0.5 : b + 0.5);
 }
 

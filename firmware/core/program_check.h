@@ -25,7 +25,7 @@ enum program_error {
     PROGRAM_ERR_PERIOD_USED = -11, /* period is not the one configured in the controller */
     PROGRAM_ERR_FLAGS = -12,       /* unknown flag, or a reserved field of the header is not 0 */
     PROGRAM_ERR_AXES = -13,        /* axis count is not 2 */
-    PROGRAM_ERR_DURATION = -14,    /* not the sum of the pieces, or above 2^22 s */
+    PROGRAM_ERR_DURATION = -14,    /* not the sum of the pieces, or not below 2^22 s */
     PROGRAM_ERR_LENGTH = -15,      /* length not in (0, 2^22) mm */
     PROGRAM_ERR_NAME = -16,        /* name not padded with zeros */
     /* segments: index = the segment (of a joint: the later one) */
@@ -45,7 +45,7 @@ enum program_error {
     PROGRAM_ERR_SEGMENT_SHORT = -32, /* a tick at 200 % could cross more than two segment ends */
     PROGRAM_ERR_TRAVEL = -33,        /* leaves the travel limits */
     /* pieces: index = the piece (of a joint: the later one) */
-    PROGRAM_ERR_PIECE_DURATION = -40,    /* duration 0 */
+    PROGRAM_ERR_PIECE_DURATION = -40,    /* duration 0, or above 2^22 s */
     PROGRAM_ERR_COEFFICIENT = -41,       /* a coefficient is above 2^14 mm */
     PROGRAM_ERR_PIECE_LONG = -42,        /* longer than 32 mm */
     PROGRAM_ERR_PIECE_FIRST = -43,       /* the first piece does not start at arc length 0 */

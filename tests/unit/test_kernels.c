@@ -164,11 +164,31 @@ static void test_expansion_of_a_line(void)
     TEST_ASSERT_INT64_WITHIN(32, (int64_t)4 << 50, ph.sigma_q50_mm[1]);
 }
 
+/* 2^14 mm in 2^-32 s is 2^46 mm/s and overflows q32. */
+static void test_absurd_feeds_are_held(void)
+{
+    const int64_t most = (int64_t)1 << 62;
+    struct program_piece piece = {.duration_q32_s = 1, .c_q40_mm = {(int64_t)1 << 54}};
+    struct feed_piece integers;
+    struct kernel_double_piece exact;
+    struct feed_point point;
+    for (int sign = 1; sign >= -1; sign -= 2) {
+        feed_piece_set(&integers, &piece);
+        feed_piece_at(&integers, 0, &point);
+        TEST_ASSERT_EQUAL_INT64(sign * (most - 1), point.feed_q32_mm_s);
+        kernel_double_piece_set(&exact, &piece);
+        kernel_double_piece_at(&exact, 0, &point);
+        TEST_ASSERT_EQUAL_INT64(sign * most, point.feed_q32_mm_s);
+        piece.c_q40_mm[0] = -piece.c_q40_mm[0];
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_kernels_agree_at_the_limit_of_the_ratio);
     RUN_TEST(test_ends_are_met);
     RUN_TEST(test_expansion_of_a_line);
+    RUN_TEST(test_absurd_feeds_are_held);
     return UNITY_END();
 }
