@@ -208,6 +208,16 @@ def test_list_names_the_bus_and_unknown_names_are_refused(bus: OpenBus) -> None:
     assert refused.stderr == "with-vcan: no bus named no-such-bus is open; tools/with-vcan --list\n"
 
 
+def test_a_name_in_use_is_refused_and_its_bus_stays(bus: OpenBus) -> None:
+    command = [WITH_VCAN, "--user-mode", "--name", bus.name, "true"]
+    refused = subprocess.run(command, capture_output=True, check=False, text=True)
+    assert refused.returncode == 125
+    assert refused.stderr == (
+        f"with-vcan: a bus named {bus.name} is open already; tools/with-vcan --list\n"
+    )
+    assert bus.run("true").returncode == 0
+
+
 def test_inside_the_bus_that_is_there_is_used(bus: OpenBus) -> None:
     """Where the kernel has vcan0 there is nothing to open."""
     name = "readlink /proc/self/ns/net"

@@ -51,7 +51,7 @@ class Broker:
     """The loop between the line into the kernel and the clients."""
 
     def __init__(self, bus: Bus, owner: socket.socket, memory: str) -> None:
-        self._bus = bus
+        self._bus = bus  # its folder is there and locked
         self._selector = selectors.DefaultSelector()
         self._clients: dict[int, Client] = {}
         self._channels = 0
@@ -59,7 +59,6 @@ class Broker:
         self._line_room = frames.LINE_IN
         self._line_taken = 0
         self._ready = False
-        self._lock = registry.create(bus)
         self._listener = socket.socket(socket.AF_UNIX)
         self._listener.bind(str(bus.folder / "socket"))
         self._listener.listen()
@@ -143,16 +142,17 @@ class Broker:
         self._line_queue += frames.encode(frames.CLOSE, client.channel)
 
     def _line_turn(self, events: int) -> None:
-        if events & selectors.EVENT_WRITE and self._line_queue:
-            count = self._line.send(self._line_queue[: self._line_room])
-            del self._line_queue[:count]
-            self._line_room -= count
-        if not events & selectors.EVENT_READ:
-            return
+        data = b""
         try:
+            if events & selectors.EVENT_WRITE and self._line_queue:
+                count = self._line.send(self._line_queue[: self._line_room])
+                del self._line_queue[:count]
+                self._line_room -= count
+            if not events & selectors.EVENT_READ:
+                return
             data = self._line.recv(65536)
         except ConnectionError:
-            data = b""
+            pass
         if not data:
             raise BusUnavailable(
                 "user-mode Linux has ended" if self._ready else "user-mode Linux did not start"
@@ -289,8 +289,13 @@ def main(bus: Bus, owner: socket.socket, memory: str) -> None:
     # Stubs whose kernel has died become children of this process, which can then wait for them.
     _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
     try:
-        Broker(bus, owner, memory).serve()
+        registry.create(bus)  # the lock is held to the end of this process
+        try:
+            broker = Broker(bus, owner, memory)
+        except BaseException:
+            registry.remove(bus)
+            raise
+        broker.serve()
     except BusUnavailable as error:
-        registry.remove(bus)
         with contextlib.suppress(OSError):
             owner.sendall(frames.encode(frames.FAIL, 0, str(error).encode()))

@@ -8,6 +8,7 @@ socket and boot log there.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -110,15 +111,16 @@ def _sweep() -> None:
     if in_user_mode_linux():
         return
     for folder in root().iterdir():
-        if _is_left_over(folder):
-            shutil.rmtree(folder, ignore_errors=True)
+        with contextlib.suppress(FileNotFoundError):  # removed meanwhile
+            if _is_left_over(folder):
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def _is_left_over(folder: Path) -> bool:
     try:
         lock = os.open(folder / "lock", os.O_RDWR | os.O_CLOEXEC)
     except OSError:
-        return time.time() - folder.stat().st_mtime > 10 if folder.exists() else False
+        return time.time() - folder.stat().st_mtime > 10
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
