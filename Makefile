@@ -160,7 +160,7 @@ $(UNITY_DIR)/unity.h: $(UNITY_DIR)/unity.c
 ## ---- object dictionaries, generated from the EDS files -------------------------------------------
 
 define OD_RULE
-$(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h &: $(2) tools/eds_to_c.py $(VENV)/.ready
+$(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h &: $(2) $(wildcard tools/eds_*.py) $(VENV)/.ready
 	@mkdir -p $(BUILD)/generated
 	$$(call say,eds,$$<)
 	$$(Q)$(PY) tools/eds_to_c.py $(2) $(1) $(BUILD)/generated
@@ -286,7 +286,7 @@ format: $(VENV)/.ready ## bring C and Python into the formats that lint asks for
 NATIVE := host_tools/hodograph/native/_native.abi3.so
 .PHONY: native
 native: $(NATIVE)
-$(NATIVE): host_tools/hodograph/native/build_native.py $(BUILD)/host/libhodograph_core.a $(BUILD)/host/libhodograph_sim.a \
+$(NATIVE): host_tools/hodograph/native/build_native.py host_tools/hodograph/native/declarations.h $(BUILD)/host/libhodograph_core.a $(BUILD)/host/libhodograph_sim.a \
            $(wildcard firmware/core/*.h sim/plant/*.h sim/rig/*.h) $(VENV)/.editable
 	$(call say,cffi,$@)
 	$(Q)$(PY) $< --build $(BUILD)
