@@ -3,6 +3,7 @@
  * The kernels on random segments that reach the limit of the speed ratio, from 32 mm to 1e-10 mm long: the bounds of
  * docs/numerics.md sections 9 to 12. (Against 50-digit arithmetic: benchmarks/kernels.py.)
  */
+#include "core/crc32.h"
 #include "core/kernel_double.h"
 #include "core/kernel_fixed.h"
 #include "core/kernel_float.h"
@@ -125,6 +126,59 @@ static void test_kernels_agree_at_the_limit_of_the_ratio(void)
     }
 }
 
+static uint32_t add_to_crc(uint32_t crc, int64_t value)
+{
+    uint8_t bytes[8];
+    for (int i = 0; i < 8; i++) {
+        bytes[i] = (uint8_t)((uint64_t)value >> (8 * i));
+    }
+    return crc32_update(crc, bytes, sizeof bytes);
+}
+
+static uint32_t add_path_bits(uint32_t crc)
+{
+    struct program_segment g;
+    int64_t point[2];
+    random_segment(&g, (int)(golden_random(&seed) % 18u) - 17);
+    ph_segment_expand(&ph, &g);
+    kernel_fixed_segment_set(&fixed, &ph);
+    int64_t length_q40 = 2 * ph.c_q48_mm[PH_S][0] >> 8;
+    for (int k = 0; k <= POINTS; k++) {
+        kernel_fixed_segment_at(&fixed, g.start_q40_mm + length_q40 / POINTS * k, point);
+        crc = add_to_crc(add_to_crc(crc, point[0]), point[1]);
+    }
+    return crc;
+}
+
+static uint32_t add_feed_bits(uint32_t crc)
+{
+    struct program_piece piece = {.duration_q32_s = (golden_random(&seed) >> 28) + 1u};
+    struct feed_piece feed;
+    struct feed_point point;
+    for (int k = 0; k < 7; k++) {
+        piece.c_q40_mm[k] = (int64_t)golden_random(&seed) >> 19;
+    }
+    feed_piece_set(&feed, &piece);
+    for (uint64_t k = 0; k < POINTS; k++) {
+        feed_piece_at(&feed, (piece.duration_q32_s << 10) / POINTS * k, &point);
+        crc = add_to_crc(add_to_crc(crc, point.arc_length_q40_mm), point.feed_q32_mm_s);
+    }
+    return crc;
+}
+
+/* Recorded runs and the hashes of their setpoints hang on these bits. */
+static void test_fixed_bits_never_change(void)
+{
+    uint32_t path = 0;
+    uint32_t feed = 0;
+    for (int i = 0; i < 2000; i++) {
+        path = add_path_bits(path);
+        feed = add_feed_bits(feed);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0x6323ECB4, path);
+    TEST_ASSERT_EQUAL_HEX32(0x89D0824F, feed);
+}
+
 /* At the two ends the fixed kernel is at the end points of the segment. */
 static void test_ends_are_met(void)
 {
@@ -187,6 +241,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_kernels_agree_at_the_limit_of_the_ratio);
+    RUN_TEST(test_fixed_bits_never_change);
     RUN_TEST(test_ends_are_met);
     RUN_TEST(test_expansion_of_a_line);
     RUN_TEST(test_absurd_feeds_are_held);
