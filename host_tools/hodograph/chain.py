@@ -12,7 +12,7 @@ from pathlib import Path
 from .config import Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
 from .feed import ControllerLimits, FeedPlan, plan_feed
-from .program import Compilation, Program, ProgramLimits, compile_path, encode
+from .program import Compilation, Program, ProgramLimits, compile_path, encode, fit_plan
 from .spline import SplineResult, from_control_polygon
 
 
@@ -87,21 +87,22 @@ class Chain:
 
     @cached_property
     def plan(self) -> FeedPlan:
-        """The feed over the spline."""
+        """The feed over the spline, as the program has it."""
         machine = self.machine_or_none
-        length_mm = self.spline_result.spline.length_mm
+        spline = self.spline_result.spline
         with _told_by(f"{self.file.file}:"):
-            return plan_feed(
-                length_mm,
+            plan = plan_feed(
+                spline.length_mm,
                 self.file.feed,
                 self.file.limits,
                 controller_limits(machine) if machine is not None else None,
                 period_us=machine.period_us if machine is not None else 1000,
             )
+            return fit_plan(spline, plan)
 
     @cached_property
     def compilation(self) -> Compilation:
-        """The program for the machine, and the plan that it really holds."""
+        """The program for the machine."""
         machine = self.machine
         spline, plan = self.spline_result.spline, self.plan
         with _told_by(f"{self.file.file}:"):

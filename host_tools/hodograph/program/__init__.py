@@ -2,7 +2,7 @@
 """The uploaded program: compile, encode, decode, check, print; docs/protocol.md section 1."""
 
 from .check import Fault, ProgramLimits, check
-from .compiler import Compilation, compile_path, compile_program
+from .compiler import Compilation, compile_path, compile_program, fit_plan
 from .image import Program, decode, encode
 from .inspection import inspect_dict, inspect_text
 
@@ -16,6 +16,7 @@ __all__ = [
     "compile_program",
     "decode",
     "encode",
+    "fit_plan",
     "inspect_dict",
     "inspect_text",
 ]

@@ -123,6 +123,15 @@ def compile_path(
     return Compilation(program, plan, plan.notes, geometry.drift_mm)
 
 
+def fit_plan(spline: PHSpline, plan: FeedPlan) -> FeedPlan:
+    """The plan that `compile_path` makes a program of: its feed lowered where short segments ask for it.
+
+    Raises PlanError as `compile_path` does for them, and InputError for a path beyond the format.
+    """
+    geometry = _quantise(spline.split(LONGEST_SEGMENT_MM, 2.0), 0j)
+    return _fit_feed(plan, geometry.start_q40, spline)[0]
+
+
 def _quantise(spline: PHSpline, offset_mm: complex) -> _Geometry:
     """Integer segments: w rounded, then everything else from exact sums of the rounded w."""
     far = np.abs(np.concatenate((spline.origin, [offset_mm])))

@@ -107,6 +107,23 @@ def test_simulate_needs_no_given_folder(
     assert result(capsys, "simulate", str(EXAMPLES / "alpha.toml"), "--json")["ticks"] > 1000
 
 
+def test_feed_of_a_dense_path_is_that_of_its_program(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Short segments lower the feed; `feed` has to say so, not only `simulate`."""
+    points = [[0.05 * k, float(2.0 * np.sin(0.025 * k))] for k in range(400)]
+    file = tmp_path / "dense.toml"
+    file.write_text(
+        f"[path]\nclosed = false\ncontrol_points = {points}\n[feed]\nnominal_mm_s = 200\n"
+        f'ramp_time_s = 0.05\n[machine]\nfile = "{EXAMPLES / "machines/paper_alpha.toml"}"\n'
+    )
+    assert main(["feed", str(file), "--json"]) == 0
+    out, notes = capsys.readouterr()
+    assert "two neighbouring segments" in notes
+    ticks = result(capsys, "simulate", str(file), "--json")["ticks"]
+    assert ticks == np.ceil(json.loads(out)["duration_s"] * 1000.0) + 1
+
+
 def test_compile_and_inspect(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     output = tmp_path / "heart.hdgp"
     made = result(capsys, "compile", str(EXAMPLES / "heart.toml"), "-o", str(output), "--json")
