@@ -3,9 +3,6 @@
 
 #include "core/feed_bounds.h"
 
-#define LEAST_FEED_Q24 ((int64_t)1 << 14) /* 2^-10 mm/s */
-#define NO_BOUND_Q24   (INT64_MAX / 64)
-
 static int64_t piece_end_arc(const struct program *p, uint32_t i)
 {
     struct program_piece next;
@@ -29,7 +26,7 @@ static int64_t crossing_feed_q24(const struct program *p, int64_t length_q40)
 static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32_t *first)
 {
     int64_t feed = crossing_feed_q24(p, to - from);
-    if (feed < LEAST_FEED_Q24) {
+    if (feed < FEED_LEAST_Q24) {
         return 0;
     }
     while (*first + 1 < p->header.piece_count && piece_end_arc(p, *first) < from) {
@@ -41,7 +38,7 @@ static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32
         if (c.start_q40_mm > to) {
             break;
         }
-        if (!feed_bounds_within(&c, FEED_VELOCITY, -NO_BOUND_Q24, feed)) {
+        if (!feed_bounds_within(&c, FEED_VELOCITY, -FEED_NO_BOUND_Q24, feed)) {
             return 0;
         }
     }

@@ -78,8 +78,8 @@ void feed_bounds_end(const struct program_piece *piece, struct feed_state *out)
 /* A bound in 2^-24 physical units as one of the scaled Bernstein coefficients in q36 and tau. */
 static int64_t scaled_bound(int64_t bound_q24, int64_t scale, int order, int exponent)
 {
-    int64_t limit = INT64_MAX / 64;
-    bound_q24 = bound_q24 > limit ? limit : bound_q24 < -limit ? -limit : bound_q24;
+    const int64_t most = FEED_NO_BOUND_Q24;
+    bound_q24 = bound_q24 > most ? most : bound_q24 < -most ? -most : bound_q24;
     return qmath_shift_clamp(bound_q24 * scale, 12 + order * exponent);
 }
 

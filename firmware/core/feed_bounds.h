@@ -21,6 +21,11 @@ struct feed_state {
 void feed_bounds_start(const struct program_piece *piece, struct feed_state *out);
 void feed_bounds_end(const struct program_piece *piece, struct feed_state *out);
 
+/* A feed this far below 0 is rounding, not motion; slower ones count as this one: 2^-10 mm/s. */
+#define FEED_LEAST_Q24 ((int64_t)1 << 14)
+/* Beyond any feed, acceleration or jerk. */
+#define FEED_NO_BOUND_Q24 (INT64_MAX / 64)
+
 enum feed_derivative { FEED_VELOCITY = 1, FEED_ACCELERATION = 2, FEED_JERK = 3 };
 
 /* 1 when that derivative of F stays within [low, high] over the whole piece, in 2^-24 mm/s, mm/s^2

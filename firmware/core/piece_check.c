@@ -11,9 +11,7 @@
 #define JOIN_Q44              ((int64_t)1 << 10) /* 2^-34 mm */
 #define JOIN_FEED_Q24         ((int64_t)1 << 8)  /* 2^-16 mm/s */
 #define JOIN_ACCELERATION_Q16 ((int64_t)1 << 10) /* 2^-6 mm/s^2 */
-#define LEAST_FEED_Q24        ((int64_t)1 << 14) /* 2^-10 mm/s */
 #define OVERRIDE_ONE          (1u << 24)
-#define NO_BOUND_Q24          (INT64_MAX / 64)
 
 static int within(int64_t a, int64_t tolerance)
 {
@@ -39,18 +37,18 @@ static int check_ranges(const struct program_piece *c)
 /* 2^24 / 1000 = 2^21 / 125 */
 static int64_t milli_q24(uint32_t a)
 {
-    return a == 0 ? NO_BOUND_Q24 : (int64_t)(qmath_div_u64((uint64_t)a << 21, 125u));
+    return a == 0 ? FEED_NO_BOUND_Q24 : (int64_t)(qmath_div_u64((uint64_t)a << 21, 125u));
 }
 
 static int check_bounds(const struct program_piece *c, const struct program_limits *limits)
 {
     int64_t feed = milli_q24(limits->feed_um_s);
     int64_t acceleration = milli_q24(limits->acceleration_um_s2);
-    int64_t jerk = limits->jerk_mm_s3 == 0 ? NO_BOUND_Q24 : (int64_t)limits->jerk_mm_s3 << 24;
-    if (!feed_bounds_within(c, FEED_VELOCITY, -LEAST_FEED_Q24, NO_BOUND_Q24)) {
+    int64_t jerk = limits->jerk_mm_s3 == 0 ? FEED_NO_BOUND_Q24 : (int64_t)limits->jerk_mm_s3 << 24;
+    if (!feed_bounds_within(c, FEED_VELOCITY, -FEED_LEAST_Q24, FEED_NO_BOUND_Q24)) {
         return PROGRAM_ERR_BACKWARDS;
     }
-    if (!feed_bounds_within(c, FEED_VELOCITY, -LEAST_FEED_Q24, feed)) {
+    if (!feed_bounds_within(c, FEED_VELOCITY, -FEED_LEAST_Q24, feed)) {
         return PROGRAM_ERR_FEED;
     }
     if (!feed_bounds_within(c, FEED_ACCELERATION, -acceleration, acceleration)) {
