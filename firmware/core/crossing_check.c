@@ -3,14 +3,11 @@
 
 #include "core/feed_bounds.h"
 
-static int64_t piece_end_arc(const struct program *p, uint32_t i)
+static int64_t piece_start(const struct program *p, uint32_t i)
 {
-    struct program_piece next;
-    if (i + 1 == p->header.piece_count) {
-        return p->header.length_q40_mm;
-    }
-    program_piece_get(p, i + 1u, &next);
-    return next.start_q40_mm;
+    struct program_piece c;
+    program_piece_get(p, i, &c);
+    return c.start_q40_mm;
 }
 
 /* Feed at which a tick of twice the period covers this length: length 10^6 / (2 period_us). */
@@ -29,7 +26,7 @@ static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32
     if (feed < FEED_LEAST_Q24) {
         return 0;
     }
-    while (*first + 1 < p->header.piece_count && piece_end_arc(p, *first) < from) {
+    while (*first + 1 < p->header.piece_count && piece_start(p, *first + 1u) < from) {
         (*first)++;
     }
     for (uint32_t i = *first; i < p->header.piece_count; i++) {
