@@ -136,6 +136,19 @@ static void test_download_repeats_what_was_lost(void)
     download(1, never);
 }
 
+/* At the end of the block, not after half of the timeout. */
+static void test_a_gap_is_answered_with_the_last_segment(void)
+{
+    initiate(IMAGE_MAX);
+    sdo_talk_segment(&talk, 1, image, 7);
+    for (uint8_t sequence = 3; sequence < TALK_BLOCK; sequence++) {
+        TEST_ASSERT_FALSE(sdo_talk_segment(&talk, sequence, image, 7));
+    }
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, TALK_BLOCK, image, 7));
+    TEST_ASSERT_EQUAL_HEX8(0xA2, talk.answer.data[0]);
+    TEST_ASSERT_EQUAL_UINT8(1, talk.answer.data[1]);
+}
+
 static void test_download_when_the_last_segment_of_a_block_is_lost(void)
 {
     download(IMAGE_MAX, last_of_first_block);
@@ -403,6 +416,7 @@ static void upload(uint32_t size, uint8_t segments, bool (*lost)(uint32_t))
 static void test_upload_of_every_size(void)
 {
     for (uint32_t size = 0; size < 100; size++) {
+        upload(size, 1, never);
         upload(size, 4, never);
         upload(size, 127, never);
     }
@@ -449,6 +463,7 @@ int main(void)
     RUN_TEST(test_crc_check_value);
     RUN_TEST(test_download_of_every_size);
     RUN_TEST(test_download_repeats_what_was_lost);
+    RUN_TEST(test_a_gap_is_answered_with_the_last_segment);
     RUN_TEST(test_download_when_the_last_segment_of_a_block_is_lost);
     RUN_TEST(test_download_without_size_and_crc);
     RUN_TEST(test_download_of_a_value);
