@@ -15,6 +15,10 @@ ln -s /proc/self/fd/0 /dev/stdin
 ln -s /proc/self/fd/1 /dev/stdout
 ln -s /proc/self/fd/2 /dev/stderr
 echo "$HOST" >/proc/sys/kernel/hostname
+# Socket buffers as large as root may have, so that an ordinary user's recording keeps every frame too.
+for limit in rmem_max wmem_max; do
+    echo 67108864 >/proc/sys/net/core/$limit
+done
 for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev drivers/net/can/vcan; do
     insmod "$MODULES/kernel/$module.ko"
 done
