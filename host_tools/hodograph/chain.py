@@ -11,9 +11,9 @@ from pathlib import Path
 
 from .config import Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
-from .feed import ControllerLimits, FeedPlan, plan_feed
+from .feed import ControllerLimits, FeedPlan, FeedRequest, plan_feed
 from .program import Compilation, Program, ProgramLimits, compile_path, encode, fit_plan
-from .spline import SplineResult, from_control_polygon
+from .spline import SplineResult, from_control_polygon, through_points
 
 
 def controller_limits(machine: Machine) -> ControllerLimits:
@@ -56,8 +56,17 @@ class Chain:
     @cached_property
     def machine_or_none(self) -> Machine | None:
         """The machine, None when none is named."""
-        name = self.given_machine or self.file.machine_file
-        return load_machine(name) if name is not None else None
+        if self.given_machine is not None:
+            return load_machine(self.given_machine)
+        name = self.file.machine_file
+        if name is None:
+            return None
+        if not name.is_file():
+            raise InputError(
+                f"{self.file.file}: [machine] file names {name}, which is not there: "
+                "correct it or use --machine FILE"
+            )
+        return load_machine(name)
 
     @property
     def machine(self) -> Machine:
@@ -75,8 +84,6 @@ class Chain:
         with _told_by(f"{self.file.file}: [path]"):
             if not path.through:
                 return from_control_polygon(path.points, path.closed)
-            from .spline import through_points
-
             return through_points(
                 path.points,
                 path.closed,
@@ -85,15 +92,24 @@ class Chain:
                 end_tangent=path.end_tangent,
             )
 
+    @property
+    def feed(self) -> FeedRequest:
+        """The feed asked for; raises InputError when the file has no section [feed]."""
+        if self.file.feed is None:
+            raise InputError(
+                f"{self.file.file}: the section [feed] is missing: add it with nominal_mm_s and ramp_time_s"
+            )
+        return self.file.feed
+
     @cached_property
     def plan(self) -> FeedPlan:
         """The feed over the spline, as the program has it."""
-        machine = self.machine_or_none
+        feed, machine = self.feed, self.machine_or_none
         spline = self.spline_result.spline
         with _told_by(f"{self.file.file}:"):
             plan = plan_feed(
                 spline.length_mm,
-                self.file.feed,
+                feed,
                 self.file.limits,
                 controller_limits(machine) if machine is not None else None,
                 period_us=machine.period_us if machine is not None else 1000,

@@ -23,7 +23,7 @@ def spline(options: Namespace) -> None:
     found = chain.spline_result
     curve = found.spline
     for line in found.notes:
-        note(line)
+        note(f"{options.file.name}: {line}")
     nodes = curve.nodal_points
     result: dict[str, object] = {
         "closed": curve.closed,
@@ -33,6 +33,10 @@ def spline(options: Namespace) -> None:
         "segment_lengths_mm": curve.segment_lengths_mm.tolist(),
         "newton_iterations": found.newton_iterations,
         "max_curvature_per_mm": curve.max_curvature_per_mm(),
+        "trial_iterations": found.trial_iterations,
+        "changed_sides": found.changed_sides,
+        "extra_turning_rad": found.extra_turning_rad,
+        "bending_ratio": found.bending_ratio,
     }
     if options.at is not None:
         s = _within("--at", options.at, curve.length_mm, "mm")
@@ -160,8 +164,8 @@ def inspect(options: Namespace) -> None:
         print(inspect_text(program, full=options.full))
 
 
-def simulate_chain(chain: Chain, kernel: str | None) -> Motion:
-    """A run of a path without a bus."""
+def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) -> Motion:
+    """A run of a path without a bus. Without its rows (one a tick) it takes no memory to speak of."""
     machine = chain.machine
     image = chain.image
     with progress("simulate", "tick", chain.program.ticks) as bar:
@@ -170,6 +174,7 @@ def simulate_chain(chain: Chain, kernel: str | None) -> Motion:
             [axis.drive for axis in machine.axes],
             kernel=kernel or machine.kernel,
             counts_per_mm=machine.counts_per_mm,
+            keep_rows=keep_rows,
             progress=lambda done, total: bar(done),
         )
 
@@ -177,7 +182,7 @@ def simulate_chain(chain: Chain, kernel: str | None) -> Motion:
 def simulate_(options: Namespace) -> None:
     """hodograph simulate."""
     chain = load_chain(options.file, options.machine)
-    motion = simulate_chain(chain, options.kernel)
+    motion = simulate_chain(chain, options.kernel, keep_rows=options.trace is not None)
     print_notes(chain, chain.compilation.plan)
     if options.trace is not None:
         write_trace(motion, options.trace)

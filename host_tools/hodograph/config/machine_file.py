@@ -117,7 +117,7 @@ def _axis(table: Table, counts_per_mm: int) -> Axis:
     reach = COUNTS_LIMIT / counts_per_mm
     if max(abs(low), abs(high)) > reach:
         raise table.error("travel_mm", f"leaves the ±{reach:.1f} mm that i32 counts can express")
-    drive_file = table.path("drive")
+    drive_file = table.present("drive")
     return Axis(
         name=table.text("name"),
         node=table.integer("node", low=1, high=127),

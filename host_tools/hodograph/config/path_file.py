@@ -26,6 +26,8 @@ from ..spline import END_NAMES
 from .table import Table, read_toml
 
 COORDINATE_LIMIT_MM = 4096.0
+_CLOSING = 1e-3
+_SAME_MM = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +44,12 @@ class PathSpec:
 
 @dataclass(frozen=True, eq=False)
 class PathFile:
-    """What a path file says. `machine_file` is None when it names none."""
+    """What a path file says. `feed` and `machine_file` are None when it has none."""
 
     file: Path
     name: str
     path: PathSpec
-    feed: FeedRequest
+    feed: FeedRequest | None
     limits: Limits
     machine_file: Path | None
 
@@ -59,14 +61,14 @@ _LIMITS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "policy")
 
 
 def load_path_file(file: Path) -> PathFile:
-    """The path file `file`; raises InputError. The machine file is named, not read."""
+    """The path file `file`; raises InputError. The machine file is named, not looked for."""
     root = Table(file, "", read_toml(file), _SECTIONS)
     machine = root.table("machine", ("file",), required=False)
     return PathFile(
         file=file,
         name=file.stem,
         path=_path(root.table("path", _PATH)),
-        feed=_feed(root.table("feed", _FEED)),
+        feed=_feed(root.table("feed", _FEED)) if root.has("feed") else None,
         limits=_limits(root.table("limits", _LIMITS, required=False)),
         machine_file=machine.path("file") if machine.has("file") else None,
     )
@@ -82,14 +84,39 @@ def _path(table: Table) -> PathSpec:
     for key in ("ends", "start_tangent", "end_tangent"):
         if table.has(key) and (closed or not through):
             raise table.error(key, "applies to open paths with through points only: remove it")
+    key = "through" if through else "control_points"
+    points = table.points(key, limit=COORDINATE_LIMIT_MM)
+    if closed:
+        _check_closing(table, key, points)
     return PathSpec(
         closed=closed,
-        points=table.points("through" if through else "control_points", limit=COORDINATE_LIMIT_MM),
+        points=points,
         through=through,
         ends=table.choice("ends", END_NAMES, END_NAMES[0]),
         start_tangent=_tangent(table, "start_tangent"),
         end_tangent=_tangent(table, "end_tangent"),
     )
+
+
+def _check_closing(table: Table, key: str, points: NDArray[np.complex128]) -> None:
+    """Refuses a tail that seems meant to repeat the first points of a closed path and does not.
+
+    It seems so where the last point, or two of the last three, lie within `_CLOSING` of the median
+    distance between neighbours; exact repeats are left to the spline, which drops them.
+    """
+    near = _CLOSING * float(np.median(np.abs(np.diff(points)))) if points.size > 1 else 0.0
+    for tail in (1, 3):
+        if points.size < tail + 3:
+            return
+        misses = np.abs(points[-tail:] - points[:tail])
+        worst = int(np.argmax(misses))
+        agree = np.count_nonzero(misses <= near)
+        if misses[worst] > _SAME_MM and 2 * agree > tail:
+            raise table.error(
+                key,
+                f"do not close: point {points.size - tail + worst} is {misses[worst]:.6g} mm away from "
+                f"point {worst}, which it seems to repeat: give each point once, or repeat it exactly",
+            )
 
 
 def _tangent(table: Table, key: str) -> complex | None:

@@ -96,11 +96,12 @@ class Table:
         value = self._get(key, default, "a number")
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise self.error(key, f"must be a number, but is {_show(value)}")
+        value = _as_float(value)
         if not math.isfinite(value):
             raise self.error(key, f"must be a finite number, but is {value}")
         if not low <= value <= high:
             raise self.error(key, f"must be from {low:g} to {high:g}, but is {value:g}")
-        return float(value)
+        return value
 
     def optional_number(self, key: str, *, low: float, high: float) -> float | None:
         """As `number`; None when the file does not give the key."""
@@ -161,8 +162,10 @@ class Table:
             for coordinate in point:
                 if isinstance(coordinate, bool) or not isinstance(coordinate, (int, float)):
                     raise self.error(key, f"point {i} holds {_show(coordinate)}: give two numbers")
-                if not math.isfinite(coordinate):
-                    raise self.error(key, f"point {i} holds {coordinate}: give two finite numbers")
+                if not math.isfinite(_as_float(coordinate)):
+                    raise self.error(
+                        key, f"point {i} holds {_show(coordinate)}: give two finite numbers"
+                    )
                 if abs(coordinate) > limit:
                     raise self.error(
                         key, f"point {i} holds {coordinate:g}: at most {limit:g} mm from 0"
@@ -187,11 +190,15 @@ class Table:
         return [Table(self.file, f"{key} {i + 1}", v, known) for i, v in enumerate(value)]
 
     def path(self, key: str) -> Path:
-        """A file name, relative to the directory of this file."""
+        """A file name, relative to the directory of this file; the file need not be there."""
         name = self.text(key)
         if "\0" in name:
             raise self.error(key, "holds a NUL character: name a file")
-        found = self.file.parent / Path(name).expanduser()
+        return self.file.parent / Path(name).expanduser()
+
+    def present(self, key: str) -> Path:
+        """As `path`, of a file that is there."""
+        found = self.path(key)
         if not found.is_file():
             raise self.error(key, f"names {found}, which is not there")
         return found
@@ -202,6 +209,13 @@ def _advice(key: str, known: Collection[str]) -> str:
     if near:
         return f'did you mean "{near[0]}"?'
     return "use one of: " + ", ".join(known)
+
+
+def _as_float(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return math.inf if value > 0 else -math.inf
 
 
 def _show(value: object) -> str:

@@ -5,11 +5,11 @@ The compiled module is made by `make build` (build_native.py); without it every 
 says so. Arrays go in and out without copies; the interpreter lock is released during the calls.
 """
 
+from ..names import KERNELS
 from .contour import Contour
 from .drive import DriveModel
 from .library import library
 from .program import (
-    KERNELS,
     POINT,
     NativeFault,
     NativeLimits,

@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..names import KERNELS
 from .library import library, text
-
-KERNELS = ("fixed", "float", "double")
-"""Names of the number kernels; the index is their code in C and in object 0x2004 sub 5."""
 
 POINT = np.dtype(
     [

@@ -58,7 +58,7 @@ def _compare_case(name: str) -> dict[str, Any]:
 
 def plain_plan(chain: Chain) -> FeedPlan:
     """The plain quintic profile with the same nominal feed and ramp time."""
-    asked = chain.file.feed
+    asked = chain.feed
     request = FeedRequest("quintic", asked.nominal_mm_s, asked.ramp_time_s)
     return plan_feed(
         chain.spline_result.spline.length_mm,
@@ -91,7 +91,7 @@ def _feed_rows(chain: Chain, row: Any) -> None:
 
 def _joint_rows(chain: Chain, printed: Printed, row: Any) -> None:
     found = joint_disturbance(
-        chain.spline_result.spline, chain.file.feed.nominal_mm_s, chain.plan.period_us / 1e6
+        chain.spline_result.spline, chain.feed.nominal_mm_s, chain.plan.period_us / 1e6
     )
     acceleration, jerk = found.acceleration_mm_s2, found.jerk_mm_s3
     row(
@@ -118,7 +118,7 @@ def _contour_rows(chain: Chain, printed: Printed, row: Any) -> None:
 
 
 def _dynamics_rows(chain: Chain, row: Any) -> None:
-    found = constant_feed_dynamics(chain.spline_result.spline, chain.file.feed.nominal_mm_s)
+    found = constant_feed_dynamics(chain.spline_result.spline, chain.feed.nominal_mm_s)
     for key, limit, unit, maximum in (
         ("vector_acceleration_mm_s2", A_MAX_MM_S2, "mm/s^2", found.vector_acceleration),
         ("axis_acceleration_mm_s2", A_MAX_MM_S2, "mm/s^2", found.axis_acceleration),

@@ -104,6 +104,27 @@ def test_paths(
     assert list(tmp_path.iterdir()) == [tmp_path / "path.toml"]
 
 
+def test_only_a_path(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What a command does not need may be missing."""
+    file = tmp_path / "bare.toml"
+    file.write_text("[path]\nclosed = true\nthrough = [[0,0],[9,0],[5,6]]\n")
+    assert main(["spline", str(file), "--json"]) == 0
+    capsys.readouterr()
+    status, line = failed(capsys, "feed", str(file), "--json")
+    assert status == 2
+    assert "bare.toml: the section [feed] is missing" in line
+    feed = "[feed]\nprofile='quintic'\nnominal_mm_s=10\nramp_time_s=0.1\n"
+    file.write_text(file.read_text() + feed)
+    assert main(["feed", str(file), "--json"]) == 0
+    capsys.readouterr()
+    file.write_text(file.read_text() + "[machine]\nfile = 'no.toml'\n")
+    assert main(["spline", str(file), "--json"]) == 0
+    capsys.readouterr()
+    status, line = failed(capsys, "simulate", str(file), "--json")
+    assert status == 2
+    assert re.search(r"bare\.toml: \[machine\] file names .*no\.toml, which is not there", line)
+
+
 def test_no_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = Path(path_file(tmp_path))
     file.write_text(file.read_text().partition("[machine]")[0])

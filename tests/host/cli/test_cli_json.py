@@ -19,7 +19,7 @@ NAMES = ["alpha", "heart", "star"]
 
 SPLINE_KEYS = {
     "closed", "segments", "nodal_points", "length_mm", "segment_lengths_mm", "newton_iterations",
-    "max_curvature_per_mm",
+    "max_curvature_per_mm", "trial_iterations", "changed_sides", "extra_turning_rad", "bending_ratio",
 }  # fmt: skip
 FEED_KEYS = {
     "profile", "n_c", "evaluations", "ramp_time_s", "duration_s", "peak_acceleration_mm_s2",

@@ -122,14 +122,11 @@ MISTAKES = [
     ("ramp_time_s = 0.1", "ramp_time_s = 0", r"ramp_time_s must be from 0\.002 to 1000"),
     ("n_c = 5", 'n_c = "optimize"', r'n_c cannot be "optimize"; did you mean "optimise"\?'),
     ("n_c = 5", "n_c = []", r"n_c must be a number"),
+    ("n_c = 5", "n_c = 1" + 400 * "0", r"n_c must be a finite number"),
+    ("[12, 18]", "[1" + 400 * "0" + ", 18]", r"point 1 holds 10+\.\.\.: give two finite numbers"),
     ("n_c = 5", "degree = 5.5", r"degree must be a whole number"),
     ('policy = "report"', 'policy = "ignore"', r'policy cannot be "ignore"'),
     ("jerk_mm_s3 = 5e4", "jerk_mm_s3 = 0", r"jerk_mm_s3 must be from 0\.1"),
-    (
-        "[limits]",
-        "[machine]\nfile = 'no.toml'\n[limits]",
-        r"\[machine\] file names .*no\.toml, which is not there",
-    ),
     ("[limits]", "[machine]\nfile = 3\n[limits]", r"\[machine\] file must be a text"),
     ("[limits]", "feed = 3\n[limits]", r"unknown key"),
 ]
@@ -167,3 +164,47 @@ def test_unreadable_files(tmp_path: Path) -> None:
     deep.write_text("a = " + "[" * 20000)
     with pytest.raises(InputError, match="not valid TOML"):
         load_path_file(deep)
+
+
+def test_only_a_path(tmp_path: Path) -> None:
+    """`hodograph spline` needs neither a feed nor a machine that is there."""
+    text = "[path]\nclosed = true\nthrough = [[0,0],[1,0],[1,1]]\n[machine]\nfile = 'no.toml'\n"
+    found = load_path_file(write(tmp_path, text))
+    assert found.feed is None
+    assert found.machine_file == tmp_path / "no.toml"
+
+
+ROUND = [[0, 0], [9, 1], [12, 8], [5, 12], [-3, 7]]
+
+
+@pytest.mark.parametrize(
+    ("key", "tail"),
+    [
+        ("through", [[0.001, 0]]),
+        ("control_points", [[0, 0.002]]),
+        ("control_points", [[0, 0], [9, 1], [12.5, 8]]),
+        ("control_points", [[0, 0], [9, 3], [12, 8]]),
+        ("control_points", [[0.001, 0], [9, 1], [12, 8]]),
+    ],
+)
+def test_a_closed_path_whose_end_does_not_match(
+    tmp_path: Path, key: str, tail: list[list[float]]
+) -> None:
+    text = f"[path]\nclosed = true\n{key} = {ROUND + tail}\n"
+    with pytest.raises(InputError, match=r"path\.toml: \[path\] \w+ do not close: point \d is"):
+        load_path_file(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("key", "tail"),
+    [
+        ("through", [[0, 0]]),
+        ("through", [[0.1, 0]]),
+        ("control_points", [[0, 0], [9, 1], [12, 8]]),
+        ("control_points", [[0, 0], [9, -5], [20, 8]]),
+    ],
+)
+def test_a_closed_path_that_comes_back(tmp_path: Path, key: str, tail: list[list[float]]) -> None:
+    """Repeated exactly, or passing the same place once more: both are meant."""
+    text = f"[path]\nclosed = true\n{key} = {ROUND + tail}\n"
+    assert load_path_file(write(tmp_path, text)).path.points.size == len(ROUND + tail)
