@@ -3,7 +3,8 @@
 
 from .pattern_search import SearchStep
 from .pieces import FeedPiece, FeedPieces
-from .plan import Excess, FeedPlan, plan_feed
+from .plan import Excess, FeedPlan
+from .planning import plan_again, plan_feed
 from .request import ControllerLimits, FeedRequest, Limits
 
 __all__ = [
@@ -15,5 +16,6 @@ __all__ = [
     "FeedRequest",
     "Limits",
     "SearchStep",
+    "plan_again",
     "plan_feed",
 ]

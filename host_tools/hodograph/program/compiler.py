@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
-from ..feed import FeedPlan
+from ..feed import FeedPlan, plan_again
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
 from .check import Fault, ProgramLimits, check
@@ -184,7 +184,7 @@ def _fit_feed(plan: FeedPlan, joints_q40: Int, spline: PHSpline) -> tuple[FeedPl
                 f"{where}: {feed * (1.0 - 5e-4):.4g} mm/s would do; "
                 'lower nominal_mm_s or set policy "respect"'
             )
-        plan = plan.with_feed_cap(feed, where)
+        plan = plan_again(plan, feed, where)
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
 
 
