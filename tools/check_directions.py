@@ -54,7 +54,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "spline": {"errors"},
     "feed": {"errors"},
     "config": {"errors", "names", "feed", "spline"},
-    "native": {"errors", "config"},
+    "native": {"errors", "names", "config"},
     "program": {"errors", "spline", "feed", "native"},
     "simulate": {"errors", "config", "native", "program"},
     "bus": {
