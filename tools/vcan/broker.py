@@ -258,15 +258,17 @@ def _boot_file(path: Path, **values: str) -> None:
 
 
 def _memory_folder(memory: str) -> str:
-    """Where the kernel's memory file can lie: room for all of it, and mapping as code not forbidden."""
+    """Where the kernel's memory file can lie: writable, room for all of it, mapping as code not forbidden."""
     need = int(memory.rstrip("MG")) << (30 if memory.endswith("G") else 20)
     for folder in ("/dev/shm", "/tmp", "/var/tmp"):
         with contextlib.suppress(OSError):
             facts = os.statvfs(folder)
-            if facts.f_bavail * facts.f_frsize >= need and not facts.f_flag & os.ST_NOEXEC:
+            room = facts.f_bavail * facts.f_frsize >= need and not facts.f_flag & os.ST_NOEXEC
+            if room and os.access(folder, os.W_OK | os.X_OK):
                 return folder
     raise BusUnavailable(
-        f"neither /dev/shm, /tmp nor /var/tmp has {memory} free and allows code; make room or use --memory 512M"
+        f"neither /dev/shm, /tmp nor /var/tmp is writable, allows code and has {memory} free; "
+        "make room or use --memory 512M"
     )
 
 
