@@ -30,10 +30,9 @@ int motion_begin_at(struct motion *motion, const struct program *program,
         return result;
     }
     const uint64_t time_q42_s = program_time_at_q42(program, arc_length_q40_mm);
-    const uint64_t time_q32_s = (time_q42_s + 512u) >> 10;
-    timebase_begin_at(&motion->timebase, program, config->period_us, time_q32_s << 10);
-    (void)interp_seek(&motion->interp, time_q32_s);
-    (void)interp_at(&motion->interp, time_q32_s, &motion->point);
+    timebase_begin_at(&motion->timebase, program, config->period_us, time_q42_s);
+    (void)interp_seek(&motion->interp, time_q42_s >> 10);
+    (void)interp_at_q42(&motion->interp, time_q42_s, &motion->point);
     to_counts(motion, &motion->point, start_counts);
     return 0;
 }
