@@ -277,7 +277,10 @@ int main(int argc, char **argv)
 
 
 def build_driver(compiler: str, folder: Path) -> Path:
-    """A program that runs an image: FILE KERNEL RUNS [LOW HIGH], the override changing between both; prints its ticks."""
+    """A program that runs an image: FILE KERNEL RUNS [LOW HIGH]; prints its ticks.
+
+    The override changes between LOW and HIGH per cent.
+    """
     source, target = folder / "driver.c", folder / "driver"
     source.write_text(DRIVER)
     sources = sorted(str(p) for p in CORE.glob("*.c"))

@@ -17,8 +17,8 @@ static int prepare(struct controller *controller, int64_t from_q40_mm, struct mo
                    int32_t start_counts[PLANE_AXES])
 {
     const struct program_slot *slot = &controller->slot;
-    const int result = motion_begin_at(prepared, &slot->program, &controller->config, from_q40_mm,
-                                       start_counts);
+    const int result =
+        motion_begin_at(prepared, &slot->program, &controller->config, from_q40_mm, start_counts);
     if (from_q40_mm <= 0) {
         start_counts[0] = slot->start_counts[0];
         start_counts[1] = slot->start_counts[1];

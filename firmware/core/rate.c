@@ -85,8 +85,7 @@ static int64_t way_ticks(int64_t way_q57, const struct rate_bounds *bounds)
     return way_q57 / 2 / bounds->slope_q56 + bounds->slope_q56 / bounds->second_q56 + 5;
 }
 
-int64_t rate_span_q12(const struct rate *rate, int64_t target_q57,
-                      const struct rate_bounds *bounds)
+int64_t rate_span_q12(const struct rate *rate, int64_t target_q57, const struct rate_bounds *bounds)
 {
     int64_t rest = clamp(rate_rest(rate, bounds->second_q56), -RATE_ONE, 2 * RATE_MOST);
     int64_t away = magnitude(rest - rate->rate_q57);

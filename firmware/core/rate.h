@@ -13,10 +13,10 @@
 
 #include <stdint.h>
 
-#define RATE_ONE         ((int64_t)1 << 57)
-#define RATE_MOST        (2 * RATE_ONE)
-#define RATE_SLOPE_MOST  ((int64_t)1 << 56) /* a bound above this is the same as this */
-#define RATE_SPAN_TICKS  ((int64_t)1 << 20) /* transitions this long and longer are not told apart */
+#define RATE_ONE        ((int64_t)1 << 57)
+#define RATE_MOST       (2 * RATE_ONE)
+#define RATE_SLOPE_MOST ((int64_t)1 << 56) /* a bound above this is the same as this */
+#define RATE_SPAN_TICKS ((int64_t)1 << 20) /* transitions this long and longer are not told apart */
 
 struct rate {
     int64_t rate_q57; /* 0 ... RATE_MOST */

@@ -67,8 +67,8 @@ static void plan(struct timebase *tb, int64_t target_q57)
     if (find_bounds(tb, target_q57, &bounds) == 0) {
         return;
     }
-    if (!renewed || (bounds.slope_q56 >= tb->plan.slope_q56 &&
-                     bounds.second_q56 >= tb->plan.second_q56)) {
+    if (!renewed ||
+        (bounds.slope_q56 >= tb->plan.slope_q56 && bounds.second_q56 >= tb->plan.second_q56)) {
         tb->plan = bounds;
         tb->plan_target_q57 = target_q57;
     }

@@ -26,7 +26,7 @@ enum timebase_state {
     TIMEBASE_RUNNING = 0,  /* at the override, or on the way to it; also with an override of 0 */
     TIMEBASE_STOPPING = 1, /* the rate goes to 0, for good */
     TIMEBASE_STOPPED = 2,  /* rate 0, time stands still before the end */
-    TIMEBASE_ENDED = 3, /* time has reached the duration: the last step was the exact end point */
+    TIMEBASE_ENDED = 3,   /* time has reached the duration: the last step was the exact end point */
     TIMEBASE_HOLDING = 4, /* the rate goes to 0 until resumed */
     TIMEBASE_HELD = 5,    /* rate 0 until resumed */
 };
@@ -37,10 +37,10 @@ enum timebase_state {
 struct timebase {
     const struct program *program;
     uint64_t duration_q42_s;
-    uint64_t time_q42_s;       /* of the last step, rounded down */
-    uint32_t rest;             /* and what it leaves: in 1/15625 of 2^-42 s, by ticks at rate 1, */
-    uint32_t fine;             /* and in 2^-62 s, by all others; each below 2^-42 s */
-    uint64_t period_q42_s;     /* rounded down */
+    uint64_t time_q42_s;   /* of the last step, rounded down */
+    uint32_t rest;         /* and what it leaves: in 1/15625 of 2^-42 s, by ticks at rate 1, */
+    uint32_t fine;         /* and in 2^-62 s, by all others; each below 2^-42 s */
+    uint64_t period_q42_s; /* rounded down */
     uint32_t period_rest;
     uint32_t period_q32_s;     /* rounded up, for look-ahead */
     uint64_t sixth_q70_s;      /* a sixth of the period */
@@ -59,7 +59,7 @@ struct timebase {
     int64_t plan_target_q57; /* at most least.most_q57 */
     uint32_t plan_piece;     /* looked for a better one last in this piece */
     /* Above the least factor of the program */
-    uint32_t climb_piece;    /* no attempt before this piece */
+    uint32_t climb_piece;     /* no attempt before this piece */
     uint64_t climb_end_q32_s; /* at the present rate the way back is known until then */
     uint32_t saturated;
 };

@@ -8,9 +8,9 @@
 #include "golden.h"
 #include "unity.h"
 
-#define Q40 1099511627776.0
-#define Q32 4294967296.0
-#define SAMPLES 400
+#define Q40        1099511627776.0
+#define Q32        4294967296.0
+#define SAMPLES    400
 #define SEGMENT_MM 31.0
 
 double override_random(uint64_t *random, double low, double high)
@@ -67,8 +67,8 @@ static void read_pieces(struct override_program *p)
         piece->end_s = start_s += (double)raw.duration_q32_s / Q32;
         piece->c[0] = (double)raw.start_q40_mm / Q40;
         for (int k = 1; k < 8; k++) {
-            piece->c[k] =
-                ldexp((double)raw.c_q40_mm[k - 1], -40 - k * program_piece_exponent(raw.duration_q32_s));
+            piece->c[k] = ldexp((double)raw.c_q40_mm[k - 1],
+                                -40 - k * program_piece_exponent(raw.duration_q32_s));
         }
         for (int n = 0; n <= SAMPLES; n++) {
             override_program_feed(
@@ -219,8 +219,8 @@ void override_program_random(struct override_program *p, uint32_t period_us, uin
     for (int i = 0; i <= ramps; i++) {
         double v1 = i == ramps ? 0 : exp(override_random(random, 1.5, 5.5));
         add_ramp(&b, v0, v1, override_random(random, 30, 150) * shortest_s, shortest_s, random);
-        add_ramp(&b, v1, v1, v1 == 0 ? 0 : override_random(random, 3, 300) * shortest_s,
-                 shortest_s, random);
+        add_ramp(&b, v1, v1, v1 == 0 ? 0 : override_random(random, 3, 300) * shortest_s, shortest_s,
+                 random);
         v0 = v1;
     }
     struct program_header *header = &p->program.header;

@@ -6,8 +6,8 @@
 #include "canopen/sdo_abort.h"
 #include "unity.h"
 
-#define X_COUNTS 10000000
-#define Y_COUNTS (-5000000)
+#define X_COUNTS      10000000
+#define Y_COUNTS      (-5000000)
 #define LENGTH_COUNTS 4000000
 
 static struct app_bench bench;
@@ -132,7 +132,8 @@ static void test_override(void)
     TEST_ASSERT_INT_WITHIN(20, 7500, app_bench_read(&bench, 0x2009, 2));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2010, 1, 200, 2));
     app_bench_periods(&bench, 150);
-    TEST_ASSERT_EQUAL_INT(1 << 30, app_bench_read(&bench, 0x2010, 2)); /* its pieces allow no more */
+    TEST_ASSERT_EQUAL_INT(1 << 30,
+                          app_bench_read(&bench, 0x2010, 2)); /* its pieces allow no more */
     TEST_ASSERT_EQUAL_INT(1, app_bench_read(&bench, 0x2010, 3));
     finish_at_the_end();
     TEST_ASSERT_EQUAL_INT(200, app_bench_read(&bench, 0x2010, 1));
@@ -156,8 +157,7 @@ static void test_start_from_where_it_stopped(void)
     app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
     refused(COMMAND_START, MACHINE_AWAY_FROM_START);
     refused(COMMAND_START_FROM, MACHINE_AWAY_FROM_START);
-    TEST_ASSERT_EQUAL_HEX32(SDO_OK,
-                            app_bench_write(&bench, 0x2011, 0, (uint64_t)arc_q40_mm, 8));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2011, 0, (uint64_t)arc_q40_mm, 8));
     command(COMMAND_START_FROM);
     TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
     app_bench_periods(&bench, 3);

@@ -141,13 +141,12 @@ static void check_motion(const struct timebase *before)
 {
     const double scale = 1.0 / 72057594037927936.0; /* 2^-56 */
     struct tick k;
-    int64_t rise = now.tb.now.rate_q57 - before->now.rate_q57 - before->now.slope_q56 -
-                   now.tb.now.slope_q56;
+    int64_t rise =
+        now.tb.now.rate_q57 - before->now.rate_q57 - before->now.slope_q56 - now.tb.now.slope_q56;
     at_most("rate is the sum of its slopes", (double)llabs(rise), 1);
     k.rate = (double)before->now.rate_q57 * scale / 2;
     k.slope = (double)before->now.slope_q56 * scale / now.h;
-    k.second =
-        (double)(now.tb.now.slope_q56 - before->now.slope_q56) * scale / (now.h * now.h);
+    k.second = (double)(now.tb.now.slope_q56 - before->now.slope_q56) * scale / (now.h * now.h);
     k.time_s = now.time_s;
     double way = now.h * (k.rate + now.h * (k.slope / 2 + now.h * k.second / 6));
     uint64_t time = timebase_time_q42(&now.tb);
@@ -186,8 +185,9 @@ static void check_point(void)
         struct interp_point exact;
         interp_seek(&now.exact, time >> 10);
         interp_at_q42(&now.exact, time, &exact);
-        at_most("on the curve", hypot((double)(exact.x_q40_mm - now.point.x_q40_mm),
-                                      (double)(exact.y_q40_mm - now.point.y_q40_mm)),
+        at_most("on the curve",
+                hypot((double)(exact.x_q40_mm - now.point.x_q40_mm),
+                      (double)(exact.y_q40_mm - now.point.y_q40_mm)),
                 1.1e6);
     }
     memmove(now.arc, now.arc + 1, 3 * sizeof *now.arc);
@@ -295,16 +295,16 @@ static void finish(void)
     for (int64_t i = 0; i < ticks && !over(); i++) {
         int64_t rate = now.tb.now.rate_q57;
         int still = now.tb.now.slope_q56 == 0;
-        if (now.wish == RUN ? still && rate >= wanted - 100 &&
-                                  (now.percent * (RATE_ONE / 100) > least->most_q57 ||
-                                   rate <= wanted + 100)
-                            : still && rate == 0) {
+        if (now.wish == RUN
+                ? still && rate >= wanted - 100 &&
+                      (now.percent * (RATE_ONE / 100) > least->most_q57 || rate <= wanted + 100)
+                : still && rate == 0) {
             return;
         }
         tick();
     }
-    TEST_ASSERT_TRUE_MESSAGE(over(), where("never there", (double)now.tb.now.rate_q57 / RATE_ONE,
-                                           now.percent));
+    TEST_ASSERT_TRUE_MESSAGE(
+        over(), where("never there", (double)now.tb.now.rate_q57 / RATE_ONE, now.percent));
 }
 
 static void run_to_the_end(void)
@@ -402,10 +402,11 @@ static void test_any_commands_at_any_instant(void)
         now.number = i;
         run_case(seed * 0x100000001u + i);
     }
-    printf("%u cases, %.3g ticks: acceleration %.6f, jerk %.6f of the limits (by differences %.6f); %u "
+    printf("%u cases, %.3g ticks: acceleration %.6f, jerk %.6f of the limits (by differences "
+           "%.6f); %u "
            "ended, %u stopped, %u held; %u ticks saturated\n",
-           cases, (double)worst.ticks, worst.acceleration, worst.jerk, worst.difference, worst.ended,
-           worst.stopped, worst.held, worst.saturated);
+           cases, (double)worst.ticks, worst.acceleration, worst.jerk, worst.difference,
+           worst.ended, worst.stopped, worst.held, worst.saturated);
     TEST_ASSERT_TRUE(cases < 1000u || (worst.ended > 0 && worst.stopped > 0 && worst.held > 0 &&
                                        worst.saturated > 0 && worst.jerk > 0.9));
     for (uint32_t i = 0; i < 4u * LINES; i++) {

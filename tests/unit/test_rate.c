@@ -51,9 +51,9 @@ static void check_way(const struct rate *from, int64_t target, const struct rate
         TEST_ASSERT_TRUE(beyond || (rising ? rate.rate_q57 <= target : rate.rate_q57 >= target));
         TEST_ASSERT_TRUE(before.slope_q56 != 0 || before.rate_q57 != rate.rate_q57 ||
                          rate.slope_q56 != 0);
-        time_q12 += ((double)before.rate_q57 * 3 + (double)before.slope_q56 * 2 +
-                     (double)rate.slope_q56) /
-                    6 / 17592186044416.0;
+        time_q12 +=
+            ((double)before.rate_q57 * 3 + (double)before.slope_q56 * 2 + (double)rate.slope_q56) /
+            6 / 17592186044416.0;
     }
     TEST_ASSERT_TRUE(span == INT64_MAX || time_q12 <= (double)span);
 }

@@ -278,7 +278,7 @@ static void test_override_saturates(void)
     uint32_t most = 0;
     uint32_t last = 0;
     set_override(15 << 16, 400 << 8);
-    set_factor(0, p.header.piece_count, (1u << 24) + (1u << 22)); /* 1.25 */
+    set_factor(0, p.header.piece_count, (1u << 24) + (1u << 22));        /* 1.25 */
     set_factor(10, p.header.piece_count - 10u, (1u << 24) + (1u << 23)); /* 1.5 */
     timebase_begin(&tb, &p, 1000);
     timebase_override(&tb, 999);
