@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/rate_plan.h"
 
+#define MOST_ROUNDS 6 /* a window that has still not been found is given up */
+
 static int64_t greater(int64_t a, int64_t b)
 {
     return a > b ? a : b;
@@ -40,20 +42,20 @@ static int find_bounds(const struct timebase *tb, int64_t target_q57, struct rat
 {
     struct rate_window w;
     open_window(tb, &w);
-    while (keeps(&tb->now, target_q57, &w.bounds)) {
+    for (int round = 0; round < MOST_ROUNDS && keeps(&tb->now, target_q57, &w.bounds); round++) {
         *out = w.bounds;
         uint64_t reached = reached_q32(tb, rate_span_q12(&tb->now, target_q57, out));
-        while (reached > w.end_q32_s && same(out, &w.bounds) && rate_window_extend(&w) != 0) {
+        while (reached > w.end_q32_s && rate_window_extend(&w) != 0) {
         }
-        if (reached <= w.end_q32_s && same(out, &w.bounds)) {
-            return 1;
-        }
-        if (same(out, &w.bounds)) { /* as far as it may look */
-            *out = tb->least;
-            return keeps(&tb->now, target_q57, out);
+        if (same(out, &w.bounds)) {
+            if (reached <= w.end_q32_s) {
+                return 1;
+            }
+            break;
         }
     }
-    return 0;
+    *out = tb->least;
+    return keeps(&tb->now, target_q57, out);
 }
 
 static void plan(struct timebase *tb, int64_t target_q57)
@@ -113,10 +115,11 @@ static int climb(struct timebase *tb, int64_t *slope_q56)
         return 1;
     }
     open_window(tb, &w);
-    while (try_tick(tb, &w.bounds, &a)) {
+    for (int round = 0; round < MOST_ROUNDS && try_tick(tb, &w.bounds, &a); round++) {
         struct rate_bounds bounds = w.bounds;
         uint64_t reached = reached_q32(tb, rate_span_q12(&a.after, a.back_q57, &bounds)) + margin;
-        while (reached > w.end_q32_s && same(&bounds, &w.bounds) && rate_window_extend(&w) != 0) {
+        while (reached > w.end_q32_s && w.bounds.most_q57 == bounds.most_q57 &&
+               rate_window_extend(&w) != 0) {
         }
         if (reached <= w.end_q32_s && same(&bounds, &w.bounds)) {
             int still = a.after.slope_q56 == 0 && arrived(a.after.rate_q57, a.target_q57) &&
