@@ -9,7 +9,9 @@ Compiles firmware/core as a shared object of its own. Prints the figures and wri
   limit of the speed ratio (31 mm to 1e-6 mm) and on the golden programs;
 - noise: third differences of the unrounded output at 1 kHz minus those of the exact points, mm/s^3, and the
   same for the feed (first differences of the chord);
-- speed: time of a tick relative to the double kernel, and instructions of a tick where `valgrind` is there.
+- speed: time of a tick relative to the double kernel, and instructions of a tick where `valgrind` is there;
+- override: instructions of a tick of the fixed kernel at a constant override, while the rate is on its way all
+  the time, and above the factor that every piece allows.
 """
 
 from __future__ import annotations
@@ -248,25 +250,37 @@ int main(int argc, char **argv)
     static struct timebase tb;
     struct interp_point point;
     volatile long long sum = 0;
+    unsigned long ticks = 0;
+    unsigned low = argc > 5 ? (unsigned)atoi(argv[4]) : 100u;
+    unsigned high = argc > 5 ? (unsigned)atoi(argv[5]) : 100u;
     FILE *f = fopen(argv[1], "rb");
     size_t size = fread(image, 1, sizeof image, f);
     program_open(&p, image, (unsigned)size);
-    for (int run = atoi(argv[3]); run > 0 && argc == 4; run--) {
+    for (int run = atoi(argv[3]); run > 0; run--) {
         interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2]));
         timebase_begin(&tb, &p, p.header.period_us);
-        do {
+        timebase_override(&tb, high);
+        for (unsigned k = 1; timebase_state(&tb) != TIMEBASE_ENDED; k++) {
+            if (low != high && k % 40u == 0) {
+                timebase_override(&tb, k % 80u == 0 ? high : low);
+            }
             timebase_step(&tb);
             interp_at_q42(&it, timebase_time_q42(&tb), &point);
             sum += point.x_q40_mm + point.y_q40_mm;
-        } while (timebase_state(&tb) != TIMEBASE_ENDED);
+            ticks++;
+        }
     }
+    printf("%lu\n", ticks);
     return 0;
 }
 """
 
 
 def build_driver(compiler: str, folder: Path) -> Path:
-    """A program that runs an image: FILE KERNEL RUNS."""
+    """A program that runs an image: FILE KERNEL RUNS [LOW HIGH]; prints its ticks.
+
+    The override changes between LOW and HIGH per cent.
+    """
     source, target = folder / "driver.c", folder / "driver"
     source.write_text(DRIVER)
     sources = sorted(str(p) for p in CORE.glob("*.c"))
@@ -276,8 +290,13 @@ def build_driver(compiler: str, folder: Path) -> Path:
     return target
 
 
-def instructions(driver: Path, name: str, kernel: int, runs: int) -> int:
+def instructions(driver: Path, name: str, kernel: int, runs: int, *override: int) -> int:
     """Instructions of so many runs, counted by callgrind."""
+    return counted(driver, name, kernel, runs, *override)[0]
+
+
+def counted(driver: Path, name: str, kernel: int, runs: int, *override: int) -> tuple[int, int]:
+    """Instructions and ticks of so many runs."""
     command = [
         "valgrind",
         "--tool=callgrind",
@@ -286,12 +305,13 @@ def instructions(driver: Path, name: str, kernel: int, runs: int) -> int:
         str(PROGRAMS / f"{name}.hdgp"),
         str(kernel),
         str(runs),
+        *map(str, override),
     ]
-    text = subprocess.run(command, check=True, capture_output=True, text=True).stderr
-    found = re.search(r"Collected : (\d+)", text)
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    found = re.search(r"Collected : (\d+)", done.stderr)
     if found is None:
         raise SystemExit("callgrind gave no count")
-    return int(found.group(1))
+    return int(found.group(1)), int(done.stdout)
 
 
 def speed(compiler: str, folder: Path) -> dict[str, Any]:
@@ -311,13 +331,35 @@ def speed(compiler: str, folder: Path) -> dict[str, Any]:
     return out
 
 
+OVERRIDES = {
+    "plain": (100, 100),
+    "constant 70 %": (70, 70),
+    "on the way between 50 and 90 %": (50, 90),
+    "200 % wanted": (200, 200),
+}
+
+
+def override_cost(compiler: str, folder: Path) -> dict[str, float]:
+    """Instructions of a tick with the override in use; empty without valgrind."""
+    if not shutil.which("valgrind"):
+        return {}
+    driver = build_driver(compiler, folder)
+    out = {}
+    for label, override in OVERRIDES.items():
+        one, three = (counted(driver, "heart_exponential", 0, n, *override) for n in (1, 3))
+        out[label] = (three[0] - one[0]) / (three[1] - one[1])
+    return out
+
+
 def run_time(driver: Path, name: str, kernel: int, runs: int) -> float:
     """User seconds of so many runs."""
     import resource
 
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     subprocess.run(
-        [str(driver), str(PROGRAMS / f"{name}.hdgp"), str(kernel), str(runs)], check=True
+        [str(driver), str(PROGRAMS / f"{name}.hdgp"), str(kernel), str(runs)],
+        check=True,
+        stdout=subprocess.DEVNULL,
     )
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
@@ -338,6 +380,7 @@ def main() -> None:
                 n: noise(core, n, 400) for n in ("alpha_exponential", "heart_exponential")
             },
             "speed": speed(options.compiler, folder),
+            "override_tick_instructions": override_cost(options.compiler, folder),
         }
     report(figures)
     if options.json:
@@ -363,6 +406,8 @@ def report(figures: dict[str, Any]) -> None:
             f"  {kernel}: {values['tick_ns']:.0f} ns a tick{counted}, "
             f"{values['time_ratio_to_double']:.2f} of double"
         )
+    for label, cost in figures["override_tick_instructions"].items():
+        print(f"  fixed, override {label}: {cost:.0f} instructions a tick")
 
 
 if __name__ == "__main__":

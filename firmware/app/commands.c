@@ -12,8 +12,22 @@ static enum machine_refusal locked(struct machine *machine,
     return refusal;
 }
 
+/* The start of the program is exactly the image's point; anywhere else the kernel says where. */
+static int prepare(struct controller *controller, int64_t from_q40_mm, struct motion *prepared,
+                   int32_t start_counts[PLANE_AXES])
+{
+    const struct program_slot *slot = &controller->slot;
+    const int result =
+        motion_begin_at(prepared, &slot->program, &controller->config, from_q40_mm, start_counts);
+    if (from_q40_mm <= 0) {
+        start_counts[0] = slot->start_counts[0];
+        start_counts[1] = slot->start_counts[1];
+    }
+    return result;
+}
+
 /* Everything that takes long (program check, reading all pieces) happens before the lock. */
-static enum machine_refusal start(struct controller *controller)
+static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
 {
     struct program_slot *slot = &controller->slot;
     if (!slot->present) {
@@ -24,12 +38,13 @@ static enum machine_refusal start(struct controller *controller)
         return MACHINE_OUTSIDE_LIMITS;
     }
     struct motion prepared;
-    if (motion_begin(&prepared, &slot->program, &controller->config) != 0) {
+    int32_t start_counts[PLANE_AXES];
+    if (prepare(controller, from_q40_mm, &prepared, start_counts) != 0) {
         return MACHINE_OUTSIDE_LIMITS;
     }
     port_lock();
     const enum machine_refusal refusal =
-        machine_start(&controller->machine, &prepared, slot->start_counts);
+        machine_start(&controller->machine, &prepared, start_counts);
     port_unlock();
     return refusal;
 }
@@ -41,7 +56,13 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     case COMMAND_ENABLE:
         return locked(machine, machine_enable);
     case COMMAND_START:
-        return start(controller);
+        return start(controller, 0);
+    case COMMAND_START_FROM:
+        return start(controller, controller->values.start_position);
+    case COMMAND_HOLD:
+        return locked(machine, machine_hold);
+    case COMMAND_RESUME:
+        return locked(machine, machine_resume);
     case COMMAND_DISABLE:
         return locked(machine, machine_disable);
     case COMMAND_RESET:

@@ -11,6 +11,9 @@ enum command {
     COMMAND_STOP = 3,
     COMMAND_DISABLE = 4,
     COMMAND_RESET = 5,
+    COMMAND_HOLD = 6,
+    COMMAND_RESUME = 7,
+    COMMAND_START_FROM = 8, /* at the arc length of object 0x2011 */
 };
 
 /* Does it, or says why not; the answer is also kept in controller->refusal. */

@@ -147,7 +147,7 @@ static void note_state(struct controller *controller)
 {
     static const char *const names[] = {"state boot",  "state off",     "state enabling",
                                         "state ready", "state running", "state stopping",
-                                        "state fault"};
+                                        "state fault", "state holding", "state held"};
     port_lock();
     const enum machine_state state = controller->machine.state;
     port_unlock();

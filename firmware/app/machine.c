@@ -24,12 +24,14 @@ void machine_init(struct machine *machine, const struct config *config)
 {
     memset(machine, 0, sizeof *machine);
     machine->config = *config;
+    machine->override_percent = 100;
     machine_enter_boot(machine);
 }
 
 bool machine_moving(const struct machine *machine)
 {
     return machine->state == MACHINE_RUNNING || machine->state == MACHINE_STOPPING ||
+           machine->state == MACHINE_HOLDING || machine->state == MACHINE_HELD ||
            (machine->state == MACHINE_FAULT && machine->fault_phase == MACHINE_FAULT_BRAKING);
 }
 
@@ -101,13 +103,53 @@ enum machine_refusal machine_disable(struct machine *machine)
 
 enum machine_refusal machine_request_stop(struct machine *machine)
 {
-    if (machine->state == MACHINE_RUNNING) {
+    if (machine->state == MACHINE_RUNNING || machine->state == MACHINE_HOLDING ||
+        machine->state == MACHINE_HELD) {
         motion_stop(&machine->motion);
         machine->state = MACHINE_STOPPING;
     } else if (machine->state == MACHINE_ENABLING) {
         return machine_disable(machine);
     }
     return MACHINE_ACCEPTED;
+}
+
+static enum machine_refusal nothing_runs(const struct machine *machine)
+{
+    return machine->state == MACHINE_FAULT ? MACHINE_FAULT_PRESENT : MACHINE_NOT_RUNNING;
+}
+
+enum machine_refusal machine_hold(struct machine *machine)
+{
+    if (machine->state == MACHINE_HOLDING || machine->state == MACHINE_HELD) {
+        return MACHINE_ACCEPTED;
+    }
+    if (machine->state != MACHINE_RUNNING) {
+        return nothing_runs(machine);
+    }
+    motion_hold(&machine->motion);
+    machine->state = MACHINE_HOLDING;
+    return MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_resume(struct machine *machine)
+{
+    if (machine->state == MACHINE_RUNNING) {
+        return MACHINE_ACCEPTED;
+    }
+    if (machine->state != MACHINE_HOLDING && machine->state != MACHINE_HELD) {
+        return nothing_runs(machine);
+    }
+    motion_resume(&machine->motion);
+    machine->state = MACHINE_RUNNING;
+    return MACHINE_ACCEPTED;
+}
+
+void machine_override(struct machine *machine, uint32_t percent)
+{
+    machine->override_percent = percent;
+    if (machine_moving(machine)) {
+        motion_override(&machine->motion, percent);
+    }
 }
 
 enum machine_refusal machine_reset(struct machine *machine)
@@ -157,6 +199,7 @@ enum machine_refusal machine_start(struct machine *machine, const struct motion 
     const enum machine_refusal refusal = start_refusal(machine, start_counts);
     if (refusal == MACHINE_ACCEPTED) {
         machine->motion = *prepared;
+        motion_override(&machine->motion, machine->override_percent);
         machine->ticks_left = MACHINE_SETTLE_TICKS;
         statistics_restart(&machine->statistics);
         machine->state = MACHINE_RUNNING;
@@ -187,7 +230,7 @@ bool machine_drives_operational(const struct machine *machine)
 
 bool machine_busy(const struct machine *machine)
 {
-    if (machine->state != MACHINE_READY) {
+    if (machine->state != MACHINE_READY && machine->state != MACHINE_HELD) {
         return machine->state == MACHINE_ENABLING || machine_moving(machine);
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {

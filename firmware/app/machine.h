@@ -5,6 +5,7 @@
  *
  *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
  *                                       RUNNING -> STOPPING -> READY
+ *                                       RUNNING -> HOLDING -> HELD -> RUNNING, STOPPING
  *
  * The state changes in two places only: in the requests below (mainline, under the lock) and in
  * machine_step (timer). The whole struct is guarded by the port's lock.
@@ -30,6 +31,8 @@ enum machine_state {
     MACHINE_RUNNING = 4,  /* a program runs, or its last point is being settled at */
     MACHINE_STOPPING = 5, /* the same for a stop along the path */
     MACHINE_FAULT = 6,
+    MACHINE_HOLDING = 7, /* a feed hold brings the path to rest, or the program ended first */
+    MACHINE_HELD = 8,    /* at rest on the path until resumed or stopped */
 };
 
 /* What goes on inside FAULT. */
@@ -49,6 +52,7 @@ enum machine_refusal {
     MACHINE_FAULT_PRESENT = 5,
     MACHINE_DRIVES_MISSING = 6,
     MACHINE_OUTSIDE_LIMITS = 7,
+    MACHINE_NOT_RUNNING = 8,
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
@@ -64,6 +68,7 @@ struct machine {
     enum machine_state state;
     enum machine_fault_phase fault_phase; /* in FAULT */
     uint32_t ticks_left;                  /* settling, enabling, resetting */
+    uint32_t override_percent;            /* wanted, object 0x2010 sub 1; for every program */
     bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
     bool configured; /* drives are configured; BOOT then waits for their first answers */
     bool boot_due;   /* the mainline shall find and configure the drives (anew) */
@@ -78,11 +83,17 @@ enum machine_refusal machine_enable(struct machine *machine);
 enum machine_refusal machine_disable(struct machine *machine);
 /* Never refused; without effect when nothing runs. From ENABLING it leads back to OFF. */
 enum machine_refusal machine_request_stop(struct machine *machine);
+/* Feed hold and its end; accepted as well when there is nothing to change. */
+enum machine_refusal machine_hold(struct machine *machine);
+enum machine_refusal machine_resume(struct machine *machine);
 enum machine_refusal machine_reset(struct machine *machine);
 /* Starts a prepared motion whose first setpoint is at start_counts: copied, if the axes are
  * enabled, stand still and are within the configured tolerance. */
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
                                    const int32_t start_counts[PLANE_AXES]);
+
+/* The feed override, 0 ... 200 per cent, at any time. Under the lock. */
+void machine_override(struct machine *machine, uint32_t percent);
 
 /* True where 0x1006 and 0x2004 ... 0x2007 may be written: BOOT, OFF, FAULT with the axes at rest.
  */

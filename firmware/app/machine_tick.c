@@ -4,8 +4,8 @@
 
 static bool enabled_expected(const struct machine *machine)
 {
-    return machine->state == MACHINE_READY || machine->state == MACHINE_RUNNING ||
-           machine->state == MACHINE_STOPPING;
+    return machine->state == MACHINE_READY ||
+           (machine->state != MACHINE_FAULT && machine_moving(machine));
 }
 
 /* The drive's own words, when they have come, say more than "a fault". */
@@ -91,6 +91,9 @@ static void step_motion(struct machine *machine)
 {
     if (!motion_over(&machine->motion)) {
         next_targets(machine);
+        if (machine->state == MACHINE_HOLDING && motion_held(&machine->motion)) {
+            machine->state = MACHINE_HELD;
+        }
     } else if (time_is_up(machine)) {
         machine->state = MACHINE_READY;
     }
@@ -127,6 +130,8 @@ void machine_step(struct machine *machine)
         break;
     case MACHINE_RUNNING:
     case MACHINE_STOPPING:
+    case MACHINE_HOLDING:
+    case MACHINE_HELD:
         step_motion(machine);
         break;
     case MACHINE_FAULT:

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/counts.h"
+#include "core/program_time.h"
 
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config)
 {
@@ -11,6 +12,29 @@ int motion_begin(struct motion *motion, const struct program *program, const str
     motion->counts_per_mm = config->counts_per_mm;
     timebase_begin(&motion->timebase, program, config->period_us);
     return interp_begin(&motion->interp, program, (enum interp_kernel)config->kernel);
+}
+
+static void to_counts(const struct motion *motion, const struct interp_point *point,
+                      int32_t counts[PLANE_AXES])
+{
+    counts[0] = counts_from_q40_mm(point->x_q40_mm, motion->counts_per_mm);
+    counts[1] = counts_from_q40_mm(point->y_q40_mm, motion->counts_per_mm);
+}
+
+int motion_begin_at(struct motion *motion, const struct program *program,
+                    const struct config *config, int64_t arc_length_q40_mm,
+                    int32_t start_counts[PLANE_AXES])
+{
+    const int result = motion_begin(motion, program, config);
+    if (result < 0) {
+        return result;
+    }
+    const uint64_t time_q42_s = program_time_at_q42(program, arc_length_q40_mm);
+    timebase_begin_at(&motion->timebase, program, config->period_us, time_q42_s);
+    (void)interp_seek(&motion->interp, time_q42_s >> 10);
+    (void)interp_at_q42(&motion->interp, time_q42_s, &motion->point);
+    to_counts(motion, &motion->point, start_counts);
+    return 0;
 }
 
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
@@ -23,14 +47,33 @@ int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
     }
     motion->time_q32_s = time_q32_s;
     motion->setpoints++;
-    target_counts[0] = counts_from_q40_mm(motion->point.x_q40_mm, motion->counts_per_mm);
-    target_counts[1] = counts_from_q40_mm(motion->point.y_q40_mm, motion->counts_per_mm);
+    to_counts(motion, &motion->point, target_counts);
     return 0;
 }
 
 void motion_stop(struct motion *motion)
 {
     timebase_stop(&motion->timebase);
+}
+
+void motion_hold(struct motion *motion)
+{
+    timebase_hold(&motion->timebase);
+}
+
+void motion_resume(struct motion *motion)
+{
+    timebase_resume(&motion->timebase);
+}
+
+void motion_override(struct motion *motion, uint32_t percent)
+{
+    timebase_override(&motion->timebase, percent);
+}
+
+bool motion_held(const struct motion *motion)
+{
+    return timebase_state(&motion->timebase) == TIMEBASE_HELD;
 }
 
 bool motion_over(const struct motion *motion)

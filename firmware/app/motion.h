@@ -28,11 +28,25 @@ struct motion {
  * motion lasts. 0 or a negative INTERP_ERR_... Mainline; linear in the number of pieces. */
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config);
 
+/* The same, but to go on from rest at an arc length of the program. Gives where that is, in counts.
+ * Mainline. */
+int motion_begin_at(struct motion *motion, const struct program *program,
+                    const struct config *config, int64_t arc_length_q40_mm,
+                    int32_t start_counts[PLANE_AXES]);
+
 /* The next setpoint. 0, or a negative INTERP_ERR_... with targets unchanged. Timer. */
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES]);
 
 /* Asks for a stop along the path. Under the lock. */
 void motion_stop(struct motion *motion);
+
+/* Feed hold, the end of it, the rate wanted (0 ... 200 %). Under the lock. */
+void motion_hold(struct motion *motion);
+void motion_resume(struct motion *motion);
+void motion_override(struct motion *motion, uint32_t percent);
+
+/* True while a hold has the path at rest. */
+bool motion_held(const struct motion *motion);
 
 /* True when the last setpoint given was the last one: end of the program or of the stop. */
 bool motion_over(const struct motion *motion);

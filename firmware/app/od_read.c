@@ -109,6 +109,19 @@ static uint64_t motion_number(const struct motion *motion, uint8_t sub)
     }
 }
 
+static uint64_t override_number(const struct machine *machine, uint8_t sub)
+{
+    const struct timebase *timebase = &machine->motion.timebase;
+    switch (sub) {
+    case 1:
+        return machine->override_percent;
+    case 2:
+        return machine_moving(machine) ? timebase_rate_q30(timebase) : 0u;
+    default:
+        return machine_moving(machine) && timebase_saturated(timebase) ? 1u : 0u;
+    }
+}
+
 static uint64_t axis_number(const struct axis *axis, uint16_t index)
 {
     switch (index) {
@@ -137,6 +150,8 @@ static uint64_t machine_number(const struct controller *controller, const struct
         return statistics_number(&machine->statistics, entry->sub);
     case 0x2009:
         return motion_number(&machine->motion, entry->sub);
+    case 0x2010:
+        return override_number(machine, entry->sub);
     default:
         return axis_number(&machine->axes[entry->sub - 1u], entry->index);
     }
@@ -148,7 +163,7 @@ static bool is_mirror(const struct od_entry *entry)
         return true;
     }
     const bool in_record = entry->index == 0x2003 || entry->index == 0x2008 ||
-                           entry->index == 0x2009 ||
+                           entry->index == 0x2009 || entry->index == 0x2010 ||
                            (entry->index >= 0x200A && entry->index <= 0x200E);
     return in_record && entry->sub > 0u;
 }

@@ -53,7 +53,11 @@ static void reconfigure(struct controller *controller, const struct od_entry *en
 void od_written_hook(void *context, const struct od_entry *entry)
 {
     struct controller *controller = context;
-    if (entry->index == 0x1003) {
+    if (entry->index == 0x2010) {
+        port_lock();
+        machine_override(&controller->machine, controller->values.override.percent);
+        port_unlock();
+    } else if (entry->index == 0x1003) {
         emcy_producer_forget(&controller->emcy);
     } else if (config_contains(entry->index) && !controller->same_value) {
         reconfigure(controller, entry);

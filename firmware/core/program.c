@@ -108,6 +108,15 @@ uint64_t program_piece_duration(const struct program *p, uint32_t i)
     return read_u64(piece_bytes(p, i));
 }
 
+void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
+                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2)
+{
+    const uint8_t *b = piece_bytes(p, i);
+    *factor_q24 = read_u32(b + 72);
+    *rate_q16_per_s = read_u32(b + 76);
+    *second_q8_per_s2 = read_u32(b + 80);
+}
+
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out)
 {
     const uint8_t *b = segment_bytes(p, i);

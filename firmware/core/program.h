@@ -81,6 +81,10 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
 int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
+/* Only its override bounds, fields as in struct program_piece. */
+void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
+                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2);
+
 /* Setpoints of the program: ceil(duration / period) + 1, with the period of the header. Needs a
  * program that passed program_check. */
 uint32_t program_ticks(const struct program *p);

@@ -46,3 +46,17 @@ int64_t qmath_fifth(int64_t a)
 {
     return mul_reciprocal(a, 0x33333333u);
 }
+
+uint64_t qmath_root(uint64_t a)
+{
+    uint64_t root = 0;
+    for (uint64_t bit = (uint64_t)1 << 62; bit != 0; bit >>= 2) {
+        uint64_t next = root + bit;
+        root >>= 1;
+        if (a >= next) {
+            a -= next;
+            root += bit;
+        }
+    }
+    return root;
+}

@@ -97,6 +97,9 @@ static inline int32_t qmath_clamp32(int64_t a)
  * in the tick. */
 uint64_t qmath_div_u64(uint64_t a, uint32_t b);
 
+/* floor of the square root; 32 rounds of additions. */
+uint64_t qmath_root(uint64_t a);
+
 /* a / 3 and a / 5 for |a| < 2^62, by the reciprocal: at most 2 units below the exact value. */
 int64_t qmath_third(int64_t a);
 int64_t qmath_fifth(int64_t a);

@@ -2,148 +2,200 @@
 #include "core/timebase.h"
 
 #include "core/qmath.h"
+#include "core/rate_plan.h"
 
-#define REST_UNIT  15625u /* 10^6 = 15625 * 2^6: periods in 2^-42 s are multiples of 1/15625 */
-#define ONE_Q30    (1u << 30)
-#define MOST_TICKS (1u << 20)
+#define REST_UNIT 15625u /* 10^6 = 15625 * 2^6: periods in 2^-42 s are multiples of 1/15625 */
+#define FINE_BITS 20
+#define MOST_ENDS 2u /* piece ends in a tick, protocol.md 1.3 */
 
-static uint32_t divide_up(uint64_t a, uint32_t b)
+static void set_period(struct timebase *tb, uint32_t period_us)
 {
-    uint64_t quotient = qmath_div_u64(a + b - 1u, b);
-    return quotient > UINT32_MAX ? UINT32_MAX : (uint32_t)quotient;
+    uint64_t period = (uint64_t)period_us << 36;
+    tb->period_q42_s = qmath_div_u64(period, REST_UNIT);
+    tb->period_rest = (uint32_t)(period - tb->period_q42_s * REST_UNIT);
+    tb->period_q32_s = (uint32_t)(tb->period_q42_s >> 10) + 1u;
+    /* period_us 2^63 / 46875 in two steps */
+    uint64_t high = qmath_div_u64((uint64_t)period_us << 48, 46875u);
+    uint64_t left = ((uint64_t)period_us << 48) - high * 46875u;
+    tb->sixth_q70_s = (high << 15) + qmath_div_u64(left << 15, 46875u);
+    rate_scale_set(&tb->scale, period_us);
 }
 
-static uint32_t root_up(uint32_t a)
+static void set_least(struct timebase *tb)
 {
-    uint32_t root = 0;
-    for (uint32_t bit = 1u << 15; bit != 0; bit >>= 1) {
-        uint32_t next = root | bit;
-        root = next * next <= a ? next : root;
+    struct rate_bounds bounds;
+    rate_window_piece(&tb->scale, tb->program, 0, &tb->least);
+    for (uint32_t i = 1; i < tb->program->header.piece_count; i++) {
+        rate_window_piece(&tb->scale, tb->program, i, &bounds);
+        tb->least = rate_bounds_least(&tb->least, &bounds);
     }
-    return root * root < a ? root + 1u : root;
 }
 
-static uint32_t at_least(uint32_t a, uint32_t least)
+/* Makes the piece of the present time the current one. */
+static void find_piece(struct timebase *tb, uint32_t most)
 {
-    return a < least ? least : a;
+    uint64_t time_q32_s = tb->time_q42_s >> 10;
+    uint32_t i = tb->piece;
+    while (time_q32_s >= tb->piece_end_q32_s && i + 1u < tb->program->header.piece_count &&
+           most > 0) {
+        i++;
+        most--;
+        tb->piece_end_q32_s += program_piece_duration(tb->program, i);
+    }
+    if (i != tb->piece) {
+        tb->piece = i;
+        tb->climb_end_q32_s = 0;
+        rate_window_piece(&tb->scale, tb->program, i, &tb->bounds);
+    }
 }
 
-/* slope >= 1/(rate h) and slope^2 >= 1/(second h^2); corner >= 1/(second h^2 slope): numerics.md
- * section 12. */
-static void plan_stop(struct timebase *tb, uint32_t rate_q16, uint32_t second_q8,
-                      uint32_t period_us)
+void timebase_begin_at(struct timebase *tb, const struct program *p, uint32_t period_us,
+                       uint64_t time_q42_s)
 {
-    uint32_t per_rate = divide_up(UINT64_C(65536000000) / 1000u, period_us / 1000u);
-    uint32_t per_second = 256000000u / (period_us / 1000u) / (period_us / 1000u);
-    uint32_t by_rate = divide_up(per_rate, at_least(rate_q16, 1));
-    uint32_t square = divide_up(per_second, at_least(second_q8, 1));
-    uint32_t slope = at_least(by_rate, root_up(square));
-    slope = slope > MOST_TICKS ? MOST_TICKS : slope;
-    uint32_t corner = divide_up(square, slope);
-    tb->slope_ticks = slope;
-    tb->corner_ticks = corner > slope ? slope : corner;
-    tb->unit_q62 = qmath_div_u64(qmath_div_u64(UINT64_C(1) << 62, 6u * slope), tb->corner_ticks);
+    tb->program = p;
+    tb->duration_q42_s = p->header.duration_q32_s << 10;
+    tb->time_q42_s = time_q42_s < tb->duration_q42_s ? time_q42_s : tb->duration_q42_s;
+    tb->rest = 0;
+    tb->fine = 0;
+    set_period(tb, period_us);
+    set_least(tb);
+    tb->started = 0;
+    tb->state = tb->time_q42_s == tb->duration_q42_s ? TIMEBASE_ENDED : TIMEBASE_RUNNING;
+    tb->piece = 0;
+    tb->piece_end_q32_s = program_piece_duration(p, 0);
+    tb->climb_end_q32_s = 0;
+    rate_window_piece(&tb->scale, p, 0, &tb->bounds);
+    find_piece(tb, UINT32_MAX);
+    tb->now.rate_q57 = 0;
+    tb->now.slope_q56 = 0;
+    tb->override_q57 = RATE_ONE;
+    tb->plan = tb->least;
+    tb->plan_target_q57 = 0;
+    tb->plan_piece = tb->piece;
+    tb->climb_piece = 0;
+    tb->saturated = 0;
 }
 
 void timebase_begin(struct timebase *tb, const struct program *p, uint32_t period_us)
 {
-    uint64_t period = (uint64_t)period_us << 36;
-    struct program_piece piece;
-    uint32_t rate = UINT32_MAX;
-    uint32_t second = UINT32_MAX;
-    for (uint32_t i = 0; i < p->header.piece_count; i++) {
-        program_piece_get(p, i, &piece);
-        rate = piece.override_rate_q16_per_s < rate ? piece.override_rate_q16_per_s : rate;
-        second =
-            piece.override_second_q8_per_s2 < second ? piece.override_second_q8_per_s2 : second;
+    timebase_begin_at(tb, p, period_us, 0);
+}
+
+static void set_state(struct timebase *tb, enum timebase_state state)
+{
+    tb->state = state;
+    tb->climb_end_q32_s = 0;
+    tb->climb_piece = 0;
+}
+
+void timebase_hold(struct timebase *tb)
+{
+    if (tb->state == TIMEBASE_RUNNING) {
+        set_state(tb, TIMEBASE_HOLDING);
     }
-    tb->duration_q42_s = p->header.duration_q32_s << 10;
-    tb->time_q42_s = 0;
-    tb->rest = 0;
-    tb->period_q42_s = qmath_div_u64(period, REST_UNIT);
-    tb->period_rest = (uint32_t)(period - tb->period_q42_s * REST_UNIT);
-    tb->period_q38_s = (uint32_t)((tb->period_q42_s + 8u) >> 4);
-    tb->started = 0;
-    tb->state = tb->duration_q42_s == 0 ? TIMEBASE_ENDED : TIMEBASE_RUNNING;
-    tb->ramp_tick = 0;
-    tb->rate_q30 = ONE_Q30;
-    plan_stop(tb, rate, second, period_us);
+}
+
+void timebase_resume(struct timebase *tb)
+{
+    if (tb->state == TIMEBASE_HOLDING || tb->state == TIMEBASE_HELD) {
+        set_state(tb, TIMEBASE_RUNNING);
+    }
+}
+
+void timebase_override(struct timebase *tb, uint32_t percent)
+{
+    uint32_t used = percent < TIMEBASE_MOST_PERCENT ? percent : TIMEBASE_MOST_PERCENT;
+    tb->override_q57 = (int64_t)qmath_div_u64(((uint64_t)RATE_ONE >> 2) * used, 25u);
+    tb->climb_end_q32_s = 0;
+    tb->climb_piece = 0;
 }
 
 void timebase_stop(struct timebase *tb)
 {
-    if (tb->state == TIMEBASE_RUNNING) {
-        tb->state = TIMEBASE_STOPPING;
-        tb->ramp_tick = 0;
+    if (tb->state == TIMEBASE_RUNNING || tb->state == TIMEBASE_HOLDING) {
+        set_state(tb, TIMEBASE_STOPPING);
+    } else if (tb->state == TIMEBASE_HELD) {
+        set_state(tb, TIMEBASE_STOPPED);
     }
 }
 
-static void step_running(struct timebase *tb)
+/* A program begins with feed and acceleration zero: there the rate may jump. */
+static void step_first(struct timebase *tb)
 {
-    tb->time_q42_s += tb->period_q42_s;
-    tb->rest += tb->period_rest;
-    if (tb->rest >= REST_UNIT) {
-        tb->rest -= REST_UNIT;
-        tb->time_q42_s++;
+    tb->started = 1;
+    if (tb->time_q42_s == 0 && tb->state == TIMEBASE_RUNNING) {
+        tb->now.rate_q57 = tb->override_q57 < RATE_ONE ? tb->override_q57 : RATE_ONE;
+        tb->plan_target_q57 = tb->now.rate_q57;
     }
 }
 
-/* Six times the increase of the integral of (n - from)^2 / 2 over tick n, from where it begins. */
-static uint64_t corner_term(uint32_t n, uint32_t from)
+/* Integral of the rate over the tick: 6 times its mean is 3 rate + 2 slope + next slope. */
+static void advance(struct timebase *tb, int64_t slope_q56)
 {
-    uint64_t x = n - from;
-    return n >= from ? 3u * x * (x + 1u) + 1u : 0u;
+    if (tb->now.rate_q57 == RATE_ONE && tb->now.slope_q56 == 0 && slope_q56 == 0) {
+        tb->time_q42_s += tb->period_q42_s;
+        tb->rest += tb->period_rest;
+        if (tb->rest >= REST_UNIT) {
+            tb->rest -= REST_UNIT;
+            tb->time_q42_s++;
+        }
+        return;
+    }
+    int64_t six_q56 = 3 * tb->now.rate_q57 + 2 * tb->now.slope_q56 + slope_q56;
+    int64_t way_q62 = qmath_mul_unsigned(six_q56, (uint32_t)(tb->sixth_q70_s >> 32)) +
+                      (qmath_mul_unsigned(six_q56, (uint32_t)tb->sixth_q70_s) >> 32);
+    uint64_t sum = tb->fine + (uint64_t)(way_q62 > 0 ? way_q62 : 0);
+    tb->time_q42_s += sum >> FINE_BITS;
+    tb->fine = (uint32_t)sum & ((1u << FINE_BITS) - 1u);
 }
 
-/* Mean rate over ramp tick n: 1 - 6 dH / (6 slope corner), numerics.md section 12. */
-static uint64_t ramp_rate_q62(const struct timebase *tb, uint32_t n)
+static void settle(struct timebase *tb)
 {
-    uint32_t slope = tb->slope_ticks;
-    uint32_t corner = tb->corner_ticks;
-    uint64_t fall = corner_term(n, 0) + corner_term(n, slope + corner);
-    fall -= corner_term(n, corner) + corner_term(n, slope);
-    return (UINT64_C(1) << 62) - fall * tb->unit_q62;
-}
-
-static void step_stopping(struct timebase *tb)
-{
-    uint64_t rate = ramp_rate_q62(tb, tb->ramp_tick);
-    int64_t way_q68 = qmath_mul_unsigned((int64_t)rate, tb->period_q38_s);
-    tb->time_q42_s += (uint64_t)way_q68 >> 26;
-    tb->rate_q30 = (uint32_t)(rate >> 32);
-    tb->ramp_tick++;
-    if (tb->ramp_tick == tb->slope_ticks + tb->corner_ticks) {
-        tb->state = TIMEBASE_STOPPED;
+    if (tb->time_q42_s >= tb->duration_q42_s) {
+        tb->time_q42_s = tb->duration_q42_s;
+        tb->rest = 0;
+        tb->fine = 0;
+        tb->state = TIMEBASE_ENDED;
+    } else if (tb->now.rate_q57 == 0 && tb->now.slope_q56 == 0) {
+        tb->state = tb->state == TIMEBASE_STOPPING  ? TIMEBASE_STOPPED
+                    : tb->state == TIMEBASE_HOLDING ? TIMEBASE_HELD
+                                                    : tb->state;
     }
 }
 
 uint64_t timebase_step(struct timebase *tb)
 {
     if (tb->started == 0) {
-        tb->started = 1;
-    } else if (tb->state == TIMEBASE_RUNNING) {
-        step_running(tb);
-    } else if (tb->state == TIMEBASE_STOPPING) {
-        step_stopping(tb);
+        step_first(tb);
+    } else if (tb->state == TIMEBASE_ENDED || tb->state == TIMEBASE_STOPPED) {
+        tb->now.rate_q57 = 0;
+        tb->now.slope_q56 = 0;
     } else {
-        tb->rate_q30 = 0;
+        int64_t slope_q56 = rate_plan_slope(tb);
+        advance(tb, slope_q56);
+        rate_move(&tb->now, slope_q56);
+        find_piece(tb, MOST_ENDS);
     }
-    if (tb->time_q42_s >= tb->duration_q42_s) {
-        tb->time_q42_s = tb->duration_q42_s;
-        tb->rest = 0;
-        tb->state = TIMEBASE_ENDED;
-    }
-    return (tb->time_q42_s + 512u) >> 10;
+    settle(tb);
+    return (timebase_time_q42(tb) + 512u) >> 10;
 }
 
 uint64_t timebase_time_q42(const struct timebase *tb)
 {
-    return tb->time_q42_s + (2u * tb->rest > REST_UNIT ? 1u : 0u);
+    uint64_t rest = ((uint64_t)tb->rest << FINE_BITS) + (uint64_t)tb->fine * REST_UNIT;
+    uint64_t half = (uint64_t)REST_UNIT << (FINE_BITS - 1);
+    return tb->time_q42_s + (rest > half ? 1u : 0u) + (rest > 3u * half ? 1u : 0u);
 }
 
 uint32_t timebase_rate_q30(const struct timebase *tb)
 {
-    return tb->rate_q30;
+    int over = tb->state == TIMEBASE_ENDED || tb->state == TIMEBASE_STOPPED;
+    return over ? 0u : (uint32_t)(tb->now.rate_q57 >> 27);
+}
+
+int timebase_saturated(const struct timebase *tb)
+{
+    return tb->saturated != 0;
 }
 
 enum timebase_state timebase_state(const struct timebase *tb)

@@ -36,9 +36,12 @@ PROGRAM, COMMAND, STATE, FAULT = 0x2000, 0x2001, 0x2002, 0x2003
 CONFIGURATION, AXIS_NODE, TRAVEL_MINIMUM, TRAVEL_MAXIMUM = 0x2004, 0x2005, 0x2006, 0x2007
 STATISTICS, MOTION = 0x2008, 0x2009
 STATUSWORD, ACTUAL, DRIVE_ERROR, TARGET = 0x200A, 0x200B, 0x200C, 0x200D
+OVERRIDE, START_POSITION = 0x2010, 0x2011
 
-ENABLE, START, STOP, DISABLE, RESET = 1, 2, 3, 4, 5
-BOOT, OFF, ENABLING, READY, RUNNING, STOPPING, FAULT_STATE = 0, 1, 2, 3, 4, 5, 6
+ENABLE, START, STOP, DISABLE, RESET, HOLD, RESUME, START_FROM = 1, 2, 3, 4, 5, 6, 7, 8
+BOOT, OFF, ENABLING, READY, RUNNING, STOPPING, FAULT_STATE, HOLDING, HELD = range(9)
+ON_PATH = (RUNNING, HOLDING, HELD)
+"""States in which a stop has something to stop."""
 REFUSED_MOVING = 3
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
@@ -183,7 +186,7 @@ class Controller:
         if not different:
             return False
         state = self.state()
-        if state in (RUNNING, STOPPING, ENABLING):
+        if state in (*ON_PATH, STOPPING, ENABLING):
             raise RefusedError(
                 f"{self._who()} is {STATES[state]} with another configuration: hodograph stop first"
             )
@@ -315,28 +318,37 @@ class Controller:
             self.command(ENABLE)
         self.wait_for((READY,), 10.0)
 
-    def start(self, wait_s: float = 10.0) -> None:
-        """Starts the program, waiting as long as the axes are said to be still moving."""
+    def start(self, wait_s: float = 10.0, from_mm: float | None = None) -> None:
+        """Starts the program, waiting as long as the axes are said to be still moving.
+
+        `from_mm`: from rest at this arc length of the path, where the axes must stand.
+        """
+        if from_mm is not None:
+            self.write(START_POSITION, None, round(from_mm * 2**40))
         deadline = time.monotonic() + wait_s
         while True:
             try:
-                self.command(START)
+                self.command(START if from_mm is None else START_FROM)
                 return
             except CommandRefusedError as error:
-                moving = self.state() in (RUNNING, STOPPING)
+                moving = self.state() in (*ON_PATH, STOPPING)
                 if error.reason != REFUSED_MOVING or moving or time.monotonic() > deadline:
                     raise
             time.sleep(POLL_S)
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand."""
-        if self.state() in (RUNNING, ENABLING):
+        if self.state() in (*ON_PATH, ENABLING):
             try:
                 self.command(STOP)
             except CommandRefusedError:
-                if self.state() in (RUNNING, ENABLING):
+                if self.state() in (*ON_PATH, ENABLING):
                     raise
         self.wait_for((BOOT, OFF, READY), wait_s)
+
+    def override(self, percent: int) -> None:
+        """Sets the feed override, 0 to 200 per cent, for this and later programs."""
+        self.write(OVERRIDE, 1, percent)
 
     def targets(self, axes: int) -> list[int]:
         """Target positions of the drives, in counts."""

@@ -113,6 +113,7 @@ def run_program(
     program = NativeProgram(image)
     _, setpoints = program.setpoints(kernel, machine.counts_per_mm)
     controller.configure(machine, kernel)
+    controller.override(100)
     controller.enable()
     goto(controller, machine, (int(setpoints[0, 0]), int(setpoints[0, 1])))
     controller.upload(image)

@@ -12,6 +12,7 @@ from .controller import (
     DRIVE_ERROR,
     FAULT,
     MOTION,
+    OVERRIDE,
     STATUSWORD,
     TARGET,
     Controller,
@@ -20,6 +21,7 @@ from .texts import REFUSALS, STATES, drive_state, fault_text
 
 _Q40 = 2.0**-40
 _Q32 = 2.0**-32
+_Q30 = 2.0**-30
 
 
 def read_status(controller: Controller) -> dict[str, Any]:
@@ -37,6 +39,11 @@ def read_status(controller: Controller) -> dict[str, Any]:
             "arc_length_mm": controller.read(MOTION, 1) * _Q40,
             "feed_mm_s": controller.read(MOTION, 2) / 1000,
             "time_s": controller.read(MOTION, 3) * _Q32,
+        },
+        "override": {
+            "wanted_percent": controller.read(OVERRIDE, 1),
+            "actual_percent": 100 * controller.read(OVERRIDE, 2) * _Q30,
+            "saturated": bool(controller.read(OVERRIDE, 3)),
         },
         "axes": [
             _axis(controller, i, counts_per_mm)
@@ -90,6 +97,7 @@ def status_rows(status: dict[str, Any]) -> list[tuple[str, str]]:
             f"time {motion['time_s']:.3f} s",
         ),
     ]
+    rows.append(("override", _override_words(status["override"])))
     for i, axis in enumerate(status["axes"], start=1):
         error = f", error 0x{axis['error_code']:04X}" if axis["error_code"] else ""
         rows.append(
@@ -106,6 +114,11 @@ def status_rows(status: dict[str, Any]) -> list[tuple[str, str]]:
         )
     )
     return rows
+
+
+def _override_words(override: dict[str, Any]) -> str:
+    saturated = ", as much as the program allows here" if override["saturated"] else ""
+    return f"{override['wanted_percent']} %, now {override['actual_percent']:.1f} %{saturated}"
 
 
 def _fault_words(fault: dict[str, Any]) -> str:

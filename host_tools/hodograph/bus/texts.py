@@ -11,6 +11,8 @@ STATES = {
     4: "running",
     5: "stopping",
     6: "fault",
+    7: "holding",
+    8: "held",
 }
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
 
@@ -22,6 +24,7 @@ REFUSALS = {
     5: "a fault is present: see hodograph status",
     6: "drives are missing: are all nodes of the machine file on the bus?",
     7: "the program is not within the limits now configured: upload it again",
+    8: "no program runs: hodograph start",
 }
 """Object 0x2003 sub 4, and the remedy."""
 

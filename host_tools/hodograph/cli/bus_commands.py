@@ -13,10 +13,13 @@ from ..bus.controller import (
     BOOT,
     DISABLE,
     FAULT_STATE,
+    HELD,
+    HOLD,
     OFF,
+    ON_PATH,
     READY,
     RESET,
-    RUNNING,
+    RESUME,
     Controller,
     connect,
 )
@@ -56,7 +59,7 @@ def start(options: Namespace) -> None:
             controller.wait_for((OFF, READY, BOOT), 5.0)
         with stopping(controller):
             controller.enable()
-            controller.start()
+            controller.start(from_mm=options.from_mm)
             if options.follow:
                 controller.wait_for((READY,), math.inf)
     print("done" if options.follow else "running")
@@ -66,12 +69,37 @@ def stop(options: Namespace) -> None:
     """hodograph stop."""
     address = parse_address(options.bus)
     with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
-        was_running = controller.state() == RUNNING
+        was_running = controller.state() in ON_PATH
         controller.stop_and_wait()
         if options.off and controller.state() == READY:
             controller.command(DISABLE)
             controller.wait_for((OFF, BOOT), 5.0)
     print(("stopped" if was_running else "standing") + (", drives off" if options.off else ""))
+
+
+def hold(options: Namespace) -> None:
+    """hodograph hold."""
+    address = parse_address(options.bus)
+    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+        controller.command(HOLD)
+        state = controller.wait_for((HELD, READY), 10.0)
+    print("held" if state == HELD else "the program had ended")
+
+
+def resume(options: Namespace) -> None:
+    """hodograph resume."""
+    address = parse_address(options.bus)
+    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+        controller.command(RESUME)
+    print("running")
+
+
+def override(options: Namespace) -> None:
+    """hodograph override."""
+    address = parse_address(options.bus)
+    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+        controller.override(options.percent)
+    print(f"override {options.percent} %")
 
 
 def status(options: Namespace) -> None:
@@ -85,4 +113,11 @@ def status(options: Namespace) -> None:
         print_rows(status_rows(found))
 
 
-COMMANDS = {"start": start, "stop": stop, "status": status}
+COMMANDS = {
+    "start": start,
+    "stop": stop,
+    "hold": hold,
+    "resume": resume,
+    "override": override,
+    "status": status,
+}

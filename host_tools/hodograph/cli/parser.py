@@ -48,6 +48,13 @@ def finite(text: str) -> float:
     return value
 
 
+def percentage(text: str) -> int:
+    """A feed override."""
+    if not text.isdigit() or int(text) > 200:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 0 to 200')
+    return int(text)
+
+
 def node_number(text: str) -> int:
     """A CANopen node number."""
     if not text.isdigit() or not 1 <= int(text) <= 127:
@@ -156,6 +163,13 @@ def make_parser() -> argparse.ArgumentParser:
 
     start = command("start", "switch the drives on if need be and start the loaded program")
     start.add_argument("--reset", action="store_true", help="reset a fault first")
+    start.add_argument(
+        "--from",
+        dest="from_mm",
+        type=finite,
+        metavar="MM",
+        help="from rest at this arc length, where the axes must stand",
+    )
     start.add_argument("--follow", action="store_true", help="return when the axes stand again")
     _bus(start)
     _node(start)
@@ -164,6 +178,19 @@ def make_parser() -> argparse.ArgumentParser:
     stop.add_argument("--off", action="store_true", help="then switch the drives off")
     _bus(stop)
     _node(stop)
+
+    for name, text in (
+        ("hold", "hold the feed: come to rest on the path until resumed"),
+        ("resume", "go on after a hold"),
+    ):
+        parser_ = command(name, text)
+        _bus(parser_)
+        _node(parser_)
+
+    override = command("override", "set the feed override")
+    override.add_argument("percent", metavar="PERCENT", type=percentage, help="0 to 200")
+    _bus(override)
+    _node(override)
 
     status = command("status", "print the state of controller, drives and program")
     _bus(status)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""Hold, resume, override and start from a position, by the command on the bus."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hodograph.bus.address import parse_address
+from hodograph.bus.controller import HELD, READY, RUNNING, Controller, connect
+from hodograph.bus.processes import Rig
+from hodograph.cli.main import main
+from hodograph.config import load_machine
+
+pytestmark = pytest.mark.bus
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+BUS = parse_address("socketcan:vcan0")
+
+
+@pytest.fixture
+def controller() -> Iterator[Controller]:
+    """A configured controller with its drives, off, in real time."""
+    machine = load_machine(EXAMPLES / "machines" / "paper_alpha.toml")
+    with Rig(machine, BUS, "real-time"), connect(BUS, 1, 1_000_000) as found:
+        found.require(20.0)
+        found.configure(machine, "fixed")
+        yield found
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> str:
+    """The alpha at 10 mm/s: about 10 s."""
+    text = (EXAMPLES / "alpha.toml").read_text().replace("nominal_mm_s = 100", "nominal_mm_s = 10")
+    file = tmp_path / "slow.toml"
+    file.write_text(
+        text.replace('"exponential"', '"quintic"').replace("machines/", f"{EXAMPLES}/machines/")
+    )
+    return str(file)
+
+
+def status(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    capsys.readouterr()
+    assert main(["status", "--json"]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_hold_override_resume(
+    controller: Controller, slow: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["hold"]) == 5
+    assert main(["goto", slow]) == 0
+    assert main(["start"]) == 0
+    time.sleep(1.0)
+    assert main(["hold"]) == 0
+    assert controller.state() == HELD
+    held = status(capsys)
+    assert held["state"] == "held"
+    assert held["motion"]["feed_mm_s"] == 0
+    assert held["override"] == {"wanted_percent": 100, "actual_percent": 0, "saturated": False}
+    time.sleep(0.3)
+    assert status(capsys)["motion"]["arc_length_mm"] == held["motion"]["arc_length_mm"]
+    assert main(["override", "50"]) == 0
+    assert controller.state() == HELD
+    assert main(["resume"]) == 0
+    time.sleep(1.0)
+    half = status(capsys)
+    assert half["override"]["actual_percent"] == 50
+    assert math.isclose(half["motion"]["feed_mm_s"], 5, rel_tol=1e-3)
+    assert main(["override", "201"]) == 2
+    assert main(["override", "200"]) == 0
+    assert controller.wait_for((READY,), 60.0) == READY
+    assert math.isclose(
+        status(capsys)["motion"]["arc_length_mm"], half["program"]["length_mm"], abs_tol=1e-9
+    )
+
+
+def test_goes_on_where_it_was_stopped(
+    controller: Controller, slow: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["goto", slow]) == 0
+    assert main(["start"]) == 0
+    time.sleep(1.5)
+    assert main(["stop"]) == 0
+    arc_mm = status(capsys)["motion"]["arc_length_mm"]
+    assert 5 < arc_mm < 50
+    assert main(["start", "--from", f"{arc_mm + 1.0}"]) == 5
+    assert main(["start", "--from", f"{arc_mm!r}"]) == 0
+    assert controller.state() == RUNNING
+    assert main(["stop"]) == 0
+    assert status(capsys)["motion"]["arc_length_mm"] > arc_mm

@@ -1,0 +1,258 @@
+/* SPDX-License-Identifier: MIT */
+#include "override_program.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "golden.h"
+#include "unity.h"
+
+#define Q40        1099511627776.0
+#define Q32        4294967296.0
+#define SAMPLES    400
+#define SEGMENT_MM 31.0
+
+double override_random(uint64_t *random, double low, double high)
+{
+    return low + (high - low) * (double)(golden_random(random) >> 11) / 9007199254740992.0;
+}
+
+static void put(uint8_t *at, uint64_t value, int bytes)
+{
+    for (int i = 0; i < bytes; i++) {
+        at[i] = (uint8_t)(value >> (8 * i));
+    }
+}
+
+static uint8_t *piece_at(const struct override_program *p, uint32_t i)
+{
+    return p->image + PROGRAM_HEADER_SIZE +
+           (size_t)p->program.header.segment_count * PROGRAM_SEGMENT_SIZE +
+           (size_t)i * PROGRAM_PIECE_SIZE;
+}
+
+void override_program_feed(const struct override_program *p, uint32_t i, double time_s,
+                           double derivative[4])
+{
+    const double *c = p->pieces[i].c;
+    double t = time_s - p->pieces[i].start_s;
+    memset(derivative, 0, 4 * sizeof *derivative);
+    for (int k = 7; k >= 0; k--) {
+        derivative[3] = derivative[3] * t + 3.0 * derivative[2];
+        derivative[2] = derivative[2] * t + 2.0 * derivative[1];
+        derivative[1] = derivative[1] * t + derivative[0];
+        derivative[0] = derivative[0] * t + c[k];
+    }
+}
+
+static double greater(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+/* Doubles and peaks from the image. */
+static void read_pieces(struct override_program *p)
+{
+    double start_s = 0;
+    memset(&p->peak, 0, sizeof p->peak);
+    TEST_ASSERT_TRUE(p->program.header.piece_count <= OVERRIDE_PIECES);
+    for (uint32_t i = 0; i < p->program.header.piece_count; i++) {
+        struct override_piece *piece = &p->pieces[i];
+        struct program_piece raw;
+        double d[4];
+        memset(piece, 0, sizeof *piece);
+        program_piece_get(&p->program, i, &raw);
+        piece->start_s = start_s;
+        piece->end_s = start_s += (double)raw.duration_q32_s / Q32;
+        piece->c[0] = (double)raw.start_q40_mm / Q40;
+        for (int k = 1; k < 8; k++) {
+            piece->c[k] = ldexp((double)raw.c_q40_mm[k - 1],
+                                -40 - k * program_piece_exponent(raw.duration_q32_s));
+        }
+        for (int n = 0; n <= SAMPLES; n++) {
+            override_program_feed(
+                p, i, piece->start_s + (piece->end_s - piece->start_s) * n / SAMPLES, d);
+            piece->feed = greater(piece->feed, fabs(d[1]));
+            piece->acceleration = greater(piece->acceleration, fabs(d[2]));
+            piece->jerk = greater(piece->jerk, fabs(d[3]));
+        }
+        piece->feed = piece->feed * 1.0001 + 1e-6;
+        piece->acceleration = piece->acceleration * 1.0001 + 1e-4;
+        piece->jerk = piece->jerk * 1.0001 + 1e-2;
+        p->peak.feed = greater(p->peak.feed, piece->feed);
+        p->peak.acceleration = greater(p->peak.acceleration, piece->acceleration);
+        p->peak.jerk = greater(p->peak.jerk, piece->jerk);
+    }
+}
+
+static uint32_t stored(double value, double scale)
+{
+    double a = floor(value * (1.0 - 1e-9) * scale);
+    return a > 4294967295.0 ? UINT32_MAX : a < 1.0 ? 1u : (uint32_t)a;
+}
+
+/* docs/numerics.md section 7; no program limits but those of the controller. */
+static void set_bounds(struct override_program *p, uint32_t i)
+{
+    struct override_piece *piece = &p->pieces[i];
+    double v = piece->feed;
+    double a = piece->acceleration;
+    double j = piece->jerk;
+    const struct override_limits *limit = &p->limit;
+    double f = fmin(2.0, limit->feed / v);
+    f = fmin(f, sqrt((a + limit->acceleration) / (2.0 * a)));
+    f = greater(1.0, fmin(f, cbrt((j + limit->jerk) / (2.0 * j))));
+    uint32_t factor = stored(f, 16777216.0);
+    factor = factor < 1u << 24 ? 1u << 24 : factor;
+    f = piece->factor = factor / 16777216.0;
+    double room_j = limit->jerk - f * f * f * j;
+    uint32_t rate =
+        stored(fmin((limit->acceleration - f * f * a) / v, room_j / (6.0 * f * a)), 65536.0);
+    piece->rate = rate / 65536.0;
+    uint32_t second = stored((room_j - 3.0 * f * piece->rate * a) / v, 256.0);
+    piece->second = second / 256.0;
+    uint8_t *at = piece_at(p, i);
+    put(at + 72, factor, 4);
+    put(at + 76, rate, 4);
+    put(at + 80, second, 4);
+}
+
+void override_program_limits(struct override_program *p, uint64_t *random)
+{
+    p->limit.feed = p->peak.feed * override_random(random, 1.0, 2.5);
+    p->limit.acceleration = p->peak.acceleration * override_random(random, 1.05, 3.0);
+    p->limit.jerk = p->peak.jerk * override_random(random, 1.05, 3.0);
+    for (uint32_t i = 0; i < p->program.header.piece_count; i++) {
+        set_bounds(p, i);
+    }
+}
+
+/* v0 + (v1 - v0) (10 x^3 - 15 x^4 + 6 x^5), x = t/T, as F' of a piece that begins at t = a. */
+static void ramp_derivatives(double v0, double v1, double ramp_s, double a, double d[8])
+{
+    const double c[6] = {v0, 0, 0, 10 * (v1 - v0), -15 * (v1 - v0), 6 * (v1 - v0)};
+    double x = a / ramp_s;
+    for (int k = 1; k < 8; k++) { /* derivative k of F over k! */
+        double sum = 0;
+        for (int n = 5; n >= k - 1; n--) {
+            double factor = 1;
+            for (int m = 0; m < k - 1; m++) {
+                factor *= (n - m) / ramp_s;
+            }
+            sum = sum * x + factor * c[n];
+        }
+        d[k] = sum / tgamma(k + 1.0);
+    }
+}
+
+struct builder {
+    struct override_program *p;
+    uint32_t count;
+    int64_t arc_q40;
+    uint8_t bytes[OVERRIDE_PIECES][PROGRAM_PIECE_SIZE];
+};
+
+static void add_piece(struct builder *b, double v0, double v1, double ramp_s, double from_s,
+                      double length_s)
+{
+    uint64_t duration = (uint64_t)(length_s * Q32 + 0.5);
+    double d[8];
+    double sum = 0;
+    double h = (double)duration / Q32;
+    uint8_t *at = b->bytes[b->count++];
+    memset(at, 0, PROGRAM_PIECE_SIZE);
+    ramp_derivatives(v0, v1, ramp_s, from_s, d);
+    put(at, duration, 8);
+    put(at + 8, (uint64_t)b->arc_q40, 8);
+    for (int k = 1; k < 8; k++) {
+        double c = nearbyint(ldexp(d[k], 40 + k * program_piece_exponent(duration)));
+        put(at + 8 + 8 * k, (uint64_t)(int64_t)c, 8);
+        sum += ldexp(c, -k * program_piece_exponent(duration)) * pow(h, k);
+    }
+    b->arc_q40 += (int64_t)nearbyint(sum);
+    b->p->program.header.duration_q32_s += duration;
+}
+
+static void add_ramp(struct builder *b, double v0, double v1, double ramp_s, double shortest_s,
+                     uint64_t *random)
+{
+    double from_s = 0;
+    double most_s = 31.0 / (greater(v0, v1) + 1.0);
+    while (ramp_s - from_s > 1e-9) {
+        double length = shortest_s * exp(override_random(random, 0, 5));
+        length = fmin(length, most_s);
+        length = ramp_s - from_s - length < shortest_s ? ramp_s - from_s : length;
+        length = length > most_s ? length / 2 : length;
+        add_piece(b, v0, v1, ramp_s, from_s, length);
+        from_s += length;
+    }
+}
+
+static void set_line(struct override_program *p, int64_t length_q40)
+{
+    int64_t start = 0;
+    int64_t step = (int64_t)(SEGMENT_MM * Q40);
+    for (uint32_t i = 0; i < p->program.header.segment_count; i++) {
+        uint8_t *at = p->image + PROGRAM_HEADER_SIZE + (size_t)i * PROGRAM_SEGMENT_SIZE;
+        int64_t length = i + 1 < p->program.header.segment_count ? step : length_q40 - start;
+        uint64_t u = (uint64_t)(sqrt((double)length / Q40) * 17592186044416.0 + 0.5);
+        put(at, (uint64_t)start, 8);
+        put(at + 8, (uint64_t)start, 8);
+        for (int k = 0; k < 3; k++) {
+            put(at + 24 + 16 * k, u, 8);
+        }
+        start += length;
+    }
+}
+
+void override_program_random(struct override_program *p, uint32_t period_us, uint64_t *random)
+{
+    static struct builder b;
+    double shortest_s = period_us * 1.05e-6;
+    double v0 = 0;
+    memset(p, 0, sizeof *p);
+    memset(&b, 0, sizeof b);
+    b.p = p;
+    p->program.header.period_us = period_us;
+    int ramps = 1 + (int)(golden_random(random) % 4u);
+    for (int i = 0; i <= ramps; i++) {
+        double v1 = i == ramps ? 0 : exp(override_random(random, 1.5, 5.5));
+        add_ramp(&b, v0, v1, override_random(random, 30, 150) * shortest_s, shortest_s, random);
+        add_ramp(&b, v1, v1, v1 == 0 ? 0 : override_random(random, 3, 300) * shortest_s, shortest_s,
+                 random);
+        v0 = v1;
+    }
+    struct program_header *header = &p->program.header;
+    header->version = PROGRAM_VERSION;
+    header->header_size = PROGRAM_HEADER_SIZE;
+    header->axis_count = 2;
+    header->piece_count = b.count;
+    header->length_q40_mm = b.arc_q40;
+    header->segment_count = (uint32_t)((double)b.arc_q40 / Q40 / SEGMENT_MM) + 1u;
+    p->program.size = header->image_size = PROGRAM_HEADER_SIZE +
+                                           header->segment_count * PROGRAM_SEGMENT_SIZE +
+                                           b.count * PROGRAM_PIECE_SIZE;
+    p->image = calloc(1, p->program.size);
+    TEST_ASSERT_NOT_NULL(p->image);
+    p->program.image = p->image;
+    set_line(p, b.arc_q40);
+    memcpy(piece_at(p, 0), b.bytes, (size_t)b.count * PROGRAM_PIECE_SIZE);
+    read_pieces(p);
+}
+
+void override_program_golden(struct override_program *p, const char *name)
+{
+    uint32_t size = 0;
+    memset(p, 0, sizeof *p);
+    p->image = golden_load(name, &size);
+    TEST_ASSERT_NOT_NULL_MESSAGE(p->image, name);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, program_open(&p->program, p->image, size), name);
+    read_pieces(p);
+}
+
+void override_program_close(struct override_program *p)
+{
+    free(p->image);
+    p->image = NULL;
+}

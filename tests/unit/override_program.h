@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Programs for the override's property test: random feed over a straight line, or a golden image, with override bounds
+ * made in C from chosen limits, as docs/numerics.md section 7 says.
+ */
+#ifndef HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
+#define HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
+
+#include "core/program.h"
+
+#define OVERRIDE_PIECES 256
+
+struct override_limits {
+    double feed, acceleration, jerk;
+};
+
+/* A piece as doubles: coefficients of t in s, and its peaks. */
+struct override_piece {
+    double start_s, end_s;
+    double c[8];
+    double feed, acceleration, jerk; /* greatest magnitudes, rounded up a little */
+    double factor, rate, second;     /* bounds as stored */
+};
+
+struct override_program {
+    struct program program;
+    uint8_t *image;
+    struct override_limits peak, limit;
+    struct override_piece pieces[OVERRIDE_PIECES];
+};
+
+/* Random feed over a line; period_us sets the shortest pieces. Free with override_program_close. */
+void override_program_random(struct override_program *p, uint32_t period_us, uint64_t *random);
+void override_program_golden(struct override_program *p, const char *name);
+void override_program_close(struct override_program *p);
+
+/* Limits somewhat above the peaks of the program, and the pieces' bounds from them. */
+void override_program_limits(struct override_program *p, uint64_t *random);
+
+/* F', F'', F''' of piece i at a program time in s. */
+void override_program_feed(const struct override_program *p, uint32_t i, double time_s,
+                           double derivative[4]);
+
+/* Uniform in [low, high). */
+double override_random(uint64_t *random, double low, double high);
+
+#endif
