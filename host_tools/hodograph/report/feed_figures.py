@@ -27,7 +27,7 @@ def feed_figure(chain: Chain, plan: FeedPlan) -> bytes:
     for column, end_s in enumerate((max(plan.duration_s, plain.duration_s), ramp_end_s)):
         t_s = np.linspace(0.0, end_s, _SAMPLES)
         for shown, color, label in ((plain, ORANGE, "plain quintic"), (plan, BLUE, name)):
-            inside = t_s[t_s <= shown.duration_s]
+            inside = np.unique(np.minimum(t_s, shown.duration_s))
             for axes, value in zip(
                 grid[:, column],
                 (shown.feed(inside), shown.acceleration(inside), shown.jerk(inside)),
