@@ -67,9 +67,24 @@ static void test_who_is_not_ready_in_time_makes_the_tick_late(void)
     schedule_await(&schedule, 100u * MS, true);
     schedule_finish(&schedule, start_ns);
     TEST_ASSERT_EQUAL_UINT64(start_ns + 100u * MS, schedule.due_ns);
-    schedule_ready(&schedule);
+    schedule_ready(&schedule, start_ns + MS / 2u);
     TEST_ASSERT_EQUAL_UINT64(start_ns + MS, schedule.due_ns);
     TEST_ASSERT_EQUAL_UINT64(2u * MS, tick(2u * MS));
+}
+
+/* Two thirds of the time at most: the rest is for the mainline. */
+static void test_a_slow_machine_rests_half_of_what_it_worked(void)
+{
+    const uint64_t start_ns = schedule.due_ns;
+    (void)schedule_start(&schedule, start_ns);
+    schedule_await(&schedule, 100u * MS, false);
+    schedule_finish(&schedule, start_ns + MS);
+    schedule_ready(&schedule, start_ns + 4u * MS);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + 6u * MS, schedule.due_ns);
+    (void)schedule_start(&schedule, schedule.due_ns);
+    const uint64_t next_ns = schedule.due_ns;
+    schedule_finish(&schedule, next_ns + 2u * MS);
+    TEST_ASSERT_EQUAL_UINT64(next_ns + 3u * MS, schedule.due_ns);
 }
 
 static void test_whoever_is_never_ready_is_left_after_the_guard(void)
@@ -97,7 +112,7 @@ static void test_lock_step_in_a_hurry_is_due_when_all_are_ready(void)
     schedule_begin(&schedule, 0, MS, true);
     lock_step_tick(true, true);
     TEST_ASSERT_EQUAL_UINT64(101u * (uint64_t)MS, schedule.due_ns);
-    schedule_ready(&schedule);
+    schedule_ready(&schedule, 3u * MS);
     TEST_ASSERT_EQUAL_UINT64(MS, schedule.due_ns);
     TEST_ASSERT_EQUAL_UINT64(0, tick(5u * MS));
 }
@@ -106,7 +121,7 @@ static void test_lock_step_without_hurry_goes_by_the_clock(void)
 {
     schedule_begin(&schedule, 0, MS, true);
     lock_step_tick(true, false);
-    schedule_ready(&schedule);
+    schedule_ready(&schedule, MS + MS / 2u);
     TEST_ASSERT_EQUAL_UINT64(2u * MS, schedule.due_ns);
     lock_step_tick(false, false);
     TEST_ASSERT_EQUAL_UINT64(3u * MS, schedule.due_ns);
@@ -120,6 +135,7 @@ int main(void)
     RUN_TEST(test_lateness_is_made_up);
     RUN_TEST(test_after_a_miss_the_clock_is_set_anew);
     RUN_TEST(test_who_is_not_ready_in_time_makes_the_tick_late);
+    RUN_TEST(test_a_slow_machine_rests_half_of_what_it_worked);
     RUN_TEST(test_whoever_is_never_ready_is_left_after_the_guard);
     RUN_TEST(test_lock_step_in_a_hurry_is_due_when_all_are_ready);
     RUN_TEST(test_lock_step_without_hurry_goes_by_the_clock);

@@ -50,7 +50,7 @@ void port_tick_await(uint32_t guard_us, bool hurry)
 
 void port_tick_ready(void)
 {
-    schedule_ready(&self.schedule);
+    schedule_ready(&self.schedule, self.now_ns);
 }
 
 static uint32_t now_us(void)
@@ -61,11 +61,10 @@ static uint32_t now_us(void)
 static void run_tick(void)
 {
     port_lock();
-    const uint64_t started_ns = self.now_ns;
-    const uint64_t late_ns = schedule_start(&self.schedule, started_ns);
+    const uint64_t late_ns = schedule_start(&self.schedule, self.now_ns);
     self.handlers.tick(self.handlers.self, now_us(),
                        late_ns < UINT32_MAX ? (uint32_t)late_ns : UINT32_MAX);
-    schedule_finish(&self.schedule, started_ns);
+    schedule_finish(&self.schedule, self.schedule.hurry ? self.now_ns : clock_ns());
     port_unlock();
 }
 

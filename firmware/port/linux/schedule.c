@@ -9,6 +9,7 @@ static uint64_t later(uint64_t a_ns, uint64_t b_ns)
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step)
 {
     schedule->period_ns = period_ns;
+    schedule->started_ns = now_ns;
     schedule->nominal_ns = now_ns + period_ns;
     schedule->earliest_ns = schedule->nominal_ns;
     schedule->due_ns = schedule->nominal_ns;
@@ -25,8 +26,17 @@ void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry)
     schedule->hurry = hurry && schedule->lock_step;
 }
 
-void schedule_ready(struct schedule *schedule)
+static void rest_after_work(struct schedule *schedule, uint64_t now_ns)
 {
+    const uint64_t worked_ns = now_ns - schedule->started_ns;
+    schedule->earliest_ns = later(schedule->earliest_ns, now_ns + worked_ns / 2u);
+}
+
+void schedule_ready(struct schedule *schedule, uint64_t now_ns)
+{
+    if (!schedule->hurry) {
+        rest_after_work(schedule, now_ns);
+    }
     schedule->due_ns = schedule->earliest_ns;
 }
 
@@ -37,28 +47,32 @@ static uint64_t lateness_ns(const struct schedule *schedule, uint64_t now_ns)
 
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns)
 {
+    schedule->started_ns = now_ns;
     schedule->awaiting = false;
     schedule->hurry = false;
     return schedule->lock_step ? 0u : lateness_ns(schedule, now_ns);
 }
 
-static void next_by_clock(struct schedule *schedule, uint64_t started_ns)
+static void next_by_clock(struct schedule *schedule, uint64_t now_ns)
 {
+    const uint64_t started_ns = schedule->started_ns;
     const uint64_t period_ns = schedule->period_ns;
     if (lateness_ns(schedule, started_ns) > period_ns) {
         schedule->nominal_ns = started_ns;
     }
     schedule->nominal_ns += period_ns;
     schedule->earliest_ns = later(schedule->nominal_ns, started_ns + period_ns - period_ns / 4u);
+    rest_after_work(schedule, now_ns);
 }
 
-void schedule_finish(struct schedule *schedule, uint64_t started_ns)
+void schedule_finish(struct schedule *schedule, uint64_t now_ns)
 {
+    const uint64_t started_ns = schedule->started_ns;
     if (schedule->hurry) {
         schedule->nominal_ns = started_ns;
         schedule->earliest_ns = started_ns;
     } else {
-        next_by_clock(schedule, started_ns);
+        next_by_clock(schedule, now_ns);
     }
     const uint64_t patience_ns = schedule->awaiting ? schedule->guard_ns : 0u;
     schedule->due_ns = later(schedule->earliest_ns, started_ns + patience_ns);
