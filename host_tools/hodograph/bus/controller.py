@@ -26,7 +26,7 @@ from ..names import KERNELS
 from .address import BusAddress
 from .network import open_network
 from .texts import PROGRAM_STATES, REFUSALS, STATES, fault_text
-from .turns import Turns
+from .turns import TURN_WAIT_S, Turns
 
 if TYPE_CHECKING:
     from ..config import Machine
@@ -70,8 +70,8 @@ class Controller:
         self._turns.close()
 
     @contextmanager
-    def _turn(self) -> Iterator[None]:
-        with self._turns.turn() as handed_over:
+    def _turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[None]:
+        with self._turns.turn(wait_s) as handed_over:
             if handed_over:
                 self._let_pass()
             yield
@@ -128,14 +128,17 @@ class Controller:
     def _who(self) -> str:
         return f"node {self.node_id} on {self.address}"
 
-    def answers(self, wait_s: float) -> bool:
-        """Whether the node answers an SDO within `wait_s`."""
+    def answers(self, wait_s: float, turn_wait_s: float = TURN_WAIT_S) -> bool:
+        """Whether the node answers an SDO within `wait_s`.
+
+        Raises BusError when another command keeps it to itself for longer than `turn_wait_s`.
+        """
         patience, self._sdo.RESPONSE_TIMEOUT = self._sdo.RESPONSE_TIMEOUT, min(0.25, wait_s)
         deadline = time.monotonic() + wait_s
         try:
             while True:
                 try:
-                    with self._turn():
+                    with self._turn(turn_wait_s):
                         self._variable(STATE, None).raw  # noqa: B018
                     self._check_identity()
                     return True
@@ -166,8 +169,8 @@ class Controller:
         self._identified = True
 
     def require(self, wait_s: float) -> None:
-        """Raises BusError unless the node answers within `wait_s`."""
-        if not self.answers(wait_s):
+        """Raises BusError unless the node, and before it our turn at it, comes within `wait_s`."""
+        if not self.answers(wait_s, wait_s):
             raise BusError(
                 f"no answer from {self._who()} in {wait_s:g} s: start the controller "
                 f"(hodograph rig --bus {self.address} brings up a simulated machine)"

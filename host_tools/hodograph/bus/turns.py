@@ -12,49 +12,91 @@ import fcntl
 import os
 import re
 import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from ..errors import BusError
 from .address import BusAddress
+
+TURN_WAIT_S = 30.0
+"""Patience for a turn where nothing else is asked for: mid-way in a job, giving up would cost more than waiting."""
+_LOOK_S = 0.002
 
 
 class Turns:
-    """The lock of one bus and node. Without a writable lock file every turn is granted at once."""
+    """The lock of one bus and node. Without writable lock files every turn is granted at once.
+
+    A second lock is held while waiting for the first: whoever gave back the turn can't take it again before those
+    who wait, however quickly it asks.
+    """
 
     def __init__(self, address: BusAddress, node: int) -> None:
-        name = re.sub(r"[^A-Za-z0-9]+", "-", f"hodograph-{address}-{node}")
+        self._who = f"node {node} on {address}"
         self._depth = 0
-        try:
-            self._file = os.open(
-                Path(tempfile.gettempdir()) / f"{name}.lock",
-                os.O_RDWR | os.O_CREAT | os.O_CLOEXEC,
-                0o666,
-            )
-        except OSError:
-            self._file = -1
+        name = re.sub(r"[^A-Za-z0-9]+", "-", f"hodograph-{address}-{node}")
+        self._files: list[int] = []
+        with suppress(OSError):
+            for ending in ("next", "lock"):
+                self._files.append(_open(Path(tempfile.gettempdir()) / f"{name}.{ending}"))
 
     def close(self) -> None:
-        """Gives the lock file back."""
-        if self._file >= 0:
-            os.close(self._file)
-            self._file = -1
+        """Gives the lock files back."""
+        while self._files:
+            os.close(self._files.pop())
 
     @contextmanager
-    def turn(self) -> Iterator[bool]:
-        """The channel is ours inside; true when another process had it before. Turns may be nested."""
-        if self._file < 0 or self._depth:
+    def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[bool]:
+        """The channel is ours inside; true when another process had it before. Turns may be nested.
+
+        Raises BusError when others keep the channel for longer than `wait_s`.
+        """
+        if len(self._files) < 2 or self._depth:
             yield False
             return
-        fcntl.flock(self._file, fcntl.LOCK_EX)
+        self._take(wait_s)
         self._depth += 1
         try:
-            me = str(os.getpid()).encode()
-            last = os.pread(self._file, 32, 0)
-            if last != me:
-                os.ftruncate(self._file, 0)
-                os.pwrite(self._file, me, 0)
-            yield bool(last) and last != me
+            yield _sign(self._files[1])
         finally:
             self._depth -= 1
-            fcntl.flock(self._file, fcntl.LOCK_UN)
+            fcntl.flock(self._files[1], fcntl.LOCK_UN)
+
+    def _take(self, wait_s: float) -> None:
+        deadline = time.monotonic() + wait_s
+        following, turn = self._files
+        got = _lock(following, deadline)
+        if got:
+            got = _lock(turn, deadline)
+            fcntl.flock(following, fcntl.LOCK_UN)
+        if not got:
+            raise BusError(
+                f"another hodograph command is using {self._who}: no turn in {wait_s:g} s, "
+                "try again when it is done"
+            )
+
+
+def _open(file: Path) -> int:
+    return os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+
+
+def _lock(file: int, deadline: float) -> bool:
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if time.monotonic() >= deadline:
+                return False
+        time.sleep(_LOOK_S)
+
+
+def _sign(file: int) -> bool:
+    """Puts our name down; true when another's stood there."""
+    me = str(os.getpid()).encode()
+    last = os.pread(file, 32, 0)
+    if last != me:
+        os.ftruncate(file, 0)
+        os.pwrite(file, me, 0)
+    return bool(last) and last != me

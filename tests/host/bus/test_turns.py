@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Turns at a controller's SDO channel: a lock that is waited for, but not for ever."""
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from hodograph.bus.address import BusAddress
+from hodograph.bus.controller import connect
+from hodograph.bus.turns import Turns
+from hodograph.errors import BusError
+
+BUS = BusAddress("virtual", f"turns-{os.getpid()}")
+
+
+@pytest.fixture
+def other() -> Iterator[Turns]:
+    turns = Turns(BUS, 1)
+    yield turns
+    turns.close()
+
+
+def test_a_turn_that_never_comes_is_a_bus_error(other: Turns) -> None:
+    mine = Turns(BUS, 1)
+    begun = time.monotonic()
+    with (
+        other.turn(),
+        pytest.raises(BusError, match=rf"another hodograph command is using node 1 on {BUS}: "),
+        mine.turn(0.1),
+    ):
+        pass
+    assert 0.1 <= time.monotonic() - begun < 3.0
+    with mine.turn():
+        pass
+    mine.close()
+
+
+def test_a_turn_is_waited_for(other: Turns) -> None:
+    mine = Turns(BUS, 1)
+    held = threading.Event()
+
+    def hold() -> None:
+        with other.turn():
+            held.set()
+            time.sleep(0.2)
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    assert held.wait(10.0)
+    begun = time.monotonic()
+    with mine.turn():
+        waited_s = time.monotonic() - begun
+    thread.join()
+    mine.close()
+    assert waited_s > 0.05
+
+
+def test_turns_of_another_node_are_free(other: Turns) -> None:
+    mine = Turns(BUS, 2)
+    with other.turn(), mine.turn(0.0):
+        pass
+    mine.close()
+
+
+def test_whoever_asks_again_and_again_lets_others_in(other: Turns) -> None:
+    done = threading.Event()
+
+    def greedy() -> None:
+        while not done.is_set():
+            with other.turn():
+                time.sleep(0.005)
+
+    thread = threading.Thread(target=greedy)
+    thread.start()
+    mine = Turns(BUS, 1)
+    try:
+        for _ in range(20):
+            with mine.turn(5.0):
+                pass
+    finally:
+        done.set()
+        thread.join()
+        mine.close()
+
+
+def test_a_controller_that_another_command_uses(other: Turns) -> None:
+    with (
+        connect(BUS, 1, 1_000_000) as controller,
+        other.turn(),
+        pytest.raises(BusError, match="another hodograph command is using node 1"),
+    ):
+        controller.require(0.1)
