@@ -44,3 +44,8 @@ class RunError(HodographError):
 
 INTERRUPTED_EXIT_STATUS = 130
 """Exit status after Ctrl-C (128 + SIGINT), as shells have it."""
+
+
+def one_line(error: Exception) -> str:
+    """An error of somebody else's, to be quoted within a message of ours."""
+    return " ".join(str(error).split()) or type(error).__name__

@@ -12,7 +12,8 @@ from ..errors import InputError
 from ..feed import FeedRequest, Limits, plan_feed
 from ..program import compile_path, encode
 from ..spline import line
-from .controller import READY, Controller
+from .controller import Controller
+from .objects import READY
 
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25

@@ -15,7 +15,7 @@ import can
 import canopen
 from can.interfaces.socketcan import SocketcanBus
 
-from ..errors import BusError
+from ..errors import BusError, one_line
 from .address import BusAddress, check_socketcan
 
 SEND_TIMEOUT_S = 1.0
@@ -75,14 +75,10 @@ def open_network(address: BusAddress, node: int, bitrate: int) -> Iterator[canop
             **options,
         )
     except Exception as error:
-        raise BusError(f"{address}: cannot be opened: {_one_line(error)}") from error
+        raise BusError(f"{address}: cannot be opened: {one_line(error)}") from error
     network.bus = bus
     network.connect()
     try:
         yield network
     finally:
         network.disconnect()
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

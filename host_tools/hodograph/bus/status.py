@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .controller import (
+from .controller import Controller
+from .objects import (
     ACTUAL,
     AXIS_NODE,
     CONFIGURATION,
@@ -15,7 +16,6 @@ from .controller import (
     OVERRIDE,
     STATUSWORD,
     TARGET,
-    Controller,
 )
 from .texts import REFUSALS, STATES, drive_state, fault_text
 

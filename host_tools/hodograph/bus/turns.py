@@ -66,9 +66,9 @@ class Turns:
     def _take(self, wait_s: float) -> None:
         deadline = time.monotonic() + wait_s
         following, turn = self._files
-        got = _lock(following, deadline)
-        if got:
-            got = _lock(turn, deadline)
+        try:
+            got = _lock(following, deadline) and _lock(turn, deadline)
+        finally:
             fcntl.flock(following, fcntl.LOCK_UN)
         if not got:
             raise BusError(

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, one_line
 
 MAX_FILE_BYTES = 64 * 2**20
 """A configuration file above this size is refused unread (10^5 points take about 4 MB)."""
@@ -44,13 +44,9 @@ def read_toml(file: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: not UTF-8 text (byte {error.start}): is it TOML?") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file}: not valid TOML: {_one_line(error)}") from None
+        raise InputError(f"{file}: not valid TOML: {one_line(error)}") from None
     except RecursionError:
         raise InputError(f"{file}: not valid TOML: nested too deeply") from None
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 class Table:

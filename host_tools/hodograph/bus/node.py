@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""SDO access to one node: reading and writing objects in turn with other commands, and errors in our words."""
+
+from __future__ import annotations
+
+import os
+import queue
+import struct
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import can
+import canopen
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from ..errors import BusError, RefusedError, one_line
+from .address import BusAddress
+from .objects import STATE
+from .turns import TURN_WAIT_S, Turns
+
+IDENTITY_OBJECT = 0x1018
+IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))
+"""Sub-index, name, low bits that may differ (the minor revision)."""
+
+NOWHERE = 0x5000
+LET_PASS_S = 1.0
+
+
+class Node:
+    """A node with an SDO server, as its EDS describes it."""
+
+    def __init__(self, address: BusAddress, node_id: int, node: canopen.RemoteNode) -> None:
+        self.address = address
+        self.node_id = node_id
+        self._turns = Turns(address, node_id)
+        self._identified = False
+        self.sdo: Any = node.sdo
+        self.sdo.RESPONSE_TIMEOUT = 3.0
+
+    def close(self) -> None:
+        """Gives back what was opened for taking turns."""
+        self._turns.close()
+
+    @contextmanager
+    def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[None]:
+        """The node's SDO channel is ours inside, and what was sent to another process is thrown away.
+
+        Raises BusError when there is no turn in `wait_s`, or when what is inside can't send.
+        """
+        try:
+            with self._turns.turn(wait_s) as handed_over:
+                if handed_over:
+                    self._let_pass()
+                yield
+        except (can.CanError, OSError) as error:
+            raise BusError(f"{self.address}: cannot send: {one_line(error)}") from error
+
+    def _let_pass(self) -> None:
+        """Throws away answers to another process: all that come before the answer to a question only we ask.
+
+        The question is for an object that does not exist, so the answer is an abort that names it.
+        """
+        index = NOWHERE | (os.getpid() & 0xFFF)
+        self.sdo.send_request(bytearray(struct.pack("<BHBL", 0x40, index, 0, 0)))
+        deadline = time.monotonic() + LET_PASS_S
+        with suppress(queue.Empty):
+            while (left := deadline - time.monotonic()) > 0:
+                answer = self.sdo.responses.get(timeout=left)
+                if struct.unpack_from("<H", answer, 1)[0] == index:
+                    return
+
+    def read(self, index: int, sub: int | None = None) -> int:
+        """An integer object."""
+        return int(self._guarded(lambda: self._variable(index, sub).raw, index, sub))
+
+    def write(self, index: int, sub: int | None, value: int) -> None:
+        """Writes an integer object. A refusal is an SdoAbortedError's text in a RefusedError."""
+
+        def action() -> None:
+            self._variable(index, sub).raw = value
+
+        self._guarded(action, index, sub)
+
+    def _variable(self, index: int, sub: int | None) -> Any:
+        return self.sdo[index] if sub is None else self.sdo[index][sub]
+
+    def _guarded(self, action: Callable[[], Any], index: int, sub: int | None) -> Any:
+        try:
+            with self.turn():
+                return action()
+        except SdoAbortedError as error:
+            raise RefusedError(
+                f"{self.who()} refused object {_name(index, sub)}: {error}"
+            ) from error
+        except SdoCommunicationError as error:
+            raise BusError(
+                f"{self.who()} stopped answering (object {_name(index, sub)}): "
+                "is its process or its power gone?"
+            ) from error
+        except KeyError as error:
+            raise BusError(
+                f"the EDS file has no object {_name(index, sub)}: wrong version?"
+            ) from error
+
+    def who(self) -> str:
+        """The node and its bus, to begin a message with."""
+        return f"node {self.node_id} on {self.address}"
+
+    def answers(self, wait_s: float, turn_wait_s: float = TURN_WAIT_S) -> bool:
+        """Whether the node answers an SDO within `wait_s`.
+
+        Raises BusError when another command keeps it to itself for longer than `turn_wait_s`.
+        """
+        patience, self.sdo.RESPONSE_TIMEOUT = self.sdo.RESPONSE_TIMEOUT, min(0.25, wait_s)
+        deadline = time.monotonic() + wait_s
+        try:
+            while True:
+                try:
+                    with self.turn(turn_wait_s):
+                        self._variable(STATE, None).raw  # noqa: B018
+                    self._check_identity()
+                    return True
+                except SdoAbortedError as error:
+                    raise BusError(
+                        f"{self.who()} is not a Hodograph controller: {error}"
+                    ) from error
+                except SdoCommunicationError:
+                    if time.monotonic() >= deadline:
+                        return False
+        finally:
+            self.sdo.RESPONSE_TIMEOUT = patience
+
+    def _check_identity(self) -> None:
+        """Raises BusError when the node is not what the EDS file describes."""
+        if self._identified:
+            return
+        for sub, name, kept in IDENTITY:
+            wanted = int(self.sdo.od[IDENTITY_OBJECT][sub].default or 0) >> kept
+            found = self.read(IDENTITY_OBJECT, sub)
+            if found >> kept != wanted:
+                raise BusError(
+                    f"{self.who()} has {name} {found:#x}, the EDS file of these host tools {wanted << kept:#x}: "
+                    "controller and host tools are of different versions, rebuild both"
+                )
+        self._identified = True
+
+    def require(self, wait_s: float) -> None:
+        """Raises BusError unless the node, and before it our turn at it, comes within `wait_s`."""
+        if not self.answers(wait_s, wait_s):
+            raise BusError(
+                f"no answer from {self.who()} in {wait_s:g} s: start the controller "
+                f"(hodograph rig --bus {self.address} brings up a simulated machine)"
+            )
+
+
+def _name(index: int, sub: int | None) -> str:
+    return f"0x{index:04X}" if sub is None else f"0x{index:04X} sub {sub}"

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""Sending a program image to the controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from ..errors import BusError, RefusedError, one_line
+from .node import Node
+from .objects import PROGRAM, STATE
+from .texts import STATES
+
+ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
+
+Progress = Callable[[int], None]
+
+
+def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
+    """Sends a program image by block download; on a refusal the old program stays.
+
+    `progress` is called with the number of bytes sent so far.
+    """
+    patience, node.sdo.RESPONSE_TIMEOUT = node.sdo.RESPONSE_TIMEOUT, 5.0
+    try:
+        with node.turn():
+            _block_download(node, image, progress)
+    except SdoAbortedError as error:
+        raise _refusal(node, error) from error
+    except (SdoCommunicationError, RuntimeError) as error:
+        raise BusError(
+            f"upload to {node.who()} broke off: {one_line(error)}: the old program is unharmed; "
+            "upload again"
+        ) from error
+    finally:
+        node.sdo.RESPONSE_TIMEOUT = patience
+
+
+def _block_download(node: Node, image: bytes, progress: Progress | None) -> None:
+    stream = node.sdo.open(PROGRAM, 1, "wb", buffering=0, size=len(image), block_transfer=True)
+    try:
+        while stream.pos < len(image):
+            stream.write(image[stream.pos : stream.pos + 7])
+            if progress is not None:
+                progress(stream.pos)
+    except BaseException as error:
+        stream._initialized = False  # or close() would go on with the protocol
+        if not isinstance(error, SdoAbortedError):
+            node.sdo.abort()
+        raise
+    stream.close()
+
+
+def _refusal(node: Node, error: SdoAbortedError) -> RefusedError | BusError:
+    if error.code == ABORT_STATE:
+        return RefusedError(
+            f"{node.who()} takes no program now ({STATES.get(node.read(STATE), '?')}): "
+            "wait until the axes stand, or hodograph stop"
+        )
+    if error.code != ABORT_VALUE_RANGE:
+        return BusError(f"upload to {node.who()} failed: {error}: the old program stays")
+    code, index = node.read(PROGRAM, 3), node.read(PROGRAM, 4)
+    return RefusedError(
+        f"{node.who()} refused the program: {program_fault_text(code, index)}; "
+        "the old program stays"
+    )
+
+
+def program_fault_text(code: int, index: int) -> str:
+    """A refusal code of program_check in words, with its place."""
+    from ..program.check import Fault
+    from ..program.codes import ProgramError
+
+    try:
+        fault = Fault(ProgramError(code), index)
+    except ValueError:
+        return f"code {code} at {index}, unknown to this version of the host tools"
+    return f"{fault.code.text} ({fault.code.name}, code {code}, {fault.place})"
