@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The uploaded program: compile, encode, decode, check, print; docs/protocol.md section 1."""
 
-from .check import Fault, ProgramLimits, check
+from .check import Fault, check
 from .compiler import Compilation, compile_path, compile_program, fit_plan
 from .image import Program, decode, encode
 from .inspection import inspect_dict, inspect_text
+from .limits import ProgramLimits
 
 __all__ = [
     "Compilation",

@@ -17,24 +17,13 @@ from .check_segments import Rule, end_faults, segment_faults, too_short
 from .codes import ProgramError
 from .exactmath import segment_ways
 from .image import Program, ReservedFields, decode, open_fault, reserved_fields
+from .limits import ProgramLimits
 
 Int = NDArray[np.int64]
 
 PERIODS_US = (1000, 2000, 4000, 8000)
 LONGEST_Q32_S = 2**54
 LONGEST_Q40_MM = 2**62
-
-
-@dataclass(frozen=True)
-class ProgramLimits:
-    """What a controller allows, in the units of the protocol; 0 for period, feed, acceleration, jerk: any."""
-
-    period_us: int
-    feed_um_s: int
-    acceleration_um_s2: int
-    jerk_mm_s3: int
-    min_q40_mm: tuple[int, int]
-    max_q40_mm: tuple[int, int]
 
 
 @dataclass(frozen=True)

@@ -3,17 +3,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..feed.pieces import DEGREE, derivative_bounds, derivative_extremes, exponents
 from .codes import ProgramError
 from .image import Program
-
-if TYPE_CHECKING:
-    from .check import ProgramLimits
+from .limits import ProgramLimits
 
 Bool = NDArray[np.bool_]
 Rule = tuple[Bool, int, ProgramError]

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,10 +10,8 @@ from ..spline.bernstein import square
 from .codes import ProgramError
 from .exactmath import WAY_SCALE
 from .image import Program
+from .limits import ProgramLimits
 from .neighbours import brief_pairs
-
-if TYPE_CHECKING:
-    from .check import ProgramLimits
 
 Bool = NDArray[np.bool_]
 Rule = tuple[Bool, int, ProgramError]

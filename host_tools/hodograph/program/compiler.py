@@ -13,11 +13,12 @@ from ..errors import InputError, PlanError
 from ..feed import FeedPlan, plan_again
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
-from .check import Fault, ProgramLimits, check
+from .check import Fault, check
 from .check_segments import boxes_q40
 from .codes import ProgramError
 from .exactmath import cumulative, segment_ways, way_to_q40
 from .image import NAME_SIZE, Program
+from .limits import ProgramLimits
 from .neighbours import LEAST_FEED_MM_S, brief_pairs
 
 Int = NDArray[np.int64]
