@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 from ..chain import controller_limits, program_limits
 from ..config import Machine
-from ..errors import InputError
+from ..errors import InputError, RefusedError
 from ..feed import FeedRequest, Limits, plan_feed
 from ..program import compile_path, encode
 from ..spline import line
 from .controller import Controller
-from .objects import READY
+from .objects import OVERRIDE, READY
 
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25
@@ -65,7 +65,8 @@ def goto(
 ) -> float:
     """Moves from the present setpoint to a point in counts; returns the way in mm, at standstill.
 
-    The drives have to be on (state ready). Each move replaces the program that is loaded.
+    The drives have to be on (state ready). Each move replaces the program that is loaded. Raises RefusedError when
+    the feed override is 0, with which nothing would move.
     """
     for axis, counts in zip(machine.axes, end_counts, strict=True):
         at_mm = counts / machine.counts_per_mm
@@ -79,7 +80,12 @@ def goto(
         complex(x / machine.counts_per_mm, y / machine.counts_per_mm) for x, y in (here, end_counts)
     )
     way_mm = 0.0
-    for a, b in legs(start_mm, end_mm, machine):
+    moves = legs(start_mm, end_mm, machine)
+    if moves and controller.read(OVERRIDE, 1) == 0:
+        raise RefusedError(
+            f"goto: the feed override of {controller.who()} is 0 %, nothing would move: hodograph override 100 first"
+        )
+    for a, b in moves:
         controller.upload(line_image(a, b, machine))
         controller.start()
         controller.wait_for((READY,), math.inf, tick)

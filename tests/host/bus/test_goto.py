@@ -5,14 +5,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import canopen
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hodograph.bus.goto import SHORTEST_MOVE_MM, legs, line_image
+from hodograph.bus.address import BusAddress
+from hodograph.bus.controller import connect
+from hodograph.bus.goto import SHORTEST_MOVE_MM, goto, legs, line_image
 from hodograph.chain import program_limits
 from hodograph.config import load_machine
-from hodograph.errors import PlanError
+from hodograph.data import CONTROLLER_EDS
+from hodograph.errors import PlanError, RefusedError
 from hodograph.native import NativeLimits, NativeProgram
 
 MACHINE = load_machine(
@@ -54,3 +58,19 @@ def check_moves(start: tuple[int, int], end: tuple[int, int]) -> None:
 def test_outside_the_travel() -> None:
     with pytest.raises(PlanError, match="travel"):
         line_image(0j, 300 + 0j, MACHINE)
+
+
+def test_an_override_of_0_is_said() -> None:
+    bus = BusAddress("virtual", "goto")
+    network = canopen.Network()
+    network.connect(interface=bus.interface, channel=bus.channel)
+    node = network.create_node(1, str(CONTROLLER_EDS))
+    node.sdo[0x200D][1].raw = node.sdo[0x200D][2].raw = 0
+    node.sdo[0x2010][1].raw = 0
+    try:
+        with connect(bus, 1, 1_000_000) as controller:
+            with pytest.raises(RefusedError, match=r"override of node 1 on .* is 0 %"):
+                goto(controller, MACHINE, (1_000_000, 0))
+            assert goto(controller, MACHINE, (0, 0)) == 0.0
+    finally:
+        network.disconnect()
