@@ -24,6 +24,7 @@ class PlatformDistribution(Distribution):
     """Has a compiled module, made elsewhere: the wheel is for one platform."""
 
     def has_ext_modules(self) -> bool:
+        """Always."""
         return True
 
 
@@ -31,6 +32,7 @@ class CompleteWheel(bdist_wheel):
     """A wheel with all its data and the module, or none."""
 
     def run(self) -> None:
+        """Makes the wheel, and takes it back with a FileError when something is missing."""
         super().run()
         wheel = Path(self.distribution.dist_files[-1][2])
         with zipfile.ZipFile(wheel) as archive:
