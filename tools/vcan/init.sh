@@ -10,6 +10,8 @@ mount -t sysfs sys /sys
 mkdir -p /dev/pts /dev/shm
 mount -t devpts dev /dev/pts
 mount -t tmpfs shm /dev/shm
+# Locks of the commands inside concern this bus, not the host's.
+[ ! -d /run/lock ] || mount -t tmpfs lock /run/lock
 ln -s /proc/self/fd /dev/fd
 ln -s /proc/self/fd/0 /dev/stdin
 ln -s /proc/self/fd/1 /dev/stdout

@@ -138,7 +138,10 @@ class Node:
             return
         for sub, name, kept in IDENTITY:
             wanted = int(self.sdo.od[IDENTITY_OBJECT][sub].default or 0) >> kept
-            found = self.read(IDENTITY_OBJECT, sub)
+            with self.turn():
+                found = int(
+                    self._variable(IDENTITY_OBJECT, sub).raw
+                )  # a slow answer is the caller's to judge
             if found >> kept != wanted:
                 raise BusError(
                     f"{self.who()} has {name} {found:#x}, the EDS file of these host tools {wanted << kept:#x}: "

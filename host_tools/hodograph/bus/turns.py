@@ -23,6 +23,7 @@ from .address import BusAddress
 TURN_WAIT_S = 30.0
 """Patience for a turn where nothing else is asked for: mid-way in a job, giving up would cost more than waiting."""
 _LOOK_S = 0.002
+LOCK_FOLDER = Path("/run/lock")
 
 
 class Turns:
@@ -39,7 +40,7 @@ class Turns:
         self._files: list[int] = []
         with suppress(OSError):
             for ending in ("next", "lock"):
-                self._files.append(_open(Path(tempfile.gettempdir()) / f"{name}.{ending}"))
+                self._files.append(_open(_folder() / f"{name}.{ending}"))
 
     def close(self) -> None:
         """Gives the lock files back."""
@@ -77,8 +78,18 @@ class Turns:
             )
 
 
+def _folder() -> Path:
+    """Where all users of this kernel, and no others, find the same files."""
+    return LOCK_FOLDER if os.access(LOCK_FOLDER, os.W_OK) else Path(tempfile.gettempdir())
+
+
 def _open(file: Path) -> int:
-    return os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    with suppress(FileNotFoundError):
+        return os.open(file, os.O_RDWR | os.O_CLOEXEC)
+    descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    with suppress(PermissionError):  # another user was quicker: then it is theirs to open to all
+        os.fchmod(descriptor, 0o666)
+    return descriptor
 
 
 def _lock(file: int, deadline: float) -> bool:
