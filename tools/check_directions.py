@@ -57,6 +57,8 @@ PYTHON_RULES: dict[str, set[str]] = {
     "native": {"errors", "names", "config"},
     "program": {"errors", "spline", "feed", "native"},
     "simulate": {"errors", "config", "native", "program"},
+    "bustime": {"errors", "data", "config"},
+    "dbc": {"data", "config", "bustime"},
     "bus": {
         "errors",
         "names",
@@ -68,6 +70,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "program",
         "simulate",
         "chain",
+        "bustime",
     },
     "chain": {"errors", "config", "spline", "feed", "program"},
     "paper": {
@@ -90,6 +93,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "simulate",
         "chain",
         "bus",
+        "bustime",
         "paper",
     },
     "cli": {"*"},

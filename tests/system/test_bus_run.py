@@ -14,7 +14,7 @@ from hodograph.cli.main import main
 pytestmark = pytest.mark.bus
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-RUN_ONLY = {"bus", "deadline_misses", "pace", "frames"}
+RUN_ONLY = {"bus", "deadline_misses", "pace", "frames", "bus_load"}
 
 
 def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:

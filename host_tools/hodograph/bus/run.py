@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bustime import RecordedLoad, machine_bus_time, recorded_load
 from ..config import Machine
 from ..errors import BusError, HodographError, RunError
 from ..native import NativeProgram
@@ -44,6 +45,7 @@ class BusRun:
     pace: str
     frames: int
     wall_s: float
+    load: RecordedLoad
 
     def summary(self) -> dict[str, object]:
         """The keys that tools may rely on in `hodograph run --json`."""
@@ -52,6 +54,7 @@ class BusRun:
             "deadline_misses": self.deadline_misses,
             "pace": self.pace,
             "frames": self.frames,
+            "bus_load": self.load.summary(),
         }
 
 
@@ -139,6 +142,7 @@ def run_program(
         pace=at.pace or measured_pace(motion, wall_s),
         frames=int(frames.size),
         wall_s=wall_s,
+        load=recorded_load(frames, machine_bus_time(machine)),
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from ..bus.address import BusAddress, parse_address
 from ..bus.goto import goto as goto_point
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
+from ..bustime import require_fit
 from ..chain import Chain, load_chain
 from ..config import Machine, load_machine, read_toml
 from ..errors import BusError, InputError
@@ -24,8 +25,12 @@ from .path_commands import motion_rows, print_notes, read_image
 def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
     image = read_image(options.file)
     if image is not None:
-        return image, load_machine(options.machine) if options.machine else None
+        machine = load_machine(options.machine) if options.machine else None
+        if machine is not None:
+            require_fit(machine)
+        return image, machine
     chain = load_chain(options.file, options.machine)
+    require_fit(chain.machine)
     image = chain.image
     print_notes(chain, chain.compilation.plan)
     return image, chain.machine
@@ -62,6 +67,7 @@ def goto(options: Namespace) -> None:
         machine = named
     else:
         machine = _machine_of(options.file, options.machine)
+        require_fit(machine)
     end = _end_counts(options, machine, image)
     with reached(address, machine.node, machine.bitrate, options.wait) as controller:
         controller.configure(machine, options.kernel or machine.kernel)
@@ -108,6 +114,7 @@ def run(options: Namespace) -> None:
         raise InputError("--trace: takes one FILE; run the others by themselves")
     chains = [load_chain(file, options.machine) for file in options.files]
     for chain in chains:
+        require_fit(chain.machine)
         chain.image  # noqa: B018  (all that can be wrong with the input shows before anything moves)
     runs = [_run_one(chain, address, options) for chain in chains]
     if options.trace is not None:
@@ -152,6 +159,7 @@ def _print_runs(chains: list[Chain], runs: list[BusRun], as_json: bool) -> None:
                     ("bus", f"{result.bus}, pace {result.pace}, {result.frames} frames"),
                     ("time", f"{result.wall_s:.2f} s for {nominal_s:.2f} s of motion"),
                     ("deadline misses", str(result.deadline_misses)),
+                    ("bus load", result.load.text()),
                     *motion_rows(motion),
                 ]
             ]
@@ -162,6 +170,7 @@ def rig(options: Namespace) -> None:
     """hodograph rig."""
     address = parse_address(options.bus)
     machine = _machine_of(options.file, None)
+    require_fit(machine)
     kernel = options.kernel or machine.kernel
     rig_until_interrupted(machine, address, options.pace, kernel, note)
 

@@ -231,6 +231,15 @@ def make_parser() -> argparse.ArgumentParser:
     paper = command("paper", "print the paper's numbers beside ours")
     _json(paper)
 
+    dbc = command("dbc", "write the bus of a machine as a DBC file for other CAN tools")
+    dbc.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
+    dbc.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="default: MACHINE with .dbc, here"
+    )
+    dbc.add_argument(
+        "--eds", type=Path, metavar="EDS", help="of the drives (default: the simulated drive's)"
+    )
+
     rig = command("rig", "bring up a simulated machine on a virtual bus until Ctrl-C")
     rig.add_argument(
         "file", metavar="FILE", type=Path, help="machine file, or a path file that names one"

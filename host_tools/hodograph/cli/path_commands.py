@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bustime import require_fit
 from ..chain import Chain, load_chain
 from ..errors import InputError
 from ..feed import FeedPlan
@@ -115,6 +116,7 @@ def feed(options: Namespace) -> None:
 def compile_(options: Namespace) -> None:
     """hodograph compile."""
     chain = load_chain(options.file, options.machine)
+    require_fit(chain.machine)
     image = chain.image
     print_notes(chain, chain.compilation.plan)
     output = options.output or Path(chain.file.name + ".hdgp")

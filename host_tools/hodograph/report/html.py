@@ -98,7 +98,24 @@ def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
         "file": str(chain.file.file),
         "notes": chain.notes(plan),
         "figures": figures,
+        "load": _load(run),
     }
+
+
+def _load(run: BusRun | None) -> dict[str, Any] | None:
+    """The table of bus load, None for a simulated run."""
+    if run is None:
+        return None
+
+    def share(value: float | None) -> str:
+        return "–" if value is None else f"{value:.2f}"
+
+    rows = [
+        (k.kind, str(k.frames), *map(share, (k.plain_percent, k.measured_percent, k.worst_percent)))
+        for k in run.load.kinds
+    ]
+    rows.append(("frames of the ticks", "", *map(share, run.load.cyclic())))
+    return {"bitrate": run.load.bitrate, "rows": rows}
 
 
 def _render(cases: Sequence[Case], shown_cases: list[dict[str, Any]]) -> str:
@@ -138,6 +155,7 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
             "bus": run.bus if run is not None else "none (simulated)",
             "pace": run.pace if run is not None else "–",
             "deadline misses": str(run.deadline_misses) if run is not None else "–",
+            "bus load, %": f"{run.load.cyclic()[1]:.1f}" if run is not None else "–",
             "frames recorded": str(run.frames) if run is not None else "–",
             "SHA-256 of setpoints": motion.setpoints_sha256,
             "SHA-256 of encoder counts": motion.encoders_sha256,

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""The DBC of the examples, as cantools reads it."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import cantools
+import pytest
+
+from hodograph.cli.main import main
+from hodograph.config import load_machine
+from hodograph.dbc import dbc_text
+
+MACHINE = Path(__file__).resolve().parents[3] / "examples" / "machines" / "paper_alpha.toml"
+
+
+def database() -> cantools.database.Database:
+    return cantools.database.load_string(dbc_text(load_machine(MACHINE)), "dbc", strict=True)
+
+
+def test_frames_and_their_sizes() -> None:
+    sizes = {message.frame_id: message.length for message in database().messages}
+    expected = {0x000: 2, 0x080: 1, 0x701: 1, 0x081: 8}
+    for node in (2, 3):
+        expected |= {0x80 + node: 8, 0x180 + node: 6, 0x200 + node: 6}
+        expected |= {0x280 + node: 2, 0x700 + node: 1}
+    assert sizes == expected
+
+
+def test_values_and_units() -> None:
+    found = database().decode_message(0x183, struct.pack("<Hi", 0x1237, -1_234_567))
+    assert found["Drive3_Statusword"] == 0x1237
+    assert found["Drive3_PositionActualValue"] == pytest.approx(-1.234567)
+    assert database().decode_message(0x282, struct.pack("<h", -2500)) == {
+        "Drive2_MotorVoltage": pytest.approx(-2.5)
+    }
+    assert str(database().decode_message(0x702, b"\x05")["Drive2_NMT_State"]) == "operational"
+    assert database().get_message_by_name("SYNC").cycle_time == 1
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "alpha.dbc"
+    assert main(["dbc", str(MACHINE), "-o", str(output)]) == 0
+    assert "14 frames" in capsys.readouterr().out
+    assert output.read_text() == dbc_text(load_machine(MACHINE))
+
+
+def test_something_else_than_an_eds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    eds = tmp_path / "not.eds"
+    eds.write_text("hello")
+    assert main(["dbc", str(MACHINE), "-o", str(tmp_path / "x"), "--eds", str(eds)]) == 2
+    assert "not an EDS" in capsys.readouterr().err
