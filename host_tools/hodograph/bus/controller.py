@@ -173,6 +173,14 @@ class Controller(Node):
         code, node, detail = (self.read(FAULT, sub) for sub in (1, 2, 3))
         return f"{fault_text(code)} (code 0x{code:04X}, node {node}, detail {detail})"
 
+    def require_standing(self) -> None:
+        """Raises RefusedError while a program is under way: it is somebody's, and goes on."""
+        state = self.state()
+        if state in (*ON_PATH, STOPPING):
+            raise RefusedError(
+                f"{self.who()} is {STATES[state]}: wait until the axes stand, or hodograph stop"
+            )
+
     def enable(self) -> None:
         """Switches the drives on; returns at standstill, ready."""
         state = self.state()

@@ -84,6 +84,7 @@ def station(
         elif not is_virtual(address):
             controller.require(wait_s)
         if rig is None:
+            controller.require_standing()
             note(f"node {machine.node} is on {address} already: using it and its drives")
         try:
             yield Station(controller, pace if rig is not None else None, rig)

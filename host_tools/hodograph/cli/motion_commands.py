@@ -70,6 +70,7 @@ def goto(options: Namespace) -> None:
         require_fit(machine)
     end = _end_counts(options, machine, image)
     with reached(address, machine.node, machine.bitrate, options.wait) as controller:
+        controller.require_standing()
         controller.configure(machine, options.kernel or machine.kernel)
         with stopping(controller):
             controller.enable()
