@@ -128,6 +128,10 @@ def test_upload_while_moving(
     status, line = status_line(capsys, "upload", str(ALPHA))
     assert (status, "takes no program now" in line) == (5, True), line
     assert controller.program_crc() == crc
+    for command in ("goto", "run"):
+        status, line = status_line(capsys, command, str(ALPHA))
+        assert (status, "wait until the axes stand" in line) == (5, True), line
+        assert controller.state() == RUNNING
     assert main(["stop"]) == 0
     assert controller.state() == READY
     assert 0 < controller.read(0x2009, 1) < controller.read(0x2000, 11)
