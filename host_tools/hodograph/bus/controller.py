@@ -33,6 +33,7 @@ from .objects import (
     FAULT_STATE,
     HELD,
     HOLD,
+    MOVING,
     OFF,
     ON_PATH,
     OVERRIDE,
@@ -48,7 +49,6 @@ from .objects import (
     STATE,
     STATISTICS,
     STOP,
-    STOPPING,
     TARGET,
 )
 from .texts import PROGRAM_STATES, REFUSALS, STATES, fault_text
@@ -94,7 +94,7 @@ class Controller(Node):
         if not different:
             return False
         state = self.state()
-        if state in (*ON_PATH, STOPPING, ENABLING):
+        if state in (*MOVING, ENABLING):
             raise RefusedError(
                 f"{self.who()} is {STATES[state]} with another configuration: hodograph stop first"
             )
@@ -176,7 +176,7 @@ class Controller(Node):
     def require_standing(self) -> None:
         """Raises RefusedError while a program is under way: it is somebody's, and goes on."""
         state = self.state()
-        if state in (*ON_PATH, STOPPING):
+        if state in MOVING:
             raise RefusedError(
                 f"{self.who()} is {STATES[state]}: wait until the axes stand, or hodograph stop"
             )
@@ -203,7 +203,7 @@ class Controller(Node):
                 self.command(START if from_mm is None else START_FROM)
                 return
             except CommandRefusedError as error:
-                moving = self.state() in (*ON_PATH, STOPPING)
+                moving = self.state() in MOVING
                 if error.reason != REFUSED_MOVING or moving or time.monotonic() > deadline:
                     raise
             time.sleep(POLL_S)

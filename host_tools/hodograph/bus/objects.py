@@ -14,6 +14,8 @@ ENABLE, START, STOP, DISABLE, RESET, HOLD, RESUME, START_FROM = 1, 2, 3, 4, 5, 6
 BOOT, OFF, ENABLING, READY, RUNNING, STOPPING, FAULT_STATE, HOLDING, HELD = range(9)
 ON_PATH = (RUNNING, HOLDING, HELD)
 """States in which a stop has something to stop."""
+MOVING = (*ON_PATH, STOPPING)
+"""States in which a program is under way."""
 REFUSED_MOVING = 3
 
 Object = tuple[int, int | None]
