@@ -31,6 +31,9 @@ bool axis_close_sync(struct axis *axis)
     if (missed && axis->missed_in_row < UINT32_MAX) {
         axis->missed_in_row++;
     }
+    if (missed && axis->missed < UINT32_MAX) {
+        axis->missed++;
+    }
     axis->answered = false;
     return missed;
 }

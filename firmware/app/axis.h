@@ -35,6 +35,10 @@ struct axis {
     enum cia402_goal goal;
     uint32_t answered_us; /* port_time_us() of the last answer */
     uint32_t missed_in_row;
+    uint32_t missed;                /* SYNCs unanswered since it was found */
+    uint32_t digital_inputs;        /* 0x60FD */
+    int32_t following_error_counts; /* 0x60F4, looked at a few times a second */
+    bool homed;                     /* since it was found */
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 

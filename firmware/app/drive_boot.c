@@ -83,11 +83,18 @@ void drive_boot_init(struct drive_boot *boot)
     boot->phase = DRIVE_BOOT_IDLE;
 }
 
+static void forget_trouble(struct drive_boot *boot)
+{
+    boot->trouble_node = 0;
+    boot->trouble_object = 0;
+    boot->trouble_abort = SDO_OK;
+    boot->trouble_value = 0;
+}
+
 void drive_boot_begin(struct drive_boot *boot, const struct config *config)
 {
     boot->config = *config;
-    boot->trouble_node = 0;
-    boot->trouble_abort = SDO_OK;
+    forget_trouble(boot);
     sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
     pause(boot, DRIVE_BOOT_PAUSE_US);
 }
@@ -99,8 +106,11 @@ static uint8_t node_of(const struct drive_boot *boot)
 
 static void give_up(struct drive_boot *boot, uint32_t abort_code)
 {
+    const struct step *step = &steps[boot->step];
     boot->trouble_node = node_of(boot);
+    boot->trouble_object = ((uint32_t)step->index << 8) + step->sub;
     boot->trouble_abort = abort_code;
+    boot->trouble_value = abort_code == SDO_OK ? (uint32_t)sdo_client_unsigned(&boot->client) : 0u;
     sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
     pause(boot, DRIVE_BOOT_RETRY_US);
 }
@@ -186,8 +196,7 @@ static int start_next(struct drive_boot *boot, struct can_msg *out)
     boot->axis++;
     if (boot->axis == boot->config.axis_count) {
         boot->phase = DRIVE_BOOT_DONE;
-        boot->trouble_node = 0;
-        boot->trouble_abort = SDO_OK;
+        forget_trouble(boot);
     }
     return 1;
 }

@@ -34,9 +34,11 @@ struct drive_boot {
     uint32_t pause_us;
     uint8_t axis;
     uint8_t step;
-    bool simulated;         /* every drive so far is one of ours (0x1018) */
-    uint8_t trouble_node;   /* the drive that the last attempt failed at; 0: none */
-    uint32_t trouble_abort; /* its SDO abort code; 0: it answered with a wrong value */
+    bool simulated;          /* every drive so far is one of ours (0x1018) */
+    uint8_t trouble_node;    /* the drive that the last attempt failed at; 0: none */
+    uint32_t trouble_object; /* index << 8 + sub that it was about */
+    uint32_t trouble_abort;  /* its SDO abort code; 0: it answered with a wrong value */
+    uint32_t trouble_value;  /* that value */
 };
 
 void drive_boot_init(struct drive_boot *boot);

@@ -122,9 +122,38 @@ static uint64_t override_number(const struct machine *machine, uint8_t sub)
     }
 }
 
+static uint64_t boot_number(const struct drive_boot *boot, uint8_t sub)
+{
+    switch (sub) {
+    case 1:
+        return boot->trouble_node;
+    case 2:
+        return boot->trouble_object;
+    case 3:
+        return boot->trouble_abort;
+    default:
+        return boot->trouble_value;
+    }
+}
+
+static uint64_t drive_state(const struct axis *axis)
+{
+    return axis->present ? (uint64_t)cia402_decode(axis->statusword) + 1u : 0u;
+}
+
 static uint64_t axis_number(const struct axis *axis, uint16_t index)
 {
     switch (index) {
+    case 0x2017:
+        return axis->homed ? 1u : 0u;
+    case 0x201B:
+        return axis->digital_inputs;
+    case 0x201C:
+        return of_i32(axis->following_error_counts);
+    case 0x2024:
+        return axis->missed;
+    case 0x2026:
+        return drive_state(axis);
     case 0x200A:
         return axis->statusword;
     case 0x200B:
@@ -152,6 +181,8 @@ static uint64_t machine_number(const struct controller *controller, const struct
         return motion_number(&machine->motion, entry->sub);
     case 0x2010:
         return override_number(machine, entry->sub);
+    case 0x2025:
+        return boot_number(&controller->boot, entry->sub);
     default:
         return axis_number(&machine->axes[entry->sub - 1u], entry->index);
     }
@@ -162,10 +193,15 @@ static bool is_mirror(const struct od_entry *entry)
     if (entry->index == 0x2002) {
         return true;
     }
-    const bool in_record = entry->index == 0x2003 || entry->index == 0x2008 ||
-                           entry->index == 0x2009 || entry->index == 0x2010 ||
-                           (entry->index >= 0x200A && entry->index <= 0x200E);
-    return in_record && entry->sub > 0u;
+    static const uint16_t records[] = {0x2003, 0x2008, 0x2009, 0x200A, 0x200B,
+                                       0x200C, 0x200D, 0x200E, 0x2010, 0x2017,
+                                       0x201B, 0x201C, 0x2024, 0x2025, 0x2026};
+    for (size_t i = 0; i < sizeof records / sizeof records[0]; ++i) {
+        if (records[i] == entry->index) {
+            return entry->sub > 0u;
+        }
+    }
+    return false;
 }
 
 uint32_t od_read_hook(void *context, const struct od_entry *entry)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/config.h"
 
+#include "od_controller.h"
 #include "unity.h"
 
 #define Q40 (INT64_C(1) << 40)
@@ -78,6 +79,49 @@ static void test_which_objects_concern_the_drives(void)
     TEST_ASSERT_TRUE(config_concerns_drives(0x2007, 6));
     TEST_ASSERT_TRUE(config_contains(0x2005));
     TEST_ASSERT_FALSE(config_contains(0x2008));
+    TEST_ASSERT_FALSE(config_concerns_drives(0x2004, 9));
+    TEST_ASSERT_TRUE(config_concerns_drives(0x2004, 11));
+    TEST_ASSERT_TRUE(config_concerns_drives(0x2012, 1));
+    TEST_ASSERT_FALSE(config_concerns_drives(0x2018, 1));
+    TEST_ASSERT_FALSE(config_concerns_drives(0x201A, 6));
+    TEST_ASSERT_TRUE(config_concerns_drives(0x201F, 1));
+    TEST_ASSERT_TRUE(config_contains(0x2023));
+    TEST_ASSERT_FALSE(config_contains(0x2017));
+    TEST_ASSERT_FALSE(config_contains(0x201C));
+    TEST_ASSERT_FALSE(config_contains(0x2024));
+}
+
+/* Each object reaches the field of its axis, with its sign. */
+static void test_every_axis_object_is_read(void)
+{
+    struct od_controller values = od_controller_defaults;
+    struct od od;
+    struct config config;
+    od_init(&od, &od_controller_table, &values, NULL, NULL);
+    values.configuration.answer_wait_ms = 5;
+    values.configuration.missed_max = 3;
+    values.configuration.setpoint_timeout_ms = 60000;
+    values.configuration.feedforward = 2;
+    values.homing_method[0] = -3;
+    values.home_offset[5] = INT32_MIN;
+    values.velocity_feedforward[1] = 2000;
+    values.torque_per_acceleration[2] = -65536;
+    values.following_error_window[3] = 4000000000u;
+    values.following_error_time_out[4] = 65535;
+    values.gear_shaft_revolutions[5] = 7;
+    config_read(&config, &od);
+    TEST_ASSERT_EQUAL_UINT16(5, config.answer_wait_ms);
+    TEST_ASSERT_EQUAL_UINT8(3, config.missed_max);
+    TEST_ASSERT_EQUAL_UINT16(60000, config.setpoint_timeout_ms);
+    TEST_ASSERT_EQUAL_UINT8(CONFIG_VELOCITY_FEEDFORWARD, config.feedforward);
+    TEST_ASSERT_EQUAL_INT32(-3, config.axis[0].homing_method);
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, config.axis[5].home_offset_counts);
+    TEST_ASSERT_EQUAL_UINT32(2000, config.axis[1].velocity_permille);
+    TEST_ASSERT_EQUAL_INT32(-65536, config.axis[2].torque_per_acceleration_q16);
+    TEST_ASSERT_EQUAL_UINT32(4000000000u, config.axis[3].following_window_counts);
+    TEST_ASSERT_EQUAL_UINT32(65535, config.axis[4].following_timeout_ms);
+    TEST_ASSERT_EQUAL_UINT32(7, config.axis[5].gear_shaft_revolutions);
+    TEST_ASSERT_EQUAL_UINT32(2000000000u, config.axis[0].quick_stop_counts_s2);
 }
 
 int main(void)
@@ -88,5 +132,6 @@ int main(void)
     RUN_TEST(test_the_ends_of_the_range);
     RUN_TEST(test_values_that_make_no_sense);
     RUN_TEST(test_which_objects_concern_the_drives);
+    RUN_TEST(test_every_axis_object_is_read);
     return UNITY_END();
 }
