@@ -21,7 +21,7 @@ LIMIT_S = 60.0
 SEND = """
 import socket, sys, time
 s = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-s.bind(("vcan0",))
+s.bind((sys.argv[3] if len(sys.argv) > 3 else "vcan0",))
 for _ in range(int(sys.argv[2])):
     s.send(bytes([int(sys.argv[1]), 0, 0, 0, 1, 0, 0, 0, 42, 0, 0, 0, 0, 0, 0, 0]))
     time.sleep(0.05)
@@ -29,7 +29,7 @@ for _ in range(int(sys.argv[2])):
 RECEIVE = """
 import socket, sys
 s = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-s.bind(("vcan0",))
+s.bind((sys.argv[1] if len(sys.argv) > 1 else "vcan0",))
 s.settimeout(30)
 print("listening", flush=True)
 print(s.recv(16)[0])
@@ -166,6 +166,14 @@ def test_frames_go_from_one_shell_to_another(bus: OpenBus) -> None:
         assert receiver.wait(LIMIT_S) == 0
 
 
+def test_a_second_bus_is_there_and_apart(bus: OpenBus) -> None:
+    with started(bus.command(sys.executable, "-c", RECEIVE, "vcan1")) as receiver:
+        assert line_of(receiver) == b"listening\n"
+        assert bus.run(sys.executable, "-c", SEND, "1", "2", "vcan0").returncode == 0
+        assert bus.run(sys.executable, "-c", SEND, "2", "1", "vcan1").returncode == 0
+        assert line_of(receiver) == b"2\n"
+
+
 def test_two_buses_are_two(bus: OpenBus) -> None:
     with (
         opened("other") as other,
@@ -231,9 +239,18 @@ def test_a_kernel_with_can_gives_a_bus_in_a_namespace(bus: OpenBus) -> None:
     script = f"{WITH_VCAN} --own {receive} & sleep 1.5; {send} 3 2; kill $!; wait $!"
     done = bus.run("sh", "-c", script)
     assert done.stdout == b"listening\n"  # and no frame from the bus outside
-    inner = f"{receive} & sleep 0.5; {send} 4 1; wait"
-    done = bus.run(WITH_VCAN, "--own", "sh", "-c", inner)
-    assert done.stdout == b"listening\n4\n"
+    for name in ("vcan0", "vcan1"):
+        inner = f"{receive} {name} & sleep 0.5; {send} 4 1 {name}; wait"
+        done = bus.run(WITH_VCAN, "--own", "sh", "-c", inner)
+        assert done.stdout == b"listening\n4\n"
+
+
+def test_beside_a_vcan0_the_second_bus_is_made(bus: OpenBus) -> None:
+    """Where it may be: by root, whom `unshare` makes of everybody."""
+    inner = f"ip link add dev vcan0 type vcan && ip link set vcan0 up && {WITH_VCAN} ip -o link show up type vcan"
+    done = bus.run("unshare", "-rn", "sh", "-c", inner)
+    names = [line.split()[1] for line in done.stdout.decode().splitlines()]
+    assert names == ["vcan0:", "vcan1:"], done.stderr
 
 
 def test_real_time_scheduling_is_allowed_inside(bus: OpenBus) -> None:

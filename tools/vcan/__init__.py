@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A vcan0 for a command: the kernel's own, or one inside user-mode Linux. tools/with-vcan is the command.
+"""A vcan0 (and vcan1) for a command: the kernel's own, or inside user-mode Linux. tools/with-vcan is the command.
 
 main       command line
-kernel     the bus of this kernel: vcan0 that is there, or one in a network namespace of its own
+kernel     the buses of this kernel: vcan0 that is there, or in a network namespace of their own
 client     runs one command on a user-mode bus, passing its streams, signals and exit status
 broker     owns the user-mode Linux process; joins clients to the agent; ends and cleans everything
 agent      first process inside user-mode Linux: starts the commands

@@ -25,7 +25,9 @@ for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev drivers/ne
     insmod "$MODULES/kernel/$module.ko"
 done
 ip link set lo up
-ip link add dev vcan0 type vcan && ip link set vcan0 up || echo "with-vcan: no vcan0"
+for bus in vcan0 vcan1; do
+    ip link add dev $bus type vcan && ip link set $bus up || echo "with-vcan: no $bus"
+done
 "$PYTHON" -I -S "$AGENT" /dev/ttyS0
 echo "with-vcan: the agent has ended: $?"
 sync

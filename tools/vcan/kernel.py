@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The bus of this kernel: vcan0 where there is one, else one in a network namespace of the command's own.
+"""The buses of this kernel: vcan0 where there is one, else one in a network namespace of the command's own; and vcan1.
+
+vcan1 is a second bus for whatever stands between two of them, such as the fault injector.
 
 A namespace keeps buses apart, so that tests may run at once, and leaves nothing behind. Without root it
 is entered through a user namespace, in which the user keeps his number.
@@ -7,6 +9,7 @@ is entered through a user namespace, in which the user keeps his number.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import fcntl
 import os
@@ -29,15 +32,27 @@ _IFLA_LINKINFO = 18
 _IFLA_INFO_KIND = 1
 
 
-def has_bus() -> bool:
-    """Whether vcan0 is there and up."""
-    request = struct.pack("16sh14x", b"vcan0", 0)
+BUSES = ("vcan0", "vcan1")
+"""What a command finds."""
+
+
+def has_bus(name: str = BUSES[0]) -> bool:
+    """Whether vcan0 (or another bus) is there and up."""
+    request = struct.pack("16sh14x", name.encode(), 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
         try:
             answer = fcntl.ioctl(any_socket, _SIOCGIFFLAGS, request)
         except OSError:
             return False
     return bool(struct.unpack_from("h", answer, 16)[0] & _IFF_UP)
+
+
+def complete() -> None:
+    """Beside a vcan0 that is there already, makes the other buses where that is allowed."""
+    for name in BUSES[1:]:
+        if not has_bus(name):
+            with contextlib.suppress(OSError):
+                _new_bus(name)
 
 
 def can_make_namespace() -> bool:
@@ -60,7 +75,7 @@ def can_make_namespace() -> bool:
 
 
 def enter_new_namespace() -> None:
-    """Moves this process into a network namespace with a vcan0 (and lo) that is up. OSError: not possible here."""
+    """Moves this process into a network namespace with buses (and lo) that are up. OSError: not possible here."""
     uid, gid = os.getuid(), os.getgid()
     if os.geteuid() == 0:
         _unshare(_CLONE_NEWNET)
@@ -69,13 +84,11 @@ def enter_new_namespace() -> None:
         Path("/proc/self/setgroups").write_text("deny")
         Path("/proc/self/uid_map").write_text(f"{uid} {uid} 1")
         Path("/proc/self/gid_map").write_text(f"{gid} {gid} 1")
-    kind = _attribute(_IFLA_INFO_KIND, b"vcan")
-    _new_link(
-        0, _attribute(_IFLA_IFNAME, b"vcan0\0") + _attribute(_IFLA_LINKINFO, kind), create=True
-    )
+    for name in BUSES:
+        _new_bus(name)
     _new_link(socket.if_nametoindex("lo"), b"", create=False)
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
-        bus.bind(("vcan0",))
+        bus.bind((BUSES[0],))
 
 
 def join_namespace(pid: int) -> None:
@@ -103,6 +116,12 @@ def _check(result: int) -> None:
 def _attribute(kind: int, payload: bytes) -> bytes:
     padding = b"\0" * (-len(payload) % 4)
     return struct.pack("HH", 4 + len(payload), kind) + payload + padding
+
+
+def _new_bus(name: str) -> None:
+    kind = _attribute(_IFLA_INFO_KIND, b"vcan")
+    words = _attribute(_IFLA_IFNAME, name.encode() + b"\0") + _attribute(_IFLA_LINKINFO, kind)
+    _new_link(0, words, create=True)
 
 
 def _new_link(index: int, attributes: bytes, *, create: bool) -> None:

@@ -27,7 +27,8 @@ _TROUBLE = 125
 
 _ABOUT = """\
 Runs COMMAND with a CAN bus vcan0: the kernel's own where there is one, else one in a network namespace,
-else one inside user-mode Linux (installed when missing). The exit status is COMMAND's, 128 + N when
+else one inside user-mode Linux (installed when missing). There is a second one, vcan1, too; beside a vcan0
+of the kernel's own only where it exists or may be made. The exit status is COMMAND's, 128 + N when
 signal N ended it, 127 when it was not found, 125 when there is no bus."""
 
 
@@ -121,6 +122,7 @@ def _join(name: str | None, command: list[str]) -> int:
 def _open(options: argparse.Namespace) -> int:
     if not options.user_mode:
         if kernel.has_bus() and not options.own:
+            kernel.complete()
             _become(options.command)
         if kernel.can_make_namespace():
             _open_namespace(options)
