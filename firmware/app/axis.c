@@ -53,7 +53,10 @@ void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg 
 {
     const uint16_t before = axis->controlword;
     axis->controlword = cia402_master_controlword(axis->goal, axis->statusword, before);
-    if (before != CIA402_ENABLE_OPERATION && !axis_enabled(axis)) {
+    if (axis->controlword == CIA402_ENABLE_OPERATION) {
+        axis->controlword = (uint16_t)(axis->controlword | axis->control_extra);
+    }
+    if ((before & CIA402_CONTROL_ENABLE) == 0u && !axis_enabled(axis)) {
         axis->target_counts = axis->position_counts;
     }
     count_standstill(axis, tolerance_counts);

@@ -28,7 +28,9 @@ struct axis {
     bool answered; /* has answered the present SYNC */
     uint16_t statusword;
     uint16_t controlword; /* sent last */
-    uint16_t error_code;  /* of the drive's last EMCY; 0: none */
+    uint16_t
+        control_extra;   /* more controlword bits while the drive is told to be enabled: homing */
+    uint16_t error_code; /* of the drive's last EMCY; 0: none */
     int32_t position_counts;
     int32_t target_counts;      /* to be sent in this tick */
     int32_t target_sent_counts; /* sent in the last one */

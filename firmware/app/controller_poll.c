@@ -145,9 +145,10 @@ static void poll_emergency(struct controller *controller)
 
 static void note_state(struct controller *controller)
 {
-    static const char *const names[] = {"state boot",  "state off",     "state enabling",
-                                        "state ready", "state running", "state stopping",
-                                        "state fault", "state holding", "state held"};
+    static const char *const names[] = {"state boot",   "state off",       "state enabling",
+                                        "state ready",  "state running",   "state stopping",
+                                        "state fault",  "state holding",   "state held",
+                                        "state homing", "state quick stop"};
     port_lock();
     const enum machine_state state = controller->machine.state;
     port_unlock();

@@ -7,6 +7,7 @@ static void set_goals(struct machine *machine, enum cia402_goal goal)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         machine->axes[i].goal = goal;
+        machine->axes[i].control_extra = 0;
     }
 }
 
@@ -63,7 +64,7 @@ static enum machine_refusal not_available(const struct machine *machine)
     if (machine->state == MACHINE_FAULT) {
         return MACHINE_FAULT_PRESENT;
     }
-    if (machine_moving(machine)) {
+    if (machine_moving(machine) || machine->state == MACHINE_HOMING) {
         return MACHINE_MOVING;
     }
     return machine->state == MACHINE_BOOT ? MACHINE_DRIVES_MISSING : MACHINE_ACCEPTED;
@@ -142,6 +143,27 @@ enum machine_refusal machine_resume(struct machine *machine)
     motion_resume(&machine->motion);
     machine->state = MACHINE_RUNNING;
     return MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_begin_homing(struct machine *machine)
+{
+    const enum machine_refusal refusal = not_available(machine);
+    if (refusal != MACHINE_ACCEPTED) {
+        return refusal;
+    }
+    if (machine->state != MACHINE_OFF) {
+        return MACHINE_DRIVES_ON;
+    }
+    machine->state = MACHINE_HOMING;
+    return MACHINE_ACCEPTED;
+}
+
+void machine_end_homing(struct machine *machine)
+{
+    if (machine->state == MACHINE_HOMING) {
+        set_goals(machine, CIA402_GOAL_OFF);
+        machine->state = MACHINE_OFF;
+    }
 }
 
 void machine_override(struct machine *machine, uint32_t percent)
@@ -231,7 +253,8 @@ bool machine_drives_operational(const struct machine *machine)
 bool machine_busy(const struct machine *machine)
 {
     if (machine->state != MACHINE_READY && machine->state != MACHINE_HELD) {
-        return machine->state == MACHINE_ENABLING || machine_moving(machine);
+        return machine->state == MACHINE_ENABLING || machine->state == MACHINE_HOMING ||
+               machine_moving(machine);
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         if (!axis_still(&machine->axes[i])) {

@@ -6,6 +6,7 @@
  *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
  *                                       RUNNING -> STOPPING -> READY
  *                                       RUNNING -> HOLDING -> HELD -> RUNNING, STOPPING
+ *   OFF -> HOMING -> OFF
  *
  * The state changes in two places only: in the requests below (mainline, under the lock) and in
  * machine_step (timer). The whole struct is guarded by the port's lock.
@@ -31,8 +32,10 @@ enum machine_state {
     MACHINE_RUNNING = 4,  /* a program runs, or its last point is being settled at */
     MACHINE_STOPPING = 5, /* the same for a stop along the path */
     MACHINE_FAULT = 6,
-    MACHINE_HOLDING = 7, /* a feed hold brings the path to rest, or the program ended first */
-    MACHINE_HELD = 8,    /* at rest on the path until resumed or stopped */
+    MACHINE_HOLDING = 7,     /* a feed hold brings the path to rest, or the program ended first */
+    MACHINE_HELD = 8,        /* at rest on the path until resumed or stopped */
+    MACHINE_HOMING = 9,      /* drives home by their own motion; the mainline leads them */
+    MACHINE_QUICK_STOP = 10, /* all drives brake by their own ramps; then OFF */
 };
 
 /* What goes on inside FAULT. */
@@ -53,6 +56,7 @@ enum machine_refusal {
     MACHINE_DRIVES_MISSING = 6,
     MACHINE_OUTSIDE_LIMITS = 7,
     MACHINE_NOT_RUNNING = 8,
+    MACHINE_DRIVES_ON = 9, /* homing wants them off */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
@@ -91,6 +95,12 @@ enum machine_refusal machine_reset(struct machine *machine);
  * enabled, stand still and are within the configured tolerance. */
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
                                    const int32_t start_counts[PLANE_AXES]);
+
+/* Homing, from OFF to OFF. In between the mainline sets each axis's `goal` and `control_extra`
+ * (under the lock); the targets follow the positions. It has failed when the state has left HOMING
+ * before machine_end_homing, which then changes nothing. */
+enum machine_refusal machine_begin_homing(struct machine *machine);
+void machine_end_homing(struct machine *machine);
 
 /* The feed override, 0 ... 200 per cent, at any time. Under the lock. */
 void machine_override(struct machine *machine, uint32_t percent);

@@ -87,6 +87,14 @@ static void next_targets(struct machine *machine)
     machine->statistics.program_tick = machine->motion.setpoints - 1u;
 }
 
+/* The drives move by themselves. */
+static void step_homing(struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        machine->axes[i].target_counts = machine->axes[i].position_counts;
+    }
+}
+
 static void step_motion(struct machine *machine)
 {
     if (!motion_over(&machine->motion)) {
@@ -134,6 +142,9 @@ void machine_step(struct machine *machine)
     case MACHINE_HELD:
         step_motion(machine);
         break;
+    case MACHINE_HOMING:
+        step_homing(machine);
+        break;
     case MACHINE_FAULT:
         step_fault(machine);
         break;
@@ -144,6 +155,7 @@ void machine_step(struct machine *machine)
         break;
     case MACHINE_OFF:
     case MACHINE_READY:
+    case MACHINE_QUICK_STOP:
     default:
         break;
     }
