@@ -73,6 +73,12 @@ const struct nmt_hooks drive_node_nmt_hooks = {
     .changed = drive_node_changed,
 };
 
+void drive_node_power_on(struct drive_node *node)
+{
+    nmt_slave_init(&node->nmt, node->id, &drive_node_nmt_hooks, node);
+    drive_node_reset(node);
+}
+
 int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_config *config,
                     int32_t position_counts, struct drive_node_port port)
 {
@@ -84,8 +90,7 @@ int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_conf
         return error;
     }
     od_init(&node->od, &od_drive_table, &node->values, &drive_node_od_hooks, node);
-    nmt_slave_init(&node->nmt, id, &drive_node_nmt_hooks, node);
-    drive_node_reset(node);
+    drive_node_power_on(node);
     return 0;
 }
 
@@ -158,6 +163,9 @@ static void drive_node_receive_pdo(struct drive_node *node, const struct can_msg
 void drive_node_receive(struct drive_node *node, const struct can_msg *in)
 {
     struct can_msg out;
+    if (node->silent) {
+        return;
+    }
     if (nmt_slave_receive(&node->nmt, in)) {
         return;
     }
@@ -206,6 +214,10 @@ static void drive_node_watch_sync(struct drive_node *node, uint32_t elapsed_us)
 void drive_node_process(struct drive_node *node, uint32_t elapsed_us)
 {
     struct can_msg out;
+    if (node->silent) {
+        axis_motion_hold(&node->axis);
+        return;
+    }
     if (nmt_slave_process(&node->nmt, &out) != 0) {
         drive_node_send(node, &out);
     }
@@ -214,7 +226,8 @@ void drive_node_process(struct drive_node *node, uint32_t elapsed_us)
         drive_node_stop_for(node, EMCY_HEARTBEAT);
     }
     if (heartbeat_producer_process(&node->heartbeat, node->values.producer_heartbeat_time,
-                                   node->nmt.state, elapsed_us, &out) != 0) {
+                                   node->nmt.state, elapsed_us, &out) != 0 &&
+        !node->no_heartbeat) {
         drive_node_send(node, &out);
     }
     while (emcy_producer_process(&node->emcy, &out) != 0) {

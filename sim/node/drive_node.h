@@ -57,6 +57,8 @@ struct drive_node {
     bool setpoint_fresh; /* a target came since the last period */
     bool received_new;   /* `received` waits for the next SYNC */
     struct pdo_setpoint received;
+    bool silent;       /* as without power: node_fault.h */
+    bool no_heartbeat; /* node_fault.h */
     uint8_t id;
 };
 

@@ -68,3 +68,30 @@ void drive_node_stop_for(struct drive_node *node, uint16_t code)
     emcy_producer_raise(&node->emcy, code, EMCY_REGISTER_COMMUNICATION, NULL);
     (void)cia402_device_quick_stop(&node->device);
 }
+
+/* Bits of 0x1001 for an error code, by its class (CiA 301 table 26). */
+static uint8_t drive_node_register_bits(uint16_t code)
+{
+    switch (code >> 12) {
+    case 2:
+        return EMCY_REGISTER_CURRENT;
+    case 3:
+        return EMCY_REGISTER_VOLTAGE;
+    case 4:
+        return EMCY_REGISTER_TEMPERATURE;
+    case 8:
+        return (code & 0xFF00u) <= 0x8200u ? EMCY_REGISTER_COMMUNICATION : EMCY_REGISTER_PROFILE;
+    case 15:
+        return EMCY_REGISTER_MANUFACTURER;
+    default:
+        return EMCY_REGISTER_GENERIC;
+    }
+}
+
+void drive_node_fail(struct drive_node *node, uint16_t code)
+{
+    if (cia402_device_fault(&node->device)) {
+        node->values.error_code = code;
+        emcy_producer_raise(&node->emcy, code, drive_node_register_bits(code), NULL);
+    }
+}

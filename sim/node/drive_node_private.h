@@ -25,4 +25,10 @@ void drive_node_step(struct drive_node *node);
  */
 void drive_node_stop_for(struct drive_node *node, uint16_t code);
 
+/* Power is back after a loss: all values as at power-on, the boot-up frame follows. */
+void drive_node_power_on(struct drive_node *node);
+
+/* To Fault with this EMCY code, as 0x605E says; nothing when the drive is in Fault already. */
+void drive_node_fail(struct drive_node *node, uint16_t code);
+
 #endif
