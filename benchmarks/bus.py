@@ -30,7 +30,7 @@ def measure(name: str, pace: str) -> dict[str, Any]:
     address = parse_address("socketcan:vcan0")
     with station(chain.machine, address, pace, 5.0, print) as at:
         run = run_program(at, chain.machine, chain.image, chain.machine.kernel)
-    drives = [axis.drive for axis in chain.machine.axes[:2]]
+    drives = chain.machine.models(chain.machine.plane)
     expected = simulate(chain.image, drives, kernel=chain.machine.kernel).summary()
     got = run.summary()
     return {

@@ -44,7 +44,8 @@ def example(name: str, laps: int = 1) -> tuple[bytes, tuple[Drive, Drive]]:
     )
     plan = plan_feed(spline.length_mm, path.feed, path.limits, controller)
     image = encode(compile_program(spline, plan, name=name))
-    return image, (machine.axes[0].drive, machine.axes[1].drive)
+    x, y = machine.models(machine.plane)
+    return image, (x, y)
 
 
 def speed() -> dict[str, Any]:

@@ -27,12 +27,12 @@ def controller_limits(machine: Machine) -> ControllerLimits:
 
 
 def program_limits(machine: Machine) -> ProgramLimits:
-    """What the controller of this machine checks a program against."""
+    """What the controller of this machine checks a program against. Raises InputError: it has one axis only."""
     low, high = (
         tuple(round(mm * 2**40) for mm in ends)
         for ends in (
-            [axis.travel_min_mm for axis in machine.axes[:2]],
-            [axis.travel_max_mm for axis in machine.axes[:2]],
+            [axis.travel_min_mm for axis in machine.plane],
+            [axis.travel_max_mm for axis in machine.plane],
         )
     )
     return ProgramLimits(
@@ -120,6 +120,7 @@ class Chain:
     def compilation(self) -> Compilation:
         """The program for the machine."""
         machine = self.machine
+        limits = program_limits(machine)
         spline, plan = self.spline_result.spline, self.plan
         with _told_by(f"{self.file.file}:"):
             return compile_path(
@@ -127,7 +128,7 @@ class Chain:
                 plan,
                 period_us=machine.period_us,
                 offset_mm=machine.offset_mm,
-                limits=program_limits(machine),
+                limits=limits,
                 name=self.file.name,
             )
 

@@ -1,29 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""The controller's configuration, as a machine file asks for it."""
+"""The controller's configuration, as a machine file asks for it (docs/protocol.md section 3)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..names import KERNELS
-from .objects import (
-    AXIS_NODE,
-    CONFIGURATION,
-    PERIOD,
-    TRAVEL_MAXIMUM,
-    TRAVEL_MINIMUM,
-    Object,
-)
+from . import objects
+from .objects import CONFIGURATION, Object
 
 if TYPE_CHECKING:
-    from ..config import Machine
+    from ..config import Axis, Machine
+
+WINDOW_OFF = 2**32 - 1
+_Q16 = 2**16
 
 
 def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
     """What the objects of the controller have to hold."""
     counts = machine.counts_per_mm
+    supervision = machine.supervision
     wanted: list[tuple[Object, int]] = [
-        ((PERIOD, None), machine.period_us),
+        ((objects.PERIOD, None), machine.period_us),
         ((CONFIGURATION, 1), len(machine.axes)),
         ((CONFIGURATION, 2), round(machine.feed_mm_s * 1000)),
         ((CONFIGURATION, 3), round(machine.acceleration_mm_s2 * 1000)),
@@ -31,9 +30,44 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
         ((CONFIGURATION, 5), KERNELS.index(kernel)),
         ((CONFIGURATION, 6), machine.start_tolerance_counts),
         ((CONFIGURATION, 7), counts),
+        ((CONFIGURATION, 8), supervision.answer_wait_ms),
+        ((CONFIGURATION, 9), supervision.missed_max),
+        ((CONFIGURATION, 10), supervision.setpoint_timeout_ms),
+        ((CONFIGURATION, 11), feedforward_bits(machine)),
     ]
-    for i, axis in enumerate(machine.axes, start=1):
-        wanted.append(((AXIS_NODE, i), axis.node))
-        wanted.append(((TRAVEL_MINIMUM, i), round(axis.travel_min_mm * counts)))
-        wanted.append(((TRAVEL_MAXIMUM, i), round(axis.travel_max_mm * counts)))
+    for sub, axis in enumerate(machine.axes, start=1):
+        wanted += [((index, sub), value) for index, value in _axis(axis, counts)]
     return wanted
+
+
+def feedforward_bits(machine: Machine) -> int:
+    """What the setpoints carry beside the position, for all drives alike: where one axis needs it, all have room."""
+    torque = any(axis.feedforward.has_torque for axis in machine.axes)
+    velocity = any(axis.feedforward.velocity for axis in machine.axes)
+    return objects.FEEDFORWARD_TORQUE * torque + objects.FEEDFORWARD_VELOCITY * velocity
+
+
+def _axis(axis: Axis, counts_per_mm: int) -> Iterator[tuple[int, int]]:
+    def counts(mm: float) -> int:
+        return round(mm * counts_per_mm)
+
+    yield objects.AXIS_NODE, axis.node
+    yield objects.TRAVEL_MINIMUM, counts(axis.travel_min_mm)
+    yield objects.TRAVEL_MAXIMUM, counts(axis.travel_max_mm)
+    homing, forward, scaling = axis.homing, axis.feedforward, axis.scaling
+    yield objects.HOMING_METHOD, homing.method
+    yield objects.HOME_OFFSET, counts(homing.offset_mm)
+    yield objects.HOMING_SPEED, counts(homing.speed_mm_s)
+    yield objects.HOMING_SLOW, counts(homing.slow_mm_s)
+    yield objects.HOMING_ACCELERATION, counts(homing.acceleration_mm_s2)
+    yield objects.VELOCITY_FEEDFORWARD, round(forward.velocity * 1000)
+    yield objects.TORQUE_PER_ACCELERATION, round(forward.torque_permille_s2_m * _Q16)
+    yield objects.TORQUE_PER_VELOCITY, round(forward.torque_permille_s_m * _Q16)
+    window = axis.following_window_mm
+    yield objects.FOLLOWING_WINDOW, WINDOW_OFF if window is None else counts(window)
+    yield objects.FOLLOWING_TIMEOUT, axis.following_timeout_ms
+    yield objects.QUICK_STOP_DECELERATION, counts(axis.quick_stop_mm_s2)
+    yield objects.ENCODER_INCREMENTS, scaling.encoder_increments_per_rev
+    yield objects.FEED_CONSTANT, scaling.feed_counts_per_rev
+    yield objects.GEAR_MOTOR, scaling.gear_motor_revolutions
+    yield objects.GEAR_SHAFT, scaling.gear_shaft_revolutions

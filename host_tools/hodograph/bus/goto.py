@@ -51,7 +51,7 @@ def legs(start_mm: complex, end_mm: complex, machine: Machine) -> list[tuple[com
         return []
     if abs(end_mm - start_mm) >= SHORTEST_MOVE_MM:
         return [(start_mm, end_mm)]
-    axis = machine.axes[0]
+    axis = machine.plane[0]
     middle = (axis.travel_min_mm + axis.travel_max_mm) / 2
     detour = start_mm + math.copysign(DETOUR_MM, middle - start_mm.real)
     return [(start_mm, detour), (detour, end_mm)]
@@ -68,14 +68,14 @@ def goto(
     The drives have to be on (state ready). Each move replaces the program that is loaded. Raises RefusedError when
     the feed override is 0, with which nothing would move.
     """
-    for axis, counts in zip(machine.axes, end_counts, strict=True):
+    for axis, counts in zip(machine.plane, end_counts, strict=True):
         at_mm = counts / machine.counts_per_mm
         if not axis.travel_min_mm <= at_mm <= axis.travel_max_mm:
             raise InputError(
                 f"goto: {axis.name} = {at_mm:g} mm is outside the travel "
                 f"{axis.travel_min_mm:g} to {axis.travel_max_mm:g} mm"
             )
-    here = controller.targets(len(machine.axes))
+    here = controller.targets(len(machine.plane))
     start_mm, end_mm = (
         complex(x / machine.counts_per_mm, y / machine.counts_per_mm) for x, y in (here, end_counts)
     )

@@ -17,7 +17,7 @@ from ..errors import BusError
 from .address import BusAddress
 
 if TYPE_CHECKING:
-    from ..config import Axis, Machine
+    from ..config import Drive, Machine
 
 CONTROLLER, DRIVE = "hodograph-controller", "hodograph-drive"
 _REPOSITORY = Path(__file__).resolve().parents[3]
@@ -47,15 +47,14 @@ def controller_command(machine: Machine, address: BusAddress, pace: str) -> list
 def drive_command(machine: Machine, address: BusAddress) -> list[str]:
     """Command line of the one process that simulates all drives."""
     command = [str(find_program(DRIVE)), "--bus", address.channel]
-    for axis in machine.axes:
-        command += ["--axis", _axis_text(axis, machine)]
+    for axis, drive in zip(machine.axes, machine.models(machine.axes), strict=True):
+        command += ["--axis", _axis_text(axis.node, drive, machine)]
     return command
 
 
-def _axis_text(axis: Axis, machine: Machine) -> str:
-    drive = axis.drive
+def _axis_text(node: int, drive: Drive, machine: Machine) -> str:
     values: dict[str, float] = {
-        "node": axis.node,
+        "node": node,
         "gain_rad_s_v": drive.gain_rad_s_v,
         "time_constant_s": drive.time_constant_s,
         "screw_mm_rad": drive.screw_mm_rad,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bustime import RecordedLoad, machine_bus_time, recorded_load
-from ..config import Machine
+from ..config import PLANE_AXES, Machine
 from ..errors import BusError, HodographError, RunError
 from ..native import NativeProgram
 from ..simulate import Motion, analyse, settling_ticks
@@ -134,7 +134,7 @@ def run_program(
             "(larger receive buffer)"
         )
     frames = recorder.frames()
-    ticks = decode_ticks(frames, [axis.node for axis in machine.axes])
+    ticks = decode_ticks(frames, machine.nodes)
     motion = _motion(image, program, ticks, setpoints, machine, kernel)
     return BusRun(
         motion=motion,
@@ -181,17 +181,18 @@ def _motion(
     kernel: str,
 ) -> Motion:
     if ticks.volts_mv is None:
-        ticks_volts = np.zeros((ticks.count, 2), dtype=np.int16)
+        volts_mv = np.zeros(ticks.targets.shape, dtype=np.int16)
     else:
-        ticks_volts = ticks.volts_mv
-    first = first_tick(ticks.targets, setpoints)
+        volts_mv = ticks.volts_mv
+    plane = np.s_[:, :PLANE_AXES]
+    first = first_tick(ticks.targets[plane], setpoints)
     count = program.ticks + settling_ticks(machine.period_us)
     reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
     return analyse(
         image,
-        ticks.targets[first : first + count],
-        ticks.actual[reached],
-        ticks_volts[reached],
+        ticks.targets[plane][first : first + count],
+        ticks.actual[plane][reached],
+        volts_mv[plane][reached],
         kernel=kernel,
         counts_per_mm=machine.counts_per_mm,
     )

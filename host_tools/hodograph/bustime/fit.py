@@ -31,7 +31,7 @@ def bus_time(
 
 def machine_bus_time(machine: Machine) -> BusTime:
     """The bus time of a machine file."""
-    return bus_time(_nodes(machine), machine.period_us, machine.bitrate, controller=machine.node)
+    return bus_time(machine.nodes, machine.period_us, machine.bitrate, controller=machine.node)
 
 
 def max_drives(period_us: int, bitrate: int, *, only_first_pdos: bool = False) -> int:
@@ -56,7 +56,7 @@ def require_fit(machine: Machine) -> None:
 
 
 def _advice(machine: Machine) -> str:
-    nodes = _nodes(machine)
+    nodes = machine.nodes
 
     def fits(period_us: int, bitrate: int) -> bool:
         return bus_time(nodes, period_us, bitrate, controller=machine.node).fits
@@ -74,13 +74,9 @@ def _advice(machine: Machine) -> str:
 
 
 def _both(machine: Machine) -> str:
-    nodes = _nodes(machine)
+    nodes = machine.nodes
     for bitrate in BITRATES:
         for period_us in PERIODS_US:
             if bus_time(nodes, period_us, bitrate, controller=machine.node).fits:
                 return f"period_us = {period_us} with bitrate = {bitrate}"
     return "fewer drives at 8000 us and 1000000 bit/s"
-
-
-def _nodes(machine: Machine) -> list[int]:
-    return [axis.node for axis in machine.axes]

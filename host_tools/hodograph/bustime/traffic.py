@@ -85,9 +85,8 @@ def messages(
 
 def machine_messages(machine: Machine, *, only_first_pdos: bool = False) -> tuple[Message, ...]:
     """The periodic frames of a machine file."""
-    nodes = [axis.node for axis in machine.axes]
     return messages(
-        nodes, machine.period_us, controller=machine.node, only_first_pdos=only_first_pdos
+        machine.nodes, machine.period_us, controller=machine.node, only_first_pdos=only_first_pdos
     )
 
 

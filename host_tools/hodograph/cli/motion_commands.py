@@ -12,7 +12,7 @@ from ..bus.address import BusAddress, parse_address
 from ..bus.goto import goto as goto_point
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
 from ..bustime import require_fit
-from ..chain import Chain, load_chain
+from ..chain import Chain, load_chain, program_limits
 from ..config import Machine, load_machine, read_toml
 from ..errors import BusError, InputError
 from ..native import NativeProgram
@@ -27,6 +27,7 @@ def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
     if image is not None:
         machine = load_machine(options.machine) if options.machine else None
         if machine is not None:
+            program_limits(machine)
             require_fit(machine)
         return image, machine
     chain = load_chain(options.file, options.machine)

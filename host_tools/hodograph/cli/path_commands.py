@@ -173,7 +173,7 @@ def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) 
     with progress("simulate", "tick", chain.program.ticks) as bar:
         return simulate(
             image,
-            [axis.drive for axis in machine.axes],
+            machine.models(machine.plane),
             kernel=kernel or machine.kernel,
             counts_per_mm=machine.counts_per_mm,
             keep_rows=keep_rows,

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: MIT
 """The input files (TOML) as checked, frozen dataclasses."""
 
+from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive
-from .machine_file import Axis, Machine, load_machine
+from .machine_file import PLANE_AXES, Machine, Supervision, load_machine
 from .path_file import PathFile, PathSpec, load_path_file
 from .table import read_toml
 
 __all__ = [
+    "PLANE_AXES",
     "Axis",
     "Drive",
+    "Feedforward",
+    "Homing",
     "Machine",
     "PathFile",
     "PathSpec",
+    "Scaling",
+    "Supervision",
     "load_drive",
     "load_machine",
     "load_path_file",

@@ -3,26 +3,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..errors import InputError
 from ..names import KERNELS
-from .drive_file import Drive, load_drive
+from .axis_table import Axis, read_axes
+from .drive_file import Drive
 from .table import Table, read_toml
 
-COUNTS_LIMIT = 2**31 - 1
+PLANE_AXES = 2
+"""The first two axes follow the path, the rest hold their position."""
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One axis: CANopen node, travel limits in machine coordinates, bus resolution, drive."""
+class Supervision:
+    """When answers or setpoints that stay away become a fault (docs/protocol.md section 3, object 0x2004)."""
 
-    name: str
-    node: int
-    travel_min_mm: float
-    travel_max_mm: float
-    drive: Drive
-    drive_file: Path
+    answer_wait_ms: int = 100
+    missed_max: int = 1
+    setpoint_timeout_ms: int = 200
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class Machine:
     start_tolerance_mm: float
     offset_mm: complex
     counts_per_mm: int
+    supervision: Supervision
     axes: tuple[Axis, ...]
 
     @property
@@ -48,8 +50,32 @@ class Machine:
         """Tolerance at the start point, in bus counts."""
         return round(self.start_tolerance_mm * self.counts_per_mm)
 
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """Node numbers of the drives, by axis."""
+        return tuple(axis.node for axis in self.axes)
 
-_SECTIONS = ("bus", "controller", "work", "axis")
+    @property
+    def plane(self) -> tuple[Axis, Axis]:
+        """The axes that follow a path, x and y. Raises InputError: there is only one axis."""
+        if len(self.axes) < PLANE_AXES:
+            raise InputError(
+                f"{self.file}: has one axis ({self.axes[0].name}), a path needs two: add a second [[axis]]"
+            )
+        return self.axes[0], self.axes[1]
+
+    def models(self, axes: Sequence[Axis]) -> tuple[Drive, ...]:
+        """The drives of these axes as simulated. Raises InputError: one has no drive file."""
+        for axis in axes:
+            if axis.drive is None:
+                raise InputError(
+                    f"{self.file}: axis {axis.name} cannot be simulated without a model: "
+                    'add drive = "FILE" to its [[axis]]'
+                )
+        return tuple(axis.drive for axis in axes if axis.drive is not None)
+
+
+_SECTIONS = ("bus", "controller", "supervision", "work", "axis")
 _CONTROLLER = (
     "node",
     "kernel",
@@ -59,7 +85,7 @@ _CONTROLLER = (
     "reserve",
     "start_tolerance_mm",
 )
-_AXIS = ("name", "node", "travel_mm", "counts_per_mm", "drive")
+_SUPERVISION = ("answer_wait_ms", "missed_max", "setpoint_timeout_ms")
 
 
 def load_machine(file: Path) -> Machine:
@@ -69,7 +95,8 @@ def load_machine(file: Path) -> Machine:
     controller = root.table("controller", _CONTROLLER)
     work = root.table("work", ("offset_mm",), required=False)
     node = controller.integer("node", 1, low=1, high=127)
-    axes, counts_per_mm = _axes(root, node)
+    acceleration_mm_s2 = controller.number("acceleration_mm_s2", low=0.1, high=4e6)
+    axes, counts_per_mm = read_axes(root, node, acceleration_mm_s2)
     return Machine(
         file=file,
         bitrate=bus.integer("bitrate", 1_000_000, low=10_000, high=1_000_000),
@@ -77,12 +104,13 @@ def load_machine(file: Path) -> Machine:
         node=node,
         kernel=controller.choice("kernel", KERNELS, "fixed"),
         feed_mm_s=controller.number("feed_mm_s", low=0.01, high=4000),
-        acceleration_mm_s2=controller.number("acceleration_mm_s2", low=0.1, high=4e6),
+        acceleration_mm_s2=acceleration_mm_s2,
         jerk_mm_s3=controller.number("jerk_mm_s3", low=1, high=4e9),
         reserve=controller.number("reserve", 0.1, low=0, high=0.9),
         start_tolerance_mm=controller.number("start_tolerance_mm", 0.005, low=1e-6, high=10),
         offset_mm=complex(*work.pair("offset_mm", (0.0, 0.0), low=-4096, high=4096)),
         counts_per_mm=counts_per_mm,
+        supervision=_supervision(root),
         axes=axes,
     )
 
@@ -94,35 +122,19 @@ def _period(bus: Table) -> int:
     return period_us
 
 
-def _axes(root: Table, controller_node: int) -> tuple[tuple[Axis, ...], int]:
-    tables = root.tables("axis", _AXIS)
-    if len(tables) != 2:
-        raise tables[-1].error("name", f"makes {len(tables)} axes: a planar machine has exactly 2")
-    counts = [t.integer("counts_per_mm", 1_000_000, low=1000, high=10_000_000) for t in tables]
-    if len(set(counts)) != 1:
-        raise tables[-1].error("counts_per_mm", "must be the same for all axes")
-    axes = tuple(_axis(t, counts[0]) for t in tables)
-    taken = {controller_node: "the controller"}
-    for axis, table in zip(axes, tables, strict=True):
-        if axis.node in taken:
-            raise table.error("node", f"{axis.node} is taken by {taken[axis.node]}")
-        taken[axis.node] = f"axis {axis.name}"
-    return axes, counts[0]
-
-
-def _axis(table: Table, counts_per_mm: int) -> Axis:
-    low, high = table.pair("travel_mm", low=-4096, high=4096)
-    if not low < high:
-        raise table.error("travel_mm", f"must be [least, greatest], but is [{low:g}, {high:g}]")
-    reach = COUNTS_LIMIT / counts_per_mm
-    if max(abs(low), abs(high)) > reach:
-        raise table.error("travel_mm", f"leaves the ±{reach:.1f} mm that i32 counts can express")
-    drive_file = table.present("drive")
-    return Axis(
-        name=table.text("name"),
-        node=table.integer("node", low=1, high=127),
-        travel_min_mm=low,
-        travel_max_mm=high,
-        drive=load_drive(drive_file),
-        drive_file=drive_file,
+def _supervision(root: Table) -> Supervision:
+    table, usual = root.table("supervision", _SUPERVISION, required=False), Supervision()
+    wait_ms = table.integer("answer_wait_ms", usual.answer_wait_ms, low=0, high=10_000)
+    timeout_ms = table.integer(
+        "setpoint_timeout_ms", usual.setpoint_timeout_ms, low=10, high=60_000
+    )
+    if timeout_ms <= wait_ms:
+        raise table.error(
+            "setpoint_timeout_ms",
+            f"is {timeout_ms}: must be above answer_wait_ms = {wait_ms}, or drives stop while one is waited for",
+        )
+    return Supervision(
+        answer_wait_ms=wait_ms,
+        missed_max=table.integer("missed_max", usual.missed_max, low=0, high=255),
+        setpoint_timeout_ms=timeout_ms,
     )

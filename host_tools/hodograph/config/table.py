@@ -170,13 +170,14 @@ class Table:
         return np.asarray(xy[:, 0] + 1j * xy[:, 1])
 
     def table(self, key: str, known: Collection[str], *, required: bool = True) -> Table:
-        """The sub-table `key`; empty when it is absent and not required."""
+        """The sub-table `key`; empty when it is absent and not required. Its messages begin with [outer.key]."""
         if key not in self._data and required:
             raise InputError(f"{self.file}: the section {self._name(key)} is missing: add it")
         value = self._data.get(key, {})
         if not isinstance(value, dict):
             raise self.error(key, f"must be a section, but is {_show(value)}")
-        return Table(self.file, key, value, known)
+        section = f"{self.section}.{key}" if self.section else key
+        return Table(self.file, section, value, known)
 
     def tables(self, key: str, known: Collection[str]) -> list[Table]:
         """The array of tables [[key]]; at least one."""

@@ -109,7 +109,7 @@ def _contour_rows(chain: Chain, printed: Printed, row: Any) -> None:
     machine = chain.machine
     motion = simulate(
         chain.image,
-        [axis.drive for axis in machine.axes],
+        machine.models(machine.plane),
         kernel=machine.kernel,
         counts_per_mm=machine.counts_per_mm,
     )

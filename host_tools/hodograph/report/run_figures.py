@@ -101,11 +101,11 @@ def _error(axes: Axes, motion: Motion, worst: int) -> None:
 def drive_figure(chain: Chain, motion: Motion) -> bytes:
     """Following error and voltage of each axis."""
     figure, (following, volts) = pyplot.subplots(2, 1, figsize=(9.6, 4.8), sharex=True)
-    for i, (axis, color) in enumerate(zip(chain.machine.axes, (BLUE, GREEN), strict=True)):
+    for i, (axis, color) in enumerate(zip(chain.machine.plane, (BLUE, GREEN), strict=True)):
         following.plot(motion.t_s, motion.following_error_um[:, i], color=color, label=axis.name)
         volts.plot(motion.t_s, motion.volts[:, i], color=color, label=axis.name)
-    limit = min(axis.drive.volts_limit for axis in chain.machine.axes)
-    if motion.max_volts > 0.5 * limit:
+    limits = [axis.drive.volts_limit for axis in chain.machine.plane if axis.drive is not None]
+    if limits and motion.max_volts > 0.5 * (limit := min(limits)):
         for sign in (-1, 1):
             volts.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
     following.set_ylabel("setpoint - position, µm")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hodograph.config import load_drive, load_machine
+from hodograph.config import Feedforward, Homing, Scaling, Supervision, load_drive, load_machine
 from hodograph.errors import InputError
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -42,6 +42,30 @@ def test_machines_of_the_paper(name: str) -> None:
     assert machine.counts_per_mm == 1_000_000
     assert machine.start_tolerance_counts == 5000
     assert machine.offset_mm == 0
+    assert machine.supervision == Supervision(100, 1, 200)
+    for axis in machine.axes:
+        assert (axis.homing, axis.feedforward, axis.scaling) == (Homing(), Feedforward(), Scaling())
+        assert (axis.following_window_mm, axis.following_timeout_ms) == (None, 0)
+        assert axis.quick_stop_mm_s2 == pytest.approx(
+            4294.967
+        )  # u32 cannot hold 5000 mm/s^2 in nm/s^2
+
+
+def test_every_key_of_real_drives() -> None:
+    machine = load_machine(EXAMPLES / "machines" / "real_drives.toml")
+    assert machine.supervision == Supervision(
+        answer_wait_ms=2, missed_max=1, setpoint_timeout_ms=50
+    )
+    x, y, z = machine.axes
+    assert (x.following_window_mm, x.following_timeout_ms, x.quick_stop_mm_s2) == (2, 20, 3000)
+    assert x.homing == Homing(17, -200.0, 20.0, 2.0, 200.0)
+    assert x.feedforward == Feedforward(1.0, 12.5, 3.0)
+    assert x.scaling == Scaling(131072, 10_000_000, 1, 1)
+    assert y.homing.method == 37
+    assert (z.drive, z.feedforward.has_torque) == (None, False)
+    assert machine.plane == (x, y)
+    with pytest.raises(InputError, match="axis x cannot be simulated without a model"):
+        machine.models(machine.axes)
 
 
 def machine_with(folder: Path, old: str, new: str) -> Path:
@@ -70,6 +94,19 @@ MISTAKES = [
     ("offset_mm = [0, 0]", "offset_mm = [0, inf]", r"offset_mm must be a finite number"),
     ("[[axis]]", "[axis]", r"not valid TOML|\[\[axis\]\]"),
     ("[work]", "[wrk]", r'did you mean "work"\?'),
+    ("[work]", "[supervision]\nmissed_max = -1\n[work]", r"\[supervision\] missed_max must be from 0 to 255"),
+    ("[work]", "[supervision]\nanswer_wait_ms = 300\n[work]", r"setpoint_timeout_ms is 200: must be above"),
+    ("[work]", "[supervision]\nanswer_wait = 3\n[work]", r'did you mean "answer_wait_ms"\?'),
+    ("node = 3", "node = 3\nfollowing_window_mm = 0", r"\[axis 2\] following_window_mm must be from"),
+    ("node = 3", "node = 3\nquick_stop_mm_s2 = 5000", r"quick_stop_mm_s2 must be from 1e-06 to 4295.0 \(u32 in counts"),
+    ("node = 3", "node = 3\nhoming = {speed_mm_s = 3}", r"\[axis 2.homing\] method is missing"),
+    ("node = 3", "node = 3\nhoming = {method = 5}", r"\[axis 2.homing\] method must be one of 0, 17, .*but is 5"),
+    ("node = 3", "node = 3\nhoming = {method = 17, speed_mm_s = 1, slow_mm_s = 2}", r"slow_mm_s is 2, above"),
+    ("node = 3", "node = 3\nhoming = 17", r"\[axis 2\] homing must be a section"),
+    ("node = 3", "node = 3\nfeedforward = {velocity = 2.5}", r"\[axis 2.feedforward\] velocity must be from 0 to 2"),
+    ("node = 3", "node = 3\nfeedforward = {torque_permille_s_mm = 1}", r'did you mean "torque_permille_s_m"\?'),
+    ("node = 3", "node = 3\nscaling = {gear_motor_revolutions = 0}", r"both or none"),
+    ("node = 3", "node = 3\nscaling = {feed_counts_per_rev = 1e6}", r"feed_counts_per_rev must be a whole number"),
 ]  # fmt: skip
 
 
@@ -81,6 +118,32 @@ def test_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert re.search(message, text), text
     assert "paper_alpha.toml" in text
     assert "\n" not in text
+
+
+@pytest.mark.parametrize("count", range(1, 8))
+def test_one_to_six_axes(tmp_path: Path, count: int) -> None:
+    file = machine_with(tmp_path, "[work]", "[work]")
+    text, axis = file.read_text().split("[[axis]]")[0], "[[axis]]\nname = 'a{0}'\nnode = {0}\n"
+    axis += "travel_mm = [-1, 1]\ndrive = '../drives/alpha_x.toml'\n"
+    file.write_text(text + "".join(axis.format(node) for node in range(2, 2 + count)))
+    if count == 7:
+        with pytest.raises(InputError, match=r"\[axis 7\] name makes 7 axes: a machine has 1 to 6"):
+            load_machine(file)
+        return
+    machine = load_machine(file)
+    assert machine.nodes == tuple(range(2, 2 + count))
+    if count > 1:
+        assert [axis.name for axis in machine.plane] == ["a2", "a3"]
+        return
+    with pytest.raises(InputError, match=r"has one axis \(a2\), a path needs two: add a second"):
+        _ = machine.plane
+
+
+def test_scaling_from_the_screw(tmp_path: Path) -> None:
+    file = machine_with(
+        tmp_path, "node = 2", "node = 2\nscaling = {encoder_increments_per_rev = 8192}"
+    )
+    assert load_machine(file).axes[0].scaling == Scaling(8192, 9_990_265, 0, 0)  # 2 pi 1.59 mm
 
 
 DRIVE_MISTAKES = [

@@ -33,7 +33,8 @@ def make_case(name: str) -> Case:
     )
     plan = plan_feed(spline.length_mm, path.feed, path.limits, limits)
     image = encode(compile_program(spline, plan, name=name))
-    drives = (machine.axes[0].drive, machine.axes[1].drive)
+    x, y = machine.models(machine.plane)
+    drives = (x, y)
     return Case(image, drives, spline, simulate(image, drives))
 
 
