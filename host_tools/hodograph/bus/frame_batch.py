@@ -19,13 +19,9 @@ from numpy.typing import NDArray
 
 from ..errors import BusError
 from .address import BusAddress
+from .frames import FRAME_DTYPE, Frames
 
-FRAME_DTYPE = np.dtype(
-    [("id", "<u4"), ("length", "u1"), ("padding", "u1", 3), ("data", "u1", 8)], align=False
-)
-"""struct can_frame of linux/can.h on a little-endian machine."""
-
-Frames = NDArray[np.void]
+__all__ = ["BATCH", "FRAME_BYTES", "FRAME_DTYPE", "FrameBatch", "Frames", "open_socket"]
 
 FRAME_BYTES = 16
 BATCH = 1024
@@ -36,6 +32,15 @@ _SO_TIMESTAMP = 29
 _SO_RXQ_OVFL = 40
 _MSG_DONTWAIT = 0x40
 _CMSG = struct.Struct("<Qii")
+_STAMP = np.dtype(
+    {
+        "names": ["level", "kind", "seconds", "microseconds"],
+        "formats": ["<i4", "<i4", "<i8", "<i8"],
+        "offsets": [8, 12, 16, 24],
+        "itemsize": _CONTROL_BYTES,
+    }
+)
+"""The first control message, which is the time stamp where the socket has them."""
 
 
 def open_socket(address: BusAddress, *, timestamps: bool = False) -> socket.socket:
@@ -93,6 +98,14 @@ class FrameBatch:
         self._vectors = (_IoVec * BATCH)()
         self._messages = (_MMsgHdr * BATCH)()
         control_base = ctypes.addressof(control)
+        self._stamps = np.frombuffer(self._control, dtype=_STAMP)
+        self._control_lengths = np.ndarray(
+            BATCH,
+            dtype=np.uint64,
+            buffer=memoryview(self._messages).cast("B"),
+            offset=_MsgHdr.control_length.offset,
+            strides=(ctypes.sizeof(_MMsgHdr),),
+        )
         for i in range(BATCH):
             self._vectors[i].base = ctypes.addressof(frames) + i * FRAME_BYTES
             self._vectors[i].length = FRAME_BYTES
@@ -132,6 +145,13 @@ class FrameBatch:
                 return float(seconds + microseconds * 1e-6)
         return None
 
+    def times_us(self, count: int) -> NDArray[np.int64]:
+        """When the kernel got each of the first `count` frames, microseconds since 1970; 0 without time stamps."""
+        stamps = self._stamps[:count]
+        times = stamps["seconds"] * 1_000_000 + stamps["microseconds"]
+        is_stamp = (stamps["level"] == socket.SOL_SOCKET) & (stamps["kind"] == _SO_TIMESTAMP)
+        return np.where(is_stamp, times, 0)
+
     def _words_beside(self, last: int) -> Iterator[tuple[int, bytes]]:
         """Kind and data of each control message (cmsg(3)) of level SOL_SOCKET."""
         start = last * _CONTROL_BYTES
@@ -146,5 +166,4 @@ class FrameBatch:
 
     def rearm(self, count: int) -> None:
         """Makes the control buffers of the first `count` messages whole again."""
-        for i in range(count):
-            self._messages[i].header.control_length = _CONTROL_BYTES
+        self._control_lengths[:count] = _CONTROL_BYTES

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Recording every frame of a SocketCAN bus, fast enough for a bus at full pace.
 
-A thread takes frames in batches (frame_batch) and keeps the raw 16-byte structures of linux/can.h. They are looked at
-afterwards, with numpy.
+A thread takes frames in batches (frame_batch) and keeps the raw 16-byte structures of linux/can.h and the kernel's time
+stamps. They are looked at afterwards, with numpy.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ import time
 from types import TracebackType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import BusError
 from .address import BusAddress
-from .frame_batch import BATCH, FRAME_BYTES, FRAME_DTYPE, FrameBatch, Frames, open_socket
+from .frame_batch import BATCH, FrameBatch, open_socket
+from .frames import FRAME_DTYPE, RECORD_DTYPE, Frames
 
-__all__ = ["FRAME_DTYPE", "Frames", "Recorder"]
+__all__ = ["FRAME_DTYPE", "RECORD_DTYPE", "Frames", "Recorder"]
 
 _PAUSE_S = 0.002
 
@@ -27,9 +29,9 @@ class Recorder:
 
     def __init__(self, address: BusAddress) -> None:
         """Opens the socket; frames queue up from here on. Raises BusError."""
-        self._socket = open_socket(address)
-        self._chunks: list[bytes] = []
-        self._bytes = 0
+        self._socket = open_socket(address, timestamps=True)
+        self._chunks: list[tuple[bytes, NDArray[np.int64]]] = []
+        self._count = 0
         self._dropped = 0
         self._error: OSError | None = None
         self._ending = threading.Event()
@@ -56,8 +58,8 @@ class Recorder:
                 ending = self._ending.is_set()
                 count = batch.receive(descriptor)
                 if count:
-                    self._chunks.append(batch.taken(count))
-                    self._bytes += count * FRAME_BYTES
+                    self._chunks.append((batch.taken(count), batch.times_us(count)))
+                    self._count += count
                     self._dropped = batch.dropped(count - 1) or self._dropped
                     batch.rearm(count)
                 if count < BATCH:
@@ -70,7 +72,7 @@ class Recorder:
     @property
     def frame_count(self) -> int:
         """Frames recorded so far."""
-        return self._bytes // FRAME_BYTES
+        return self._count
 
     @property
     def dropped(self) -> int:
@@ -84,7 +86,30 @@ class Recorder:
         self._socket.close()
 
     def frames(self) -> Frames:
-        """Everything recorded, in the order of the bus. Raises BusError when the bus went away."""
+        """Everything recorded (`RECORD_DTYPE`), in the order of the bus, less what `take` took away.
+
+        Raises BusError when the bus went away.
+        """
+        self._check()
+        return _joined(list(self._chunks))
+
+    def take(self) -> Frames:
+        """What came since the last call; it is forgotten here. Raises BusError as `frames`."""
+        self._check()
+        chunks = self._chunks[: len(self._chunks)]  # the thread appends only
+        del self._chunks[: len(chunks)]
+        return _joined(chunks)
+
+    def _check(self) -> None:
         if self._error is not None:
             raise BusError(f"recording ended: {self._error.strerror}: did the interface go down?")
-        return np.frombuffer(b"".join(list(self._chunks)), dtype=FRAME_DTYPE)
+
+
+def _joined(chunks: list[tuple[bytes, NDArray[np.int64]]]) -> Frames:
+    raw = np.frombuffer(b"".join(chunk for chunk, _ in chunks), dtype=FRAME_DTYPE)
+    frames = np.zeros(raw.size, dtype=RECORD_DTYPE)
+    for name in ("id", "length", "data"):
+        frames[name] = raw[name]
+    if chunks:
+        frames["time_us"] = np.concatenate([times for _, times in chunks])
+    return frames

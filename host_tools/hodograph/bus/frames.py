@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: MIT
+"""Frames of a bus as numpy arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FRAME_DTYPE = np.dtype(
+    [("id", "<u4"), ("length", "u1"), ("padding", "u1", 3), ("data", "u1", 8)], align=False
+)
+"""struct can_frame of linux/can.h on a little-endian machine."""
+
+RECORD_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_us", "<i8")])
+"""A frame and when it came: microseconds since 1970 (UTC)."""
+
+Frames = NDArray[np.void]
+"""An array of `RECORD_DTYPE`, in the order of the bus. Who needs no times takes `FRAME_DTYPE` as well."""
