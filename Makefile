@@ -241,10 +241,10 @@ SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)
 LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC)
 # Every C file under the warning flags of gcc and of clang; the fuzz drivers too, though not linked.
 LINT_OBJ   := $(foreach v,host clang,$(call object_of,$(v),$(LINTED_C) $(OD_C)))
-LINT_PARTS := warnings tidy cppcheck clang-format ruff mypy shellcheck directions
+LINT_PARTS := warnings tidy cppcheck clang-format ruff mypy shellcheck directions eds
 .PHONY: $(LINT_PARTS:%=lint-%)
 
-lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, formats, ruff, mypy, directions
+lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, formats, ruff, mypy, directions, EDS files
 	@echo "lint: all is well"
 
 lint-warnings: $(LINT_OBJ)
@@ -282,6 +282,10 @@ format: $(VENV)/.ready ## bring C and Python into the formats that lint asks for
 	$(VENV)/bin/clang-format -i $(C_FILES)
 	$(VENV)/bin/ruff check --quiet --fix-only $(PY_TREES) tools/with-vcan
 	$(VENV)/bin/ruff format --quiet $(PY_TREES) tools/with-vcan
+
+lint-eds: $(VENV)/.ready
+	$(call say,eds,CiA 306)
+	$(Q)$(PY) tools/check_eds.py $(wildcard firmware/app/controller.eds sim/node/drive.eds)
 
 ## ---- the native module of the Python package -------------------------------------------------------
 
