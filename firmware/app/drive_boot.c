@@ -3,78 +3,14 @@
 
 #include <string.h>
 
-#include "canopen/cia402.h"
 #include "canopen/nmt.h"
 #include "canopen/sdo_abort.h"
-
-#define DEVICE_PROFILE_DRIVE 402u /* low half of 0x1000 */
-#define SIMULATED_VENDOR     0u   /* no real vendor has it */
-#define SIMULATED_PRODUCT    2u   /* sim/node/drive.eds */
-
-enum step_kind {
-    STEP_PRE_OPERATIONAL, /* NMT: process data off while parameters change */
-    STEP_EXPECT,          /* read; the masked value must be as given */
-    STEP_IDENTIFY,        /* read; another value: not a simulated drive */
-    STEP_WRITE,
-    STEP_WRITE_OPTIONAL, /* a drive without the object is fine */
-};
-
-enum step_value {
-    VALUE_CONSTANT,
-    VALUE_PERIOD_US,
-    VALUE_PERIOD_MS,
-    VALUE_TRAVEL_MIN,
-    VALUE_TRAVEL_MAX,
-};
-
-struct step {
-    uint16_t index;
-    uint8_t sub;
-    uint8_t size; /* bytes; STEP_EXPECT: of the comparison */
-    uint8_t kind;
-    uint8_t value;
-    uint32_t constant;
-};
-
-/* CiA 301 and CiA 402-2; 0x60C2 is the time between setpoints as sub 1 * 10^(sub 2) s. */
-static const struct step steps[] = {
-    {0x1000, 0, 2, STEP_EXPECT, VALUE_CONSTANT, DEVICE_PROFILE_DRIVE},
-    {0x1018, 1, 4, STEP_IDENTIFY, VALUE_CONSTANT, SIMULATED_VENDOR},
-    {0x1018, 2, 4, STEP_IDENTIFY, VALUE_CONSTANT, SIMULATED_PRODUCT},
-    {0, 0, 0, STEP_PRE_OPERATIONAL, VALUE_CONSTANT, 0},
-    {0x1006, 0, 4, STEP_WRITE_OPTIONAL, VALUE_PERIOD_US, 0},
-    {0x1017, 0, 2, STEP_WRITE, VALUE_CONSTANT, DRIVE_HEARTBEAT_MS},
-    {0x60C2, 1, 1, STEP_WRITE, VALUE_PERIOD_MS, 0},
-    {0x60C2, 2, 1, STEP_WRITE, VALUE_CONSTANT, 0xFDu}, /* -3 */
-    {0x607D, 1, 4, STEP_WRITE, VALUE_TRAVEL_MIN, 0},
-    {0x607D, 2, 4, STEP_WRITE, VALUE_TRAVEL_MAX, 0},
-    {0x6060, 0, 1, STEP_WRITE, VALUE_CONSTANT, CIA402_MODE_CSP},
-    {0x6061, 0, 1, STEP_EXPECT, VALUE_CONSTANT, CIA402_MODE_CSP},
-};
-
-#define STEP_COUNT (sizeof steps / sizeof steps[0])
-
-static uint32_t value_of(const struct drive_boot *boot, const struct step *step)
-{
-    switch (step->value) {
-    case VALUE_PERIOD_US:
-        return boot->config.period_us;
-    case VALUE_PERIOD_MS:
-        return boot->config.period_us / 1000u;
-    case VALUE_TRAVEL_MIN:
-        return (uint32_t)boot->config.travel_min_counts[boot->axis];
-    case VALUE_TRAVEL_MAX:
-        return (uint32_t)boot->config.travel_max_counts[boot->axis];
-    case VALUE_CONSTANT:
-    default:
-        return step->constant;
-    }
-}
 
 static void pause(struct drive_boot *boot, uint32_t pause_us)
 {
     boot->phase = DRIVE_BOOT_PAUSE;
     boot->pause_us = pause_us;
+    sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
 }
 
 void drive_boot_init(struct drive_boot *boot)
@@ -83,19 +19,10 @@ void drive_boot_init(struct drive_boot *boot)
     boot->phase = DRIVE_BOOT_IDLE;
 }
 
-static void forget_trouble(struct drive_boot *boot)
-{
-    boot->trouble_node = 0;
-    boot->trouble_object = 0;
-    boot->trouble_abort = SDO_OK;
-    boot->trouble_value = 0;
-}
-
 void drive_boot_begin(struct drive_boot *boot, const struct config *config)
 {
     boot->config = *config;
-    forget_trouble(boot);
-    sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
+    memset(&boot->trouble, 0, sizeof boot->trouble);
     pause(boot, DRIVE_BOOT_PAUSE_US);
 }
 
@@ -104,90 +31,143 @@ static uint8_t node_of(const struct drive_boot *boot)
     return boot->config.node[boot->axis];
 }
 
-static void give_up(struct drive_boot *boot, uint32_t abort_code)
+static void give_up(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
 {
-    const struct step *step = &steps[boot->step];
-    boot->trouble_node = node_of(boot);
-    boot->trouble_object = ((uint32_t)step->index << 8) + step->sub;
-    boot->trouble_abort = abort_code;
-    boot->trouble_value = abort_code == SDO_OK ? (uint32_t)sdo_client_unsigned(&boot->client) : 0u;
-    sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
+    boot->trouble = (struct drive_trouble){
+        .node = node_of(boot),
+        .object = ((uint32_t)boot->op.index << 8) + boot->op.sub,
+        .abort_code = abort_code,
+        .value = value,
+    };
     pause(boot, DRIVE_BOOT_RETRY_US);
 }
 
-/* The step is done: to the next one, the next drive, or on to starting them all. */
-static void advance(struct drive_boot *boot)
+static void begin_drive(struct drive_boot *boot)
 {
-    boot->client.status = SDO_CLIENT_IDLE;
-    boot->step++;
-    if (boot->step < STEP_COUNT) {
-        return;
-    }
-    boot->step = 0;
+    drive_plan_begin(&boot->plan, &boot->config, boot->axis, &boot->facts[boot->axis]);
+    boot->reading_back = false;
+    boot->reads = 0;
+}
+
+/* The drive is configured: to the next one, or on to starting them all. */
+static void finish_drive(struct drive_boot *boot)
+{
+    boot->simulated = boot->simulated && drive_is_simulated(&boot->facts[boot->axis]);
     boot->axis++;
     if (boot->axis == boot->config.axis_count) {
         boot->axis = 0;
         boot->phase = DRIVE_BOOT_START;
+    } else {
+        begin_drive(boot);
     }
 }
 
-static bool as_expected(const struct drive_boot *boot, const struct step *step)
+static void advance(struct drive_boot *boot)
 {
-    const uint64_t mask = (UINT64_C(1) << (8u * step->size)) - 1u;
-    return (sdo_client_unsigned(&boot->client) & mask) == value_of(boot, step);
+    boot->client.status = SDO_CLIENT_IDLE;
+    boot->reading_back = false;
+    boot->reads = 0;
+    drive_plan_advance(&boot->plan);
+}
+
+static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
+{
+    boot->client.status = SDO_CLIENT_IDLE;
+    boot->reading_back = false;
+    if (!drive_plan_refused(&boot->plan)) {
+        give_up(boot, abort_code, value);
+    }
+}
+
+static bool as_wanted(const struct drive_op *op, uint32_t value)
+{
+    return ((value ^ op->value) & op->mask) == 0u;
+}
+
+/* What a write should have made so, or what only the drive knows. */
+static void judge_read(struct drive_boot *boot)
+{
+    const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
+    if (as_wanted(&boot->op, value)) {
+        drive_facts_learn(boot->plan.facts, boot->op.fact, value);
+        advance(boot);
+    } else if (boot->reading_back) {
+        refused(boot, boot->refused_code, value);
+    } else if (++boot->reads < DRIVE_BOOT_READS) {
+        boot->client.status = SDO_CLIENT_IDLE;
+        boot->pause_us = DRIVE_BOOT_READ_AGAIN_US;
+    } else {
+        refused(boot, SDO_OK, value);
+    }
+}
+
+static void judge_refusal(struct drive_boot *boot, uint32_t abort_code)
+{
+    const bool missing = abort_code == SDO_ABORT_NO_OBJECT || abort_code == SDO_ABORT_NO_SUB;
+    if (boot->op.kind == DRIVE_OP_PREPARE || (boot->op.optional && missing)) {
+        advance(boot);
+    } else if (boot->op.kind == DRIVE_OP_WRITE && !missing && !boot->reading_back) {
+        boot->client.status = SDO_CLIENT_IDLE;
+        boot->reading_back = true;
+        boot->refused_code = abort_code;
+    } else {
+        refused(boot, boot->reading_back ? boot->refused_code : abort_code, 0);
+    }
 }
 
 static void judge(struct drive_boot *boot)
 {
-    const struct step *step = &steps[boot->step];
-    const bool done = boot->client.status == SDO_CLIENT_DONE;
-    if (step->kind == STEP_IDENTIFY && boot->client.status != SDO_CLIENT_FAILED) {
-        boot->simulated = boot->simulated && done && as_expected(boot, step);
-        advance(boot);
-    } else if (done) {
-        if (step->kind == STEP_EXPECT && !as_expected(boot, step)) {
-            give_up(boot, SDO_OK);
-        } else {
-            advance(boot);
-        }
-    } else if (step->kind == STEP_WRITE_OPTIONAL &&
-               boot->client.abort_code == SDO_ABORT_NO_OBJECT) {
-        advance(boot);
+    if (boot->client.status == SDO_CLIENT_FAILED) {
+        give_up(boot, boot->client.abort_code, 0);
+    } else if (boot->client.status == SDO_CLIENT_REFUSED) {
+        judge_refusal(boot, boot->client.abort_code);
+    } else if (boot->op.kind == DRIVE_OP_READ || boot->reading_back) {
+        judge_read(boot);
     } else {
-        give_up(boot, boot->client.abort_code);
+        advance(boot);
     }
 }
 
-static int begin_step(struct drive_boot *boot, struct can_msg *out)
+static int begin_op(struct drive_boot *boot, struct can_msg *out)
 {
-    const struct step *step = &steps[boot->step];
+    const struct drive_op *op = &boot->op;
     const uint8_t node = node_of(boot);
-    if (step->kind == STEP_PRE_OPERATIONAL) {
+    if (op->kind == DRIVE_OP_NMT_PRE_OPERATIONAL) {
         nmt_master_command(NMT_ENTER_PRE_OPERATIONAL, node, out);
         advance(boot);
         return 1;
     }
-    const bool read = step->kind == STEP_EXPECT || step->kind == STEP_IDENTIFY;
-    const int sent = read ? sdo_client_read_number(&boot->client, node, step->index, step->sub, out)
-                          : sdo_client_write_number(&boot->client, node, step->index, step->sub,
-                                                    value_of(boot, step), step->size, out);
+    const int sent = op->kind == DRIVE_OP_READ || boot->reading_back
+                         ? sdo_client_read_number(&boot->client, node, op->index, op->sub, out)
+                         : sdo_client_write_number(&boot->client, node, op->index, op->sub,
+                                                   op->value, op->size, out);
     return sent > 0 ? 1 : 0;
+}
+
+static bool waits(struct drive_boot *boot, uint32_t elapsed_us)
+{
+    boot->pause_us -= elapsed_us < boot->pause_us ? elapsed_us : boot->pause_us;
+    return boot->pause_us > 0u;
 }
 
 static int configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
 {
-    switch (boot->client.status) {
-    case SDO_CLIENT_IDLE:
-        return begin_step(boot, out);
-    case SDO_CLIENT_BUSY:
+    if (boot->client.status == SDO_CLIENT_BUSY) {
         return sdo_client_process(&boot->client, elapsed_us, out);
-    case SDO_CLIENT_DONE:
-    case SDO_CLIENT_REFUSED:
-    case SDO_CLIENT_FAILED:
-    default:
-        judge(boot);
-        return boot->phase == DRIVE_BOOT_CONFIGURE ? begin_step(boot, out) : 0;
     }
+    if (boot->client.status != SDO_CLIENT_IDLE) {
+        judge(boot);
+    }
+    if (boot->phase != DRIVE_BOOT_CONFIGURE || waits(boot, elapsed_us)) {
+        return 0;
+    }
+    while (!drive_plan_op(&boot->plan, &boot->op)) {
+        finish_drive(boot);
+        if (boot->phase != DRIVE_BOOT_CONFIGURE) {
+            return 0;
+        }
+    }
+    return begin_op(boot, out);
 }
 
 static int start_next(struct drive_boot *boot, struct can_msg *out)
@@ -196,21 +176,17 @@ static int start_next(struct drive_boot *boot, struct can_msg *out)
     boot->axis++;
     if (boot->axis == boot->config.axis_count) {
         boot->phase = DRIVE_BOOT_DONE;
-        forget_trouble(boot);
+        memset(&boot->trouble, 0, sizeof boot->trouble);
     }
     return 1;
 }
 
-static void let_pause_pass(struct drive_boot *boot, uint32_t elapsed_us)
+static void begin_attempt(struct drive_boot *boot)
 {
-    if (elapsed_us < boot->pause_us) {
-        boot->pause_us -= elapsed_us;
-        return;
-    }
     boot->axis = 0;
-    boot->step = 0;
     boot->simulated = true;
     boot->phase = DRIVE_BOOT_CONFIGURE;
+    begin_drive(boot);
 }
 
 int drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out)
@@ -220,8 +196,8 @@ int drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct
 
 int drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
 {
-    if (boot->phase == DRIVE_BOOT_PAUSE) {
-        let_pause_pass(boot, elapsed_us);
+    if (boot->phase == DRIVE_BOOT_PAUSE && !waits(boot, elapsed_us)) {
+        begin_attempt(boot);
     }
     if (boot->phase == DRIVE_BOOT_CONFIGURE) {
         const int sent = configure(boot, elapsed_us, out);

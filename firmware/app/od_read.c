@@ -69,9 +69,9 @@ static uint64_t fault_number(const struct controller *controller, uint8_t sub)
     case 1:
         return machine->fault.code;
     case 2:
-        return booting ? controller->boot.trouble_node : machine->fault.node;
+        return booting ? controller->boot.trouble.node : machine->fault.node;
     case 3:
-        return booting ? controller->boot.trouble_abort : machine->fault.detail;
+        return booting ? controller->boot.trouble.abort_code : machine->fault.detail;
     default:
         return (uint64_t)controller->refusal;
     }
@@ -126,13 +126,13 @@ static uint64_t boot_number(const struct drive_boot *boot, uint8_t sub)
 {
     switch (sub) {
     case 1:
-        return boot->trouble_node;
+        return boot->trouble.node;
     case 2:
-        return boot->trouble_object;
+        return boot->trouble.object;
     case 3:
-        return boot->trouble_abort;
+        return boot->trouble.abort_code;
     default:
-        return boot->trouble_value;
+        return boot->trouble.value;
     }
 }
 

@@ -19,6 +19,10 @@
 #define COB_RPDO1      0x200u /* + node */
 #define COB_TPDO2      0x280u /* + node */
 #define COB_RPDO2      0x300u /* + node */
+#define COB_TPDO3      0x380u /* + node */
+#define COB_RPDO3      0x400u /* + node */
+#define COB_TPDO4      0x480u /* + node */
+#define COB_RPDO4      0x500u /* + node */
 #define COB_SDO_ANSWER 0x580u /* + node: server to client */
 #define COB_SDO_ASK    0x600u /* + node: client to server */
 #define COB_HEARTBEAT  0x700u /* + node */

@@ -26,6 +26,7 @@ void fake_drive_init(struct fake_drive *drive, uint8_t node, int32_t position_co
     drive->latched_counts = position_counts;
     drive->target_counts = position_counts;
     drive->values = od_drive_defaults;
+    od_drive_set_node(&drive->values, node);
     od_init(&drive->od, &od_drive_table, &drive->values, &hooks, drive);
     sdo_server_init(&drive->server, &drive->od, node, 1000000, 127);
     nmt_slave_init(&drive->nmt, node, NULL, NULL);

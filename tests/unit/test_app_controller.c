@@ -423,6 +423,7 @@ static void test_simulated_drives_are_awaited_and_hurried_while_something_moves(
 static void test_real_drives_are_never_awaited(void)
 {
     bench.drives[1].values.identity_object.vendor_id = 0x123;
+    bench.drives[1].values.tpdo2_communication_parameter.cob_id |= 0x80000000u;
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     switch_on();
     app_bench_period(&bench);
