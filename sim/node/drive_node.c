@@ -12,7 +12,7 @@ enum {
     NAP_US = 20000 /* a longer gap between two calls of process was this process sleeping */
 };
 
-static void drive_node_send(const struct drive_node *node, const struct can_msg *frame)
+void drive_node_send(const struct drive_node *node, const struct can_msg *frame)
 {
     node->port.send(node->port.context, frame);
 }
@@ -28,6 +28,7 @@ static void drive_node_begin(struct drive_node *node)
     heartbeat_producer_init(&node->heartbeat, node->id);
     heartbeat_consumer_init_entry(&node->master, node->values.consumer_heartbeat_time[0]);
     sync_consumer_init(&node->sync, node->values.synchronous_counter_overflow_value);
+    drive_node_pdo_begin(node);
 }
 
 static void drive_node_reset(void *context)
@@ -40,7 +41,6 @@ static void drive_node_reset(void *context)
     axis_motion_hold(&node->axis);
     node->sync_lost = false;
     node->setpoint_fresh = false;
-    node->received_new = false;
     drive_node_begin(node);
 }
 
@@ -61,6 +61,7 @@ static void drive_node_reset_communication(void *context)
 static void drive_node_changed(void *context, enum nmt_state state)
 {
     struct drive_node *node = context;
+    drive_node_pdo_rest(node);
     if (state != NMT_OPERATIONAL) {
         drive_node_stop_for(node, EMCY_COMMUNICATION);
         sync_consumer_init(&node->sync, node->values.synchronous_counter_overflow_value);
@@ -94,35 +95,11 @@ int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_conf
     return 0;
 }
 
-static void drive_node_report(const struct drive_node *node)
-{
-    const struct pdo_actual actual = {
-        .position_counts = drive_position_counts(&node->axis.drive),
-        .statusword = cia402_device_statusword(&node->device),
-    };
-    struct can_msg frame;
-    pdo_encode_actual(node->id, &actual, &frame);
-    drive_node_send(node, &frame);
-    pdo_encode_volts(node->id, drive_volts_mv(&node->axis.drive), &frame);
-    drive_node_send(node, &frame);
-}
-
 /* SYNC is back after the node ran by itself: its counter is the new beginning. */
 static void drive_node_sync_back(struct drive_node *node)
 {
     node->sync_lost = false;
     sync_consumer_init(&node->sync, node->values.synchronous_counter_overflow_value);
-}
-
-static void drive_node_latch(struct drive_node *node)
-{
-    if (node->received_new) {
-        node->values.controlword = node->received.controlword;
-        node->values.target_position = node->received.target_counts;
-        node->setpoint_fresh = true;
-        node->received_new = false;
-    }
-    drive_node_control(node, node->values.controlword);
 }
 
 static void drive_node_sync(struct drive_node *node, const struct can_msg *in)
@@ -142,21 +119,10 @@ static void drive_node_sync(struct drive_node *node, const struct can_msg *in)
         node->values.simulation.lost_syncs++;
         drive_node_step(node);
     }
-    drive_node_report(node);
+    drive_node_pdo_report(node);
     if (periods > 0) {
-        drive_node_latch(node);
+        drive_node_pdo_latch(node);
         drive_node_step(node);
-    }
-}
-
-static void drive_node_receive_pdo(struct drive_node *node, const struct can_msg *in)
-{
-    struct pdo_setpoint setpoint;
-    if (in->id == COB_SYNC) {
-        drive_node_sync(node, in);
-    } else if (pdo_decode_setpoint(in, &setpoint) == node->id) {
-        node->received = setpoint;
-        node->received_new = true;
     }
 }
 
@@ -170,7 +136,11 @@ void drive_node_receive(struct drive_node *node, const struct can_msg *in)
         return;
     }
     if (nmt_permits_pdo(node->nmt.state)) {
-        drive_node_receive_pdo(node, in);
+        if (in->id == COB_SYNC) {
+            drive_node_sync(node, in);
+        } else {
+            drive_node_pdo_receive(node, in);
+        }
     }
     if (nmt_permits_sdo(node->nmt.state) && sdo_server_wants(&node->sdo, in) &&
         sdo_server_receive(&node->sdo, in, &out) != 0) {
@@ -222,6 +192,9 @@ void drive_node_process(struct drive_node *node, uint32_t elapsed_us)
         drive_node_send(node, &out);
     }
     drive_node_watch_sync(node, elapsed_us);
+    if (nmt_permits_pdo(node->nmt.state)) {
+        drive_node_pdo_process(node, elapsed_us < NAP_US ? elapsed_us : NAP_US);
+    }
     if (heartbeat_consumer_process(&node->master, elapsed_us) == HEARTBEAT_LOST) {
         drive_node_stop_for(node, EMCY_HEARTBEAT);
     }

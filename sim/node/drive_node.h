@@ -26,11 +26,13 @@
 #include "canopen/heartbeat.h"
 #include "canopen/nmt.h"
 #include "canopen/od.h"
-#include "canopen/pdo.h"
+#include "canopen/pdo_map.h"
 #include "canopen/sdo_server.h"
 #include "canopen/sync.h"
 #include "node/axis_motion.h"
 #include "od_drive.h"
+
+#define DRIVE_NODE_PDOS 4 /* in each direction */
 
 struct drive_node_port {
     void (*send)(void *context, const struct can_msg *frame);
@@ -47,6 +49,8 @@ struct drive_node {
     struct heartbeat_producer heartbeat;
     struct heartbeat_consumer master;
     struct sync_consumer sync;
+    struct pdo_map rpdos[DRIVE_NODE_PDOS];
+    struct pdo_map tpdos[DRIVE_NODE_PDOS];
     struct cia402_device device;
     struct axis_motion axis;
     struct drive_node_port port;
@@ -55,10 +59,10 @@ struct drive_node {
     bool sync_seen;      /* since the last drive_node_process */
     bool sync_lost;      /* running on the own clock */
     bool setpoint_fresh; /* a target came since the last period */
-    bool received_new;   /* `received` waits for the next SYNC */
-    struct pdo_setpoint received;
-    bool silent;       /* as without power: node_fault.h */
-    bool no_heartbeat; /* node_fault.h */
+    bool pdos_moved; /* the identifiers of RPDOs changed: for the owner's filters, who clears it */
+    bool pdos_want_all; /* a TPDO maps more than what is always up to date */
+    bool silent;        /* as without power: node_fault.h */
+    bool no_heartbeat;  /* node_fault.h */
     uint8_t id;
 };
 

@@ -23,20 +23,26 @@ static int32_t drive_node_speed(const struct drive_node *node)
     return encoder_to_i32(mm_s * (double)node->axis.config.counts_per_mm);
 }
 
+void drive_node_od_refresh_cyclic(struct drive_node *node)
+{
+    struct od_drive *v = &node->values;
+    v->statusword = cia402_device_statusword(&node->device);
+    v->position_actual_value = drive_position_counts(&node->axis.drive);
+    v->motor_voltage = drive_volts_mv(&node->axis.drive);
+}
+
 void drive_node_od_refresh(struct drive_node *node)
 {
     struct od_drive *v = &node->values;
     const struct drive *drive = &node->axis.drive;
-    v->statusword = cia402_device_statusword(&node->device);
+    drive_node_od_refresh_cyclic(node);
     v->modes_of_operation_display = v->modes_of_operation;
     v->position_demand_value = node->axis.target_counts;
-    v->position_actual_value = drive_position_counts(drive);
     v->position_actual_internal_value =
         encoder_to_i32(drive->state.motor.position_mm * drive->encoder.increments_per_mm);
     v->following_error_actual_value =
         encoder_to_i32((double)v->position_demand_value - (double)v->position_actual_value);
     v->velocity_actual_value = drive_node_speed(node);
-    v->motor_voltage = drive_volts_mv(drive);
     v->simulation.parked = drive_parked(drive) ? 1 : 0;
 }
 
@@ -87,6 +93,10 @@ static uint32_t drive_node_write(void *context, const struct od_entry *entry, co
     if (entry->index == OD_DRIVE_MODES_OF_OPERATION) {
         return value[0] == CIA402_MODE_CSP ? SDO_OK : SDO_ABORT_VALUE;
     }
+    const uint32_t refused = drive_node_pdo_write(node, entry, value, size);
+    if (refused != SDO_OK) {
+        return refused;
+    }
     if (entry->index != OD_DRIVE_COMMUNICATION_CYCLE_PERIOD &&
         entry->index != OD_DRIVE_INTERPOLATION_TIME_PERIOD) {
         return SDO_OK;
@@ -118,6 +128,7 @@ static void drive_node_written(void *context, const struct od_entry *entry)
         node->setpoint_fresh = true;
         break;
     default:
+        drive_node_pdo_written(node, entry);
         break;
     }
 }

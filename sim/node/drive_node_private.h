@@ -12,8 +12,23 @@ extern const struct nmt_hooks drive_node_nmt_hooks;
 /* Values that follow from the model's configuration. */
 void drive_node_od_fill(struct drive_node *node);
 
-/* Brings the fields that the bus can read up to date. */
+/* Brings all fields that the bus can read up to date; _cyclic: the few that each SYNC needs. */
 void drive_node_od_refresh(struct drive_node *node);
+void drive_node_od_refresh_cyclic(struct drive_node *node);
+
+void drive_node_send(const struct drive_node *node, const struct can_msg *frame);
+
+/* The PDOs (drive_node_pdo.c): as after power-on; the od's hooks; a frame; at SYNC, first the report
+ * and then the latch of what has come; and the times. _rest: on a change of the NMT state. */
+void drive_node_pdo_begin(struct drive_node *node);
+void drive_node_pdo_rest(struct drive_node *node);
+uint32_t drive_node_pdo_write(const struct drive_node *node, const struct od_entry *entry,
+                              const uint8_t *value, uint32_t size);
+void drive_node_pdo_written(struct drive_node *node, const struct od_entry *entry);
+void drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in);
+void drive_node_pdo_report(struct drive_node *node);
+void drive_node_pdo_latch(struct drive_node *node);
+void drive_node_pdo_process(struct drive_node *node, uint32_t elapsed_us);
 
 /* A controlword, from RPDO1 or SDO. */
 void drive_node_control(struct drive_node *node, uint16_t controlword);

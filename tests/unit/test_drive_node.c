@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "canopen/cob.h"
+#include "canopen/pdo.h"
 #include "canopen/sdo_abort.h"
 #include "unity.h"
 

@@ -23,7 +23,7 @@ struct can_socket_filter {
     uint16_t mask; /* a frame passes when (id ^ filter id) & mask is 0 */
 };
 
-#define CAN_SOCKET_FILTERS 16u
+#define CAN_SOCKET_FILTERS 40u
 #define CAN_SOCKET_BATCH   32u
 
 /* Opens and binds. Returns 0, or a negative errno with one line in `reason`: what is wrong and what

@@ -1,0 +1,249 @@
+/* SPDX-License-Identifier: MIT */
+#include "canopen/pdo_map.h"
+
+#include <assert.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "canopen/cob.h"
+
+enum {
+    SUB_COB_ID = 1,
+    SUB_TYPE = 2,
+    SUB_INHIBIT = 3,
+    SUB_EVENT = 5,
+    TO_MAPPING = 0x200,
+    SYNCHRONOUS_MAX = 240
+};
+
+static uint32_t parameter(const struct pdo_map *map, uint16_t index, uint8_t sub)
+{
+    const struct od_entry *entry = od_find(map->od, index, sub);
+
+    return entry == NULL ? 0 : (uint32_t)od_number(map->od, entry);
+}
+
+static void take_communication(struct pdo_map *map)
+{
+    const uint32_t cob_id = parameter(map, map->index, SUB_COB_ID);
+
+    map->valid = (cob_id & PDO_MAP_OFF) == 0;
+    map->cob_id = (uint16_t)(cob_id & CAN_ID_MAX);
+    map->type = (uint8_t)parameter(map, map->index, SUB_TYPE);
+    map->inhibit_us = 100u * parameter(map, map->index, SUB_INHIBIT);
+    map->event_us = 1000u * parameter(map, map->index, SUB_EVENT);
+}
+
+static void take_mapping(struct pdo_map *map)
+{
+    const uint16_t index = (uint16_t)(map->index + TO_MAPPING);
+
+    map->count = (uint8_t)parameter(map, index, 0);
+    map->length = 0;
+    for (uint8_t i = 0; i < map->count; i++) {
+        const uint32_t mapped = parameter(map, index, (uint8_t)(i + 1u));
+        const struct od_entry *entry =
+            od_find(map->od, (uint16_t)(mapped >> 16), (uint8_t)((mapped >> 8) & 0xFFu));
+        assert(entry != NULL && map->length + entry->size <= CAN_DATA_MAX);
+        map->fields[i].value = map->od->storage + entry->offset;
+        map->fields[i].size = (uint8_t)entry->size;
+        map->length = (uint8_t)(map->length + entry->size);
+    }
+}
+
+void pdo_map_init(struct pdo_map *map, struct od *od, uint16_t index)
+{
+    memset(map, 0, sizeof *map);
+    map->od = od;
+    map->index = index;
+    take_communication(map);
+    take_mapping(map);
+    pdo_map_rest(map);
+}
+
+bool pdo_map_written(struct pdo_map *map, const struct od_entry *entry)
+{
+    if (entry->index == map->index) {
+        take_communication(map);
+        pdo_map_rest(map);
+        return true;
+    }
+    if (entry->index == map->index + TO_MAPPING) {
+        take_mapping(map);
+        pdo_map_rest(map);
+        return true;
+    }
+    return false;
+}
+
+void pdo_map_rest(struct pdo_map *map)
+{
+    map->waited_us = map->inhibit_us;
+    map->syncs = 0;
+    map->pending = false;
+    map->watched = false;
+    map->last.len = 0;
+}
+
+/* The fields are numbers in the host's byte order; a frame is little-endian. */
+static void store(const struct pdo_map_field *field, const uint8_t *from)
+{
+    const uint64_t value = cob_get(from, field->size);
+    const uint16_t u16 = (uint16_t)(value & 0xFFFFu);
+    const uint32_t u32 = (uint32_t)(value & 0xFFFFFFFFu);
+
+    switch (field->size) {
+    case 1:
+        *field->value = *from;
+        break;
+    case 2:
+        memcpy(field->value, &u16, sizeof u16);
+        break;
+    case 4:
+        memcpy(field->value, &u32, sizeof u32);
+        break;
+    default:
+        memcpy(field->value, &value, sizeof value);
+        break;
+    }
+}
+
+static uint64_t load(const struct pdo_map_field *field)
+{
+    uint16_t u16;
+    uint32_t u32;
+    uint64_t u64;
+
+    switch (field->size) {
+    case 1:
+        return *field->value;
+    case 2:
+        memcpy(&u16, field->value, sizeof u16);
+        return u16;
+    case 4:
+        memcpy(&u32, field->value, sizeof u32);
+        return u32;
+    default:
+        memcpy(&u64, field->value, sizeof u64);
+        return u64;
+    }
+}
+
+static void unpack(const struct pdo_map *map)
+{
+    const uint8_t *from = map->last.data;
+
+    for (uint8_t i = 0; i < map->count; i++) {
+        store(&map->fields[i], from);
+        from += map->fields[i].size;
+    }
+}
+
+static void pack(const struct pdo_map *map, struct can_msg *out)
+{
+    uint8_t *to = out->data;
+
+    cob_frame(out, map->cob_id, map->length);
+    for (uint8_t i = 0; i < map->count; i++) {
+        cob_put(to, load(&map->fields[i]), map->fields[i].size);
+        to += map->fields[i].size;
+    }
+}
+
+enum pdo_map_result pdo_map_receive(struct pdo_map *map, const struct can_msg *in)
+{
+    if (!map->valid || in->id != map->cob_id || map->count == 0) {
+        return PDO_MAP_NOT;
+    }
+    if (in->len < map->length) {
+        return PDO_MAP_SHORT;
+    }
+    map->last = *in;
+    map->waited_us = 0;
+    map->watched = true;
+    map->pending = true;
+    if (map->type > SYNCHRONOUS_MAX) {
+        (void)pdo_map_apply(map);
+    }
+    return PDO_MAP_TAKEN;
+}
+
+bool pdo_map_apply(struct pdo_map *map)
+{
+    if (!map->pending) {
+        return false;
+    }
+    map->pending = false;
+    unpack(map);
+    return true;
+}
+
+static void wait(struct pdo_map *map, uint32_t elapsed_us)
+{
+    map->waited_us =
+        map->waited_us > UINT32_MAX - elapsed_us ? UINT32_MAX : map->waited_us + elapsed_us;
+}
+
+bool pdo_map_overdue(struct pdo_map *map, uint32_t elapsed_us)
+{
+    if (!map->watched || map->event_us == 0) {
+        return false;
+    }
+    wait(map, elapsed_us);
+    if (map->waited_us <= map->event_us) {
+        return false;
+    }
+    map->watched = false;
+    return true;
+}
+
+/* Packs; returns whether the content differs from what was sent last. */
+static bool renew(struct pdo_map *map, struct can_msg *out)
+{
+    pack(map, out);
+    return map->last.len != out->len || memcmp(map->last.data, out->data, out->len) != 0;
+}
+
+static int sent(struct pdo_map *map, const struct can_msg *out)
+{
+    map->last = *out;
+    map->waited_us = 0;
+    map->syncs = 0;
+    return 1;
+}
+
+int pdo_map_sync(struct pdo_map *map, struct can_msg *out)
+{
+    if (!map->valid || map->count == 0 || map->type > SYNCHRONOUS_MAX) {
+        return 0;
+    }
+    if (map->type == 0) {
+        return renew(map, out) ? sent(map, out) : 0;
+    }
+    map->syncs++;
+    if (map->syncs < map->type) {
+        return 0;
+    }
+    map->syncs = 0;
+    pack(map, out);
+    return 1;
+}
+
+bool pdo_map_event_driven(const struct pdo_map *map)
+{
+    return map->valid && map->count != 0 && map->type > SYNCHRONOUS_MAX;
+}
+
+int pdo_map_process(struct pdo_map *map, uint32_t elapsed_us, struct can_msg *out)
+{
+    if (!pdo_map_event_driven(map)) {
+        return 0;
+    }
+    wait(map, elapsed_us);
+    if (map->waited_us < map->inhibit_us) {
+        return 0;
+    }
+    const bool changed = renew(map, out);
+    const bool due = map->event_us != 0 && map->waited_us >= map->event_us;
+    return changed || due ? sent(map, out) : 0;
+}

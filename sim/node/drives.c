@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
+#include "node/drives.h"
+
+#include <errno.h>
+#include <poll.h>
+
+#include "canopen/cob.h"
+
+enum { SEND_TRIES = 200, BATCHES = 4 };
+
+/* A full queue of the interface empties within a few frame times: wait for it. */
+static void drives_send(void *context, const struct can_msg *frame)
+{
+    struct drives *drives = context;
+    int result = -EAGAIN;
+    for (int i = 0; i < SEND_TRIES && result == -EAGAIN; i++) {
+        result = can_socket_send(&drives->socket, frame);
+        if (result == -EAGAIN) {
+            struct pollfd writable = {.fd = drives->socket.fd, .events = POLLOUT};
+            (void)poll(&writable, 1, 1);
+        }
+    }
+    if (result != 0) {
+        drives->failed = result;
+    }
+}
+
+int drives_init(struct drives *drives, const struct node_options *options, uint8_t *node)
+{
+    const struct drive_node_port port = {drives_send, drives};
+    drives->count = 0;
+    drives->failed = 0;
+    for (size_t i = 0; i < options->axis_count; i++) {
+        const struct node_options_axis *axis = &options->axes[i];
+        const int32_t start =
+            encoder_to_i32(axis->position_mm * (double)axis->config.counts_per_mm);
+        const int error =
+            drive_node_init(&drives->nodes[i], axis->node, &axis->config, start, port);
+        if (error != 0) {
+            *node = axis->node;
+            return error;
+        }
+        drives->count++;
+    }
+    return 0;
+}
+
+int drives_filter(struct drives *drives)
+{
+    struct can_socket_filter filters[3 + (1 + DRIVE_NODE_PDOS) * NODE_OPTIONS_AXES] = {
+        {COB_NMT, CAN_ID_MAX}, {COB_SYNC, CAN_ID_MAX}, {COB_HEARTBEAT, 0x780}};
+    size_t n = 3;
+    for (size_t i = 0; i < drives->count; i++) {
+        struct drive_node *node = &drives->nodes[i];
+        filters[n++] = (struct can_socket_filter){(uint16_t)(COB_SDO_ASK + node->id), CAN_ID_MAX};
+        for (int k = 0; k < DRIVE_NODE_PDOS; k++) {
+            if (node->rpdos[k].valid) {
+                filters[n++] = (struct can_socket_filter){node->rpdos[k].cob_id, CAN_ID_MAX};
+            }
+        }
+        node->pdos_moved = false;
+    }
+    return can_socket_filter(&drives->socket, filters, n);
+}
+
+/* Cyclic frames need no process(). */
+static bool drives_cyclic(const struct drives *drives, const struct can_msg *frame)
+{
+    if (frame->id == COB_SYNC) {
+        return true;
+    }
+    for (size_t i = 0; i < drives->count; i++) {
+        for (int k = 0; k < DRIVE_NODE_PDOS; k++) {
+            const struct pdo_map *map = &drives->nodes[i].rpdos[k];
+            if (map->valid && frame->id == map->cob_id) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static void drives_take(struct drives *drives, const struct can_msg *frame)
+{
+    bool moved = false;
+    for (size_t i = 0; i < drives->count; i++) {
+        drive_node_receive(&drives->nodes[i], frame);
+        moved = moved || drives->nodes[i].pdos_moved;
+    }
+    if (moved) {
+        const int error = drives_filter(drives);
+        drives->failed = error != 0 ? error : drives->failed;
+    }
+}
+
+bool drives_receive(struct drives *drives)
+{
+    struct can_msg frames[CAN_SOCKET_BATCH];
+    bool acyclic = false;
+    int more = 1;
+    for (int batch = 0; batch < BATCHES && more != 0; batch++) {
+        const int count = can_socket_receive(&drives->socket, frames, &more);
+        if (count < 0) {
+            drives->failed = count;
+            return true;
+        }
+        for (int k = 0; k < count; k++) {
+            acyclic = acyclic || !drives_cyclic(drives, &frames[k]);
+            drives_take(drives, &frames[k]);
+        }
+    }
+    return acyclic;
+}
+
+void drives_process(struct drives *drives, uint32_t elapsed_us)
+{
+    for (size_t i = 0; i < drives->count; i++) {
+        drive_node_process(&drives->nodes[i], elapsed_us);
+    }
+}

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* drives: the simulated drives of one process on one SocketCAN bus.
+ *
+ * All in one thread. Bus errors are kept in `failed`; the caller looks at it.
+ */
+#ifndef NODE_DRIVES_H
+#define NODE_DRIVES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "node/drive_node.h"
+#include "node/node_options.h"
+#include "port/linux/can_socket.h"
+
+struct drives {
+    struct can_socket socket;
+    struct drive_node nodes[NODE_OPTIONS_AXES];
+    size_t count;
+    int failed; /* negative errno of the bus, 0: none */
+};
+
+/* Makes the drives; nothing is sent yet. Returns 0, or a negative enum drive_error with `*node` the
+ * drive whose figures are wrong. */
+int drives_init(struct drives *drives, const struct node_options *options, uint8_t *node);
+
+/* Only what the drives want wakes the process; again when a drive's PDOs were moved. Returns 0 or a
+ * negative errno. */
+int drives_filter(struct drives *drives);
+
+/* Hands waiting frames to the drives, a bounded number: the wall clock (drives_process) must go on
+ * in a flood, too. Returns true when one of them was acyclic (NMT, SDO, heartbeat): it wants
+ * drives_process at once. */
+bool drives_receive(struct drives *drives);
+
+/* Lets wall time pass. */
+void drives_process(struct drives *drives, uint32_t elapsed_us);
+
+#endif
