@@ -96,6 +96,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "bustime",
         "paper",
     },
+    "monitor": {"errors", "data", "config", "native", "bus", "bustime", "__init__"},
     "cli": {"*"},
     "__main__": {"cli"},
     "__init__": {"errors"},

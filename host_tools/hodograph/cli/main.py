@@ -25,6 +25,7 @@ _MODULES = {
     **dict.fromkeys(("upload", "goto", "run", "rig"), "motion_commands"),
     **dict.fromkeys(("start", "stop", "hold", "resume", "override", "status"), "bus_commands"),
     "dbc": "dbc_command",
+    "monitor": "monitor_command",
     **dict.fromkeys(("report", "paper"), "report_commands"),
 }
 """Where each command is; only its module is imported, since some take a second to load."""

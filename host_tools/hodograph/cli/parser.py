@@ -105,6 +105,41 @@ def _at(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--at", type=finite, nargs="+", metavar="V", help=what)
 
 
+def port_number(text: str) -> int:
+    """A TCP port that an ordinary user may serve."""
+    if not text.isdigit() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a port (1 to 65535)')
+    return int(text)
+
+
+def _monitor(parser: argparse.ArgumentParser) -> None:
+    _machine(parser)
+    parser.add_argument(
+        "--program",
+        type=Path,
+        metavar="FILE",
+        help="path file or program image to draw (default: the one in the controller)",
+    )
+    parser.add_argument(
+        "--bus",
+        default=DEFAULT_BUS,
+        metavar="INTERFACE:CHANNEL",
+        help=f"as python-can has it (default {DEFAULT_BUS})",
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address to serve (default 127.0.0.1: this machine only)",
+    )
+    parser.add_argument("--port", type=port_number, default=8402, help="default 8402")
+    parser.add_argument("--token", help="what commands need (default: made up, and printed)")
+    parser.add_argument("--token-file", type=Path, metavar="FILE", help="a file that holds it")
+    parser.add_argument("--replay", type=Path, metavar="FILE", help="a recording instead of a bus")
+    parser.add_argument(
+        "--speed", type=finite, default=1.0, metavar="N", help="of the replay (default 1)"
+    )
+
+
 def make_parser() -> argparse.ArgumentParser:
     """The whole command line."""
     parser = _Parser(prog="hodograph", description=DESCRIPTION, epilog=EPILOG)
@@ -196,6 +231,8 @@ def make_parser() -> argparse.ArgumentParser:
     _bus(status)
     _node(status)
     _json(status)
+
+    _monitor(command("monitor", "serve a live page of the machine for browsers"))
 
     simulate = command("simulate", "run a path without a bus, as fast as it goes")
     _file(simulate)

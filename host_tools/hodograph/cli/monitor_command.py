@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""hodograph monitor: the live page, on a bus or from a recording."""
+
+from __future__ import annotations
+
+import asyncio
+from argparse import Namespace
+from pathlib import Path
+
+from ..bus.address import parse_address
+from ..bus.frame_batch import Frames
+from ..chain import load_chain
+from ..config import Machine, load_machine
+from ..errors import InputError
+from ..monitor.decoder import nodes_in
+from ..monitor.pump import Layout
+from ..monitor.security import make_token
+from ..monitor.session import Live, Place, Replay, Session
+from ..native import NativeProgram
+from .bus_commands import DEFAULT_BITRATE
+from .output import note
+from .path_commands import read_image
+
+_USUAL_PERIOD_US = 1000
+_USUAL_COUNTS_PER_MM = 1_000_000
+
+
+def monitor(options: Namespace) -> None:
+    """hodograph monitor."""
+    image, machine = _image_and_machine(options)
+    place = Place(options.host, options.port, make_token(_token(options)))
+    if options.replay is not None:
+        what, layout = _replay(options, machine, image)
+    elif machine is not None:
+        what, layout = Live(parse_address(options.bus), machine.node), machine_layout(machine)
+    else:
+        raise InputError("monitor: needs --machine FILE, or a path file as --program")
+    asyncio.run(Session(what, layout, place, image, note).serve())
+
+
+def _replay(
+    options: Namespace, machine: Machine | None, image: bytes | None
+) -> tuple[Live | Replay, Layout]:
+    from ..monitor.replay import ReplaySource, load_recording
+
+    if not options.speed > 0:
+        raise InputError(f"--speed: must be more than 0, but is {options.speed:g}")
+    frames = load_recording(options.replay)
+    layout = _recorded_layout(frames, image) if machine is None else machine_layout(machine)
+    what = Replay(
+        options.replay.name,
+        options.speed,
+        lambda: ReplaySource(frames, layout.period_us, options.speed),
+    )
+    return what, layout
+
+
+def _recorded_layout(frames: Frames, image: bytes | None) -> Layout:
+    """Without a machine file: the drives that speak, the period of the program, and what is usual."""
+    nodes = nodes_in(frames)
+    names = tuple("xyzabc"[i] if i < 6 else str(node) for i, node in enumerate(nodes))
+    period_us = NativeProgram(image).period_us if image is not None else _USUAL_PERIOD_US
+    return Layout(names, nodes, _USUAL_COUNTS_PER_MM, period_us, DEFAULT_BITRATE)
+
+
+def machine_layout(machine: Machine) -> Layout:
+    """What the frames of this machine mean."""
+    return Layout(
+        names=tuple(axis.name for axis in machine.axes),
+        nodes=tuple(axis.node for axis in machine.axes),
+        counts_per_mm=machine.counts_per_mm,
+        period_us=machine.period_us,
+        bitrate=machine.bitrate,
+    )
+
+
+def _image_and_machine(options: Namespace) -> tuple[bytes | None, Machine | None]:
+    machine = load_machine(options.machine) if options.machine is not None else None
+    if options.program is None:
+        return None, machine
+    image = read_image(options.program)
+    if image is not None:
+        return image, machine
+    chain = load_chain(options.program, options.machine)
+    return chain.image, chain.machine
+
+
+def _token(options: Namespace) -> str | None:
+    if options.token_file is None:
+        return str(options.token) if options.token is not None else None
+    file: Path = options.token_file
+    try:
+        return file.read_text(encoding="ascii").strip()
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file}: cannot be read as a token: {error}") from None
+
+
+COMMANDS = {"monitor": monitor}

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: MIT
+"""The live page: `hodograph monitor`, on a running bus or from a recording (docs/monitor.md).
+
+source, replay  where frames come from: a bus, a recording
+decoder         frames to samples, one a SYNC
+derived         samples to what the plots show: feed, acceleration, jerk, following error
+path            the program's curve: to draw, and to measure the contour error from
+decimator       many rows to few groups that keep their peaks
+pump            all of these, some 25 times a second, in a thread of its own
+link            the controller's state and commands, by SDO, in another
+hub             messages to the browsers; bounded for each
+security        who may see, who may command
+server          HTTP and WebSocket
+session         puts it together
+page            what the browser gets
+"""

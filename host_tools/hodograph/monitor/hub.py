@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Messages to the browsers. Each has a bounded queue; for one that is too slow the oldest rows give way.
+
+All methods but `publish` belong to the event loop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from typing import Any
+
+from .messages import encode
+
+QUEUE = 100
+"""Messages that wait for one browser: some four seconds."""
+HISTORY = 1500
+"""Messages of rows kept for browsers that come later: a minute at the machine's own pace."""
+EVENTS = 50
+QUEUED = ("rows", "event")
+"""Types of which every message counts; of the others only the latest."""
+
+
+class Client:
+    """What waits for one browser: the latest message of each type, and a bounded queue of rows and events."""
+
+    def __init__(self) -> None:
+        self._latest: dict[str, str] = {}
+        self._queue: deque[str] = deque()
+        self._there = asyncio.Event()
+        self.dropped = 0
+
+    def put_latest(self, kind: str, text: str) -> None:
+        """Replaces the message of this type that still waits."""
+        self._latest[kind] = text
+        self._there.set()
+
+    def put(self, text: str) -> None:
+        """Queues a message; the oldest gives way when there is no room."""
+        if len(self._queue) >= QUEUE:
+            self._queue.popleft()
+            self.dropped += 1
+        self._queue.append(text)
+        self._there.set()
+
+    def clear_rows(self) -> None:
+        """What waits belongs to a past that is of no interest any more."""
+        self._queue.clear()
+
+    async def get(self) -> str:
+        """The next message."""
+        while not self._latest and not self._queue:
+            self._there.clear()
+            await self._there.wait()
+        if self._latest:
+            return self._latest.pop(next(iter(self._latest)))
+        return self._queue.popleft()
+
+
+class Hub:
+    """What every browser sees: rows and events as they come, and the latest message of each other type."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._clients: set[Client] = set()
+        self._latest: dict[str, str] = {}
+        self._rows: deque[str] = deque(maxlen=HISTORY)
+        self._events: deque[str] = deque(maxlen=EVENTS)
+
+    def publish(self, message: dict[str, Any]) -> None:
+        """From any thread. After the loop has ended nothing happens."""
+        text = encode(message)
+        try:
+            self._loop.call_soon_threadsafe(self._deliver, str(message["type"]), text)
+        except RuntimeError:
+            return
+
+    def _deliver(self, kind: str, text: str) -> None:
+        if kind == "restart":
+            self._rows.clear()
+            for client in self._clients:
+                client.clear_rows()
+                client.put(text)
+        elif kind in QUEUED:
+            (self._rows if kind == "rows" else self._events).append(text)
+            for client in self._clients:
+                client.put(text)
+        else:
+            self._latest[kind] = text
+            for client in self._clients:
+                client.put_latest(kind, text)
+
+    def join(self) -> Client:
+        """A new browser; it gets what there is."""
+        client = Client()
+        for kind, text in self._latest.items():
+            client.put_latest(kind, text)
+        history = ",".join([*self._rows, *self._events])
+        client.put(f'{{"type":"history","messages":[{history}]}}')
+        self._clients.add(client)
+        return client
+
+    def leave(self, client: Client) -> None:
+        """The browser has gone."""
+        self._clients.discard(client)
+
+    @property
+    def count(self) -> int:
+        """Browsers that look on."""
+        return len(self._clients)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""The controller by SDO, in a thread of its own: its state a few times a second, and commands in between.
+
+A command does not wait until a state has been read: it goes between two objects of it.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import zlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from canopen.sdo.exceptions import SdoAbortedError, SdoError
+
+from ..bus.address import BusAddress
+from ..bus.controller import Controller
+from ..bus.network import open_network
+from ..bus.objects import PROGRAM
+from ..bus.status import read_status
+from ..data import CONTROLLER_EDS
+from ..errors import BusError, HodographError, RefusedError
+from .pump import Publish
+
+PAUSE_S = 0.25
+_ANSWER_S = 1.0
+_RETRY_S = 1.0
+LONGEST_UPLOAD = 256 * 1024
+"""A program up to this size is fetched from the controller to be drawn; larger ones would take the bus too long."""
+
+Command = Callable[[Controller], None]
+
+
+class _Prompt(Controller):
+    """A controller that lets something be done before each object is read."""
+
+    before_read: Callable[[], None]
+
+    def read(self, index: int, sub: int | None = None) -> int:
+        self.before_read()
+        return super().read(index, sub)
+
+
+class Link:
+    """`show_program` is called with the image of the controller's program, or None and why there is none.
+
+    `given` is the image that is shown already.
+    """
+
+    def __init__(
+        self,
+        address: BusAddress,
+        node: int,
+        bitrate: int,
+        publish: Publish,
+        show_program: Callable[[bytes | None, str], None],
+        given: bytes | None,
+    ) -> None:
+        self._address, self._node, self._bitrate = address, node, bitrate
+        self._publish = publish
+        self._show_program = show_program
+        self._given_crc32 = None if given is None else zlib.crc32(given[16:])
+        self._crc32: int | None = self._given_crc32
+        self._commands: queue.SimpleQueue[tuple[Command, Future[None]]] = queue.SimpleQueue()
+        self._wake = threading.Event()
+        self._ending = threading.Event()
+        self._in_command = False
+        self._connected = False
+        self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
+
+    def start(self) -> None:
+        """Begins to look for the controller."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ends the thread; commands that wait fail."""
+        self._ending.set()
+        self._wake.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._fail_commands(BusError("the monitor has ended"))
+
+    def submit(self, command: Command) -> Future[None]:
+        """Gives a command; the future has a HodographError when it was not taken."""
+        done: Future[None] = Future()
+        self._commands.put((command, done))
+        self._wake.set()
+        return done
+
+    # -- in the thread ------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        while not self._ending.is_set():
+            try:
+                with self._open() as controller:
+                    self._attend(controller)
+            except HodographError as error:
+                self._lost(str(error))
+                self._ending.wait(_RETRY_S)
+
+    @contextmanager
+    def _open(self) -> Iterator[_Prompt]:
+        with open_network(self._address, self._node, self._bitrate) as network:
+            remote = network.add_node(self._node, str(CONTROLLER_EDS))
+            controller = _Prompt(self._address, self._node, remote)
+            controller.sdo.RESPONSE_TIMEOUT = _ANSWER_S
+            controller.before_read = lambda: self._obey(controller)
+            try:
+                yield controller
+            finally:
+                controller.close()
+
+    def _attend(self, controller: _Prompt) -> None:
+        while not self._ending.is_set():
+            if not controller.answers(_ANSWER_S):
+                self._lost(
+                    f"no answer from {controller.who()}: waiting for a controller to be started"
+                )
+                continue
+            status = read_status(controller)
+            self._connected = True
+            self._publish({"type": "status", "connected": True, "note": "", "status": status})
+            self._look_at_program(controller, status["program"])
+            self._obey(controller)
+            self._wake.wait(PAUSE_S)
+            self._wake.clear()
+
+    def _lost(self, note: str) -> None:
+        self._connected = False
+        self._publish({"type": "status", "connected": False, "note": note, "status": None})
+        self._fail_commands(BusError(note))
+
+    def _fail_commands(self, error: HodographError) -> None:
+        with suppress(queue.Empty):
+            while True:
+                self._commands.get_nowait()[1].set_exception(error)
+
+    def _obey(self, controller: Controller) -> None:
+        """Carries out the commands that wait."""
+        if self._in_command:
+            return
+        self._in_command = True
+        try:
+            while not self._commands.empty():
+                command, done = self._commands.get()
+                try:
+                    command(controller)
+                    done.set_result(None)
+                except HodographError as error:
+                    done.set_exception(error)
+        finally:
+            self._in_command = False
+
+    def _look_at_program(self, controller: Controller, program: dict[str, Any]) -> None:
+        """Fetches the program to draw when it is another one than before."""
+        crc32 = program["crc32"] if program["state"] == "ready" else None
+        if crc32 == self._crc32 or (crc32 is None and self._given_crc32 is not None):
+            return
+        self._crc32 = crc32
+        if crc32 is None:
+            self._show_program(None, "no program is loaded")
+        elif program["size"] > LONGEST_UPLOAD:
+            self._show_program(None, "the program is too long to be fetched: give it as --program")
+        else:
+            with suppress(RefusedError, BusError):
+                self._show_program(_fetch(controller), "")
+
+
+def _fetch(controller: Controller) -> bytes:
+    """The image of the active program."""
+    try:
+        with controller.turn():
+            return bytes(controller.sdo.upload(PROGRAM, 1))
+    except SdoAbortedError as error:
+        raise RefusedError(f"{controller.who()} gives no program: {error}") from error
+    except SdoError as error:
+        raise BusError(f"{controller.who()} stopped answering: {error}") from error

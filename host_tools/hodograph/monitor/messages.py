@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""What goes to the browsers, as JSON: small numbers of digits, null for what is not there."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from .decimator import extremes, group_starts
+from .decoder import Floats
+from .derived import Rows
+from .path import ProgramPath
+
+GROUP_S = 0.010
+"""Time that one group of the plots covers at the machine's own pace."""
+MOST_GROUPS = 16
+"""Groups in a message at most: at full pace they become longer."""
+POINT_S = 0.004
+MOST_POINTS = 40
+"""The same for the points of the plane."""
+
+
+def encode(message: dict[str, Any]) -> str:
+    """JSON text. NaN and infinities are a bug, so they raise."""
+    return json.dumps(message, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+
+
+def numbers(values: Floats, digits: int) -> list[float | None]:
+    """A column for JSON."""
+    rounded = np.round(values, digits).tolist()
+    return [value if math.isfinite(value) else None for value in rounded]
+
+
+def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
+    """The program's curve to draw; `note` says why there is none, or what is odd about it."""
+    message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}
+    if path is not None:
+        points = path.drawing()
+        message |= {
+            "x": numbers(points[:, 0], 5),
+            "y": numbers(points[:, 1], 5),
+            "name": path.name,
+            "length_mm": path.length_mm,
+            "duration_s": path.duration_s,
+            "crc32": path.crc32,
+        }
+    return message
+
+
+def rows_message(rows: Rows, period_s: float, age_ms: float | None) -> dict[str, Any]:
+    """The rows of one look, decimated. `age_ms`: how old the newest frame in it is."""
+    starts = group_starts(rows.count, round(GROUP_S / period_s), MOST_GROUPS)
+    message: dict[str, Any] = {
+        "type": "rows",
+        "age_ms": None if age_ms is None else round(age_ms, 1),
+        "ticks": rows.count,
+        "t": numbers(rows.t_s[starts], 4),
+    }
+    for name, values, digits in _series(rows):
+        low, high = extremes(values, starts)
+        message[name] = [numbers(low, digits), numbers(high, digits)]
+    points = group_starts(rows.count, round(POINT_S / period_s), MOST_POINTS)
+    if rows.cmd_mm.shape[1] >= 2:
+        message["cmd"] = [numbers(rows.cmd_mm[points, i], 5) for i in (0, 1)]
+        message["act"] = [numbers(rows.act_mm[points, i], 5) for i in (0, 1)]
+    return message
+
+
+def _series(rows: Rows) -> list[tuple[str, Floats, int]]:
+    plain = [
+        ("feed", rows.feed_mm_s, 3),
+        ("acceleration", rows.acceleration_mm_s2, 1),
+        ("jerk", rows.jerk_mm_s3, 0),
+        ("contour", rows.contour_um, 3),
+    ]
+    following = rows.following_um
+    return plain + [(f"following{i}", following[:, i], 2) for i in range(following.shape[1])]

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""The thread that turns frames into messages: some 25 times a second, whatever the bus brings."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..bus.decode import SYNC_ID
+from ..bus.texts import drive_state, fault_text
+from ..bustime import exact_bits
+from ..errors import BusError, InputError
+from .decoder import Decoder, Samples
+from .derived import Derivation
+from .messages import path_message, rows_message
+from .path import ProgramPath
+from .source import Source, Taken
+
+LOOK_S = 0.04
+_STATE_S = 0.25
+_RETRY_S = 1.0
+_EMCY, _NODES = 0x080, 0x7F
+
+Publish = Callable[[dict[str, Any]], None]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the frames of a machine mean."""
+
+    names: tuple[str, ...]
+    nodes: tuple[int, ...]
+    counts_per_mm: int
+    period_us: int
+    bitrate: int
+
+
+@dataclass
+class Tally:
+    """How the pump itself does, for the page's last line."""
+
+    frames: int = 0
+    dropped: int = 0
+    busy_s: float = 0.0
+    since_s: float = field(default_factory=time.monotonic)
+
+
+class Pump:
+    """Owns the source; `open_source` is called again whenever the bus went away."""
+
+    def __init__(self, open_source: Callable[[], Source], layout: Layout, publish: Publish) -> None:
+        self._open_source = open_source
+        self._layout = layout
+        self._publish = publish
+        self._path: ProgramPath | None = None
+        self._ending = threading.Event()
+        self._again = threading.Event()
+        self._tally = Tally()
+        self._decoder = Decoder(layout.nodes)
+        self._derivation = self._fresh_derivation()
+        self._state_due_s = 0.0
+        self._thread = threading.Thread(target=self._work, name="monitor-pump", daemon=True)
+
+    def start(self) -> None:
+        """Begins to look at the bus."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ends the thread and gives the bus back."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def restart(self) -> None:
+        """Opens the source anew: a recording begins again."""
+        self._again.set()
+
+    def show(self, image: bytes | None, note: str = "") -> None:
+        """The program whose curve counts from now on; None: there is none."""
+        path = None
+        if image is not None:
+            try:
+                path = ProgramPath(image, self._layout.counts_per_mm)
+            except InputError as error:
+                note = str(error)
+        self._path = path
+        self._publish(path_message(path, note))
+
+    def _fresh_derivation(self) -> Derivation:
+        layout = self._layout
+        return Derivation(len(layout.nodes), layout.counts_per_mm, layout.period_us)
+
+    def _work(self) -> None:
+        while not self._ending.is_set():
+            try:
+                source = self._open_source()
+            except BusError as error:
+                self._publish({"type": "bus", "there": False, "note": str(error)})
+                self._ending.wait(_RETRY_S)
+                continue
+            self._publish({"type": "bus", "there": True, "note": ""})
+            self._decoder = Decoder(self._layout.nodes)
+            self._derivation = self._fresh_derivation()
+            try:
+                self._look_on(source)
+            except BusError as error:
+                self._publish({"type": "bus", "there": False, "note": str(error)})
+            finally:
+                with suppress(OSError):
+                    source.close()
+
+    def _look_on(self, source: Source) -> None:
+        due_s = time.monotonic()
+        while not self._ending.is_set():
+            begun_s = time.thread_time()
+            taken = source.take()
+            if taken.frames.size:
+                self._pass_on(taken)
+            self._tally.busy_s += time.thread_time() - begun_s
+            self._tell(taken)
+            if self._again.is_set():
+                self._again.clear()
+                self._publish({"type": "restart"})
+                return
+            due_s = max(due_s + LOOK_S, time.monotonic())
+            self._ending.wait(due_s - time.monotonic())
+
+    def _pass_on(self, taken: Taken) -> None:
+        self._tally.frames += taken.frames.size
+        samples = self._decoder.feed(taken.frames)
+        rows = self._derivation.feed(samples, self._path)
+        self._emergencies(taken)
+        if rows.count:
+            age_ms = None if taken.newest_s is None else 1000 * (time.time() - taken.newest_s)
+            self._publish(rows_message(rows, self._layout.period_us / 1e6, age_ms))
+        if samples.count and time.monotonic() >= self._state_due_s:
+            self._state_due_s = time.monotonic() + _STATE_S
+            self._publish(self._drives(samples, taken))
+
+    def _drives(self, samples: Samples, taken: Taken) -> dict[str, Any]:
+        """Positions and states of the drives by their own words, and the load of the bus."""
+        layout = self._layout
+        drives = []
+        for axis, (name, node) in enumerate(zip(layout.names, layout.nodes, strict=True)):
+            word = int(samples.statuswords[-1, axis])
+            actual = samples.actual[-1, axis] / layout.counts_per_mm
+            drives.append(
+                {
+                    "name": name,
+                    "node": node,
+                    "state": "silent" if word < 0 else drive_state(word),
+                    "statusword": word,
+                    "actual_mm": round(actual, 6) if np.isfinite(actual) else None,
+                }
+            )
+        path = self._path
+        return {
+            "type": "drives",
+            "drives": drives,
+            "load_percent": self._load_percent(taken),
+            "arc_length_mm": None if path is None else path.arc_length_mm,
+        }
+
+    def _load_percent(self, taken: Taken) -> float | None:
+        sync_at = np.flatnonzero(taken.frames["id"] == SYNC_ID)
+        if sync_at.size < 2:
+            return None
+        bits = int(exact_bits(taken.frames[sync_at[0] : sync_at[-1]]).sum())
+        window_s = (sync_at.size - 1) * self._layout.period_us / 1e6
+        return round(100 * bits / (window_s * self._layout.bitrate), 1)
+
+    def _emergencies(self, taken: Taken) -> None:
+        identifiers = taken.frames["id"]
+        found = (identifiers > _EMCY) & (identifiers <= _EMCY + _NODES)
+        for frame in taken.frames[found][:50]:
+            code = int(frame["data"][0]) | int(frame["data"][1]) << 8
+            node = int(frame["id"]) - _EMCY
+            text = "no error any more" if code == 0 else f"{fault_text(code)} (0x{code:04X})"
+            self._publish({"type": "event", "text": f"node {node}: {text}", "fault": code != 0})
+
+    def _tell(self, taken: Taken) -> None:
+        """How the pump does, every second."""
+        tally, now_s = self._tally, time.monotonic()
+        self._tally.dropped = taken.dropped
+        if now_s - tally.since_s < 1.0:
+            return
+        passed_s = now_s - tally.since_s
+        self._publish(
+            {
+                "type": "pump",
+                "frames_per_s": round(tally.frames / passed_s),
+                "busy_percent": round(100 * tally.busy_s / passed_s, 1),
+                "dropped": tally.dropped,
+                "ended": taken.ended,
+            }
+        )
+        self._tally = Tally(dropped=tally.dropped)

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""HTTP and WebSocket: the page, messages to it, commands from it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from importlib.resources import files
+from typing import Any
+
+from aiohttp import WSMsgType, web
+
+from ..errors import HodographError, InputError
+from .hub import Client, Hub
+from .messages import encode
+from .security import HEADERS, Guard
+
+MOST_CLIENTS = 16
+_MOST_REQUEST = 4096
+_HELLO_S = 10.0
+_WRONG_TOKEN_S = 0.5
+_BEAT_S = 10.0
+_POLICY, _TOKEN_NEEDED = 1008, 4401
+"""Close codes: not from our page or full; the token is missing or wrong."""
+
+_TYPES = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+}
+
+Obey = Callable[[dict[str, Any]], Awaitable[str]]
+"""Carries out the request of a browser that may command; returns words. Raises HodographError."""
+
+
+class Server:
+    """The web application; `greeting` is what a page is told first."""
+
+    def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], obey: Obey) -> None:
+        self._guard, self._hub, self._greeting, self._obey = guard, hub, greeting, obey
+        self._pages = _load_pages()
+        self._sockets: set[web.WebSocketResponse] = set()
+        self.app = web.Application(middlewares=[self._check], client_max_size=_MOST_REQUEST)
+        self.app.router.add_get("/ws", self._socket)
+        self.app.router.add_get("/{name:[a-z_.]*}", self._page)
+        self.app.on_shutdown.append(self._shut_down)
+
+    @web.middleware
+    async def _check(
+        self,
+        request: web.Request,
+        handler: Callable[[web.Request], Awaitable[web.StreamResponse]],
+    ) -> web.StreamResponse:
+        if not self._guard.knows_host(request.headers.get("Host")):
+            return web.Response(
+                status=421,
+                headers=HEADERS,
+                text="This name is not one of the monitor's machine: use the printed address.\n",
+            )
+        return await handler(request)
+
+    async def _page(self, request: web.Request) -> web.Response:
+        name = request.match_info["name"] or "index.html"
+        if name not in self._pages:
+            return web.Response(status=404, headers=HEADERS, text="There is no such page.\n")
+        kind, body = self._pages[name]
+        return web.Response(body=body, content_type=kind, charset="utf-8", headers=HEADERS)
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        origin, host = request.headers.get("Origin"), request.headers.get("Host")
+        if not self._guard.knows_origin(origin, host):
+            return web.Response(status=403, headers=HEADERS, text="Not from the monitor's page.\n")
+        socket = web.WebSocketResponse(
+            heartbeat=_BEAT_S, max_msg_size=_MOST_REQUEST, compress=False
+        )
+        if not socket.can_prepare(request).ok:
+            return web.Response(status=426, headers=HEADERS, text="A WebSocket is wanted here.\n")
+        await socket.prepare(request)
+        if len(self._sockets) >= MOST_CLIENTS:
+            await socket.close(code=_POLICY, message=b"too many browsers")
+            return socket
+        self._sockets.add(socket)
+        try:
+            await self._serve(socket)
+        finally:
+            self._sockets.discard(socket)
+        return socket
+
+    async def _serve(self, socket: web.WebSocketResponse) -> None:
+        may_command = await self._welcome(socket)
+        if may_command is None:
+            return
+        await socket.send_str(
+            encode({"type": "hello", "may_command": may_command, **self._greeting})
+        )
+        client = self._hub.join()
+        sender = asyncio.create_task(_send(socket, client))
+        try:
+            async for message in socket:
+                if message.type is WSMsgType.TEXT:
+                    await self._answer(socket, message.data, may_command, client)
+        finally:
+            self._hub.leave(client)
+            sender.cancel()
+            with suppress(asyncio.CancelledError, ConnectionError):
+                await sender
+
+    async def _welcome(self, socket: web.WebSocketResponse) -> bool | None:
+        """Whether the browser that says hello may command; None when it may not even see."""
+        with suppress(asyncio.TimeoutError, TypeError, ValueError):
+            hello = _read(await socket.receive_str(timeout=_HELLO_S))
+            token = hello.get("token") if hello.get("type") == "hello" else None
+            if self._guard.knows_token(token):
+                return True
+            if token:
+                await asyncio.sleep(_WRONG_TOKEN_S)
+            elif self._guard.open_to_see and hello.get("type") == "hello":
+                return False
+        await socket.close(code=_TOKEN_NEEDED, message=b"token")
+        return None
+
+    async def _answer(
+        self, socket: web.WebSocketResponse, text: str, may_command: bool, client: Client
+    ) -> None:
+        try:
+            request = _read(text)
+        except ValueError:
+            await socket.close(code=_POLICY, message=b"not understood")
+            return
+        if request.get("type") == "ping":
+            pong = {"type": "pong", "at": _number(request.get("at")), "dropped": client.dropped}
+            await socket.send_str(encode(pong))
+        elif request.get("type") == "command":
+            answer = await self._command(request, may_command)
+            await socket.send_str(encode(answer))
+
+    async def _command(self, request: dict[str, Any], may_command: bool) -> dict[str, Any]:
+        answer = {"type": "answer", "id": _number(request.get("id")), "ok": False}
+        if not may_command:
+            return answer | {"text": "this page was opened without the token: it may only look on"}
+        try:
+            return answer | {"ok": True, "text": await self._obey(request)}
+        except HodographError as error:
+            return answer | {"text": str(error)}
+
+    async def _shut_down(self, _: web.Application) -> None:
+        for socket in list(self._sockets):
+            await socket.close(code=1001, message=b"the monitor ends")
+
+
+async def _send(socket: web.WebSocketResponse, client: Client) -> None:
+    """Passes on what waits for a browser, at its own pace."""
+    with suppress(ConnectionError):
+        while True:
+            await socket.send_str(await client.get())
+
+
+def _read(text: str) -> dict[str, Any]:
+    """A JSON object. Raises ValueError."""
+    request = json.loads(text)
+    if not isinstance(request, dict):
+        raise ValueError("not an object")
+    return request
+
+
+def _number(value: object) -> float | int:
+    if type(value) in (int, float) and abs(value) < 1e15:  # type: ignore[arg-type]
+        return value  # type: ignore[return-value]
+    return 0
+
+
+def _load_pages() -> dict[str, tuple[str, bytes]]:
+    """The files of the page by name: nothing else can be asked for."""
+    pages = {}
+    for file in (files(__package__) / "page").iterdir():
+        ending = "." + file.name.rpartition(".")[2]
+        if ending in _TYPES:
+            pages[file.name] = (_TYPES[ending], file.read_bytes())
+    if "index.html" not in pages:
+        raise InputError(
+            "hodograph.monitor: the page's files are missing: install the package anew"
+        )
+    return pages

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""A monitor from start to end: bus or recording, page, commands."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from aiohttp import web
+
+from .. import __version__
+from ..bus.address import BusAddress
+from ..errors import InputError
+from .commands import read_command
+from .hub import Hub
+from .link import Link
+from .pump import Layout, Pump
+from .security import Guard, is_loopback
+from .server import Server
+from .source import Source, open_source
+from .usage import Usage
+
+
+@dataclass(frozen=True)
+class Live:
+    """A bus and the controller on it."""
+
+    address: BusAddress
+    node: int
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A recording; `open` begins it anew."""
+
+    name: str
+    speed: float
+    open: Callable[[], Source]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the page is served."""
+
+    host: str
+    port: int
+    token: str
+
+    @property
+    def url(self) -> str:
+        """Of the page that may command: the token is behind the #, which browsers keep to themselves."""
+        host = "127.0.0.1" if self.host in ("0.0.0.0", "::") else self.host
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{self.port}/#token={self.token}"
+
+
+class Session:
+    """Serves until SIGINT or SIGTERM. `crc32` is that of the program given, None without one."""
+
+    def __init__(
+        self,
+        what: Live | Replay,
+        layout: Layout,
+        place: Place,
+        image: bytes | None,
+        say: Callable[[str], None],
+    ) -> None:
+        self._what, self._layout, self._place = what, layout, place
+        self._image, self._say = image, say
+
+    async def serve(self) -> None:
+        """Raises InputError when the place is taken."""
+        loop = asyncio.get_running_loop()
+        ending = asyncio.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, ending.set)
+        hub = Hub(loop)
+        pump = Pump(self._opener(), self._layout, hub.publish)
+        link = self._link(hub, pump)
+        server = Server(
+            Guard(self._place.host, self._place.token), hub, self._greeting(), _obey(link, pump)
+        )
+        runner = web.AppRunner(server.app, access_log=None, shutdown_timeout=2.0)
+        await runner.setup()
+        usage = Usage()
+        try:
+            await self._listen(runner)
+            if self._image is not None:
+                pump.show(self._image)
+            pump.start()
+            if link is not None:
+                link.start()
+            self._say(f"monitor: {self._place.url}")
+            while not ending.is_set():
+                hub.publish(usage.message(hub.count))
+                with_timeout = asyncio.wait_for(ending.wait(), 1.0)
+                try:
+                    await with_timeout
+                except TimeoutError:
+                    continue
+        finally:
+            await asyncio.to_thread(_close, link, pump)
+            await runner.cleanup()
+
+    async def _listen(self, runner: web.AppRunner) -> None:
+        site = web.TCPSite(runner, self._place.host, self._place.port)
+        try:
+            await site.start()
+        except OSError as error:
+            raise InputError(
+                f"{self._place.host}:{self._place.port}: cannot be served: {error.strerror or error}: "
+                "choose another --port or --host"
+            ) from error
+
+    def _opener(self) -> Callable[[], Source]:
+        what, bitrate = self._what, self._layout.bitrate
+        if isinstance(what, Replay):
+            return what.open
+        return lambda: open_source(what.address, bitrate)
+
+    def _link(self, hub: Hub, pump: Pump) -> Link | None:
+        if isinstance(self._what, Replay):
+            return None
+        return Link(
+            self._what.address,
+            self._what.node,
+            self._layout.bitrate,
+            hub.publish,
+            pump.show,
+            given=self._image,
+        )
+
+    def _greeting(self) -> dict[str, Any]:
+        what = self._what
+        return {
+            "version": __version__,
+            "mode": "replay" if isinstance(what, Replay) else "live",
+            "what": f"{what.name}, speed {what.speed:g}"
+            if isinstance(what, Replay)
+            else str(what.address),
+            "axes": list(self._layout.names),
+            "nodes": list(self._layout.nodes),
+            "period_us": self._layout.period_us,
+            "loopback": is_loopback(self._place.host),
+        }
+
+
+def _obey(link: Link | None, pump: Pump) -> Callable[[dict[str, Any]], Any]:
+    async def obey(request: dict[str, Any]) -> str:
+        name = str(request.get("name"))
+        if link is None:
+            if name != "replay":
+                raise InputError("a recording takes no commands")
+            pump.restart()
+            return "from the beginning"
+        await asyncio.wrap_future(link.submit(read_command(request)))
+        return f"{name}: done"
+
+    return obey
+
+
+def _close(link: Link | None, pump: Pump) -> None:
+    if link is not None:
+        link.close()
+    pump.close()

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: MIT
+"""Where the frames of a live bus come from. What waits is bounded; what had to be dropped is counted."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import can
+import numpy as np
+
+from ..bus.address import BusAddress, check_socketcan
+from ..bus.frame_batch import BATCH, FRAME_DTYPE, FrameBatch, Frames, open_socket
+from ..errors import BusError, one_line
+
+MOST_FRAMES = 65536
+"""Frames taken at once, and frames that may wait on interfaces without a queue in the kernel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """What has come since the last look; `newest_s` is the age reference: time.time() of the last frame."""
+
+    frames: Frames
+    newest_s: float | None
+    dropped: int = 0
+    """Frames lost since the start, for want of somebody to take them."""
+    ended: bool = False
+    """A recording is at its end."""
+
+
+NOTHING = Taken(np.empty(0, dtype=FRAME_DTYPE), None)
+
+
+class Source(Protocol):
+    """Frames in the order of the bus."""
+
+    def take(self) -> Taken:
+        """Everything that has come; never waits. Raises BusError when the bus is gone."""
+        ...
+
+    def close(self) -> None:
+        """Gives the bus back."""
+        ...
+
+
+def open_source(address: BusAddress, bitrate: int) -> Source:
+    """Listens on a bus. Raises BusError with the remedy."""
+    if address.is_socketcan:
+        check_socketcan(address)
+        return SocketSource(address)
+    return PythonCanSource(address, bitrate)
+
+
+class SocketSource:
+    """SocketCAN. The kernel keeps what waits, and counts what it has no room for."""
+
+    def __init__(self, address: BusAddress) -> None:
+        self._address = address
+        self._socket = open_socket(address, timestamps=True)
+        self._batch = FrameBatch()
+        self._dropped = 0
+
+    def take(self) -> Taken:
+        """See Source."""
+        chunks: list[bytes] = []
+        newest_s: float | None = None
+        count = BATCH
+        try:
+            while count == BATCH and len(chunks) < MOST_FRAMES // BATCH:
+                count = self._batch.receive(self._socket.fileno())
+                if count:
+                    chunks.append(self._batch.taken(count))
+                    newest_s = self._batch.time_s(count - 1)
+                    self._dropped = self._batch.dropped(count - 1) or self._dropped
+                    self._batch.rearm(count)
+        except OSError as error:
+            raise BusError(
+                f"{self._address}: {error.strerror}: did the interface go down?"
+            ) from error
+        return Taken(np.frombuffer(b"".join(chunks), dtype=FRAME_DTYPE), newest_s, self._dropped)
+
+    def close(self) -> None:
+        """See Source."""
+        self._socket.close()
+
+
+class PythonCanSource:
+    """Any other interface of python-can: a thread receives, the oldest frames give way."""
+
+    def __init__(self, address: BusAddress, bitrate: int) -> None:
+        self._address = address
+        try:
+            self._bus = can.Bus(
+                channel=address.channel, interface=address.interface, bitrate=bitrate
+            )
+        except Exception as error:
+            raise BusError(f"{address}: cannot be opened: {one_line(error)}") from error
+        self._waiting: deque[tuple[int, bytes]] = deque(maxlen=MOST_FRAMES)
+        self._came = 0
+        self._given = 0
+        self._lock = threading.Lock()
+        self._newest_s: float | None = None
+        self._error: Exception | None = None
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="monitor-bus", daemon=True)
+        self._thread.start()
+
+    def _work(self) -> None:
+        while not self._ending.is_set():
+            try:
+                message = self._bus.recv(0.1)
+            except (can.CanError, OSError) as error:
+                self._error = error
+                return
+            if message is None or message.is_error_frame or message.is_extended_id:
+                continue
+            with self._lock:
+                self._waiting.append((message.arbitration_id, bytes(message.data)))
+                self._came += 1
+                self._newest_s = time.time()
+
+    def take(self) -> Taken:
+        """See Source."""
+        if self._error is not None:
+            raise BusError(f"{self._address}: {one_line(self._error)}: is the adapter still there?")
+        with self._lock:
+            waiting = list(self._waiting)
+            self._waiting.clear()
+            dropped, newest_s = self._came - self._given - len(waiting), self._newest_s
+            self._given += len(waiting)
+        frames = np.zeros(len(waiting), dtype=FRAME_DTYPE)
+        for row, (identifier, data) in zip(frames, waiting, strict=True):
+            _fill(row, identifier, data)
+        return Taken(frames, newest_s if waiting else None, dropped)
+
+    def close(self) -> None:
+        """See Source."""
+        self._ending.set()
+        self._thread.join()
+        with suppress(can.CanError, OSError):
+            self._bus.shutdown()
+
+
+def _fill(row: Any, identifier: int, data: bytes) -> None:
+    row["id"], row["length"] = identifier, len(data)
+    row["data"][: len(data)] = np.frombuffer(data, dtype=np.uint8)
