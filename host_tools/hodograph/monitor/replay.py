@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bus.decode import SYNC_ID, SYNC_OVERFLOW
-from ..bus.frame_batch import Frames
+from ..bus.frame_batch import FRAME_DTYPE, Frames
 from ..bus.recordings import read_recording
 from ..errors import InputError
 from .source import NOTHING, Taken
@@ -17,7 +17,10 @@ from .source import NOTHING, Taken
 
 def load_recording(file: Path) -> Frames:
     """The frames of a recording. Raises InputError: not readable, or nothing to show in it."""
-    frames = read_recording(file)
+    recorded = read_recording(file)
+    frames = np.zeros(recorded.size, dtype=FRAME_DTYPE)
+    for name in ("id", "length", "data"):
+        frames[name] = recorded[name]
     if np.count_nonzero(frames["id"] == SYNC_ID) < 2:
         raise InputError(f"{file}: has no SYNCs (0x080): is it a recording of a running machine?")
     return frames
