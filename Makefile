@@ -38,25 +38,28 @@ OD_NAMES := $(if $(wildcard firmware/app/controller.eds),controller) $(if $(wild
 OD_C     := $(OD_NAMES:%=$(BUILD)/generated/od_%.c)
 OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
 
-LIBS        := app node port canopen sim core od
+LIBS        := app node injector faults port canopen sim core od
 core_SRC    := $(wildcard firmware/core/*.c)
 canopen_SRC := $(wildcard firmware/canopen/*.c)
 sim_SRC     := $(wildcard sim/plant/*.c sim/rig/*.c)
 app_SRC     := $(filter-out %/main.c,$(wildcard firmware/app/*.c))
 port_SRC    := $(filter-out %/main.c,$(wildcard firmware/port/linux/*.c))
 node_SRC    := $(filter-out %/main.c,$(wildcard sim/node/*.c))
+faults_SRC  := $(wildcard sim/faults/*.c)
+injector_SRC := $(filter-out %/main.c,$(wildcard sim/injector/*.c))
 od_SRC      := $(OD_C)
 
-BINS            := controller drive
+BINS            := controller drive injector
 controller_MAIN := $(wildcard firmware/app/main.c firmware/port/linux/main.c)
 drive_MAIN      := $(wildcard sim/node/main.c)
+injector_MAIN   := $(wildcard sim/injector/main.c)
 BINS            := $(foreach b,$(BINS),$(if $($(b)_MAIN),$(b)))
 
 UNIT_SRC      := $(wildcard tests/unit/test_*.c)
 UNIT_SUPPORT  := $(filter-out $(UNIT_SRC),$(wildcard tests/unit/*.c))
 UNIT_NAMES    := $(UNIT_SRC:tests/unit/%.c=%)
 
-OWN_C    := $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(controller_MAIN) $(drive_MAIN)
+OWN_C    := $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
 OWN_H    := $(wildcard firmware/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
 FUZZ_SRC := $(wildcard tests/fuzz/*.c)
 

@@ -38,7 +38,15 @@ C_RULES: dict[str, set[str]] = {
         "firmware/port/linux/can_socket.h",  # a Linux program: socket and clock are those of the port
         "firmware/port/linux/clock.h",
         "sim/plant",
+        "sim/faults",
         "generated",
+    },
+    "sim/faults": {"firmware/can"},
+    "sim/injector": {
+        "firmware/can",
+        "firmware/port/linux/can_socket.h",
+        "firmware/port/linux/clock.h",
+        "sim/faults",
     },
 }
 

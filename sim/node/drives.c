@@ -6,6 +6,8 @@
 #include <poll.h>
 
 #include "canopen/cob.h"
+#include "faults/fault_log.h"
+#include "port/linux/clock.h"
 
 enum { SEND_TRIES = 200, BATCHES = 4 };
 
@@ -26,6 +28,13 @@ static void drives_send(void *context, const struct can_msg *frame)
     }
 }
 
+static void drives_note(const struct fault_rule *rule, uint64_t now_ns, int64_t tick, bool on)
+{
+    const struct fault_event event = {rule, now_ns, tick};
+    fault_log_state(stdout, &event, on);
+    (void)fflush(stdout);
+}
+
 int drives_init(struct drives *drives, const struct node_options *options, uint8_t *node)
 {
     const struct drive_node_port port = {drives_send, drives};
@@ -43,14 +52,18 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
         }
         drives->count++;
     }
+    node_faults_init(&drives->faults, &drives->rules, drives->nodes, drives->count, drives_note);
     return 0;
 }
 
 int drives_filter(struct drives *drives)
 {
-    struct can_socket_filter filters[3 + (1 + DRIVE_NODE_PDOS) * NODE_OPTIONS_AXES] = {
+    struct can_socket_filter filters[4 + (1 + DRIVE_NODE_PDOS) * NODE_OPTIONS_AXES] = {
         {COB_NMT, CAN_ID_MAX}, {COB_SYNC, CAN_ID_MAX}, {COB_HEARTBEAT, 0x780}};
     size_t n = 3;
+    if (drives->rules.count > 0) {
+        filters[n++] = (struct can_socket_filter){COB_RPDO1, 0x780}; /* ticks are those of all */
+    }
     for (size_t i = 0; i < drives->count; i++) {
         struct drive_node *node = &drives->nodes[i];
         filters[n++] = (struct can_socket_filter){(uint16_t)(COB_SDO_ASK + node->id), CAN_ID_MAX};
@@ -84,6 +97,9 @@ static bool drives_cyclic(const struct drives *drives, const struct can_msg *fra
 static void drives_take(struct drives *drives, const struct can_msg *frame)
 {
     bool moved = false;
+    if (drives->rules.count > 0) {
+        node_faults_receive(&drives->faults, frame, clock_ns());
+    }
     for (size_t i = 0; i < drives->count; i++) {
         drive_node_receive(&drives->nodes[i], frame);
         moved = moved || drives->nodes[i].pdos_moved;
@@ -115,6 +131,9 @@ bool drives_receive(struct drives *drives)
 
 void drives_process(struct drives *drives, uint32_t elapsed_us)
 {
+    if (drives->rules.count > 0) {
+        node_faults_process(&drives->faults, clock_ns());
+    }
     for (size_t i = 0; i < drives->count; i++) {
         drive_node_process(&drives->nodes[i], elapsed_us);
     }

@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "node/drive_node.h"
+#include "node/node_faults.h"
 #include "node/node_options.h"
 #include "port/linux/can_socket.h"
 
@@ -18,7 +19,9 @@ struct drives {
     struct can_socket socket;
     struct drive_node nodes[NODE_OPTIONS_AXES];
     size_t count;
-    int failed; /* negative errno of the bus, 0: none */
+    struct fault_rules rules;  /* set before drives_init; none: all zero */
+    struct node_faults faults; /* in use when there are rules */
+    int failed;                /* negative errno of the bus, 0: none */
 };
 
 /* Makes the drives; nothing is sent yet. Returns 0, or a negative enum drive_error with `*node` the

@@ -12,6 +12,7 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include "faults/fault_file.h"
 #include "node/drives.h"
 #include "node/node_options.h"
 #include "port/linux/clock.h"
@@ -83,9 +84,13 @@ static void ask_for_priority(void)
 
 static int start(struct drives *drives, const struct node_options *options)
 {
-    char reason[256];
+    char reason[512];
     uint8_t node = 0;
     const int signals = open_signals();
+    if (options->faults != NULL &&
+        fault_file_read(&drives->rules, options->faults, reason, sizeof reason) != 0) {
+        return complain(EXIT_USAGE, reason);
+    }
     const int error = drives_init(drives, options, &node);
     if (error != 0) {
         (void)snprintf(reason, sizeof reason, "--axis of node %u: %s", node,

@@ -8,11 +8,13 @@
 #include <string.h>
 
 const char node_options_help[] =
-    "usage: hodograph-drive --bus INTERFACE --axis KEY=VALUE,... [--axis ...]\n"
+    "usage: hodograph-drive --bus INTERFACE --axis KEY=VALUE,... [--axis ...] [--faults FILE]\n"
     "\n"
     "Simulated CiA 402 servo drives on a SocketCAN bus, one per --axis (at most 6).\n"
     "\n"
     "  --bus INTERFACE  a CAN interface that is up, such as vcan0\n"
+    "  --faults FILE    fault rules, one a line (docs/protocol.md section 4); what they do is\n"
+    "                   printed, one JSON object a line\n"
     "  --axis ...       one drive; keys (all but the last five are required):\n"
     "                   node (2 to 127), gain_rad_s_v, time_constant_s, screw_mm_rad,\n"
     "                   torque_to_volts, volts_limit, k_pp_rad_s_mm, k_pv_nm_s_rad, k_iv_per_s,\n"
@@ -191,7 +193,8 @@ static enum node_options_result add_axis(struct node_options *options, char *spe
 static enum node_options_result set_option(struct node_options *options, const char *name,
                                            char *value, struct reason reason)
 {
-    if (strcmp(name, "--bus") != 0 && strcmp(name, "--axis") != 0) {
+    const bool faults = strcmp(name, "--faults") == 0;
+    if (!faults && strcmp(name, "--bus") != 0 && strcmp(name, "--axis") != 0) {
         return wrong(reason, "unknown option", name);
     }
     if (value == NULL) {
@@ -200,7 +203,11 @@ static enum node_options_result set_option(struct node_options *options, const c
     if (strcmp(name, "--axis") == 0) {
         return add_axis(options, value, reason);
     }
-    options->bus = value;
+    if (faults) {
+        options->faults = value;
+    } else {
+        options->bus = value;
+    }
     return NODE_OPTIONS_OK;
 }
 
@@ -209,6 +216,7 @@ enum node_options_result node_options_parse(struct node_options *options, int ar
 {
     const struct reason reason = {reason_text, size};
     options->bus = NULL;
+    options->faults = NULL;
     options->axis_count = 0;
     for (int i = 1; i < argc; i += 2) {
         if (strcmp(argv[i], "--help") == 0) {

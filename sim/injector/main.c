@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: MIT */
+/* hodograph-injector: a bridge between two SocketCAN buses that injects faults. One thread: it
+ * sleeps until frames or a signal come, or a delayed frame is due. */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <poll.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/signalfd.h>
+
+#include "faults/fault_file.h"
+#include "faults/fault_log.h"
+#include "injector/bridge.h"
+#include "injector/injector_options.h"
+#include "port/linux/can_socket.h"
+#include "port/linux/clock.h"
+
+/* Below the controller's tick, above the drives and everything ordinary. */
+#define PRIORITY 25
+
+enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, SEND_TRIES = 200, WAKE_MS = 20 };
+
+struct injector {
+    struct can_socket sockets[2]; /* by enum fault_side */
+    struct fault_rules rules;
+    struct bridge bridge;
+    uint64_t now_ns;
+    int failed; /* negative errno of a bus, 0: none */
+    bool verbose;
+};
+
+static int complain(int status, const char *reason)
+{
+    (void)fprintf(stderr, "hodograph-injector: %s\n", reason);
+    return status;
+}
+
+/* A full queue of the interface empties within a few frame times: wait for it. */
+static void send_frame(void *context, enum fault_side to, const struct can_msg *frame)
+{
+    struct injector *injector = context;
+    int result = -EAGAIN;
+    for (int i = 0; i < SEND_TRIES && result == -EAGAIN; i++) {
+        result = can_socket_send(&injector->sockets[to], frame);
+        if (result == -EAGAIN) {
+            struct pollfd writable = {.fd = injector->sockets[to].fd, .events = POLLOUT};
+            (void)poll(&writable, 1, 1);
+        }
+    }
+    injector->failed = result != 0 ? result : injector->failed;
+}
+
+static void note(void *context, const struct fault_watch *watch, enum fault_side from,
+                 const struct can_msg *frame, bool on)
+{
+    const struct injector *injector = context;
+    const struct fault_event event = {watch->rule, injector->now_ns, injector->bridge.ticks.tick};
+    if (!injector->verbose) {
+        return;
+    }
+    if (frame != NULL) {
+        fault_log_frame(stdout, &event, from, frame);
+    } else {
+        fault_log_state(stdout, &event, on);
+    }
+    (void)fflush(stdout);
+}
+
+static int receive(struct injector *injector, enum fault_side from)
+{
+    struct can_msg frames[CAN_SOCKET_BATCH];
+    int more = 1;
+    while (more != 0) {
+        const int count = can_socket_receive(&injector->sockets[from], frames, &more);
+        if (count < 0) {
+            return count;
+        }
+        injector->now_ns = clock_ns();
+        for (int i = 0; i < count; i++) {
+            bridge_receive(&injector->bridge, from, &frames[i], injector->now_ns);
+        }
+    }
+    return 0;
+}
+
+/* Until something is due, but no longer than WAKE_MS: rules in ms end without traffic too. */
+static struct timespec patience(const struct injector *injector)
+{
+    const uint64_t now_ns = clock_ns();
+    const uint64_t due_ns = bridge_due_ns(&injector->bridge);
+    uint64_t wait_ns = WAKE_MS * 1000000ull;
+    if (due_ns <= now_ns) {
+        wait_ns = 0;
+    } else if (due_ns - now_ns < wait_ns) {
+        wait_ns = due_ns - now_ns;
+    }
+    return (struct timespec){.tv_sec = 0, .tv_nsec = (long)wait_ns};
+}
+
+static int run(struct injector *injector, int signals)
+{
+    struct pollfd wait[3] = {{.fd = injector->sockets[0].fd, .events = POLLIN},
+                             {.fd = injector->sockets[1].fd, .events = POLLIN},
+                             {.fd = signals, .events = POLLIN}};
+    while (injector->failed == 0) {
+        const struct timespec limit = patience(injector);
+        const int ready = ppoll(wait, 3, &limit, NULL);
+        if (ready < 0 && errno != EINTR) {
+            injector->failed = -errno;
+        } else if (ready > 0 && wait[2].revents != 0) {
+            return EXIT_OK;
+        }
+        for (unsigned side = 0; side < 2u && ready > 0; side++) {
+            if (wait[side].revents != 0) {
+                const int error = receive(injector, (enum fault_side)side);
+                injector->failed = error != 0 ? error : injector->failed;
+            }
+        }
+        if (ready <= 0 || bridge_due_ns(&injector->bridge) != UINT64_MAX) {
+            injector->now_ns = clock_ns();
+            bridge_process(&injector->bridge, injector->now_ns);
+        }
+    }
+    (void)fprintf(stderr,
+                  "hodograph-injector: a bus failed: %s: check the interfaces, start again\n",
+                  strerror(-injector->failed));
+    return EXIT_BUS;
+}
+
+/* Ends come as readable bytes, so that no handler runs in the middle of anything. */
+static int open_signals(void)
+{
+    sigset_t set;
+    (void)sigemptyset(&set);
+    (void)sigaddset(&set, SIGTERM);
+    (void)sigaddset(&set, SIGINT);
+    (void)sigprocmask(SIG_BLOCK, &set, NULL);
+    return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+}
+
+static int start(struct injector *injector, const struct injector_options *options)
+{
+    char reason[512];
+    const struct sched_param priority = {.sched_priority = PRIORITY};
+    const int signals = open_signals();
+    if (options->rules != NULL &&
+        fault_file_read(&injector->rules, options->rules, reason, sizeof reason) != 0) {
+        return complain(EXIT_USAGE, reason);
+    }
+    if (signals < 0) {
+        return complain(EXIT_BUS, strerror(errno));
+    }
+    for (unsigned side = 0; side < 2u; side++) {
+        if (can_socket_open(&injector->sockets[side], options->bus[side], reason, sizeof reason) !=
+            0) {
+            return complain(EXIT_BUS, reason);
+        }
+    }
+    injector->verbose = options->verbose;
+    bridge_init(&injector->bridge, &injector->rules,
+                (struct bridge_port){send_frame, note, injector});
+    (void)sched_setscheduler(0, SCHED_FIFO, &priority);
+    return run(injector, signals);
+}
+
+int main(int argc, char **argv)
+{
+    static struct injector injector = {.sockets = {{.fd = -1}, {.fd = -1}}};
+    struct injector_options options;
+    char reason[256];
+    switch (injector_options_parse(&options, argc, argv, reason, sizeof reason)) {
+    case INJECTOR_OPTIONS_HELP:
+        (void)fputs(injector_options_help, stdout);
+        return EXIT_OK;
+    case INJECTOR_OPTIONS_WRONG:
+        return complain(EXIT_USAGE, reason);
+    default:
+        break;
+    }
+    const int status = start(&injector, &options);
+    can_socket_close(&injector.sockets[0]);
+    can_socket_close(&injector.sockets[1]);
+    return status;
+}

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: MIT */
+#include <stdio.h>
+#include <string.h>
+
+#include "faults/fault_file.h"
+#include "faults/fault_parse.h"
+#include "faults/fault_watch.h"
+#include "faults/tick_count.h"
+#include "unity.h"
+
+static struct fault_rules rules;
+static char reason[256];
+
+void setUp(void)
+{
+    memset(&rules, 0, sizeof rules);
+    reason[0] = '\0';
+}
+
+void tearDown(void)
+{
+}
+
+static void parse(const char *text)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, fault_parse(&rules, text, strlen(text), reason, sizeof reason),
+                                  reason);
+}
+
+static void refused(const char *text, const char *part)
+{
+    TEST_ASSERT_EQUAL_INT(FAULT_PARSE_WRONG,
+                          fault_parse(&rules, text, strlen(text), reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, part), reason);
+    TEST_ASSERT_NULL(strchr(reason, '\n'));
+}
+
+static void test_every_kind_and_key(void)
+{
+    parse("# a comment\n"
+          "\n"
+          "drop at=5 id=0x182 for=3 count=2 p=0.25 seed=7   # the rest\r\n"
+          "duplicate\tat=0 id=386\n"
+          "delay at=1 id=0x203 us=1500\n"
+          "reorder at=1 id=0x202\n"
+          "corrupt at=2 id=0x7FF byte=7 xor=0xFF\n"
+          "short at=2 id=0 len=0\n"
+          "flood at=3 id=0x7A0 per_tick=4 for_ms=20\n"
+          "bus-off at=3 side=drives for=9\n"
+          "stop at=4 node=2\nrestart at=4 node=127\nheartbeat-stop at=4 node=3 for=1000\n"
+          "encoder-freeze at=4 node=2\nencoder-jump at=4 node=2 counts=-250000\n"
+          "encoder-fault at=4 node=2\nsaturate at=4 node=2 volts=.5\nload at=4 node=3 volts=-1.25\n"
+          "limit-switch at=6 node=2 side=positive\nfault at=6 node=3 code=0x3210");
+    TEST_ASSERT_EQUAL_UINT32(FAULT_KINDS, rules.count);
+    for (uint32_t i = 0; i < FAULT_KINDS; i++) {
+        TEST_ASSERT_EQUAL_INT((int)i, (int)rules.rules[i].kind);
+    }
+    const struct fault_rule *drop = &rules.rules[0], *flood = &rules.rules[6];
+    TEST_ASSERT_EQUAL_UINT32(3, drop->line);
+    TEST_ASSERT_EQUAL_UINT32(5, drop->at);
+    TEST_ASSERT_EQUAL_UINT32(3, drop->for_ticks);
+    TEST_ASSERT_EQUAL_UINT32(2, drop->count);
+    TEST_ASSERT_EQUAL_UINT32(7, drop->seed);
+    TEST_ASSERT_EQUAL_HEX16(0x182, drop->id);
+    TEST_ASSERT_TRUE(drop->p == 0.25);
+    TEST_ASSERT_EQUAL_HEX16(386, rules.rules[1].id);
+    TEST_ASSERT_EQUAL_UINT32(1, rules.rules[1].for_ticks);
+    TEST_ASSERT_EQUAL_UINT32(1500, rules.rules[2].delay_us);
+    TEST_ASSERT_EQUAL_HEX8(0xFF, rules.rules[4].mask);
+    TEST_ASSERT_EQUAL_UINT8(7, rules.rules[4].byte);
+    TEST_ASSERT_EQUAL_UINT32(4, flood->per_tick);
+    TEST_ASSERT_EQUAL_UINT32(20, flood->for_ms);
+    TEST_ASSERT_EQUAL_UINT32(0, flood->for_ticks);
+    TEST_ASSERT_EQUAL_INT(FAULT_SIDE_DRIVES, rules.rules[7].side);
+    TEST_ASSERT_EQUAL_UINT8(127, rules.rules[9].node);
+    TEST_ASSERT_EQUAL_INT32(-250000, rules.rules[12].counts);
+    TEST_ASSERT_EQUAL_UINT32(FAULT_FOR_EVER, rules.rules[12].for_ticks);
+    TEST_ASSERT_TRUE(rules.rules[14].volts == 0.5 && rules.rules[15].volts == -1.25);
+    TEST_ASSERT_EQUAL_INT(FAULT_SIDE_POSITIVE, rules.rules[16].side);
+    TEST_ASSERT_EQUAL_HEX16(0x3210, rules.rules[17].code);
+}
+
+static void test_what_is_wrong_is_said_with_its_line(void)
+{
+    refused("drop at=1 id=1\nbreak at=1", "line 2: there is no kind of fault 'break'");
+    refused("drop id=1", "line 1: drop needs at=");
+    refused("\n\nstop at=1", "line 3: stop needs node=");
+    refused("drop at=1 id=1 for", "key=value is needed, not 'for'");
+    refused("drop at=1 id=1 foo=1", "there is no key 'foo'");
+    refused("drop at=1 id=1 node=2", "no key 'node'");
+    refused("drop at=1 at=2 id=1", "given twice: 'at'");
+    refused("drop at=1 id=0x800", "'id=0x800'");
+    refused("drop at=-1 id=1", "'at=-1'");
+    refused("drop at=1.5 id=1", "'at=1.5'");
+    refused("drop at= id=1", "'at='");
+    refused("drop at=1 id=0x", "'id=0x'");
+    refused("drop at=1 id=1 p=nan", "'p=nan'");
+    refused("drop at=1 id=1 p=1.01", "'p=1.01'");
+    refused("drop at=1 id=1 for=0", "'for=0'");
+    refused("drop at=1 id=1 for=1 for_ms=1", "not both");
+    refused("bus-off at=1 side=left", "'side=left'");
+    refused("bus-off at=1 side=positive", "'side=positive'");
+    refused("limit-switch at=1 node=2 side=drives", "'side=drives'");
+    refused("encoder-jump at=1 node=2 counts=2147483648", "counts=2147483648");
+    refused("saturate at=1 node=2 volts=0", "'volts=0'");
+    refused("stop at=1 node=0", "'node=0'");
+    refused("restart at=1 node=2 for=2", "no key 'for'");
+}
+
+static void test_bounds_of_text(void)
+{
+    static char text[20 * (FAULT_RULES_MAX + 1u)];
+    size_t used = 0;
+    for (unsigned i = 0; i <= FAULT_RULES_MAX; i++) {
+        used += (size_t)snprintf(text + used, sizeof text - used, "drop at=1 id=1\n");
+    }
+    refused(text, "line 65: too many rules");
+    char line[FAULT_LINE_MAX + 3u];
+    memset(line, '#', sizeof line);
+    line[sizeof line - 1u] = '\0';
+    refused(line, "line 1: longer");
+    line[FAULT_LINE_MAX] = '\0';
+    parse(line);
+    static const char nul[] = "drop at=1 id=1\n\0drop";
+    TEST_ASSERT_EQUAL_INT(FAULT_PARSE_WRONG,
+                          fault_parse(&rules, nul, sizeof nul - 1u, reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL(strstr(reason, "line 2"));
+}
+
+static void test_a_file_that_is_not_there(void)
+{
+    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, "/no/such/rules", reason, sizeof reason));
+    TEST_ASSERT_EQUAL_STRING("/no/such/rules: No such file or directory", reason);
+}
+
+static void test_ticks_and_frames_of_a_rule(void)
+{
+    struct fault_watch watch;
+    const struct can_msg frame = {.id = 0x182}, other = {.id = 0x183};
+    parse("drop at=5 id=0x182 for=10 count=2");
+    fault_watch_init(&watch, &rules.rules[0]);
+    TEST_ASSERT_FALSE(fault_watch_acts(&watch, -1, 1));
+    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 4, 1));
+    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 5, 1));
+    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 14, 1));
+    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 15, 1));
+    TEST_ASSERT_FALSE(fault_watch_takes(&watch, &other));
+    TEST_ASSERT_TRUE(fault_watch_takes(&watch, &frame));
+    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 6, 1));
+    TEST_ASSERT_TRUE(fault_watch_takes(&watch, &frame));
+    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 6, 1));
+}
+
+static void test_wall_time_of_a_rule(void)
+{
+    struct fault_watch watch;
+    parse("bus-off at=5 side=drives for_ms=20");
+    fault_watch_init(&watch, &rules.rules[0]);
+    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 4, 1000000));
+    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 5, 2000000));
+    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 500, 21999999));
+    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 5, 22000000));
+}
+
+static void test_probability_is_met_and_repeats(void)
+{
+    struct fault_watch watch, again;
+    const struct can_msg frame = {.id = 0x182};
+    unsigned hits = 0;
+    parse("drop at=0 id=0x182 for=1000000 p=0.3 seed=42");
+    fault_watch_init(&watch, &rules.rules[0]);
+    fault_watch_init(&again, &rules.rules[0]);
+    for (unsigned i = 0; i < 10000; i++) {
+        const bool hit = fault_watch_takes(&watch, &frame);
+        TEST_ASSERT_EQUAL(hit, fault_watch_takes(&again, &frame));
+        hits += hit ? 1u : 0u;
+    }
+    TEST_ASSERT_UINT_WITHIN(150, 3000, hits); /* more than three deviations of 46 */
+}
+
+static bool sync(struct tick_count *count, uint8_t counter)
+{
+    const struct can_msg in = {.id = 0x80, .len = 1, .data = {counter}};
+    return tick_count_receive(count, &in);
+}
+
+static void setpoint(struct tick_count *count, uint8_t node, uint8_t control, uint8_t target)
+{
+    const struct can_msg in = {.id = 0x200u + node, .len = 6, .data = {control, 0, target}};
+    TEST_ASSERT_FALSE(tick_count_receive(count, &in));
+}
+
+static void test_tick_0_is_the_sync_after_the_first_step(void)
+{
+    struct tick_count count;
+    tick_count_init(&count);
+    setpoint(&count, 2, 0x06, 1); /* not enabled: the target follows the axis */
+    setpoint(&count, 2, 0x0F, 2);
+    TEST_ASSERT_FALSE(sync(&count, 7));
+    setpoint(&count, 3, 0x0F, 9); /* another drive */
+    setpoint(&count, 2, 0x0F, 2);
+    TEST_ASSERT_FALSE(sync(&count, 8));
+    TEST_ASSERT_EQUAL_INT64(-1, count.tick);
+    setpoint(&count, 3, 0x0F, 10);
+    TEST_ASSERT_EQUAL_INT64(-1, count.tick);
+    TEST_ASSERT_TRUE(sync(&count, 9));
+    TEST_ASSERT_EQUAL_INT64(0, count.tick);
+    TEST_ASSERT_TRUE(sync(&count, 10));
+    TEST_ASSERT_EQUAL_INT64(1, count.tick);
+}
+
+static void test_ticks_go_by_the_counter(void)
+{
+    struct tick_count count;
+    tick_count_init(&count);
+    setpoint(&count, 2, 0x0F, 1);
+    setpoint(&count, 2, 0x0F, 2);
+    (void)sync(&count, 238);
+    TEST_ASSERT_TRUE(sync(&count, 240));
+    TEST_ASSERT_EQUAL_INT64(2, count.tick);
+    TEST_ASSERT_FALSE(sync(&count, 240)); /* twice */
+    TEST_ASSERT_TRUE(sync(&count, 1));
+    TEST_ASSERT_EQUAL_INT64(3, count.tick);
+    const struct can_msg plain = {.id = 0x80}; /* a SYNC without a counter */
+    TEST_ASSERT_TRUE(tick_count_receive(&count, &plain));
+    TEST_ASSERT_EQUAL_INT64(4, count.tick);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_every_kind_and_key);
+    RUN_TEST(test_what_is_wrong_is_said_with_its_line);
+    RUN_TEST(test_bounds_of_text);
+    RUN_TEST(test_a_file_that_is_not_there);
+    RUN_TEST(test_ticks_and_frames_of_a_rule);
+    RUN_TEST(test_wall_time_of_a_rule);
+    RUN_TEST(test_probability_is_met_and_repeats);
+    RUN_TEST(test_tick_0_is_the_sync_after_the_first_step);
+    RUN_TEST(test_ticks_go_by_the_counter);
+    return UNITY_END();
+}

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+#include "node/node_faults.h"
+
+#include <string.h>
+
+#include "faults/fault_parse.h"
+#include "unity.h"
+
+static const struct drive_config figures = {
+    .plant = {.gain_rad_s_v = 83.0089,
+              .time_constant_s = 0.19936,
+              .screw_mm_rad = 1.59,
+              .torque_to_volts = 1.4,
+              .volts_limit = 5},
+    .pdff = {.k_pp_rad_s_mm = 97.38,
+             .k_pv_nm_s_rad = 1.19,
+             .k_iv_per_s = 252.8,
+             .k_pf_rad_mm = 0.8,
+             .k_vf = 0.85},
+    .encoder_counts_per_rev = 1048576,
+    .loop_rate_hz = 16000,
+    .counts_per_mm = 1000000,
+    .period_us = 1000,
+};
+
+static struct drive_node nodes[2];
+static struct fault_rules rules;
+static struct node_faults faults;
+static unsigned begun, ended;
+static int64_t last_tick;
+
+static void nowhere(void *context, const struct can_msg *frame)
+{
+    (void)context;
+    (void)frame;
+}
+
+static void note(const struct fault_rule *rule, uint64_t now_ns, int64_t tick, bool on)
+{
+    TEST_ASSERT_TRUE(now_ns > 0u && rule->line > 0u);
+    last_tick = tick;
+    begun += on ? 1u : 0u;
+    ended += on ? 0u : 1u;
+}
+
+void setUp(void)
+{
+    const struct drive_node_port port = {nowhere, NULL};
+    begun = ended = 0;
+    TEST_ASSERT_EQUAL_INT(0, drive_node_init(&nodes[0], 2, &figures, 0, port));
+    TEST_ASSERT_EQUAL_INT(0, drive_node_init(&nodes[1], 3, &figures, 0, port));
+}
+
+void tearDown(void)
+{
+}
+
+static void frame(uint16_t id, uint8_t first, uint8_t target)
+{
+    const struct can_msg in = {.id = id, .len = 6, .data = {first, 0, target}};
+    node_faults_receive(&faults, &in, 1000);
+}
+
+/* In motion: the next SYNC is tick 1 with counter 11. */
+static void begin(const char *text)
+{
+    char reason[200] = "";
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, fault_parse(&rules, text, strlen(text), reason, sizeof reason),
+                                  reason);
+    node_faults_init(&faults, &rules, nodes, 2, note);
+    frame(0x203, 0x0F, 1);
+    frame(0x203, 0x0F, 2);
+    frame(0x080, 10, 0);
+}
+
+static void test_a_rule_acts_on_its_drive_for_its_ticks(void)
+{
+    begin("saturate at=2 for=3 node=3 volts=1.5\ndrop at=0 id=0x182\n");
+    frame(0x080, 11, 0);
+    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 5.0);
+    frame(0x080, 12, 0);
+    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 1.5);
+    TEST_ASSERT_TRUE(nodes[0].axis.drive.pdff.volts_limit == 5.0);
+    TEST_ASSERT_EQUAL_INT64(2, last_tick);
+    frame(0x080, 14, 0);
+    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 1.5);
+    frame(0x080, 15, 0);
+    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 5.0);
+    TEST_ASSERT_EQUAL_UINT(1, begun);
+    TEST_ASSERT_EQUAL_UINT(1, ended);
+}
+
+static void test_ms_end_without_frames(void)
+{
+    begin("stop at=0 for_ms=50 node=2");
+    TEST_ASSERT_TRUE(nodes[0].silent);
+    TEST_ASSERT_FALSE(nodes[1].silent);
+    node_faults_process(&faults, 50000999);
+    TEST_ASSERT_TRUE(nodes[0].silent);
+    node_faults_process(&faults, 50001000);
+    TEST_ASSERT_FALSE(nodes[0].silent);
+}
+
+static void test_a_rule_about_another_process(void)
+{
+    begin("stop at=0 node=9");
+    TEST_ASSERT_EQUAL_UINT(1, begun);
+    TEST_ASSERT_FALSE(nodes[0].silent || nodes[1].silent);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_a_rule_acts_on_its_drive_for_its_ticks);
+    RUN_TEST(test_ms_end_without_frames);
+    RUN_TEST(test_a_rule_about_another_process);
+    return UNITY_END();
+}
