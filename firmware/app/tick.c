@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/tick.h"
 
+#include <string.h>
+
 #include "port/port.h"
 
 #define SYNC_COUNTER_OVERFLOW 240u
@@ -8,6 +10,7 @@
 void tick_init(struct tick *tick, struct machine *machine)
 {
     tick->machine = machine;
+    feedforward_init(&tick->feedforward);
     sync_producer_init(&tick->sync, SYNC_COUNTER_OVERFLOW);
 }
 
@@ -27,15 +30,51 @@ static void send_sync(struct tick *tick)
     tick->machine->statistics.syncs++;
 }
 
-static void send_setpoints(struct machine *machine)
+/* Axes that hold have none. */
+static void find_offsets(struct tick *tick, struct feedforward_offset offset[AXES_MAX])
 {
-    if (!machine_drives_operational(machine)) {
-        return;
+    const struct machine *machine = tick->machine;
+    memset(offset, 0, AXES_MAX * sizeof offset[0]);
+    if (machine->config.feedforward != 0u) {
+        feedforward_step(&tick->feedforward, &machine->config,
+                         machine_moving(machine) ? &machine->motion : NULL, offset);
     }
+}
+
+static void send_setpoints(struct machine *machine, const struct feedforward_offset *offset)
+{
+    const bool torque = (machine->config.feedforward & CONFIG_TORQUE_FEEDFORWARD) != 0u;
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         struct can_msg setpoint;
         axis_setpoint(&machine->axes[i], machine->config.start_tolerance_counts, &setpoint);
+        if (torque) {
+            pdo_add_torque(&setpoint, offset[i].torque_permille);
+        }
         send(machine, &setpoint);
+    }
+}
+
+static void send_velocities(struct machine *machine, const struct feedforward_offset *offset)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        struct can_msg velocity;
+        pdo_encode_velocity(machine->axes[i].node, offset[i].velocity_counts_s, &velocity);
+        send(machine, &velocity);
+    }
+}
+
+/* All positions first: they matter most on a bus that is full. */
+static void send_process_data(struct tick *tick)
+{
+    struct machine *machine = tick->machine;
+    struct feedforward_offset offset[AXES_MAX];
+    find_offsets(tick, offset);
+    if (!machine_drives_operational(machine)) {
+        return;
+    }
+    send_setpoints(machine, offset);
+    if ((machine->config.feedforward & CONFIG_VELOCITY_FEEDFORWARD) != 0u) {
+        send_velocities(machine, offset);
     }
 }
 
@@ -46,7 +85,7 @@ void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns)
     send_sync(tick);
     machine_supervise(machine, now_us);
     machine_step(machine);
-    send_setpoints(machine);
+    send_process_data(tick);
     if (machine_awaits_drives(machine)) {
         port_tick_await(TICK_GUARD_US, machine_busy(machine));
     }

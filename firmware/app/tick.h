@@ -6,6 +6,7 @@
 
 #include <stdint.h>
 
+#include "app/feedforward.h"
 #include "app/machine.h"
 #include "canopen/sync.h"
 
@@ -15,12 +16,13 @@
 struct tick {
     struct machine *machine;
     struct sync_producer sync;
+    struct feedforward feedforward;
 };
 
 void tick_init(struct tick *tick, struct machine *machine);
 
 /* One period: send SYNC k; look at what the drives answered to the last one; move the machine on;
- * send setpoints k. Timer. */
+ * send setpoints k, then what feedforward adds to them. Timer. */
 void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns);
 
 #endif

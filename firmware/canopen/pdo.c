@@ -4,7 +4,10 @@
 #include "canopen/cob.h"
 
 #define WORD_AND_POSITION_BYTES 6u
+#define WITH_TORQUE_BYTES       8u
 #define VOLTS_BYTES             2u
+#define VELOCITY_BYTES          4u
+#define INPUTS_BYTES            4u
 
 static void put_word_and_position(struct can_msg *out, uint32_t cob, uint8_t drive, uint16_t word,
                                   int32_t position)
@@ -40,6 +43,54 @@ int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint)
     if (drive > 0) {
         setpoint->controlword = (uint16_t)cob_get(in->data, 2);
         setpoint->target_counts = get_position(in);
+    }
+    return drive;
+}
+
+void pdo_add_torque(struct can_msg *out, int16_t torque_permille)
+{
+    out->len = WITH_TORQUE_BYTES;
+    cob_put(out->data + WORD_AND_POSITION_BYTES, (uint16_t)torque_permille, 2);
+}
+
+int pdo_decode_torque(const struct can_msg *in, int16_t *torque_permille)
+{
+    int drive = node_of(in, COB_RPDO1, WITH_TORQUE_BYTES);
+
+    if (drive > 0) {
+        *torque_permille = (int16_t)cob_signed(cob_get(in->data + WORD_AND_POSITION_BYTES, 2), 2);
+    }
+    return drive;
+}
+
+void pdo_encode_velocity(uint8_t drive, int32_t velocity_counts_s, struct can_msg *out)
+{
+    cob_frame(out, COB_RPDO2 + drive, VELOCITY_BYTES);
+    cob_put(out->data, (uint32_t)velocity_counts_s, VELOCITY_BYTES);
+}
+
+int pdo_decode_velocity(const struct can_msg *in, int32_t *velocity_counts_s)
+{
+    int drive = node_of(in, COB_RPDO2, VELOCITY_BYTES);
+
+    if (drive > 0) {
+        *velocity_counts_s = (int32_t)cob_signed(cob_get(in->data, VELOCITY_BYTES), VELOCITY_BYTES);
+    }
+    return drive;
+}
+
+void pdo_encode_inputs(uint8_t drive, uint32_t inputs, struct can_msg *out)
+{
+    cob_frame(out, COB_TPDO3 + drive, INPUTS_BYTES);
+    cob_put(out->data, inputs, INPUTS_BYTES);
+}
+
+int pdo_decode_inputs(const struct can_msg *in, uint32_t *inputs)
+{
+    int drive = node_of(in, COB_TPDO3, INPUTS_BYTES);
+
+    if (drive > 0) {
+        *inputs = (uint32_t)cob_get(in->data, INPUTS_BYTES);
     }
     return drive;
 }

@@ -30,11 +30,24 @@ struct pdo_actual {
 void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out);
 int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint);
 
+/* RPDO1 with a third object, 0x60B2: the torque offset, per mille of the rated torque; added to the
+ * frame of pdo_encode_setpoint. pdo_decode_setpoint takes both lengths. */
+void pdo_add_torque(struct can_msg *out, int16_t torque_permille);
+int pdo_decode_torque(const struct can_msg *in, int16_t *torque_permille);
+
+/* RPDO2 of a drive: 0x60B1, the velocity offset. */
+void pdo_encode_velocity(uint8_t drive, int32_t velocity_counts_s, struct can_msg *out);
+int pdo_decode_velocity(const struct can_msg *in, int32_t *velocity_counts_s);
+
 void pdo_encode_actual(uint8_t drive, const struct pdo_actual *actual, struct can_msg *out);
 int pdo_decode_actual(const struct can_msg *in, struct pdo_actual *actual);
 
 /* TPDO2 of a simulated drive: 0x2100, the motor voltage. */
 void pdo_encode_volts(uint8_t drive, int16_t volts_mv, struct can_msg *out);
 int pdo_decode_volts(const struct can_msg *in, int16_t *volts_mv);
+
+/* TPDO3 of a drive: 0x60FD, the digital inputs. */
+void pdo_encode_inputs(uint8_t drive, uint32_t inputs, struct can_msg *out);
+int pdo_decode_inputs(const struct can_msg *in, uint32_t *inputs);
 
 #endif

@@ -73,6 +73,41 @@ static void test_volts(void)
     TEST_ASSERT_EQUAL_INT(PDO_ERR_SHORT, pdo_decode_volts(&out, &volts_mv));
 }
 
+static void test_feedforward_and_inputs(void)
+{
+    const struct pdo_setpoint setpoint = {.controlword = 0x000F, .target_counts = -2};
+    const uint8_t wire[] = {0x0F, 0x00, 0xFE, 0xFF, 0xFF, 0xFF, 0x18, 0xFC};
+    struct pdo_setpoint back;
+    struct can_msg out;
+    int16_t torque = 0;
+    int32_t velocity = 0;
+    uint32_t inputs = 0;
+
+    pdo_encode_setpoint(3, &setpoint, &out);
+    pdo_add_torque(&out, -1000);
+    TEST_ASSERT_EQUAL_HEX32(0x203, out.id);
+    TEST_ASSERT_EQUAL_UINT8(8, out.len);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(wire, out.data, 8);
+    TEST_ASSERT_EQUAL_INT(3, pdo_decode_setpoint(&out, &back));
+    TEST_ASSERT_EQUAL_INT32(-2, back.target_counts);
+    TEST_ASSERT_EQUAL_INT(3, pdo_decode_torque(&out, &torque));
+    TEST_ASSERT_EQUAL_INT16(-1000, torque);
+    out.len = 6;
+    TEST_ASSERT_EQUAL_INT(PDO_ERR_SHORT, pdo_decode_torque(&out, &torque));
+
+    pdo_encode_velocity(4, INT32_MIN, &out);
+    TEST_ASSERT_EQUAL_HEX32(0x304, out.id);
+    TEST_ASSERT_EQUAL_INT(4, pdo_decode_velocity(&out, &velocity));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, velocity);
+
+    pdo_encode_inputs(5, 0x80000006u, &out);
+    TEST_ASSERT_EQUAL_HEX32(0x385, out.id);
+    TEST_ASSERT_EQUAL_INT(5, pdo_decode_inputs(&out, &inputs));
+    TEST_ASSERT_EQUAL_HEX32(0x80000006u, inputs);
+    out.len = 3;
+    TEST_ASSERT_EQUAL_INT(PDO_ERR_SHORT, pdo_decode_inputs(&out, &inputs));
+}
+
 static void test_lengths(void)
 {
     struct pdo_actual actual = {7, 7};
@@ -106,6 +141,7 @@ int main(void)
     RUN_TEST(test_actual_on_the_wire);
     RUN_TEST(test_there_and_back);
     RUN_TEST(test_volts);
+    RUN_TEST(test_feedforward_and_inputs);
     RUN_TEST(test_lengths);
     RUN_TEST(test_other_identifiers);
     return UNITY_END();
