@@ -47,8 +47,8 @@ struct feedforward_offset feedforward_offset(const struct config *config, uint8_
     const int64_t change_q40_mm = clamp(second_q40_mm, CHANGE_MAX_Q40_MM);
     const struct feedforward_offset offset = {
         .velocity_counts_s = velocity_offset(config, axis, way_q40_mm),
-        .torque_permille = torque_offset(&config->axis[axis], period_bits(config), way_q40_mm,
-                                         change_q40_mm),
+        .torque_permille =
+            torque_offset(&config->axis[axis], period_bits(config), way_q40_mm, change_q40_mm),
     };
     return offset;
 }

@@ -78,7 +78,7 @@ static void test_every_period(void)
 {
     for (uint32_t period_ms = 1; period_ms <= 8u; period_ms *= 2u) {
         config.period_us = 1000u * period_ms;
-        const int64_t way = Q40 / 20 * (int64_t)period_ms; /* 50 mm/s */
+        const int64_t way = Q40 / 20 * (int64_t)period_ms;                   /* 50 mm/s */
         const int64_t change = Q40 / 500 * (int64_t)(period_ms * period_ms); /* 2 m/s^2 */
         const struct feedforward_offset result = feedforward_offset(&config, 0, way, change);
         TEST_ASSERT_INT32_WITHIN(1, 50000000, result.velocity_counts_s);
@@ -100,8 +100,7 @@ static void test_extremes_saturate(void)
     config.axis[0].velocity_permille = 2000;
     config.axis[0].torque_per_velocity_q16 = INT32_MAX;
     config.axis[0].torque_per_acceleration_q16 = INT32_MAX;
-    struct feedforward_offset result =
-        feedforward_offset(&config, 0, INT64_MAX / 2, INT64_MAX / 2);
+    struct feedforward_offset result = feedforward_offset(&config, 0, INT64_MAX / 2, INT64_MAX / 2);
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, result.velocity_counts_s);
     TEST_ASSERT_EQUAL_INT16(INT16_MAX, result.torque_permille);
     result = feedforward_offset(&config, 0, INT64_MIN / 2, INT64_MIN / 2);
