@@ -14,41 +14,29 @@ from pathlib import Path
 
 import pytest
 
-from hodograph.bus.address import parse_address
+from bench import BUS, EXAMPLES, MakeAlpha, MakeBench
 from hodograph.bus.controller import BOOT, READY, RUNNING, Controller, connect
-from hodograph.bus.processes import Rig
 from hodograph.chain import load_chain
 from hodograph.cli.main import main
-from hodograph.config import load_machine
 from hodograph.errors import BusError, RefusedError
 
 pytestmark = pytest.mark.bus
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 ALPHA = EXAMPLES / "alpha.toml"
-BUS = parse_address("socketcan:vcan0")
 LIMIT_S = 120.0
 Start = Callable[[], subprocess.Popen[str]]
 
 
 @pytest.fixture
-def controller() -> Iterator[Controller]:
+def controller(make_bench: MakeBench) -> Controller:
     """A configured controller with its drives, off, at full pace."""
-    machine = load_machine(EXAMPLES / "machines" / "paper_alpha.toml")
-    with Rig(machine, BUS, "fast"), connect(BUS, 1, 1_000_000) as found:
-        found.require(20.0)
-        found.configure(machine, "fixed")
-        yield found
+    return make_bench("fast").controller
 
 
 @pytest.fixture
-def slow_file(tmp_path: Path) -> Path:
+def slow_file(alpha_at: MakeAlpha) -> Path:
     """The alpha at 2 mm/s: nearly a minute of motion, some seconds at full pace."""
-    text = ALPHA.read_text().replace("nominal_mm_s = 100", "nominal_mm_s = 2")
-    text = text.replace('"exponential"', '"quintic"')
-    file = tmp_path / "slow.toml"
-    file.write_text(text.replace("machines/", f"{EXAMPLES}/machines/"))
-    return file
+    return alpha_at(2)
 
 
 def until(controller: Controller, state: int, limit_s: float = LIMIT_S) -> None:
@@ -237,16 +225,13 @@ def test_rig_refuses_a_second_controller(
     assert controller.state() != BOOT
 
 
-def test_dead_drives_are_a_clear_error(slow_run: Start) -> None:
-    machine = load_machine(EXAMPLES / "machines" / "paper_alpha.toml")
-    with Rig(machine, BUS, "fast") as rig, connect(BUS, 1, 1_000_000) as controller:
-        controller.require(20.0)
-        drives = rig.process_ids[0]
-        child = slow_run()
-        until(controller, RUNNING)
-        os.kill(drives, signal.SIGKILL)
-        _, err = child.communicate(timeout=LIMIT_S)
-        assert child.returncode == 6, err
-        assert "is in fault" in err.splitlines()[-1]
-        with pytest.raises(BusError, match="hodograph-drive ended by itself"):
-            rig.check()
+def test_dead_drives_are_a_clear_error(make_bench: MakeBench, slow_run: Start) -> None:
+    bench = make_bench("fast")
+    child = slow_run()
+    until(bench.controller, RUNNING)
+    os.kill(bench.rig.process_ids[0], signal.SIGKILL)
+    _, err = child.communicate(timeout=LIMIT_S)
+    assert child.returncode == 6, err
+    assert "is in fault" in err.splitlines()[-1]
+    with pytest.raises(BusError, match="hodograph-drive ended by itself"):
+        bench.rig.check()

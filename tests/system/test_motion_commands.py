@@ -6,43 +6,27 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from hodograph.bus.address import parse_address
-from hodograph.bus.controller import HELD, READY, RUNNING, Controller, connect
-from hodograph.bus.processes import Rig
+from bench import MakeAlpha, MakeBench
+from hodograph.bus.controller import HELD, READY, RUNNING, Controller
 from hodograph.cli.main import main
-from hodograph.config import load_machine
 
 pytestmark = pytest.mark.bus
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-BUS = parse_address("socketcan:vcan0")
-
 
 @pytest.fixture
-def controller() -> Iterator[Controller]:
+def controller(make_bench: MakeBench) -> Controller:
     """A configured controller with its drives, off, in real time."""
-    machine = load_machine(EXAMPLES / "machines" / "paper_alpha.toml")
-    with Rig(machine, BUS, "real-time"), connect(BUS, 1, 1_000_000) as found:
-        found.require(20.0)
-        found.configure(machine, "fixed")
-        yield found
+    return make_bench("real-time").controller
 
 
 @pytest.fixture
-def slow(tmp_path: Path) -> str:
+def slow(alpha_at: MakeAlpha) -> str:
     """The alpha at 10 mm/s: about 10 s."""
-    text = (EXAMPLES / "alpha.toml").read_text().replace("nominal_mm_s = 100", "nominal_mm_s = 10")
-    file = tmp_path / "slow.toml"
-    file.write_text(
-        text.replace('"exponential"', '"quintic"').replace("machines/", f"{EXAMPLES}/machines/")
-    )
-    return str(file)
+    return str(alpha_at(10))
 
 
 def status(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""A simulated machine on the bus, and where things are; fixtures that make one are in conftest.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from hodograph.bus.address import parse_address
+from hodograph.bus.controller import Controller
+from hodograph.bus.processes import Rig
+from hodograph.config import Machine
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+PAPER_ALPHA = EXAMPLES / "machines" / "paper_alpha.toml"
+BUS = parse_address("socketcan:vcan0")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A simulated machine on vcan0 and its controller: configured, drives off."""
+
+    machine: Machine
+    rig: Rig
+    controller: Controller
+
+
+MakeBench = Callable[..., Bench]
+MakeAlpha = Callable[[float], Path]

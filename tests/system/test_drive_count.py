@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""Machines of one, three and six drives: the plane moves as with two, the others hold, one drive takes no program."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench import EXAMPLES, MakeBench
+from hodograph.bus.controller import OFF, READY
+from hodograph.bus.objects import ACTUAL, TARGET
+from hodograph.cli.main import main
+
+pytestmark = pytest.mark.bus
+
+ALPHA = str(EXAMPLES / "alpha.toml")
+
+
+def machine_of(folder: Path, drives: int, period_us: int) -> Path:
+    """The machine of the alpha with so many drives; the first two are the paper's, the others like its x."""
+    text = (EXAMPLES / "machines" / "paper_alpha.toml").read_text()
+    text = text.replace("../drives", f"{EXAMPLES}/drives")
+    text = text.replace("period_us = 1000", f"period_us = {period_us}")
+    head, *axes = text.split("[[axis]]")
+    axes += [
+        f'\nname = "a{i}"\nnode = {i + 1}\ntravel_mm = [0, 9]\ndrive = "{EXAMPLES}/drives/alpha_x.toml"\n'
+        for i in range(3, drives + 1)
+    ]
+    file = folder / f"machine_{drives}.toml"
+    file.write_text("[[axis]]".join([head, *axes[:drives]]))
+    return file
+
+
+def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
+    capsys.readouterr()
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    return json.loads(out)
+
+
+@pytest.mark.parametrize(("drives", "period_us"), [(3, 1000), (6, 2000)])
+def test_the_plane_moves_as_with_two_drives(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, drives: int, period_us: int
+) -> None:
+    two = machine_of(tmp_path, 2, period_us)
+    many = machine_of(tmp_path, drives, period_us)
+    simulated = result(capsys, "simulate", ALPHA, "--machine", str(two), "--json")
+    report = ("--report", str(tmp_path / "report")) if drives == 6 else ()
+    recorded = result(
+        capsys, "run", ALPHA, "--machine", str(many), "--json", "--pace", "fast", *report
+    )
+    assert {key: recorded[key] for key in simulated} == simulated
+    load = recorded["bus_load"]
+    assert load["model_least_percent"] <= load["measured_percent"] <= load["model_worst_percent"]
+    assert load["kinds"]["setpoints"]["frames"] == pytest.approx(
+        drives * load["kinds"]["SYNC"]["frames"], abs=drives
+    )
+
+
+@pytest.mark.parametrize(("drives", "period_us"), [(3, 1000), (6, 2000)])
+def test_further_axes_hold(
+    make_bench: MakeBench,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    drives: int,
+    period_us: int,
+) -> None:
+    file = machine_of(tmp_path, drives, period_us)
+    controller = make_bench("fast", file).controller
+    assert main(["goto", ALPHA, "--machine", str(file)]) == 0
+    held = [controller.read(TARGET, axis) for axis in range(3, drives + 1)]
+    assert main(["start", "--follow"]) == 0
+    assert [controller.read(TARGET, axis) for axis in range(3, drives + 1)] == held
+    assert [controller.read(ACTUAL, axis) for axis in range(3, drives + 1)] == held
+    status = result(capsys, "status", "--json")
+    assert [axis["node"] for axis in status["axes"]] == list(range(2, 2 + drives))
+    assert {axis["state"] for axis in status["axes"]} == {"operation enabled"}
+
+
+def test_one_drive_takes_no_program(
+    make_bench: MakeBench, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = machine_of(tmp_path, 1, 1000)
+    controller = make_bench("fast", file).controller
+    image = tmp_path / "alpha.hdgp"
+    assert main(["compile", ALPHA, "-o", str(image)]) == 0
+    for command in ("compile", "upload", "run", "goto", "simulate"):
+        for program in (ALPHA, str(image)) if command == "upload" else (ALPHA,):
+            capsys.readouterr()
+            assert main([command, program, "--machine", str(file)]) == 2
+            assert (
+                "has one axis (x), a path needs two: add a second [[axis]]"
+                in capsys.readouterr().err
+            )
+    controller.enable()
+    assert controller.state() == READY
+    assert main(["start"]) == 5  # no program
+    assert len(result(capsys, "status", "--json")["axes"]) == 1
+    assert main(["stop", "--off"]) == 0
+    assert controller.state() == OFF
