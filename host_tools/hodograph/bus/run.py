@@ -23,6 +23,7 @@ from .decode import Ticks, decode_ticks
 from .goto import goto
 from .processes import Rig
 from .recorder import Recorder
+from .setpoint_check import require_no_jump, step_limits
 from .signals import unbroken
 
 REACHED_AFTER = 2
@@ -110,8 +111,8 @@ def run_program(
 ) -> BusRun:
     """Runs a program image from wherever the axes stand, and analyses the recording.
 
-    Raises RefusedError, BusError, and RunError when the recording is incomplete or its setpoints are not those that
-    the same kernel gives here.
+    Raises RefusedError, BusError, and RunError when the recording is incomplete, a setpoint jumps, or the setpoints are
+    not those that the same kernel gives here.
     """
     controller = at.controller
     program = NativeProgram(image)
@@ -134,6 +135,7 @@ def run_program(
             "(larger receive buffer)"
         )
     frames = recorder.frames()
+    require_no_jump(frames, machine.nodes, step_limits(machine, setpoints))
     ticks = decode_ticks(frames, machine.nodes)
     motion = _motion(image, program, ticks, setpoints, machine, kernel)
     return BusRun(

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""No setpoint jumps: every step that a recording holds is one that the controller's limits allow.
+
+Checked is what a drive acts on: a target that follows another one, both sent with controlword bits 0 to 3 set, to a
+drive that has said it is in Operation enabled. (Before that, targets follow the axis; while homing, which controlword
+bit 4 shows, drives ignore them.) With T the period, d = r_k - r_(k-1) the step of the plane's axes in counts:
+
+speed         |d| <= v T. A chord is never longer than its arc, so only rounding is added: half a count a
+              coordinate at either end, at most sqrt(2) counts, and as much for the kernel's own error.
+acceleration  | |d_k| - |d_(k-1)| | <= a T^2: the second difference of arc length is a mean of F'' over two
+              periods, and F'' is within the limit. Rounding counts twice. A chord is shorter than its arc by
+              s theta^2 / 24 (theta: the turn of the path within the step), so where the path turns, that much
+              is added for both; theta counts up to half a radian, so that a step aside is not excused by its own turn.
+turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greatest normal acceleration n is known.
+
+Where SYNCs passed without a setpoint a step is spread over them. Axes beyond the plane hold their position: they are
+checked for speed and acceleration one by one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RunError
+from .decode import RPDO1, SYNC_ID, TPDO1
+from .recorder import Frames
+
+if TYPE_CHECKING:
+    from ..config import Machine
+
+_PLANE = 2
+_ROUNDING_COUNTS = 2 * math.sqrt(2.0)
+_ENABLED, _HOMING = 0x0F, 0x10
+_STATE_MASK, _OPERATION_ENABLED = 0x6F, 0x27
+_LARGEST_TURN = 0.5
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """In counts per period and per period squared; infinite where there is no limit."""
+
+    speed: float
+    acceleration: float
+    normal: float = math.inf
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A step that breaks a limit: at which SYNC of the recording, of which axes (from 1), by which rule."""
+
+    sync: int
+    axes: tuple[int, ...]
+    rule: str
+    found_counts: float
+    allowed_counts: float
+
+    def __str__(self) -> str:
+        names = " and ".join(str(axis) for axis in self.axes)
+        return (
+            f"setpoint jump at SYNC {self.sync} of the recording, axis {names}: {self.rule} "
+            f"{self.found_counts:.1f} counts, allowed {self.allowed_counts:.1f}"
+        )
+
+
+def step_limits(machine: Machine, setpoints: NDArray[np.int32] | None = None) -> StepLimits:
+    """The controller's limits; with a program's nominal setpoints also its normal acceleration at 100 % feed."""
+    period_s, counts_per_mm = machine.period_us * 1e-6, machine.counts_per_mm
+    speed = machine.feed_mm_s * period_s * counts_per_mm
+    acceleration = machine.acceleration_mm_s2 * period_s**2 * counts_per_mm
+    normal = math.inf
+    if setpoints is not None:
+        second = np.diff(setpoints.astype(np.float64), n=2, axis=0)
+        normal = float(np.hypot(*second.T).max(initial=0.0))
+    return StepLimits(speed or math.inf, acceleration or math.inf, normal)
+
+
+def require_no_jump(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> None:
+    """Raises RunError with the first step that breaks a limit."""
+    jumps = find_jumps(frames, nodes, limits)
+    if jumps:
+        more = f" ({len(jumps) - 1} more)" if len(jumps) > 1 else ""
+        raise RunError(f"{jumps[0]}{more}")
+
+
+def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list[Jump]:
+    """All steps that break a limit, in the order of the recording."""
+    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+    if sync_at.size < 2:
+        return []
+    steps, followed = _steps(frames, sync_at, nodes)
+    groups = [tuple(range(min(_PLANE, len(nodes))))]
+    groups += [(axis,) for axis in range(_PLANE, len(nodes))]
+    jumps = [
+        jump
+        for group in groups
+        for jump in _check(steps[:, group], followed[:, group], group, limits)
+    ]
+    return sorted(jumps, key=lambda jump: jump.sync)
+
+
+def _steps(
+    frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]
+) -> tuple[Float, NDArray[np.bool_]]:
+    """Rows by SYNC, columns by axis: the step in counts per period, and whether the drive followed it."""
+    steps = np.zeros((sync_at.size, len(nodes)))
+    followed = np.zeros((sync_at.size, len(nodes)), dtype=np.bool_)
+    for axis, node in enumerate(nodes):
+        at = np.flatnonzero((frames["id"] == RPDO1 + node) & (frames["length"] >= 6))
+        sync = np.searchsorted(sync_at, at) - 1
+        at, sync = at[sync >= 0], sync[sync >= 0]
+        if at.size < 2:
+            continue
+        data = frames["data"][at]
+        control = np.ascontiguousarray(data[:, 0:2]).view("<u2")[:, 0]
+        target = np.ascontiguousarray(data[:, 2:6]).view("<i4")[:, 0].astype(np.float64)
+        commanded = _commanded(control)
+        follows = commanded & _enabled(frames, node, at)
+        periods = np.maximum(np.diff(sync), 1)
+        valid = follows[1:] & commanded[:-1]
+        # Two setpoints for one SYNC: the larger step counts.
+        followed[sync[1:][valid], axis] = True
+        step = np.where(valid, np.diff(target) / periods, 0.0)
+        larger = np.argsort(np.abs(step), kind="stable")
+        steps[sync[1:][larger], axis] = step[larger]
+        if valid[0] and follows[0]:  # begun in motion, perhaps: as fast as it goes on
+            followed[sync[0], axis], steps[sync[0], axis] = True, step[0]
+    return steps, followed
+
+
+def _commanded(control: NDArray[np.uint16]) -> Bool:
+    """Told to follow, in no stretch of enabled setpoints that homes."""
+    enabled = (control & _ENABLED) == _ENABLED
+    stretch = np.cumsum(~enabled)
+    homing = np.unique(stretch[enabled & ((control & _HOMING) != 0)])
+    return np.asarray(enabled & ~np.isin(stretch, homing))
+
+
+def _enabled(frames: Frames, node: int, at: NDArray[np.intp]) -> Bool:
+    """Whether the drive's last word before each of these frames was Operation enabled."""
+    said = np.flatnonzero((frames["id"] == TPDO1 + node) & (frames["length"] >= 2))
+    if not said.size:
+        return np.zeros(at.size, dtype=np.bool_)
+    words = np.ascontiguousarray(frames["data"][said, 0:2]).view("<u2")[:, 0]
+    last = np.searchsorted(said, at) - 1
+    return np.asarray((last >= 0) & ((words[last] & _STATE_MASK) == _OPERATION_ENABLED))
+
+
+def _check(steps: Float, followed: Bool, axes: tuple[int, ...], limits: StepLimits) -> list[Jump]:
+    # The step before the first followed one is no step: the axis stood.
+    now, before = steps[1:], np.where(followed[1:] & followed[:-1], steps[:-1], 0.0)
+    length, length_before = np.linalg.norm(now, axis=1), np.linalg.norm(before, axis=1)
+    whole = np.all(followed[1:], axis=1)
+    turned = np.minimum(_turn(now, before, length, length_before), _LARGEST_TURN)
+    bow = (length + length_before) * turned**2 / 24
+    change = np.linalg.norm(now - before, axis=1)
+    rules = (
+        (
+            "speed",
+            length,
+            np.full(length.size, limits.speed + _ROUNDING_COUNTS),
+            np.ones_like(whole),
+        ),
+        (
+            "acceleration",
+            np.abs(length - length_before),
+            limits.acceleration + 2 * _ROUNDING_COUNTS + bow,
+            whole,
+        ),
+        (
+            "turn",
+            change,
+            np.full(length.size, math.hypot(limits.acceleration, limits.normal))
+            + 2 * _ROUNDING_COUNTS,
+            whole,
+        ),
+    )
+    found = []
+    for name, value, allowed, checked in rules:
+        for row in np.flatnonzero(checked & (value > allowed)):
+            names = tuple(axis + 1 for axis, f in zip(axes, followed[row + 1], strict=True) if f)
+            found.append(Jump(int(row) + 1, names, name, float(value[row]), float(allowed[row])))
+    return found
+
+
+def _turn(now: Float, before: Float, length: Float, length_before: Float) -> Float:
+    """Angle between a step and the one before; 0 where one of them is too short to have a direction."""
+    product = length * length_before
+    cosine = np.sum(now * before, axis=1) / np.where(product > 0, product, 1.0)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return np.where(product > 0, angle, 0.0)

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""Setpoint jumps are found, and motion within the limits is not taken for one."""
+
+from __future__ import annotations
+
+import math
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hodograph.bus.recorder import FRAME_DTYPE, Frames
+from hodograph.bus.setpoint_check import StepLimits, find_jumps, require_no_jump, step_limits
+from hodograph.chain import load_chain
+from hodograph.errors import RunError
+from hodograph.native import NativeProgram
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+NODES = (2, 3)
+LIMITS = StepLimits(speed=1000.0, acceleration=100.0)
+ENABLED, SWITCHED_ON, OFF = 0x0F, 0x07, 0x06
+OE, STANDBY = 0x1237, 0x1231
+
+
+class Stream:
+    """A recording in the making."""
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[int, bytes]] = []
+        self.syncs = 0
+
+    def tick(self, *targets: float, control: int = ENABLED, status: int = OE) -> Stream:
+        self.frames.append((0x80, bytes([self.syncs % 240 + 1])))
+        self.syncs += 1
+        for node, target in enumerate(targets, start=2):
+            self.frames.append((0x180 + node, struct.pack("<Hi", status, 0)))
+            self.frames.append((0x200 + node, struct.pack("<Hi", control, round(target))))
+        return self
+
+    def packed(self) -> Frames:
+        array = np.zeros(len(self.frames), dtype=FRAME_DTYPE)
+        for i, (identifier, data) in enumerate(self.frames):
+            array[i]["id"], array[i]["length"] = identifier, len(data)
+            array[i]["data"][: len(data)] = list(data)
+        return array
+
+
+def jumps(stream: Stream, limits: StepLimits = LIMITS, nodes: tuple[int, ...] = NODES) -> list[str]:
+    return [f"{jump.rule}@{jump.sync}" for jump in find_jumps(stream.packed(), nodes, limits)]
+
+
+def standing() -> Stream:
+    return Stream().tick(0, 0).tick(0, 0)
+
+
+def test_acceleration_within_the_limit() -> None:
+    stream = standing()
+    x = 0.0
+    for k in range(1, 11):
+        x += 100 * k
+        stream.tick(x, 0)
+    for _ in range(5):
+        x += 1000
+        stream.tick(x, 0)
+    assert jumps(stream) == []
+
+
+def test_a_step_from_rest_is_named_with_its_place() -> None:
+    stream = standing().tick(0, 200).tick(0, 400)
+    with pytest.raises(
+        RunError, match=r"SYNC 2 of the recording, axis 1 and 2: acceleration 200\.0"
+    ):
+        require_no_jump(stream.packed(), NODES, LIMITS)
+
+
+def test_too_fast_and_gone_back() -> None:
+    stream = standing().tick(5000, 0).tick(0, 0)
+    assert jumps(stream)[:2] == ["speed@2", "acceleration@2"]
+    assert "speed@3" in jumps(stream)
+
+
+def test_rounding_is_no_jump_but_more_is() -> None:
+    limit = StepLimits(speed=1000.0, acceleration=0.0)
+    assert jumps(standing().tick(4, 4), limit) == []
+    assert jumps(standing().tick(5, 5), limit) == ["acceleration@2"]
+
+
+def test_a_recording_that_begins_in_motion() -> None:
+    stream = Stream()
+    for k in range(5):
+        stream.tick(900 * k, 0)
+    assert jumps(stream) == []
+
+
+def test_before_the_drive_follows_targets_are_free() -> None:
+    stream = Stream().tick(0, 0, control=OFF, status=STANDBY)
+    stream.tick(9000, 0, control=SWITCHED_ON, status=STANDBY)
+    stream.tick(12000, 0, control=ENABLED, status=STANDBY)
+    stream.tick(12000, 0)
+    assert jumps(stream) == []
+
+
+def test_a_step_as_soon_as_the_drive_follows() -> None:
+    stream = Stream().tick(0, 0, control=ENABLED, status=STANDBY).tick(300, 0)
+    assert jumps(stream) == ["acceleration@1"]
+
+
+def test_homing_is_left_out_and_what_comes_after_is_not() -> None:
+    stream = standing().tick(0, 0, control=0x1F).tick(40000, 0, control=0x1F).tick(50000, 0)
+    stream.tick(50000, 0, control=SWITCHED_ON).tick(50000, 0)
+    assert jumps(stream) == []
+    assert jumps(stream.tick(60000, 0).tick(60000, 0))[0] == "speed@7"
+
+
+def test_a_quick_stop_lets_go_of_the_targets() -> None:
+    stream = standing().tick(0, 0, control=0x02).tick(70000, 0, control=0x02)
+    assert jumps(stream) == []
+
+
+def test_ticks_without_a_setpoint_spread_the_step() -> None:
+    stream = standing().tick(100, 0).tick().tick(300, 0).tick(400, 0)
+    assert jumps(stream) == []
+
+
+def test_two_setpoints_for_one_sync_are_two_steps() -> None:
+    stream = standing().tick(0, 0)
+    stream.frames.append((0x202, struct.pack("<Hi", ENABLED, 900)))
+    stream.frames.append((0x202, struct.pack("<Hi", ENABLED, 0)))
+    assert jumps(stream)[0] == "acceleration@2"
+
+
+def test_a_sharp_turn_shows_where_the_program_is_known() -> None:
+    stream = standing()
+    x = 0.0
+    for k in range(1, 11):
+        x += 100 * k
+        stream.tick(x, 0)
+    stream.tick(x, 1000).tick(x, 2000)
+    assert "turn@12" in jumps(stream, StepLimits(1000.0, 100.0, normal=200.0))
+
+
+def test_third_axis_by_itself() -> None:
+    stream = Stream().tick(0, 0, 7).tick(0, 0, 7).tick(0, 0, 7).tick(0, 0, 500)
+    found = find_jumps(stream.packed(), (2, 3, 4), LIMITS)
+    assert [(jump.sync, jump.axes) for jump in found] == [(3, (3,))]
+
+
+def test_six_byte_and_eight_byte_setpoints_and_an_empty_recording() -> None:
+    assert find_jumps(np.zeros(0, dtype=FRAME_DTYPE), NODES, LIMITS) == []
+    stream = standing()
+    for k in range(3):
+        stream.frames.append((0x80, bytes([k + 3])))
+        stream.frames.append((0x202, struct.pack("<Hih", ENABLED, 5000 * k, 77)))
+    assert "speed@3" in jumps(stream)
+
+
+def streamed(setpoints: NDArray[np.int32]) -> Stream:
+    stream = Stream().tick(*map(int, setpoints[0])).tick(*map(int, setpoints[0]))
+    for row in setpoints:
+        stream.tick(*map(int, row))
+    return stream
+
+
+@pytest.mark.parametrize("name", ["alpha", "heart", "star"])
+def test_whole_programs_pass_and_each_jump_in_them_is_found(name: str) -> None:
+    chain = load_chain(EXAMPLES / f"{name}.toml")
+    machine = chain.machine
+    _, setpoints = NativeProgram(chain.image).setpoints("fixed", machine.counts_per_mm)
+    limits = step_limits(machine, setpoints)
+    assert find_jumps(streamed(setpoints).packed(), NODES, limits) == []
+    least = math.ceil(2 * math.hypot(limits.acceleration, limits.normal)) + 20
+    for at in range(50, len(setpoints) - 50, 97):
+        moved = setpoints.copy()
+        moved[at:, at % 2] += least
+        assert find_jumps(streamed(moved).packed(), NODES, limits), f"at {at}"
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 1000), st.floats(20.0, 400.0), st.floats(0.0, 6.28))
+def test_circles_at_any_speed_are_no_jump(steps: int, radius: float, phase: float) -> None:
+    """A path that turns a lot within a tick: chords differ from arcs."""
+    speed, place, stream = 0.0, 0.0, Stream()
+    for k in range(120):
+        speed = min(speed + 0.9 * 100, 200.0) if k < steps % 100 else max(speed - 90.0, 0.0)
+        place += speed
+        angle = phase + place / (10 * radius)
+        stream.tick(10 * radius * math.cos(angle), 10 * radius * math.sin(angle))
+    assert jumps(stream, StepLimits(200.0, 100.0)) == []
