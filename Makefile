@@ -86,7 +86,7 @@ VARIANTS := host asan clang
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c test unit pytest run lint format bench clean distclean help lock packages venv FORCE
+.PHONY: build c test unit pytest run lint format soak bench clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -117,6 +117,11 @@ OUT ?= out
 RUN ?=
 run: build ## run the alpha and the heart on a CAN bus, write a report to out/, print a summary
 	@tools/with-vcan $(VENV)/bin/hodograph run examples/alpha.toml examples/heart.toml --report $(OUT) $(RUN)
+
+# SOAK_S: bus time in seconds
+SOAK_S ?= 3600
+soak: build ## programs over and over for SOAK_S seconds of bus time (an hour), every frame looked at
+	@tools/with-vcan $(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
 
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/bench.py --build $(BUILD)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+"""A minute of bus time with programs: nothing on the bus that should not be there (`make soak`: an hour)."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SECONDS = 60
+
+
+@pytest.mark.bus
+def test_a_minute_of_bus_time(root: Path, tmp_path: Path) -> None:
+    figures = tmp_path / "soak.json"
+    command = [sys.executable, str(root / "tools/soak.py")]
+    done = subprocess.run(
+        [*command, "--seconds", str(SECONDS), "--json", str(figures)],
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads(figures.read_text())
+    assert found["unexpected"] == 0
+    assert found["bus_s"] >= SECONDS
+    assert found["programs"] >= 3
+    assert found["frames"] > 6 * found["syncs"]

@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Runs programs over and over on a virtual bus and looks at every frame.
+
+    tools/with-vcan .venv/bin/python tools/soak.py [--seconds 3600] [--json FILE] [--bus vcan0]
+
+`--seconds` is bus time: SYNCs times period. Setpoints and encoders of each repetition must have the hashes that
+`hodograph simulate` gives for the program. Prints a summary; exit status 1 when anything unexpected was on the bus, 4
+when the machine failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from bus_checker import BusChecker
+from bus_tap import Tap
+from hodograph.bus.address import BusAddress
+from hodograph.bus.run import run_program, station
+from hodograph.chain import Chain, load_chain
+from hodograph.errors import HodographError
+from hodograph.simulate import simulate
+
+ROOT = Path(__file__).resolve().parents[1]
+MACHINE = ROOT / "examples" / "machines" / "paper_alpha.toml"
+PROGRAMS = tuple(ROOT / "examples" / name for name in ("alpha.toml", "heart.toml", "star.toml"))
+KERNEL = "fixed"
+_REPORT_S = 60.0
+
+
+class Soak:
+    """One soak: its programs, their hashes, what was seen."""
+
+    def __init__(self, address: BusAddress, note: Callable[[str], None]) -> None:
+        """Plans and simulates the programs. Raises HodographError."""
+        self.address = address
+        self.note = note
+        self.chains = [load_chain(file, MACHINE) for file in PROGRAMS]
+        self.machine = self.chains[0].machine
+        self.expected = [self._simulated(chain) for chain in self.chains]
+        self.checker = BusChecker(self.machine)
+        self.repetitions = 0
+        self.program_ticks = 0
+        self.deadline_misses = 0
+        self.wall_s = 0.0
+        self.dropped = 0
+
+    def _simulated(self, chain: Chain) -> tuple[str, str]:
+        drives = [axis.drive for axis in self.machine.plane if axis.drive is not None]
+        counts = self.machine.counts_per_mm
+        motion = simulate(chain.image, drives, kernel=KERNEL, counts_per_mm=counts)
+        return motion.setpoints_sha256, motion.encoders_sha256
+
+    @property
+    def bus_s(self) -> float:
+        """Bus time so far."""
+        return self.checker.syncs * self.machine.period_us / 1e6
+
+    def run(self, seconds: float) -> None:
+        """Runs until so much bus time has passed, the last program to its end. Raises HodographError."""
+        begun = told = time.monotonic()
+        with (
+            Tap(self.address) as tap,
+            station(self.machine, self.address, "fast", 10.0, self.note) as at,
+        ):
+            while self.bus_s < seconds:
+                which = self.repetitions % len(self.chains)
+                run = run_program(at, self.machine, self.chains[which].image, KERNEL)
+                found = (run.motion.setpoints_sha256, run.motion.encoders_sha256)
+                if found != self.expected[which]:
+                    self.checker.found(f"{PROGRAMS[which].name}: hashes {found}")
+                self.repetitions += 1
+                self.program_ticks += run.motion.ticks
+                self.deadline_misses += run.deadline_misses
+                self.checker.take(tap.take())
+                self.wall_s = time.monotonic() - begun
+                if time.monotonic() - told > _REPORT_S:
+                    told = time.monotonic()
+                    self.note(self.line())
+            self.dropped = tap.dropped
+        if self.dropped:
+            self.checker.found(
+                f"{self.dropped} frames dropped by the kernel: not all were looked at"
+            )
+
+    def line(self) -> str:
+        """Where it stands, in a line."""
+        return (
+            f"{self.bus_s:.0f} s of bus time in {self.wall_s:.0f} s, {self.checker.frames} frames, "
+            f"{self.repetitions} programs, {self.checker.finding_count} unexpected"
+        )
+
+    def summary(self) -> dict[str, object]:
+        """Figures for --json."""
+        return {
+            "bus_s": self.bus_s,
+            "wall_s": self.wall_s,
+            "frames": self.checker.frames,
+            "syncs": self.checker.syncs,
+            "programs": self.repetitions,
+            "program_ticks": self.program_ticks,
+            "deadline_misses": self.deadline_misses,
+            "late_frames": self.checker.late,
+            "worst_heartbeat_ms": round(self.checker.worst_heartbeat_s * 1000, 1),
+            "kinds": dict(sorted(self.checker.kinds.items())),
+            "unexpected": self.checker.finding_count,
+            "findings": self.checker.findings,
+        }
+
+
+def main(arguments: list[str]) -> int:
+    """Command line; returns the exit status."""
+    parser = argparse.ArgumentParser(description="programs over and over, every frame looked at")
+    parser.add_argument("--seconds", type=float, default=3600.0, help="bus time (%(default)g)")
+    parser.add_argument("--bus", default="vcan0")
+    parser.add_argument("--json", type=Path, help="write the figures there")
+    options = parser.parse_args(arguments)
+    try:
+        soak = Soak(
+            BusAddress("socketcan", options.bus),
+            lambda text: print(text, file=sys.stderr, flush=True),
+        )
+        soak.run(options.seconds)
+    except HodographError as error:
+        print(f"soak: {error}", file=sys.stderr)
+        return 4
+    if options.json is not None:
+        options.json.write_text(json.dumps(soak.summary(), indent=2) + "\n", encoding="utf-8")
+    for finding in soak.checker.findings:
+        print(finding)
+    print(soak.line())
+    return 1 if soak.checker.finding_count else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
