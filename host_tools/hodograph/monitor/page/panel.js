@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// Words and buttons: the controller's state, faults with remedy, drives, program, messages.
+
+import { text } from "./scale.js";
+
+const $ = (id) => document.getElementById(id);
+const MOST_EVENTS = 60;
+
+/** Commands that make sense in a state; quick stop always does. */
+const POSSIBLE = {
+  off: ["enable"], enabling: ["stop", "disable"], ready: ["start", "disable"], running: ["hold", "stop"],
+  holding: ["resume", "stop"], held: ["resume", "stop"], fault: ["reset"], stopping: [], boot: [], homing: ["stop"],
+};
+const LOOKS = { running: "good", ready: "good", fault: "bad", holding: "warn", held: "warn", stopping: "warn", homing: "warn", "quick stop": "bad" };
+
+export class Panel {
+  constructor() {
+    this.mayCommand = false;
+    this.connected = false;
+    this.reasons = new Map(); // why something is not as it should be; the first one is shown
+    this.following = [];
+  }
+
+  hello(message) {
+    this.mayCommand = message.may_command;
+    this.replay = message.mode === "replay";
+    $("controls").hidden = this.replay;
+    $("replay").hidden = !this.replay;
+    $("program").hidden = false;
+    $("what").textContent = `${this.replay ? "recording" : "bus"} ${message.what}`;
+    $("unlock").hidden = this.mayCommand || this.replay;
+    this.reason("look on", this.mayCommand || this.replay ? "" : "Opened without the token: this page may look on, not command.");
+    if (this.replay) this.state("replay", "");
+    this.buttons(null);
+  }
+
+  reason(key, words, bad = false) {
+    if (words) this.reasons.set(key, { words, bad });
+    else this.reasons.delete(key);
+    const all = [...this.reasons.values()].sort((a, b) => b.bad - a.bad);
+    $("banner").hidden = all.length === 0;
+    const shown = all.map((reason) => reason.words).join("  ·  ");
+    if ($("banner").textContent !== shown) $("banner").textContent = shown;
+    $("banner").classList.toggle("bad", Boolean(all[0]?.bad));
+  }
+
+  state(name, look) {
+    if ($("state").textContent !== name) $("state").textContent = name;
+    $("state").className = `pill ${look}`;
+    document.title = `${name} – Hodograph`;
+  }
+
+  status({ connected, note, status }) {
+    this.connected = connected;
+    this.reason("controller", connected ? "" : note, true);
+    this.state(connected ? status.state : "no controller", connected ? (LOOKS[status.state] ?? "") : "bad");
+    this.buttons(connected ? status.state : null);
+    if (!connected) return;
+    this.reason("fault", status.fault ? faultWords(status.fault) : "", true);
+    this.program(status);
+    this.override(status.override);
+  }
+
+  buttons(state) {
+    const possible = POSSIBLE[state] ?? [];
+    for (const button of document.querySelectorAll("[data-command]")) {
+      const name = button.dataset.command;
+      const makesSense = name === "quick-stop" ? state !== null : possible.includes(name);
+      button.disabled = !this.mayCommand || !makesSense;
+    }
+    $("override").disabled = $("override-100").disabled = !this.mayCommand || state === null;
+  }
+
+  override({ wanted_percent: wanted, actual_percent: actual, saturated }) {
+    if (!this.sliding) {
+      $("override").value = String(wanted);
+      $("override-value").textContent = `${wanted} %`;
+    }
+    const now = actual > 0 ? `now ${text(actual, 1)} %` : "";
+    $("override-now").textContent = saturated ? `${now}, all that is allowed here` : now;
+  }
+
+  program({ program, motion, statistics }) {
+    const rows = [["program", program.state]];
+    if (program.state === "ready") {
+      const length = program.length_mm;
+      $("way").value = length ? Math.min(1, motion.arc_length_mm / length) : 0;
+      rows[0] = ["program", `${this.name ? `${this.name}, ` : ""}${text(length, 2)} mm, ${text(program.duration_s, 2)} s`];
+      rows.push(["arc length", `${text(motion.arc_length_mm, 3)} mm`]);
+    }
+    rows.push(
+      ["feed", `${text(motion.feed_mm_s, 2)} mm/s`],
+      ["missed ticks", String(statistics.deadline_misses)],
+      ["worst tick", `${text(statistics.worst_tick_ns / 1000, 0)} µs`],
+      ["missed answers", String(statistics.missed_tpdos)],
+    );
+    if (this.load !== undefined) rows.push(["bus load", this.load === null ? "–" : `${text(this.load, 1)} %`]);
+    facts(rows);
+  }
+
+  drives(message) {
+    this.load = message.load_percent;
+    $("drive-rows").replaceChildren(...message.drives.map((drive, i) => {
+      const bad = /fault|silent|quick/.test(drive.state);
+      return row([drive.name, `axis${i % 3}`], [String(drive.node)], [drive.state, bad ? "bad-text" : ""],
+        [text(drive.actual_mm, 6), "number"], [text(this.following[i], 2), "number"]);
+    }));
+    if (this.replay) {
+      facts([
+        ["program", this.name || "–"], ["arc length", message.arc_length_mm === null ? "–" : `${text(message.arc_length_mm, 3)} mm`],
+        ["bus load", message.load_percent === null ? "–" : `${text(message.load_percent, 1)} %`],
+      ]);
+      $("way").value = this.lengthMm && message.arc_length_mm !== null ? message.arc_length_mm / this.lengthMm : 0;
+    }
+  }
+
+  event(words, bad) {
+    const item = document.createElement("li"), time = document.createElement("time");
+    time.textContent = new Date().toLocaleTimeString([], { hour12: false });
+    item.append(time, words);
+    item.classList.toggle("bad", Boolean(bad));
+    $("event-rows").prepend(item);
+    while ($("event-rows").childElementCount > MOST_EVENTS) $("event-rows").lastElementChild.remove();
+  }
+}
+
+function faultWords(fault) {
+  const remedy = fault.remedy ? ` ${fault.remedy}` : "";
+  return `Fault: ${fault.text} (0x${fault.code.toString(16).toUpperCase().padStart(4, "0")}, node ${fault.node}).${remedy}`;
+}
+
+function facts(rows) {
+  $("facts").replaceChildren(...rows.flatMap(([name, value]) => {
+    const term = document.createElement("dt"), data = document.createElement("dd");
+    term.textContent = name;
+    data.textContent = value;
+    return [term, data];
+  }));
+}
+
+function row(...cells) {
+  const line = document.createElement("tr");
+  line.append(...cells.map(([words, look]) => {
+    const cell = document.createElement("td");
+    cell.textContent = words;
+    if (look) cell.className = look;
+    return cell;
+  }));
+  return line;
+}

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: MIT
+// The path in the plane: the program's curve, where the setpoints went, where the axes went.
+
+import { digitsOf, prepare, roundUp } from "./scale.js";
+
+const MARGIN = 0.08;
+const KEYS = { "+": "in", "=": "in", "-": "out", 0: "fit", ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down" };
+
+export class Plane {
+  constructor(canvas, redraw) {
+    this.canvas = canvas;
+    this.redraw = redraw;
+    this.path = { x: [], y: [] };
+    this.magnify = 1;
+    this.follow = false;
+    this.view = null; // {x, y: middle in mm; scale: pixels a mm}; null: fitted
+    canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    canvas.addEventListener("pointerdown", (event) => this.drag(event));
+    canvas.addEventListener("dblclick", () => this.fit());
+    canvas.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  setPath(x, y) {
+    this.path = { x, y };
+    this.redraw();
+  }
+
+  fit() {
+    this.view = null;
+    this.redraw();
+  }
+
+  draw(points, colours) {
+    const { context, width, height } = prepare(this.canvas);
+    const view = this.look(points, width, height);
+    this.shown = view;
+    const px = (x) => width / 2 + (x - view.x) * view.scale;
+    const py = (y) => height / 2 - (y - view.y) * view.scale;
+    grid(context, view, width, height, px, py, colours);
+    context.lineJoin = context.lineCap = "round";
+    this.curve(context, px, py, colours);
+    this.trail(context, points, "cx", "cy", 1, px, py, colours.cmd, 1);
+    this.trail(context, points, "ax", "ay", this.magnify, px, py, colours.act, 1.8);
+    this.tool(context, points, px, py, colours);
+    this.canvas.dataset.points = String(points.end);
+  }
+
+  look(points, width, height) {
+    const view = this.view ?? this.whole(points, width, height);
+    if (!this.follow || points.end === 0) return view;
+    const [x, y] = at(points, "cx", "cy", points.end - 1);
+    return Number.isNaN(x + y) ? view : { ...view, x, y };
+  }
+
+  whole(points, width, height) {
+    const { x, y } = this.path;
+    const box = [Infinity, Infinity, -Infinity, -Infinity];
+    const take = (px, py) => {
+      if (Number.isNaN(px + py)) return;
+      box[0] = Math.min(box[0], px); box[1] = Math.min(box[1], py);
+      box[2] = Math.max(box[2], px); box[3] = Math.max(box[3], py);
+    };
+    x.forEach((value, i) => take(value, y[i]));
+    const step = Math.max(1, Math.floor((points.end - points.start) / 500));
+    for (let i = points.start; i < points.end; i += step) take(...at(points, "cx", "cy", i));
+    if (points.end) take(...at(points, "cx", "cy", points.end - 1));
+    if (box[0] === Infinity) return { x: 0, y: 0, scale: width / 100 };
+    const room = 1 - 2 * MARGIN;
+    const scale = Math.min((room * width) / Math.max(box[2] - box[0], 1), (room * height) / Math.max(box[3] - box[1], 1));
+    return { x: (box[0] + box[2]) / 2, y: (box[1] + box[3]) / 2, scale };
+  }
+
+  curve(context, px, py, colours) {
+    const { x, y } = this.path;
+    context.strokeStyle = colours.program;
+    context.lineWidth = 6;
+    context.beginPath();
+    x.forEach((value, i) => context.lineTo(px(value), py(y[i])));
+    context.stroke();
+  }
+
+  /** Positions, `magnify` times as far from the commanded ones as they are. */
+  trail(context, points, nameX, nameY, magnify, px, py, colour, lineWidth) {
+    context.strokeStyle = colour;
+    context.lineWidth = lineWidth;
+    context.beginPath();
+    let lastX = NaN, lastY = NaN;
+    for (let i = points.start; i < points.end; i += 1) {
+      const [cx, cy] = at(points, "cx", "cy", i);
+      const [ax, ay] = at(points, nameX, nameY, i);
+      const x = px(cx + magnify * (ax - cx)), y = py(cy + magnify * (ay - cy));
+      if (Number.isNaN(x + y)) { lastX = NaN; continue; }
+      if (Number.isNaN(lastX)) context.moveTo(x, y);
+      else if (Math.abs(x - lastX) + Math.abs(y - lastY) < 0.7) continue;
+      else context.lineTo(x, y);
+      lastX = x; lastY = y;
+    }
+    context.stroke();
+    context.lineWidth = 1;
+  }
+
+  tool(context, points, px, py, colours) {
+    if (points.end === 0) return;
+    const [x, y] = at(points, "ax", "ay", points.end - 1);
+    if (Number.isNaN(x + y)) return;
+    context.beginPath();
+    context.arc(px(x), py(y), 6, 0, 2 * Math.PI);
+    context.fillStyle = colours.act;
+    context.fill();
+    context.strokeStyle = colours.card;
+    context.lineWidth = 2;
+    context.stroke();
+    context.lineWidth = 1;
+  }
+
+  zoom(factor, x, y) {
+    const { clientWidth, clientHeight } = this.canvas;
+    const view = this.shown ?? { x: 0, y: 0, scale: 1 };
+    const scale = Math.min(1e6, Math.max(1e-2, view.scale * factor));
+    const change = 1 / view.scale - 1 / scale;
+    this.view = { x: view.x + (x - clientWidth / 2) * change, y: view.y - (y - clientHeight / 2) * change, scale };
+    this.redraw();
+  }
+
+  wheel(event) {
+    event.preventDefault();
+    this.zoom(Math.exp(-event.deltaY / 500), event.offsetX, event.offsetY);
+  }
+
+  drag(event) {
+    this.canvas.setPointerCapture(event.pointerId);
+    const move = (moved) => this.move(moved.movementX, moved.movementY);
+    this.canvas.addEventListener("pointermove", move);
+    this.canvas.addEventListener("pointerup", () => this.canvas.removeEventListener("pointermove", move), { once: true });
+  }
+
+  move(right, down) {
+    if (!this.shown) return;
+    const { x, y, scale } = this.shown;
+    this.view = { x: x - right / scale, y: y + down / scale, scale };
+    this.redraw();
+  }
+
+  key(event) {
+    const step = 40, { clientWidth, clientHeight } = this.canvas;
+    const actions = {
+      in: () => this.zoom(1.25, clientWidth / 2, clientHeight / 2),
+      out: () => this.zoom(0.8, clientWidth / 2, clientHeight / 2),
+      fit: () => this.fit(),
+      left: () => this.move(step, 0), right: () => this.move(-step, 0),
+      up: () => this.move(0, step), down: () => this.move(0, -step),
+    };
+    const action = actions[KEYS[event.key]];
+    if (!action || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    action();
+  }
+}
+
+function at(points, nameX, nameY, i) {
+  return [points.get(nameX, i), points.get(nameY, i)];
+}
+
+function grid(context, view, width, height, px, py, colours) {
+  const step = roundUp(70 / view.scale), digits = digitsOf(step);
+  context.font = "11px system-ui, sans-serif";
+  context.lineWidth = 1;
+  context.textAlign = "left";
+  context.textBaseline = "bottom";
+  const lines = (middle, half, draw) => {
+    for (let k = Math.ceil((middle - half) / step); k * step <= middle + half; k += 1) {
+      context.strokeStyle = k === 0 ? colours.line : colours.grid;
+      context.fillStyle = colours.soft;
+      context.beginPath();
+      draw(k * step, (k * step).toFixed(digits));
+      context.stroke();
+    }
+  };
+  lines(view.x, width / 2 / view.scale, (x, label) => {
+    const at = Math.round(px(x)) + 0.5;
+    context.moveTo(at, 0);
+    context.lineTo(at, height);
+    context.fillText(label, at + 3, height - 2);
+  });
+  lines(view.y, height / 2 / view.scale, (y, label) => {
+    const at = Math.round(py(y)) + 0.5;
+    context.moveTo(0, at);
+    context.lineTo(width, at);
+    if (at < height - 20) context.fillText(label, 3, at - 2);
+  });
+  context.textAlign = "right";
+  context.textBaseline = "top";
+  context.fillText("mm", width - 4, 4);
+}
