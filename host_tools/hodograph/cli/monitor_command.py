@@ -8,7 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from ..bus.address import parse_address
-from ..bus.frame_batch import Frames
+from ..bus.frames import Frames
 from ..chain import load_chain
 from ..config import Machine, load_machine
 from ..errors import InputError

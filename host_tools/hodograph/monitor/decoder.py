@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bus.decode import RPDO1, SYNC_ID, SYNC_OVERFLOW, TPDO1
-from ..bus.frame_batch import FRAME_DTYPE, Frames
+from ..bus.frames import FRAME_DTYPE, Frames
 
 HELD_BACK = 3
 """SYNCs that wait for late answers."""

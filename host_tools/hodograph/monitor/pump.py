@@ -139,7 +139,7 @@ class Pump:
         if rows.count:
             age_ms = None if taken.newest_s is None else 1000 * (time.time() - taken.newest_s)
             self._publish(rows_message(rows, self._layout.period_us / 1e6, age_ms))
-        if samples.count and time.monotonic() >= self._state_due_s:
+        if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S
             self._publish(self._drives(samples, taken))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bus.decode import SYNC_ID, SYNC_OVERFLOW
-from ..bus.frame_batch import FRAME_DTYPE, Frames
+from ..bus.frames import FRAME_DTYPE, Frames
 from ..bus.recordings import read_recording
 from ..errors import InputError
 from .source import NOTHING, Taken

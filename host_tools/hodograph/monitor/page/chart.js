@@ -22,7 +22,10 @@ export class Chart {
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `${title} over time`);
-    box.append(this.title, this.canvas);
+    const frame = document.createElement("div");
+    frame.className = "frame";
+    frame.append(this.canvas);
+    box.append(this.title, frame);
     parent.append(box);
   }
 
@@ -124,14 +127,16 @@ function stroke(context, { low, high, gap }, at, colour) {
   context.lineWidth = 1.5;
   context.lineJoin = "round";
   context.beginPath();
-  let last = -Infinity;
+  let last = -Infinity, before = 0;
   for (let column = 0; column < low.length; column += 1) {
     if (low[column] === Infinity) continue;
     const x = LEFT + column + 0.5;
-    if (column - last > Math.max(2, gap)) context.moveTo(x, at(high[column]));
-    else context.lineTo(x, at(high[column]));
-    if (high[column] !== low[column]) context.lineTo(x, at(low[column]));
-    last = column;
+    const rising = Math.abs(low[column] - before) <= Math.abs(high[column] - before);
+    const [first, second] = rising ? [low[column], high[column]] : [high[column], low[column]];
+    if (column - last > Math.max(2, gap)) context.moveTo(x, at(first));
+    else context.lineTo(x, at(first));
+    if (first !== second) context.lineTo(x, at(second));
+    [last, before] = [column, second];
   }
   context.stroke();
   context.lineWidth = 1;
