@@ -22,7 +22,7 @@ from hodograph.bus.frame_batch import Frames
 from hodograph.config import Machine
 from hodograph.dbc import dbc_text
 
-_NMT, _SYNC, _EMCY, _TPDO1, _RPDO1, _TPDO2 = 0x000, 0x080, 0x080, 0x180, 0x200, 0x280
+_NMT, _SYNC, _EMCY, _TPDO1, _RPDO1, _TPDO2, _TPDO3 = 0x000, 0x080, 0x080, 0x180, 0x200, 0x280, 0x380
 _SDO_ANSWER, _SDO_ASK, _HEARTBEAT = 0x580, 0x600, 0x700
 _SDO_BYTES, _SDO_ABORT = 8, 0x80
 _OVERFLOW = 240
@@ -57,6 +57,14 @@ _FROM_TO = {
     (0x27, 0x21),
     (0x27, 0x40),
 }
+_MAY_REFUSE = {
+    (0x1005, 0x06010002),  # the COB-ID of SYNC is fixed
+    (0x1006, 0x06090032),  # and so is the counter, whatever the period: it need not be 0 before
+    (0x100C, 0x06020000),  # no node guarding
+    (0x100D, 0x06020000),
+    (0x1400, 0x06090011),  # no inhibit time of an RPDO
+}
+"""What a simulated drive has not, and the controller asks every drive for at its configuration."""
 _KEPT_FINDINGS = 50
 _SAMPLE = 499
 """cantools itself decodes each frame whose number this divides; the rest is decoded by numpy."""
@@ -98,6 +106,9 @@ class BusChecker:
             for base, name in ((_SDO_ANSWER, "SDO answer"), (_SDO_ASK, "SDO request")):
                 self._lengths[base + node] = _SDO_BYTES
                 self._names[base + node] = f"{name} of node {node}"
+        for axis in self.machine.axes:  # docs/protocol.md section 2: not in every machine
+            self._lengths.setdefault(_TPDO3 + axis.node, 4)
+            self._names.setdefault(_TPDO3 + axis.node, f"Drive{axis.node}_TPDO3")
         self._drives = {axis.node: self._drive(axis.node) for axis in self.machine.axes}
         self._controller_answered = False
         self._counter: int | None = None
@@ -276,6 +287,10 @@ class BusChecker:
         for frame in frames[sdo & (frames["data"][:, 0] == _SDO_ABORT)]:
             index = int.from_bytes(bytes(frame["data"][1:3]), "little")
             code = int.from_bytes(bytes(frame["data"][4:8]), "little")
+            drive = self._drives.get(int(frame["id"]) - _SDO_ANSWER)
+            if drive is not None and not drive.operational and (index, code) in _MAY_REFUSE:
+                self.kinds["SDO refused by a drive while it was configured"] += 1
+                continue
             name = self._names.get(int(frame["id"]), "SDO")
             self.found(f"{name}: abort 0x{code:08X} of 0x{index:04X} sub {int(frame['data'][3])}")
 
