@@ -65,6 +65,8 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
         return locked(machine, machine_resume);
     case COMMAND_DISABLE:
         return locked(machine, machine_disable);
+    case COMMAND_HOME:
+        return homing_begin(&controller->homing, machine, controller->boot.facts);
     case COMMAND_RESET:
         return locked(machine, machine_reset);
     case COMMAND_STOP:

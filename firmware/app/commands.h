@@ -14,6 +14,7 @@ enum command {
     COMMAND_HOLD = 6,
     COMMAND_RESUME = 7,
     COMMAND_START_FROM = 8, /* at the arc length of object 0x2011 */
+    COMMAND_HOME = 10,
 };
 
 /* Does it, or says why not; the answer is also kept in controller->refusal. */

@@ -52,10 +52,21 @@ void controller_init(struct controller *controller, uint8_t node)
     frame_queue_init(&controller->queue);
     program_slot_init(&controller->slot);
     drive_boot_init(&controller->boot);
+    drive_look_init(&controller->look);
+    homing_init(&controller->homing);
     drive_watch_begin(&controller->watch, &controller->config);
     sdo_server_init(&controller->server, &controller->od, node, SDO_TIMEOUT_US, SDO_BLOCK_SEGMENTS);
     nmt_slave_init(&controller->nmt, node, NULL, NULL);
     heartbeat_producer_init(&controller->heartbeat, node);
+}
+
+/* TPDO3, or what looks like one. */
+static void take_inputs(struct machine *machine, int node, uint32_t inputs)
+{
+    struct axis *axis = node > 0 ? machine_axis(machine, (uint8_t)node) : NULL;
+    if (axis != NULL) {
+        axis->digital_inputs = inputs;
+    }
 }
 
 /* Receive: process data at once, the rest waits for the mainline. */
@@ -63,10 +74,14 @@ static void on_receive(void *self, const struct can_msg *message, uint32_t now_u
 {
     struct controller *controller = self;
     struct pdo_actual unused;
+    uint32_t inputs;
+    const int inputs_node = pdo_decode_inputs(message, &inputs);
     if (pdo_decode_actual(message, &unused) != 0) {
         if (machine_receive(&controller->machine, message, now_us)) {
             port_tick_ready();
         }
+    } else if (inputs_node != 0) {
+        take_inputs(&controller->machine, inputs_node, inputs);
     } else if (frame_queue_put(&controller->queue, message)) {
         port_wake();
     }
@@ -81,11 +96,9 @@ static void on_tick(void *self, uint32_t now_us, uint32_t late_ns)
 int controller_start(struct controller *controller)
 {
     const struct port_filter filters[] = {
-        {COB_NMT, CAN_ID_MAX},
-        {COB_EMCY, 0x780u},
-        {COB_TPDO1, 0x780u},
-        {COB_SDO_ANSWER, 0x780u},
-        {(uint16_t)(COB_SDO_ASK + controller->node), CAN_ID_MAX},
+        {COB_NMT, CAN_ID_MAX},    {COB_EMCY, 0x780u},
+        {COB_TPDO1, 0x780u},      {COB_TPDO3, 0x780u},
+        {COB_SDO_ANSWER, 0x780u}, {(uint16_t)(COB_SDO_ASK + controller->node), CAN_ID_MAX},
         {COB_HEARTBEAT, 0x780u},
     };
     const struct port_handlers handlers = {

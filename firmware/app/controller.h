@@ -16,8 +16,10 @@
 #include <stdint.h>
 
 #include "app/drive_boot.h"
+#include "app/drive_look.h"
 #include "app/drive_watch.h"
 #include "app/frame_queue.h"
+#include "app/homing.h"
 #include "app/machine.h"
 #include "app/program_slot.h"
 #include "app/tick.h"
@@ -45,6 +47,8 @@ struct controller {
     struct program_slot slot;
     struct drive_boot boot;
     struct drive_watch watch;
+    struct drive_look look;
+    struct homing homing;
     struct od od;
     struct od_controller values;
     struct sdo_server server;

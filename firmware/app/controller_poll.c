@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 
+#include "canopen/cob.h"
 #include "port/port.h"
 
 /* The node is its own NMT master: it enters OPERATIONAL by itself, and obeys resets from outside
@@ -31,6 +32,17 @@ static void take_nmt(struct controller *controller, const struct can_msg *in)
     port_unlock();
 }
 
+/* One of the three asks at a time. */
+static void take_answer(struct controller *controller, const struct can_msg *in)
+{
+    struct can_msg out;
+    if (drive_boot_receive(&controller->boot, in, &out) != 0 ||
+        homing_receive(&controller->homing, in, &out) != 0 ||
+        drive_look_receive(&controller->look, in, &out) != 0) {
+        controller_send(&out);
+    }
+}
+
 static void take_frame(struct controller *controller, const struct can_msg *in)
 {
     struct can_msg out;
@@ -41,9 +53,7 @@ static void take_frame(struct controller *controller, const struct can_msg *in)
             controller_send(&out);
         }
     } else {
-        if (drive_boot_receive(&controller->boot, in, &out) != 0) {
-            controller_send(&out);
-        }
+        take_answer(controller, in);
         drive_watch_receive(&controller->watch, &controller->machine, in);
     }
 }
@@ -91,6 +101,21 @@ static bool boot_requested(struct machine *machine)
     return due;
 }
 
+/* What the inputs of a drive were that is about to be started: TPDO3 tells changes only. */
+static void note_inputs(struct controller *controller, const struct can_msg *command)
+{
+    if (command->id != COB_NMT || command->data[0] != (uint8_t)NMT_START) {
+        return;
+    }
+    port_lock();
+    struct axis *axis = machine_axis(&controller->machine, command->data[1]);
+    if (axis != NULL) {
+        const uint32_t i = (uint32_t)(axis - controller->machine.axes);
+        axis->digital_inputs = controller->boot.facts[i].value[DRIVE_INPUTS];
+    }
+    port_unlock();
+}
+
 static void poll_boot(struct controller *controller, uint32_t elapsed_us)
 {
     if (boot_requested(&controller->machine)) {
@@ -100,6 +125,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
     struct can_msg out;
     int due = drive_boot_process(&controller->boot, elapsed_us, &out);
     while (due != 0) {
+        note_inputs(controller, &out);
         controller_send(&out);
         due = drive_boot_process(&controller->boot, 0, &out);
     }
@@ -109,6 +135,27 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
             machine_drives_configured(&controller->machine, controller->boot.simulated);
         }
         port_unlock();
+    }
+}
+
+static void poll_homing(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    if (homing_process(&controller->homing, &controller->machine, elapsed_us, &out) != 0) {
+        controller_send(&out);
+    }
+}
+
+static void poll_look(struct controller *controller, uint32_t elapsed_us)
+{
+    port_lock();
+    const bool found = controller->machine.state != MACHINE_BOOT;
+    port_unlock();
+    struct can_msg out;
+    const bool allowed = found && !homing_busy(&controller->homing);
+    if (drive_look_process(&controller->look, &controller->machine, controller->boot.facts, allowed,
+                           elapsed_us, &out) != 0) {
+        controller_send(&out);
     }
 }
 
@@ -175,6 +222,8 @@ void controller_poll(struct controller *controller)
     poll_nmt(controller, elapsed_us);
     poll_server(controller, elapsed_us);
     poll_boot(controller, elapsed_us);
+    poll_homing(controller, elapsed_us);
+    poll_look(controller, elapsed_us);
     drive_watch_process(&controller->watch, &controller->machine, elapsed_us);
     poll_emergency(controller);
     note_state(controller);

@@ -10,6 +10,12 @@ const char *fault_text(uint16_t code)
         return "drive left Operation enabled by itself, statusword";
     case FAULT_REBOOTED:
         return "drive restarted by itself, detail";
+    case FAULT_HOMING_MODE:
+        return "drive does not change its mode of operation for homing, abort code or mode";
+    case FAULT_HOMING_FAILED:
+        return "drive reports a homing error, statusword";
+    case FAULT_HOMING_LATE:
+        return "drive did not find its home in time, statusword";
     default:
         return emcy_text(code);
     }

@@ -14,6 +14,11 @@
     (EMCY_MANUFACTURER | 0x02u)                    /* left Operation enabled; detail: statusword */
 #define FAULT_REBOOTED (EMCY_MANUFACTURER | 0x03u) /* a drive restarted by itself */
 
+/* Homing. */
+#define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */
+#define FAULT_HOMING_FAILED (EMCY_MANUFACTURER | 0x11u) /* the drive says so; statusword */
+#define FAULT_HOMING_LATE   (EMCY_MANUFACTURER | 0x12u) /* no end in time; statusword */
+
 struct fault {
     uint16_t code;   /* CANopen emergency error code; 0: none */
     uint8_t node;    /* the node it is about; 0: the controller */

@@ -56,7 +56,9 @@ enum machine_refusal {
     MACHINE_DRIVES_MISSING = 6,
     MACHINE_OUTSIDE_LIMITS = 7,
     MACHINE_NOT_RUNNING = 8,
-    MACHINE_DRIVES_ON = 9, /* homing wants them off */
+    MACHINE_DRIVES_ON = 9,        /* homing wants them off */
+    MACHINE_NO_HOMING_MODE = 10,  /* an axis shall be homed whose drive has no homing mode */
+    MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */

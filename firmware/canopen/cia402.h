@@ -38,13 +38,18 @@ enum cia402_state {
 #define CIA402_STATUS_FOLLOWS         0x1000u /* CSP: drive follows the command value */
 #define CIA402_STATUS_FOLLOWING_ERROR 0x2000u /* CSP */
 
+/* The same bits in homing mode. */
+#define CIA402_STATUS_HOMING_ATTAINED 0x1000u
+#define CIA402_STATUS_HOMING_ERROR    0x2000u
+
 /* Controlword bits. */
-#define CIA402_CONTROL_SWITCH_ON   0x0001u
-#define CIA402_CONTROL_VOLTAGE     0x0002u
-#define CIA402_CONTROL_QUICK_STOP  0x0004u /* active low */
-#define CIA402_CONTROL_ENABLE      0x0008u
-#define CIA402_CONTROL_FAULT_RESET 0x0080u
-#define CIA402_CONTROL_HALT        0x0100u
+#define CIA402_CONTROL_SWITCH_ON    0x0001u
+#define CIA402_CONTROL_VOLTAGE      0x0002u
+#define CIA402_CONTROL_QUICK_STOP   0x0004u /* active low */
+#define CIA402_CONTROL_ENABLE       0x0008u
+#define CIA402_CONTROL_START_HOMING 0x0010u /* homing mode */
+#define CIA402_CONTROL_FAULT_RESET  0x0080u
+#define CIA402_CONTROL_HALT         0x0100u
 
 /* Commands as whole controlwords. */
 #define CIA402_DISABLE_VOLTAGE  0x0000u
