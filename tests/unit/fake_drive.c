@@ -7,16 +7,58 @@
 #include "canopen/pdo.h"
 #include "canopen/sdo_abort.h"
 
+static bool lacks(const struct fake_drive *drive, uint16_t index)
+{
+    for (size_t i = 0; i < sizeof drive->lacks / sizeof drive->lacks[0]; ++i) {
+        if (drive->lacks[i] == index) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static uint32_t read_hook(void *context, const struct od_entry *entry)
 {
     struct fake_drive *drive = context;
+    drive->reads++;
     if (entry->index == 0x6061) {
-        drive->values.modes_of_operation_display = drive->values.modes_of_operation;
+        drive->values.modes_of_operation_display =
+            drive->mode_stuck != 0 ? drive->mode_stuck : drive->values.modes_of_operation;
     }
+    return lacks(drive, entry->index) ? SDO_ABORT_NO_OBJECT : SDO_OK;
+}
+
+static uint32_t write_hook(void *context, const struct od_entry *entry, const uint8_t *value,
+                           uint32_t size)
+{
+    struct fake_drive *drive = context;
+    const uint32_t object = ((uint32_t)entry->index << 8) + entry->sub;
+    if (lacks(drive, entry->index)) {
+        return SDO_ABORT_NO_OBJECT;
+    }
+    if (drive->fixed_mapping && entry->index >= 0x1400u && entry->index < 0x1C00u) {
+        return SDO_ABORT_READ_ONLY;
+    }
+    if (object == drive->refuses) {
+        return SDO_ABORT_VALUE;
+    }
+    const struct fake_write write = {object, (uint32_t)cob_get(value, size)};
+    drive->writes[drive->write_count++ % FAKE_DRIVE_WRITES] = write;
     return SDO_OK;
 }
 
-static const struct od_hooks hooks = {.read = read_hook};
+uint32_t fake_drive_written(const struct fake_drive *drive, uint32_t object, uint32_t *first)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < drive->write_count && i < FAKE_DRIVE_WRITES; ++i) {
+        if (drive->writes[i].object == object && count++ == 0u && first != NULL) {
+            *first = i;
+        }
+    }
+    return count;
+}
+
+static const struct od_hooks hooks = {.read = read_hook, .write = write_hook};
 
 void fake_drive_init(struct fake_drive *drive, uint8_t node, int32_t position_counts)
 {
@@ -52,10 +94,34 @@ static void take_setpoint(struct fake_drive *drive, const struct pdo_setpoint *s
     (void)cia402_device_control(&drive->state, setpoint->controlword);
 }
 
+/* Homing mode: begins with the edge of bit 4, tells of its end in bits 10, 12, 13. */
+static void seek_home(struct fake_drive *drive)
+{
+    const uint16_t told =
+        CIA402_STATUS_TARGET_REACHED | CIA402_STATUS_HOMING_ATTAINED | CIA402_STATUS_HOMING_ERROR;
+    if ((drive->state.controlword & CIA402_CONTROL_START_HOMING) == 0u) {
+        drive->homing_left = drive->homing_syncs;
+        drive->state.flags &= (uint16_t)~told;
+        return;
+    }
+    if (drive->homing_left > 0u) {
+        drive->homing_left--;
+    } else if (drive->homing_fails) {
+        drive->state.flags |= CIA402_STATUS_HOMING_ERROR;
+    } else {
+        drive->state.flags |= CIA402_STATUS_TARGET_REACHED | CIA402_STATUS_HOMING_ATTAINED;
+        drive->position_counts = drive->values.home_offset;
+    }
+}
+
 /* Setpoint k follows SYNC k, is latched at SYNC k+1 and reached at SYNC k+2. */
 static int take_sync(struct fake_drive *drive, struct can_msg *out)
 {
-    if (cia402_device_action(&drive->state) == CIA402_FOLLOW) {
+    if (cia402_device_action(&drive->state) == CIA402_FOLLOW &&
+        drive->values.modes_of_operation == CIA402_MODE_HOMING) {
+        seek_home(drive);
+        drive->latched_counts = drive->position_counts;
+    } else if (cia402_device_action(&drive->state) == CIA402_FOLLOW) {
         drive->position_counts = drive->latched_counts;
         drive->latched_counts = drive->target_counts;
     } else {

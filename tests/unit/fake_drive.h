@@ -17,6 +17,14 @@
 #include "canopen/sdo_server.h"
 #include "od_drive.h"
 
+#define FAKE_DRIVE_WRITES 512u
+
+/* A write by SDO that the drive took. */
+struct fake_write {
+    uint32_t object; /* index << 8 + sub */
+    uint32_t value;
+};
+
 struct fake_drive {
     struct od od;
     struct od_drive values;
@@ -29,12 +37,25 @@ struct fake_drive {
     uint32_t setpoints;         /* received */
     uint32_t worst_step_counts; /* greatest difference between setpoints followed in a row */
     uint8_t node;
-    bool following; /* the last setpoint was one to follow */
-    bool mute;      /* sends no process data */
-    bool dead;      /* neither hears nor speaks */
+    bool following;        /* the last setpoint was one to follow */
+    bool mute;             /* sends no process data */
+    uint32_t homing_syncs; /* how long it takes to find home: then its position is the offset */
+    uint32_t homing_left;
+    bool homing_fails;
+    bool fixed_mapping; /* PDO parameters are read-only */
+    uint16_t lacks[8];  /* objects that it has not */
+    uint32_t refuses;   /* object (index << 8 + sub) that takes no value */
+    int8_t mode_stuck;  /* mode that 0x6061 never leaves; 0: none */
+    uint32_t reads;     /* of objects, by SDO */
+    uint32_t write_count;
+    struct fake_write writes[FAKE_DRIVE_WRITES];
+    bool dead; /* neither hears nor speaks */
 };
 
 void fake_drive_init(struct fake_drive *drive, uint8_t node, int32_t position_counts);
+
+/* How often the drive took a write of the object, and the number of the first one. */
+uint32_t fake_drive_written(const struct fake_drive *drive, uint32_t object, uint32_t *first);
 
 /* Takes a frame from the bus. Returns how many answers are in out (at most 2). */
 int fake_drive_receive(struct fake_drive *drive, const struct can_msg *in, struct can_msg out[2]);
