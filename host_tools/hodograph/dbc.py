@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A DBC of a machine's bus for cantools, SavvyCAN and others, from the EDS of its drives.
 
-SYNC, NMT commands, EMCY, heartbeats and every PDO that is valid by default. Positions are in mm and voltages
-in V through the signals' factors. SDO is left out: what its bytes mean depends on the transfer, which DBC cannot say.
+SYNC, NMT commands, EMCY, heartbeats and every PDO that the controller maps. Positions are in mm, voltages in V, torque
+offsets in per cent through the signals' factors. SDO is left out: what its bytes mean depends on the transfer, which
+DBC cannot say.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .bustime import Pdo, drive_pdos
+from .bustime import Pdo, axis_choice, drive_pdos
 from .config import Axis, Machine
 from .data import DRIVE_EDS
 
@@ -29,7 +30,11 @@ _NMT_COMMANDS = {
 }
 _NMT_STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
 _POSITIONS = (0x6064, 0x607A)
+_VELOCITIES = (0x60B1,)
+_PER_MILLE = (0x60B2,)
 _MILLIVOLTS = (0x2100,)
+_INPUTS = 0x60FD
+_INPUT_BITS = (("NegativeLimit", 1), ("PositiveLimit", 1), ("HomeSwitch", 1), ("OtherInputs", 29))
 _NAME_LENGTH = 32
 
 
@@ -82,11 +87,12 @@ def _frames(machine: Machine, eds: Path) -> Iterator[_Frame]:
     for axis in machine.axes:
         name = _node_name(axis)
         yield from _node_frames(name, axis.node, (CONTROLLER,))
-        for pdo in drive_pdos(axis.node, eds):
+        for pdo in drive_pdos(axis.node, axis_choice(machine, axis), eds):
             sender, receiver = (CONTROLLER, name) if pdo.received else (name, CONTROLLER)
             signals = tuple(_pdo_signals(pdo, f"{name}_{pdo.name}", machine.counts_per_mm, axis))
+            cyclic_ms = 0 if pdo.name == "TPDO3" else period_ms
             yield _Frame(
-                pdo.cob_id, f"{name}_{pdo.name}", pdo.size, sender, (receiver,), signals, period_ms
+                pdo.cob_id, f"{name}_{pdo.name}", pdo.size, sender, (receiver,), signals, cyclic_ms
             )
 
 
@@ -104,16 +110,29 @@ def _node_frames(name: str, node: int, receivers: tuple[str, ...]) -> Iterator[_
 def _pdo_signals(pdo: Pdo, prefix: str, counts_per_mm: int, axis: Axis) -> Iterator[_Signal]:
     start = 0
     for entry in pdo.entries:
-        factor, unit = 1.0, ""
-        if entry.index in _POSITIONS:
-            factor, unit = 1 / counts_per_mm, "mm"
-        elif entry.index in _MILLIVOLTS:
-            factor, unit = 0.001, "V"
-        if entry.index not in range(1, 8):  # dummies only fill space
-            name = _identifier(f"{prefix.split('_')[0]}_{entry.name}")
-            comment = f"0x{entry.index:04X} sub {entry.sub}, axis {axis.name}"
-            yield _Signal(name, start, entry.bits, entry.signed, factor, unit, comment=comment)
+        drive = prefix.split("_")[0]
+        comment = f"0x{entry.index:04X} sub {entry.sub}, axis {axis.name}"
+        if entry.index == _INPUTS:
+            for name, bits in _INPUT_BITS:
+                yield _Signal(f"{drive}_{name}", start, bits, comment=comment)
+                start += bits
+            continue
+        factor, unit = _scale(entry.index, counts_per_mm)
+        name = _identifier(f"{drive}_{entry.name}")
+        yield _Signal(name, start, entry.bits, entry.signed, factor, unit, comment=comment)
         start += entry.bits
+
+
+def _scale(index: int, counts_per_mm: int) -> tuple[float, str]:
+    if index in _POSITIONS:
+        return 1 / counts_per_mm, "mm"
+    if index in _VELOCITIES:
+        return 1 / counts_per_mm, "mm/s"
+    if index in _PER_MILLE:
+        return 0.1, "%"
+    if index in _MILLIVOLTS:
+        return 0.001, "V"
+    return 1.0, ""
 
 
 def _identifier(text: str) -> str:

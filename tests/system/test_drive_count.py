@@ -9,10 +9,13 @@ from typing import Any
 
 import pytest
 
-from bench import EXAMPLES, MakeBench
+from bench import BUS, EXAMPLES, MakeBench
 from hodograph.bus.controller import OFF, READY
+from hodograph.bus.network import open_network
 from hodograph.bus.objects import ACTUAL, TARGET
+from hodograph.bustime import axis_choice, drive_pdos
 from hodograph.cli.main import main
+from hodograph.data import DRIVE_EDS
 
 pytestmark = pytest.mark.bus
 
@@ -102,3 +105,39 @@ def test_one_drive_takes_no_program(
     assert len(result(capsys, "status", "--json")["axes"]) == 1
     assert main(["stop", "--off"]) == 0
     assert controller.state() == OFF
+
+
+@pytest.mark.parametrize("feedforward", ["", "velocity = 1", "torque_permille_s_m = 2"])
+def test_the_model_has_the_pdos_that_drives_are_given(
+    make_bench: MakeBench, tmp_path: Path, feedforward: str
+) -> None:
+    file = machine_of(tmp_path, 2, 2000)
+    file.write_text(file.read_text() + f"\n[axis.feedforward]\n{feedforward}\n")
+    bench = make_bench("real-time", file)
+    bench.controller.enable()
+    for axis in bench.machine.axes:
+        with open_network(BUS, axis.node, 1_000_000) as network:
+            drive = network.add_node(axis.node, str(DRIVE_EDS))
+            drive.tpdo.read()
+            drive.rpdo.read()
+            found = {
+                (
+                    received,
+                    number,
+                    pdo.cob_id,
+                    tuple(v.index << 16 | v.subindex << 8 | v.length for v in pdo.map),
+                )
+                for received, maps in ((True, drive.rpdo), (False, drive.tpdo))
+                for number, pdo in maps.items()
+                if pdo.enabled
+            }
+        wanted = {
+            (
+                p.received,
+                p.number,
+                p.cob_id,
+                tuple(e.index << 16 | e.sub << 8 | e.bits for e in p.entries),
+            )
+            for p in drive_pdos(axis.node, axis_choice(bench.machine, axis))
+        }
+        assert found == wanted

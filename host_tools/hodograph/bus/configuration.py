@@ -41,9 +41,8 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
 
 
 def feedforward_bits(machine: Machine) -> int:
-    """What the setpoints carry beside the position, for all drives alike: where one axis needs it, all have room."""
-    torque = any(axis.feedforward.has_torque for axis in machine.axes)
-    velocity = any(axis.feedforward.velocity for axis in machine.axes)
+    """What the setpoints carry beside the position."""
+    torque, velocity = machine.torque_feedforward, machine.velocity_feedforward
     return objects.FEEDFORWARD_TORQUE * torque + objects.FEEDFORWARD_VELOCITY * velocity
 
 

@@ -4,9 +4,9 @@
 from .fit import bus_time, machine_bus_time, max_drives, require_fit
 from .frame_bits import exact_bits, generic_worst_bits, plain_bits, worst_bits
 from .model import BusTime
-from .pdos import Entry, Pdo, drive_pdos
+from .pdos import Entry, Pdo, PdoChoice, axis_choice, drive_pdos
 from .recording import KindLoad, RecordedLoad, recorded_load
-from .traffic import Message, machine_messages, messages
+from .traffic import Message, machine_drives, messages
 
 __all__ = [
     "BusTime",
@@ -14,13 +14,15 @@ __all__ = [
     "KindLoad",
     "Message",
     "Pdo",
+    "PdoChoice",
     "RecordedLoad",
+    "axis_choice",
     "bus_time",
     "drive_pdos",
     "exact_bits",
     "generic_worst_bits",
     "machine_bus_time",
-    "machine_messages",
+    "machine_drives",
     "max_drives",
     "messages",
     "plain_bits",

@@ -3,42 +3,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 
 from ..config import Machine
+from ..config.axis_table import MAX_AXES
 from ..errors import InputError
 from .model import BusTime
-from .traffic import messages
+from .pdos import PdoChoice
+from .traffic import machine_drives, messages
 
 PERIODS_US = (1000, 2000, 4000, 8000)
 BITRATES = (125_000, 250_000, 500_000, 800_000, 1_000_000)
 """Of CiA 301, as far as a tick could ever fit."""
-MAX_DRIVES = 6
 
 
 def bus_time(
-    nodes: Sequence[int],
-    period_us: int,
-    bitrate: int,
-    *,
-    controller: int = 1,
-    only_first_pdos: bool = False,
+    drives: Mapping[int, PdoChoice], period_us: int, bitrate: int, *, controller: int = 1
 ) -> BusTime:
-    """The bus time of these drives."""
-    found = messages(nodes, period_us, controller=controller, only_first_pdos=only_first_pdos)
-    return BusTime(found, bitrate, period_us)
+    """The bus time of these drives, by node."""
+    return BusTime(messages(drives, period_us, controller=controller), bitrate, period_us)
 
 
 def machine_bus_time(machine: Machine) -> BusTime:
     """The bus time of a machine file."""
-    return bus_time(machine.nodes, machine.period_us, machine.bitrate, controller=machine.node)
+    return _with(machine, machine_drives(machine))
 
 
-def max_drives(period_us: int, bitrate: int, *, only_first_pdos: bool = False) -> int:
+def _with(
+    machine: Machine,
+    drives: Mapping[int, PdoChoice],
+    *,
+    period_us: int | None = None,
+    bitrate: int | None = None,
+) -> BusTime:
+    return bus_time(
+        drives,
+        period_us or machine.period_us,
+        bitrate or machine.bitrate,
+        controller=machine.node,
+    )
+
+
+def max_drives(period_us: int, bitrate: int, choice: PdoChoice | None = None) -> int:
     """The greatest number of drives (0 … 6), nodes 2 and up, whose tick fits."""
-    for count in range(MAX_DRIVES, 0, -1):
-        nodes = range(2, 2 + count)
-        if bus_time(nodes, period_us, bitrate, only_first_pdos=only_first_pdos).fits:
+    for count in range(MAX_AXES, 0, -1):
+        drives = dict.fromkeys(range(2, 2 + count), choice or PdoChoice())
+        if bus_time(drives, period_us, bitrate).fits:
             return count
     return 0
 
@@ -48,35 +59,59 @@ def require_fit(machine: Machine) -> None:
     found = machine_bus_time(machine)
     if found.fits:
         return
+    count = len(machine.axes)
     raise InputError(
-        f"{machine.file}: [bus] {len(machine.axes)} drives need up to {found.tick_us:.0f} us a tick "
-        f"({found.load_percent:.0f} % load) at {machine.bitrate} bit/s, but period_us is {machine.period_us}: "
-        + _advice(machine)
+        f"{machine.file}: [bus] {count} drive{'s need' if count > 1 else ' needs'} up to {found.tick_us:.0f} us "
+        f"a tick ({found.load_percent:.0f} % load) at {machine.bitrate} bit/s, but period_us is "
+        f"{machine.period_us}: {_advice(machine)}"
     )
 
 
 def _advice(machine: Machine) -> str:
-    nodes = machine.nodes
-
-    def fits(period_us: int, bitrate: int) -> bool:
-        return bus_time(nodes, period_us, bitrate, controller=machine.node).fits
-
-    periods = [p for p in PERIODS_US if p > machine.period_us and fits(p, machine.bitrate)]
-    bitrates = [b for b in BITRATES if b > machine.bitrate and fits(machine.period_us, b)]
-    drives = max_drives(machine.period_us, machine.bitrate)
+    drives = machine_drives(machine)
+    periods = [
+        p for p in PERIODS_US if p > machine.period_us and _with(machine, drives, period_us=p).fits
+    ]
+    bitrates = [
+        b for b in BITRATES if b > machine.bitrate and _with(machine, drives, bitrate=b).fits
+    ]
     advice = [f"period_us = {periods[0]}"] if periods else []
     advice += [f"bitrate = {bitrates[0]}"] if bitrates else []
-    if drives:
-        advice.append(f"at most {drives} drive{'s' if drives > 1 else ''}")
+    fewer = _fewer(machine)
+    if fewer:
+        advice.append(f"at most {fewer} drive{'s' if fewer > 1 else ''}")
+    advice += _less(machine, drives)
     if not advice:
         return f"use both a longer period and a higher bitrate, such as {_both(machine)}"
     return "use " + " or ".join(advice)
 
 
+def _fewer(machine: Machine) -> int:
+    """How many of the drives fit, the first ones; 0: not even one."""
+    for count in range(len(machine.axes) - 1, 0, -1):
+        if _with(machine, machine_drives(machine, count)).fits:
+            return count
+    return 0
+
+
+def _less(machine: Machine, drives: Mapping[int, PdoChoice]) -> list[str]:
+    """What drives could do without, if that is enough: the first remedy that helps."""
+    remedies = (
+        ("[axis.feedforward] velocity = 0", {"velocity": False}),
+        ("no [axis.feedforward]", {"velocity": False, "torque": False}),
+        ("[[axis]] without drive = (only simulated drives send volts)", {"volts": False}),
+    )
+    for text, without in remedies:
+        fewer = {node: replace(choice, **without) for node, choice in drives.items()}
+        if fewer != drives and _with(machine, fewer).fits:
+            return [text]
+    return []
+
+
 def _both(machine: Machine) -> str:
-    nodes = machine.nodes
+    drives = machine_drives(machine)
     for bitrate in BITRATES:
         for period_us in PERIODS_US:
-            if bus_time(nodes, period_us, bitrate, controller=machine.node).fits:
+            if _with(machine, drives, period_us=period_us, bitrate=bitrate).fits:
                 return f"period_us = {period_us} with bitrate = {bitrate}"
     return "fewer drives at 8000 us and 1000000 bit/s"

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from .response import Task, response_time
-from .traffic import NEEDED, SDO, Message, sync_bits
+from .traffic import CYCLIC, NEEDED, SDO, SPORADIC, Message, sync_bits
 
 DRIVE_REACTION_US = 200
 """Assumed of a drive: TPDO1 waits for the bus this long after the end of SYNC, at most."""
 
 _SCALE = 1_000_000
+_SENT_WITH_SYNC = ("setpoints", "offsets")
+"""By the controller, ready when SYNC has left."""
 
 
 @dataclass(frozen=True)
@@ -30,19 +32,19 @@ class BusTime:
 
     @property
     def load_percent(self) -> float:
-        """Bus load of all periodic frames with worst-case stuffing."""
+        """Bus load of all frames with worst-case stuffing, inputs changing all the time."""
         return self._percent((m, m.worst_bits) for m in self.messages)
 
     @property
     def plain_load_percent(self) -> float:
-        """The same without a single stuff bit: no run can be below."""
-        return self._percent((m, m.plain_bits) for m in self.messages)
+        """The same without a single stuff bit and with inputs at rest: no run can be below."""
+        return self._percent((m, _least_bits(m)) for m in self.messages)
 
     def load_of(self, kind: str) -> tuple[float, float]:
         """Load in per cent of one kind of frames: without stuff bits, and at worst."""
         own = [m for m in self.messages if m.kind == kind]
         return (
-            self._percent((m, m.plain_bits) for m in own),
+            self._percent((m, _least_bits(m)) for m in own),
             self._percent((m, m.worst_bits) for m in own),
         )
 
@@ -97,9 +99,9 @@ class BusTime:
             return self._sync_end
         ahead = self._ahead(message)
         if message.kind in NEEDED:
-            needed = [m for m in ahead if m.kind in NEEDED and m.kind != "SYNC"]
-            through = self._sync_end + sum(map(self._length, (*needed, message)))
-            if message.kind == "setpoints":
+            of_tick = [m for m in ahead if m.kind in CYCLIC and m.kind != "SYNC"]
+            through = self._sync_end + sum(map(self._length, (*of_tick, message)))
+            if message.kind in _SENT_WITH_SYNC:
                 return through
             return through + self.reaction_us * self.bitrate + self._blocking(message)
         tasks = [self._task(m) for m in ahead]
@@ -110,8 +112,12 @@ class BusTime:
 
     def _task(self, message: Message) -> Task:
         jitter = 0
-        if message.kind == "setpoints":
+        if message.kind in _SENT_WITH_SYNC:
             jitter = self._sync_end
-        elif message.kind not in ("SYNC", "heartbeats"):
+        elif message.kind in CYCLIC and message.kind != "SYNC":
             jitter = self._sync_end + self.reaction_us * self.bitrate
         return Task(self._length(message), message.period_us * self.bitrate, jitter)
+
+
+def _least_bits(message: Message) -> int:
+    return 0 if message.kind in SPORADIC else message.plain_bits

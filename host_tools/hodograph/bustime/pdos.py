@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What the PDOs of a drive hold, from its EDS: communication (0x1400, 0x1800) and mapping (0x1600, 0x1A00) objects."""
+"""The PDOs of a drive as the controller maps them (docs/protocol.md section 2); names and types from its EDS."""
 
 from __future__ import annotations
 
 import configparser
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -11,11 +12,34 @@ from pathlib import Path
 import canopen
 from canopen.objectdictionary import datatypes
 
+from ..config import Axis, Machine
 from ..data import DRIVE_EDS
 from ..errors import InputError
 
-_INVALID = 1 << 31
-_PDOS_PER_DIRECTION = 4
+CONTROLWORD, TARGET, TORQUE_OFFSET, VELOCITY_OFFSET = 0x60400010, 0x607A0020, 0x60B20010, 0x60B10020
+STATUSWORD, ACTUAL, VOLTS, INPUTS = 0x60410010, 0x60640020, 0x21000010, 0x60FD0020
+"""Mapping parameters: index, sub-index, bits."""
+
+
+@dataclass(frozen=True)
+class PdoChoice:
+    """What is mapped for a drive beside setpoint (RPDO1) and position (TPDO1)."""
+
+    torque: bool = False
+    """A torque offset in RPDO1."""
+    velocity: bool = False
+    """A velocity offset, in RPDO2."""
+    volts: bool = True
+    """TPDO2, of simulated drives."""
+    inputs: bool = True
+    """TPDO3, of drives that have digital inputs."""
+
+
+def axis_choice(machine: Machine, axis: Axis) -> PdoChoice:
+    """The choice that a machine file makes; an axis without a model is no simulated drive."""
+    return PdoChoice(
+        machine.torque_feedforward, machine.velocity_feedforward, axis.drive is not None
+    )
 
 
 @dataclass(frozen=True)
@@ -31,7 +55,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Pdo:
-    """One PDO that is valid by default. `received` is seen from the drive: RPDO."""
+    """One PDO. `received` is seen from the drive: RPDO."""
 
     received: bool
     number: int
@@ -50,42 +74,41 @@ class Pdo:
 
 
 @cache
-def drive_pdos(node: int, eds: Path = DRIVE_EDS) -> tuple[Pdo, ...]:
-    """The PDOs of drive `node` as its EDS has them by default. Raises InputError."""
+def drive_pdos(
+    node: int, choice: PdoChoice | None = None, eds: Path = DRIVE_EDS
+) -> tuple[Pdo, ...]:
+    """The PDOs of drive `node`. Raises InputError: no EDS, or objects that setpoint or position need are not in it.
+
+    TPDO2 and TPDO3 are left out where the EDS has no such object.
+    """
     try:
         dictionary = canopen.import_od(str(eds), node_id=node)
-        found = [
-            _pdo(dictionary, received, number)
-            for received in (True, False)
-            for number in range(1, _PDOS_PER_DIRECTION + 1)
-        ]
+        return tuple(_pdos(dictionary, node, choice or PdoChoice()))
     except (OSError, ValueError, KeyError, TypeError, configparser.Error) as error:
         text = " ".join(str(error).split())
-        raise InputError(f"{eds}: not an EDS with PDOs that can be read: {text}") from None
-    return tuple(pdo for pdo in found if pdo is not None and pdo.entries)
+        raise InputError(f"{eds}: not an EDS with the objects of a drive: {text}") from None
 
 
-def _pdo(dictionary: canopen.ObjectDictionary, received: bool, number: int) -> Pdo | None:
-    communication = (0x1400 if received else 0x1800) + number - 1
-    mapping = (0x1600 if received else 0x1A00) + number - 1
-    if communication not in dictionary or mapping not in dictionary:
-        return None
-    cob_id = _default(dictionary, communication, 1)
-    if cob_id & _INVALID:
-        return None
-    count = _default(dictionary, mapping, 0)
-    values = [_default(dictionary, mapping, sub) for sub in range(1, count + 1)]
-    entries = tuple(_entry(dictionary, value) for value in values if value)
-    return Pdo(received, number, cob_id & 0x7FF, entries)
+def _pdos(dictionary: canopen.ObjectDictionary, node: int, choice: PdoChoice) -> Iterator[Pdo]:
+    setpoint = (CONTROLWORD, TARGET, *((TORQUE_OFFSET,) if choice.torque else ()))
+    yield Pdo(True, 1, 0x200 + node, _entries(dictionary, setpoint))
+    if choice.velocity:
+        yield Pdo(True, 2, 0x300 + node, _entries(dictionary, (VELOCITY_OFFSET,)))
+    yield Pdo(False, 1, 0x180 + node, _entries(dictionary, (STATUSWORD, ACTUAL)))
+    if choice.volts and VOLTS >> 16 in dictionary:
+        yield Pdo(False, 2, 0x280 + node, _entries(dictionary, (VOLTS,)))
+    if choice.inputs and INPUTS >> 16 in dictionary:
+        yield Pdo(False, 3, 0x380 + node, _entries(dictionary, (INPUTS,)))
 
 
-def _default(dictionary: canopen.ObjectDictionary, index: int, sub: int) -> int:
-    variable = dictionary.get_variable(index, sub)
-    return int(variable.default or 0) if variable is not None else 0
+def _entries(dictionary: canopen.ObjectDictionary, mapped: tuple[int, ...]) -> tuple[Entry, ...]:
+    return tuple(_entry(dictionary, value) for value in mapped)
 
 
 def _entry(dictionary: canopen.ObjectDictionary, value: int) -> Entry:
     index, sub, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
+    if index not in dictionary:
+        raise KeyError(f"object 0x{index:04X} is missing")
     found = dictionary[index]
     variable = found if isinstance(found, canopen.objectdictionary.ODVariable) else found[sub]
     signed = variable.data_type in datatypes.SIGNED_TYPES

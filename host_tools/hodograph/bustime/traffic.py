@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -11,22 +11,34 @@ import numpy as np
 
 from ..config import Machine
 from .frame_bits import exact_bits, generic_worst_bits, plain_bits, worst_bits
-from .pdos import drive_pdos
+from .pdos import PdoChoice, axis_choice, drive_pdos
 
 SYNC_ID, HEARTBEAT_ID, SDO_ID = 0x080, 0x700, 0x580
 SYNC_OVERFLOW = 240
 HEARTBEAT_MS = 100
 SDO_BYTES = 8
 
-CYCLIC = ("SYNC", "setpoints", "positions", "other PDOs")
+INHIBIT_US = 10_000
+"""Of TPDO3: it comes when an input changes, but not sooner than this after the last one."""
+
+SPORADIC = ("inputs",)
+"""Kinds of frames that may stay away altogether."""
+CYCLIC = ("SYNC", "setpoints", "offsets", "positions", "volts")
 """Kinds of frames that come once a tick."""
-NEEDED = ("SYNC", "setpoints", "positions")
+NEEDED = ("SYNC", "setpoints", "offsets", "positions")
 """Those that must be through before the next SYNC: the drive latches, the controller supervises."""
+_KINDS = {
+    "RPDO1": "setpoints",
+    "RPDO2": "offsets",
+    "TPDO1": "positions",
+    "TPDO2": "volts",
+    "TPDO3": "inputs",
+}
 
 
 @dataclass(frozen=True)
 class Message:
-    """A frame that comes every `period_us`."""
+    """A frame that comes every `period_us`, or at most so often."""
 
     kind: str
     identifier: int
@@ -58,36 +70,26 @@ def sync_bits() -> tuple[int, int]:
     return int(bits.min()), int(bits.max())
 
 
-def kind_of_pdo(name: str) -> str:
-    """The kind of traffic that a PDO of a drive is."""
-    return {"RPDO1": "setpoints", "TPDO1": "positions"}.get(name, "other PDOs")
-
-
 def messages(
-    nodes: Sequence[int], period_us: int, *, controller: int = 1, only_first_pdos: bool = False
+    drives: Mapping[int, PdoChoice], period_us: int, *, controller: int = 1
 ) -> tuple[Message, ...]:
-    """All periodic frames, most urgent first.
-
-    `only_first_pdos`: RPDO1 and TPDO1 only, as most real drives; otherwise all that the EDS has.
-    """
+    """All frames in steady motion, most urgent first; `drives` by node."""
     found = [Message("SYNC", SYNC_ID, 1, period_us)]
-    for node in nodes:
-        for pdo in drive_pdos(node):
-            kind = kind_of_pdo(pdo.name)
-            if kind != "other PDOs" or not only_first_pdos:
-                found.append(Message(kind, pdo.cob_id, pdo.size, period_us))
+    for node, choice in drives.items():
+        for pdo in drive_pdos(node, choice):
+            kind = _KINDS[pdo.name]
+            least_us = INHIBIT_US if kind in SPORADIC else period_us
+            found.append(Message(kind, pdo.cob_id, pdo.size, least_us))
     found += [
         Message("heartbeats", HEARTBEAT_ID + node, 1, 1000 * HEARTBEAT_MS)
-        for node in (controller, *nodes)
+        for node in (controller, *drives)
     ]
     return tuple(sorted(found, key=lambda message: message.identifier))
 
 
-def machine_messages(machine: Machine, *, only_first_pdos: bool = False) -> tuple[Message, ...]:
-    """The periodic frames of a machine file."""
-    return messages(
-        machine.nodes, machine.period_us, controller=machine.node, only_first_pdos=only_first_pdos
-    )
+def machine_drives(machine: Machine, count: int | None = None) -> dict[int, PdoChoice]:
+    """The drives of a machine file, or its first `count`, for `messages`."""
+    return {axis.node: axis_choice(machine, axis) for axis in machine.axes[:count]}
 
 
 SDO = Message("SDO", SDO_ID, SDO_BYTES, 0)

@@ -56,6 +56,16 @@ class Machine:
         return tuple(axis.node for axis in self.axes)
 
     @property
+    def torque_feedforward(self) -> bool:
+        """Whether setpoints carry a torque offset: where one axis needs it, all have room for it."""
+        return any(axis.feedforward.has_torque for axis in self.axes)
+
+    @property
+    def velocity_feedforward(self) -> bool:
+        """Whether a second frame with a velocity offset goes with the setpoints, for all axes alike."""
+        return any(axis.feedforward.velocity for axis in self.axes)
+
+    @property
     def plane(self) -> tuple[Axis, Axis]:
         """The axes that follow a path, x and y. Raises InputError: there is only one axis."""
         if len(self.axes) < PLANE_AXES:

@@ -13,11 +13,12 @@ from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.dbc import dbc_text
 
-MACHINE = Path(__file__).resolve().parents[3] / "examples" / "machines" / "paper_alpha.toml"
+MACHINES = Path(__file__).resolve().parents[3] / "examples" / "machines"
+MACHINE = MACHINES / "paper_alpha.toml"
 
 
-def database() -> cantools.database.Database:
-    return cantools.database.load_string(dbc_text(load_machine(MACHINE)), "dbc", strict=True)
+def database(machine: Path = MACHINE) -> cantools.database.Database:
+    return cantools.database.load_string(dbc_text(load_machine(machine)), "dbc", strict=True)
 
 
 def test_frames_and_their_sizes() -> None:
@@ -25,8 +26,33 @@ def test_frames_and_their_sizes() -> None:
     expected = {0x000: 2, 0x080: 1, 0x701: 1, 0x081: 8}
     for node in (2, 3):
         expected |= {0x80 + node: 8, 0x180 + node: 6, 0x200 + node: 6}
-        expected |= {0x280 + node: 2, 0x700 + node: 1}
+        expected |= {0x280 + node: 2, 0x380 + node: 4, 0x700 + node: 1}
     assert sizes == expected
+
+
+def test_real_drives_with_feedforward() -> None:
+    found = database(MACHINES / "real_drives.toml")
+    sizes = {message.frame_id: message.length for message in found.messages}
+    assert [sizes[0x200 + n] for n in (2, 3, 4)] == [8, 8, 8]
+    assert [sizes[0x300 + n] for n in (2, 3, 4)] == [4, 4, 4]
+    assert 0x282 not in sizes
+    setpoint = found.decode_message(0x202, struct.pack("<Hih", 0x0F, 2_500_000, -125))
+    assert setpoint["Drive2_TargetPosition"] == pytest.approx(2.5)
+    assert setpoint["Drive2_TorqueOffset"] == pytest.approx(-12.5)
+    velocity = found.decode_message(0x303, struct.pack("<i", 100_000_000))
+    assert velocity == {"Drive3_VelocityOffset": pytest.approx(100.0)}
+    assert found.get_message_by_name("Drive2_RPDO2").cycle_time == 2
+
+
+def test_inputs_by_name() -> None:
+    inputs = database().decode_message(0x382, struct.pack("<I", 0b101 | 1 << 31))
+    assert inputs == {
+        "Drive2_NegativeLimit": 1,
+        "Drive2_PositiveLimit": 0,
+        "Drive2_HomeSwitch": 1,
+        "Drive2_OtherInputs": 1 << 28,
+    }
+    assert database().get_message_by_name("Drive2_TPDO3").cycle_time in (None, 0)
 
 
 def test_values_and_units() -> None:
@@ -43,7 +69,7 @@ def test_values_and_units() -> None:
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "alpha.dbc"
     assert main(["dbc", str(MACHINE), "-o", str(output)]) == 0
-    assert "14 frames" in capsys.readouterr().out
+    assert "16 frames" in capsys.readouterr().out
     assert output.read_text() == dbc_text(load_machine(MACHINE))
 
 

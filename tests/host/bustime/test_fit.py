@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from hodograph.bustime import require_fit
 from hodograph.cli.main import main
+from hodograph.config import load_machine
+from hodograph.errors import InputError
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
@@ -46,3 +49,35 @@ def test_refused_with_advice(
     assert out == ""
     assert re.search(rf"paper_alpha.toml: \[bus\] 2 drives need .*{advice}", err.strip())
     assert list(Path.cwd().glob("*.hdgp")) == []
+
+
+@pytest.mark.parametrize(
+    ("feedforward", "drives", "advice"),
+    [
+        (
+            "{velocity = 1, torque_permille_s_m = 1}",
+            2,
+            r"period_us = 2000 or at most 1 drive or \[axis.feedforward\] velocity = 0$",
+        ),
+        ("{torque_permille_s_m = 1}", 3, r"at most 2 drives or no \[axis.feedforward\]$"),
+        ("{velocity = 1}", 3, r"at most 2 drives or \[axis.feedforward\] velocity = 0$"),
+        ("{}", 4, r"period_us = 2000 or at most 3 drives$"),
+    ],
+)
+def test_what_feedforward_takes(tmp_path: Path, feedforward: str, drives: int, advice: str) -> None:
+    file = Path(machine(tmp_path, 1_000_000, 1000))
+    head = file.read_text().split("[[axis]]")[0]
+    axis = f'[[axis]]\nname = "a"\nnode = %d\ntravel_mm = [0, 1]\nfeedforward = {feedforward}\n'
+    axis += 'drive = "../drives/alpha_x.toml"\n'
+    file.write_text(head + "".join(axis % node for node in range(2, 2 + drives)))
+    with pytest.raises(InputError, match=rf"{drives} drives need up to .*: use .*{advice}"):
+        require_fit(load_machine(file))
+
+
+def test_drives_without_a_model_send_no_volts(tmp_path: Path) -> None:
+    file = Path(machine(tmp_path, 1_000_000, 1000))
+    head = file.read_text().split("[[axis]]")[0]
+    axis = '[[axis]]\nname = "a"\nnode = %d\ntravel_mm = [0, 1]\nfeedforward = {torque_permille_s_m = 1}\n'
+    file.write_text(head + "".join(axis % node for node in (2, 3, 4)))
+    require_fit(load_machine(file))
+    require_fit(load_machine(EXAMPLES / "machines" / "real_drives.toml"))

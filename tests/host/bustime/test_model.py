@@ -11,13 +11,21 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hodograph.bustime import BusTime, bus_time, max_drives
+from hodograph.bustime import BusTime, PdoChoice, bus_time, max_drives
 from hodograph.bustime.model import DRIVE_REACTION_US
 from hodograph.bustime.response import Task, response_time
 from hodograph.bustime.traffic import SDO, Message, sync_bits
 
 RATE = 1_000_000
 Release = tuple[int, int, int, str]  # when, identifier, bits, name
+
+
+LEAST, USUAL = PdoChoice(volts=False, inputs=False), PdoChoice()
+MOST = PdoChoice(torque=True, velocity=True)
+
+
+def machine(count: int, period_us: int, choice: PdoChoice = USUAL, rate: int = RATE) -> BusTime:
+    return bus_time(dict.fromkeys(range(2, 2 + count), choice), period_us, rate)
 
 
 def arbitrated(releases: list[Release]) -> dict[tuple[str, int], int]:
@@ -80,8 +88,9 @@ def test_a_full_bus_has_no_bound() -> None:
 def unkind_releases(model: BusTime, draw: Any, ticks: int) -> Iterator[Release]:
     reaction = model.reaction_us
     for message in model.messages:
-        if message.kind == "heartbeats":
-            yield draw(st.integers(0, ticks * model.period_us)), message.identifier, 62, "heartbeat"
+        if message.kind in ("heartbeats", "inputs"):
+            when = draw(st.integers(0, ticks * model.period_us))
+            yield when, message.identifier, message.worst_bits, message.kind
     for _ in range(draw(st.integers(0, 3 * ticks))):
         when = draw(st.integers(0, ticks * model.period_us))
         yield when, SDO.identifier + when % 127, SDO.worst_bits, "sdo"
@@ -103,9 +112,13 @@ def run_ticks(model: BusTime, draw: Any, ticks: int) -> dict[str, int]:
         sync_end = arbitrated(releases)["SYNC", requested]
         worst["SYNC"] = max(worst.get("SYNC", 0), sync_end - requested)
         for message in model.messages:
-            if message.kind in ("SYNC", "heartbeats"):
+            if message.kind in ("SYNC", "heartbeats", "inputs"):
                 continue
-            late = 0 if message.kind == "setpoints" else draw(st.integers(0, model.reaction_us))
+            late = (
+                0
+                if message.kind in ("setpoints", "offsets")
+                else draw(st.integers(0, model.reaction_us))
+            )
             name = f"{message.kind} {message.identifier}"
             releases.append((sync_end + late, message.identifier, message.worst_bits, name))
     ends = arbitrated(releases)
@@ -113,19 +126,25 @@ def run_ticks(model: BusTime, draw: Any, ticks: int) -> dict[str, int]:
     for (name, _), ended in sorted(ends.items(), key=lambda item: item[0][1]):
         by_name.setdefault(name, []).append(ended)
     for name, times in by_name.items():
-        if name not in ("sdo", "heartbeat", "SYNC"):
+        if name not in ("sdo", "heartbeats", "inputs", "SYNC"):
             worst[name] = max(t - (500 + k * model.period_us) for k, t in enumerate(times))
     return worst
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.data(), st.sampled_from([(1, 1000), (2, 1000), (3, 1000), (6, 2000)]), st.booleans())
+@given(
+    st.data(),
+    st.sampled_from(
+        [(1, 1000), (2, 1000), (3, 1000), (6, 2000)],
+    ),
+    st.sampled_from([LEAST, USUAL, MOST]),
+)
 def test_no_tick_is_slower_than_the_model(
-    data: st.DataObject, machine: tuple[int, int], only: bool
+    data: st.DataObject, size: tuple[int, int], choice: PdoChoice
 ) -> None:
-    drives, period_us = machine
-    model = bus_time(range(2, 2 + drives), period_us, RATE, only_first_pdos=only)
-    assert model.fits
+    drives, period_us = size
+    model = machine(drives, period_us, choice)
+    assume(model.fits)
     worst = run_ticks(model, data.draw, 3)
     for message, bound in zip(model.messages, model.responses_us, strict=True):
         name = "SYNC" if message.kind == "SYNC" else f"{message.kind} {message.identifier}"
@@ -136,7 +155,7 @@ def test_no_tick_is_slower_than_the_model(
 
 def test_the_bound_of_the_tick_is_reached() -> None:
     """An SDO frame begins just before SYNC, and all drives answer at once: the last setpoint is latest."""
-    model = bus_time([2, 3, 4], 1000, RATE)
+    model = machine(3, 1000)
     sync_end = SDO.worst_bits + sync_bits()[1]
     frames = [(0, SDO.identifier, SDO.worst_bits, "sdo"), (0, 0x80, sync_bits()[1], "SYNC")]
     frames[0] = (-1, *frames[0][1:])
@@ -150,8 +169,8 @@ def test_the_bound_of_the_tick_is_reached() -> None:
 
 def test_jitter_of_sync() -> None:
     least, greatest = sync_bits()
-    assert bus_time([2, 3], 1000, RATE).sync_jitter_us == SDO.worst_bits + greatest - least
-    assert bus_time([2, 3], 8000, RATE // 8).sync_jitter_us == 8 * (135 + greatest - least)
+    assert machine(2, 1000).sync_jitter_us == SDO.worst_bits + greatest - least
+    assert machine(2, 8000, rate=RATE // 8).sync_jitter_us == 8 * (135 + greatest - least)
 
 
 def test_load_by_hand() -> None:
@@ -162,11 +181,19 @@ def test_load_by_hand() -> None:
     assert model.load_of("x")[0] == pytest.approx(5.55)
 
 
-@pytest.mark.parametrize("only", [False, True])
-def test_as_many_drives_as_were_promised(only: bool) -> None:
+@pytest.mark.parametrize("choice", [LEAST, USUAL])
+def test_as_many_drives_as_were_promised(choice: PdoChoice) -> None:
     """Up to 3 drives at 1 ms and 6 at 2 ms on 1 Mbit/s."""
-    assert max_drives(1000, RATE, only_first_pdos=only) == 3
-    assert max_drives(2000, RATE, only_first_pdos=only) == 6
+    assert max_drives(1000, RATE, choice) == 3
+    assert max_drives(2000, RATE, choice) == 6
+
+
+def test_inputs_count_at_worst_only() -> None:
+    model, without = machine(2, 1000), machine(2, 1000, PdoChoice(inputs=False))
+    assert model.plain_load_percent == without.plain_load_percent
+    assert model.load_of("inputs")[0] == 0
+    assert model.load_of("inputs")[1] == pytest.approx(2 * 95 / 100, rel=0.05)  # bits a 10 ms
+    assert model.load_percent == pytest.approx(without.load_percent + model.load_of("inputs")[1])
 
 
 @pytest.mark.parametrize("bitrate", [125_000, 250_000, 500_000, 800_000, RATE])
