@@ -32,9 +32,14 @@ void cia402_device_init(struct cia402_device *device)
     device->state = CIA402_NOT_READY;
     device->options.quick_stop = 2;
     device->options.fault_reaction = 2;
+    device->options.shutdown = 0;
+    device->options.disable = 0;
     device->controlword = 0;
     device->flags = CIA402_STATUS_REMOTE;
     device->stopped = false;
+    device->leaving = false;
+    device->leaving_to = CIA402_NOT_READY;
+    device->fault_persists = false;
 }
 
 static bool enter(struct cia402_device *device, enum cia402_state state)
@@ -43,6 +48,7 @@ static bool enter(struct cia402_device *device, enum cia402_state state)
 
     device->state = state;
     device->stopped = device->stopped && !changed;
+    device->leaving = device->leaving && !changed;
     return changed;
 }
 
@@ -87,15 +93,27 @@ static bool control_switched_on(struct cia402_device *device, enum command comma
     }
 }
 
+/* Out of Operation enabled, at once or after a stop. */
+static bool leave(struct cia402_device *device, enum cia402_state to, int16_t option)
+{
+    if (option == 0) {
+        return enter(device, to);
+    }
+    device->leaving = true;
+    device->leaving_to = to;
+    return false;
+}
+
 static bool control_enabled(struct cia402_device *device, enum command command)
 {
     switch (command) {
     case COMMAND_ENABLE_OPERATION:
+        device->leaving = false;
         return false;
     case COMMAND_SWITCH_ON:
-        return enter(device, CIA402_SWITCHED_ON);
+        return leave(device, CIA402_SWITCHED_ON, device->options.disable);
     case COMMAND_SHUTDOWN:
-        return enter(device, CIA402_READY_TO_SWITCH_ON);
+        return leave(device, CIA402_READY_TO_SWITCH_ON, device->options.shutdown);
     case COMMAND_QUICK_STOP:
         return cia402_device_quick_stop(device);
     default:
@@ -130,7 +148,7 @@ bool cia402_device_control(struct cia402_device *device, uint16_t controlword)
     case CIA402_QUICK_STOP_ACTIVE:
         return control_quick_stop(device, command);
     case CIA402_FAULT:
-        return (rising & CIA402_CONTROL_FAULT_RESET) != 0 &&
+        return (rising & CIA402_CONTROL_FAULT_RESET) != 0 && !device->fault_persists &&
                enter(device, CIA402_SWITCH_ON_DISABLED);
     default:
         return false;
@@ -155,6 +173,9 @@ bool cia402_device_stopped(struct cia402_device *device)
     if (device->state == CIA402_FAULT_REACTION_ACTIVE) {
         return enter(device, CIA402_FAULT);
     }
+    if (device->leaving) {
+        return enter(device, device->leaving_to);
+    }
     if (device->state != CIA402_QUICK_STOP_ACTIVE) {
         return false;
     }
@@ -163,13 +184,26 @@ bool cia402_device_stopped(struct cia402_device *device)
            enter(device, CIA402_SWITCH_ON_DISABLED);
 }
 
+bool cia402_device_power_off(struct cia402_device *device)
+{
+    switch (device->state) {
+    case CIA402_READY_TO_SWITCH_ON:
+    case CIA402_SWITCHED_ON:
+    case CIA402_OPERATION_ENABLED:
+    case CIA402_QUICK_STOP_ACTIVE:
+        return enter(device, CIA402_SWITCH_ON_DISABLED);
+    default:
+        return false;
+    }
+}
+
 enum cia402_action cia402_device_action(const struct cia402_device *device)
 {
     switch (device->state) {
     case CIA402_SWITCHED_ON:
         return CIA402_HOLD;
     case CIA402_OPERATION_ENABLED:
-        return CIA402_FOLLOW;
+        return device->leaving ? CIA402_SLOW_DOWN : CIA402_FOLLOW;
     case CIA402_QUICK_STOP_ACTIVE:
         return CIA402_STOP_QUICKLY;
     case CIA402_FAULT_REACTION_ACTIVE:
@@ -185,6 +219,9 @@ uint16_t cia402_device_statusword(const struct cia402_device *device)
 
     if (device->state != CIA402_OPERATION_ENABLED) {
         flags = (uint16_t)(flags & (uint16_t)~CIA402_STATUS_FOLLOWS);
+    }
+    if (device->stopped) {
+        flags |= CIA402_STATUS_TARGET_REACHED;
     }
     return (uint16_t)(flags | cia402_status_bits(device->state));
 }

@@ -19,6 +19,8 @@ enum cia402_action {
     CIA402_HOLD,   /* Switched on: powered, not following; the simulated drive keeps its torque off
                       here too if it likes */
     CIA402_FOLLOW, /* Operation enabled: follow the setpoints */
+    CIA402_SLOW_DOWN,     /* leaving Operation enabled (0x605B, 0x605C): stop, then
+                         cia402_device_stopped */
     CIA402_STOP_QUICKLY,  /* Quick stop active: stop with 0x6085, then cia402_device_stopped */
     CIA402_STOP_FOR_FAULT /* Fault reaction: as 0x605E says, then cia402_device_stopped */
 };
@@ -28,6 +30,8 @@ struct cia402_options {
     int16_t quick_stop; /* 0x605A: 0 power off; 1, 2, 3 stop, then Switch on disabled; 5, 6, 7 stop
                            and stay */
     int16_t fault_reaction; /* 0x605E: 0 power off; 1, 2, 3 stop, then Fault */
+    int16_t shutdown;       /* 0x605B: 0 power off; 1 stop, then Ready to switch on */
+    int16_t disable;        /* 0x605C: 0 power off; 1 stop, then Switched on */
 };
 
 struct cia402_device {
@@ -35,9 +39,13 @@ struct cia402_device {
     struct cia402_options options; /* may change at any time */
     uint16_t controlword;          /* last one, for edges */
     uint16_t flags; /* CIA402_STATUS_... bits beside the state; the drive sets and clears them */
-    bool stopped;   /* in Quick stop active: the motor has come to rest */
+    bool stopped;   /* in Quick stop active: the motor has come to rest; bit 10 of the statusword */
+    bool leaving;   /* Operation enabled, on the way to `leaving_to`; enabling again calls it off */
+    enum cia402_state leaving_to;
+    bool fault_persists; /* set by the drive: the cause is still there, a reset has no effect */
 };
 
+/* Options: 2 for quick stop and fault reaction, 0 (at once) for shutdown and disable operation. */
 void cia402_device_init(struct cia402_device *device);
 
 /* Initialisation is finished: Not ready -> Switch on disabled (transition 1). */
@@ -50,12 +58,15 @@ bool cia402_device_control(struct cia402_device *device, uint16_t controlword);
  * stop. */
 bool cia402_device_fault(struct cia402_device *device);
 
-/* The stop that cia402_device_action asked for is finished: transitions 14, or 12 when 0x605A says
- * so. */
+/* The stop that cia402_device_action asked for is finished: transitions 5, 8, 14, or 12 when 0x605A
+ * says so. */
 bool cia402_device_stopped(struct cia402_device *device);
 
 /* Quick stop from inside (SYNC or heartbeat lost), like transition 11. */
 bool cia402_device_quick_stop(struct cia402_device *device);
+
+/* Power off from inside (0x6007 = 2): any state with power -> Switch on disabled. */
+bool cia402_device_power_off(struct cia402_device *device);
 
 /* What to do in the present state. */
 enum cia402_action cia402_device_action(const struct cia402_device *device);

@@ -24,6 +24,7 @@
 #define EMCY_DC_UNDERVOLTAGE   0x3220u
 #define EMCY_SOFTWARE          0x6100u
 #define EMCY_POSITION_SENSOR   0x7300u
+#define EMCY_POSITION_SENSOR_1 0x7305u /* incremental sensor 1 */
 #define EMCY_COMMUNICATION     0x8100u
 #define EMCY_CAN_OVERRUN       0x8110u
 #define EMCY_CAN_PASSIVE       0x8120u

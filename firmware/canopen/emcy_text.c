@@ -15,6 +15,7 @@ static const struct error_text texts[] = {
     {EMCY_OVERLOAD, 0xFFFF, "continuous over-current (overload)"},
     {EMCY_DC_UNDERVOLTAGE, 0xFFFF, "DC link under-voltage"},
     {EMCY_POSITION_SENSOR, 0xFFFF, "position sensor"},
+    {EMCY_POSITION_SENSOR_1, 0xFFFF, "position sensor"},
     {EMCY_CAN_OVERRUN, 0xFFFF, "CAN overrun: frames lost"},
     {EMCY_CAN_PASSIVE, 0xFFFF, "CAN in error passive mode"},
     {EMCY_HEARTBEAT, 0xFFFF, "heartbeat of another node lost"},

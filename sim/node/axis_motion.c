@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "node/axis_motion.h"
 
+#include <stddef.h>
+
 static void axis_motion_rest(struct axis_motion *axis)
 {
-    axis->target_counts = drive_position_counts(&axis->drive);
+    axis->target_counts = axis_motion_position(axis);
     axis->speed_counts_period = 0;
 }
 
@@ -15,9 +17,18 @@ int axis_motion_init(struct axis_motion *axis, const struct drive_config *config
         return error;
     }
     axis->config = *config;
+    axis->brake_volts = config->plant.volts_limit;
+    axis->machine_mm = 0.0;
+    influence_none(&axis->influence, config);
     drive_place(&axis->drive, position_counts);
     axis_motion_rest(axis);
     return 0;
+}
+
+static void axis_motion_put_scale(struct drive *drive, double counts_per_mm)
+{
+    drive->counts_per_mm = counts_per_mm;
+    drive->mm_per_count = 1.0 / counts_per_mm;
 }
 
 int axis_motion_set_period(struct axis_motion *axis, uint32_t period_us)
@@ -29,6 +40,7 @@ int axis_motion_set_period(struct axis_motion *axis, uint32_t period_us)
     if (error != 0) {
         return error;
     }
+    axis_motion_put_scale(&changed, axis->drive.counts_per_mm);
     drive_place(&changed, drive_position_counts(&axis->drive));
     axis->config = config;
     axis->drive = changed;
@@ -36,40 +48,105 @@ int axis_motion_set_period(struct axis_motion *axis, uint32_t period_us)
     return 0;
 }
 
+bool axis_motion_set_scale(struct axis_motion *axis, double counts_per_mm)
+{
+    const double scale = counts_per_mm == 0.0 ? (double)axis->config.counts_per_mm : counts_per_mm;
+    const double counts = axis->drive.state.motor.position_mm * scale;
+    if (!(scale >= 1.0 && scale <= 1e9 && counts < 2147483647.0 && counts > -2147483648.0)) {
+        return false;
+    }
+    if (scale != axis->drive.counts_per_mm) {
+        axis_motion_put_scale(&axis->drive, scale);
+        drive_hold(&axis->drive);
+        axis_motion_rest(axis);
+    }
+    return true;
+}
+
+/* The model's coordinates are the drive's own, so that a homed axis has the same bits as one that
+ * was there from the beginning; the machine moves in them. */
+void axis_motion_shift(struct axis_motion *axis, int32_t from, int32_t to)
+{
+    const double shift_mm = ((double)to - (double)from) * axis->drive.mm_per_count;
+    const bool exactly = axis_motion_position(axis) == from;
+    axis->machine_mm -= shift_mm;
+    if (exactly) {
+        drive_place(&axis->drive, to);
+    } else {
+        axis->drive.state.motor.position_mm += shift_mm;
+        drive_hold(&axis->drive);
+    }
+    axis_motion_rest(axis);
+}
+
+void axis_motion_offsets(struct axis_motion *axis, int32_t speed_counts_s, double volts)
+{
+    const double mm_s = (double)speed_counts_s * axis->drive.mm_per_count;
+    axis->influence.speed_offset_rad_s = mm_s / axis->config.plant.screw_mm_rad;
+    axis->influence.volts_offset = volts;
+}
+
 void axis_motion_follow(struct axis_motion *axis, int32_t target_counts)
 {
-    drive_period(&axis->drive, target_counts);
+    if (influence_acts(&axis->influence, &axis->drive)) {
+        influence_period(&axis->influence, &axis->drive, target_counts);
+    } else {
+        drive_period(&axis->drive, target_counts);
+    }
     axis->speed_counts_period = (int64_t)target_counts - axis->target_counts;
     axis->target_counts = target_counts;
 }
 
-void axis_motion_hold(struct axis_motion *axis)
+bool axis_motion_hold(struct axis_motion *axis)
 {
-    drive_hold(&axis->drive);
+    const bool rests = influence_coast(&axis->influence, &axis->drive, axis->brake_volts);
     axis_motion_rest(axis);
+    return rests;
 }
 
-/* Change of speed in one period, counts per period: at least one, so that every stop ends. */
-static int64_t axis_motion_slower(const struct axis_motion *axis, uint32_t deceleration_counts_s2)
+/* Change of speed in one period, counts per period: at least one, so that every ramp ends. */
+static int64_t axis_motion_change(const struct axis_motion *axis, uint32_t acceleration_counts_s2)
 {
     const double period_s = (double)axis->config.period_us * 1e-6;
-    const double change = (double)deceleration_counts_s2 * period_s * period_s;
+    const double change = (double)acceleration_counts_s2 * period_s * period_s;
     return change > 1.0 ? (int64_t)change : 1;
 }
 
-bool axis_motion_stop(struct axis_motion *axis, uint32_t deceleration_counts_s2)
+bool axis_motion_ramp(struct axis_motion *axis, int64_t speed_counts_period,
+                      uint32_t acceleration_counts_s2)
 {
-    const int64_t change = axis_motion_slower(axis, deceleration_counts_s2);
+    const int64_t change = axis_motion_change(axis, acceleration_counts_s2);
     int64_t speed = axis->speed_counts_period;
-    if (speed > change) {
-        speed -= change;
-    } else if (speed < -change) {
+    if (speed_counts_period > speed + change) {
         speed += change;
+    } else if (speed_counts_period < speed - change) {
+        speed -= change;
     } else {
-        speed = 0;
+        speed = speed_counts_period;
     }
     int64_t target = axis->target_counts + speed;
     target = target > INT32_MAX ? INT32_MAX : (target < INT32_MIN ? INT32_MIN : target);
     axis_motion_follow(axis, (int32_t)target);
-    return speed == 0;
+    return speed == speed_counts_period;
+}
+
+int32_t axis_motion_position(const struct axis_motion *axis)
+{
+    return influence_read_counts(&axis->influence, &axis->drive);
+}
+
+double axis_motion_place_mm(const struct axis_motion *axis)
+{
+    return axis->drive.state.motor.position_mm + axis->machine_mm;
+}
+
+bool axis_motion_at_rest(const struct axis_motion *axis)
+{
+    return axis->drive.state.motor.speed_rad_s == 0.0;
+}
+
+int32_t axis_motion_speed(const struct axis_motion *axis)
+{
+    const double mm_s = axis->drive.state.motor.speed_rad_s * axis->config.plant.screw_mm_rad;
+    return encoder_to_i32(mm_s * axis->drive.counts_per_mm);
 }

@@ -6,11 +6,7 @@
 #include "canopen/cob.h"
 #include "node/drive_node_private.h"
 
-enum {
-    SDO_TIMEOUT_US = 1000000,
-    HISTORY = 8,
-    NAP_US = 20000 /* a longer gap between two calls of process was this process sleeping */
-};
+enum { SDO_TIMEOUT_US = 1000000, HISTORY = 8 };
 
 void drive_node_send(const struct drive_node *node, const struct can_msg *frame)
 {
@@ -31,16 +27,23 @@ static void drive_node_begin(struct drive_node *node)
     drive_node_pdo_begin(node);
 }
 
+/* The motor, if it moves, runs out on its brake in the periods that follow. */
 static void drive_node_reset(void *context)
 {
     struct drive_node *node = context;
     node->values = od_drive_defaults;
     cia402_device_init(&node->device);
-    node->device.flags |= CIA402_STATUS_VOLTAGE | CIA402_STATUS_FOLLOWS;
     (void)cia402_device_ready(&node->device);
-    axis_motion_hold(&node->axis);
+    (void)axis_motion_set_scale(&node->axis, 0.0);
+    axis_motion_offsets(&node->axis, 0, 0.0);
+    drive_node_homing_leave(node);
+    node->silence_us = 0;
+    node->following_us = 0;
     node->sync_lost = false;
     node->setpoint_fresh = false;
+    node->limit_switch_hit = false;
+    node->software_limit = false;
+    drive_node_no_stop(node);
     drive_node_begin(node);
 }
 
@@ -57,13 +60,13 @@ static void drive_node_reset_communication(void *context)
     drive_node_begin(node);
 }
 
-/* A drive that leaves OPERATIONAL gets no setpoints any more. */
+/* A drive that leaves OPERATIONAL gets no setpoints any more; a stopped one no SYNC either. */
 static void drive_node_changed(void *context, enum nmt_state state)
 {
     struct drive_node *node = context;
     drive_node_pdo_rest(node);
     if (state != NMT_OPERATIONAL) {
-        drive_node_stop_for(node, EMCY_COMMUNICATION);
+        drive_node_disconnect(node, EMCY_COMMUNICATION);
         sync_consumer_init(&node->sync, node->values.synchronous_counter_overflow_value);
     }
 }
@@ -80,9 +83,26 @@ void drive_node_power_on(struct drive_node *node)
     drive_node_reset(node);
 }
 
+bool drive_node_equip(struct drive_node *node, const struct equipment *equipment)
+{
+    if (!equipment_ok(equipment)) {
+        return false;
+    }
+    const struct drive_plant *plant = &node->axis.config.plant;
+    const double rated_volts = equipment->rated_torque_nm * plant->torque_to_volts;
+    node->equipment = *equipment;
+    node->axis.brake_volts = equipment->brake_volts;
+    node->axis.influence.friction_volts = equipment->friction_volts;
+    node->load_per_volt = 1.0 / rated_volts;
+    overload_init(&node->overload, plant->volts_limit / rated_volts, equipment->overload_s);
+    drive_node_od_fill(node);
+    return true;
+}
+
 int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_config *config,
                     int32_t position_counts, struct drive_node_port port)
 {
+    struct equipment equipment;
     memset(node, 0, sizeof *node);
     node->id = id;
     node->port = port;
@@ -90,57 +110,25 @@ int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_conf
     if (error != 0) {
         return error;
     }
+    equipment_init(&equipment, config);
+    (void)drive_node_equip(node, &equipment);
     od_init(&node->od, &od_drive_table, &node->values, &drive_node_od_hooks, node);
     drive_node_power_on(node);
     return 0;
 }
 
-/* SYNC is back after the node ran by itself: its counter is the new beginning. */
-static void drive_node_sync_back(struct drive_node *node)
-{
-    node->sync_lost = false;
-    sync_consumer_init(&node->sync, node->values.synchronous_counter_overflow_value);
-}
-
-static void drive_node_sync(struct drive_node *node, const struct can_msg *in)
-{
-    if (node->sync_lost) {
-        drive_node_sync_back(node);
-    }
-    const int periods = sync_consumer_receive(&node->sync, in);
-    if (periods < 0) {
-        return;
-    }
-    node->sync_seen = true;
-    if (periods == 0) {
-        node->values.simulation.repeated_syncs++;
-    }
-    for (int i = 1; i < periods; i++) {
-        node->values.simulation.lost_syncs++;
-        drive_node_step(node);
-    }
-    drive_node_pdo_report(node);
-    if (periods > 0) {
-        drive_node_pdo_latch(node);
-        drive_node_step(node);
-    }
-}
-
 void drive_node_receive(struct drive_node *node, const struct can_msg *in)
 {
     struct can_msg out;
-    if (node->silent) {
+    if (node->silent || nmt_slave_receive(&node->nmt, in)) {
         return;
     }
-    if (nmt_slave_receive(&node->nmt, in)) {
+    if (in->id == COB_SYNC) {
+        drive_node_sync(node, in);
         return;
     }
     if (nmt_permits_pdo(node->nmt.state)) {
-        if (in->id == COB_SYNC) {
-            drive_node_sync(node, in);
-        } else {
-            drive_node_pdo_receive(node, in);
-        }
+        drive_node_pdo_receive(node, in);
     }
     if (nmt_permits_sdo(node->nmt.state) && sdo_server_wants(&node->sdo, in) &&
         sdo_server_receive(&node->sdo, in, &out) != 0) {
@@ -149,55 +137,30 @@ void drive_node_receive(struct drive_node *node, const struct can_msg *in)
     (void)heartbeat_consumer_receive(&node->master, in);
 }
 
-/* Without SYNC the axis goes by the wall clock until it has stopped. */
-static void drive_node_own_clock(struct drive_node *node, uint32_t elapsed_us)
+static void drive_node_watch_master(struct drive_node *node, uint32_t elapsed_us)
 {
-    node->own_us += elapsed_us;
-    while (node->own_us >= node->axis.config.period_us) {
-        node->own_us -= node->axis.config.period_us;
-        drive_node_step(node);
-    }
-}
-
-static bool drive_node_moves(const struct drive_node *node)
-{
-    const enum cia402_action action = cia402_device_action(&node->device);
-    return action != CIA402_POWER_OFF && action != CIA402_HOLD;
-}
-
-static void drive_node_watch_sync(struct drive_node *node, uint32_t elapsed_us)
-{
-    const uint32_t counted_us = elapsed_us < NAP_US ? elapsed_us : NAP_US;
-    node->silence_us = node->sync_seen ? 0 : node->silence_us + counted_us;
-    node->sync_seen = false;
-    if (node->sync_lost) {
-        drive_node_own_clock(node, counted_us);
-    } else if (!drive_node_moves(node)) {
-        node->silence_us = 0;
-    } else if (node->silence_us > 1000u * (uint32_t)node->values.simulation.sync_timeout) {
-        node->sync_lost = true;
-        node->own_us = 0;
-        drive_node_stop_for(node, EMCY_SYNC_LOST);
+    if (heartbeat_consumer_process(&node->master, elapsed_us) == HEARTBEAT_LOST) {
+        drive_node_disconnect(node, EMCY_HEARTBEAT);
+        nmt_slave_error(&node->nmt, node->values.error_behaviour[0]);
     }
 }
 
 void drive_node_process(struct drive_node *node, uint32_t elapsed_us)
 {
+    const uint32_t awake_us = elapsed_us < DRIVE_NODE_NAP_US ? elapsed_us : DRIVE_NODE_NAP_US;
     struct can_msg out;
     if (node->silent) {
-        axis_motion_hold(&node->axis);
+        drive_node_own_clock(node, awake_us);
         return;
     }
     if (nmt_slave_process(&node->nmt, &out) != 0) {
         drive_node_send(node, &out);
     }
-    drive_node_watch_sync(node, elapsed_us);
+    drive_node_watch_sync(node, awake_us);
     if (nmt_permits_pdo(node->nmt.state)) {
-        drive_node_pdo_process(node, elapsed_us < NAP_US ? elapsed_us : NAP_US);
+        drive_node_pdo_process(node, awake_us);
     }
-    if (heartbeat_consumer_process(&node->master, elapsed_us) == HEARTBEAT_LOST) {
-        drive_node_stop_for(node, EMCY_HEARTBEAT);
-    }
+    drive_node_watch_master(node, elapsed_us);
     if (heartbeat_producer_process(&node->heartbeat, node->values.producer_heartbeat_time,
                                    node->nmt.state, elapsed_us, &out) != 0 &&
         !node->no_heartbeat) {

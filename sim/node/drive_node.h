@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_node: one simulated servo drive on the bus: CANopen slave, CiA 402 drive in CSP mode, axis
- * model.
+/* drive_node: one simulated servo drive on the bus: CANopen slave, CiA 402 drive with the modes CSP
+ * and homing, axis model. What each object does: docs/protocol.md section 5.
  *
  * Time (docs/protocol.md section 2): SYNC j finds the axis at the instant of SYNC j; the node
- * reports it (TPDO1, TPDO2), latches the setpoint that came since SYNC j-1, and computes the period
- * that follows. The SYNC counter is the model's clock: a difference of n means n periods, so the
- * result does not depend on the host's scheduler. While the drive is not enabled the axis is
- * braked.
+ * reports it (its synchronous TPDOs), latches the setpoint that came since SYNC j-1, and computes
+ * the period that follows. The SYNC counter is the model's clock: a difference of n means n periods,
+ * so the result does not depend on the host's scheduler. In PRE-OPERATIONAL time passes with SYNC
+ * too, without PDOs.
  *
- * When SYNC stays away for the time in 0x2101 sub 6 while the drive is enabled, the node goes on by
- * the wall clock, makes a quick stop, sends EMCY 0x8700 and marks the run as not reproducible
- * (0x2101 sub 5), until it is enabled again.
+ * When SYNC stays away for the time in 0x2101 sub 6, or the node is STOPPED, it goes on by the wall
+ * clock. If it was enabled in CSP that is an error: EMCY 0x8700, the reaction of 0x6007, and the run
+ * is marked as not reproducible (0x2101 sub 5), until the drive is enabled again. Homing may go on.
  *
  * Frames in, frames out through the port; no I/O, no heap. All functions in one context.
  */
@@ -30,7 +30,10 @@
 #include "canopen/sdo_server.h"
 #include "canopen/sync.h"
 #include "node/axis_motion.h"
+#include "node/equipment.h"
+#include "node/home_seek.h"
 #include "od_drive.h"
+#include "plant/overload.h"
 
 #define DRIVE_NODE_PDOS 4 /* in each direction */
 
@@ -39,7 +42,8 @@ struct drive_node_port {
     void *context;
 };
 
-/* Contents private, except `values` (the object dictionary), which tests may read. */
+/* Contents private, except `values` (the object dictionary), which tests may read, and what
+ * drives.c needs for its filters: `rpdos`, `pdos_moved`. */
 struct drive_node {
     struct od_drive values;
     struct od od;
@@ -53,30 +57,52 @@ struct drive_node {
     struct pdo_map tpdos[DRIVE_NODE_PDOS];
     struct cia402_device device;
     struct axis_motion axis;
+    struct equipment equipment;
+    struct overload overload;
+    struct home_seek homing;
     struct drive_node_port port;
-    uint32_t silence_us; /* without SYNC */
-    uint32_t own_us;     /* own clock: time not yet turned into periods */
-    bool sync_seen;      /* since the last drive_node_process */
-    bool sync_lost;      /* running on the own clock */
-    bool setpoint_fresh; /* a target came since the last period */
+    double load_per_volt;   /* motor load in units of the rated torque */
+    double jump_mm;         /* node_fault.h: part of the encoder's error */
+    int32_t homing_edge;    /* where home was passed */
+    uint32_t forced_inputs; /* node_fault.h: switches that are on whatever the axis does */
+    uint32_t silence_us;    /* without SYNC */
+    uint32_t own_us;        /* own clock: time not yet turned into periods */
+    uint32_t following_us;  /* following error out of its window */
+    uint32_t settled_us;    /* a stop: at rest within the position window */
+    uint32_t stopping_us;   /* a stop: since its ramp has ended */
+    bool sync_seen;         /* since the last drive_node_process */
+    bool sync_lost;         /* running on the own clock */
+    bool setpoint_fresh;    /* a target came since the last period */
     bool pdos_moved; /* the identifiers of RPDOs changed: for the owner's filters, who clears it */
     bool pdos_want_all; /* a TPDO maps more than what is always up to date */
-    bool silent;        /* as without power: node_fault.h */
-    bool no_heartbeat;  /* node_fault.h */
+    bool offsets_act;   /* the last period had a feedforward */
+    bool homed;
+    bool homing_asked;     /* bit 4 of the last controlword */
+    bool limit_switch_hit; /* the present stop is because of it */
+    bool software_limit;   /* the setpoint is outside 0x607D */
+    bool encoder_failed;   /* node_fault.h, as the next three */
+    bool supply_failed;
+    bool silent;
+    bool no_heartbeat;
     uint8_t id;
 };
 
-/* id: 1 ... 127. The first period is 1 ms, until 0x1006 or 0x60C2 says otherwise. Returns 0 or an
- * enum drive_error. The boot-up frame leaves with the first drive_node_process. */
+/* id: 1 ... 127. The first period is that of the configuration, until 0x1006 or 0x60C2 says
+ * otherwise. Returns 0 or an enum drive_error. The boot-up frame leaves with the first
+ * drive_node_process. */
 int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_config *config,
                     int32_t position_counts, struct drive_node_port port);
+
+/* Other equipment than equipment_init gives; right after drive_node_init. Returns false, and nothing
+ * changes, when a figure is out of range. */
+bool drive_node_equip(struct drive_node *node, const struct equipment *equipment);
 
 /* A frame from the bus; others than this node's are ignored. */
 void drive_node_receive(struct drive_node *node, const struct can_msg *in);
 
-/* Lets wall time pass: boot-up, heartbeat, SDO timeouts, EMCY, loss of SYNC. Call it at least every
- * 20 ms; an interval above that counts as 20 ms for the loss of SYNC, since then it was this
- * process that slept. */
+/* Lets wall time pass: boot-up, heartbeat, SDO timeouts, EMCY, PDO times, loss of SYNC. Call it at
+ * least every 20 ms; an interval above that counts as 20 ms where silence is judged, since then it
+ * was this process that slept. */
 void drive_node_process(struct drive_node *node, uint32_t elapsed_us);
 
 #endif

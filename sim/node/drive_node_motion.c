@@ -1,97 +1,131 @@
 /* SPDX-License-Identifier: MIT */
 #include "node/drive_node_private.h"
 
-/* A drive that is switched on by hand, without a setpoint, stays where it is. */
+#define CONTROL_HOMING_START 0x0010u
+
+/* 0x605A and 0x605E: the slow down ramp 0x6084 instead of the quick stop ramp 0x6085. */
+enum { RAMP_SLOW = 1, RAMP_SLOW_AND_STAY = 5 };
+
+/* The beginning of Operation enabled. A drive that is switched on by hand, without a setpoint, stays
+ * where it is. */
 static void drive_node_enabled(struct drive_node *node)
 {
     node->values.simulation.reproducible = 1;
-    node->values.error_code = EMCY_NO_ERROR;
-    emcy_producer_clear(&node->emcy, EMCY_REGISTER_COMMUNICATION);
+    node->silence_us = 0;
+    node->sync_lost = false;
+    drive_node_forgive(node);
     if (!node->setpoint_fresh) {
         node->values.target_position = node->axis.target_counts;
     }
 }
 
-void drive_node_control(struct drive_node *node, uint16_t controlword)
+static void drive_node_take_options(struct drive_node *node)
 {
-    node->values.controlword = controlword;
-    node->device.options.quick_stop = node->values.quick_stop_option_code;
-    node->device.options.fault_reaction = node->values.fault_reaction_option_code;
-    const bool changed = cia402_device_control(&node->device, controlword);
-    if (changed && cia402_device_action(&node->device) == CIA402_FOLLOW) {
-        drive_node_enabled(node);
-    }
+    struct cia402_options *options = &node->device.options;
+    options->quick_stop = node->values.quick_stop_option_code;
+    options->fault_reaction = node->values.fault_reaction_option_code;
+    options->shutdown = node->values.shutdown_option_code;
+    options->disable = node->values.disable_operation_option_code;
 }
 
-/* The setpoint within the software limits 0x607D; bit 11 of the statusword says when they bind. */
+void drive_node_control(struct drive_node *node, uint16_t controlword)
+{
+    const bool was_fault = node->device.state == CIA402_FAULT;
+    const bool was_enabled = node->device.state == CIA402_OPERATION_ENABLED;
+    node->values.controlword = controlword;
+    drive_node_take_options(node);
+    node->device.fault_persists = was_fault && drive_node_cause_persists(node);
+    const bool changed = cia402_device_control(&node->device, controlword);
+    if (changed && was_fault) {
+        drive_node_forgive(node);
+    }
+    if (changed && !was_enabled && cia402_device_action(&node->device) == CIA402_FOLLOW) {
+        drive_node_enabled(node);
+    }
+    drive_node_homing_control(node, (controlword & CONTROL_HOMING_START) != 0);
+}
+
+/* The setpoint within the software limits 0x607D. */
 static int32_t drive_node_target(struct drive_node *node)
 {
     const int32_t asked = node->values.target_position;
     const int32_t low = node->values.software_position_limit[0];
     const int32_t high = node->values.software_position_limit[1];
     const int32_t target = asked < low ? low : (asked > high ? high : asked);
-    if (target != asked) {
-        node->device.flags |= CIA402_STATUS_LIMIT;
-    } else {
-        node->device.flags &= (uint16_t)~CIA402_STATUS_LIMIT;
-    }
+    node->software_limit = target != asked;
     return target;
+}
+
+/* Velocity and torque offset 0x60B1, 0x60B2 of this period. */
+static void drive_node_offsets(struct drive_node *node, bool on)
+{
+    const int32_t speed = on ? node->values.velocity_offset : 0;
+    const int16_t torque = on ? node->values.torque_offset : 0;
+    const bool act = speed != 0 || torque != 0;
+    if (act || node->offsets_act) {
+        axis_motion_offsets(&node->axis, speed, 0.001 * (double)torque / node->load_per_volt);
+    }
+    node->offsets_act = act;
+}
+
+static uint32_t drive_node_quick_ramp(const struct drive_node *node, int16_t option)
+{
+    return option == RAMP_SLOW || option == RAMP_SLOW_AND_STAY
+               ? node->values.profile_deceleration
+               : node->values.quick_stop_deceleration;
+}
+
+/* Returns false when the setpoint leads further onto a limit switch: nothing has moved yet. */
+static bool drive_node_follow(struct drive_node *node)
+{
+    const int32_t target = drive_node_target(node);
+    if (drive_node_against_switch(node, (int64_t)target - node->axis.target_counts)) {
+        node->limit_switch_hit = true;
+        drive_node_quick_stop(node, EMCY_POSITION_LIMIT, target < node->axis.target_counts ? 1 : 2);
+        return false;
+    }
+    drive_node_offsets(node, true);
+    axis_motion_follow(&node->axis, target);
+    return true;
+}
+
+static void drive_node_move(struct drive_node *node)
+{
+    const struct od_drive *v = &node->values;
+    const enum cia402_action action = cia402_device_action(&node->device);
+    if (action == CIA402_FOLLOW && v->modes_of_operation_display != CIA402_MODE_HOMING) {
+        if (drive_node_follow(node)) {
+            return;
+        }
+        drive_node_move(node);
+        return;
+    }
+    drive_node_offsets(node, false);
+    switch (action) {
+    case CIA402_FOLLOW:
+        drive_node_homing_step(node);
+        break;
+    case CIA402_SLOW_DOWN:
+        drive_node_stop(node, v->profile_deceleration);
+        break;
+    case CIA402_STOP_QUICKLY:
+        drive_node_stop(node, drive_node_quick_ramp(node, v->quick_stop_option_code));
+        break;
+    case CIA402_STOP_FOR_FAULT:
+        drive_node_stop(node, drive_node_quick_ramp(node, v->fault_reaction_option_code));
+        break;
+    default:
+        drive_node_no_stop(node);
+        (void)axis_motion_hold(&node->axis);
+        break;
+    }
 }
 
 void drive_node_step(struct drive_node *node)
 {
-    switch (cia402_device_action(&node->device)) {
-    case CIA402_FOLLOW:
-        axis_motion_follow(&node->axis, drive_node_target(node));
-        break;
-    case CIA402_STOP_QUICKLY:
-    case CIA402_STOP_FOR_FAULT:
-        if (axis_motion_stop(&node->axis, node->values.quick_stop_deceleration)) {
-            (void)cia402_device_stopped(&node->device);
-        }
-        break;
-    default:
-        axis_motion_hold(&node->axis);
-        break;
-    }
+    drive_node_mode_take(node);
+    drive_node_move(node);
+    drive_node_watch(node);
     node->setpoint_fresh = false;
     node->values.simulation.periods++;
-}
-
-void drive_node_stop_for(struct drive_node *node, uint16_t code)
-{
-    if (cia402_device_action(&node->device) != CIA402_FOLLOW) {
-        return;
-    }
-    node->values.error_code = code;
-    node->values.simulation.reproducible = 0;
-    emcy_producer_raise(&node->emcy, code, EMCY_REGISTER_COMMUNICATION, NULL);
-    (void)cia402_device_quick_stop(&node->device);
-}
-
-/* Bits of 0x1001 for an error code, by its class (CiA 301 table 26). */
-static uint8_t drive_node_register_bits(uint16_t code)
-{
-    switch (code >> 12) {
-    case 2:
-        return EMCY_REGISTER_CURRENT;
-    case 3:
-        return EMCY_REGISTER_VOLTAGE;
-    case 4:
-        return EMCY_REGISTER_TEMPERATURE;
-    case 8:
-        return (code & 0xFF00u) <= 0x8200u ? EMCY_REGISTER_COMMUNICATION : EMCY_REGISTER_PROFILE;
-    case 15:
-        return EMCY_REGISTER_MANUFACTURER;
-    default:
-        return EMCY_REGISTER_GENERIC;
-    }
-}
-
-void drive_node_fail(struct drive_node *node, uint16_t code)
-{
-    if (cia402_device_fault(&node->device)) {
-        node->values.error_code = code;
-        emcy_producer_raise(&node->emcy, code, drive_node_register_bits(code), NULL);
-    }
 }

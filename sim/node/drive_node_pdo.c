@@ -150,7 +150,7 @@ void drive_node_pdo_process(struct drive_node *node, uint32_t elapsed_us)
     drive_node_pdo_events(node, elapsed_us);
     for (int i = 0; i < DRIVE_NODE_PDOS; i++) {
         if (pdo_map_overdue(&node->rpdos[i], elapsed_us)) {
-            drive_node_stop_for(node, EMCY_RPDO_TIMEOUT);
+            drive_node_disconnect(node, EMCY_RPDO_TIMEOUT);
         }
     }
 }

@@ -1,12 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "plant/drive.h"
 
-/* Setpoints of one period: command at sample i is start + i * step. */
-struct command {
-    double start_mm;
-    double step_mm;
-    double speed_mm_s;
-};
+#include "plant/drive_private.h"
 
 static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
 {
@@ -72,11 +67,9 @@ static bool drive_near_target(const struct drive *d)
     return away_mm <= most_mm && away_mm >= -most_mm;
 }
 
-/* Counts the periods of one target and parks the axis when its time has come. Returns whether it
- * stays parked. */
-static bool drive_stays_parked(struct drive *d, int32_t target_counts)
+bool drive_stays_parked(struct drive *d, int32_t target_counts, bool may_park)
 {
-    if (target_counts != d->target_counts) {
+    if (target_counts != d->target_counts || !may_park) {
         d->same_target_periods = 0;
         d->parked = false;
         return false;
@@ -92,9 +85,9 @@ static bool drive_stays_parked(struct drive *d, int32_t target_counts)
 
 /* The step is one multiplication of the exact difference in counts: a difference of two rounded
  * positions in mm would put noise on the speed feedforward. */
-static struct command drive_command(struct drive *d, int32_t target_counts)
+struct drive_command drive_command(struct drive *d, int32_t target_counts)
 {
-    struct command c;
+    struct drive_command c;
     const double counts = (double)target_counts - (double)d->target_counts;
     c.start_mm = (double)d->target_counts * d->mm_per_count;
     c.step_mm = counts * d->mm_per_count * d->sample_fraction;
@@ -104,7 +97,7 @@ static struct command drive_command(struct drive *d, int32_t target_counts)
 }
 
 static inline void drive_sample(const struct drive *d, struct drive_state *state,
-                                const struct command *c, uint32_t i)
+                                const struct drive_command *c, uint32_t i)
 {
     const struct pdff_input in = {
         .command_mm = c->start_mm + (double)i * c->step_mm,
@@ -119,7 +112,7 @@ static inline void drive_sample(const struct drive *d, struct drive_state *state
 /* The loops work on copies of the state, which the compiler can keep in registers. */
 static void drive_run(struct drive *d, int32_t target_counts)
 {
-    const struct command c = drive_command(d, target_counts);
+    const struct drive_command c = drive_command(d, target_counts);
     struct drive_state state = d->state;
     for (uint32_t i = 0; i < d->samples; i++) {
         drive_sample(d, &state, &c, i);
@@ -130,8 +123,8 @@ static void drive_run(struct drive *d, int32_t target_counts)
 static void drive_run_pair(struct drive *first, struct drive *second,
                            const int32_t target_counts[2])
 {
-    const struct command c0 = drive_command(first, target_counts[0]);
-    const struct command c1 = drive_command(second, target_counts[1]);
+    const struct drive_command c0 = drive_command(first, target_counts[0]);
+    const struct drive_command c1 = drive_command(second, target_counts[1]);
     struct drive_state state0 = first->state;
     struct drive_state state1 = second->state;
     for (uint32_t i = 0; i < first->samples; i++) {
@@ -144,15 +137,15 @@ static void drive_run_pair(struct drive *first, struct drive *second,
 
 void drive_period(struct drive *d, int32_t target_counts)
 {
-    if (!drive_stays_parked(d, target_counts)) {
+    if (!drive_stays_parked(d, target_counts, true)) {
         drive_run(d, target_counts);
     }
 }
 
 void drive_period_pair(struct drive *first, struct drive *second, const int32_t target_counts[2])
 {
-    const bool first_parked = drive_stays_parked(first, target_counts[0]);
-    const bool second_parked = drive_stays_parked(second, target_counts[1]);
+    const bool first_parked = drive_stays_parked(first, target_counts[0], true);
+    const bool second_parked = drive_stays_parked(second, target_counts[1], true);
     if (!first_parked && !second_parked && first->samples == second->samples) {
         drive_run_pair(first, second, target_counts);
         return;

@@ -51,4 +51,25 @@ static inline double pdff_step(const struct pdff *pdff, double *integral_rad,
     return volts;
 }
 
+/* The same with a feedforward from outside: rad/s added to the speed reference, volts to the output.
+ * With both 0 the same bits. */
+static inline double pdff_step_offset(const struct pdff *pdff, double *integral_rad,
+                                      const struct pdff_input *in, double speed_offset_rad_s,
+                                      double volts_offset)
+{
+    const double speed_ref = pdff->k_pp_rad_s_mm * (in->command_mm - in->position_mm) +
+                             pdff->k_pf_rad_mm * in->command_mm_s + speed_offset_rad_s;
+    const double early =
+        pdff->volts_per_integral * *integral_rad - pdff->volts_per_speed * in->speed_rad_s;
+    const double volts = pdff->volts_per_ref * speed_ref + early + volts_offset;
+    if (volts > pdff->volts_limit) {
+        return pdff->volts_limit;
+    }
+    if (volts < -pdff->volts_limit) {
+        return -pdff->volts_limit;
+    }
+    *integral_rad += pdff->step_s * (speed_ref - in->speed_rad_s);
+    return volts;
+}
+
 #endif

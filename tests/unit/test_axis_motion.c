@@ -41,7 +41,7 @@ static void test_stop_is_a_ramp_of_the_deceleration(void)
     }
     int periods = 1;
     int64_t before = axis.speed_counts_period;
-    while (!axis_motion_stop(&axis, 2000000000u)) {
+    while (!axis_motion_ramp(&axis, 0, 2000000000u)) {
         TEST_ASSERT_EQUAL_INT64(before - 2000, axis.speed_counts_period);
         before = axis.speed_counts_period;
         periods++;
@@ -56,10 +56,10 @@ static void test_stop_works_both_ways(void)
     for (int k = 1; k <= 10; k++) {
         axis_motion_follow(&axis, -2000000 - 5000 * k);
     }
-    TEST_ASSERT_FALSE(axis_motion_stop(&axis, 2000000000u));
+    TEST_ASSERT_FALSE(axis_motion_ramp(&axis, 0, 2000000000u));
     TEST_ASSERT_EQUAL_INT64(-3000, axis.speed_counts_period);
-    TEST_ASSERT_FALSE(axis_motion_stop(&axis, 2000000000u));
-    TEST_ASSERT_TRUE(axis_motion_stop(&axis, 2000000000u));
+    TEST_ASSERT_FALSE(axis_motion_ramp(&axis, 0, 2000000000u));
+    TEST_ASSERT_TRUE(axis_motion_ramp(&axis, 0, 2000000000u));
     TEST_ASSERT_EQUAL_INT32(-2050000 - 3000 - 1000, axis.target_counts);
 }
 
@@ -67,26 +67,86 @@ static void test_stop_ends_with_the_smallest_deceleration(void)
 {
     axis_motion_follow(&axis, -1999990);
     int periods = 1;
-    while (!axis_motion_stop(&axis, 0)) {
+    while (!axis_motion_ramp(&axis, 0, 0)) {
         TEST_ASSERT_LESS_THAN_INT(20, periods);
         periods++;
     }
-    TEST_ASSERT_TRUE(axis_motion_stop(&axis, 0));
+    TEST_ASSERT_TRUE(axis_motion_ramp(&axis, 0, 0));
 }
 
-static void test_hold_freezes_the_axis(void)
+/* The brake is as strong as the motor: 5 V of 83 rad/s/V over 0.2 s take 3310 mm/s^2, and the
+ * damping helps. From 50 mm/s the way is below v^2 / 2a = 0.38 mm. */
+static void test_without_power_the_brake_stops_the_motor(void)
 {
-    for (int k = 1; k < 50; k++) {
+    for (int k = 1; k < 200; k++) {
         axis_motion_follow(&axis, -2000000 + 50000 * k);
     }
-    axis_motion_hold(&axis);
-    const int32_t position = drive_position_counts(&axis.drive);
+    const int32_t from = axis_motion_position(&axis);
+    int periods = 1;
+    while (!axis_motion_hold(&axis)) {
+        TEST_ASSERT_EQUAL_INT16(0, drive_volts_mv(&axis.drive));
+        TEST_ASSERT_LESS_THAN_INT(20, periods);
+        periods++;
+    }
+    const int32_t position = axis_motion_position(&axis);
+    TEST_ASSERT_GREATER_THAN_INT(10, periods);
+    TEST_ASSERT_INT32_WITHIN(60000, 340000, position - from);
+    TEST_ASSERT_TRUE(axis_motion_at_rest(&axis));
     for (int k = 0; k < 300; k++) {
-        axis_motion_hold(&axis);
-        TEST_ASSERT_EQUAL_INT32(position, drive_position_counts(&axis.drive));
+        TEST_ASSERT_TRUE(axis_motion_hold(&axis));
+        TEST_ASSERT_EQUAL_INT32(position, axis_motion_position(&axis));
     }
     TEST_ASSERT_EQUAL_INT32(position, axis.target_counts);
-    TEST_ASSERT_EQUAL_INT16(0, drive_volts_mv(&axis.drive));
+}
+
+static void test_a_load_stronger_than_the_brake_moves_it(void)
+{
+    axis.influence.load_volts = 4.0;
+    TEST_ASSERT_TRUE(axis_motion_hold(&axis));
+    axis.influence.load_volts = 6.0;
+    for (int k = 0; k < 100; k++) {
+        TEST_ASSERT_FALSE(axis_motion_hold(&axis));
+    }
+    TEST_ASSERT_LESS_THAN_INT32(-2010000, axis_motion_position(&axis));
+}
+
+static void test_scale_is_a_unit_of_the_same_place(void)
+{
+    TEST_ASSERT_TRUE(axis_motion_set_scale(&axis, 1000.0));
+    TEST_ASSERT_EQUAL_INT32(-2000, axis_motion_position(&axis));
+    for (int k = 0; k < 500; k++) {
+        axis_motion_follow(&axis, -1000);
+    }
+    TEST_ASSERT_TRUE(drive_parked(&axis.drive));
+    TEST_ASSERT_EQUAL_INT32(-1000, axis_motion_position(&axis));
+    TEST_ASSERT_EQUAL_INT(0, axis_motion_set_period(&axis, 2000));
+    TEST_ASSERT_EQUAL_INT32(-1000, axis_motion_position(&axis));
+    TEST_ASSERT_TRUE(axis_motion_set_scale(&axis, 0.0));
+    TEST_ASSERT_INT32_WITHIN(5, -1000000, axis_motion_position(&axis));
+    TEST_ASSERT_FALSE(axis_motion_set_scale(&axis, 0.5));
+    TEST_ASSERT_FALSE(axis_motion_set_scale(&axis, 2e9));
+}
+
+static void test_another_zero_at_the_same_place(void)
+{
+    const double place_mm = axis_motion_place_mm(&axis);
+    axis_motion_shift(&axis, -2500000, 100);
+    TEST_ASSERT_INT32_WITHIN(5, 500100, axis_motion_position(&axis));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, place_mm, axis_motion_place_mm(&axis));
+    axis_motion_shift(&axis, axis_motion_position(&axis), 0);
+    TEST_ASSERT_EQUAL_INT32(0, axis_motion_position(&axis));
+    TEST_ASSERT_TRUE(drive_parked(&axis.drive));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, place_mm, axis_motion_place_mm(&axis));
+}
+
+static void test_a_ramp_up_and_down(void)
+{
+    int periods = 1;
+    while (!axis_motion_ramp(&axis, -5000, 500000000u)) {
+        periods++;
+    }
+    TEST_ASSERT_EQUAL_INT(10, periods);
+    TEST_ASSERT_EQUAL_INT64(-5000, axis.speed_counts_period);
 }
 
 static void test_period_changes_at_the_same_place(void)
@@ -107,7 +167,11 @@ int main(void)
     RUN_TEST(test_stop_is_a_ramp_of_the_deceleration);
     RUN_TEST(test_stop_works_both_ways);
     RUN_TEST(test_stop_ends_with_the_smallest_deceleration);
-    RUN_TEST(test_hold_freezes_the_axis);
+    RUN_TEST(test_without_power_the_brake_stops_the_motor);
+    RUN_TEST(test_a_load_stronger_than_the_brake_moves_it);
+    RUN_TEST(test_scale_is_a_unit_of_the_same_place);
+    RUN_TEST(test_another_zero_at_the_same_place);
+    RUN_TEST(test_a_ramp_up_and_down);
     RUN_TEST(test_period_changes_at_the_same_place);
     return UNITY_END();
 }

@@ -334,7 +334,7 @@ static void test_objects_follow_the_model(void)
 {
     TEST_ASSERT_EQUAL_INT64(1048576, read_object(0x608F, 1));
     TEST_ASSERT_EQUAL_INT64(9990265, read_object(0x6092, 1));
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, refusal(0x6060, 0, CIA402_MODE_HOMING, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, refusal(0x6060, 0, 3, 1));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, refusal(0x1003, 0, 1, 1));
     enable();
     for (int k = 0; k < 200; k++) {
