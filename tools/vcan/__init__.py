@@ -5,7 +5,10 @@ main       command line
 kernel     the buses of this kernel: vcan0 that is there, or in a network namespace of their own
 client     runs one command on a user-mode bus, passing its streams, signals and exit status
 broker     owns the user-mode Linux process; joins clients to the agent; ends and cleans everything
-agent      first process inside user-mode Linux: starts the commands
+user_mode  starts and ends that process
+agent      first process inside user-mode Linux: starts the commands, opens connections
+channel    what has streams inside: a command (job) or a TCP connection (connection)
+forward    TCP ports outside, passed on to ports beside the bus
 frames     what client, broker and agent say to each other
 registry   which buses are open
 """

@@ -2,7 +2,7 @@
 """Frames of the multiplexed channel between client, broker and agent.
 
 A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command
-inside (later perhaps one TCP connection). Data flows against credit, so that a slow reader holds up only
+inside, or one TCP connection to a port inside. Data flows against credit, so that a slow reader holds up only
 itself: each side may send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
 
 The line itself needs the same once more: a serial line of user-mode Linux whose 4096-byte input buffer
@@ -23,6 +23,7 @@ LONGEST = 4 * 1024 * 1024
 LINE_IN = 2048
 LINE_OUT = 64 * 1024
 ACK = struct.Struct("<I")  # LINE_ACK: bytes taken from the line
+PORT = struct.Struct("<H")  # CONNECT
 
 READY = 1  # agent to broker, broker to clients: booted, the bus is up
 OPEN = 2  # client: JSON of the command: argv, env, cwd, umask, uid, gid, groups
@@ -33,6 +34,7 @@ EXIT = 6  # agent: exit status of the command (128 + number when a signal ended 
 FAIL = 7  # broker: text; there is no bus (any more)
 CLOSE = 8  # broker: the client of this channel is gone
 LINE_ACK = 9  # broker and agent to each other
+CONNECT = 10  # client: port u16; then DATA of STDIN and STDOUT as for a command, EXIT 0 at the end or errno
 
 STDIN, STDOUT, STDERR = 0, 1, 2
 
@@ -55,7 +57,7 @@ class Decoder:
         start = 0
         while len(self._buffer) - start >= HEADER.size:
             kind, channel, length = HEADER.unpack_from(self._buffer, start)
-            if not READY <= kind <= LINE_ACK or length > LONGEST:
+            if not READY <= kind <= CONNECT or length > LONGEST:
                 raise ValueError(f"frame of type {kind} and length {length}")
             end = start + HEADER.size + length
             if len(self._buffer) < end:

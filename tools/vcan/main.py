@@ -18,9 +18,10 @@ from json import dumps, loads
 from typing import NoReturn
 
 import packages
-from vcan import broker, kernel, registry
+from vcan import broker, forward, kernel, registry
 from vcan.client import Client
 from vcan.errors import BusUnavailable
+from vcan.forward import Forward
 from vcan.registry import Bus
 
 _TROUBLE = 125
@@ -42,7 +43,7 @@ def main(arguments: list[str]) -> int:
         if options.list:
             return _list()
         if options.join:
-            return _join(options.bus, options.command)
+            return _join(options)
         return _open(options)
     except BusUnavailable as error:
         print(f"with-vcan: {error}", file=sys.stderr)
@@ -68,6 +69,13 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--user-mode", action="store_true", help="user-mode Linux, even where the kernel has CAN"
     )
+    parser.add_argument(
+        "--forward",
+        action="append",
+        default=[],
+        metavar="OUTSIDE[:INSIDE]",
+        help="serve 127.0.0.1:OUTSIDE here, passed on to the port INSIDE beside the bus; repeatable",
+    )
     parser.add_argument("--name", help="name of the new bus; default: bus-PID")
     parser.add_argument(
         "--cpu",
@@ -86,6 +94,10 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
         parser.error("COMMAND is missing")
     if not re.fullmatch(r"\d+[MG]", options.memory):
         parser.error(f"--memory {options.memory}: a number followed by M or G is needed")
+    try:
+        options.forward = [forward.parse(text) for text in options.forward]
+    except ValueError as error:
+        parser.error(f"--forward {error}")
     if options.cpu is not None and options.cpu not in os.sched_getaffinity(0):
         parser.error(f"--cpu {options.cpu}: this process may use {sorted(os.sched_getaffinity(0))}")
     return options
@@ -104,26 +116,36 @@ def _list() -> int:
     return 0
 
 
-def _join(name: str | None, command: list[str]) -> int:
+def _join(options: argparse.Namespace) -> int:
     if registry.in_user_mode_linux() and kernel.has_bus():
-        _become(command)
-    bus = registry.choose(name)
+        options.forward = _elsewhere(options.forward)
+        _become_beside(options, forward.listen(options.forward))
+    bus = registry.choose(options.bus)
+    listeners = forward.listen(options.forward)
     if bus.kind == "namespace":
         kernel.join_namespace(bus.pid)
-        _become(command)
+        _become_beside(options, listeners)
+    broker_socket = bus.folder / "socket"
     connection = socket.socket(socket.AF_UNIX)
     try:
-        connection.connect(str(bus.folder / "socket"))
+        connection.connect(str(broker_socket))
     except OSError as error:
         raise BusUnavailable(f"bus {bus.name} does not answer: {error.strerror}") from error
-    return Client(connection, command).run()
+    forward.through_broker(options.forward, listeners, broker_socket)
+    return Client(connection, options.command).run()
+
+
+def _elsewhere(forwards: list[Forward]) -> list[Forward]:
+    """Those that are needed where the command has the loopback of this process: to other ports."""
+    return [each for each in forwards if each.outside != each.inside]
 
 
 def _open(options: argparse.Namespace) -> int:
     if not options.user_mode:
         if kernel.has_bus() and not options.own:
             kernel.complete()
-            _become(options.command)
+            options.forward = _elsewhere(options.forward)
+            _become_beside(options, forward.listen(options.forward))
         if kernel.can_make_namespace():
             _open_namespace(options)
     if registry.in_user_mode_linux():
@@ -133,6 +155,11 @@ def _open(options: argparse.Namespace) -> int:
             "this kernel has no CAN (no vcan0, and none can be made), and user-mode Linux is missing: see above"
         )
     return _open_user_mode(options)
+
+
+def _become_beside(options: argparse.Namespace, listeners: list[socket.socket]) -> NoReturn:
+    forward.beside(options.forward, listeners)
+    _become(options.command)
 
 
 def _become(command: list[str]) -> NoReturn:
@@ -149,11 +176,13 @@ def _open_namespace(options: argparse.Namespace) -> NoReturn:
     os.set_inheritable(
         lock, True
     )  # the bus is open as long as the command, or a child of it, lives
+    listeners = forward.listen(options.forward)
     kernel.enter_new_namespace()
-    _become(options.command)
+    _become_beside(options, listeners)
 
 
 def _open_user_mode(options: argparse.Namespace) -> int:
+    listeners = forward.listen(options.forward)
     cpu = options.cpu if options.cpu is not None else _quietest_cpu()
     bus = Bus(options.name or f"bus-{os.getpid()}", "user-mode", os.getpid(), cpu, options.command)
     here, there = socket.socketpair()
@@ -173,6 +202,7 @@ def _open_user_mode(options: argparse.Namespace) -> int:
         start_new_session=True,
     )
     there.close()
+    forward.through_broker(options.forward, listeners, bus.folder / "socket")
     try:
         return Client(here, options.command).run()
     finally:

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""What the agent passes streams of: something with an input and outputs, a command or a TCP connection."""
+
+from __future__ import annotations
+
+import os
+
+from vcan import frames
+
+
+class Channel:
+    """One channel of the line. Descriptors do not block."""
+
+    def __init__(self, number: int, stdin: int, outputs: dict[int, int]) -> None:
+        self.number = number
+        self.stdin = stdin
+        self.outputs = outputs
+        """Descriptors to read from, and their streams."""
+        self.status: int | None = None
+        """Once it is known how it ended."""
+        self.stdin_queue = bytearray()
+        self.stdin_ended = False
+        self.credit = {frames.STDOUT: frames.WINDOW, frames.STDERR: frames.WINDOW}
+
+    def close_stdin(self) -> None:
+        """Nothing more goes in."""
+        if self.stdin >= 0:
+            os.close(self.stdin)
+            self.stdin = -1
+        self.stdin_queue.clear()
+
+    def output_ended(self, fd: int, trouble: int) -> None:
+        """Nothing more comes from this descriptor, because of errno `trouble` or in order (0)."""
+        del self.outputs[fd]
+        os.close(fd)
+
+    def close(self) -> None:
+        """Gives all descriptors back."""
+        self.close_stdin()
+        for fd in self.outputs:
+            os.close(fd)
+        self.outputs = {}
+
+    def signal(self, number: int) -> None:
+        """A signal for whoever is behind it."""
+
+    def abandon(self) -> None:
+        """Nobody listens any more, and it is closed."""
