@@ -10,7 +10,7 @@
 void tick_init(struct tick *tick, struct machine *machine)
 {
     tick->machine = machine;
-    feedforward_init(&tick->feedforward);
+    offsets_init(&tick->offsets);
     sync_producer_init(&tick->sync, SYNC_COUNTER_OVERFLOW);
 }
 
@@ -36,8 +36,8 @@ static void find_offsets(struct tick *tick, struct feedforward_offset offset[AXE
     const struct machine *machine = tick->machine;
     memset(offset, 0, AXES_MAX * sizeof offset[0]);
     if (machine->config.feedforward != 0u) {
-        feedforward_step(&tick->feedforward, &machine->config,
-                         machine_moving(machine) ? &machine->motion : NULL, offset);
+        offsets_step(&tick->offsets, &machine->config,
+                     machine_moving(machine) ? &machine->motion : NULL, offset);
     }
 }
 

@@ -6,8 +6,8 @@
 
 #include <stdint.h>
 
-#include "app/feedforward.h"
 #include "app/machine.h"
+#include "app/offsets.h"
 #include "canopen/sync.h"
 
 /* A SYNC that a simulated drive leaves unanswered is followed by the next one after this time. */
@@ -16,7 +16,7 @@
 struct tick {
     struct machine *machine;
     struct sync_producer sync;
-    struct feedforward feedforward;
+    struct offsets offsets;
 };
 
 void tick_init(struct tick *tick, struct machine *machine);
