@@ -16,9 +16,10 @@ enum drive_fact {
     DRIVE_MODES,         /* 0x6502 */
     DRIVE_INPUTS,        /* 0x60FD exists; its value then */
     DRIVE_INPUTS_MAPPED, /* and TPDO3 tells its changes */
-    DRIVE_FACTS,
-    DRIVE_NO_FACT = DRIVE_FACTS, /* of a step that learns nothing */
+    DRIVE_NO_FACT,       /* of a step that learns nothing */
 };
+
+#define DRIVE_FACTS ((unsigned)DRIVE_NO_FACT)
 
 #define DRIVE_VENDOR_SIMULATED  0u /* no real vendor has it */
 #define DRIVE_PRODUCT_SIMULATED 2u /* sim/node/drive.eds */

@@ -183,6 +183,11 @@ static uint64_t machine_number(const struct controller *controller, const struct
         return override_number(machine, entry->sub);
     case 0x2025:
         return boot_number(&controller->boot, entry->sub);
+    case 0x2027:
+    case 0x2028:
+    case 0x2029:
+    case 0x202A:
+        return controller->boot.facts[entry->sub - 1u].value[entry->index - 0x2027u];
     default:
         return axis_number(&machine->axes[entry->sub - 1u], entry->index);
     }
@@ -193,9 +198,9 @@ static bool is_mirror(const struct od_entry *entry)
     if (entry->index == 0x2002) {
         return true;
     }
-    static const uint16_t records[] = {0x2003, 0x2008, 0x2009, 0x200A, 0x200B,
-                                       0x200C, 0x200D, 0x200E, 0x2010, 0x2017,
-                                       0x201B, 0x201C, 0x2024, 0x2025, 0x2026};
+    static const uint16_t records[] = {0x2003, 0x2008, 0x2009, 0x200A, 0x200B, 0x200C, 0x200D,
+                                       0x200E, 0x2010, 0x2017, 0x201B, 0x201C, 0x2024, 0x2025,
+                                       0x2026, 0x2027, 0x2028, 0x2029, 0x202A};
     for (size_t i = 0; i < sizeof records / sizeof records[0]; ++i) {
         if (records[i] == entry->index) {
             return entry->sub > 0u;

@@ -258,6 +258,9 @@ static void test_what_a_drive_says_of_itself_is_kept(void)
     TEST_ASSERT_TRUE(drive_is_simulated(&facts[0]));
     TEST_ASSERT_FALSE(drive_is_simulated(&facts[1]));
     TEST_ASSERT_EQUAL_UINT32(99, facts[1].value[DRIVE_SERIAL]);
+    TEST_ASSERT_EQUAL_INT64(2, app_bench_read(&bench, 0x2028, 1));
+    TEST_ASSERT_EQUAL_INT64(0x123, app_bench_read(&bench, 0x2027, 2));
+    TEST_ASSERT_EQUAL_INT64(99, app_bench_read(&bench, 0x202A, 2));
     TEST_ASSERT_FALSE(bench.controller.machine.simulated);
     TEST_ASSERT_TRUE((drive(1)->values.tpdo2_communication_parameter.cob_id & 0x80000000u) != 0u);
 }
