@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "app/controller_reset.h"
 #include "app/od_program.h"
 #include "app/od_read.h"
 #include "app/od_write.h"
@@ -28,17 +29,8 @@ static const struct od_hooks od_hooks = {
 
 static void init_values(struct controller *controller)
 {
-    struct od_controller *values = &controller->values;
-    const uint8_t node = controller->node;
-    *values = od_controller_defaults;
-    values->cob_id_emcy = COB_EMCY + node;
-    values->sdo_server_parameter.cob_id_client_to_server = COB_SDO_ASK + node;
-    values->sdo_server_parameter.cob_id_server_to_client = COB_SDO_ANSWER + node;
-    od_init(&controller->od, &od_controller_table, values, &od_hooks, controller);
-    emcy_producer_init(&controller->emcy, node, &values->error_register,
-                       values->predefined_error_field, &values->predefined_error_field_count,
-                       (uint8_t)(sizeof values->predefined_error_field /
-                                 sizeof values->predefined_error_field[0]));
+    controller_reset_values(controller);
+    od_init(&controller->od, &od_controller_table, &controller->values, &od_hooks, controller);
 }
 
 void controller_init(struct controller *controller, uint8_t node)
@@ -56,7 +48,7 @@ void controller_init(struct controller *controller, uint8_t node)
     homing_init(&controller->homing);
     drive_watch_begin(&controller->watch, &controller->config);
     sdo_server_init(&controller->server, &controller->od, node, SDO_TIMEOUT_US, SDO_BLOCK_SEGMENTS);
-    nmt_slave_init(&controller->nmt, node, NULL, NULL);
+    nmt_slave_init(&controller->nmt, node, &controller_reset_hooks, controller);
     heartbeat_producer_init(&controller->heartbeat, node);
 }
 

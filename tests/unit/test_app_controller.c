@@ -495,6 +495,27 @@ static void test_nmt_reset_is_obeyed_only_while_off(void)
     TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
 }
 
+static void test_a_reset_gives_objects_their_defaults(void)
+{
+    struct can_msg reset;
+    struct od_controller *values = &bench.controller.values;
+    const uint32_t tolerance = od_controller_defaults.configuration.start_tolerance_counts;
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    values->producer_heartbeat_time = 77;
+    values->configuration.start_tolerance_counts = tolerance + 1u;
+    nmt_master_command(NMT_RESET_COMMUNICATION, 1, &reset);
+    fake_port_receive(&reset);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT16(od_controller_defaults.producer_heartbeat_time,
+                             values->producer_heartbeat_time);
+    TEST_ASSERT_EQUAL_UINT32(tolerance + 1u, bench.controller.config.start_tolerance_counts);
+    nmt_master_command(NMT_RESET_NODE, 1, &reset);
+    fake_port_receive(&reset);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT32(tolerance, bench.controller.config.start_tolerance_counts);
+    TEST_ASSERT_EQUAL_HEX32(0x81, values->cob_id_emcy);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -530,5 +551,6 @@ int main(void)
     RUN_TEST(test_shutting_down_is_bounded_when_ticks_do_not_come);
     RUN_TEST(test_a_full_port_is_counted);
     RUN_TEST(test_nmt_reset_is_obeyed_only_while_off);
+    RUN_TEST(test_a_reset_gives_objects_their_defaults);
     return UNITY_END();
 }
