@@ -182,6 +182,25 @@ def test_a_wrong_forward_is_a_usage_error(text: str) -> None:
     assert b"--forward" in done.stderr
 
 
+def test_a_port_of_a_namespace_is_reached_until_the_command_ends() -> None:
+    """Inside user-mode Linux is a kernel with CAN, so that the bus is one in a namespace there."""
+    port = free_port()
+    forward = f'"{WITH_VCAN}" --own --forward 8497:8496 "$@"; exec sleep 600'
+    command = [WITH_VCAN, "--user-mode", "--forward", f"{port}:8497", "sh", "-c", forward, "-"]
+    with subprocess.Popen(
+        [*command, sys.executable, "-c", SERVER, "8496"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"up\n"
+        with connect(port) as connection:
+            connection.sendall(b"across")
+            assert connection.recv(100) == b"across"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(LIMIT_S) == 128 + signal.SIGTERM
+
+
 def test_beside_a_namespace_a_process_relays_until_the_command_ends(tmp_path: Path) -> None:
     """What --forward does where the kernel has CAN; the namespace itself takes such a kernel."""
     outside, inside = free_port(), free_port()

@@ -9,6 +9,7 @@ user_mode  starts and ends that process
 agent      first process inside user-mode Linux: starts the commands, opens connections
 channel    what has streams inside: a command (job) or a TCP connection (connection)
 forward    TCP ports outside, passed on to ports beside the bus
+relay      does that
 frames     what client, broker and agent say to each other
 registry   which buses are open
 """
