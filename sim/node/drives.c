@@ -46,9 +46,9 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
             encoder_to_i32(axis->position_mm * (double)axis->config.counts_per_mm);
         const int error =
             drive_node_init(&drives->nodes[i], axis->node, &axis->config, start, port);
-        if (error != 0) {
+        if (error != 0 || !drive_node_equip(&drives->nodes[i], &axis->equipment)) {
             *node = axis->node;
-            return error;
+            return error != 0 ? error : DRIVES_ERR_EQUIPMENT;
         }
         drives->count++;
     }

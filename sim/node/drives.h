@@ -24,8 +24,10 @@ struct drives {
     int failed;                /* negative errno of the bus, 0: none */
 };
 
-/* Makes the drives; nothing is sent yet. Returns 0, or a negative enum drive_error with `*node` the
- * drive whose figures are wrong. */
+#define DRIVES_ERR_EQUIPMENT (-100) /* beside enum drive_error */
+
+/* Makes the drives; nothing is sent yet. Returns 0, or DRIVES_ERR_EQUIPMENT or a negative enum
+ * drive_error with `*node` the drive whose figures are wrong. */
 int drives_init(struct drives *drives, const struct node_options *options, uint8_t *node);
 
 /* Only what the drives want wakes the process; again when a drive's PDOs were moved. Returns 0 or a

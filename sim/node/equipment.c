@@ -16,6 +16,10 @@ void equipment_init(struct equipment *e, const struct drive_config *config)
     e->serial = 0;
 }
 
+const char equipment_rule[] =
+    "limit_negative_mm must be below limit_positive_mm; rated_torque_nm, rated_current_a and "
+    "brake_volts more than 0; overload_s and friction_volts not negative";
+
 bool equipment_ok(const struct equipment *e)
 {
     return e->limit_negative_mm < e->limit_positive_mm && e->rated_torque_nm > 0.0 &&

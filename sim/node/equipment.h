@@ -37,8 +37,9 @@ struct equipment {
  * overload; a brake as strong as the motor. */
 void equipment_init(struct equipment *equipment, const struct drive_config *config);
 
-/* Whether all figures are in their ranges. */
+/* Whether all figures are in their ranges; and the rule, as one phrase. */
 bool equipment_ok(const struct equipment *equipment);
+extern const char equipment_rule[];
 
 /* The switches, as bits of 0x60FD, at a place of the machine. */
 uint32_t equipment_inputs(const struct equipment *equipment, double machine_mm);

@@ -94,7 +94,7 @@ static int start(struct drives *drives, const struct node_options *options)
     const int error = drives_init(drives, options, &node);
     if (error != 0) {
         (void)snprintf(reason, sizeof reason, "--axis of node %u: %s", node,
-                       drive_error_text(error));
+                       error == DRIVES_ERR_EQUIPMENT ? equipment_rule : drive_error_text(error));
         return complain(EXIT_USAGE, reason);
     }
     if (signals < 0) {

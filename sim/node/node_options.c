@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-#include "node/node_options.h"
-
-#include <errno.h>
-#include <stdbool.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include "node/node_options_private.h"
 
 const char node_options_help[] =
     "usage: hodograph-drive --bus INTERFACE --axis KEY=VALUE,... [--axis ...] [--faults FILE]\n"
@@ -15,193 +12,41 @@ const char node_options_help[] =
     "  --bus INTERFACE  a CAN interface that is up, such as vcan0\n"
     "  --faults FILE    fault rules, one a line (docs/protocol.md section 4); what they do is\n"
     "                   printed, one JSON object a line\n"
-    "  --axis ...       one drive; keys (all but the last five are required):\n"
+    "  --axis ...       one drive; keys that are required:\n"
     "                   node (2 to 127), gain_rad_s_v, time_constant_s, screw_mm_rad,\n"
     "                   torque_to_volts, volts_limit, k_pp_rad_s_mm, k_pv_nm_s_rad, k_iv_per_s,\n"
-    "                   k_pf_rad_mm, k_vf, encoder_counts_per_rev (1048576),\n"
-    "                   loop_rate_hz (16000), counts_per_mm (1000000), position_mm (0)\n"
+    "                   k_pf_rad_mm, k_vf\n"
+    "                   keys with a default:\n"
+    "                   encoder_counts_per_rev (1048576), loop_rate_hz (16000),\n"
+    "                   counts_per_mm (1000000), position_mm (0), serial (the node)\n"
+    "                   limit_negative_mm, limit_positive_mm: limit switches, on from there\n"
+    "                   outwards (none); home_from_mm, home_to_mm: home switch (none)\n"
+    "                   rated_torque_nm (half of what volts_limit gives), rated_current_a (5),\n"
+    "                   overload_s: until the overload trips at volts_limit, 0 never (10)\n"
+    "                   friction_volts: Coulomb friction, as volts (0)\n"
+    "                   brake_volts: holding brake, as volts (volts_limit)\n"
     "\n"
     "SIGTERM or SIGINT ends it. Exit status: 0 ended as asked, 2 wrong usage, 4 bus not usable.\n";
 
-enum key_kind { KEY_NUMBER, KEY_U32, KEY_U8 };
-
-struct key {
-    const char *name;
-    size_t offset; /* in struct node_options_axis */
-    enum key_kind kind;
-    bool required;
-};
-
-#define AT(member) offsetof(struct node_options_axis, member)
-
-static const struct key keys[] = {
-    {"node", AT(node), KEY_U8, true},
-    {"gain_rad_s_v", AT(config.plant.gain_rad_s_v), KEY_NUMBER, true},
-    {"time_constant_s", AT(config.plant.time_constant_s), KEY_NUMBER, true},
-    {"screw_mm_rad", AT(config.plant.screw_mm_rad), KEY_NUMBER, true},
-    {"torque_to_volts", AT(config.plant.torque_to_volts), KEY_NUMBER, true},
-    {"volts_limit", AT(config.plant.volts_limit), KEY_NUMBER, true},
-    {"k_pp_rad_s_mm", AT(config.pdff.k_pp_rad_s_mm), KEY_NUMBER, true},
-    {"k_pv_nm_s_rad", AT(config.pdff.k_pv_nm_s_rad), KEY_NUMBER, true},
-    {"k_iv_per_s", AT(config.pdff.k_iv_per_s), KEY_NUMBER, true},
-    {"k_pf_rad_mm", AT(config.pdff.k_pf_rad_mm), KEY_NUMBER, true},
-    {"k_vf", AT(config.pdff.k_vf), KEY_NUMBER, true},
-    {"encoder_counts_per_rev", AT(config.encoder_counts_per_rev), KEY_U32, false},
-    {"loop_rate_hz", AT(config.loop_rate_hz), KEY_U32, false},
-    {"counts_per_mm", AT(config.counts_per_mm), KEY_U32, false},
-    {"position_mm", AT(position_mm), KEY_NUMBER, false},
-};
-
-enum { KEYS = sizeof keys / sizeof keys[0] };
-
-struct reason {
-    char *text;
-    size_t size;
-};
-
-static enum node_options_result wrong(struct reason reason, const char *what, const char *value)
+enum node_options_result node_options_wrong(struct node_options_reason reason, const char *what,
+                                            const char *value)
 {
     (void)snprintf(reason.text, reason.size, "%s '%s' (see --help)", what, value);
     return NODE_OPTIONS_WRONG;
 }
 
-/* A value in [0, most] without sign or blanks. */
-static bool read_whole(const char *text, unsigned long most, unsigned long *out)
-{
-    char *end = NULL;
-    errno = 0;
-    *out = strtoul(text, &end, 10);
-    return *text >= '0' && *text <= '9' && *end == '\0' && errno == 0 && *out <= most;
-}
-
-/* Finite, and of a size that any key may have. */
-static bool read_number(const char *text, double *out)
-{
-    char *end = NULL;
-    *out = strtod(text, &end);
-    return end != text && *end == '\0' && *out >= -1e12 && *out <= 1e12;
-}
-
-static bool store(struct node_options_axis *axis, const struct key *key, const char *text)
-{
-    unsigned char *field = (unsigned char *)axis + key->offset;
-    unsigned long whole = 0;
-    double number = 0.0;
-    if (key->kind == KEY_NUMBER) {
-        if (!read_number(text, &number)) {
-            return false;
-        }
-        memcpy(field, &number, sizeof number);
-        return true;
-    }
-    if (!read_whole(text, key->kind == KEY_U8 ? 127u : UINT32_MAX, &whole)) {
-        return false;
-    }
-    if (key->kind == KEY_U8) {
-        *field = (unsigned char)whole;
-    } else {
-        const uint32_t value = (uint32_t)whole;
-        memcpy(field, &value, sizeof value);
-    }
-    return true;
-}
-
-static const struct key *find_key(const char *name)
-{
-    for (size_t i = 0; i < KEYS; i++) {
-        if (strcmp(keys[i].name, name) == 0) {
-            return &keys[i];
-        }
-    }
-    return NULL;
-}
-
-/* One KEY=VALUE; cuts `item` in two. */
-static enum node_options_result set_item(struct node_options_axis *axis, char *item, bool *seen,
-                                         struct reason reason)
-{
-    char *value = strchr(item, '=');
-    if (value == NULL) {
-        return wrong(reason, "--axis takes KEY=VALUE,..., not", item);
-    }
-    *value++ = '\0';
-    const struct key *key = find_key(item);
-    if (key == NULL) {
-        return wrong(reason, "--axis has no key", item);
-    }
-    if (seen[key - keys]) {
-        return wrong(reason, "--axis gives twice the key", item);
-    }
-    seen[key - keys] = true;
-    if (!store(axis, key, value)) {
-        value[-1] = '=';
-        return wrong(reason, "--axis has a value that is no number or out of range:", item);
-    }
-    return NODE_OPTIONS_OK;
-}
-
-static enum node_options_result check_axis(const struct node_options *options, const bool *seen,
-                                           struct reason reason)
-{
-    const struct node_options_axis *axis = &options->axes[options->axis_count];
-    for (size_t i = 0; i < KEYS; i++) {
-        if (keys[i].required && !seen[i]) {
-            return wrong(reason, "--axis lacks the key", keys[i].name);
-        }
-    }
-    if (axis->node < 2) {
-        return wrong(reason, "--axis needs a node from 2 to 127, not", axis->node == 1 ? "1" : "0");
-    }
-    for (size_t i = 0; i < options->axis_count; i++) {
-        if (options->axes[i].node == axis->node) {
-            return wrong(reason, "--axis: two drives have the same", "node");
-        }
-    }
-    return NODE_OPTIONS_OK;
-}
-
-static enum node_options_result add_axis(struct node_options *options, char *spec,
-                                         struct reason reason)
-{
-    bool seen[KEYS] = {false};
-    if (options->axis_count == NODE_OPTIONS_AXES) {
-        return wrong(reason, "too many --axis: at most", "6");
-    }
-    struct node_options_axis *axis = &options->axes[options->axis_count];
-    memset(axis, 0, sizeof *axis);
-    axis->config.encoder_counts_per_rev = 1048576;
-    axis->config.loop_rate_hz = 16000;
-    axis->config.counts_per_mm = 1000000;
-    axis->config.period_us = 1000;
-    for (char *item = spec; item != NULL;) {
-        char *next = strchr(item, ',');
-        if (next != NULL) {
-            *next++ = '\0';
-        }
-        if (set_item(axis, item, seen, reason) != NODE_OPTIONS_OK) {
-            return NODE_OPTIONS_WRONG;
-        }
-        item = next;
-    }
-    if (check_axis(options, seen, reason) != NODE_OPTIONS_OK) {
-        return NODE_OPTIONS_WRONG;
-    }
-    options->axis_count++;
-    return NODE_OPTIONS_OK;
-}
-
 static enum node_options_result set_option(struct node_options *options, const char *name,
-                                           char *value, struct reason reason)
+                                           char *value, struct node_options_reason reason)
 {
     const bool faults = strcmp(name, "--faults") == 0;
     if (!faults && strcmp(name, "--bus") != 0 && strcmp(name, "--axis") != 0) {
-        return wrong(reason, "unknown option", name);
+        return node_options_wrong(reason, "unknown option", name);
     }
     if (value == NULL) {
-        return wrong(reason, "a value must follow the option", name);
+        return node_options_wrong(reason, "a value must follow the option", name);
     }
     if (strcmp(name, "--axis") == 0) {
-        return add_axis(options, value, reason);
+        return node_options_add_axis(options, value, reason);
     }
     if (faults) {
         options->faults = value;
@@ -214,7 +59,7 @@ static enum node_options_result set_option(struct node_options *options, const c
 enum node_options_result node_options_parse(struct node_options *options, int argc, char **argv,
                                             char *reason_text, size_t size)
 {
-    const struct reason reason = {reason_text, size};
+    const struct node_options_reason reason = {reason_text, size};
     options->bus = NULL;
     options->faults = NULL;
     options->axis_count = 0;
@@ -228,10 +73,10 @@ enum node_options_result node_options_parse(struct node_options *options, int ar
         }
     }
     if (options->bus == NULL) {
-        return wrong(reason, "the option is missing:", "--bus");
+        return node_options_wrong(reason, "the option is missing:", "--bus");
     }
     if (options->axis_count == 0) {
-        return wrong(reason, "the option is missing:", "--axis");
+        return node_options_wrong(reason, "the option is missing:", "--axis");
     }
     return NODE_OPTIONS_OK;
 }

@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "node/equipment.h"
 #include "plant/drive.h"
 
 #define NODE_OPTIONS_AXES 6
@@ -13,6 +14,7 @@
 struct node_options_axis {
     struct drive_config config; /* period 1000 us */
     double position_mm;
+    struct equipment equipment;
     uint8_t node;
 };
 

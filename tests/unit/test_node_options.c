@@ -60,6 +60,28 @@ static void test_two_axes_with_defaults_and_without(void)
     TEST_ASSERT_EQUAL_UINT32(4096, b->config.encoder_counts_per_rev);
 }
 
+static void test_equipment(void)
+{
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_OK,
+                          parse("node=2," FIGURES,
+                                "node=3," FIGURES ",limit_negative_mm=-3,limit_positive_mm=99.5,"
+                                "home_from_mm=1,home_to_mm=2,overload_s=0,"
+                                "rated_torque_nm=2.5,friction_volts=0.1,"
+                                "brake_volts=7,serial=4711,rated_current_a=3"));
+    const struct equipment *a = &options.axes[0].equipment, *b = &options.axes[1].equipment;
+    TEST_ASSERT_EQUAL_UINT32(2, a->serial);
+    TEST_ASSERT_TRUE(a->overload_s == 10.0 && a->friction_volts == 0.0 && a->brake_volts == 5.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * 5.0 / 1.4, a->rated_torque_nm);
+    TEST_ASSERT_EQUAL_HEX32(0, equipment_inputs(a, 1e6) | equipment_inputs(a, -1e6));
+    TEST_ASSERT_EQUAL_UINT32(4711, b->serial);
+    TEST_ASSERT_TRUE(b->rated_torque_nm == 2.5 && b->rated_current_a == 3.0);
+    TEST_ASSERT_TRUE(b->overload_s == 0.0 && b->friction_volts == 0.1 && b->brake_volts == 7.0);
+    TEST_ASSERT_EQUAL_HEX32(EQUIPMENT_INPUT_NEGATIVE, equipment_inputs(b, -3.0));
+    TEST_ASSERT_EQUAL_HEX32(EQUIPMENT_INPUT_POSITIVE, equipment_inputs(b, 99.5));
+    TEST_ASSERT_EQUAL_HEX32(EQUIPMENT_INPUT_HOME, equipment_inputs(b, 1.5));
+    TEST_ASSERT_EQUAL_HEX32(0, equipment_inputs(b, 3.0));
+}
+
 static void test_faults_are_named(void)
 {
     refused("node=2", "'gain_rad_s_v'");
@@ -109,6 +131,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_two_axes_with_defaults_and_without);
+    RUN_TEST(test_equipment);
     RUN_TEST(test_faults_are_named);
     RUN_TEST(test_a_node_may_appear_once);
     RUN_TEST(test_options_themselves);
