@@ -1,0 +1,356 @@
+/* SPDX-License-Identifier: MIT */
+/* What the drive watches: following error, switches, software limits, overload, supply, encoder,
+ * deadlines, short frames; and its objects for scaling, feedforward and actual values. */
+#include "canopen/cob.h"
+#include "canopen/sdo_abort.h"
+#include "drive_bench.h"
+#include "node/node_fault.h"
+#include "unity.h"
+
+void setUp(void)
+{
+    drive_bench_begin();
+}
+
+void tearDown(void)
+{
+}
+
+static enum cia402_state state(void)
+{
+    return bench.node.device.state;
+}
+
+static void put(uint16_t index, uint8_t sub, int64_t value)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(index, sub, value));
+}
+
+static void move(int periods, int32_t counts)
+{
+    for (int k = 0; k < periods; k++) {
+        bench.target += counts;
+        drive_bench_run(1);
+    }
+}
+
+static void fault(enum node_fault kind, double value, bool on)
+{
+    TEST_ASSERT_EQUAL_INT(0, drive_node_fault(&bench.node, kind, value, on));
+}
+
+/* Fault reset has no effect while the cause is there; then it helps. */
+static void reset(enum cia402_state expected)
+{
+    bench.word = CIA402_DISABLE_VOLTAGE;
+    drive_bench_run(2);
+    bench.word = CIA402_FAULT_RESET;
+    drive_bench_run(1);
+    TEST_ASSERT_EQUAL_INT(expected, state());
+}
+
+static void test_following_error(void)
+{
+    put(0x6065, 0, 100000); /* 0.1 mm; the loop's own lead at 10 mm/s is 0.016 mm */
+    put(0x6066, 0, 20);
+    drive_bench_enable();
+    move(500, 10000);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    fault(NODE_FAULT_ENCODER_FREEZE, 0, true);
+    int periods = 0;
+    while (state() == CIA402_OPERATION_ENABLED && periods < 100) {
+        move(1, 10000);
+        periods++;
+    }
+    TEST_ASSERT_INT_WITHIN(5, 30, periods); /* 10 ms to leave the window, 20 ms of time-out */
+    drive_bench_expect_emcy(EMCY_FOLLOWING_ERROR, EMCY_REGISTER_PROFILE | EMCY_REGISTER_GENERIC);
+    drive_bench_run(1);
+    TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_FOLLOWING_ERROR) != 0);
+    fault(NODE_FAULT_ENCODER_FREEZE, 0, false);
+    drive_bench_run(1500);
+    TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
+    reset(CIA402_SWITCH_ON_DISABLED);
+    drive_bench_run(1);
+    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_FOLLOWING_ERROR);
+}
+
+static void test_a_jump_of_the_encoder(void)
+{
+    put(0x6065, 0, 100000);
+    drive_bench_enable();
+    fault(NODE_FAULT_ENCODER_JUMP, 200000, true);
+    drive_bench_run(1);
+    TEST_ASSERT_INT32_WITHIN(20, 1200000, drive_bench_position());
+    drive_bench_run(1);
+    TEST_ASSERT_EQUAL_HEX16(EMCY_FOLLOWING_ERROR, drive_bench_read(0x603F, 0));
+    TEST_ASSERT_EQUAL_INT(NODE_FAULT_ERR_VALUE,
+                          drive_node_fault(&bench.node, NODE_FAULT_ENCODER_JUMP, 1e12, true));
+}
+
+static void test_an_encoder_that_fails(void)
+{
+    drive_bench_enable();
+    move(300, 50000);
+    fault(NODE_FAULT_ENCODER_FAULT, 0, true);
+    TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state()); /* nothing to stop with */
+    drive_bench_expect_emcy(EMCY_POSITION_SENSOR_1, EMCY_REGISTER_PROFILE | EMCY_REGISTER_GENERIC);
+    drive_bench_run(100);
+    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.axis));
+    reset(CIA402_FAULT);
+    fault(NODE_FAULT_ENCODER_FAULT, 0, false);
+    reset(CIA402_SWITCH_ON_DISABLED);
+}
+
+static void test_undervoltage(void)
+{
+    drive_bench_enable();
+    fault(NODE_FAULT_SATURATE, 0.4, true);
+    TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
+    drive_bench_expect_emcy(EMCY_DC_UNDERVOLTAGE, EMCY_REGISTER_VOLTAGE | EMCY_REGISTER_GENERIC);
+    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_read(0x6041, 0) & CIA402_STATUS_VOLTAGE);
+    reset(CIA402_FAULT);
+    fault(NODE_FAULT_SATURATE, 0, false);
+    reset(CIA402_SWITCH_ON_DISABLED);
+    TEST_ASSERT_TRUE((drive_bench_read(0x6041, 0) & CIA402_STATUS_VOLTAGE) != 0);
+}
+
+/* Rated torque is half of the greatest; 4.5 V against a load are 1.8 of it: 1.8^2 - 1 a second until
+ * (2^2 - 1) * 10 s are full: 13.4 s. */
+static void test_overload(void)
+{
+    put(0x6067, 0, 1000000);
+    drive_bench_enable();
+    fault(NODE_FAULT_LOAD, 4.5, true);
+    drive_bench_run(2000);
+    TEST_ASSERT_INT_WITHIN(5, 1800, (int)drive_bench_read(0x6077, 0));
+    TEST_ASSERT_INT_WITHIN(5, 1800, (int)drive_bench_read(0x6078, 0));
+    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_WARNING);
+    drive_bench_run(10000);
+    TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_WARNING) != 0);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    int periods = 12000;
+    while (state() == CIA402_OPERATION_ENABLED && periods < 20000) {
+        drive_bench_run(1);
+        periods++;
+    }
+    TEST_ASSERT_INT_WITHIN(100, 13400, periods);
+    TEST_ASSERT_EQUAL_HEX16(EMCY_OVERLOAD, drive_bench_read(0x603F, 0));
+    TEST_ASSERT_EQUAL_HEX8(EMCY_REGISTER_CURRENT | EMCY_REGISTER_GENERIC,
+                           drive_bench_read(0x1001, 0));
+    fault(NODE_FAULT_LOAD, 0, false);
+    reset(CIA402_FAULT);
+    drive_bench_run(6000); /* cools by 1 s a second, to 80 % of 30 s */
+    reset(CIA402_SWITCH_ON_DISABLED);
+}
+
+static void test_saturation_is_an_internal_limit(void)
+{
+    drive_bench_enable();
+    move(20, 400000);
+    TEST_ASSERT_EQUAL_INT16(5000, drive_bench_volts_mv());
+    TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_LIMIT) != 0);
+    TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_FOLLOWS) != 0);
+}
+
+static void test_limit_switch(void)
+{
+    struct equipment equipment;
+    equipment_init(&equipment, &drive_bench_config);
+    equipment.limit_positive_mm = 3.0;
+    TEST_ASSERT_TRUE(drive_node_equip(&bench.node, &equipment));
+    put(0x6085, 0, 500000000);
+    drive_bench_enable();
+    while (state() == CIA402_OPERATION_ENABLED && bench.target < 10000000) {
+        move(1, 50000);
+    }
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+    drive_bench_expect_emcy(EMCY_POSITION_LIMIT, EMCY_REGISTER_PROFILE | EMCY_REGISTER_GENERIC);
+    TEST_ASSERT_EQUAL_HEX8(2, drive_bench_newest(COB_EMCY)->data[3]);
+    TEST_ASSERT_EQUAL_HEX32(EQUIPMENT_INPUT_POSITIVE, drive_bench_read(0x60FD, 0));
+    const uint16_t bits = CIA402_STATUS_LIMIT | CIA402_STATUS_WARNING;
+    TEST_ASSERT_EQUAL_HEX16(bits, drive_bench_read(0x6041, 0) & bits);
+    bench.word = CIA402_QUICK_STOP;
+    drive_bench_run(300);
+    TEST_ASSERT_INT32_WITHIN(200000, 3000000 + 2500000, drive_bench_position());
+    drive_bench_enable(); /* away from the switch is permitted, further on it not */
+    move(20, -50000);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    move(2, 50000);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+}
+
+static void test_a_switch_that_is_forced(void)
+{
+    drive_bench_enable();
+    fault(NODE_FAULT_LIMIT_SWITCH, -1, true);
+    move(20, 10000);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    move(2, -10000);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+    fault(NODE_FAULT_LIMIT_SWITCH, -1, false);
+    TEST_ASSERT_EQUAL_HEX32(0, drive_bench_read(0x60FD, 0));
+    TEST_ASSERT_EQUAL_INT(NODE_FAULT_ERR_VALUE,
+                          drive_node_fault(&bench.node, NODE_FAULT_LIMIT_SWITCH, 0, true));
+}
+
+static void test_software_limits(void)
+{
+    put(0x607D, 2, 1500000);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x607D, 1, 1500001));
+    drive_bench_enable();
+    move(200, 5000);
+    TEST_ASSERT_INT32_WITHIN(20, 1500000, drive_bench_position());
+    TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_LIMIT) != 0);
+    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_FOLLOWS);
+    move(200, -5000);
+    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_LIMIT);
+    TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_FOLLOWS) != 0);
+}
+
+static void test_a_short_frame_is_not_processed(void)
+{
+    struct can_msg frame;
+    drive_bench_enable();
+    cob_frame(&frame, COB_RPDO1 + DRIVE_BENCH_ID, 5);
+    drive_node_receive(&bench.node, &frame);
+    drive_bench_expect_emcy(EMCY_PDO_LENGTH, EMCY_REGISTER_COMMUNICATION | EMCY_REGISTER_GENERIC);
+    drive_bench_sync();
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+}
+
+/* SYNC goes on, setpoints do not: 0x1400 sub 5. */
+static void test_setpoints_that_stay_away(void)
+{
+    put(0x1400, 5, 20);
+    drive_bench_enable();
+    for (int k = 0; k < 19; k++) { /* one more has passed with the last setpoint */
+        drive_bench_sync();
+        drive_node_process(&bench.node, 1000);
+        TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    }
+    drive_bench_sync();
+    drive_node_process(&bench.node, 1000);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+    TEST_ASSERT_EQUAL_HEX16(EMCY_RPDO_TIMEOUT, drive_bench_read(0x603F, 0));
+}
+
+static void test_scaling(void)
+{
+    put(0x608F, 1, 1048576);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x608F, 1, 4096));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x608F, 2, 2));
+    TEST_ASSERT_EQUAL_INT64(9990265, drive_bench_read(0x6092, 1));
+    put(0x6092, 1, 9990265); /* what it has: nothing is rounded */
+    TEST_ASSERT_TRUE(bench.node.axis.drive.counts_per_mm == 1e6);
+    put(0x6092, 1, 99903);
+    TEST_ASSERT_INT32_WITHIN(1, 10000, (int32_t)drive_bench_read(0x6064, 0));
+    put(0x6091, 1, 2); /* two turns of the motor for one of the shaft: half the counts */
+    TEST_ASSERT_INT32_WITHIN(1, 5000, (int32_t)drive_bench_read(0x6064, 0));
+    put(0x6091, 2, 2);
+    put(0x6092, 1, 9990265);
+    TEST_ASSERT_TRUE(bench.node.axis.drive.counts_per_mm == 1e6);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x6092, 1, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_LOW, drive_bench_write(0x6092, 1, 0));
+    drive_bench_enable();
+    put(0x6092, 1, 9990265);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, drive_bench_write(0x6092, 1, 5000000));
+}
+
+/* A scaled axis moves by its own counts. */
+static void test_a_scaled_axis_moves(void)
+{
+    put(0x6092, 1, 99903);
+    drive_bench_enable();
+    move(1000, 20);
+    drive_bench_run(300);
+    TEST_ASSERT_INT32_WITHIN(1, 30000, drive_bench_position());
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, 3.0, axis_motion_place_mm(&bench.node.axis));
+}
+
+static void test_feedforward_objects(void)
+{
+    put(0x1400, 1, 0x80000200 + DRIVE_BENCH_ID);
+    put(0x1600, 0, 0);
+    put(0x1600, 3, 0x60B20010);
+    put(0x1600, 0, 3);
+    put(0x1400, 1, 0x200 + DRIVE_BENCH_ID);
+    put(0x6040, 0, CIA402_SHUTDOWN);
+    put(0x6040, 0, CIA402_SWITCH_ON);
+    put(0x6040, 0, CIA402_ENABLE_OPERATION);
+    put(0x60B1, 0, 1590000); /* 1 rad/s of the screw of 1.59 mm/rad */
+    put(0x60B2, 0, 400);     /* of half of 5 V */
+    drive_bench_sync();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, bench.node.axis.influence.speed_offset_rad_s);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, bench.node.axis.influence.volts_offset);
+    put(0x60B1, 0, 0);
+    put(0x60B2, 0, 0);
+    drive_bench_sync();
+    TEST_ASSERT_FALSE(influence_acts(&bench.node.axis.influence, &bench.node.axis.drive));
+    put(0x60B2, 0, 400);
+    put(0x6040, 0, CIA402_DISABLE_VOLTAGE);
+    drive_bench_sync();
+    TEST_ASSERT_FALSE(influence_acts(&bench.node.axis.influence, &bench.node.axis.drive));
+}
+
+static void test_digital_inputs_on_change(void)
+{
+    put(0x1802, 1, 0x380 + DRIVE_BENCH_ID);
+    drive_bench_run(1);
+    TEST_ASSERT_NOT_NULL(drive_bench_newest(0x380));
+    drive_bench_run(20);
+    TEST_ASSERT_NULL(drive_bench_newest(0x380));
+    fault(NODE_FAULT_LIMIT_SWITCH, 1, true);
+    drive_bench_run(1);
+    TEST_ASSERT_NOT_NULL(drive_bench_newest(0x380));
+    TEST_ASSERT_EQUAL_HEX64(EQUIPMENT_INPUT_POSITIVE, cob_get(drive_bench_newest(0x380)->data, 4));
+}
+
+/* CiA 301: 0x1019 may change only while 0x1006 is 0. */
+static void test_sync_counter(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, drive_bench_write(0x1019, 0, 10));
+    put(0x1019, 0, 240);
+    put(0x1006, 0, 0);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x1019, 0, 1));
+    put(0x1019, 0, 10);
+    put(0x1006, 0, 2000);
+    TEST_ASSERT_EQUAL_UINT32(32, bench.node.axis.drive.samples);
+}
+
+static void test_identity_and_ratings(void)
+{
+    struct equipment equipment;
+    equipment_init(&equipment, &drive_bench_config);
+    equipment.serial = 4711;
+    equipment.rated_torque_nm = 1.5;
+    TEST_ASSERT_TRUE(drive_node_equip(&bench.node, &equipment));
+    TEST_ASSERT_EQUAL_INT64(4711, drive_bench_read(0x1018, 4));
+    TEST_ASSERT_EQUAL_INT64(1500, drive_bench_read(0x6076, 0));
+    TEST_ASSERT_EQUAL_INT64(5000, drive_bench_read(0x6075, 0));
+    TEST_ASSERT_EQUAL_HEX32(0xA0, drive_bench_read(0x6502, 0));
+    equipment.rated_torque_nm = 0.0;
+    TEST_ASSERT_FALSE(drive_node_equip(&bench.node, &equipment));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_following_error);
+    RUN_TEST(test_a_jump_of_the_encoder);
+    RUN_TEST(test_an_encoder_that_fails);
+    RUN_TEST(test_undervoltage);
+    RUN_TEST(test_overload);
+    RUN_TEST(test_saturation_is_an_internal_limit);
+    RUN_TEST(test_limit_switch);
+    RUN_TEST(test_a_switch_that_is_forced);
+    RUN_TEST(test_software_limits);
+    RUN_TEST(test_a_short_frame_is_not_processed);
+    RUN_TEST(test_setpoints_that_stay_away);
+    RUN_TEST(test_scaling);
+    RUN_TEST(test_a_scaled_axis_moves);
+    RUN_TEST(test_feedforward_objects);
+    RUN_TEST(test_digital_inputs_on_change);
+    RUN_TEST(test_sync_counter);
+    RUN_TEST(test_identity_and_ratings);
+    return UNITY_END();
+}

@@ -1,0 +1,370 @@
+/* SPDX-License-Identifier: MIT */
+/* The drive as a whole through the states of CiA 402-2: commands, option codes, stops of the motor. */
+#include "canopen/cob.h"
+#include "canopen/sdo_abort.h"
+#include "drive_bench.h"
+#include "node/node_fault.h"
+#include "unity.h"
+
+enum { SPEED = 50000 }; /* counts a period: 50 mm/s */
+
+void setUp(void)
+{
+    drive_bench_begin();
+}
+
+void tearDown(void)
+{
+}
+
+static enum cia402_state state(void)
+{
+    return bench.node.device.state;
+}
+
+static void move(int periods)
+{
+    for (int k = 0; k < periods; k++) {
+        bench.target += SPEED;
+        drive_bench_run(1);
+    }
+}
+
+static void put(uint16_t index, int64_t value)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(index, 0, value));
+}
+
+/* Periods until the state is left; the axis' way meanwhile in counts. */
+static int32_t way;
+static int leave(enum cia402_state from)
+{
+    const int32_t begin = axis_motion_position(&bench.node.axis);
+    int periods = 0;
+    while (state() == from && periods < 2000) {
+        drive_bench_run(1);
+        periods++;
+    }
+    way = axis_motion_position(&bench.node.axis) - begin;
+    return periods;
+}
+
+/* Brings a standing drive into a state of the standard. */
+static void bring(enum cia402_state to)
+{
+    drive_bench_begin();
+    if (to == CIA402_FAULT) {
+        (void)drive_node_fault(&bench.node, NODE_FAULT_CODE, 0x1000, true);
+        return;
+    }
+    const uint16_t words[] = {CIA402_SHUTDOWN, CIA402_SWITCH_ON, CIA402_ENABLE_OPERATION};
+    for (int k = 0; k < (int)to - (int)CIA402_SWITCH_ON_DISABLED && k < 3; k++) {
+        put(0x6040, words[k]);
+    }
+    if (to == CIA402_QUICK_STOP_ACTIVE) {
+        put(0x605A, 6);
+        put(0x6040, CIA402_QUICK_STOP);
+    }
+    TEST_ASSERT_EQUAL_INT(to, state());
+}
+
+/* CiA 402-2, the table of transitions: rows are states from Switch on disabled to Quick stop active
+ * (0x605A = 6) and Fault, columns the commands. */
+static void test_every_command_in_every_state(void)
+{
+    static const uint16_t commands[] = {CIA402_DISABLE_VOLTAGE,  CIA402_QUICK_STOP,
+                                        CIA402_SHUTDOWN,         CIA402_SWITCH_ON,
+                                        CIA402_ENABLE_OPERATION, CIA402_FAULT_RESET};
+    enum {
+        D = CIA402_SWITCH_ON_DISABLED,
+        R = CIA402_READY_TO_SWITCH_ON,
+        S = CIA402_SWITCHED_ON,
+        E = CIA402_OPERATION_ENABLED,
+        Q = CIA402_QUICK_STOP_ACTIVE,
+        F = CIA402_FAULT
+    };
+    static const struct {
+        int from;
+        int to[6];
+    } rows[] = {
+        {D, {D, D, R, D, D, D}}, {R, {D, D, R, S, S, D}}, {S, {D, D, R, S, E, D}},
+        {E, {D, Q, R, S, E, D}}, {Q, {D, Q, Q, Q, E, D}}, {F, {F, F, F, F, F, D}},
+    };
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        for (unsigned c = 0; c < 6; c++) {
+            bring((enum cia402_state)rows[i].from);
+            put(0x605A, 6);
+            put(0x605C, 0);
+            put(0x6040, commands[c]);
+            TEST_ASSERT_EQUAL_INT(rows[i].to[c], state());
+            TEST_ASSERT_EQUAL_HEX16(cia402_status_bits(state()),
+                                    drive_bench_read(0x6041, 0) & 0x6F);
+        }
+    }
+}
+
+/* 0x605A: where the drive ends, and by which ramp (0x6084 gentle, 0x6085 hard). */
+static void test_quick_stop_codes(void)
+{
+    static const struct {
+        int16_t code;
+        enum cia402_state end;
+        int32_t way; /* v^2 / 2a */
+    } rows[] = {
+        {0, CIA402_SWITCH_ON_DISABLED, 0},       {1, CIA402_SWITCH_ON_DISABLED, 12500000},
+        {2, CIA402_SWITCH_ON_DISABLED, 1250000}, {5, CIA402_QUICK_STOP_ACTIVE, 12500000},
+        {6, CIA402_QUICK_STOP_ACTIVE, 1250000},
+    };
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        drive_bench_begin();
+        put(0x605A, rows[i].code);
+        put(0x6084, 100000000);
+        put(0x6085, 1000000000);
+        drive_bench_enable();
+        move(400);
+        bench.word = CIA402_QUICK_STOP;
+        drive_bench_run(1);
+        if (rows[i].code == 0) {
+            TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+            continue;
+        }
+        TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+        TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_TARGET_REACHED);
+        const int32_t from = axis_motion_position(&bench.node.axis);
+        drive_bench_run(700);
+        TEST_ASSERT_EQUAL_INT(rows[i].end, state());
+        TEST_ASSERT_INT32_WITHIN(rows[i].way / 10 + 150000, rows[i].way,
+                                 axis_motion_position(&bench.node.axis) - from);
+        if (rows[i].code >= 5) {
+            TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_TARGET_REACHED) != 0);
+            bench.target = axis_motion_position(&bench.node.axis);
+            bench.word = CIA402_ENABLE_OPERATION; /* transition 16 */
+            drive_bench_run(1);
+            TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+        }
+    }
+}
+
+static void test_codes_that_do_not_exist(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x605A, 0, 3));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x605A, 0, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605A, 0, 7));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_LOW, drive_bench_write(0x605A, 0, -1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605B, 0, 2));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605C, 0, 2));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605E, 0, 3));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x6007, 0, 4));
+}
+
+/* 0x605B (shutdown), 0x605C (disable operation): at once, or after the ramp 0x6084. */
+static void test_leaving_operation_enabled(void)
+{
+    static const struct {
+        uint16_t object;
+        uint16_t command;
+        enum cia402_state end;
+    } rows[] = {{0x605B, CIA402_SHUTDOWN, CIA402_READY_TO_SWITCH_ON},
+                {0x605C, CIA402_SWITCH_ON, CIA402_SWITCHED_ON}};
+    for (unsigned i = 0; i < 2; i++) {
+        for (int16_t code = 0; code <= 1; code++) {
+            drive_bench_begin();
+            put(0x6084, 500000000);
+            put(rows[i].object, code);
+            drive_bench_enable();
+            move(200);
+            bench.word = rows[i].command;
+            const int periods = leave(CIA402_OPERATION_ENABLED);
+            TEST_ASSERT_EQUAL_INT(rows[i].end, state());
+            TEST_ASSERT_TRUE(code == 0 ? periods == 1 : periods > 100 && periods < 140);
+        }
+    }
+}
+
+/* Enabling again calls a slow stop off. */
+static void test_a_stop_called_off(void)
+{
+    drive_bench_enable();
+    move(200);
+    bench.word = CIA402_SWITCH_ON;
+    drive_bench_run(10);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    bench.target = bench.node.axis.target_counts;
+    bench.word = CIA402_ENABLE_OPERATION;
+    drive_bench_run(300);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    TEST_ASSERT_INT32_WITHIN(100, bench.target, drive_bench_position());
+}
+
+static void test_fault_reaction_codes(void)
+{
+    for (int16_t code = 0; code <= 2; code++) {
+        drive_bench_begin();
+        put(0x605E, code);
+        put(0x6084, 100000000);
+        put(0x6085, 1000000000);
+        drive_bench_enable();
+        move(200);
+        (void)drive_node_fault(&bench.node, NODE_FAULT_CODE, 0x6100, true);
+        TEST_ASSERT_EQUAL_INT(code == 0 ? CIA402_FAULT : CIA402_FAULT_REACTION_ACTIVE, state());
+        (void)leave(CIA402_FAULT_REACTION_ACTIVE);
+        TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
+        const int32_t expected = code == 0 ? 0 : (code == 1 ? 12500000 : 1250000);
+        TEST_ASSERT_INT32_WITHIN(expected / 10 + 150000, expected, way);
+        TEST_ASSERT_EQUAL_HEX16(0x6100, drive_bench_read(0x603F, 0));
+    }
+}
+
+/* The motor is slower than its reference: the stop ends with the motor, not with the reference. */
+static void test_a_stop_ends_when_the_motor_stands(void)
+{
+    put(0x6085, 2000000000);
+    drive_bench_enable();
+    move(400);
+    (void)drive_node_fault(&bench.node, NODE_FAULT_SATURATE, 0.9, true);
+    bench.word = CIA402_QUICK_STOP;
+    const int reference = 25; /* periods of the ramp: 50 mm/s by 2000 mm/s^2 */
+    drive_bench_run(reference + 10);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+    TEST_ASSERT_EQUAL_INT64(0, bench.node.axis.speed_counts_period);
+    TEST_ASSERT_FALSE(axis_motion_at_rest(&bench.node.axis));
+    (void)leave(CIA402_QUICK_STOP_ACTIVE);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+    TEST_ASSERT_INT32_WITHIN(1000000, 0, axis_motion_speed(&bench.node.axis));
+}
+
+/* A motor that never comes to rest is left to its brake after a second. */
+static void test_patience_ends(void)
+{
+    put(0x605A, 6);
+    drive_bench_enable();
+    (void)drive_node_fault(&bench.node, NODE_FAULT_SATURATE, 0.9, true);
+    (void)drive_node_fault(&bench.node, NODE_FAULT_LOAD, 3.0, true);
+    put(0x605A, 2);
+    bench.word = CIA402_QUICK_STOP;
+    TEST_ASSERT_INT_WITHIN(5, 1002,
+                           leave(CIA402_OPERATION_ENABLED) + leave(CIA402_QUICK_STOP_ACTIVE));
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+}
+
+static void test_power_off_is_the_brake(void)
+{
+    drive_bench_enable();
+    move(400);
+    bench.word = CIA402_DISABLE_VOLTAGE;
+    const int32_t from = axis_motion_position(&bench.node.axis);
+    drive_bench_run(1);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+    drive_bench_run(50);
+    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.axis));
+    TEST_ASSERT_INT32_WITHIN(150000, 360000, axis_motion_position(&bench.node.axis) - from);
+}
+
+static void test_reset_says_no_error(void)
+{
+    drive_bench_enable();
+    (void)drive_node_fault(&bench.node, NODE_FAULT_CODE, 0x4210, true);
+    drive_bench_run(50);
+    bench.word = CIA402_FAULT_RESET;
+    drive_bench_run(1);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+    TEST_ASSERT_NOT_NULL(drive_bench_newest(COB_EMCY));
+    TEST_ASSERT_EQUAL_HEX64(0, cob_get(drive_bench_newest(COB_EMCY)->data, 3));
+    TEST_ASSERT_EQUAL_HEX64(0, drive_bench_read(0x603F, 0));
+    TEST_ASSERT_EQUAL_HEX64(0, drive_bench_read(0x1001, 0));
+    TEST_ASSERT_EQUAL_INT64(1, drive_bench_read(0x1003, 0));
+    TEST_ASSERT_EQUAL_HEX64(0x4210, drive_bench_read(0x1003, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(0x1003, 0, 0));
+    TEST_ASSERT_EQUAL_INT64(0, drive_bench_read(0x1003, 0));
+}
+
+/* 0x6007: what the loss of the connection does. */
+static void test_abort_connection_codes(void)
+{
+    static const enum cia402_state after[] = {CIA402_OPERATION_ENABLED,
+                                              CIA402_FAULT_REACTION_ACTIVE,
+                                              CIA402_SWITCH_ON_DISABLED, CIA402_QUICK_STOP_ACTIVE};
+    for (int16_t code = 0; code <= 3; code++) {
+        drive_bench_begin();
+        put(0x6007, code);
+        drive_bench_enable();
+        move(50);
+        for (int i = 0; i < 60 && bench.node.values.error_code == 0; i++) {
+            drive_node_process(&bench.node, 10000); /* no SYNC */
+        }
+        TEST_ASSERT_EQUAL_INT(after[code], state());
+        TEST_ASSERT_EQUAL_HEX16(EMCY_SYNC_LOST, drive_bench_read(0x603F, 0));
+    }
+}
+
+/* 0x1016 and 0x1029: the master's heartbeat. */
+static void test_error_behaviour(void)
+{
+    static const enum nmt_state after[] = {NMT_PRE_OPERATIONAL, NMT_OPERATIONAL, NMT_STOPPED};
+    for (uint8_t code = 0; code <= 2; code++) {
+        struct can_msg beat;
+        drive_bench_begin();
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(0x1029, 1, code));
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(0x1016, 1, 0x00010064));
+        drive_bench_enable();
+        move(50);
+        cob_frame(&beat, COB_HEARTBEAT + 1, 1);
+        beat.data[0] = NMT_OPERATIONAL;
+        drive_node_receive(&bench.node, &beat);
+        for (int k = 0; k < 120 && state() == CIA402_OPERATION_ENABLED; k++) {
+            move(1);
+        }
+        TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+        TEST_ASSERT_EQUAL_HEX8(after[code], bench.node.nmt.state);
+        TEST_ASSERT_EQUAL_HEX16(EMCY_HEARTBEAT, bench.node.values.error_code);
+        (void)leave(CIA402_QUICK_STOP_ACTIVE); /* time passes in each NMT state */
+        TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+    }
+}
+
+/* Enabled by SDO in CSP with no SYNC at all: stands, and after the time of 0x2101 sub 6 the reaction
+ * of 0x6007. */
+static void test_csp_without_sync(void)
+{
+    put(0x6040, CIA402_SHUTDOWN);
+    put(0x6040, CIA402_SWITCH_ON);
+    for (int k = 0; k < 100; k++) {
+        drive_node_process(&bench.node, 10000);
+    }
+    put(0x6040, CIA402_ENABLE_OPERATION);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    for (int k = 0; k < 50; k++) {
+        drive_node_process(&bench.node, 10000);
+        TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    }
+    drive_node_process(&bench.node, 10000);
+    TEST_ASSERT_EQUAL_HEX16(EMCY_SYNC_LOST, drive_bench_read(0x603F, 0));
+    for (int k = 0; k < 10; k++) {
+        drive_node_process(&bench.node, 10000);
+    }
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+    put(0x6040, CIA402_SHUTDOWN); /* and again */
+    put(0x6040, CIA402_SWITCH_ON);
+    put(0x6040, CIA402_ENABLE_OPERATION);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_read(0x603F, 0));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_every_command_in_every_state);
+    RUN_TEST(test_quick_stop_codes);
+    RUN_TEST(test_codes_that_do_not_exist);
+    RUN_TEST(test_leaving_operation_enabled);
+    RUN_TEST(test_a_stop_called_off);
+    RUN_TEST(test_fault_reaction_codes);
+    RUN_TEST(test_a_stop_ends_when_the_motor_stands);
+    RUN_TEST(test_patience_ends);
+    RUN_TEST(test_power_off_is_the_brake);
+    RUN_TEST(test_reset_says_no_error);
+    RUN_TEST(test_abort_connection_codes);
+    RUN_TEST(test_error_behaviour);
+    RUN_TEST(test_csp_without_sync);
+    return UNITY_END();
+}
