@@ -35,6 +35,8 @@ class Recorder:
         self._dropped = 0
         self._error: OSError | None = None
         self._ending = threading.Event()
+        self._emptied = 0
+        self._batch = FrameBatch()
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         self._thread.start()
         self.started_s = time.monotonic()
@@ -51,7 +53,7 @@ class Recorder:
         self.stop()
 
     def _work(self) -> None:
-        batch = FrameBatch()
+        batch = self._batch
         descriptor = self._socket.fileno()
         try:
             while True:
@@ -63,6 +65,7 @@ class Recorder:
                     self._dropped = batch.dropped(count - 1) or self._dropped
                     batch.rearm(count)
                 if count < BATCH:
+                    self._emptied += 1
                     if ending:
                         return
                     time.sleep(_PAUSE_S)
@@ -94,11 +97,18 @@ class Recorder:
         return _joined(list(self._chunks))
 
     def take(self) -> Frames:
-        """What came since the last call; it is forgotten here. Raises BusError as `frames`."""
+        """What came since the last call, up to now; it is forgotten here. Raises BusError as `frames`."""
+        self._catch_up()
         self._check()
         chunks = self._chunks[: len(self._chunks)]  # the thread appends only
         del self._chunks[: len(chunks)]
         return _joined(chunks)
+
+    def _catch_up(self) -> None:
+        """Waits until the thread has found the socket empty, having begun to look after now."""
+        wanted = self._emptied + 2
+        while self._emptied < wanted and self._thread.is_alive():
+            time.sleep(_PAUSE_S / 2)
 
     def _check(self) -> None:
         if self._error is not None:

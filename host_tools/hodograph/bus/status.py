@@ -1,134 +1,227 @@
 # SPDX-License-Identifier: MIT
-"""The controller's state, gathered and in words."""
+"""The controller's state, gathered over SDO into one typed snapshot.
+
+`Status.json()` has the keys that tools may rely on (docs/cli.md). A snapshot of two axes is some 60 short SDO
+transfers, a few milliseconds on an idle machine; what belongs together is read in one turn.
+"""
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from typing import Any
 
+from .boot_texts import BootTrouble, boot_trouble
 from .controller import Controller
+from .drive_states import inputs_on, state_of_number
 from .objects import (
     ACTUAL,
     AXIS_NODE,
+    BOOT,
+    BOOT_TROUBLE,
     CONFIGURATION,
+    DIGITAL_INPUTS,
     DRIVE_ERROR,
+    DRIVE_STATE,
     FAULT,
+    FOLLOWING_ERROR,
+    HOMED,
+    MISSED_TPDOS,
     MOTION,
     OVERRIDE,
     STATUSWORD,
     TARGET,
 )
-from .texts import REFUSALS, STATES, drive_state, fault_text
+from .texts import REFUSALS, STATES, detail_text, fault_words
+from .upload import program_fault_text
 
 _Q40 = 2.0**-40
 _Q32 = 2.0**-32
 _Q30 = 2.0**-30
 
 
+@dataclass(frozen=True)
+class Fault:
+    """What stopped the machine; node 0 is the controller itself."""
+
+    code: int
+    text: str
+    remedy: str
+    node: int
+    detail: int
+    detail_text: str
+
+
+@dataclass(frozen=True)
+class LoadedProgram:
+    """The active program; numbers are 0 without one. `refused` is why the last upload was refused, None: it was not."""
+
+    state: str
+    refused: str | None
+    refused_code: int
+    refused_index: int
+    crc32: int
+    size: int
+    segments: int
+    pieces: int
+    ticks: int
+    duration_s: float
+    length_mm: float
+    start_x_counts: int
+    start_y_counts: int
+    end_x_counts: int
+    end_y_counts: int
+
+
+@dataclass(frozen=True)
+class PathPosition:
+    """Where on the path the setpoint is."""
+
+    arc_length_mm: float
+    feed_mm_s: float
+    time_s: float
+
+
+@dataclass(frozen=True)
+class Override:
+    """What is asked for; at what rate the program's time runs now; whether the program allows no more here."""
+
+    wanted_percent: int
+    actual_percent: float
+    saturated: bool
+
+
+@dataclass(frozen=True)
+class AxisStatus:
+    """One drive, as the controller sees it. The following error is the drive's own (0x60F4)."""
+
+    node: int
+    state: str
+    statusword: int
+    actual_mm: float
+    target_mm: float
+    following_error_um: float
+    missed_tpdos: int
+    digital_inputs: int
+    inputs_on: tuple[str, ...]
+    homed: bool
+    error_code: int
+    error: str | None
+    remedy: str | None
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Object 0x2008: SYNCs since power-on, the rest of the present or last run."""
+
+    syncs: int
+    tick: int
+    deadline_misses: int
+    worst_lateness_us: int
+    worst_tick_ns: int
+    missed_tpdos: int
+    frames_not_sent: int
+
+
+@dataclass(frozen=True)
+class Status:
+    """Everything that the controller tells, at one instant or nearly so."""
+
+    bus: str
+    node: int
+    state: str
+    fault: Fault | None
+    boot_trouble: BootTrouble | None
+    last_refusal: str | None
+    program: LoadedProgram
+    motion: PathPosition
+    override: Override
+    axes: tuple[AxisStatus, ...]
+    statistics: Statistics
+
+    def json(self) -> dict[str, Any]:
+        """As nested dictionaries and lists, ready for JSON."""
+        found = asdict(self)
+        found["axes"] = [
+            axis | {"inputs_on": list(axis["inputs_on"])} for axis in asdict(self)["axes"]
+        ]
+        return found
+
+
+def snapshot(controller: Controller) -> Status:
+    """Reads everything. Raises BusError when the controller stops answering."""
+    with controller.turn():
+        state = controller.state()
+        motion = [controller.read(MOTION, sub) for sub in (1, 2, 3)]
+        override = [controller.read(OVERRIDE, sub) for sub in (1, 2, 3)]
+        refusal = controller.read(FAULT, 4)
+        fault = _fault(controller)
+        trouble = _boot_trouble(controller) if state == BOOT else None
+        statistics = Statistics(**controller.statistics())
+    with controller.turn():
+        counts_per_mm = controller.read(CONFIGURATION, 7)
+        axis_count = controller.read(CONFIGURATION, 1)
+        axes = tuple(_axis(controller, i, counts_per_mm) for i in range(1, axis_count + 1))
+    return Status(
+        bus=str(controller.address),
+        node=controller.node_id,
+        state=STATES.get(state, str(state)),
+        fault=fault,
+        boot_trouble=trouble,
+        last_refusal=REFUSALS.get(refusal),
+        program=_program(controller),
+        motion=PathPosition(motion[0] * _Q40, motion[1] / 1000, motion[2] * _Q32),
+        override=Override(override[0], 100 * override[1] * _Q30, bool(override[2])),
+        axes=axes,
+        statistics=statistics,
+    )
+
+
 def read_status(controller: Controller) -> dict[str, Any]:
-    """State, fault, program, motion, axes and statistics, ready for JSON."""
-    state = controller.state()
-    counts_per_mm = controller.read(CONFIGURATION, 7)
-    return {
-        "bus": str(controller.address),
-        "node": controller.node_id,
-        "state": STATES.get(state, str(state)),
-        "fault": _fault(controller),
-        "last_refusal": REFUSALS.get(controller.read(FAULT, 4)),
-        "program": _program(controller),
-        "motion": {
-            "arc_length_mm": controller.read(MOTION, 1) * _Q40,
-            "feed_mm_s": controller.read(MOTION, 2) / 1000,
-            "time_s": controller.read(MOTION, 3) * _Q32,
-        },
-        "override": {
-            "wanted_percent": controller.read(OVERRIDE, 1),
-            "actual_percent": 100 * controller.read(OVERRIDE, 2) * _Q30,
-            "saturated": bool(controller.read(OVERRIDE, 3)),
-        },
-        "axes": [
-            _axis(controller, i, counts_per_mm)
-            for i in range(1, controller.read(CONFIGURATION, 1) + 1)
-        ],
-        "statistics": controller.statistics(),
-    }
+    """`snapshot`, ready for JSON."""
+    return snapshot(controller).json()
 
 
-def _fault(controller: Controller) -> dict[str, Any] | None:
+def _fault(controller: Controller) -> Fault | None:
     code = controller.read(FAULT, 1)
     if code == 0:
         return None
-    return {
-        "code": code,
-        "text": fault_text(code),
-        "node": controller.read(FAULT, 2),
-        "detail": controller.read(FAULT, 3),
-    }
+    node, detail = controller.read(FAULT, 2), controller.read(FAULT, 3)
+    words = fault_words(code)
+    return Fault(code, words.text, words.remedy, node, detail, detail_text(code, detail))
 
 
-def _program(controller: Controller) -> dict[str, Any]:
-    summary = controller.program_summary()
-    summary["duration_s"] = summary.pop("duration_q32_s") * _Q32
-    summary["length_mm"] = summary.pop("length_q40_mm") * _Q40
-    return summary
+def _boot_trouble(controller: Controller) -> BootTrouble | None:
+    return boot_trouble(*(controller.read(BOOT_TROUBLE, sub) for sub in (1, 2, 3, 4)))
 
 
-def _axis(controller: Controller, i: int, counts_per_mm: int) -> dict[str, Any]:
-    statusword = controller.read(STATUSWORD, i)
-    return {
-        "node": controller.read(AXIS_NODE, i),
-        "state": drive_state(statusword),
-        "statusword": statusword,
-        "actual_mm": controller.read(ACTUAL, i) / counts_per_mm,
-        "target_mm": controller.read(TARGET, i) / counts_per_mm,
-        "error_code": controller.read(DRIVE_ERROR, i),
-    }
-
-
-def status_rows(status: dict[str, Any]) -> list[tuple[str, str]]:
-    """The same for people."""
-    program, motion, statistics = status["program"], status["motion"], status["statistics"]
-    rows = [
-        ("controller", f"node {status['node']} on {status['bus']}: {status['state']}"),
-        ("fault", "none" if status["fault"] is None else _fault_words(status["fault"])),
-        ("program", _program_words(program)),
-        (
-            "motion",
-            f"arc length {motion['arc_length_mm']:.6f} mm, feed {motion['feed_mm_s']:.3f} mm/s, "
-            f"time {motion['time_s']:.3f} s",
-        ),
-    ]
-    rows.append(("override", _override_words(status["override"])))
-    for i, axis in enumerate(status["axes"], start=1):
-        error = f", error 0x{axis['error_code']:04X}" if axis["error_code"] else ""
-        rows.append(
-            (
-                f"axis {i}",
-                f"node {axis['node']}: {axis['state']}, at {axis['actual_mm']:.6f} mm, "
-                f"target {axis['target_mm']:.6f} mm{error}",
-            )
-        )
-    rows.append(
-        (
-            "statistics",
-            ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in statistics.items()),
-        )
+def _program(controller: Controller) -> LoadedProgram:
+    with controller.turn():
+        numbers = controller.program_summary()
+    code, index = numbers["refused_code"], numbers["refused_index"]
+    return LoadedProgram(
+        refused=program_fault_text(code, index) if code else None,
+        duration_s=numbers.pop("duration_q32_s") * _Q32,
+        length_mm=numbers.pop("length_q40_mm") * _Q40,
+        **numbers,
     )
-    return rows
 
 
-def _override_words(override: dict[str, Any]) -> str:
-    saturated = ", as much as the program allows here" if override["saturated"] else ""
-    return f"{override['wanted_percent']} %, now {override['actual_percent']:.1f} %{saturated}"
-
-
-def _fault_words(fault: dict[str, Any]) -> str:
-    return f"{fault['text']} (code 0x{fault['code']:04X}, node {fault['node']}, detail {fault['detail']})"
-
-
-def _program_words(program: dict[str, Any]) -> str:
-    if program["state"] != "ready":
-        return str(program["state"])
-    return (
-        f"{program['segments']} segments, {program['pieces']} pieces, {program['ticks']} ticks, "
-        f"{program['duration_s']:.3f} s, {program['length_mm']:.3f} mm, CRC-32 {program['crc32']:08x}"
+def _axis(controller: Controller, i: int, counts_per_mm: int) -> AxisStatus:
+    error = controller.read(DRIVE_ERROR, i)
+    words = fault_words(error) if error else None
+    inputs = controller.read(DIGITAL_INPUTS, i)
+    return AxisStatus(
+        node=controller.read(AXIS_NODE, i),
+        state=state_of_number(controller.read(DRIVE_STATE, i)),
+        statusword=controller.read(STATUSWORD, i),
+        actual_mm=controller.read(ACTUAL, i) / counts_per_mm,
+        target_mm=controller.read(TARGET, i) / counts_per_mm,
+        following_error_um=1000 * controller.read(FOLLOWING_ERROR, i) / counts_per_mm,
+        missed_tpdos=controller.read(MISSED_TPDOS, i),
+        digital_inputs=inputs,
+        inputs_on=inputs_on(inputs),
+        homed=bool(controller.read(HOMED, i)),
+        error_code=error,
+        error=words.text if words else None,
+        remedy=words.remedy if words else None,
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands that only speak to a controller: start, stop, status. Light on imports, so that they answer quickly."""
+"""Commands that only speak to a controller: start, stop, hold, resume, override; light on imports, so quick."""
 
 from __future__ import annotations
 
@@ -24,11 +24,8 @@ from ..bus.controller import (
     connect,
 )
 from ..bus.signals import unbroken
-from ..bus.status import read_status, status_rows
 from ..errors import HodographError
-from .output import print_json, print_rows
-
-DEFAULT_BITRATE = 1_000_000
+from .targets import DEFAULT_BITRATE
 
 
 @contextmanager
@@ -102,22 +99,10 @@ def override(options: Namespace) -> None:
     print(f"override {options.percent} %")
 
 
-def status(options: Namespace) -> None:
-    """hodograph status."""
-    address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
-        found = read_status(controller)
-    if options.json:
-        print_json(found)
-    else:
-        print_rows(status_rows(found))
-
-
 COMMANDS = {
     "start": start,
     "stop": stop,
     "hold": hold,
     "resume": resume,
     "override": override,
-    "status": status,
 }

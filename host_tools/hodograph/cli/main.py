@@ -23,7 +23,8 @@ TERMINATED_EXIT_STATUS = 143
 _MODULES = {
     **dict.fromkeys(("spline", "feed", "compile", "inspect", "simulate"), "path_commands"),
     **dict.fromkeys(("upload", "goto", "run", "rig"), "motion_commands"),
-    **dict.fromkeys(("start", "stop", "hold", "resume", "override", "status"), "bus_commands"),
+    **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
+    "status": "status_command",
     "dbc": "dbc_command",
     "monitor": "monitor_command",
     **dict.fromkeys(("report", "paper"), "report_commands"),

@@ -17,9 +17,9 @@ from ..monitor.pump import Layout
 from ..monitor.security import make_token
 from ..monitor.session import Live, Place, Replay, Session
 from ..native import NativeProgram
-from .bus_commands import DEFAULT_BITRATE
 from .output import note
 from .path_commands import read_image
+from .targets import DEFAULT_BITRATE
 
 _USUAL_PERIOD_US = 1000
 _USUAL_COUNTS_PER_MM = 1_000_000

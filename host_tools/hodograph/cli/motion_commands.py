@@ -17,9 +17,10 @@ from ..config import Machine, load_machine, read_toml
 from ..errors import BusError, InputError
 from ..native import NativeProgram
 from ..simulate import write_trace
-from .bus_commands import DEFAULT_BITRATE, reached, stopping
+from .bus_commands import reached, stopping
 from .output import note, print_json, print_rows, progress
 from .path_commands import motion_rows, print_notes, read_image
+from .targets import DEFAULT_BITRATE
 
 
 def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:

@@ -29,9 +29,13 @@ def print_json(value: object) -> None:
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     """Names and values, aligned."""
+    print("\n".join(aligned(rows)))
+
+
+def aligned(rows: Sequence[tuple[str, str]]) -> list[str]:
+    """The lines of names and values in two columns."""
     width = max(len(name) for name, _ in rows)
-    for name, value in rows:
-        print(f"{name:<{width}}  {value}")
+    return [f"{name:<{width}}  {value}" for name, value in rows]
 
 
 def pairs(values: NDArray[np.complex128]) -> list[list[float]]:

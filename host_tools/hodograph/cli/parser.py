@@ -48,6 +48,14 @@ def finite(text: str) -> float:
     return value
 
 
+def seconds(text: str) -> float:
+    """A time above zero."""
+    value = finite(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a time above 0')
+    return value
+
+
 def percentage(text: str) -> int:
     """A feed override."""
     if not text.isdigit() or int(text) > 200:
@@ -227,10 +235,21 @@ def make_parser() -> argparse.ArgumentParser:
     _bus(override)
     _node(override)
 
-    status = command("status", "print the state of controller, drives and program")
+    status = command("status", "print the state of controller, drives, program and bus")
     _bus(status)
-    _node(status)
+    status.add_argument("--node", type=node_number, help="the controller's node number (default 1)")
+    status.add_argument(
+        "--machine", type=Path, metavar="FILE", help="for node number, bit rate, names of the axes"
+    )
     _json(status)
+    status.add_argument(
+        "--watch",
+        action="store_true",
+        help="again and again until Ctrl-C; with --json a line each time",
+    )
+    status.add_argument(
+        "--interval", type=seconds, default=0.5, metavar="S", help="of --watch (default 0.5)"
+    )
 
     _monitor(command("monitor", "serve a live page of the machine for browsers"))
 

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""States of a CiA 402 drive by the standard's names, and the bits that say more."""
+
+from __future__ import annotations
+
+NOT_THERE = "not there"
+DRIVE_STATES = (
+    "not ready to switch on",
+    "switch on disabled",
+    "ready to switch on",
+    "switched on",
+    "operation enabled",
+    "quick stop active",
+    "fault reaction active",
+    "fault",
+)
+"""In the order of enum cia402_state (firmware/canopen/cia402.h)."""
+
+_SHORT, _LONG = 0x4F, 0x6F
+_CODINGS = (
+    (_SHORT, 0x00),
+    (_SHORT, 0x40),
+    (_LONG, 0x21),
+    (_LONG, 0x23),
+    (_LONG, 0x27),
+    (_LONG, 0x07),
+    (_SHORT, 0x0F),
+    (_SHORT, 0x08),
+)
+
+INPUTS = ((0x1, "negative limit"), (0x2, "positive limit"), (0x4, "home switch"))
+"""Bits of 0x60FD."""
+
+
+def state_of_statusword(statusword: int) -> str:
+    """The state that a statusword (0x6041) tells."""
+    for (mask, coding), name in zip(_CODINGS, DRIVE_STATES, strict=True):
+        if statusword & mask == coding:
+            return name
+    return f"unknown (0x{statusword:04X})"
+
+
+def state_of_number(number: int) -> str:
+    """The state that object 0x2026 tells: 0 not there, else enum cia402_state + 1."""
+    if number == 0:
+        return NOT_THERE
+    return DRIVE_STATES[number - 1] if number <= len(DRIVE_STATES) else f"unknown ({number})"
+
+
+def inputs_on(inputs: int) -> tuple[str, ...]:
+    """Names of the digital inputs (0x60FD) that are on; the manufacturer's, from bit 16, by number."""
+    named = [name for bit, name in INPUTS if inputs & bit]
+    named += [f"input {bit - 16}" for bit in range(16, 32) if inputs >> bit & 1]
+    return tuple(named)

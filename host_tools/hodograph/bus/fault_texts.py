@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: MIT
+"""Emergency error codes (CiA 301 table 26, CiA 402-2, and our own 0xFFxx) in words: what it is, and what to do.
+
+When that is done, `hodograph start --reset` resets the fault.
+
+Single codes come before the classes that contain them. The codes that the controller (firmware/app/fault.h) and the
+simulated drives (firmware/canopen/emcy.h) can raise are all single codes here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .drive_states import state_of_statusword
+
+
+@dataclass(frozen=True)
+class FaultText:
+    """One phrase each, without a full stop."""
+
+    text: str
+    remedy: str
+
+
+_SINGLE = {
+    0x1000: (
+        "generic error of a drive",
+        "read what the drive itself says (its display, its error history 0x1003)",
+    ),
+    0x2310: (
+        "overload: the motor's current was too high for too long (I2t)",
+        "look for a jammed axis, lower feed or acceleration, let the motor cool down",
+    ),
+    0x2320: ("short circuit or earth leakage", "check motor, motor cable and their insulation"),
+    0x2350: (
+        "overload: thermal state of the motor (I2t)",
+        "lower feed or acceleration, let the motor cool down",
+    ),
+    0x3110: ("mains over-voltage", "check the supply of the drive"),
+    0x3120: ("mains under-voltage", "check the supply of the drive, its fuses and contactors"),
+    0x3130: ("a mains phase is missing", "check the supply of the drive and its fuses"),
+    0x3210: (
+        "DC link over-voltage",
+        "check the supply and the brake resistor; lower the quick stop deceleration",
+    ),
+    0x3220: (
+        "DC link under-voltage",
+        "switch the drive's power on, check supply and emergency stop",
+    ),
+    0x4210: ("the drive is too hot", "let it cool down, check fans and filters"),
+    0x4310: ("the motor is too hot", "let it cool down, lower feed or acceleration"),
+    0x6100: (
+        "internal software error",
+        "note code, node and detail and report it; restart the controller if it comes again",
+    ),
+    0x7121: ("the motor is blocked", "look for a collision or a closed brake"),
+    0x7122: (
+        "motor or commutation error",
+        "check the motor's wiring and the drive's commissioning",
+    ),
+    0x7300: ("position sensor", "check encoder and encoder cable; home the axis anew"),
+    0x7305: (
+        "encoder fault: the position is not to be trusted",
+        "check encoder and encoder cable; home the axis anew",
+    ),
+    0x7306: ("second encoder fault", "check encoder and encoder cable; home the axis anew"),
+    0x8100: ("communication", "check CAN cable, termination and bit rate of all nodes"),
+    0x8110: (
+        "CAN overrun: frames were lost",
+        "look for other traffic on the bus (hodograph status shows the load), take it away",
+    ),
+    0x8120: (
+        "CAN in error passive mode",
+        "check CAN cable, termination (120 ohms at both ends) and bit rate",
+    ),
+    0x8130: (
+        "no life sign: heartbeats stayed away",
+        "is the drive powered and connected, is the controller running? check the CAN cable",
+    ),
+    0x8140: (
+        "recovered from bus-off",
+        "check CAN cable, termination (120 ohms at both ends) and bit rate",
+    ),
+    0x8210: (
+        "a PDO was too short",
+        "another node sends under this identifier: look with candump, take it away",
+    ),
+    0x8240: ("SYNC has an unexpected length", "another SYNC producer is on the bus: switch it off"),
+    0x8250: (
+        "expected PDOs stayed away",
+        "is the drive powered and connected? check the CAN cable and the bus load; "
+        "on a slow host raise answer_wait_ms in the machine file",
+    ),
+    0x8311: ("torque above its limit", "look for a collision, lower feed or acceleration"),
+    0x8480: ("speed out of bounds", "lower the feed, check the encoder"),
+    0x8611: (
+        "following error: the axis does not follow its setpoints",
+        "look for a jammed axis, lower feed or acceleration, or widen the following error window",
+    ),
+    0x8612: (
+        "position limit: the axis is at the end of its travel or on a limit switch",
+        "move the axis off the limit, check travel and work offset in the machine file",
+    ),
+    0x8700: (
+        "SYNC lost: the controller's clock stayed away",
+        "is the controller running? check the CAN cable",
+    ),
+    0xFF00: (
+        "manufacturer specific error",
+        "read what the drive itself says (its manual, its history 0x1003)",
+    ),
+    0xFF01: (
+        "the drive did not switch on in time",
+        "is its power stage fed and its enable input on? read the drive's error code",
+    ),
+    0xFF02: (
+        "the drive left operation enabled by itself",
+        "check emergency stop, enable input and power of the drive, read its error code",
+    ),
+    0xFF03: ("the drive restarted by itself", "check its supply; home the axis anew"),
+    0xFF04: (
+        "the drive no longer obeys the bus (remote bit off)",
+        "switch its local operation or its commissioning tool off",
+    ),
+    0xFF05: (
+        "the drive is enabled but does not follow its target",
+        "check mode and limits of the drive (its internal limits, a limit switch)",
+    ),
+    0xFF06: (
+        "the drive did not end its quick stop in time",
+        "check quick stop deceleration 0x6085 and reaction 0x605A of the drive",
+    ),
+    0xFF07: (
+        "the bus takes no frames from the controller",
+        "check CAN cable and termination: is any other node powered? look at the bus load",
+    ),
+    0xFF10: (
+        "the drive did not take the mode for homing, or the one for motion after it",
+        "has the drive a homing mode (0x6502)? switch its local operation off",
+    ),
+    0xFF11: (
+        "homing failed, says the drive",
+        "check home and limit switches and the homing method, read the drive's error code",
+    ),
+    0xFF12: (
+        "homing did not end in time",
+        "check home and limit switches, homing method and homing speeds",
+    ),
+}
+
+_CLASSES = (
+    (0xFF00, 0x0000, "no error", "nothing needs to be done"),
+    (
+        0xF000,
+        0x1000,
+        "generic error",
+        "read what the drive itself says (its manual, its history 0x1003)",
+    ),
+    (
+        0xFF00,
+        0x2100,
+        "current on the device's input side",
+        "check the supply of the drive and its fuses",
+    ),
+    (
+        0xFF00,
+        0x2200,
+        "current inside the device",
+        "switch the drive off and on; have it checked if it comes again",
+    ),
+    (
+        0xFF00,
+        0x2300,
+        "current on the device's output side",
+        "check motor and motor cable, look for a jammed axis",
+    ),
+    (0xF000, 0x2000, "current", "check motor, motor cable and supply, look for a jammed axis"),
+    (0xFF00, 0x3100, "mains voltage", "check the supply of the drive"),
+    (0xFF00, 0x3200, "voltage inside the device", "check the supply of the drive"),
+    (0xFF00, 0x3300, "output voltage", "check motor and motor cable"),
+    (0xF000, 0x3000, "voltage", "check the supply of the drive"),
+    (0xFF00, 0x4100, "ambient temperature", "cool the cabinet, check fans and filters"),
+    (0xF000, 0x4000, "temperature", "let drive and motor cool down, check fans and filters"),
+    (
+        0xF000,
+        0x5000,
+        "device hardware",
+        "switch the drive off and on; have it checked if it comes again",
+    ),
+    (
+        0xFF00,
+        0x6300,
+        "data set: parameters of the drive",
+        "check the drive's parameters, restore them from its backup",
+    ),
+    (
+        0xF000,
+        0x6000,
+        "device software",
+        "switch the drive off and on; check its firmware and parameters",
+    ),
+    (0xFF00, 0x7100, "power module, brake or motor", "check motor, brake and their wiring"),
+    (0xFF00, 0x7300, "sensor", "check encoder and encoder cable; home the axis anew"),
+    (0xF000, 0x7000, "additional modules", "check the modules plugged into the drive"),
+    (0xFF00, 0x8100, "communication", "check CAN cable, termination and bit rate of all nodes"),
+    (
+        0xFF00,
+        0x8200,
+        "protocol error",
+        "another node may use the same identifiers: look with candump",
+    ),
+    (0xFF00, 0x8300, "torque control", "look for a collision or a jammed axis"),
+    (0xFF00, 0x8400, "velocity control", "lower the feed, check the encoder"),
+    (0xFF00, 0x8500, "position control", "check encoder and gains of the drive"),
+    (0xFF00, 0x8600, "positioning", "check travel, following error window and homing of the axis"),
+    (0xFF00, 0x8700, "synchronisation", "is the controller running? check the CAN cable"),
+    (
+        0xF000,
+        0x8000,
+        "monitoring",
+        "read what the drive itself says (its manual, its history 0x1003)",
+    ),
+    (
+        0xF000,
+        0x9000,
+        "external error",
+        "look at the inputs of the drive: emergency stop, external fault",
+    ),
+    (
+        0xFF00,
+        0xF000,
+        "additional functions",
+        "read what the drive itself says (its manual, its history 0x1003)",
+    ),
+    (0xFF00, 0xFF00, "device specific error", "look the code up in the drive's manual"),
+)
+
+
+def known_code(code: int) -> bool:
+    """Whether this very code has words of its own."""
+    return code in _SINGLE
+
+
+def fault_words(code: int) -> FaultText:
+    """Text and remedy of a CANopen emergency error code, by its class when the code is not known."""
+    if code in _SINGLE:
+        return FaultText(*_SINGLE[code])
+    for mask, value, text, remedy in _CLASSES:
+        if code & mask == value:
+            return FaultText(text, remedy)
+    return FaultText(f"unknown error 0x{code:04X}", "look the code up in the drive's manual")
+
+
+def fault_text(code: int) -> str:
+    """The text alone."""
+    return fault_words(code).text
+
+
+_STATUSWORD_CODES = (0x1000, 0xFF01, 0xFF02, 0xFF04, 0xFF05, 0xFF06, 0xFF11, 0xFF12)
+_COUNTS = {0x8250: "positions missed in a row", 0xFF07: "ticks in a row"}
+
+
+def detail_text(code: int, detail: int) -> str:
+    """What object 0x2003 sub 3 says beside a code of the controller, empty when nothing."""
+    if code in _STATUSWORD_CODES and detail:
+        return f"statusword 0x{detail:04X}, {state_of_statusword(detail)}"
+    if code in _COUNTS:
+        return f"{detail} {_COUNTS[code]}"
+    return f"detail {detail}" if detail else ""

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""The load of a bus, measured by listening: bits of every frame, stuff bits computed, over wall time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bustime.frame_bits import ERROR, EXTENDED, exact_bits
+from .address import BusAddress
+from .frames import Frames
+from .recorder import Recorder
+
+LEAST_LISTEN_S = 0.25
+
+_CLASSES = (
+    ("NMT", 0x000, 0x000),
+    ("SYNC", 0x080, 0x080),
+    ("EMCY", 0x081, 0x0FF),
+    ("TIME", 0x100, 0x100),
+    ("TPDO1", 0x181, 0x1FF),
+    ("RPDO1", 0x201, 0x27F),
+    ("TPDO2", 0x281, 0x2FF),
+    ("RPDO2", 0x301, 0x37F),
+    ("TPDO3", 0x381, 0x3FF),
+    ("RPDO3", 0x401, 0x47F),
+    ("TPDO4", 0x481, 0x4FF),
+    ("RPDO4", 0x501, 0x57F),
+    ("SDO", 0x581, 0x67F),
+    ("heartbeat", 0x701, 0x77F),
+)
+"""COB-IDs of the predefined connection set (CiA 301 tables 38 and 39)."""
+OTHER = "other"
+
+
+@dataclass(frozen=True)
+class ClassLoad:
+    """One class of COB-IDs: frames a second, and their share of the bus's time."""
+
+    frames_per_s: float
+    percent: float
+
+
+@dataclass(frozen=True)
+class BusLoad:
+    """What was on the bus during `seconds`; classes that did not show up are left out."""
+
+    bitrate: int
+    seconds: float
+    frames_per_s: float
+    percent: float
+    classes: dict[str, ClassLoad]
+
+    def json(self) -> dict[str, Any]:
+        """As nested dictionaries."""
+        return asdict(self)
+
+
+def bus_load(frames: Frames, seconds: float, bitrate: int) -> BusLoad:
+    """The load of frames that came during `seconds` on a bus of `bitrate` bit/s."""
+    bits = exact_bits(frames)
+    kinds = _kinds(frames["id"])
+    classes = {}
+    for kind, name in enumerate([name for name, _, _ in _CLASSES] + [OTHER]):
+        own = bits[kinds == kind]
+        if own.size:
+            classes[name] = ClassLoad(own.size / seconds, _percent(own, seconds, bitrate))
+    return BusLoad(
+        bitrate, seconds, frames.size / seconds, _percent(bits, seconds, bitrate), classes
+    )
+
+
+def _percent(bits: NDArray[np.int64], seconds: float, bitrate: int) -> float:
+    return 100.0 * int(bits.sum()) / (seconds * bitrate)
+
+
+def _kinds(identifiers: NDArray[np.uint32]) -> NDArray[np.int64]:
+    kinds = np.full(identifiers.size, len(_CLASSES))
+    plain = (identifiers & np.uint32(EXTENDED | ERROR)) == 0
+    numbers = identifiers & np.uint32(0x7FF)
+    for kind, (_, first, last) in enumerate(_CLASSES):
+        kinds[plain & (numbers >= first) & (numbers <= last)] = kind
+    return kinds
+
+
+def _now_us() -> int:
+    """By the clock that the kernel stamps frames with."""
+    return time.time_ns() // 1000
+
+
+class LoadMeter:
+    """Listens to a SocketCAN bus; a context manager. Raises BusError."""
+
+    def __init__(self, address: BusAddress, bitrate: int) -> None:
+        self._recorder = Recorder(address)
+        self._bitrate = bitrate
+        self._since_us = _now_us()
+        self._left = self._recorder.take()[:0]
+
+    def measure(self, least_s: float = LEAST_LISTEN_S) -> BusLoad:
+        """The load since the beginning or the last call, waiting until that is `least_s` ago."""
+        due_us = self._since_us + round(1e6 * least_s)
+        time.sleep(max(0, due_us - _now_us()) / 1e6)
+        now_us = _now_us()
+        frames = np.concatenate([self._left, self._recorder.take()])
+        in_time = (frames["time_us"] >= self._since_us) & (frames["time_us"] < now_us)
+        self._left = frames[frames["time_us"] >= now_us]
+        seconds, self._since_us = (now_us - self._since_us) / 1e6, now_us
+        return bus_load(frames[in_time], max(seconds, 1e-6), self._bitrate)
+
+    def __enter__(self) -> LoadMeter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._recorder.stop()

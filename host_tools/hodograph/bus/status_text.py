@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""A status for people: rows with names, or one line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .load import BusLoad
+from .status import AxisStatus, LoadedProgram, Override, Statistics, Status
+
+Row = tuple[str, str]
+
+
+def status_rows(
+    status: Status, load: BusLoad | None = None, names: Sequence[str] = ()
+) -> list[Row]:
+    """Everything, a line each; `names` are those of the axes."""
+    rows = [("controller", f"node {status.node} on {status.bus}: {status.state}")]
+    rows += _trouble_rows(status)
+    rows.append(("program", _program_words(status.program)))
+    rows.append(("position", _position_words(status)))
+    rows.append(("feed", f"{status.motion.feed_mm_s:.3f} mm/s"))
+    rows.append(("override", _override_words(status.override)))
+    for i, axis in enumerate(status.axes):
+        name = names[i] if i < len(names) else str(i + 1)
+        rows.append((f"axis {name}", _axis_words(axis)))
+        if axis.error is not None:
+            rows.append(("", f"error: {axis.error} (0x{axis.error_code:04X})"))
+            rows.append(("", f"remedy: {axis.remedy}"))
+    rows += [] if load is None else _load_rows(load)
+    rows += _statistics_rows(status.statistics)
+    return rows
+
+
+def _trouble_rows(status: Status) -> list[Row]:
+    rows: list[Row] = []
+    if status.fault is not None:
+        fault = status.fault
+        where = f"node {fault.node}" if fault.node else "the controller"
+        detail = f", {fault.detail_text}" if fault.detail_text else ""
+        rows.append(("fault", f"{fault.text} (code 0x{fault.code:04X}, {where}{detail})"))
+        rows.append(("remedy", f"{fault.remedy}; then hodograph start --reset"))
+    else:
+        rows.append(("fault", "none"))
+    if status.boot_trouble is not None:
+        rows.append(("boot waits", status.boot_trouble.text))
+        rows.append(("remedy", status.boot_trouble.remedy))
+    if status.last_refusal is not None:
+        rows.append(("last refusal", status.last_refusal))
+    return rows
+
+
+def _program_words(program: LoadedProgram) -> str:
+    refused = f"; the last upload was refused: {program.refused}" if program.refused else ""
+    if program.state != "ready":
+        return program.state + refused
+    return (
+        f"{program.segments} segments, {program.pieces} pieces, {program.ticks} ticks, "
+        f"{program.duration_s:.3f} s, {program.length_mm:.3f} mm, CRC-32 {program.crc32:08x}{refused}"
+    )
+
+
+def _position_words(status: Status) -> str:
+    motion, program = status.motion, status.program
+    return (
+        f"{motion.arc_length_mm:.6f} of {program.length_mm:.6f} mm, "
+        f"{motion.time_s:.3f} of {program.duration_s:.3f} s, tick {status.statistics.tick}"
+    )
+
+
+def _override_words(override: Override) -> str:
+    saturated = ", as much as the program allows here" if override.saturated else ""
+    return f"{override.wanted_percent} % asked for, {override.actual_percent:.1f} % now{saturated}"
+
+
+def _axis_words(axis: AxisStatus) -> str:
+    inputs = f", {' and '.join(axis.inputs_on)} on" if axis.inputs_on else ""
+    return (
+        f"node {axis.node}: {axis.state}, at {axis.actual_mm:.6f} mm, target {axis.target_mm:.6f} mm, "
+        f"following error {axis.following_error_um:.3f} um, {'' if axis.homed else 'not '}homed, "
+        f"{axis.missed_tpdos} TPDOs missed{inputs}"
+    )
+
+
+def _load_rows(load: BusLoad) -> list[Row]:
+    kinds = ", ".join(f"{name} {kind.percent:.1f}" for name, kind in load.classes.items())
+    return [
+        (
+            "bus load",
+            f"{load.percent:.1f} % of {load.bitrate / 1000:g} kbit/s, {load.frames_per_s:.0f} frames/s, "
+            f"over {load.seconds:.2f} s",
+        ),
+        ("", kinds or "silent"),
+    ]
+
+
+def _statistics_rows(statistics: Statistics) -> list[Row]:
+    return [
+        (
+            "ticks",
+            f"worst tick {statistics.worst_tick_ns / 1000:.1f} us, worst lateness "
+            f"{statistics.worst_lateness_us} us, deadline misses {statistics.deadline_misses}",
+        ),
+        (
+            "frames",
+            f"SYNCs {statistics.syncs}, missed TPDOs {statistics.missed_tpdos}, "
+            f"not sent {statistics.frames_not_sent}",
+        ),
+    ]
+
+
+def status_line(status: Status, load: BusLoad | None = None) -> str:
+    """The gist in one line."""
+    motion = status.motion
+    words = [
+        status.state,
+        f"{motion.arc_length_mm:.3f} mm",
+        f"{motion.feed_mm_s:.1f} mm/s",
+        f"override {status.override.actual_percent:.0f}/{status.override.wanted_percent} %",
+        f"missed ticks {status.statistics.deadline_misses}",
+    ]
+    if load is not None:
+        words.append(f"bus {load.percent:.1f} %")
+    if status.fault is not None:
+        words.append(f"fault 0x{status.fault.code:04X}: {status.fault.text}")
+    if status.boot_trouble is not None:
+        words.append(status.boot_trouble.text)
+    return ", ".join(words)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""hodograph status: once, or again and again."""
+
+from __future__ import annotations
+
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from ..bus.address import BusAddress, parse_address
+from ..bus.controller import Controller, connect
+from ..bus.load import LEAST_LISTEN_S, BusLoad, LoadMeter
+from ..bus.status import Status, snapshot
+from ..bus.status_text import Row, status_line, status_rows
+from ..errors import BusError
+from .output import aligned, print_json
+from .targets import Target, target
+
+_HOME, _CLEAR_LINE, _CLEAR_BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
+_ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
+
+
+def status(options: Namespace) -> None:
+    """hodograph status."""
+    address = parse_address(options.bus)
+    to = target(options)
+    with ExitStack() as stack:
+        controller = stack.enter_context(connect(address, to.node, to.bitrate))
+        controller.require(options.wait)
+        meter = _meter(address, to, stack)
+        if options.watch:
+            _watch(controller, meter, to, options)
+        else:
+            _once(controller, meter, to, options)
+
+
+def _meter(address: BusAddress, to: Target, stack: ExitStack) -> LoadMeter | None:
+    """Only SocketCAN lets us listen beside what we ask."""
+    if not address.is_socketcan:
+        return None
+    return stack.enter_context(LoadMeter(address, to.bitrate))
+
+
+def _once(controller: Controller, meter: LoadMeter | None, to: Target, options: Namespace) -> None:
+    found = snapshot(controller)
+    load = None if meter is None else meter.measure()
+    if options.json:
+        print_json(_document(found, load))
+    else:
+        print("\n".join(aligned(status_rows(found, load, to.axis_names))))
+
+
+def _document(found: Status, load: BusLoad | None) -> dict[str, Any]:
+    return found.json() | {"bus_load": None if load is None else load.json()}
+
+
+@dataclass
+class _Screen:
+    """A terminal shows the newest view in place; anything else gets a line each time."""
+
+    names: tuple[str, ...]
+    as_json: bool
+
+    def show(self, found: Status, load: BusLoad | None) -> None:
+        if self.as_json:
+            print_json({"time": _now()} | _document(found, load))
+        elif sys.stdout.isatty():
+            self._draw(status_rows(found, load, self.names))
+        else:
+            print(f"{_now()} {status_line(found, load)}")
+        sys.stdout.flush()
+
+    def lost(self, words: str) -> None:
+        if self.as_json:
+            print_json({"time": _now(), "error": words})
+        elif sys.stdout.isatty():
+            self._draw([("controller", words)])
+        else:
+            print(f"{_now()} {words}")
+        sys.stdout.flush()
+
+    def _draw(self, rows: list[Row]) -> None:
+        lines = [*aligned([("time", _now()), *rows]), "", "Ctrl-C ends"]
+        sys.stdout.write(_HOME + "".join(f"{line}{_CLEAR_LINE}\n" for line in lines) + _CLEAR_BELOW)
+
+
+def _now() -> str:
+    return datetime.now().astimezone().isoformat(timespec="milliseconds")
+
+
+@contextmanager
+def _own_screen() -> Iterator[None]:
+    """On a terminal the view has a screen of its own, so that what was there comes back."""
+    if not sys.stdout.isatty():
+        yield
+        return
+    sys.stdout.write(_ENTER)
+    try:
+        yield
+    finally:
+        sys.stdout.write(_LEAVE)
+        sys.stdout.flush()
+
+
+def _watch(controller: Controller, meter: LoadMeter | None, to: Target, options: Namespace) -> None:
+    screen = _Screen(to.axis_names, options.json)
+    try:
+        with _own_screen():
+            while True:
+                begun = time.monotonic()
+                _look(controller, meter, screen)
+                time.sleep(max(0.0, begun + options.interval - time.monotonic()))
+    except KeyboardInterrupt as error:
+        if type(error) is not KeyboardInterrupt:  # SIGTERM
+            raise
+
+
+def _look(controller: Controller, meter: LoadMeter | None, screen: _Screen) -> None:
+    try:
+        if not controller.answers(LEAST_LISTEN_S):
+            raise BusError(f"no answer from {controller.who()}: still trying")
+        found = snapshot(controller)
+        screen.show(found, None if meter is None else meter.measure())
+    except BusError as error:
+        screen.lost(str(error))
+
+
+COMMANDS = {"status": status}
