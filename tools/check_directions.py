@@ -105,6 +105,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "paper",
     },
     "monitor": {"errors", "data", "config", "native", "bus", "bustime", "__init__"},
+    "faults": {"errors", "data", "config", "native", "simulate", "chain", "bus"},
     "cli": {"*"},
     "__main__": {"cli"},
     "__init__": {"errors"},

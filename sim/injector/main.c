@@ -17,13 +17,20 @@
 #include "port/linux/can_socket.h"
 #include "port/linux/clock.h"
 
-/* Below the controller's tick, above the drives and everything ordinary. */
-#define PRIORITY 25
+/* Below the drives and the controller's tick, so that they finish what they send together; above everything
+ * ordinary. */
+#define PRIORITY 10
 
 enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, SEND_TRIES = 200, WAKE_MS = 20 };
 
+struct outbox {
+    struct can_msg frames[CAN_SOCKET_BATCH];
+    size_t count;
+};
+
 struct injector {
     struct can_socket sockets[2]; /* by enum fault_side */
+    struct outbox outboxes[2];    /* what waits for the end of a batch, to that side */
     struct fault_rules rules;
     struct bridge bridge;
     uint64_t now_ns;
@@ -38,18 +45,48 @@ static int complain(int status, const char *reason)
 }
 
 /* A full queue of the interface empties within a few frame times: wait for it. */
+static void flush(struct injector *injector, enum fault_side to)
+{
+    struct outbox *box = &injector->outboxes[to];
+    struct can_socket *socket = &injector->sockets[to];
+    size_t done = 0;
+    for (int tries = 0; done < box->count && tries < SEND_TRIES;) {
+        const int sent = can_socket_send_many(socket, box->frames + done, box->count - done);
+        if (sent > 0) {
+            done += (size_t)sent;
+        } else if (sent == -EAGAIN) {
+            struct pollfd writable = {.fd = socket->fd, .events = POLLOUT};
+            (void)poll(&writable, 1, 1);
+            tries++;
+        } else {
+            injector->failed = sent;
+            break;
+        }
+    }
+    if (done < box->count && injector->failed == 0) {
+        injector->failed = -ENOBUFS;
+    }
+    box->count = 0;
+}
+
+/* Frames go out together: a call of the system for each costs more than all the rest. */
 static void send_frame(void *context, enum fault_side to, const struct can_msg *frame)
 {
     struct injector *injector = context;
-    int result = -EAGAIN;
-    for (int i = 0; i < SEND_TRIES && result == -EAGAIN; i++) {
-        result = can_socket_send(&injector->sockets[to], frame);
-        if (result == -EAGAIN) {
-            struct pollfd writable = {.fd = injector->sockets[to].fd, .events = POLLOUT};
-            (void)poll(&writable, 1, 1);
+    struct outbox *box = &injector->outboxes[to];
+    box->frames[box->count++] = *frame;
+    if (box->count == CAN_SOCKET_BATCH) {
+        flush(injector, to);
+    }
+}
+
+static void flush_both(struct injector *injector)
+{
+    for (unsigned side = 0; side < 2u; side++) {
+        if (injector->outboxes[side].count > 0) {
+            flush(injector, (enum fault_side)side);
         }
     }
-    injector->failed = result != 0 ? result : injector->failed;
 }
 
 static void note(void *context, const struct fault_watch *watch, enum fault_side from,
@@ -81,6 +118,7 @@ static int receive(struct injector *injector, enum fault_side from)
         for (int i = 0; i < count; i++) {
             bridge_receive(&injector->bridge, from, &frames[i], injector->now_ns);
         }
+        flush_both(injector);
     }
     return 0;
 }
@@ -88,8 +126,8 @@ static int receive(struct injector *injector, enum fault_side from)
 /* Until something is due, but no longer than WAKE_MS: rules in ms end without traffic too. */
 static struct timespec patience(const struct injector *injector)
 {
-    const uint64_t now_ns = clock_ns();
     const uint64_t due_ns = bridge_due_ns(&injector->bridge);
+    const uint64_t now_ns = due_ns == UINT64_MAX ? 0u : clock_ns();
     uint64_t wait_ns = WAKE_MS * 1000000ull;
     if (due_ns <= now_ns) {
         wait_ns = 0;
@@ -121,6 +159,7 @@ static int run(struct injector *injector, int signals)
         if (ready <= 0 || bridge_due_ns(&injector->bridge) != UINT64_MAX) {
             injector->now_ns = clock_ns();
             bridge_process(&injector->bridge, injector->now_ns);
+            flush_both(injector);
         }
     }
     (void)fprintf(stderr,

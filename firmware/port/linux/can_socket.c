@@ -151,13 +151,40 @@ int can_socket_filter(struct can_socket *socket, const struct can_socket_filter 
     return setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_FILTER, raw, bytes) == 0 ? 0 : -errno;
 }
 
-int can_socket_send(struct can_socket *socket, const struct can_msg *message)
+static struct can_frame raw_frame(const struct can_msg *message)
 {
     struct can_frame frame;
     memset(&frame, 0, sizeof frame);
     frame.can_id = message->id;
     frame.can_dlc = message->len;
     memcpy(frame.data, message->data, sizeof frame.data);
+    return frame;
+}
+
+int can_socket_send_many(struct can_socket *socket, const struct can_msg *messages, size_t count)
+{
+    struct can_frame frames[CAN_SOCKET_BATCH];
+    struct iovec vectors[CAN_SOCKET_BATCH];
+    struct mmsghdr headers[CAN_SOCKET_BATCH];
+    count = count < CAN_SOCKET_BATCH ? count : CAN_SOCKET_BATCH;
+    memset(headers, 0, sizeof headers);
+    for (size_t i = 0; i < count; ++i) {
+        frames[i] = raw_frame(&messages[i]);
+        vectors[i].iov_base = &frames[i];
+        vectors[i].iov_len = sizeof frames[i];
+        headers[i].msg_hdr.msg_iov = &vectors[i];
+        headers[i].msg_hdr.msg_iovlen = 1;
+    }
+    const int sent = sendmmsg(socket->fd, headers, (unsigned)count, MSG_DONTWAIT);
+    if (sent < 0) {
+        return errno == ENOBUFS || errno == EINTR ? -EAGAIN : -errno;
+    }
+    return sent;
+}
+
+int can_socket_send(struct can_socket *socket, const struct can_msg *message)
+{
+    const struct can_frame frame = raw_frame(message);
     if (write(socket->fd, &frame, sizeof frame) == (ssize_t)sizeof frame) {
         return 0;
     }

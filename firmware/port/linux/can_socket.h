@@ -39,6 +39,10 @@ int can_socket_filter(struct can_socket *socket, const struct can_socket_filter 
  * removed). */
 int can_socket_send(struct can_socket *socket, const struct can_msg *message);
 
+/* Sends up to CAN_SOCKET_BATCH frames in one call of the system. Returns how many went out, from the
+ * first on; -EAGAIN when not even one did (queue full); else a negative errno. */
+int can_socket_send_many(struct can_socket *socket, const struct can_msg *messages, size_t count);
+
 /* Takes up to CAN_SOCKET_BATCH waiting frames, oldest first. Returns how many are in `messages` and
  * sets *more when others may wait; or a negative errno (interface down, removed). */
 int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],

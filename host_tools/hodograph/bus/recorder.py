@@ -27,8 +27,9 @@ _PAUSE_S = 0.002
 class Recorder:
     """Records all frames from `start` to `stop`; a context manager."""
 
-    def __init__(self, address: BusAddress) -> None:
-        """Opens the socket; frames queue up from here on. Raises BusError."""
+    def __init__(self, address: BusAddress, pause_s: float = _PAUSE_S) -> None:
+        """Opens the socket; frames queue up from here on, and are taken every `pause_s`. Raises BusError."""
+        self._pause_s = pause_s
         self._socket = open_socket(address, timestamps=True)
         self._chunks: list[tuple[bytes, NDArray[np.int64]]] = []
         self._count = 0
@@ -68,7 +69,7 @@ class Recorder:
                     self._emptied += 1
                     if ending:
                         return
-                    time.sleep(_PAUSE_S)
+                    time.sleep(self._pause_s)
         except OSError as error:
             self._error = error
 

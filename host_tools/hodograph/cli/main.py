@@ -26,6 +26,7 @@ _MODULES = {
     **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
     "status": "status_command",
     "dbc": "dbc_command",
+    "faults": "faults_command",
     "monitor": "monitor_command",
     **dict.fromkeys(("report", "paper"), "report_commands"),
 }

@@ -63,6 +63,13 @@ def percentage(text: str) -> int:
     return int(text)
 
 
+def count(text: str) -> int:
+    """A number of things."""
+    if not text.isdigit() or int(text) > 100_000:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 0 to 100000')
+    return int(text)
+
+
 def node_number(text: str) -> int:
     """A CANopen node number."""
     if not text.isdigit() or not 1 <= int(text) <= 127:
@@ -295,6 +302,26 @@ def make_parser() -> argparse.ArgumentParser:
     dbc.add_argument(
         "--eds", type=Path, metavar="EDS", help="of the drives (default: the simulated drive's)"
     )
+
+    faults = command("faults", "inject faults into simulated machines and judge what comes of it")
+    faults.add_argument(
+        "scenarios",
+        metavar="SCENARIO",
+        nargs="*",
+        help="names or files; default: all of examples/faults",
+    )
+    faults.add_argument("--seeds", type=count, default=5, metavar="N", help="cases a scenario")
+    faults.add_argument("--seed", type=count, metavar="N", help="one case only, with this seed")
+    faults.add_argument("--folder", type=Path, metavar="DIR", help="of other scenario files")
+    faults.add_argument(
+        "--drives-bus",
+        default="socketcan:vcan1",
+        metavar="INTERFACE:CHANNEL",
+        help="the drives' side (default socketcan:vcan1)",
+    )
+    faults.add_argument("--verbose", action="store_true", help="a line for each case on stderr")
+    _bus(faults)
+    _json(faults)
 
     rig = command("rig", "bring up a simulated machine on a virtual bus until Ctrl-C")
     rig.add_argument(

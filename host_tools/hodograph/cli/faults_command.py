@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""hodograph faults: the campaign of injected faults."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from ..bus.address import parse_address
+from ..data import EXAMPLES
+from ..errors import RunError
+from ..faults.campaign import run_campaign
+from ..faults.scenario import find_scenarios
+from ..faults.table import text
+from .output import note, print_json
+
+SCENARIOS = EXAMPLES / "faults"
+
+
+def faults(options: Namespace) -> None:
+    """Runs scenarios, prints the table; raises RunError when there is a violation."""
+    scenarios = find_scenarios(options.folder or SCENARIOS, options.scenarios)
+    first = 0 if options.seed is None else options.seed
+    seeds = range(first, first + (options.seeds if options.seed is None else 1))
+    verdicts = []
+    for verdict in run_campaign(
+        scenarios, seeds, parse_address(options.bus), parse_address(options.drives_bus)
+    ):
+        verdicts.append(verdict)
+        if options.verbose:
+            note(f"{verdict.summary()}")
+    violations = sum(len(verdict.violations) for verdict in verdicts)
+    if options.json:
+        print_json({"cases": [verdict.summary() for verdict in verdicts], "violations": violations})
+    else:
+        print(text(verdicts))
+    if violations:
+        raise RunError(f"{violations} violations in {len(verdicts)} cases")
+
+
+COMMANDS = {"faults": faults}

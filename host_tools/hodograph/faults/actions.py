@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""What the host does while a case runs: it kills processes, cuts uploads, watches drives without a controller."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from ..bus.address import BusAddress
+from ..bus.controller import Controller
+from ..bus.network import open_network
+from ..bus.objects import PROGRAM
+from ..data import DRIVE_EDS
+from ..errors import RunError
+
+_STATUSWORD, _POSITION = 0x6041, 0x6064
+_STATE_MASK, _OPERATION_ENABLED = 0x6F, 0x27
+_WATCH_S = 0.004
+_STILL_LOOKS = 5
+
+
+def cut_upload(controller: Controller, image: bytes, at: int, *, polite: bool) -> None:
+    """Sends the first bytes of an image (a multiple of seven, or all but the end), then nothing more.
+
+    `polite` sends the SDO abort that a program in trouble sends; a killed one does not.
+    """
+    with controller.turn():
+        stream = controller.sdo.open(
+            PROGRAM, 1, "wb", buffering=0, size=len(image), block_transfer=True
+        )
+        while stream.pos < min(at, len(image) - 1):
+            stream.write(image[stream.pos : stream.pos + 7])
+        stream._initialized = False  # or close() would go on with the protocol
+        if polite:
+            controller.sdo.abort()
+
+
+def spawn_command(*words: str) -> subprocess.Popen[bytes]:
+    """A hodograph command of its own, to be killed."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "hodograph", *words],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def spawn_upload(path: Path, bus: BusAddress) -> subprocess.Popen[bytes]:
+    """`hodograph upload` as a process."""
+    return spawn_command("upload", str(path), "--bus", str(bus))
+
+
+def kill(process: subprocess.Popen[bytes]) -> None:
+    """SIGKILL, and wait for the end."""
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+
+
+@contextmanager
+def drives_at(bus: BusAddress, nodes: Sequence[int], bitrate: int) -> Iterator[list[Any]]:
+    """SDO clients of the drives themselves, for when there is no controller."""
+    with ExitStack() as stack:
+        clients = []
+        for node in nodes:
+            network = stack.enter_context(open_network(bus, node, bitrate))
+            client = network.add_node(node, str(DRIVE_EDS)).sdo
+            client.RESPONSE_TIMEOUT = 1.0
+            clients.append(client)
+        yield clients
+
+
+def await_rest(clients: Sequence[Any], tolerance_counts: int, wait_s: float) -> float:
+    """Monotonic time at which the drives, asked by SDO, had come to rest, not enabled. Raises RunError: they do not."""
+    deadline = time.monotonic() + wait_s
+    rests = {id(client): (0, 0.0, 0) for client in clients}  # place, since when, looks
+    while True:
+        for client in clients:
+            place, since_s, looks = rests[id(client)]
+            word, now = int(client[_STATUSWORD].raw), int(client[_POSITION].raw)
+            off = word & _STATE_MASK != _OPERATION_ENABLED
+            if off and abs(now - place) <= tolerance_counts and looks > 0:
+                rests[id(client)] = (place, since_s, looks + 1)
+            else:
+                rests[id(client)] = (now, time.monotonic(), 1 if off else 0)
+        if all(looks >= _STILL_LOOKS for _, _, looks in rests.values()):
+            return max(since_s for _, since_s, _ in rests.values())
+        if time.monotonic() > deadline:
+            raise RunError(f"without a controller, a drive is not off and at rest in {wait_s:g} s")
+        time.sleep(_WATCH_S)

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""What of a case's record must not be, and the figures that are worth a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..bus.setpoint_check import find_jumps, step_limits
+from ..native import Contour, NativeProgram
+from .evidence import Evidence
+from .run_case import REST_TOLERANCE_COUNTS, Record
+
+CONTROLLER_KILLED = "kill-controller"
+_PATH_TOLERANCE_MM = 3e-6
+"""Rounding to counts of 1 nm, and the kernel's own error."""
+
+
+Times = tuple[int | None, float | None]
+"""Ticks, milliseconds."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A case in figures. Latencies are None where nothing was detected, or nothing moved."""
+
+    scenario: str
+    seed: int
+    drawn: dict[str, int | str]
+    injected: int
+    codes: tuple[int, ...]
+    latency_ticks: int | None
+    latency_ms: float | None
+    rest_ticks: int | None
+    rest_ms: float | None
+    violations: tuple[str, ...]
+    wall_s: float
+
+    @property
+    def detected(self) -> bool:
+        """Whether a fault was raised."""
+        return bool(self.codes)
+
+    def summary(self) -> dict[str, object]:
+        """For JSON."""
+        return {
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "drawn": self.drawn,
+            "injected": self.injected,
+            "codes": list(self.codes),
+            "latency_ticks": self.latency_ticks,
+            "latency_ms": self.latency_ms,
+            "rest_ticks": self.rest_ticks,
+            "rest_ms": self.rest_ms,
+            "violations": list(self.violations),
+            "wall_s": round(self.wall_s, 3),
+        }
+
+
+def judge(record: Record) -> Verdict:
+    """Looks at everything that a case has left."""
+    evidence = record.evidence
+    violations = list(record.troubles)
+    codes: list[int] = []
+    latency: Times = (None, None)
+    rest: Times = (None, None)
+    if evidence is None:
+        violations.append("no recording")
+    else:
+        codes, latency, rest = _reaction(record, evidence)
+        violations += _bad_setpoints(record, evidence)
+    violations += _unexpected(record, codes, latency, rest)
+    violations += _not_recovered(record)
+    return Verdict(
+        scenario=record.case.scenario.name,
+        seed=record.case.seed,
+        drawn=dict(record.case.drawn),
+        injected=len(record.injections) + (record.case.scenario.action != "none"),
+        codes=tuple(codes),
+        latency_ticks=latency[0],
+        latency_ms=latency[1],
+        rest_ticks=rest[0],
+        rest_ms=rest[1],
+        violations=tuple(violations),
+        wall_s=record.wall_s,
+    )
+
+
+def _reaction(record: Record, evidence: Evidence) -> tuple[list[int], Times, Times]:
+    """Fault codes, time from the injection to the fault, time from the fault to rest."""
+    killed = record.case.scenario.action == CONTROLLER_KILLED
+    if killed:
+        found = evidence.emergencies(evidence.drives, evidence.nodes)
+    else:
+        found = evidence.emergencies(evidence.control, (record.job.machine.node,))
+    found = [emergency for emergency in found if emergency.time_us >= record.began_us]
+    codes = sorted({e.code for e in found} | set(record.fault_codes))
+    if not found:
+        return codes, (None, None), (None, None)
+    fault_us = found[0].time_us
+    latency = _between(evidence, record.began_us, fault_us)
+    rest_us = record.rest_us if killed else evidence.last_motion_us(REST_TOLERANCE_COUNTS)
+    rest = (0, 0.0) if rest_us is None else _between(evidence, fault_us, rest_us)
+    return codes, latency, rest
+
+
+def _between(evidence: Evidence, from_us: int, to_us: int) -> tuple[int, float]:
+    ticks = evidence.tick_at(to_us) - evidence.tick_at(from_us)
+    return max(0, ticks), max(0.0, round((to_us - from_us) / 1000, 3))
+
+
+def _bad_setpoints(record: Record, evidence: Evidence) -> list[str]:
+    """Jumps, and setpoints away from the curve."""
+    machine = record.job.machine
+    limits = step_limits(machine, record.job.setpoints)
+    bad = [str(jump) for jump in find_jumps(evidence.control, machine.nodes, limits)[:3]]
+    if not evidence.moved:
+        return bad
+    (x, x_sent), (y, y_sent) = evidence.setpoints()[:2]
+    sent = x_sent & y_sent
+    points = np.unique(np.stack([x[sent], y[sent]], axis=1), axis=0)
+    worst_mm = _distance_mm(record, points)
+    if worst_mm > _PATH_TOLERANCE_MM:
+        bad.append(f"a setpoint is {worst_mm * 1e6:.1f} nm away from the curve")
+    return bad
+
+
+def _distance_mm(record: Record, points: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> float:
+    program = NativeProgram(record.job.image)
+    rows, nominal = program.setpoints("fixed", record.job.machine.counts_per_mm)
+    contour, worst = Contour(program), 0.0
+    place = nominal[:, 0] + 1j * nominal[:, 1]
+    for x, y in points.tolist():
+        near = int(np.argmin(np.abs(place - complex(x, y))))
+        arc_mm = float(rows["arc_length_q40_mm"][near]) * 2.0**-40
+        scale = record.job.machine.counts_per_mm
+        worst = max(worst, abs(contour.distance_mm(arc_mm, x / scale, y / scale)))
+    return worst
+
+
+def _unexpected(record: Record, codes: list[int], latency: Times, rest: Times) -> list[str]:
+    expect, bad = record.case.scenario.expect, []
+    names = ", ".join(f"0x{code:04X}" for code in codes)
+    if record.case.rules and not record.injections:
+        bad.append("nothing was injected")
+    if not codes and expect.codes and not expect.may:
+        bad.append("no fault was raised")
+    if codes and not set(codes) & set(expect.codes):
+        bad.append(f"fault {names} was raised, which is none of those expected")
+    if not codes and not record.finished and not record.troubles:
+        bad.append("the program did not come to its end, and no fault says why")
+    for what, (ticks, ms), most_ticks, most_ms in (
+        ("fault raised", latency, expect.within_ticks, expect.within_ms),
+        ("axes at rest", rest, expect.rest_ticks, expect.rest_ms),
+    ):
+        if ticks is not None and ticks > most_ticks:
+            bad.append(f"{what} after {ticks} ticks, {most_ticks} are allowed")
+        if ms is not None and ms > most_ms:
+            bad.append(f"{what} after {ms:.0f} ms, {most_ms} are allowed")
+    return bad
+
+
+def _not_recovered(record: Record) -> list[str]:
+    clean, again = record.job.clean, record.again
+    if again is None:
+        return ["no clean run afterwards"] if not record.troubles else []
+    bad = []
+    if again.setpoints_sha256 != clean.setpoints_sha256:
+        bad.append("the run afterwards has other setpoints")
+    if again.encoders_sha256 != clean.encoders_sha256:
+        bad.append("the run afterwards has other encoder positions")
+    return bad

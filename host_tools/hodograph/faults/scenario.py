@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""Scenario files: a fault with random places and strengths, and what must come of it.
+
+text = "what happens"
+path = "path.toml"                  # the program, and by it the machine; relative to the file
+rules = ["drop at={at} id={tpdo1}"] # docs/protocol.md section 4, with the names drawn below
+[random]
+at = [20, 500]                      # a whole number from the first to the second
+node = [2, 3]                       # also gives {tpdo1}, {tpdo2}, {rpdo1}
+side = ["controller", "drives"]     # one of these words
+[host]
+action = "kill-controller"          # what the host does, at tick {at}
+[expect]
+codes = [0x8250]                    # fault codes of which one must be raised; none: no fault at all
+may = true                          # a fault is allowed, not required
+within_ticks = 5                    # from the first injection to the fault
+within_ms = 300                     # the same in wall time, where ticks do not go on
+rest_ticks = 400                    # from the fault until the axes are at rest
+rest_ms = 400                       # the same in wall time
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..config.table import Table, read_toml
+from ..errors import InputError
+
+ACTIONS = (
+    "none",
+    "kill-controller",
+    "kill-drives",
+    "kill-one-drive",
+    "kill-host",
+    "cut-upload",
+    "kill-upload",
+)
+_NO_LIMIT = 10**9
+_EXPECT = ("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms")
+
+Drawn = int | str
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What must come of a fault. Times that are not given do not bind."""
+
+    codes: tuple[int, ...]
+    may: bool
+    within_ticks: int
+    within_ms: int
+    rest_ticks: int
+    rest_ms: int
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario file; `name` is the file's."""
+
+    name: str
+    text: str
+    path: Path
+    rules: tuple[str, ...]
+    ranges: Mapping[str, tuple[Drawn, ...]]
+    action: str
+    expect: Expectation
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scenario with what one seed drew."""
+
+    scenario: Scenario
+    seed: int
+    drawn: Mapping[str, Drawn]
+
+    @property
+    def rules(self) -> str:
+        """The text of the rule file."""
+        return "".join(f"{rule.format_map(self.drawn)}\n" for rule in self.scenario.rules)
+
+    @property
+    def at(self) -> int:
+        """The tick of the host's action."""
+        return int(self.drawn.get("at", 0))
+
+    @property
+    def last_tick(self) -> int:
+        """The tick at which the last rule has ended."""
+        ends = [0]
+        for rule in self.rules.splitlines():
+            at, lasts = re.search(r"\bat=(\d+)", rule), re.search(r"\bfor=(\d+)", rule)
+            ends.append((int(at[1]) if at else 0) + (int(lasts[1]) if lasts else 1))
+        return max(ends)
+
+    @property
+    def longest_ms(self) -> int:
+        """The longest wall time that a rule acts."""
+        return max(map(int, re.findall(r"\bfor_ms=(\d+)", self.rules)), default=0)
+
+    def __str__(self) -> str:
+        return f"{self.scenario.name} seed {self.seed}"
+
+
+def load_scenario(file: Path) -> Scenario:
+    """Raises InputError."""
+    root = Table(file, "", read_toml(file), ("text", "path", "rules", "random", "host", "expect"))
+    expect = root.table("expect", _EXPECT, required=False)
+    host = root.table("host", ("action",), required=False)
+    raw = read_toml(file)
+    scenario = Scenario(
+        name=file.stem,
+        text=root.text("text"),
+        path=root.path("path"),
+        rules=_texts(root, raw, "rules"),
+        ranges={name: _range(root, name, value) for name, value in raw.get("random", {}).items()},
+        action=host.choice("action", ACTIONS, "none"),
+        expect=_expectation(expect, raw.get("expect", {})),
+    )
+    try:
+        draw(scenario, 0).rules  # noqa: B018
+    except (KeyError, IndexError, ValueError) as error:
+        raise root.error("rules", f"name what [random] does not give: {error}") from None
+    return scenario
+
+
+def _texts(table: Table, raw: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    values = raw.get(key, [])
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise table.error(key, "must be a list of texts")
+    return tuple(values)
+
+
+def _range(root: Table, name: str, value: object) -> tuple[Drawn, ...]:
+    if isinstance(value, list) and value and all(isinstance(item, str) for item in value):
+        return tuple(value)
+    whole = isinstance(value, list) and len(value) == 2 and all(type(v) is int for v in value)
+    if not whole or value[0] > value[1]:  # type: ignore[index]
+        raise root.error("random", f"{name} must be [least, greatest] or a list of words")
+    return tuple(value)  # type: ignore[arg-type]
+
+
+def _expectation(table: Table, raw: Mapping[str, Any]) -> Expectation:
+    codes = raw.get("codes", [])
+    if not isinstance(codes, list) or not all(type(code) is int for code in codes):
+        raise table.error("codes", "must be a list of numbers such as 0x8130")
+
+    def limit(key: str) -> int:
+        return table.integer(key, _NO_LIMIT, low=0, high=_NO_LIMIT)
+
+    return Expectation(
+        codes=tuple(codes),
+        may=table.flag("may", False),
+        within_ticks=limit("within_ticks"),
+        within_ms=limit("within_ms"),
+        rest_ticks=limit("rest_ticks"),
+        rest_ms=limit("rest_ms"),
+    )
+
+
+def draw(scenario: Scenario, seed: int) -> Case:
+    """What a seed makes of a scenario: always the same."""
+    source = random.Random(f"{scenario.name} {seed}")
+    drawn: dict[str, Drawn] = {"seed": seed + 1}
+    for name, values in scenario.ranges.items():
+        if isinstance(values[0], str):
+            drawn[name] = source.choice(values)
+        else:
+            drawn[name] = source.randint(int(values[0]), int(values[1]))
+    node = drawn.get("node")
+    if isinstance(node, int):
+        drawn |= {"tpdo1": 0x180 + node, "tpdo2": 0x280 + node, "rpdo1": 0x200 + node}
+    return Case(scenario, seed, drawn)
+
+
+def find_scenarios(folder: Path, names: list[str]) -> list[Scenario]:
+    """The scenarios of a folder, or those named (a name may also be a file). Raises InputError."""
+    known = {
+        file.stem: file for file in sorted(folder.glob("*.toml")) if "rules" in read_toml(file)
+    }
+    if not names:
+        return [load_scenario(file) for file in known.values()]
+    found = []
+    for name in names:
+        file = known.get(name, Path(name))
+        if name not in known and not file.is_file():
+            raise InputError(f'there is no scenario "{name}"; {folder} has {", ".join(known)}')
+        found.append(load_scenario(file))
+    return found
