@@ -6,6 +6,7 @@ from __future__ import annotations
 import subprocess
 import time
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bus.address import BusAddress
-from ..bus.controller import BOOT, FAULT_STATE, OFF, READY, RESET, Controller, connect
+from ..bus.controller import (
+    BOOT,
+    FAULT_STATE,
+    OFF,
+    READY,
+    RESET,
+    CommandRefusedError,
+    Controller,
+    connect,
+)
 from ..bus.objects import FAULT, MOVING, STATISTICS
 from ..bus.recorder import Recorder
 from ..bus.run import Station, run_program
@@ -262,8 +272,20 @@ def _recover(record: Record, stand: Stand, controller: Controller) -> None:
         for drive in stand.drives:
             drive.end()
         stand.start_drives(faulty=False)
-    if controller.state() == FAULT_STATE:
-        controller.command(RESET)
-    controller.wait_for((OFF, READY), _LIMIT_S)
+    _reset(controller)
     run = run_program(Station(controller, "fast", None), job.machine, job.image, "fixed")
     record.again = run.motion
+
+
+def _reset(controller: Controller) -> None:
+    """Resets until the fault is gone and the drives are found: braking comes first, drives take their time."""
+    deadline = time.monotonic() + _LIMIT_S
+    while (state := controller.state()) not in (OFF, READY):
+        if time.monotonic() > deadline:
+            raise RunError(
+                f"{STATES.get(state, state)} after {_LIMIT_S:g} s of resets: {controller.fault_text()}"
+            )
+        if state == FAULT_STATE:
+            with suppress(CommandRefusedError):
+                controller.command(RESET)
+        time.sleep(0.05)
