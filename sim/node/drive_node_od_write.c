@@ -71,14 +71,6 @@ static uint32_t drive_node_quick_stop_write(uint32_t value)
     return value == 3 || value == 4 ? SDO_ABORT_VALUE : SDO_OK;
 }
 
-/* The software limits in their order. */
-static uint32_t drive_node_limits_write(const struct drive_node *node, uint8_t sub, int64_t value)
-{
-    const int32_t *limits = node->values.software_position_limit;
-    const bool crossed = sub == 1 ? value > limits[1] : value < limits[0];
-    return crossed ? SDO_ABORT_VALUE : SDO_OK;
-}
-
 uint32_t drive_node_od_write(void *context, const struct od_entry *entry, const uint8_t *value,
                              uint32_t size)
 {
@@ -96,8 +88,6 @@ uint32_t drive_node_od_write(void *context, const struct od_entry *entry, const 
         return drive_node_mode_write(node, cob_signed(number, size));
     case OD_DRIVE_QUICK_STOP_OPTION_CODE:
         return drive_node_quick_stop_write(number);
-    case OD_DRIVE_SOFTWARE_POSITION_LIMIT:
-        return drive_node_limits_write(node, entry->sub, cob_signed(number, size));
     case OD_DRIVE_HOMING_METHOD:
         return home_seek_supports((int8_t)cob_signed(number, size)) ? SDO_OK : SDO_ABORT_VALUE;
     case OD_DRIVE_POSITION_ENCODER_RESOLUTION:

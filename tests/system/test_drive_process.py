@@ -21,7 +21,7 @@ FIGURES = (
     "gain_rad_s_v=83.0089,time_constant_s=0.19936,screw_mm_rad=1.59,torque_to_volts=1.39664804469,"
     "volts_limit=5,k_pp_rad_s_mm=97.38,k_pv_nm_s_rad=1.19,k_iv_per_s=252.8,k_pf_rad_mm=0.8,k_vf=0.85"
 )
-MODELLED = {0x1018, 0x6041, 0x6062, 0x6063, 0x6064, 0x607A, 0x6092, 0x2101}
+MODELLED = {0x1018, 0x2101, 0x6041, 0x6062, 0x6063, 0x6064, 0x6075, 0x6076, 0x607A, 0x6092}
 """Objects whose value is the model's, not the default of the EDS."""
 
 
@@ -59,10 +59,10 @@ def test_help(root: Path) -> None:
 
 @pytest.fixture
 def drives(root: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Two drives: node 42 at 1.5 mm, node 43 at 0."""
+    """Two drives: node 42 at 1.5 mm, node 43 at 0 with a limit switch at -2 mm."""
     with can.Bus(interface="socketcan", channel="vcan0") as bus:
         words = [str(root / DRIVE), "--bus", "vcan0"]
-        for axis in ("node=42,position_mm=1.5", "node=43"):
+        for axis in ("node=42,position_mm=1.5", "node=43,limit_negative_mm=-2"):
             words += ["--axis", f"{axis},{FIGURES}"]
         process = subprocess.Popen(words, stderr=subprocess.PIPE)
         missing = {0x700 + 42, 0x700 + 43}
@@ -131,6 +131,37 @@ def test_two_nodes_answer_a_sync_each(network: canopen.Network) -> None:
             assert (word & 0x6F, position) == (0x40, 1_500_003)
             assert struct.unpack("<Hi", found[0x180, 43])[1] == 0
             assert struct.unpack("<h", found[0x280, 43]) == (0,)
+
+
+@pytest.mark.bus
+def test_a_moved_pdo_is_heard(network: canopen.Network) -> None:
+    """The filters of the process follow the COB-ID; type 255 acts without SYNC."""
+    sdo = network[42].sdo
+    network.nmt.send_command(1)
+    sdo[0x1400][1].raw = 0x80000000 | 0x22A
+    sdo[0x1400][1].raw = 0x80000000 | 0x3C5
+    sdo[0x1400][2].raw = 255
+    sdo[0x1400][1].raw = 0x3C5
+    network.send_message(0x22A, b"\x06\x00\x00\x00\x00\x00")
+    assert sdo[0x6041].raw & 0x6F == 0x40
+    network.send_message(0x3C5, b"\x06\x00\x00\x00\x00\x00")
+    assert sdo[0x6041].raw & 0x6F == 0x21
+
+
+@pytest.mark.bus
+def test_homes_by_sdo_without_sync(network: canopen.Network) -> None:
+    sdo = network[43].sdo
+    sdo[0x6060].raw = 6
+    assert sdo[0x6061].raw == 6
+    sdo[0x6098].raw = 17
+    for word in (0x06, 0x07, 0x0F, 0x1F):
+        sdo[0x6040].raw = word
+    limit = time.monotonic() + 20
+    while sdo[0x6041].raw & 0x3400 == 0 and time.monotonic() < limit:
+        time.sleep(0.1)
+    assert sdo[0x6041].raw & 0x3400 == 0x1400
+    assert sdo[0x60FD].raw == 0  # the switch is off again
+    assert 0 <= sdo[0x6064].raw < 200_000  # it passed home slowly
 
 
 @pytest.mark.bus
