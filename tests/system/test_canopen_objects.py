@@ -40,7 +40,7 @@ MEASURED = {
     "drive": {0x6041, 0x6062, 0x6063, 0x6064, 0x607A, 0x60FD, 0x2101},
 }
 """Objects whose value depends on what happens."""
-OF_THE_AXIS = {(0x1006, 0), (0x608F, 1), (0x6092, 1), (0x6099, 1), (0x6099, 2), (0x609A, 0)}
+OF_THE_AXIS = {(0x1006, 0), (0x1018, 4), (0x6075, 0), (0x6076, 0), (0x608F, 1), (0x6092, 1)}
 """Defaults that follow from the figures on the drive's command line."""
 PDO_OBJECTS = range(0x1400, 0x1C00)
 """Their rules depend on one another: test_canopen_pdo.py."""
@@ -48,7 +48,16 @@ NOT_ALL_VALUES = {
     "controller": {(0x1003, 0)},  # takes 0 only
     "drive": {
         (0x1003, 0),
+        (0x1019, 0),  # only while 0x1006 is 0
+        (0x605A, 0),  # not 3 and 4
         (0x6060, 0),  # takes the modes that there are
+        (0x608F, 1),  # the encoder's own
+        (0x608F, 2),
+        (0x6091, 1),  # scales that the axis can have
+        (0x6091, 2),
+        (0x6092, 1),
+        (0x6092, 2),
+        (0x6098, 0),  # the methods that there are
         (0x60C2, 1),  # both together must give a period that the drive can keep
         (0x60C2, 2),
     },
