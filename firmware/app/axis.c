@@ -15,27 +15,21 @@ void axis_init(struct axis *axis, uint8_t node)
     axis->goal = CIA402_GOAL_OFF;
 }
 
+void axis_command(struct axis *axis, enum cia402_goal goal)
+{
+    axis->goal = goal;
+    axis->control_extra = 0;
+    axis->by_itself = false;
+}
+
 void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us)
 {
     axis->statusword = actual->statusword;
     axis->position_counts = actual->position_counts;
-    axis->answered_us = now_us;
-    axis->answered = true;
-    axis->present = true;
-    axis->missed_in_row = 0;
-}
-
-bool axis_close_sync(struct axis *axis)
-{
-    const bool missed = axis->present && !axis->answered;
-    if (missed && axis->missed_in_row < UINT32_MAX) {
-        axis->missed_in_row++;
+    answers_take(&axis->answers, now_us);
+    if (axis_enabled(axis) && axis->goal == CIA402_GOAL_ENABLED) {
+        status_watch_take(&axis->watch, axis->statusword, !axis->by_itself);
     }
-    if (missed && axis->missed < UINT32_MAX) {
-        axis->missed++;
-    }
-    axis->answered = false;
-    return missed;
 }
 
 static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
@@ -49,27 +43,53 @@ static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
     }
 }
 
-void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg *out)
+/* A statusword that once says "not enabled" must not move the target of a drive that may follow it still. */
+static void note_engaged(struct axis *axis)
 {
-    const uint16_t before = axis->controlword;
-    axis->controlword = cia402_master_controlword(axis->goal, axis->statusword, before);
-    if (axis->controlword == CIA402_ENABLE_OPERATION) {
-        axis->controlword = (uint16_t)(axis->controlword | axis->control_extra);
+    if (axis->goal == CIA402_GOAL_ENABLED) {
+        axis->engaged = axis->engaged || axis_enabled(axis);
+    } else if (axis->goal != CIA402_GOAL_QUICK_STOP && !axis_enabled(axis)) {
+        axis->engaged = false;
+        status_watch_init(&axis->watch);
     }
-    if ((before & CIA402_CONTROL_ENABLE) == 0u && !axis_enabled(axis)) {
+}
+
+static void follow_position(struct axis *axis)
+{
+    if (axis->goal == CIA402_GOAL_QUICK_STOP) {
+        axis->target_counts = axis->target_sent_counts;
+    } else if (axis->by_itself || !axis->engaged) {
         axis->target_counts = axis->position_counts;
     }
+}
+
+static uint16_t next_controlword(const struct axis *axis)
+{
+    const uint16_t word =
+        cia402_master_controlword(axis->goal, axis->statusword, axis->controlword);
+    const uint16_t extra = word == CIA402_ENABLE_OPERATION ? axis->control_extra : 0u;
+    return (uint16_t)(word | extra);
+}
+
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg *out)
+{
+    axis->controlword = next_controlword(axis);
+    note_engaged(axis);
+    follow_position(axis);
     count_standstill(axis, tolerance_counts);
     const struct pdo_setpoint setpoint = {.controlword = axis->controlword,
                                           .target_counts = axis->target_counts};
     pdo_encode_setpoint(axis->node, &setpoint, out);
+}
+
+void axis_sent(struct axis *axis)
+{
     axis->target_sent_counts = axis->target_counts;
 }
 
-bool axis_lost(const struct axis *axis, uint32_t now_us)
+bool axis_gone(const struct axis *axis, uint32_t now_us)
 {
-    const bool silent = now_us - axis->answered_us > AXIS_SILENCE_MAX_US;
-    return axis->missed_in_row > (silent ? AXIS_MISSED_MAX : AXIS_MISSED_LOST);
+    return axis->answers.lost && now_us - axis->answers.last_us > AXIS_GONE_US;
 }
 
 bool axis_in_fault(const struct axis *axis)
@@ -83,9 +103,29 @@ bool axis_enabled(const struct axis *axis)
     return cia402_decode(axis->statusword) == CIA402_OPERATION_ENABLED;
 }
 
+bool axis_dropped_out(const struct axis *axis)
+{
+    return axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis_enabled(axis);
+}
+
+bool axis_obeys(const struct axis *axis)
+{
+    return axis_enabled(axis) && !axis->answers.lost && status_watch_obeys(&axis->watch);
+}
+
+bool axis_left(const struct axis *axis)
+{
+    const enum cia402_state state = cia402_decode(axis->statusword);
+    return axis->answers.lost ||
+           (state != CIA402_OPERATION_ENABLED && state != CIA402_QUICK_STOP_ACTIVE &&
+            state != CIA402_FAULT_REACTION_ACTIVE);
+}
+
 bool axis_reached(const struct axis *axis)
 {
-    return cia402_master_reached(axis->goal, axis->statusword);
+    const bool follows = axis->goal != CIA402_GOAL_ENABLED || axis->by_itself ||
+                         (axis->statusword & CIA402_STATUS_FOLLOWS) != 0u;
+    return follows && cia402_master_reached(axis->goal, axis->statusword);
 }
 
 bool axis_still(const struct axis *axis)

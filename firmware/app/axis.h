@@ -11,21 +11,21 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "app/answers.h"
+#include "app/status_watch.h"
 #include "can/can_frame.h"
 #include "canopen/cia402_master.h"
 #include "canopen/pdo.h"
 
-/* A drive is lost after so many SYNCs in a row without an answer; or after fewer, when they took long: so at lock
- * step, where every one of them is waited for. A host that stalls sends no SYNCs, so it loses no drive. */
-#define AXIS_MISSED_LOST      100u
-#define AXIS_MISSED_MAX       10u
-#define AXIS_SILENCE_MAX_US   1000000u
 #define AXIS_STANDSTILL_SYNCS 250u
+
+/* With power off a drive that is lost may still come back by itself within this time. */
+#define AXIS_GONE_US 1000000u
 
 struct axis {
     uint8_t node;
-    bool present;  /* has answered a SYNC since it was configured */
-    bool answered; /* has answered the present SYNC */
+    struct answers answers;
+    struct status_watch watch;
     uint16_t statusword;
     uint16_t controlword; /* sent last */
     uint16_t
@@ -35,9 +35,9 @@ struct axis {
     int32_t target_counts;      /* to be sent in this tick */
     int32_t target_sent_counts; /* sent in the last one */
     enum cia402_goal goal;
-    uint32_t answered_us; /* port_time_us() of the last answer */
-    uint32_t missed_in_row;
-    uint32_t missed;                /* SYNCs unanswered since it was found */
+    bool
+        engaged; /* seen in Operation enabled since it was told to go there: its target is its own */
+    bool by_itself; /* it homes: moves by its own motion, its target follows its position */
     uint32_t digital_inputs;        /* 0x60FD */
     int32_t following_error_counts; /* 0x60F4, looked at a few times a second */
     bool homed;                     /* since it was found */
@@ -46,21 +46,28 @@ struct axis {
 
 void axis_init(struct axis *axis, uint8_t node);
 
+/* A new goal, which ends homing: by_itself and control_extra are cleared. Under the lock. */
+void axis_command(struct axis *axis, enum cia402_goal goal);
+
 /* Takes the drive's TPDO1. Receive. */
 void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us);
 
-/* A SYNC is over: returns true when the drive has not answered it. Timer. */
-bool axis_close_sync(struct axis *axis);
-
-/* Makes the setpoint frame of this tick. While the drive is not yet commanded to follow, its target
- * follows its position, so that switching on moves nothing. Timer. */
+/* Makes the setpoint frame of this tick. Until the drive has been seen in Operation enabled its target follows its
+ * position, so that switching on moves nothing; from then on it stays where it is put, in a quick stop too. Once the
+ * drive is off it follows again. Timer. */
 void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg *out);
 
+/* The port has taken that frame. Timer. */
+void axis_sent(struct axis *axis);
+
 /* All pure, under the lock. */
-bool axis_lost(const struct axis *axis, uint32_t now_us);
-bool axis_in_fault(const struct axis *axis); /* Fault, or on the way there */
-bool axis_enabled(const struct axis *axis);  /* Operation enabled */
-bool axis_reached(const struct axis *axis);  /* at its goal */
+bool axis_gone(const struct axis *axis, uint32_t now_us); /* lost for long */
+bool axis_in_fault(const struct axis *axis);              /* Fault, or on the way there */
+bool axis_enabled(const struct axis *axis);               /* Operation enabled */
+bool axis_dropped_out(const struct axis *axis); /* was enabled, shall be, and is not any more */
+bool axis_obeys(const struct axis *axis);       /* enabled, answers, follows its target */
+bool axis_left(const struct axis *axis);    /* moves no more by its own power: off, or in Fault */
+bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
 
 /* Distance of both target and position from a place, whichever is larger. */

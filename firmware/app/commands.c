@@ -69,6 +69,8 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
         return homing_begin(&controller->homing, machine, controller->boot.facts);
     case COMMAND_RESET:
         return locked(machine, machine_reset);
+    case COMMAND_QUICK_STOP:
+        return locked(machine, machine_quick_stop);
     case COMMAND_STOP:
     default:
         return locked(machine, machine_request_stop);

@@ -14,6 +14,7 @@ enum command {
     COMMAND_HOLD = 6,
     COMMAND_RESUME = 7,
     COMMAND_START_FROM = 8, /* at the arc length of object 0x2011 */
+    COMMAND_QUICK_STOP = 9,
     COMMAND_HOME = 10,
 };
 

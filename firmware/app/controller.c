@@ -46,7 +46,8 @@ void controller_init(struct controller *controller, uint8_t node)
     drive_boot_init(&controller->boot);
     drive_look_init(&controller->look);
     homing_init(&controller->homing);
-    drive_watch_begin(&controller->watch, &controller->config);
+    drive_watch_begin(&controller->watch, &controller->config,
+                      controller->values.consumer_heartbeat_time);
     sdo_server_init(&controller->server, &controller->od, node, SDO_TIMEOUT_US, SDO_BLOCK_SEGMENTS);
     nmt_slave_init(&controller->nmt, node, &controller_reset_hooks, controller);
     heartbeat_producer_init(&controller->heartbeat, node);

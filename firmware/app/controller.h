@@ -56,11 +56,12 @@ struct controller {
     struct heartbeat_producer heartbeat;
     struct emcy_producer emcy;
     uint32_t polled_us;             /* port_time_us() of the last poll */
-    uint16_t reported_fault;        /* the fault code that the last EMCY told of */
+    uint32_t reported_serial;       /* machine.fault_serial that the last EMCY told of */
     enum machine_state noted_state; /* last one logged */
     enum machine_refusal refusal;   /* of the last command */
     uint8_t node;
-    bool same_value; /* the write under way changes nothing */
+    bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
+    bool same_value;            /* the write under way changes nothing */
 };
 
 /* Everything to its power-on state. */
@@ -75,6 +76,12 @@ void controller_poll(struct controller *controller);
 /* Ends in bounded time: stops along the path if running, switches the drives off, leaves them
  * pre-operational. True when all of that succeeded. Interrupts are still on afterwards. */
 bool controller_shut_down(struct controller *controller);
+
+/* Part of the round: tells of faults (EMCY), states and limits. */
+void controller_report(struct controller *controller);
+
+/* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
+void controller_start_itself(struct controller *controller);
 
 /* Sends from the mainline, waiting a little when the port is full; then the frame is dropped: every
  * protocol above can stand a lost frame. */

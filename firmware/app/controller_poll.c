@@ -71,9 +71,7 @@ static void poll_nmt(struct controller *controller, uint32_t elapsed_us)
     struct can_msg out;
     if (nmt_slave_process(&controller->nmt, &out) != 0) {
         controller_send(&out);
-        struct can_msg start;
-        nmt_master_command(NMT_START, controller->node, &start);
-        (void)nmt_slave_receive(&controller->nmt, &start);
+        controller_start_itself(controller);
     }
     if (heartbeat_producer_process(&controller->heartbeat,
                                    controller->values.producer_heartbeat_time,
@@ -120,7 +118,8 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
 {
     if (boot_requested(&controller->machine)) {
         drive_boot_begin(&controller->boot, &controller->config);
-        drive_watch_begin(&controller->watch, &controller->config);
+        drive_watch_begin(&controller->watch, &controller->config,
+                          controller->values.consumer_heartbeat_time);
     }
     struct can_msg out;
     int due = drive_boot_process(&controller->boot, elapsed_us, &out);
@@ -159,52 +158,6 @@ static void poll_look(struct controller *controller, uint32_t elapsed_us)
     }
 }
 
-/* Faults are raised in interrupts; their telling is left to the mainline. */
-static void report_fault(struct controller *controller)
-{
-    port_lock();
-    const struct fault fault = controller->machine.fault;
-    port_unlock();
-    if (fault.code == controller->reported_fault) {
-        return;
-    }
-    if (fault.code == EMCY_NO_ERROR) {
-        emcy_producer_clear(&controller->emcy, EMCY_REGISTER_PROFILE);
-    } else {
-        const uint8_t detail[EMCY_DETAIL_SIZE] = {
-            fault.node, (uint8_t)fault.detail, (uint8_t)(fault.detail >> 8),
-            (uint8_t)(fault.detail >> 16), (uint8_t)(fault.detail >> 24)};
-        emcy_producer_raise(&controller->emcy, fault.code, EMCY_REGISTER_PROFILE, detail);
-        port_log(PORT_WARNING, "fault at node", fault.node);
-        port_log(PORT_WARNING, fault_text(fault.code), (int32_t)fault.detail);
-    }
-    controller->reported_fault = fault.code;
-}
-
-static void poll_emergency(struct controller *controller)
-{
-    struct can_msg out;
-    report_fault(controller);
-    while (emcy_producer_process(&controller->emcy, &out) != 0) {
-        controller_send(&out);
-    }
-}
-
-static void note_state(struct controller *controller)
-{
-    static const char *const names[] = {"state boot",   "state off",       "state enabling",
-                                        "state ready",  "state running",   "state stopping",
-                                        "state fault",  "state holding",   "state held",
-                                        "state homing", "state quick stop"};
-    port_lock();
-    const enum machine_state state = controller->machine.state;
-    port_unlock();
-    if (state != controller->noted_state) {
-        controller->noted_state = state;
-        port_log(PORT_NOTE, names[state], (int32_t)state);
-    }
-}
-
 static uint32_t counted_us(uint32_t elapsed_us)
 {
     return elapsed_us < CONTROLLER_ELAPSED_MAX_US ? elapsed_us : CONTROLLER_ELAPSED_MAX_US;
@@ -225,6 +178,5 @@ void controller_poll(struct controller *controller)
     poll_homing(controller, elapsed_us);
     poll_look(controller, elapsed_us);
     drive_watch_process(&controller->watch, &controller->machine, elapsed_us);
-    poll_emergency(controller);
-    note_state(controller);
+    controller_report(controller);
 }

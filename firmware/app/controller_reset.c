@@ -26,7 +26,7 @@ static void forget_errors(struct controller *controller)
                        values->predefined_error_field, &values->predefined_error_field_count,
                        (uint8_t)(sizeof values->predefined_error_field /
                                  sizeof values->predefined_error_field[0]));
-    controller->reported_fault = EMCY_NO_ERROR; /* a fault that is still there is told again */
+    controller->reported_serial--; /* a fault that is still there is told again */
 }
 
 void controller_reset_values(struct controller *controller)

@@ -9,15 +9,18 @@
 #include "app/machine.h"
 #include "canopen/heartbeat.h"
 
-#define DRIVE_WATCH_HEARTBEAT_MS 1000u /* consumer time; the drives send ten times as often */
+/* Consumer time of a drive that has no entry in 0x1016; the drives send ten times as often. */
+#define DRIVE_WATCH_HEARTBEAT_MS 1000u
 
 struct drive_watch {
     struct heartbeat_consumer consumers[AXES_MAX];
     uint8_t count;
 };
 
-/* Begins to watch the drives of the configuration, all unknown. */
-void drive_watch_begin(struct drive_watch *watch, const struct config *config);
+/* Begins to watch the drives of the configuration, all unknown: each from its first heartbeat on. `entries` as in
+ * 0x1016: bits 16 ... 23 node, 0 ... 15 time in ms; other nodes in it are of no interest. */
+void drive_watch_begin(struct drive_watch *watch, const struct config *config,
+                       const uint32_t entries[AXES_MAX]);
 
 /* Takes any frame. A drive that restarts, or reports an error, makes a fault or a new boot. */
 void drive_watch_receive(struct drive_watch *watch, struct machine *machine,

@@ -16,7 +16,20 @@ const char *fault_text(uint16_t code)
         return "drive reports a homing error, statusword";
     case FAULT_HOMING_LATE:
         return "drive did not find its home in time, statusword";
+    case FAULT_NOT_REMOTE:
+        return "drive does not obey its controlword (remote off), statusword";
+    case FAULT_NOT_FOLLOWING:
+        return "drive is enabled but does not follow its target, statusword";
+    case FAULT_NOT_STOPPED:
+        return "drive did not end its quick stop in time, statusword";
+    case FAULT_NOT_SENT:
+        return "the bus takes no frames of the controller, ticks in a row";
     default:
         return emcy_text(code);
     }
+}
+
+bool fault_is_vague(uint16_t code)
+{
+    return code == EMCY_GENERIC || code == FAULT_DROPPED_OUT || code == FAULT_NOT_FOLLOWING;
 }

@@ -6,10 +6,11 @@
  *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
  *                                       RUNNING -> STOPPING -> READY
  *                                       RUNNING -> HOLDING -> HELD -> RUNNING, STOPPING
- *   OFF -> HOMING -> OFF
+ *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
- * The state changes in two places only: in the requests below (mainline, under the lock) and in
- * machine_step (timer). The whole struct is guarded by the port's lock.
+ * The state changes in two places only: in the requests (mainline, under the lock; machine_requests.c) and in the
+ * timer's functions (machine_tick.c, machine_supervise.c, machine_fault.c). The whole struct is guarded by the port's
+ * lock.
  */
 #ifndef APP_MACHINE_H
 #define APP_MACHINE_H
@@ -40,9 +41,10 @@ enum machine_state {
 
 /* What goes on inside FAULT. */
 enum machine_fault_phase {
-    MACHINE_FAULT_BRAKING,   /* the drives that still obey stop along the path */
+    MACHINE_FAULT_BRAKING,   /* all drives obey: stop along the path, settle */
+    MACHINE_FAULT_QUICK,     /* else: quick stop of all that still hear; targets stay */
     MACHINE_FAULT_OFF,       /* drives are switched off; waits for the reset */
-    MACHINE_FAULT_RESETTING, /* drives are being reset; then BOOT */
+    MACHINE_FAULT_RESETTING, /* drives are being reset; then BOOT, or OFF when the cause persists */
 };
 
 /* Why a request was refused: values of object 0x2003 sub 4. */
@@ -63,7 +65,12 @@ enum machine_refusal {
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
 #define MACHINE_ENABLE_TICKS 2000u /* time for the drives to switch on */
+#define MACHINE_QUICK_TICKS  2000u /* time for the drives to end a quick stop */
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
+#define MACHINE_UNSENT_MAX   3u    /* so many ticks in a row the port may refuse frames */
+
+/* Drives that are not simulated are never waited for: what is later than this is missed. */
+#define MACHINE_REAL_WAIT_MAX_MS 5u
 
 struct machine {
     struct config config;
@@ -71,13 +78,19 @@ struct machine {
     struct motion motion;
     struct statistics statistics;
     struct fault fault;
+    uint32_t fault_serial; /* counts every change of `fault` */
     enum machine_state state;
     enum machine_fault_phase fault_phase; /* in FAULT */
-    uint32_t ticks_left;                  /* settling, enabling, resetting */
+    uint32_t ticks_left;                  /* settling, enabling, quick stop, resetting */
     uint32_t override_percent;            /* wanted, object 0x2010 sub 1; for every program */
+    uint32_t sync_us;                     /* time of the last SYNC */
+    uint32_t unsent_ticks;                /* in a row with a frame that the port refused */
+    bool sync_sent;                       /* the last SYNC has left */
     bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
     bool configured; /* drives are configured; BOOT then waits for their first answers */
     bool boot_due;   /* the mainline shall find and configure the drives (anew) */
+    bool
+        mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
 };
 
 void machine_init(struct machine *machine, const struct config *config);
@@ -87,11 +100,15 @@ void machine_init(struct machine *machine, const struct config *config);
 
 enum machine_refusal machine_enable(struct machine *machine);
 enum machine_refusal machine_disable(struct machine *machine);
-/* Never refused; without effect when nothing runs. From ENABLING it leads back to OFF. */
+/* Never refused; without effect when nothing runs. From ENABLING it leads back to OFF, HOMING ends by a quick stop. */
 enum machine_refusal machine_request_stop(struct machine *machine);
+/* Never refused: all drives that are on brake by their own ramps (0x6085), then OFF; in FAULT a stop along the path
+ * becomes such a one. Without effect where drives are off. */
+enum machine_refusal machine_quick_stop(struct machine *machine);
 /* Feed hold and its end; accepted as well when there is nothing to change. */
 enum machine_refusal machine_hold(struct machine *machine);
 enum machine_refusal machine_resume(struct machine *machine);
+/* Out of FAULT by way of BOOT; refused while something still brakes. */
 enum machine_refusal machine_reset(struct machine *machine);
 /* Starts a prepared motion whose first setpoint is at start_counts: copied, if the axes are
  * enabled, stand still and are within the configured tolerance. */
@@ -110,7 +127,9 @@ void machine_override(struct machine *machine, uint32_t percent);
 /* True where 0x1006 and 0x2004 ... 0x2007 may be written: BOOT, OFF, FAULT with the axes at rest.
  */
 bool machine_configurable(const struct machine *machine);
-/* True from start until READY, and while braking in a fault: the program must stay as it is. */
+/* True while setpoints come from the program: from start until READY, and while braking on the path in a fault. */
+bool machine_on_path(const struct machine *machine);
+/* The same, or the drives move by themselves: homing, quick stop. The program must stay as it is. */
 bool machine_moving(const struct machine *machine);
 
 /* New configuration, where machine_configurable. When it concerns the drives: to BOOT. */
@@ -121,20 +140,28 @@ void machine_enter_boot(struct machine *machine);
  * each has answered a SYNC. */
 void machine_drives_configured(struct machine *machine, bool simulated);
 
-/* Something is wrong: FAULT, stopping on the path first when a program runs. Only the first fault
- * counts. Any context, under the lock. */
+/* Something is wrong: FAULT. With a program running and every drive obeying it stops along the path, else by quick stop.
+ * Only the first fault counts, but a further one turns the stop along the path into a quick stop when a drive no longer
+ * obeys. Any context, under the lock. */
 void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail);
 
-/* In FAULT: gives the stop on the path up and switches the drives off. Any context, under the lock.
- */
+/* The drive's own emergency code has come: kept, and it takes the place of a vaguer code of the present fault. */
+void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code);
+
+/* In FAULT: gives every stop up and switches the drives off. Any context, under the lock. */
 void machine_switch_off(struct machine *machine);
 
 /* --- Timer --- */
 
 /* The SYNC before this tick is over: counts missing answers, watches the drives. */
 void machine_supervise(struct machine *machine, uint32_t now_us);
+/* Whether SYNC, and every frame, of this tick left. More than MACHINE_UNSENT_MAX ticks in a row with a refused frame are
+ * a fault when drives are on. */
+void machine_note_sent(struct machine *machine, bool sync, bool all);
 /* Moves on by one tick: states, goals and targets of the axes. */
 void machine_step(struct machine *machine);
+/* How long answers may be late, from the configuration. */
+uint32_t machine_answer_wait_us(const struct machine *machine);
 /* Whether every drive has answered a SYNC since BOOT began. */
 bool machine_drives_answer(const struct machine *machine);
 /* Whether setpoints are to be sent in this state. */

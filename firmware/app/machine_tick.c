@@ -1,60 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* The machine's side of the tick: supervision of the drives, and the states that time moves on. */
+/* The states that time moves on. */
 #include "app/machine.h"
 
-static bool enabled_expected(const struct machine *machine)
-{
-    return machine->state == MACHINE_READY ||
-           (machine->state != MACHINE_FAULT && machine_moving(machine));
-}
+#include "app/machine_private.h"
 
-/* The drive's own words, when they have come, say more than "a fault". */
-static uint16_t code_of_drive(const struct axis *axis)
-{
-    return axis->error_code != EMCY_NO_ERROR ? axis->error_code : EMCY_GENERIC;
-}
-
-static void supervise_axis(struct machine *machine, const struct axis *axis, uint32_t now_us)
-{
-    if (!axis->present) {
-        return;
-    }
-    if (axis_lost(axis, now_us) && machine->state == MACHINE_OFF) {
-        machine_enter_boot(machine); /* with power off they may come and go */
-    } else if (axis_lost(axis, now_us)) {
-        machine_raise(machine, EMCY_RPDO_TIMEOUT, axis->node, axis->missed_in_row);
-    } else if (axis_in_fault(axis)) {
-        machine_raise(machine, code_of_drive(axis), axis->node, axis->statusword);
-    } else if (enabled_expected(machine) && !axis_enabled(axis)) {
-        machine_raise(machine, FAULT_DROPPED_OUT, axis->node, axis->statusword);
-    }
-}
-
-void machine_supervise(struct machine *machine, uint32_t now_us)
+const struct axis *machine_straggler(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        struct axis *axis = &machine->axes[i];
-        if (axis_close_sync(axis) && machine_moving(machine)) {
-            machine->statistics.missed_tpdos++;
-        }
-        if (machine->state != MACHINE_BOOT) {
-            supervise_axis(machine, axis, now_us);
-        }
-    }
-}
-
-/* The first axis that is not yet where it shall be, or NULL. */
-static const struct axis *straggler(const struct machine *machine)
-{
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (machine->axes[i].present && !axis_reached(&machine->axes[i])) {
-            return &machine->axes[i];
+        const struct axis *axis = &machine->axes[i];
+        if (!axis->answers.lost && !axis_reached(axis)) {
+            return axis;
         }
     }
     return NULL;
 }
 
-static bool time_is_up(struct machine *machine)
+bool machine_time_is_up(struct machine *machine)
 {
     if (machine->ticks_left > 0u) {
         machine->ticks_left--;
@@ -62,23 +23,35 @@ static bool time_is_up(struct machine *machine)
     return machine->ticks_left == 0u;
 }
 
+/* While they were being configured nobody waited for their answers. */
+static void step_boot(struct machine *machine)
+{
+    if (!machine->configured || !machine_drives_answer(machine)) {
+        return;
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        answers_restart(&machine->axes[i].answers);
+    }
+    machine->state = MACHINE_OFF;
+}
+
 static void step_enabling(struct machine *machine)
 {
-    const struct axis *late = straggler(machine);
+    const struct axis *late = machine_straggler(machine);
     if (late == NULL) {
         machine->state = MACHINE_READY;
-    } else if (time_is_up(machine)) {
+    } else if (machine_time_is_up(machine)) {
         machine_raise(machine, FAULT_NOT_ENABLED, late->node, late->statusword);
     }
 }
 
-static void next_targets(struct machine *machine)
+/* Without a point there is nothing to brake along. */
+void machine_next_targets(struct machine *machine)
 {
     int32_t target_counts[PLANE_AXES];
     const int result = motion_step(&machine->motion, target_counts);
     if (result < 0) {
-        machine->motion.timebase.state = TIMEBASE_STOPPED;
-        machine_raise(machine, EMCY_SOFTWARE, 0, (uint32_t)-result);
+        machine_raise_quick(machine, EMCY_SOFTWARE, 0, (uint32_t)-result);
         return;
     }
     for (uint8_t i = 0; i < PLANE_AXES; ++i) {
@@ -87,46 +60,31 @@ static void next_targets(struct machine *machine)
     machine->statistics.program_tick = machine->motion.setpoints - 1u;
 }
 
-/* The drives move by themselves. */
-static void step_homing(struct machine *machine)
-{
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        machine->axes[i].target_counts = machine->axes[i].position_counts;
-    }
-}
-
 static void step_motion(struct machine *machine)
 {
     if (!motion_over(&machine->motion)) {
-        next_targets(machine);
+        machine_next_targets(machine);
         if (machine->state == MACHINE_HOLDING && motion_held(&machine->motion)) {
             machine->state = MACHINE_HELD;
         }
-    } else if (time_is_up(machine)) {
+    } else if (machine_time_is_up(machine)) {
         machine->state = MACHINE_READY;
     }
 }
 
-void machine_switch_off(struct machine *machine)
+static void step_quick_stop(struct machine *machine)
 {
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        machine->axes[i].goal = CIA402_GOAL_OFF;
-    }
-    machine->fault_phase = MACHINE_FAULT_OFF;
-}
-
-static void step_fault(struct machine *machine)
-{
-    if (machine->fault_phase == MACHINE_FAULT_BRAKING) {
-        next_targets(machine);
-        if (motion_over(&machine->motion)) {
+    const struct axis *moving = machine_not_stopped(machine);
+    if (moving != NULL) {
+        if (machine_time_is_up(machine)) {
+            machine_raise_quick(machine, FAULT_NOT_STOPPED, moving->node, moving->statusword);
             machine_switch_off(machine);
         }
-    } else if (machine->fault_phase == MACHINE_FAULT_RESETTING) {
-        if (straggler(machine) == NULL || time_is_up(machine)) {
-            machine->fault = (struct fault){.code = EMCY_NO_ERROR, .node = 0, .detail = 0};
-            machine_enter_boot(machine);
-        }
+    } else if (machine->mode_left) {
+        machine_enter_boot(machine);
+    } else {
+        machine_command(machine, CIA402_GOAL_OFF);
+        machine->state = MACHINE_OFF;
     }
 }
 
@@ -142,20 +100,18 @@ void machine_step(struct machine *machine)
     case MACHINE_HELD:
         step_motion(machine);
         break;
-    case MACHINE_HOMING:
-        step_homing(machine);
+    case MACHINE_QUICK_STOP:
+        step_quick_stop(machine);
         break;
     case MACHINE_FAULT:
-        step_fault(machine);
+        machine_step_fault(machine);
         break;
     case MACHINE_BOOT:
-        if (machine->configured && machine_drives_answer(machine)) {
-            machine->state = MACHINE_OFF;
-        }
+        step_boot(machine);
         break;
     case MACHINE_OFF:
     case MACHINE_READY:
-    case MACHINE_QUICK_STOP:
+    case MACHINE_HOMING: /* led by the mainline */
     default:
         break;
     }

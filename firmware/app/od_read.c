@@ -116,9 +116,9 @@ static uint64_t override_number(const struct machine *machine, uint8_t sub)
     case 1:
         return machine->override_percent;
     case 2:
-        return machine_moving(machine) ? timebase_rate_q30(timebase) : 0u;
+        return machine_on_path(machine) ? timebase_rate_q30(timebase) : 0u;
     default:
-        return machine_moving(machine) && timebase_saturated(timebase) ? 1u : 0u;
+        return machine_on_path(machine) && timebase_saturated(timebase) ? 1u : 0u;
     }
 }
 
@@ -138,7 +138,7 @@ static uint64_t boot_number(const struct drive_boot *boot, uint8_t sub)
 
 static uint64_t drive_state(const struct axis *axis)
 {
-    return axis->present ? (uint64_t)cia402_decode(axis->statusword) + 1u : 0u;
+    return axis->answers.present ? (uint64_t)cia402_decode(axis->statusword) + 1u : 0u;
 }
 
 static uint64_t axis_number(const struct axis *axis, uint16_t index)
@@ -151,7 +151,7 @@ static uint64_t axis_number(const struct axis *axis, uint16_t index)
     case 0x201C:
         return of_i32(axis->following_error_counts);
     case 0x2024:
-        return axis->missed;
+        return axis->answers.missed;
     case 0x2026:
         return drive_state(axis);
     case 0x200A:

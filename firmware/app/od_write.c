@@ -57,6 +57,9 @@ void od_written_hook(void *context, const struct od_entry *entry)
         port_lock();
         machine_override(&controller->machine, controller->values.override.percent);
         port_unlock();
+    } else if (entry->index == 0x1016) {
+        drive_watch_begin(&controller->watch, &controller->config,
+                          controller->values.consumer_heartbeat_time);
     } else if (entry->index == 0x1003) {
         emcy_producer_forget(&controller->emcy);
     } else if (config_contains(entry->index) && !controller->same_value) {

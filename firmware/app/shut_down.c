@@ -20,7 +20,7 @@ static bool switched_off(const struct machine *machine)
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (axis->present && axis->missed_in_row <= AXIS_MISSED_MAX && axis_enabled(axis)) {
+        if (!axis_left(axis)) {
             return false;
         }
     }

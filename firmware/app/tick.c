@@ -10,24 +10,30 @@
 void tick_init(struct tick *tick, struct machine *machine)
 {
     tick->machine = machine;
+    tick->refused = false;
     offsets_init(&tick->offsets);
     sync_producer_init(&tick->sync, SYNC_COUNTER_OVERFLOW);
 }
 
-static void send(struct machine *machine, const struct can_msg *message)
+static bool send(struct tick *tick, const struct can_msg *message)
 {
-    if (port_can_send(message) != 0 && machine_moving(machine)) {
-        machine->statistics.frames_not_sent++;
+    if (port_can_send(message) == 0) {
+        return true;
     }
+    tick->refused = true;
+    if (machine_on_path(tick->machine)) {
+        tick->machine->statistics.frames_not_sent++;
+    }
+    return false;
 }
 
 /* First of all, so that the work of the tick does not move it about. */
-static void send_sync(struct tick *tick)
+static bool send_sync(struct tick *tick)
 {
     struct can_msg sync;
     sync_producer_next(&tick->sync, &sync);
-    send(tick->machine, &sync);
     tick->machine->statistics.syncs++;
+    return send(tick, &sync);
 }
 
 /* Axes that hold have none. */
@@ -37,29 +43,34 @@ static void find_offsets(struct tick *tick, struct feedforward_offset offset[AXE
     memset(offset, 0, AXES_MAX * sizeof offset[0]);
     if (machine->config.feedforward != 0u) {
         offsets_step(&tick->offsets, &machine->config,
-                     machine_moving(machine) ? &machine->motion : NULL, offset);
+                     machine_on_path(machine) ? &machine->motion : NULL, offset);
     }
 }
 
-static void send_setpoints(struct machine *machine, const struct feedforward_offset *offset)
+static void send_setpoints(struct tick *tick, const struct feedforward_offset *offset)
 {
+    struct machine *machine = tick->machine;
     const bool torque = (machine->config.feedforward & CONFIG_TORQUE_FEEDFORWARD) != 0u;
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        struct axis *axis = &machine->axes[i];
         struct can_msg setpoint;
-        axis_setpoint(&machine->axes[i], machine->config.start_tolerance_counts, &setpoint);
+        axis_setpoint(axis, machine->config.start_tolerance_counts, &setpoint);
         if (torque) {
             pdo_add_torque(&setpoint, offset[i].torque_permille);
         }
-        send(machine, &setpoint);
+        if (send(tick, &setpoint)) {
+            axis_sent(axis);
+        }
     }
 }
 
-static void send_velocities(struct machine *machine, const struct feedforward_offset *offset)
+static void send_velocities(struct tick *tick, const struct feedforward_offset *offset)
 {
+    const struct machine *machine = tick->machine;
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         struct can_msg velocity;
         pdo_encode_velocity(machine->axes[i].node, offset[i].velocity_counts_s, &velocity);
-        send(machine, &velocity);
+        (void)send(tick, &velocity);
     }
 }
 
@@ -72,24 +83,33 @@ static void send_process_data(struct tick *tick)
     if (!machine_drives_operational(machine)) {
         return;
     }
-    send_setpoints(machine, offset);
+    send_setpoints(tick, offset);
     if ((machine->config.feedforward & CONFIG_VELOCITY_FEEDFORWARD) != 0u) {
-        send_velocities(machine, offset);
+        send_velocities(tick, offset);
     }
+}
+
+/* At lock step nothing but this time keeps the next SYNC from coming at once. */
+static uint32_t guard_us(const struct machine *machine)
+{
+    const uint32_t wait_us = machine_answer_wait_us(machine);
+    return wait_us > machine->config.period_us ? wait_us : machine->config.period_us;
 }
 
 void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns)
 {
     struct machine *machine = tick->machine;
     const uint32_t started_ns = port_time_ns();
-    send_sync(tick);
+    tick->refused = false;
+    const bool sync_sent = send_sync(tick);
     machine_supervise(machine, now_us);
     machine_step(machine);
     send_process_data(tick);
+    machine_note_sent(machine, sync_sent, !tick->refused);
     if (machine_awaits_drives(machine)) {
-        port_tick_await(TICK_GUARD_US, machine_busy(machine));
+        port_tick_await(guard_us(machine), machine_busy(machine));
     }
-    if (machine_moving(machine)) {
+    if (machine_on_path(machine)) {
         statistics_tick(&machine->statistics, late_ns, port_time_ns() - started_ns,
                         machine->config.period_us);
     }

@@ -4,25 +4,25 @@
 #ifndef APP_TICK_H
 #define APP_TICK_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "app/machine.h"
 #include "app/offsets.h"
 #include "canopen/sync.h"
 
-/* A SYNC that a simulated drive leaves unanswered is followed by the next one after this time. */
-#define TICK_GUARD_US 100000u
-
 struct tick {
     struct machine *machine;
     struct sync_producer sync;
     struct offsets offsets;
+    bool refused; /* the port took not all frames of this tick */
 };
 
 void tick_init(struct tick *tick, struct machine *machine);
 
 /* One period: send SYNC k; look at what the drives answered to the last one; move the machine on;
- * send setpoints k, then what feedforward adds to them. Timer. */
+ * send setpoints k, then what feedforward adds to them; for simulated drives ask the port to wait for their answers, for
+ * answer_wait_ms (0x2004 sub 8) or a period at most. Timer. */
 void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns);
 
 #endif

@@ -30,9 +30,7 @@ uint16_t cia402_master_controlword(enum cia402_goal goal, uint16_t statusword, u
     case CIA402_GOAL_ENABLED:
         return climb(state, CIA402_OPERATION_ENABLED);
     case CIA402_GOAL_QUICK_STOP:
-        return state == CIA402_OPERATION_ENABLED || state == CIA402_QUICK_STOP_ACTIVE
-                   ? CIA402_QUICK_STOP
-                   : CIA402_DISABLE_VOLTAGE;
+        return CIA402_QUICK_STOP;
     case CIA402_GOAL_RESET:
         return state == CIA402_FAULT && (previous & CIA402_CONTROL_FAULT_RESET) == 0
                    ? CIA402_FAULT_RESET

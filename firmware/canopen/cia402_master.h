@@ -20,8 +20,9 @@ enum cia402_goal {
     CIA402_GOAL_SWITCHED_ON,
     CIA402_GOAL_ENABLED, /* Operation enabled. From Quick stop active by way of Switch on disabled
                           */
-    CIA402_GOAL_QUICK_STOP, /* Quick stop active from Operation enabled; else off */
-    CIA402_GOAL_RESET       /* out of Fault, to Switch on disabled */
+    CIA402_GOAL_QUICK_STOP, /* Quick stop active from Operation enabled; else off. The command is the same whatever
+                               the statusword says: nobody brakes by what may be wrong or old */
+    CIA402_GOAL_RESET /* out of Fault, to Switch on disabled */
 };
 
 /* The controlword to send after `statusword` came and `previous` was sent last. */

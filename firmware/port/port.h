@@ -89,8 +89,8 @@ void port_tick_period(uint32_t period_us);
 
 /* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
  * port_tick_await() the next one waits until port_tick_ready() is called (from the receive handler:
- * all drives have answered), for guard_us at most; then it starts late rather than on time. At lock step
- * it starts then at once if `hurry`. A board, whose timer knows nothing but the clock, ignores both. */
+ * all drives have answered), for guard_us at most; then it starts late rather than on time. While the host as a whole
+ * stalls the guard time does not run. At lock step the tick starts then at once if `hurry`. A board, whose timer knows nothing but the clock, ignores both. */
 void port_tick_await(uint32_t guard_us, bool hurry);
 void port_tick_ready(void);
 

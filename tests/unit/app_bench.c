@@ -121,7 +121,7 @@ static void beat(struct app_bench *bench)
 {
     for (uint32_t i = 0; i < BENCH_DRIVES; ++i) {
         struct fake_drive *drive = &bench->drives[i];
-        if (!drive->dead && drive->nmt.state != NMT_INITIALISING &&
+        if (!drive->dead && !drive->silent_heart && drive->nmt.state != NMT_INITIALISING &&
             bench->ticks % DRIVE_HEARTBEAT_MS == 0u) {
             struct can_msg frame;
             cob_frame(&frame, COB_HEARTBEAT + drive->node, 1);
@@ -131,9 +131,11 @@ static void beat(struct app_bench *bench)
     }
 }
 
+/* As a port does that waits for answers. */
 void app_bench_period(struct app_bench *bench)
 {
-    fake_port_advance_us(bench->controller.config.period_us);
+    const bool guard_over = fake_port_awaited_us() > 0u && !fake_port_ready();
+    fake_port_advance_us(guard_over ? fake_port_awaited_us() : bench->controller.config.period_us);
     fake_port_tick(0);
     (void)pass_frames(bench);
     beat(bench);

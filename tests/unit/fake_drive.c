@@ -73,6 +73,8 @@ void fake_drive_init(struct fake_drive *drive, uint8_t node, int32_t position_co
     sdo_server_init(&drive->server, &drive->od, node, 1000000, 127);
     nmt_slave_init(&drive->nmt, node, NULL, NULL);
     cia402_device_init(&drive->state);
+    drive->state.flags |= CIA402_STATUS_VOLTAGE | CIA402_STATUS_FOLLOWS;
+    drive->quick_stop_syncs = 3;
     (void)cia402_device_ready(&drive->state);
 }
 
@@ -88,10 +90,54 @@ static void take_setpoint(struct fake_drive *drive, const struct pdo_setpoint *s
     if (follow && drive->following && step > drive->worst_step_counts) {
         drive->worst_step_counts = step;
     }
+    if (setpoint->controlword != CIA402_QUICK_STOP) {
+        drive->quick_stop_target = setpoint->target_counts;
+    } else if (setpoint->target_counts != drive->quick_stop_target) {
+        drive->quick_stop_moved++;
+    }
     drive->following = follow;
     drive->target_counts = setpoint->target_counts;
     drive->setpoints++;
     (void)cia402_device_control(&drive->state, setpoint->controlword);
+    if (drive->stuck) {
+        (void)cia402_device_fault(&drive->state);
+    }
+}
+
+/* Comes to rest where it is. */
+static void brake(struct fake_drive *drive)
+{
+    const enum cia402_action action = cia402_device_action(&drive->state);
+    if (action != CIA402_STOP_QUICKLY && action != CIA402_STOP_FOR_FAULT) {
+        drive->stopping_syncs = 0;
+    } else if (++drive->stopping_syncs >= drive->quick_stop_syncs) {
+        (void)cia402_device_stopped(&drive->state);
+    }
+}
+
+static int answer(struct fake_drive *drive, const struct pdo_actual *actual, struct can_msg *out)
+{
+    if (drive->drops > 0u) {
+        drive->drops--;
+        return 0;
+    }
+    pdo_encode_actual(drive->node, actual, out);
+    return drive->mute ? 0 : 1;
+}
+
+/* What it says now; or, late, what it wanted to say to the last SYNC. When it is late no more, both. */
+static int answers(struct fake_drive *drive, const struct pdo_actual *actual, struct can_msg out[2])
+{
+    int count = 0;
+    if (drive->held) {
+        count += answer(drive, &drive->actual, &out[count]);
+    }
+    drive->held = drive->late;
+    drive->actual = *actual;
+    if (!drive->late) {
+        count += answer(drive, actual, &out[count]);
+    }
+    return count;
 }
 
 /* Homing mode: begins with the edge of bit 4, tells of its end in bits 10, 12, 13. */
@@ -115,7 +161,7 @@ static void seek_home(struct fake_drive *drive)
 }
 
 /* Setpoint k follows SYNC k, is latched at SYNC k+1 and reached at SYNC k+2. */
-static int take_sync(struct fake_drive *drive, struct can_msg *out)
+static int take_sync(struct fake_drive *drive, struct can_msg out[2])
 {
     if (cia402_device_action(&drive->state) == CIA402_FOLLOW &&
         drive->values.modes_of_operation == CIA402_MODE_HOMING) {
@@ -127,10 +173,10 @@ static int take_sync(struct fake_drive *drive, struct can_msg *out)
     } else {
         drive->latched_counts = drive->position_counts;
     }
+    brake(drive);
     const struct pdo_actual actual = {.statusword = cia402_device_statusword(&drive->state),
                                       .position_counts = drive->position_counts};
-    pdo_encode_actual(drive->node, &actual, out);
-    return drive->mute ? 0 : 1;
+    return answers(drive, &actual, out);
 }
 
 int fake_drive_receive(struct fake_drive *drive, const struct can_msg *in, struct can_msg out[2])

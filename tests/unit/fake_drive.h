@@ -14,6 +14,7 @@
 #include "canopen/cia402_device.h"
 #include "canopen/nmt.h"
 #include "canopen/od.h"
+#include "canopen/pdo.h"
 #include "canopen/sdo_server.h"
 #include "od_drive.h"
 
@@ -49,7 +50,17 @@ struct fake_drive {
     uint32_t reads;     /* of objects, by SDO */
     uint32_t write_count;
     struct fake_write writes[FAKE_DRIVE_WRITES];
-    bool dead; /* neither hears nor speaks */
+    bool late;                 /* answers each SYNC only when the next one has come */
+    bool held;                 /* such an answer waits */
+    bool stuck;                /* its faults come back at once when they are reset */
+    uint32_t drops;            /* so many of its next answers are lost */
+    uint32_t quick_stop_syncs; /* how long a quick stop takes */
+    uint32_t stopping_syncs;   /* how long it has taken */
+    int32_t quick_stop_target; /* the target that came with the first quick stop command */
+    uint32_t quick_stop_moved; /* quick stop commands with another target */
+    struct pdo_actual actual;  /* the answer that waits */
+    bool silent_heart;         /* sends no heartbeats (the bench sends them) */
+    bool dead;                 /* neither hears nor speaks */
 };
 
 void fake_drive_init(struct fake_drive *drive, uint8_t node, int32_t position_counts);

@@ -28,11 +28,12 @@ static struct pdo_setpoint sent(void)
 {
     struct pdo_setpoint setpoint;
     axis_setpoint(&axis, TOLERANCE, &frame);
+    axis_sent(&axis);
     TEST_ASSERT_EQUAL_INT(5, pdo_decode_setpoint(&frame, &setpoint));
     return setpoint;
 }
 
-static void test_target_follows_until_the_drive_is_told_to_follow(void)
+static void test_target_follows_until_the_drive_is_seen_enabled(void)
 {
     axis.goal = CIA402_GOAL_ENABLED;
     answer(CIA402_SWITCH_ON_DISABLED, 1000, 0);
@@ -42,9 +43,89 @@ static void test_target_follows_until_the_drive_is_told_to_follow(void)
     TEST_ASSERT_EQUAL_HEX16(CIA402_ENABLE_OPERATION, last.controlword);
     TEST_ASSERT_EQUAL_INT32(1010, last.target_counts);
     answer(CIA402_SWITCHED_ON, 1020, 0);
-    TEST_ASSERT_EQUAL_INT32(1010, sent().target_counts);
+    TEST_ASSERT_EQUAL_INT32(1020, sent().target_counts);
     answer(CIA402_OPERATION_ENABLED, 1030, 0);
-    TEST_ASSERT_EQUAL_INT32(1010, sent().target_counts);
+    TEST_ASSERT_EQUAL_INT32_MESSAGE(1020, sent().target_counts, "what it follows already");
+    answer(CIA402_OPERATION_ENABLED, 1040, 0);
+    TEST_ASSERT_EQUAL_INT32(1020, sent().target_counts);
+}
+
+/* A frame that did not leave moved nothing: the quick stop's target is the one before. */
+static void test_a_quick_stop_takes_the_target_that_was_sent(void)
+{
+    axis.goal = CIA402_GOAL_ENABLED;
+    answer(CIA402_OPERATION_ENABLED, 50, 0);
+    axis.target_counts = 60;
+    (void)sent();
+    axis.target_counts = 70;
+    axis_setpoint(&axis, TOLERANCE, &frame);
+    axis_command(&axis, CIA402_GOAL_QUICK_STOP);
+    TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
+}
+
+/* One wrong statusword, with a wrong position beside it, moves nothing. */
+static void test_a_statusword_that_lies_once_does_not_move_the_target(void)
+{
+    axis.goal = CIA402_GOAL_ENABLED;
+    answer(CIA402_OPERATION_ENABLED, 50, 0);
+    (void)sent();
+    axis.target_counts = 60;
+    (void)sent();
+    answer(CIA402_SWITCHED_ON, 9999, 0);
+    TEST_ASSERT_TRUE(axis_dropped_out(&axis));
+    TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
+    axis_command(&axis, CIA402_GOAL_QUICK_STOP);
+    const struct pdo_setpoint stop = sent();
+    TEST_ASSERT_EQUAL_HEX16(CIA402_QUICK_STOP, stop.controlword);
+    TEST_ASSERT_EQUAL_INT32(60, stop.target_counts);
+}
+
+static void test_a_quick_stop_leaves_the_target_until_the_drive_is_off(void)
+{
+    axis.goal = CIA402_GOAL_ENABLED;
+    answer(CIA402_OPERATION_ENABLED, 50, 0);
+    (void)sent();
+    axis.target_counts = 60;
+    (void)sent();
+    axis_command(&axis, CIA402_GOAL_QUICK_STOP);
+    answer(CIA402_QUICK_STOP_ACTIVE, 70, 0);
+    TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
+    TEST_ASSERT_FALSE(axis_left(&axis));
+    answer(CIA402_SWITCH_ON_DISABLED, 80, 0);
+    TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
+    TEST_ASSERT_TRUE(axis_left(&axis));
+    axis_command(&axis, CIA402_GOAL_OFF);
+    TEST_ASSERT_EQUAL_INT32(80, sent().target_counts);
+}
+
+static void test_homing_adds_its_bits_and_follows_the_position(void)
+{
+    axis.by_itself = true;
+    axis.control_extra = 0x10;
+    axis.goal = CIA402_GOAL_ENABLED;
+    answer(CIA402_SWITCH_ON_DISABLED, 1, 0);
+    TEST_ASSERT_EQUAL_HEX16(CIA402_SHUTDOWN, sent().controlword);
+    answer(CIA402_OPERATION_ENABLED, 2, 0);
+    TEST_ASSERT_EQUAL_HEX16(CIA402_ENABLE_OPERATION | 0x10, sent().controlword);
+    answer(CIA402_OPERATION_ENABLED, 300, 0);
+    TEST_ASSERT_EQUAL_INT32(300, sent().target_counts);
+    TEST_ASSERT_TRUE_MESSAGE(axis_reached(&axis), "bit 12 means something else while homing");
+    axis_command(&axis, CIA402_GOAL_QUICK_STOP);
+    answer(CIA402_QUICK_STOP_ACTIVE, 400, 0);
+    const struct pdo_setpoint stop = sent();
+    TEST_ASSERT_EQUAL_HEX16(CIA402_QUICK_STOP, stop.controlword);
+    TEST_ASSERT_EQUAL_INT32(300, stop.target_counts);
+}
+
+static void test_enabled_means_that_the_target_is_followed(void)
+{
+    axis.goal = CIA402_GOAL_ENABLED;
+    answer(CIA402_OPERATION_ENABLED, 0, 0);
+    TEST_ASSERT_FALSE(axis_reached(&axis));
+    const struct pdo_actual actual = {.statusword = cia402_status_bits(CIA402_OPERATION_ENABLED) |
+                                                    CIA402_STATUS_FOLLOWS};
+    axis_receive(&axis, &actual, 0);
+    TEST_ASSERT_TRUE(axis_reached(&axis));
 }
 
 static void test_switching_off_lets_the_target_follow_again(void)
@@ -62,6 +143,7 @@ static void test_switching_off_lets_the_target_follow_again(void)
 
 static void hold(int32_t position_counts, uint32_t syncs)
 {
+    axis.goal = CIA402_GOAL_ENABLED;
     for (uint32_t k = 0; k < syncs; ++k) {
         answer(CIA402_OPERATION_ENABLED, position_counts, 0);
         (void)sent();
@@ -91,31 +173,17 @@ static void test_a_drive_that_is_off_does_not_stand_still(void)
     TEST_ASSERT_FALSE(axis_still(&axis));
 }
 
-static void test_missed_answers_are_counted_once_the_drive_has_answered(void)
-{
-    TEST_ASSERT_FALSE(axis_close_sync(&axis));
-    answer(CIA402_SWITCHED_ON, 0, 0);
-    TEST_ASSERT_FALSE(axis_close_sync(&axis));
-    TEST_ASSERT_TRUE(axis_close_sync(&axis));
-    TEST_ASSERT_EQUAL_UINT32(1, axis.missed_in_row);
-    answer(CIA402_SWITCHED_ON, 0, 0);
-    TEST_ASSERT_EQUAL_UINT32(0, axis.missed_in_row);
-}
-
 /* The clock wraps in between. */
-static void test_lost_by_syncs_or_by_time(void)
+static void test_gone_is_lost_for_long(void)
 {
     const uint32_t last_us = UINT32_MAX - 10u;
     answer(CIA402_SWITCHED_ON, 0, last_us);
-    axis.missed_in_row = AXIS_MISSED_LOST;
-    TEST_ASSERT_FALSE(axis_lost(&axis, last_us + 500000u));
-    axis.missed_in_row = AXIS_MISSED_LOST + 1u;
-    TEST_ASSERT_TRUE(axis_lost(&axis, last_us + 500000u));
-    axis.missed_in_row = AXIS_MISSED_MAX + 1u;
-    TEST_ASSERT_FALSE(axis_lost(&axis, last_us + AXIS_SILENCE_MAX_US));
-    TEST_ASSERT_TRUE(axis_lost(&axis, last_us + AXIS_SILENCE_MAX_US + 1u));
-    axis.missed_in_row = AXIS_MISSED_MAX;
-    TEST_ASSERT_FALSE(axis_lost(&axis, last_us + 5u * AXIS_SILENCE_MAX_US));
+    TEST_ASSERT_FALSE(axis_gone(&axis, last_us + 5u * AXIS_GONE_US));
+    axis.answers.lost = true;
+    TEST_ASSERT_FALSE(axis_gone(&axis, last_us + AXIS_GONE_US));
+    TEST_ASSERT_TRUE(axis_gone(&axis, last_us + AXIS_GONE_US + 1u));
+    answer(CIA402_SWITCHED_ON, 0, last_us + 2u * AXIS_GONE_US);
+    TEST_ASSERT_FALSE(axis_gone(&axis, last_us + 2u * AXIS_GONE_US));
 }
 
 static void test_distance_is_that_of_the_farther_one_without_overflow(void)
@@ -131,12 +199,16 @@ static void test_distance_is_that_of_the_farther_one_without_overflow(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_target_follows_until_the_drive_is_told_to_follow);
+    RUN_TEST(test_target_follows_until_the_drive_is_seen_enabled);
+    RUN_TEST(test_a_quick_stop_takes_the_target_that_was_sent);
+    RUN_TEST(test_a_statusword_that_lies_once_does_not_move_the_target);
+    RUN_TEST(test_a_quick_stop_leaves_the_target_until_the_drive_is_off);
+    RUN_TEST(test_homing_adds_its_bits_and_follows_the_position);
+    RUN_TEST(test_enabled_means_that_the_target_is_followed);
     RUN_TEST(test_switching_off_lets_the_target_follow_again);
     RUN_TEST(test_standstill_needs_250_syncs_at_the_target);
     RUN_TEST(test_a_drive_that_is_off_does_not_stand_still);
-    RUN_TEST(test_missed_answers_are_counted_once_the_drive_has_answered);
-    RUN_TEST(test_lost_by_syncs_or_by_time);
+    RUN_TEST(test_gone_is_lost_for_long);
     RUN_TEST(test_distance_is_that_of_the_farther_one_without_overflow);
     return UNITY_END();
 }

@@ -101,7 +101,7 @@ static void test_fault_while_held(void)
     (void)app_bench_until(&bench, MACHINE_FAULT, 1000);
     refused(COMMAND_RESUME, MACHINE_FAULT_PRESENT);
     refused(COMMAND_HOLD, MACHINE_FAULT_PRESENT);
-    app_bench_periods(&bench, 3);
+    app_bench_periods(&bench, 8);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_OFF, machine()->fault_phase);
 }
 

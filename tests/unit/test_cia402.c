@@ -274,8 +274,10 @@ static void test_master_quick_stop(void)
         cia402_master_controlword(CIA402_GOAL_QUICK_STOP, cia402_device_statusword(&device), 0));
     put_in(CIA402_SWITCHED_ON);
     TEST_ASSERT_EQUAL_HEX16(
-        CIA402_DISABLE_VOLTAGE,
+        CIA402_QUICK_STOP,
         cia402_master_controlword(CIA402_GOAL_QUICK_STOP, cia402_device_statusword(&device), 0));
+    (void)periods_to(CIA402_GOAL_QUICK_STOP, 0);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, device.state);
 }
 
 static void test_modes(void)

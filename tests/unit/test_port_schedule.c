@@ -87,6 +87,16 @@ static void test_a_slow_machine_rests_half_of_what_it_worked(void)
     TEST_ASSERT_EQUAL_UINT64(next_ns + 3u * MS, schedule.due_ns);
 }
 
+static void test_the_rest_after_a_stall_is_short(void)
+{
+    const uint64_t start_ns = schedule.due_ns;
+    (void)schedule_start(&schedule, start_ns);
+    schedule_await(&schedule, 100u * MS, false);
+    schedule_finish(&schedule, start_ns);
+    schedule_ready(&schedule, start_ns + 900u * MS);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + 910u * MS, schedule.due_ns);
+}
+
 static void test_whoever_is_never_ready_is_left_after_the_guard(void)
 {
     const uint64_t start_ns = schedule.due_ns;
@@ -95,6 +105,35 @@ static void test_whoever_is_never_ready_is_left_after_the_guard(void)
     schedule_finish(&schedule, start_ns);
     TEST_ASSERT_EQUAL_UINT64(99u * MS, tick(0));
     TEST_ASSERT_EQUAL_UINT64(start_ns + 101u * MS, schedule.due_ns);
+}
+
+/* Wakes every 10 ms: all of it counts, whatever frames come in between. */
+static void test_the_guard_is_counted_in_slices(void)
+{
+    const uint64_t start_ns = schedule.due_ns;
+    (void)schedule_start(&schedule, start_ns);
+    schedule_await(&schedule, 100u * MS, false);
+    schedule_finish(&schedule, start_ns);
+    for (uint64_t ms = 10; ms < 100; ms += 10) {
+        schedule_wait(&schedule, start_ns + ms * MS);
+        TEST_ASSERT_EQUAL_UINT64(start_ns + 100u * MS, schedule.due_ns);
+    }
+}
+
+static void test_a_stall_counts_as_one_slice_of_20_ms(void)
+{
+    const uint64_t start_ns = schedule.due_ns;
+    (void)schedule_start(&schedule, start_ns);
+    schedule_await(&schedule, 100u * MS, false);
+    schedule_finish(&schedule, start_ns);
+    schedule_wait(&schedule, start_ns + 5000u * (uint64_t)MS);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + 5080u * (uint64_t)MS, schedule.due_ns);
+    schedule_wait(&schedule, start_ns + 5080u * (uint64_t)MS);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + 5140u * (uint64_t)MS, schedule.due_ns);
+    schedule_ready(&schedule, start_ns + 5090u * (uint64_t)MS);
+    const uint64_t due_ns = schedule.due_ns;
+    schedule_wait(&schedule, start_ns + 5100u * (uint64_t)MS);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(due_ns, schedule.due_ns, "nobody is waited for any more");
 }
 
 static void lock_step_tick(bool await, bool hurry)
@@ -136,7 +175,10 @@ int main(void)
     RUN_TEST(test_after_a_miss_the_clock_is_set_anew);
     RUN_TEST(test_who_is_not_ready_in_time_makes_the_tick_late);
     RUN_TEST(test_a_slow_machine_rests_half_of_what_it_worked);
+    RUN_TEST(test_the_rest_after_a_stall_is_short);
     RUN_TEST(test_whoever_is_never_ready_is_left_after_the_guard);
+    RUN_TEST(test_the_guard_is_counted_in_slices);
+    RUN_TEST(test_a_stall_counts_as_one_slice_of_20_ms);
     RUN_TEST(test_lock_step_in_a_hurry_is_due_when_all_are_ready);
     RUN_TEST(test_lock_step_without_hurry_goes_by_the_clock);
     return UNITY_END();

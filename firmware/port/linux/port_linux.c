@@ -34,11 +34,11 @@ static void on_signal(int number)
     port_wake();
 }
 
-static int catch_signals(void)
+static int set_signals(void (*handler)(int))
 {
     struct sigaction action;
     memset(&action, 0, sizeof action);
-    action.sa_handler = on_signal;
+    action.sa_handler = handler;
     (void)sigemptyset(&action.sa_mask);
     return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, &action, NULL) == 0
                ? 0
@@ -69,7 +69,7 @@ int port_begin(int argc, char **argv)
         return status;
     }
     self.wake_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-    if (self.wake_fd < 0 || catch_signals() != 0 ||
+    if (self.wake_fd < 0 || set_signals(on_signal) != 0 ||
         interrupts_begin(&self.socket, self.options.pace == OPTIONS_FAST) != 0) {
         (void)fprintf(stderr, "hodograph-controller: cannot prepare the process: %s\n",
                       strerror(errno));
@@ -78,11 +78,14 @@ int port_begin(int argc, char **argv)
     return 0;
 }
 
+/* The handler writes to wake_fd, so it goes first: the process is on its way out in any case. */
 int port_end(void)
 {
+    (void)set_signals(SIG_IGN);
     interrupts_end();
     can_socket_close(&self.socket);
     (void)close(self.wake_fd);
+    self.wake_fd = -1;
     const int error = interrupts_error();
     if (error == 0) {
         return 0;

@@ -14,6 +14,7 @@ void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_
     schedule->earliest_ns = schedule->nominal_ns;
     schedule->due_ns = schedule->nominal_ns;
     schedule->guard_ns = 0;
+    schedule->counted_ns = now_ns;
     schedule->awaiting = false;
     schedule->hurry = false;
     schedule->lock_step = lock_step;
@@ -26,10 +27,12 @@ void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry)
     schedule->hurry = hurry && schedule->lock_step;
 }
 
+/* A stall was no work, and the drives must not be left without SYNCs for as long again. */
 static void rest_after_work(struct schedule *schedule, uint64_t now_ns)
 {
-    const uint64_t worked_ns = now_ns - schedule->started_ns;
-    schedule->earliest_ns = later(schedule->earliest_ns, now_ns + worked_ns / 2u);
+    const uint64_t half_ns = (now_ns - schedule->started_ns) / 2u;
+    const uint64_t rest_ns = half_ns < SCHEDULE_REST_MAX_NS ? half_ns : SCHEDULE_REST_MAX_NS;
+    schedule->earliest_ns = later(schedule->earliest_ns, now_ns + rest_ns);
 }
 
 void schedule_ready(struct schedule *schedule, uint64_t now_ns)
@@ -37,7 +40,20 @@ void schedule_ready(struct schedule *schedule, uint64_t now_ns)
     if (!schedule->hurry) {
         rest_after_work(schedule, now_ns);
     }
+    schedule->awaiting = false;
     schedule->due_ns = schedule->earliest_ns;
+}
+
+void schedule_wait(struct schedule *schedule, uint64_t now_ns)
+{
+    if (!schedule->awaiting) {
+        return;
+    }
+    const uint64_t passed_ns = now_ns - schedule->counted_ns;
+    const uint64_t slice_ns = passed_ns < SCHEDULE_SLICE_MAX_NS ? passed_ns : SCHEDULE_SLICE_MAX_NS;
+    schedule->counted_ns = now_ns;
+    schedule->guard_ns -= slice_ns < schedule->guard_ns ? slice_ns : schedule->guard_ns;
+    schedule->due_ns = later(schedule->earliest_ns, now_ns + schedule->guard_ns);
 }
 
 static uint64_t lateness_ns(const struct schedule *schedule, uint64_t now_ns)
@@ -75,5 +91,6 @@ void schedule_finish(struct schedule *schedule, uint64_t now_ns)
         next_by_clock(schedule, now_ns);
     }
     const uint64_t patience_ns = schedule->awaiting ? schedule->guard_ns : 0u;
+    schedule->counted_ns = started_ns;
     schedule->due_ns = later(schedule->earliest_ns, started_ns + patience_ns);
 }

@@ -9,10 +9,13 @@
  *
  * A tick may wish that the next one waits until everybody is ready (schedule_await), for a guard time at
  * most: it is then late rather than on time. At lock step it may also wish to have it as soon as that.
+ * The guard time is counted in slices: the thread wakes at least every SCHEDULE_SLICE_NS while it waits and says so
+ * (schedule_wait); a slice that took longer than SCHEDULE_SLICE_MAX_NS counts as that. So a stall of the whole machine,
+ * in which nobody could have become ready, hardly counts.
  *
  * Real-time threads take all they ask for. So that the mainline still gets its turn on a machine too slow for the
- * period, what a tick took, up to the moment when everybody was ready, is followed by a rest of half of that. Where a
- * tick takes less than two thirds of a period this changes nothing.
+ * period, what a tick took, up to the moment when everybody was ready, is followed by a rest of half of that (10 ms at
+ * most). Where a tick takes less than two thirds of a period this changes nothing.
  */
 #ifndef PORT_LINUX_SCHEDULE_H
 #define PORT_LINUX_SCHEDULE_H
@@ -20,16 +23,21 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define SCHEDULE_SLICE_NS     10000000u
+#define SCHEDULE_SLICE_MAX_NS 20000000u
+#define SCHEDULE_REST_MAX_NS  10000000u
+
 struct schedule {
     uint64_t period_ns;
     uint64_t started_ns;  /* the present tick */
     uint64_t nominal_ns;  /* of the next tick, on the clock of the ticks */
     uint64_t earliest_ns; /* when it may start: later than nominal_ns where ticks would bunch */
     uint64_t due_ns;      /* when it has to start: later than that while somebody is waited for */
-    uint64_t guard_ns;    /* of the wish to wait */
-    bool awaiting;        /* the wishes of the present tick */
-    bool hurry;
-    bool lock_step; /* whether ticks may be faster than the clock */
+    uint64_t guard_ns;    /* what is left of the wish to wait */
+    uint64_t counted_ns;  /* up to when it was counted */
+    bool awaiting;        /* somebody is waited for, since the present tick */
+    bool hurry;           /* its other wish */
+    bool lock_step;       /* whether ticks may be faster than the clock */
 };
 
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step);
@@ -37,6 +45,9 @@ void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_
 /* Wishes of the application, from inside a tick; and from the receive handler. */
 void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry);
 void schedule_ready(struct schedule *schedule, uint64_t now_ns);
+
+/* The thread has woken: counts the guard time, moves due_ns along. */
+void schedule_wait(struct schedule *schedule, uint64_t now_ns);
 
 /* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the wishes of the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);

@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/answers.h"
+
+#include "unity.h"
+
+#define PERIOD_US 1000u
+
+static struct answers answers;
+static uint32_t now_us;
+static uint32_t wait_us;
+static uint8_t missed_max;
+
+void setUp(void)
+{
+    answers_init(&answers);
+    now_us = UINT32_MAX - 3u * PERIOD_US; /* soon to wrap */
+    wait_us = 0;
+    missed_max = 1;
+}
+
+void tearDown(void)
+{
+}
+
+/* A SYNC, answered `count` times, and the next tick, which closes it. */
+static uint32_t sync(unsigned count)
+{
+    const uint32_t sync_us = now_us;
+    for (unsigned i = 0; i < count; ++i) {
+        answers_take(&answers, sync_us + 300u);
+    }
+    now_us += PERIOD_US;
+    return answers_close_sync(&answers, now_us, sync_us, wait_us, missed_max);
+}
+
+static void test_nothing_is_missed_before_the_first_answer(void)
+{
+    for (unsigned i = 0; i < 20; ++i) {
+        TEST_ASSERT_EQUAL_UINT32(0, sync(0));
+    }
+    TEST_ASSERT_FALSE(answers.present);
+    TEST_ASSERT_FALSE(answers.lost);
+}
+
+static void test_without_patience_absent_is_missed(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(0, sync(1));
+    TEST_ASSERT_EQUAL_UINT32(1, sync(0));
+    TEST_ASSERT_EQUAL_UINT32(0, sync(1));
+    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+    TEST_ASSERT_FALSE(answers.lost);
+}
+
+static void test_one_more_than_permitted_in_a_row_is_lost_until_the_next_answer(void)
+{
+    for (missed_max = 0; missed_max < 5; ++missed_max) {
+        (void)sync(1);
+        for (unsigned i = 0; i < missed_max; ++i) {
+            TEST_ASSERT_EQUAL_UINT32(1, sync(0));
+            TEST_ASSERT_FALSE(answers.lost);
+        }
+        TEST_ASSERT_EQUAL_UINT32(1, sync(0));
+        TEST_ASSERT_TRUE(answers.lost);
+        answers_take(&answers, now_us);
+        TEST_ASSERT_FALSE(answers.lost);
+    }
+}
+
+/* Absent, absent, then three at once: the drive was late. */
+static void test_late_answers_are_not_counted(void)
+{
+    wait_us = 5000;
+    (void)sync(1);
+    TEST_ASSERT_EQUAL_UINT32(0, sync(0));
+    TEST_ASSERT_EQUAL_UINT32(0, sync(0));
+    TEST_ASSERT_EQUAL_UINT32(0, sync(3));
+    for (unsigned i = 0; i < 20; ++i) {
+        TEST_ASSERT_EQUAL_UINT32(0, sync(1));
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, answers.missed);
+}
+
+/* Two absent, only one of them comes later. */
+static void test_what_does_not_come_in_time_is_missed(void)
+{
+    wait_us = 5000;
+    (void)sync(1);
+    (void)sync(0);
+    (void)sync(0);
+    TEST_ASSERT_EQUAL_UINT32(0, sync(2));
+    TEST_ASSERT_EQUAL_UINT32(0, sync(1));
+    TEST_ASSERT_EQUAL_UINT32(1, sync(1));
+    for (unsigned i = 0; i < 20; ++i) {
+        TEST_ASSERT_EQUAL_UINT32(0, sync(1));
+    }
+    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+}
+
+static void test_lost_takes_the_patience_too(void)
+{
+    wait_us = 5000;
+    (void)sync(1);
+    for (unsigned i = 0; i < 4; ++i) {
+        (void)sync(0);
+        TEST_ASSERT_FALSE(answers.lost);
+    }
+    (void)sync(0);
+    TEST_ASSERT_TRUE(answers.lost);
+    TEST_ASSERT_EQUAL_UINT32(5, answers.missed);
+}
+
+/* Doubled frames make up for nothing that is missed later. */
+static void test_a_doubled_answer_is_one(void)
+{
+    wait_us = 5000;
+    (void)sync(2);
+    (void)sync(2);
+    (void)sync(0);
+    for (unsigned i = 0; i < 6; ++i) {
+        (void)sync(1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+}
+
+static void test_restart_keeps_the_presence_only(void)
+{
+    (void)sync(1);
+    (void)sync(0);
+    (void)sync(0);
+    answers_restart(&answers);
+    TEST_ASSERT_TRUE(answers.present);
+    TEST_ASSERT_FALSE(answers.lost);
+    TEST_ASSERT_EQUAL_UINT32(0, answers.missed);
+    (void)sync(0);
+    TEST_ASSERT_FALSE(answers.lost);
+    (void)sync(0);
+    TEST_ASSERT_TRUE(answers.lost);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_nothing_is_missed_before_the_first_answer);
+    RUN_TEST(test_without_patience_absent_is_missed);
+    RUN_TEST(test_one_more_than_permitted_in_a_row_is_lost_until_the_next_answer);
+    RUN_TEST(test_late_answers_are_not_counted);
+    RUN_TEST(test_what_does_not_come_in_time_is_missed);
+    RUN_TEST(test_lost_takes_the_patience_too);
+    RUN_TEST(test_a_doubled_answer_is_one);
+    RUN_TEST(test_restart_keeps_the_presence_only);
+    return UNITY_END();
+}
