@@ -8,55 +8,36 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..bustime import RecordedLoad, machine_bus_time, recorded_load
-from ..config import PLANE_AXES, Machine
+from ..config import Machine
 from ..errors import BusError, HodographError, RunError
 from ..native import NativeProgram
-from ..simulate import Motion, analyse, settling_ticks
+from ..simulate import settling_ticks
 from .address import BusAddress, check_socketcan, is_virtual
+from .analysis import REACHED_AFTER, BusRun, analyse_recording, first_tick, measured_pace
 from .controller import DISABLE, READY, STATISTICS, Controller, connect
-from .decode import Ticks, decode_ticks
 from .goto import goto
 from .processes import Rig
 from .recorder import Recorder
-from .setpoint_check import require_no_jump, step_limits
+from .recordings import write_recording
 from .signals import unbroken
 
-REACHED_AFTER = 2
-"""Setpoint k is reached at SYNC k+2 (docs/protocol.md section 2)."""
+__all__ = [
+    "BusRun",
+    "Station",
+    "first_tick",
+    "measured_pace",
+    "rig_until_interrupted",
+    "run_program",
+    "station",
+]
 
 _SYNCS, _TICK, _MISSES = 1, 2, 3
 _MARGIN_TICKS = 50
 """Recorded beyond what is needed, so that late answers can be told from lost ones."""
 
 Progress = Callable[[int], None]
-
-
-@dataclass(frozen=True, eq=False)
-class BusRun:
-    """A recorded run: the motion, and how the bus did. `frames` counts all that were recorded."""
-
-    motion: Motion
-    bus: str
-    deadline_misses: int
-    pace: str
-    frames: int
-    wall_s: float
-    load: RecordedLoad
-
-    def summary(self) -> dict[str, object]:
-        """The keys that tools may rely on in `hodograph run --json`."""
-        return self.motion.summary() | {
-            "bus": self.bus,
-            "deadline_misses": self.deadline_misses,
-            "pace": self.pace,
-            "frames": self.frames,
-            "bus_load": self.load.summary(),
-        }
 
 
 @dataclass(frozen=True)
@@ -107,9 +88,14 @@ def _await_rig(controller: Controller, rig: Rig, wait_s: float) -> None:
 
 
 def run_program(
-    at: Station, machine: Machine, image: bytes, kernel: str, progress: Progress | None = None
+    at: Station,
+    machine: Machine,
+    image: bytes,
+    kernel: str,
+    progress: Progress | None = None,
+    record: Path | None = None,
 ) -> BusRun:
-    """Runs a program image from wherever the axes stand, and analyses the recording.
+    """Runs a program image from wherever the axes stand, and analyses the recording, which is kept in `record`.
 
     Raises RefusedError, BusError, and RunError when the recording is incomplete, a setpoint jumps, or the setpoints are
     not those that the same kernel gives here.
@@ -135,9 +121,9 @@ def run_program(
             "(larger receive buffer)"
         )
     frames = recorder.frames()
-    require_no_jump(frames, machine.nodes, step_limits(machine, setpoints))
-    ticks = decode_ticks(frames, machine.nodes)
-    motion = _motion(image, program, ticks, setpoints, machine, kernel)
+    if record is not None:
+        write_recording(record, frames, controller.address.channel)
+    motion, load = analyse_recording(frames, image, machine, kernel)
     return BusRun(
         motion=motion,
         bus=str(controller.address),
@@ -145,14 +131,8 @@ def run_program(
         pace=at.pace or measured_pace(motion, wall_s),
         frames=int(frames.size),
         wall_s=wall_s,
-        load=recorded_load(frames, machine_bus_time(machine)),
+        load=load,
     )
-
-
-def measured_pace(motion: Motion, wall_s: float) -> str:
-    """The pace that a run's duration tells, for a controller that was there already."""
-    nominal_s = motion.ticks * motion.period_us / 1e6
-    return "real-time" if wall_s > 0.9 * nominal_s else "fast"
 
 
 def _follow(controller: Controller, rig: Rig | None, progress: Progress | None) -> None:
@@ -172,48 +152,6 @@ def _settle(controller: Controller, settling: int) -> None:
         if time.monotonic() > deadline:
             raise BusError("the controller has stopped sending SYNC: see hodograph status")
         time.sleep(0.01)
-
-
-def _motion(
-    image: bytes,
-    program: NativeProgram,
-    ticks: Ticks,
-    setpoints: NDArray[np.int32],
-    machine: Machine,
-    kernel: str,
-) -> Motion:
-    if ticks.volts_mv is None:
-        volts_mv = np.zeros(ticks.targets.shape, dtype=np.int16)
-    else:
-        volts_mv = ticks.volts_mv
-    plane = np.s_[:, :PLANE_AXES]
-    first = first_tick(ticks.targets[plane], setpoints)
-    count = program.ticks + settling_ticks(machine.period_us)
-    reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
-    return analyse(
-        image,
-        ticks.targets[plane][first : first + count],
-        ticks.actual[plane][reached],
-        volts_mv[plane][reached],
-        kernel=kernel,
-        counts_per_mm=machine.counts_per_mm,
-    )
-
-
-def first_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int:
-    """The row of `targets` that is tick 0 of `setpoints`.
-
-    Before a program the target stands still, and its first ticks may round to the same counts: the first
-    change on the bus is therefore matched with the first change in the program. Raises RunError when nothing
-    moves.
-    """
-    moves = np.flatnonzero(np.any(targets != targets[0], axis=1))
-    if not moves.size:
-        raise RunError("recording: the setpoints never move: was the program started?")
-    first_move = int(moves[0])
-    if np.any(targets[0] != setpoints[0]):
-        return first_move
-    return max(0, first_move - int(np.argmax(np.any(setpoints != setpoints[0], axis=1))))
 
 
 def rig_until_interrupted(

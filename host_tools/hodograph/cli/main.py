@@ -25,6 +25,7 @@ _MODULES = {
     **dict.fromkeys(("upload", "goto", "run", "rig"), "motion_commands"),
     **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
     "status": "status_command",
+    **dict.fromkeys(("record", "replay"), "recording_commands"),
     "dbc": "dbc_command",
     "faults": "faults_command",
     "monitor": "monitor_command",

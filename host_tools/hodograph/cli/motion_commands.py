@@ -10,6 +10,7 @@ from typing import Any
 
 from ..bus.address import BusAddress, parse_address
 from ..bus.goto import goto as goto_point
+from ..bus.recordings import check_suffix
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
 from ..bustime import require_fit
 from ..chain import Chain, load_chain, program_limits
@@ -115,6 +116,10 @@ def run(options: Namespace) -> None:
         )
     if options.trace is not None and len(options.files) > 1:
         raise InputError("--trace: takes one FILE; run the others by themselves")
+    if options.record is not None:
+        check_suffix(options.record)
+        if len(options.files) > 1:
+            raise InputError("--record: takes one FILE; run the others by themselves")
     chains = [load_chain(file, options.machine) for file in options.files]
     for chain in chains:
         require_fit(chain.machine)
@@ -139,7 +144,8 @@ def _run_one(chain: Chain, address: BusAddress, options: Namespace) -> BusRun:
     ):
         if options.pace is not None and at.pace is None:
             note("--pace has no effect on a controller that is running already")
-        return run_program(at, machine, chain.image, options.kernel or machine.kernel, bar)
+        kernel = options.kernel or machine.kernel
+        return run_program(at, machine, chain.image, kernel, bar, options.record)
 
 
 def _print_runs(chains: list[Chain], runs: list[BusRun], as_json: bool) -> None:
@@ -152,21 +158,29 @@ def _print_runs(chains: list[Chain], runs: list[BusRun], as_json: bool) -> None:
             print_json([a | b for a, b in zip(files, results, strict=True)])
         return
     for chain, result in zip(chains, runs, strict=True):
-        motion = result.motion
-        nominal_s = motion.ticks * motion.period_us / 1e6
-        print(f"{chain.file.file}")
-        print_rows(
-            [
-                (f"  {name}", value)
-                for name, value in [
-                    ("bus", f"{result.bus}, pace {result.pace}, {result.frames} frames"),
-                    ("time", f"{result.wall_s:.2f} s for {nominal_s:.2f} s of motion"),
-                    ("deadline misses", str(result.deadline_misses)),
-                    ("bus load", result.load.text()),
-                    *motion_rows(motion),
-                ]
+        print_run(str(chain.file.file), result)
+
+
+def print_run(title: str, result: BusRun) -> None:
+    """A run's results for people."""
+    motion = result.motion
+    nominal_s = motion.ticks * motion.period_us / 1e6
+    misses = (
+        [] if result.deadline_misses is None else [("deadline misses", str(result.deadline_misses))]
+    )
+    print(title)
+    print_rows(
+        [
+            (f"  {name}", value)
+            for name, value in [
+                ("bus", f"{result.bus}, pace {result.pace}, {result.frames} frames"),
+                ("time", f"{result.wall_s:.2f} s for {nominal_s:.2f} s of motion"),
+                *misses,
+                ("bus load", result.load.text()),
+                *motion_rows(motion),
             ]
-        )
+        ]
+    )
 
 
 def rig(options: Namespace) -> None:

@@ -77,13 +77,17 @@ def node_number(text: str) -> int:
     return int(text)
 
 
-def _bus(parser: argparse.ArgumentParser) -> None:
+def _bus_name(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bus",
         default=DEFAULT_BUS,
         metavar="INTERFACE:CHANNEL",
         help=f"as python-can has it (default {DEFAULT_BUS})",
     )
+
+
+def _bus(parser: argparse.ArgumentParser) -> None:
+    _bus_name(parser)
     parser.add_argument(
         "--wait", type=finite, default=2.0, metavar="S", help="how long to wait for the controller"
     )
@@ -282,6 +286,33 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--report", type=Path, metavar="DIR", help="write report.html and figures there"
     )
+
+    run.add_argument(
+        "--record",
+        type=Path,
+        metavar="RECORDING",
+        help="keep the frames in a .log (candump), .asc or .blf file (one FILE only)",
+    )
+
+    record = command("record", "record the bus into a file until Ctrl-C")
+    record.add_argument("file", metavar="RECORDING", type=Path, help=".log (candump), .asc or .blf")
+    record.add_argument("--seconds", type=seconds, metavar="S", help="for so long only")
+    _bus_name(record)
+    _json(record)
+
+    replay = command("replay", "analyse the run that a recording holds")
+    replay.add_argument(
+        "recording", metavar="RECORDING", type=Path, help=".log (candump), .asc or .blf"
+    )
+    replay.add_argument("file", metavar="FILE", type=Path, help="path file, or a program image")
+    _machine(replay)
+    _kernel(replay)
+    replay.add_argument("--channel", metavar="NAME", help="where the recording has several")
+    replay.add_argument("--trace", type=Path, metavar="CSV", help="write one row a tick")
+    replay.add_argument(
+        "--report", type=Path, metavar="DIR", help="write report.html and figures there"
+    )
+    _json(replay)
 
     report = command("report", "simulate paths and write a report with figures")
     _file(report, many=True)

@@ -102,6 +102,10 @@ def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
     }
 
 
+def _misses(run: BusRun | None) -> str:
+    return "–" if run is None or run.deadline_misses is None else str(run.deadline_misses)
+
+
 def _load(run: BusRun | None) -> dict[str, Any] | None:
     """The table of bus load, None for a simulated run."""
     if run is None:
@@ -154,7 +158,7 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
             "greatest voltage, V": f"{motion.max_volts:.3f}",
             "bus": run.bus if run is not None else "none (simulated)",
             "pace": run.pace if run is not None else "–",
-            "deadline misses": str(run.deadline_misses) if run is not None else "–",
+            "deadline misses": _misses(run),
             "bus load, %": f"{run.load.cyclic()[1]:.1f}" if run is not None else "–",
             "frames recorded": str(run.frames) if run is not None else "–",
             "SHA-256 of setpoints": motion.setpoints_sha256,

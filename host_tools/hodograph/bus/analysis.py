@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT
+"""From the frames of a run, just recorded or read from a file, to its motion and its bus load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bustime import RecordedLoad, machine_bus_time, recorded_load
+from ..config import PLANE_AXES, Machine
+from ..errors import RunError
+from ..native import NativeProgram
+from ..simulate import Motion, analyse, settling_ticks
+from .decode import RPDO1, SYNC_ID, Ticks, decode_ticks
+from .frames import Frames
+from .setpoint_check import require_no_jump, step_limits
+
+REACHED_AFTER = 2
+"""Setpoint k is reached at SYNC k+2 (docs/protocol.md section 2)."""
+
+_AROUND = 220
+"""SYNCs kept before and behind a run: late answers show themselves within 200."""
+
+
+@dataclass(frozen=True, eq=False)
+class BusRun:
+    """A recorded run: the motion, and how the bus did. `frames` counts all that were recorded.
+
+    `bus` is the file's name when it was read from one; then the deadline misses are not known.
+    """
+
+    motion: Motion
+    bus: str
+    deadline_misses: int | None
+    pace: str
+    frames: int
+    wall_s: float
+    load: RecordedLoad
+
+    def summary(self) -> dict[str, object]:
+        """The keys that tools may rely on in `hodograph run --json` and `hodograph replay --json`."""
+        return self.motion.summary() | {
+            "bus": self.bus,
+            "deadline_misses": self.deadline_misses,
+            "pace": self.pace,
+            "frames": self.frames,
+            "bus_load": self.load.summary(),
+        }
+
+
+def analyse_recording(
+    frames: Frames, image: bytes, machine: Machine, kernel: str
+) -> tuple[Motion, RecordedLoad]:
+    """The motion of a program's run at 100 %, and the bus load of the whole recording.
+
+    Raises RunError when the recording is incomplete, a setpoint jumps, or the setpoints are not those that the same
+    kernel gives here.
+    """
+    program = NativeProgram(image)
+    _, setpoints = program.setpoints(kernel, machine.counts_per_mm)
+    require_no_jump(frames, machine.nodes, step_limits(machine, setpoints))
+    ticks = decode_ticks(frames, machine.nodes)
+    motion = _motion(image, program, ticks, setpoints, machine, kernel)
+    return motion, recorded_load(frames, machine_bus_time(machine))
+
+
+def replay(frames: Frames, name: str, image: bytes, machine: Machine, kernel: str) -> BusRun:
+    """The run that a recording holds, as it came out when it was recorded; `name` says where it is from.
+
+    What was recorded beside a run (booting, going to the start, other runs) is left out. Raises RunError.
+    """
+    try:
+        motion, load = analyse_recording(frames, image, machine, kernel)
+    except RunError:
+        stretch = _stretch(frames, image, machine, kernel)
+        if stretch is None:
+            raise
+        motion, load = analyse_recording(stretch, image, machine, kernel)
+    wall_s = _run_s(frames, motion)
+    return BusRun(
+        motion=motion,
+        bus=name,
+        deadline_misses=None,
+        pace=measured_pace(motion, wall_s),
+        frames=int(frames.size),
+        wall_s=wall_s,
+        load=load,
+    )
+
+
+def _stretch(frames: Frames, image: bytes, machine: Machine, kernel: str) -> Frames | None:
+    """The frames about the program's run, None when its setpoints are not there one after the other."""
+    program = NativeProgram(image)
+    _, setpoints = program.setpoints(kernel, machine.counts_per_mm)
+    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+    whole = [complete_ticks(frames, sync_at, RPDO1 + node) for node in machine.nodes]
+    for begin, end in runs_of(np.logical_and.reduce(whole)):
+        rows = np.stack(
+            [_targets(frames, sync_at[begin : end + 1], RPDO1 + n) for n in machine.nodes], axis=1
+        )
+        first = program_tick(rows[:, :PLANE_AXES], setpoints)
+        if first is not None:
+            last = first + program.ticks + settling_ticks(machine.period_us) + REACHED_AFTER
+            start = sync_at[max(begin, begin + first - _AROUND)]
+            stop = sync_at[min(end, begin + last + _AROUND)]
+            return np.asarray(frames[start:stop])
+    return None
+
+
+def complete_ticks(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -> NDArray[np.bool_]:
+    """For each SYNC but the last: whether just one frame with this identifier follows before the next SYNC."""
+    at = np.flatnonzero(frames["id"] == identifier)
+    interval = np.searchsorted(sync_at, at) - 1
+    counts = np.bincount(interval[interval >= 0], minlength=sync_at.size)
+    return np.asarray(counts[: max(0, sync_at.size - 1)] == 1)
+
+
+def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Where flags are set one after the other: (first, behind the last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _targets(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -> NDArray[np.int32]:
+    part = frames[sync_at[0] : sync_at[-1]]
+    data = part["data"][part["id"] == identifier]
+    return np.ascontiguousarray(data[:, 2:6]).view("<i4")[:, 0]
+
+
+def _run_s(frames: Frames, motion: Motion) -> float:
+    """What the program took by the frames' times, were all of its periods like the average of the recording."""
+    times_us = frames["time_us"][frames["id"] == SYNC_ID]
+    whole_us = int(times_us[-1]) - int(times_us[0])
+    return motion.ticks * whole_us / (1e6 * (int(times_us.size) - 1))
+
+
+def measured_pace(motion: Motion, wall_s: float) -> str:
+    """The pace that a run's duration tells, for a controller that was there already."""
+    nominal_s = motion.ticks * motion.period_us / 1e6
+    return "real-time" if wall_s > 0.9 * nominal_s else "fast"
+
+
+def _motion(
+    image: bytes,
+    program: NativeProgram,
+    ticks: Ticks,
+    setpoints: NDArray[np.int32],
+    machine: Machine,
+    kernel: str,
+) -> Motion:
+    if ticks.volts_mv is None:
+        volts_mv = np.zeros(ticks.targets.shape, dtype=np.int16)
+    else:
+        volts_mv = ticks.volts_mv
+    plane = np.s_[:, :PLANE_AXES]
+    found = program_tick(ticks.targets[plane], setpoints)
+    first = first_tick(ticks.targets[plane], setpoints) if found is None else found
+    count = program.ticks + settling_ticks(machine.period_us)
+    reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
+    return analyse(
+        image,
+        ticks.targets[plane][first : first + count],
+        ticks.actual[plane][reached],
+        volts_mv[plane][reached],
+        kernel=kernel,
+        counts_per_mm=machine.counts_per_mm,
+    )
+
+
+def program_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int | None:
+    """The row of `targets` where the whole program begins, be it among others; None: nowhere."""
+    lead = int(np.argmax(np.any(setpoints != setpoints[0], axis=1)))
+    moved = np.any(np.diff(targets, axis=0) != 0, axis=1)
+    begins = np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]])) + 1 - lead
+    for first in begins[begins >= 0].tolist():
+        rows = targets[first : first + len(setpoints)]
+        if len(rows) == len(setpoints) and np.array_equal(rows, setpoints):
+            return int(first)
+    return None
+
+
+def first_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int:
+    """The row of `targets` that is tick 0 of `setpoints`.
+
+    Before a program the target stands still, and its first ticks may round to the same counts: the first
+    change on the bus is therefore matched with the first change in the program. Raises RunError when nothing
+    moves.
+    """
+    moves = np.flatnonzero(np.any(targets != targets[0], axis=1))
+    if not moves.size:
+        raise RunError("recording: the setpoints never move: was the program started?")
+    first_move = int(moves[0])
+    if np.any(targets[0] != setpoints[0]):
+        return first_move
+    return max(0, first_move - int(np.argmax(np.any(setpoints != setpoints[0], axis=1))))

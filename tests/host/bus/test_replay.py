@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""A recording made of a simulated run, read again: hashes and figures are those of the simulation."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hodograph.bus.analysis import complete_ticks, program_tick, replay, runs_of
+from hodograph.bus.frames import RECORD_DTYPE, Frames
+from hodograph.bus.recordings import read_recording, write_recording
+from hodograph.chain import Chain, load_chain
+from hodograph.cli.main import main
+from hodograph.errors import RunError
+from hodograph.simulate import Motion, simulate
+
+ROOT = Path(__file__).resolve().parents[3]
+ALPHA = ROOT / "examples" / "alpha.toml"
+NODES = (2, 3)
+STANDING = 300
+PERIOD_US = 1000
+START_US = 1_795_267_433_123_457
+ENABLED = 0x0F, 0x1637
+
+Counts = NDArray[np.int64]
+
+
+@pytest.fixture(scope="module")
+def chain() -> Chain:
+    return load_chain(ALPHA)
+
+
+@pytest.fixture(scope="module")
+def motion(chain: Chain) -> Motion:
+    machine = chain.machine
+    return simulate(
+        chain.image,
+        [axis.drive for axis in machine.axes],
+        kernel=machine.kernel,
+        counts_per_mm=machine.counts_per_mm,
+    )
+
+
+def run_of(motion: Motion) -> tuple[Counts, Counts, Counts]:
+    """Targets, positions, volts of standing, the run, standing; positions two SYNCs behind their setpoints."""
+    rows = motion.rows
+    targets = padded(rows["set_counts"], STANDING, STANDING)
+    actual = padded(rows["act_counts"], STANDING + 2, STANDING - 2)
+    volts = padded(rows["volts_mv"], STANDING + 2, STANDING - 2)
+    return targets, actual, volts
+
+
+def padded(values: NDArray[np.int32], before: int, behind: int) -> Counts:
+    first, last = values[:1].astype(np.int64), values[-1:].astype(np.int64)
+    return np.concatenate([np.repeat(first, before, 0), values, np.repeat(last, behind, 0)])
+
+
+def frame(identifier: int, data: bytes) -> Frames:
+    made = np.zeros(1, dtype=RECORD_DTYPE)
+    made["id"], made["length"] = identifier, len(data)
+    made["data"][0, : len(data)] = list(data)
+    return made
+
+
+def recorded(targets: Counts, actual: Counts, volts: Counts, first_sync: int = 0) -> Frames:
+    """Frames as the bus carries them, a period's evenly spread over it."""
+    control, status = ENABLED
+    parts = []
+    for j in range(len(targets)):
+        parts.append(frame(0x080, bytes([(first_sync + j) % 240 + 1])))
+        for axis, node in enumerate(NODES):
+            words = [(0x200 + node, control, targets), (0x180 + node, status, actual)]
+            for identifier, word, values in words:
+                position = int(values[j, axis]).to_bytes(4, "little", signed=True)
+                parts.append(frame(identifier, word.to_bytes(2, "little") + position))
+            mv = int(volts[j, axis]).to_bytes(2, "little", signed=True)
+            parts.append(frame(0x280 + node, mv))
+    frames = np.concatenate(parts)
+    frames["time_us"] = (
+        START_US + (first_sync * PERIOD_US) + np.arange(frames.size) * PERIOD_US // 7
+    )
+    return frames
+
+
+@pytest.fixture(scope="module")
+def frames(motion: Motion) -> Frames:
+    return recorded(*run_of(motion))
+
+
+@pytest.mark.parametrize("suffix", [".log", ".asc", ".blf"])
+def test_the_figures_of_the_simulation(
+    frames: Frames,
+    chain: Chain,
+    motion: Motion,
+    tmp_path: Path,
+    suffix: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file = tmp_path / f"alpha{suffix}"
+    write_recording(file, frames)
+    found = replay(read_recording(file), file.name, chain.image, chain.machine, "fixed")
+    assert found.motion.summary() == motion.summary()
+    assert found.pace == "real-time"
+    assert found.frames == frames.size
+    assert found.wall_s == pytest.approx(motion.ticks * PERIOD_US / 1e6, rel=1e-3)
+    assert main(["replay", str(file), str(ALPHA), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told | motion.summary() == told
+    assert told["deadline_misses"] is None
+    assert told["bus_load"]["kinds"]["SYNC"]["frames"] == len(motion.rows) + 2 * STANDING - 1
+
+
+def test_a_run_among_other_things(frames: Frames, chain: Chain, motion: Motion) -> None:
+    """Booting (SYNCs alone), a move to the start, the run; then a second run that was stopped half-way."""
+    booting = np.concatenate([frame(0x080, bytes([j % 240 + 1])) for j in range(500)])
+    start = motion.rows["set_counts"][0].astype(np.int64)
+    way = start + np.arange(400, -1, -1)[:, None] * [30, 20]
+    there = recorded(way, way, np.zeros_like(way), 500)
+    run = recorded(*run_of(motion), 500 + len(way))
+    half = [part[: len(motion.rows) // 2] for part in run_of(motion)]
+    again = recorded(*half, 500 + len(way) + len(motion.rows) + 2 * STANDING)
+    whole = np.concatenate([booting, there, run, again])
+    found = replay(whole, "beside", chain.image, chain.machine, "fixed")
+    assert found.motion.summary() == motion.summary()
+    assert found.frames == whole.size
+
+
+def test_what_is_not_the_program(frames: Frames, chain: Chain, motion: Motion) -> None:
+    targets, actual, volts = run_of(motion)
+    targets = targets.copy()
+    targets[STANDING + 400, 0] += 1
+    with pytest.raises(RunError, match=r"setpoint 400 on the bus .* \(1 differ\)"):
+        replay(recorded(targets, actual, volts), "x", chain.image, chain.machine, "fixed")
+    lost = np.delete(frames, 7 * 700 + 3)
+    with pytest.raises(RunError, match="is incomplete"):
+        replay(lost, "x", chain.image, chain.machine, "fixed")
+
+
+def test_where_the_program_is() -> None:
+    setpoints = np.array([[0, 0], [0, 0], [1, 0], [1, 1], [3, 1]], dtype=np.int32)
+    still = np.zeros((4, 2), dtype=np.int32)
+    assert program_tick(np.concatenate([still, setpoints]), setpoints) == 4
+    assert program_tick(np.concatenate([still, setpoints[:4]]), setpoints) is None
+    away = np.array([[9, 9], [4, 4], [2, 2], [0, 0]], dtype=np.int32)
+    assert program_tick(np.concatenate([away, still, setpoints]), setpoints) == 8
+    assert program_tick(still, setpoints) is None
+
+
+def test_runs_and_complete_ticks() -> None:
+    assert runs_of(np.array([1, 1, 0, 1, 0, 0, 1], dtype=bool)) == [(0, 2), (3, 4), (6, 7)]
+    assert runs_of(np.zeros(3, dtype=bool)) == []
+    names = [0x202, 0x080, 0x202, 0x080, 0x202, 0x202, 0x080, 0x080, 0x202, 0x080]
+    frames = np.concatenate([frame(name, b"\1") for name in names])
+    sync_at = np.flatnonzero(frames["id"] == 0x080)
+    assert complete_ticks(frames, sync_at, 0x202).tolist() == [True, False, False, True]

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""A run that was recorded and is read again gives the figures of the live run, in every format."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench import EXAMPLES
+from hodograph.bus.frames import RECORD_DTYPE
+from hodograph.bus.recordings import read_recording, write_recording
+from hodograph.cli.main import main
+
+pytestmark = pytest.mark.bus
+
+ALPHA = str(EXAMPLES / "alpha.toml")
+MACHINE = str(EXAMPLES / "machines" / "paper_alpha.toml")
+NOT_RECORDED = {"bus", "deadline_misses", "pace"}
+
+
+def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    capsys.readouterr()
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    found: dict[str, Any] = json.loads(out)
+    return found
+
+
+def failed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
+    capsys.readouterr()
+    status = main(arguments)
+    err = capsys.readouterr().err
+    assert "Traceback" not in err
+    return status, err.splitlines()[-1]
+
+
+def same(live: dict[str, Any], again: dict[str, Any]) -> None:
+    assert set(live) == set(again)
+    for key in set(live) - NOT_RECORDED:
+        assert again[key] == live[key], key
+    assert again["deadline_misses"] is None
+
+
+def test_run_record_replay(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    log = tmp_path / "alpha.log"
+    traces = [tmp_path / "live.csv", tmp_path / "again.csv"]
+    live = result(capsys, "run", ALPHA, "--json", "--record", str(log), "--trace", str(traces[0]))
+    again = result(capsys, "replay", str(log), ALPHA, "--json", "--trace", str(traces[1]))
+    same(live, again)
+    assert again["bus"] == str(log)
+    assert again["pace"] == "real-time"
+    assert live["frames"] == log.read_bytes().count(b"\n")
+    assert traces[0].read_bytes() == traces[1].read_bytes()
+
+    frames = read_recording(log)
+    for suffix in (".asc", ".blf"):
+        file = tmp_path / f"alpha{suffix}"
+        write_recording(file, frames)
+        same(live, result(capsys, "replay", str(file), ALPHA, "--json"))
+
+    image = tmp_path / "alpha.hdgp"
+    assert main(["compile", ALPHA, "-o", str(image)]) == 0
+    same(live, result(capsys, "replay", str(log), str(image), "--machine", MACHINE, "--json"))
+    status, line = failed(capsys, "replay", str(log), str(image))
+    assert (status, "needs --machine" in line) == (2, True), line
+    status, line = failed(capsys, "replay", str(log), str(EXAMPLES / "heart.toml"))
+    assert (status, "is it this program and this kernel?" in line) == (6, True), line
+
+    assert main(["replay", str(log), ALPHA, "--report", str(tmp_path / "report")]) == 0
+    assert "bus load" in capsys.readouterr().out
+    html = (tmp_path / "report" / "report.html").read_text()
+    assert live["encoders_sha256"] in html
+
+    short = tmp_path / "short.log"
+    write_recording(short, frames[: frames.size // 2])
+    status, line = failed(capsys, "replay", str(short), ALPHA)
+    assert status == 6
+    assert line.startswith(f"hodograph: {short}: ")
+    write_recording(short, frames[:0])
+    status, line = failed(capsys, "replay", str(short), ALPHA)
+    assert (status, "0 SYNCs recorded" in line) == (6, True), line
+
+
+def test_a_recording_from_beside(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """`hodograph record` hears all that happens: going to the start as well as the run."""
+    file = tmp_path / "beside.blf"
+    words = [sys.executable, "-m", "hodograph", "record", str(file), "--json"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+        deadline = time.monotonic() + 60
+        while not file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        time.sleep(0.5)
+        heart = str(EXAMPLES / "heart.toml")
+        live = result(capsys, "run", heart, "--json", "--pace", "fast")
+        child.send_signal(signal.SIGINT)
+        out, _ = child.communicate(timeout=120)
+        assert child.returncode == 0
+    told = json.loads(out)
+    frames = read_recording(file)
+    assert frames.dtype == RECORD_DTYPE
+    assert told["frames"] == frames.size > live["frames"]
+    again = result(capsys, "replay", str(file), heart, "--json")
+    for key in ("ticks", "setpoints_sha256", "encoders_sha256", "max_contour_error_um"):
+        assert again[key] == live[key], key
+
+
+def test_for_some_seconds(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "silence.log"
+    begun = time.monotonic()
+    assert main(["record", str(file), "--seconds", "0.7"]) == 0
+    assert time.monotonic() - begun >= 0.7
+    assert "0 frames in 0." in capsys.readouterr().out
+    assert file.read_bytes() == b""
+    status, line = failed(capsys, "record", str(tmp_path / "bus.txt"))
+    assert (status, "told by its name" in line) == (2, True), line
+    status, line = failed(capsys, "record", str(file), "--bus", "socketcan:nocan7")
+    assert (status, "no such network interface" in line) == (4, True), line
