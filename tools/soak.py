@@ -76,7 +76,7 @@ class Soak:
                     self.checker.found(f"{PROGRAMS[which].name}: hashes {found}")
                 self.repetitions += 1
                 self.program_ticks += run.motion.ticks
-                self.deadline_misses += run.deadline_misses
+                self.deadline_misses += run.deadline_misses or 0
                 self.checker.take(tap.take())
                 self.wall_s = time.monotonic() - begun
                 if time.monotonic() - told > _REPORT_S:
