@@ -24,6 +24,7 @@ from .node import Node
 from .objects import (
     AXIS_NODE,
     BOOT,
+    BUSY,
     COMMAND,
     CONFIGURATION,
     DISABLE,
@@ -33,6 +34,8 @@ from .objects import (
     FAULT_STATE,
     HELD,
     HOLD,
+    HOLDING,
+    HOMING,
     MOVING,
     OFF,
     ON_PATH,
@@ -94,9 +97,9 @@ class Controller(Node):
         if not different:
             return False
         state = self.state()
-        if state in (*MOVING, ENABLING):
+        if state in (*BUSY, ENABLING):
             raise RefusedError(
-                f"{self.who()} is {STATES[state]} with another configuration: hodograph stop first"
+                f"{self.who()} is {STATES.get(state, state)} with another configuration: hodograph stop first"
             )
         if state == READY:
             self.command(DISABLE)
@@ -166,7 +169,7 @@ class Controller(Node):
         if state in (BOOT, ENABLING):
             nodes = [self.read(AXIS_NODE, i + 1) for i in range(self.read(CONFIGURATION, 1))]
             return f"are the drives (nodes {', '.join(map(str, nodes))}) on the bus?"
-        return "see hodograph status"
+        return _GOES_ON.get(state, "see hodograph status")
 
     def fault_text(self) -> str:
         """The present fault in words."""
@@ -174,11 +177,11 @@ class Controller(Node):
         return f"{fault_text(code)} (code 0x{code:04X}, node {node}, detail {detail})"
 
     def require_standing(self) -> None:
-        """Raises RefusedError while a program is under way: it is somebody's, and goes on."""
+        """Raises RefusedError while axes move: that is somebody's doing, and goes on."""
         state = self.state()
-        if state in MOVING:
+        if state in BUSY:
             raise RefusedError(
-                f"{self.who()} is {STATES[state]}: wait until the axes stand, or hodograph stop"
+                f"{self.who()} is {STATES.get(state, state)}: wait until the axes stand, or hodograph stop"
             )
 
     def enable(self) -> None:
@@ -210,11 +213,12 @@ class Controller(Node):
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand."""
-        if self.state() in (*ON_PATH, ENABLING):
+        to_stop = (*ON_PATH, ENABLING, HOMING)
+        if self.state() in to_stop:
             try:
                 self.command(STOP)
             except CommandRefusedError:
-                if self.state() in (*ON_PATH, ENABLING):
+                if self.state() in to_stop:
                     raise
         self.wait_for((BOOT, OFF, READY), wait_s)
 
@@ -238,6 +242,10 @@ class Controller(Node):
         }
 
 
+_GOES_ON = {
+    HOLDING: "it goes on braking; hodograph status tells when it is held",
+    RUNNING: "the program goes on; hodograph stop ends it",
+}
 _STATISTICS = (
     "syncs",
     "tick",

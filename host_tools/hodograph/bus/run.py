@@ -17,6 +17,7 @@ from ..simulate import settling_ticks
 from .address import BusAddress, check_socketcan, is_virtual
 from .analysis import REACHED_AFTER, BusRun, analyse_recording, first_tick, measured_pace
 from .controller import DISABLE, READY, STATISTICS, Controller, connect
+from .follow import Follower
 from .goto import goto
 from .processes import Rig
 from .recorder import Recorder
@@ -40,13 +41,18 @@ _MARGIN_TICKS = 50
 Progress = Callable[[int], None]
 
 
+def _silent(text: str) -> None:
+    del text
+
+
 @dataclass(frozen=True)
 class Station:
-    """A controller that answers; `pace` is known when its processes are ours."""
+    """A controller that answers; `pace` is known when its processes are ours. `note` takes lines for the user."""
 
     controller: Controller
     pace: str | None
     rig: Rig | None
+    note: Callable[[str], None] = _silent
 
 
 @contextmanager
@@ -69,7 +75,7 @@ def station(
             controller.require_standing()
             note(f"node {machine.node} is on {address} already: using it and its drives")
         try:
-            yield Station(controller, pace if rig is not None else None, rig)
+            yield Station(controller, pace if rig is not None else None, rig, note)
         except BaseException:
             with unbroken(), suppress(HodographError):
                 controller.stop_and_wait()
@@ -111,7 +117,7 @@ def run_program(
     with Recorder(controller.address) as recorder:
         begun = time.monotonic()
         controller.start()
-        _follow(controller, at.rig, progress)
+        _follow(at, progress)
         wall_s = time.monotonic() - begun
         _settle(controller, settling_ticks(machine.period_us))
     misses = controller.read(STATISTICS, _MISSES)  # of this run: start sets it to 0
@@ -135,12 +141,15 @@ def run_program(
     )
 
 
-def _follow(controller: Controller, rig: Rig | None, progress: Progress | None) -> None:
+def _follow(at: Station, progress: Progress | None) -> None:
+    controller, follower = at.controller, Follower(at.controller, at.note)
+
     def tick() -> None:
-        if rig is not None:
-            rig.check()
+        if at.rig is not None:
+            at.rig.check()
         if progress is not None:
             progress(controller.read(STATISTICS, _TICK))
+        follower()
 
     controller.wait_for((READY,), math.inf, tick)
 

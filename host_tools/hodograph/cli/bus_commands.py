@@ -8,23 +8,22 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
+from ..bus import actions
 from ..bus.address import BusAddress, parse_address
 from ..bus.controller import (
     BOOT,
     DISABLE,
-    FAULT_STATE,
-    HELD,
-    HOLD,
     OFF,
     ON_PATH,
     READY,
-    RESET,
     RESUME,
     Controller,
     connect,
 )
+from ..bus.follow import Follower
 from ..bus.signals import unbroken
 from ..errors import HodographError
+from .output import note
 from .targets import DEFAULT_BITRATE
 
 
@@ -51,14 +50,13 @@ def start(options: Namespace) -> None:
     """hodograph start."""
     address = parse_address(options.bus)
     with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
-        if options.reset and controller.state() == FAULT_STATE:
-            controller.command(RESET)
-            controller.wait_for((OFF, READY, BOOT), 5.0)
+        if options.reset:
+            actions.reset(controller)
         with stopping(controller):
             controller.enable()
             controller.start(from_mm=options.from_mm)
             if options.follow:
-                controller.wait_for((READY,), math.inf)
+                controller.wait_for((READY,), math.inf, Follower(controller, note))
     print("done" if options.follow else "running")
 
 
@@ -78,9 +76,8 @@ def hold(options: Namespace) -> None:
     """hodograph hold."""
     address = parse_address(options.bus)
     with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
-        controller.command(HOLD)
-        state = controller.wait_for((HELD, READY), 10.0)
-    print("held" if state == HELD else "the program had ended")
+        held = actions.hold(controller, options.timeout or math.inf)
+    print("held" if held else "the program had ended")
 
 
 def resume(options: Namespace) -> None:

@@ -26,6 +26,7 @@ _MODULES = {
     **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
     "status": "status_command",
     **dict.fromkeys(("record", "replay"), "recording_commands"),
+    **dict.fromkeys(("home", "quick-stop", "reset"), "action_commands"),
     "dbc": "dbc_command",
     "faults": "faults_command",
     "monitor": "monitor_command",

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bus.address import BusAddress, parse_address
+from ..bus.follow import Follower
 from ..bus.goto import goto as goto_point
 from ..bus.recordings import check_suffix
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
@@ -69,7 +70,7 @@ def goto(options: Namespace) -> None:
             raise InputError(f"{options.file}: a program image needs --machine FILE")
         machine = named
     else:
-        machine = _machine_of(options.file, options.machine)
+        machine = machine_of(options.file, options.machine)
         require_fit(machine)
     end = _end_counts(options, machine, image)
     with reached(address, machine.node, machine.bitrate, options.wait) as controller:
@@ -77,7 +78,7 @@ def goto(options: Namespace) -> None:
         controller.configure(machine, options.kernel or machine.kernel)
         with stopping(controller):
             controller.enable()
-            way_mm = goto_point(controller, machine, end)
+            way_mm = goto_point(controller, machine, end, Follower(controller, note))
         if image is not None:
             controller.upload(image)
     place = ", ".join(f"{counts / machine.counts_per_mm:g}" for counts in end)
@@ -97,7 +98,7 @@ def _end_counts(options: Namespace, machine: Machine, image: bytes | None) -> tu
     return int(setpoints[0, 0]), int(setpoints[0, 1])
 
 
-def _machine_of(file: Path, given: Path | None) -> Machine:
+def machine_of(file: Path, given: Path | None) -> Machine:
     """The machine of a machine file, or the one that a path file names."""
     if given is not None:
         return load_machine(given)
@@ -186,7 +187,7 @@ def print_run(title: str, result: BusRun) -> None:
 def rig(options: Namespace) -> None:
     """hodograph rig."""
     address = parse_address(options.bus)
-    machine = _machine_of(options.file, None)
+    machine = machine_of(options.file, None)
     require_fit(machine)
     kernel = options.kernel or machine.kernel
     rig_until_interrupted(machine, address, options.pace, kernel, note)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+
+LINE_AFTER_S, LINE_EVERY_S = 5.0, 10.0
+"""Of progress where there is no terminal."""
 
 
 def note(text: str) -> None:
@@ -52,9 +56,12 @@ def number(value: float) -> str:
 
 @contextmanager
 def progress(title: str, unit: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """A progress bar on stderr while it is a terminal; call the result with what is done so far."""
+    """Progress on stderr: a bar while it is a terminal, else a line now and then.
+
+    Call the result with what is done so far.
+    """
     if not sys.stderr.isatty():
-        yield lambda done: None
+        yield _Lines(title, unit, total)
         return
     from tqdm import tqdm
 
@@ -64,6 +71,22 @@ def progress(title: str, unit: str, total: int | None = None) -> Iterator[Callab
             bar.update(done - bar.n)
 
         yield advance
+
+
+class _Lines:
+    """A line after LINE_AFTER_S, then at most one every LINE_EVERY_S."""
+
+    def __init__(self, title: str, unit: str, total: int | None) -> None:
+        self._title, self._unit, self._total = title, unit, total
+        self._due_s = time.monotonic() + LINE_AFTER_S
+
+    def __call__(self, done: int) -> None:
+        now_s = time.monotonic()
+        if now_s < self._due_s:
+            return
+        self._due_s = now_s + LINE_EVERY_S
+        of = f" of {self._total} ({100 * done / self._total:.0f} %)" if self._total else ""
+        note(f"{self._title}: {self._unit} {done}{of}")
 
 
 def write_file(file: Path, data: bytes) -> None:

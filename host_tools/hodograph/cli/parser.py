@@ -93,6 +93,15 @@ def _bus(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _timeout(parser: argparse.ArgumentParser, usual: str) -> None:
+    parser.add_argument(
+        "--timeout",
+        type=seconds,
+        metavar="S",
+        help=f"give up waiting for the end (default: {usual})",
+    )
+
+
 def _node(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--node", type=node_number, default=1, help="the controller's node number (default 1)"
@@ -240,6 +249,31 @@ def make_parser() -> argparse.ArgumentParser:
         parser_ = command(name, text)
         _bus(parser_)
         _node(parser_)
+        if name == "hold":
+            _timeout(parser_, "as long as braking takes")
+
+    home = command(
+        "home", "find the zero of every axis that has a homing method; drives off before and after"
+    )
+    home.add_argument(
+        "file",
+        metavar="FILE",
+        type=Path,
+        nargs="?",
+        help="machine file, or a path file that names one: configure the controller from it first",
+    )
+    _bus(home)
+    _node(home)
+    _timeout(home, "what the controller allows")
+
+    for name, text in (
+        ("quick-stop", "all drives brake by their own ramps at once, off the path, and switch off"),
+        ("reset", "reset a fault; the drives are then configured anew and off"),
+    ):
+        parser_ = command(name, text)
+        _bus(parser_)
+        _node(parser_)
+        _timeout(parser_, "10 s")
 
     override = command("override", "set the feed override")
     override.add_argument("percent", metavar="PERCENT", type=percentage, help="0 to 200")

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Commands that take a while, and what to wait for: hold, home, quick stop, reset of a fault."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from ..errors import BusError, RunError
+from .controller import POLL_S, CommandRefusedError, Controller
+from .objects import (
+    AXIS_NODE,
+    BOOT,
+    CONFIGURATION,
+    DISABLE,
+    FAULT_STATE,
+    HELD,
+    HOLD,
+    HOME,
+    HOMED,
+    HOMING_METHOD,
+    OFF,
+    QUICK_STOP,
+    READY,
+    REFUSED_MOVING,
+    RESET,
+)
+
+BOOT_S = 10.0
+"""Patience for drives to be found and configured, switched on or off."""
+
+
+def hold(controller: Controller, wait_s: float = math.inf) -> bool:
+    """Brings the path to rest; false when the program had ended before. As long as braking takes, or `wait_s`."""
+    controller.command(HOLD)
+    return controller.wait_for((HELD, READY), wait_s) == HELD
+
+
+def home(
+    controller: Controller, wait_s: float = math.inf, tick: Callable[[], None] | None = None
+) -> list[int]:
+    """Homes the axes that the configuration names, switching drives at standstill off first; their nodes.
+
+    Raises RunError when homing was broken off: a fault, or a stop by others.
+    """
+    state = controller.state()
+    if state == READY:
+        controller.command(DISABLE)
+    if state in (READY, BOOT):
+        controller.wait_for((OFF,), BOOT_S)
+    controller.command(HOME)
+    controller.wait_for((OFF, BOOT, READY), wait_s, tick)
+    axes = range(1, controller.read(CONFIGURATION, 1) + 1)
+    wanted = [axis for axis in axes if controller.read(HOMING_METHOD, axis)]
+    missing = [axis for axis in wanted if not controller.read(HOMED, axis)]
+    if missing:
+        nodes = ", ".join(str(controller.read(AXIS_NODE, axis)) for axis in missing)
+        raise RunError(f"{controller.who()}: homing was stopped before node {nodes} had its zero")
+    return [controller.read(AXIS_NODE, axis) for axis in wanted]
+
+
+def quick_stop(controller: Controller, wait_s: float = BOOT_S) -> None:
+    """All drives brake by their own ramps, off the path if need be; returns when they are off.
+
+    Raises RunError when the controller is in a fault then.
+    """
+    controller.command(QUICK_STOP)
+    controller.wait_for((OFF, BOOT), wait_s)
+
+
+def reset(controller: Controller, wait_s: float = BOOT_S) -> bool:
+    """Resets the present fault; false when there is none. Returns when the drives are configured again.
+
+    A fault that still brakes is waited for. Raises RunError when the fault comes back, BusError when drives are
+    missing.
+    """
+    if controller.state() != FAULT_STATE:
+        return False
+    deadline = time.monotonic() + wait_s
+    asked = False
+    while controller.state() == FAULT_STATE:
+        if time.monotonic() > deadline:
+            raise RunError(f"{controller.who()} is still in fault: {controller.fault_text()}")
+        asked = asked or _accepted(controller)
+        time.sleep(POLL_S)
+    try:
+        controller.wait_for((OFF, READY), max(BOOT_S, deadline - time.monotonic()))
+    except BusError as error:
+        raise BusError(f"the fault is reset, but {error}") from error
+    return True
+
+
+def _accepted(controller: Controller) -> bool:
+    try:
+        controller.command(RESET)
+    except CommandRefusedError as error:
+        if error.reason != REFUSED_MOVING:
+            raise
+        return False
+    return True

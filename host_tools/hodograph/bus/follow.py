@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""Following a program: what keeps it from moving is said, once each time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from .controller import Controller
+from .objects import HELD, OVERRIDE
+
+LOOK_S = 0.5
+
+
+class Follower:
+    """Call it again and again; it looks twice a second, and tells `note` when nothing moves and why."""
+
+    def __init__(self, controller: Controller, note: Callable[[str], None]) -> None:
+        self._controller = controller
+        self._note = note
+        self._said = ""
+        self._next_s = 0.0
+
+    def __call__(self) -> None:
+        """Looks when it is time to."""
+        now_s = time.monotonic()
+        if now_s < self._next_s:
+            return
+        self._next_s = now_s + LOOK_S
+        reason = self._reason()
+        if reason and reason != self._said:
+            self._note(reason)
+        self._said = reason
+
+    def _reason(self) -> str:
+        if self._controller.state() == HELD:
+            return "held: hodograph resume goes on, hodograph stop ends it"
+        if self._controller.read(OVERRIDE, 1) == 0:
+            return "the feed override is 0 %, nothing moves: hodograph override PERCENT goes on"
+        return ""

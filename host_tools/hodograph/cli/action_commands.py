@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Commands about the drives: home, quick-stop, reset. Light on imports, as bus_commands."""
+
+from __future__ import annotations
+
+import math
+from argparse import Namespace
+
+from ..bus import actions
+from ..bus.address import parse_address
+from ..bus.objects import BOOT, OFF, READY
+from .bus_commands import reached, stopping
+from .output import note
+from .targets import DEFAULT_BITRATE
+
+
+def home(options: Namespace) -> None:
+    """hodograph home."""
+    address = parse_address(options.bus)
+    machine = None
+    if options.file is not None:
+        from .motion_commands import machine_of
+
+        machine = machine_of(options.file, None)
+    node, bitrate = (
+        (options.node, DEFAULT_BITRATE) if machine is None else (machine.node, machine.bitrate)
+    )
+    with reached(address, node, bitrate, options.wait) as controller:
+        controller.require_standing()
+        if machine is not None:
+            controller.configure(machine, machine.kernel)
+            controller.wait_for((OFF, READY, BOOT), actions.BOOT_S)
+        with stopping(controller):
+            nodes = actions.home(controller, options.timeout or math.inf)
+    print(f"homed: node{'s' if len(nodes) > 1 else ''} {', '.join(map(str, nodes))}; drives off")
+
+
+def quick_stop(options: Namespace) -> None:
+    """hodograph quick-stop."""
+    address = parse_address(options.bus)
+    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+        actions.quick_stop(controller, options.timeout or actions.BOOT_S)
+    print("stopped by the drives, drives off")
+
+
+def reset(options: Namespace) -> None:
+    """hodograph reset."""
+    address = parse_address(options.bus)
+    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+        had_fault = actions.reset(controller, options.timeout or actions.BOOT_S)
+    if not had_fault:
+        note("no fault was present")
+    print("ready to be started")
+
+
+COMMANDS = {"home": home, "quick-stop": quick_stop, "reset": reset}
