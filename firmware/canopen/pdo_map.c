@@ -85,30 +85,9 @@ void pdo_map_rest(struct pdo_map *map)
     map->last.len = 0;
 }
 
-/* The fields are numbers in the host's byte order; a frame is little-endian. */
+/* The fields are numbers in the host's byte order, a frame is little-endian; 2 and 4 bytes without a
+ * loop, since this is each tick's work. */
 static void store(const struct pdo_map_field *field, const uint8_t *from)
-{
-    const uint64_t value = cob_get(from, field->size);
-    const uint16_t u16 = (uint16_t)(value & 0xFFFFu);
-    const uint32_t u32 = (uint32_t)(value & 0xFFFFFFFFu);
-
-    switch (field->size) {
-    case 1:
-        *field->value = *from;
-        break;
-    case 2:
-        memcpy(field->value, &u16, sizeof u16);
-        break;
-    case 4:
-        memcpy(field->value, &u32, sizeof u32);
-        break;
-    default:
-        memcpy(field->value, &value, sizeof value);
-        break;
-    }
-}
-
-static uint64_t load(const struct pdo_map_field *field)
 {
     uint16_t u16;
     uint32_t u32;
@@ -116,16 +95,50 @@ static uint64_t load(const struct pdo_map_field *field)
 
     switch (field->size) {
     case 1:
-        return *field->value;
+        *field->value = *from;
+        break;
+    case 2:
+        u16 = (uint16_t)(from[0] | (from[1] << 8));
+        memcpy(field->value, &u16, sizeof u16);
+        break;
+    case 4:
+        u32 = from[0] | ((uint32_t)from[1] << 8) | ((uint32_t)from[2] << 16) |
+              ((uint32_t)from[3] << 24);
+        memcpy(field->value, &u32, sizeof u32);
+        break;
+    default:
+        u64 = cob_get(from, field->size);
+        memcpy(field->value, &u64, sizeof u64);
+        break;
+    }
+}
+
+static void load(const struct pdo_map_field *field, uint8_t *to)
+{
+    uint16_t u16;
+    uint32_t u32;
+    uint64_t u64;
+
+    switch (field->size) {
+    case 1:
+        *to = *field->value;
+        break;
     case 2:
         memcpy(&u16, field->value, sizeof u16);
-        return u16;
+        to[0] = (uint8_t)(u16 & 0xFFu);
+        to[1] = (uint8_t)(u16 >> 8);
+        break;
     case 4:
         memcpy(&u32, field->value, sizeof u32);
-        return u32;
+        to[0] = (uint8_t)(u32 & 0xFFu);
+        to[1] = (uint8_t)((u32 >> 8) & 0xFFu);
+        to[2] = (uint8_t)((u32 >> 16) & 0xFFu);
+        to[3] = (uint8_t)(u32 >> 24);
+        break;
     default:
         memcpy(&u64, field->value, sizeof u64);
-        return u64;
+        cob_put(to, u64, field->size);
+        break;
     }
 }
 
@@ -145,7 +158,7 @@ static void pack(const struct pdo_map *map, struct can_msg *out)
 
     cob_frame(out, map->cob_id, map->length);
     for (uint8_t i = 0; i < map->count; i++) {
-        cob_put(to, load(&map->fields[i]), map->fields[i].size);
+        load(&map->fields[i], to);
         to += map->fields[i].size;
     }
 }

@@ -127,8 +127,8 @@ void drive_node_receive(struct drive_node *node, const struct can_msg *in)
         drive_node_sync(node, in);
         return;
     }
-    if (nmt_permits_pdo(node->nmt.state)) {
-        drive_node_pdo_receive(node, in);
+    if (nmt_permits_pdo(node->nmt.state) && drive_node_pdo_receive(node, in)) {
+        return;
     }
     if (nmt_permits_sdo(node->nmt.state) && sdo_server_wants(&node->sdo, in) &&
         sdo_server_receive(&node->sdo, in, &out) != 0) {

@@ -2,7 +2,7 @@
 #include "canopen/sdo_abort.h"
 #include "node/drive_node_private.h"
 
-enum { WARNING_PERMILLE = 800 }; /* of the overload's trip level */
+static const double overload_warning = 0.8; /* of the level that trips */
 
 static uint32_t drive_node_u32(double value)
 {
@@ -30,7 +30,7 @@ static bool drive_node_warns(const struct drive_node *node)
 {
     const uint32_t ends = EQUIPMENT_INPUT_NEGATIVE | EQUIPMENT_INPUT_POSITIVE;
     return (node->values.digital_inputs & ends) != 0 ||
-           overload_permille(&node->overload) > WARNING_PERMILLE;
+           overload_above(&node->overload, overload_warning);
 }
 
 static uint16_t drive_node_statusword(struct drive_node *node)

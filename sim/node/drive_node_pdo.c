@@ -20,8 +20,12 @@ static void drive_node_pdo_note(struct drive_node *node)
 {
     node->pdos_moved = true;
     node->pdos_want_all = false;
-    for (int i = 0; i < DRIVE_NODE_PDOS; i++) {
+    node->rpdo_count = 0;
+    node->tpdo_count = 0;
+    for (uint8_t i = 0; i < DRIVE_NODE_PDOS; i++) {
         const struct pdo_map *map = &node->tpdos[i];
+        node->rpdo_count = node->rpdos[i].valid ? (uint8_t)(i + 1u) : node->rpdo_count;
+        node->tpdo_count = map->valid ? (uint8_t)(i + 1u) : node->tpdo_count;
         for (int k = 0; map->valid && k < map->count; k++) {
             if (!drive_node_always_fresh(node, map->fields[k].value)) {
                 node->pdos_want_all = true;
@@ -93,11 +97,13 @@ static void drive_node_pdo_short(struct drive_node *node, const struct pdo_map *
     emcy_producer_raise(&node->emcy, EMCY_PDO_LENGTH, EMCY_REGISTER_COMMUNICATION, detail);
 }
 
-void drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in)
+bool drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in)
 {
-    for (int i = 0; i < DRIVE_NODE_PDOS; i++) {
+    bool ours = false;
+    for (int i = 0; i < node->rpdo_count; i++) {
         struct pdo_map *map = &node->rpdos[i];
         const enum pdo_map_result result = pdo_map_receive(map, in);
+        ours = ours || result != PDO_MAP_NOT;
         if (result == PDO_MAP_SHORT) {
             drive_node_pdo_short(node, map, in);
         } else if (result == PDO_MAP_TAKEN && !map->pending) {
@@ -105,11 +111,12 @@ void drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in)
             drive_node_control(node, node->values.controlword);
         }
     }
+    return ours;
 }
 
 void drive_node_pdo_latch(struct drive_node *node)
 {
-    for (int i = 0; i < DRIVE_NODE_PDOS; i++) {
+    for (int i = 0; i < node->rpdo_count; i++) {
         if (pdo_map_apply(&node->rpdos[i])) {
             drive_node_pdo_applied(node, &node->rpdos[i]);
         }
@@ -124,7 +131,7 @@ void drive_node_pdo_report(struct drive_node *node)
     if (node->pdos_want_all) {
         drive_node_od_refresh(node);
     }
-    for (int i = 0; i < DRIVE_NODE_PDOS; i++) {
+    for (int i = 0; i < node->tpdo_count; i++) {
         if (pdo_map_sync(&node->tpdos[i], &frame) != 0) {
             drive_node_send(node, &frame);
         }
@@ -134,7 +141,7 @@ void drive_node_pdo_report(struct drive_node *node)
 static void drive_node_pdo_events(struct drive_node *node, uint32_t elapsed_us)
 {
     struct can_msg frame;
-    for (int i = 0; i < DRIVE_NODE_PDOS; i++) {
+    for (int i = 0; i < node->tpdo_count; i++) {
         if (!pdo_map_event_driven(&node->tpdos[i])) {
             continue;
         }
@@ -148,7 +155,7 @@ static void drive_node_pdo_events(struct drive_node *node, uint32_t elapsed_us)
 void drive_node_pdo_process(struct drive_node *node, uint32_t elapsed_us)
 {
     drive_node_pdo_events(node, elapsed_us);
-    for (int i = 0; i < DRIVE_NODE_PDOS; i++) {
+    for (int i = 0; i < node->rpdo_count; i++) {
         if (pdo_map_overdue(&node->rpdos[i], elapsed_us)) {
             drive_node_disconnect(node, EMCY_RPDO_TIMEOUT);
         }

@@ -38,14 +38,14 @@ uint32_t drive_node_scale_write(struct drive_node *node, const struct od_entry *
                                 uint32_t value);
 double drive_node_scale_feed(const struct drive_node *node); /* counts a revolution */
 
-/* drive_node_pdo.c: as after power-on; the od's hooks; a frame; at SYNC, first the report and then
+/* drive_node_pdo.c: as after power-on; the od's hooks; a frame (true: it was an RPDO); at SYNC, first the report and then
  * the latch of what has come; and the times. _rest: on a change of the NMT state. */
 void drive_node_pdo_begin(struct drive_node *node);
 void drive_node_pdo_rest(struct drive_node *node);
 uint32_t drive_node_pdo_write(const struct drive_node *node, const struct od_entry *entry,
                               const uint8_t *value, uint32_t size);
 void drive_node_pdo_written(struct drive_node *node, const struct od_entry *entry);
-void drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in);
+bool drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in);
 void drive_node_pdo_report(struct drive_node *node);
 void drive_node_pdo_latch(struct drive_node *node);
 void drive_node_pdo_process(struct drive_node *node, uint32_t elapsed_us);

@@ -4,7 +4,7 @@
 #include "node/drive_node_private.h"
 
 /* A tripped overload lets itself be reset when it has cooled down to this. */
-enum { OVERLOAD_COOL_PERMILLE = 800, OVERLOAD_TRIP_PERMILLE = 1000 };
+static const double overload_cool = 0.8;
 
 void drive_node_inputs(struct drive_node *node)
 {
@@ -22,7 +22,7 @@ bool drive_node_against_switch(const struct drive_node *node, int64_t change_cou
 bool drive_node_cause_persists(const struct drive_node *node)
 {
     return node->encoder_failed || node->supply_failed ||
-           overload_permille(&node->overload) > OVERLOAD_COOL_PERMILLE;
+           overload_above(&node->overload, overload_cool);
 }
 
 static void drive_node_watch_following(struct drive_node *node)
@@ -49,7 +49,7 @@ static void drive_node_watch_overload(struct drive_node *node)
     }
     overload_step(&node->overload, node->axis.drive.state.volts * node->load_per_volt,
                   (double)node->axis.config.period_us * 1e-6);
-    if (overload_permille(&node->overload) > OVERLOAD_TRIP_PERMILLE) {
+    if (overload_above(&node->overload, 1.0)) {
         drive_node_fail_powerless(node, EMCY_OVERLOAD);
     }
 }

@@ -8,19 +8,19 @@
 struct home_seek_method {
     uint32_t inputs_switch;
     int8_t method;
-    int8_t direction;
     bool entering;
+    int direction;
 };
 
 static const struct home_seek_method methods[] = {
-    {EQUIPMENT_INPUT_NEGATIVE, 17, -1, false},
-    {EQUIPMENT_INPUT_POSITIVE, 18, 1, false},
-    {EQUIPMENT_INPUT_HOME, 19, 1, false},
-    {EQUIPMENT_INPUT_HOME, 20, 1, true},
-    {EQUIPMENT_INPUT_HOME, 21, -1, false},
-    {EQUIPMENT_INPUT_HOME, 22, -1, true},
-    {0, 35, 0, false},
-    {0, 37, 0, false},
+    {EQUIPMENT_INPUT_NEGATIVE, 17, false, -1},
+    {EQUIPMENT_INPUT_POSITIVE, 18, false, 1},
+    {EQUIPMENT_INPUT_HOME, 19, false, 1},
+    {EQUIPMENT_INPUT_HOME, 20, true, 1},
+    {EQUIPMENT_INPUT_HOME, 21, false, -1},
+    {EQUIPMENT_INPUT_HOME, 22, true, -1},
+    {0, 35, false, 0},
+    {0, 37, false, 0},
 };
 
 static const struct home_seek_method *home_seek_find(int8_t method)

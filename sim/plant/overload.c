@@ -13,6 +13,11 @@ void overload_step(struct overload *overload, double load, double time_s)
     overload->heat_s = heat_s > 0.0 ? heat_s : 0.0;
 }
 
+bool overload_above(const struct overload *overload, double part)
+{
+    return overload->level_s > 0.0 && overload->heat_s > part * overload->level_s;
+}
+
 uint16_t overload_permille(const struct overload *overload)
 {
     if (overload->level_s <= 0.0) {

@@ -24,6 +24,9 @@ void overload_init(struct overload *overload, double peak, double time_s);
 /* Lets time pass under `load`, in units of the rated load. */
 void overload_step(struct overload *overload, double load, double time_s);
 
+/* Whether the store holds more than this part of the level that trips. */
+bool overload_above(const struct overload *overload, double part);
+
 /* The store's level, per mille of that which trips. */
 uint16_t overload_permille(const struct overload *overload);
 
