@@ -161,12 +161,13 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
     return go_on(server, in->data, out);
 }
 
-/* A block whose last segment was lost is answered before the client gives up. Not when no segment
- * of it has come: a client that only paused would then send the whole block twice. */
+/* A block whose last segment was lost is answered before the client gives up, once. Not when no
+ * segment of it has come: a client that only paused would then send the whole block twice. */
 static int acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
-    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || s->sequence == 0 ||
-        s->silence_us < s->timeout_us / 2) {
+    const bool begun = s->sequence != 0 || (s->heard != 0 && !s->acknowledged_early);
+
+    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || !begun || s->silence_us < s->timeout_us / 2) {
         return 0;
     }
     s->acknowledged_early = true;

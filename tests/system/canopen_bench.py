@@ -45,16 +45,23 @@ def until(happened: Callable[[], Any], limit_s: float = 10.0) -> None:
         time.sleep(0.005)
 
 
+def drain(bus: can.BusABC) -> None:
+    """Forgets the frames that are waiting."""
+    while bus.recv(0) is not None:
+        pass
+
+
 @contextmanager
 def process(node: int, *words: str) -> Iterator[subprocess.Popen[bytes]]:
     """A device, from its boot-up frame to its end."""
     filters = frames_of(0x700, node=node)
     with can.Bus(interface="socketcan", channel="vcan0", can_filters=filters) as bus:
+        drain(bus)  # what came before the filters were set
         device = subprocess.Popen(words, stderr=subprocess.DEVNULL)
         try:
             frame = bus.recv(10)
             assert frame is not None, "no boot-up frame within 10 s"
-            assert bytes(frame.data) == b"\0"
+            assert (frame.arbitration_id, bytes(frame.data)) == (0x700 + node, b"\0")
             yield device
         finally:
             device.kill()
@@ -95,6 +102,7 @@ class Hand:
         self.bus = can.Bus(
             interface="socketcan", channel="vcan0", can_filters=frames_of(0x580, node=node)
         )
+        drain(self.bus)
 
     def send(self, data: bytes, length: int = 8) -> None:
         """A request, filled up with zeros."""
@@ -110,7 +118,7 @@ class Hand:
         """The next answer."""
         frame = self.bus.recv(wait_s)
         assert frame is not None, f"no answer within {wait_s:g} s"
-        assert frame.dlc == 8
+        assert (frame.arbitration_id, frame.dlc) == (0x580 + self.node, 8)
         return bytes(frame.data)
 
     def silence(self, wait_s: float = 0.1) -> None:
@@ -119,7 +127,8 @@ class Hand:
         assert frame is None, frame
 
     def ask(self, data: bytes) -> bytes:
-        """Request and answer."""
+        """Request and answer. Answers to another client are forgotten before."""
+        drain(self.bus)
         self.send(data)
         return self.answer()
 
@@ -140,6 +149,16 @@ def hand(node: int) -> Iterator[Hand]:
         yield made
     finally:
         made.close()
+
+
+def settle(node: canopen.RemoteNode) -> None:
+    """python canopen forgets the answers to a client by hand, which it has heard too."""
+    end = time.monotonic() + 0.05
+    while time.monotonic() < end:
+        while not node.sdo.responses.empty():
+            node.sdo.responses.get_nowait()
+            end = time.monotonic() + 0.05
+        time.sleep(0.005)
 
 
 def object_bytes(index: int, sub: int) -> bytes:

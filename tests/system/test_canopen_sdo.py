@@ -1,0 +1,429 @@
+# SPDX-License-Identifier: MIT
+"""SDO on the bus: python canopen's transfers of all kinds, and faults of a client made by hand."""
+
+from __future__ import annotations
+
+import binascii
+import struct
+from collections.abc import Iterator
+
+import canopen
+import pytest
+from canopen_bench import (
+    BLOCK_SIZE,
+    COMMAND,
+    CONTROLLER,
+    CONTROLLER_EDS,
+    CRC,
+    DRIVE,
+    DRIVE_EDS,
+    SEQUENCE,
+    TIMEOUT,
+    TOGGLE,
+    TOO_LONG,
+    TOO_SHORT,
+    VALUE,
+    Hand,
+    abort_code,
+    client,
+    controller_process,
+    drive_process,
+    hand,
+    object_bytes,
+    program,
+    settle,
+)
+
+pytestmark = pytest.mark.bus
+
+IMAGES = ("line_tiny", "alpha_minimax", "star_minimax")
+PROGRAM = object_bytes(0x2000, 1)
+NAME = object_bytes(0x1008, 0)
+SEGMENTS = 127
+
+
+@pytest.fixture(scope="module")
+def controller() -> Iterator[canopen.RemoteNode]:
+    with (
+        controller_process(),
+        client(canopen.RemoteNode(CONTROLLER, str(CONTROLLER_EDS))) as network,
+    ):
+        node = network[CONTROLLER]
+        for sub, limit in ((2, 500_000), (3, 5_000_000), (4, 200_000)):
+            node.sdo[0x2004][sub].raw = limit
+        yield node
+
+
+@pytest.fixture(scope="module")
+def drive() -> Iterator[canopen.RemoteNode]:
+    with drive_process(), client(canopen.RemoteNode(DRIVE, str(DRIVE_EDS))) as network:
+        yield network[DRIVE]
+
+
+@pytest.fixture
+def by_hand(controller: canopen.RemoteNode) -> Iterator[Hand]:
+    """Nothing is under way, and line_tiny is the active program."""
+    settle(controller)
+    if active(controller) != (2, own_crc(program("line_tiny"))):
+        download(controller, program("line_tiny"))
+    with hand(CONTROLLER) as made:
+        yield made
+
+
+def own_crc(image: bytes) -> int:
+    """The CRC-32 in the header of a program, which the controller has checked."""
+    return int(struct.unpack_from("<I", image, 12)[0])
+
+
+def is_active(node: canopen.RemoteNode, image: bytes) -> bool:
+    """Whether this program is the active one. The answers to a client by hand are let pass."""
+    settle(node)
+    return active(node) == (2, own_crc(image))
+
+
+def download(node: canopen.RemoteNode, image: bytes) -> None:
+    settle(node)
+    with node.sdo[0x2000][1].open(
+        "wb", size=len(image), block_transfer=True, buffering=0
+    ) as stream:
+        for start in range(0, len(image), 7):
+            stream.write(image[start : start + 7])
+
+
+def upload(node: canopen.RemoteNode) -> bytes:
+    settle(node)
+    with node.sdo[0x2000][1].open("rb", block_transfer=True) as stream:
+        return bytes(stream.read())
+
+
+def active(node: canopen.RemoteNode) -> tuple[int, int]:
+    """State and CRC-32 of the active program."""
+    return node.sdo[0x2000][2].raw, node.sdo[0x2000][5].raw
+
+
+# -- transfers of python canopen -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_block_download_and_upload(controller: canopen.RemoteNode, name: str) -> None:
+    image = program(name)
+    download(controller, image)
+    assert active(controller)[0] == 2
+    assert controller.sdo[0x2000][6].raw == len(image)
+    assert upload(controller) == image
+
+
+@pytest.mark.parametrize("name", ["line_tiny", "alpha_minimax"])
+def test_segmented_download_and_upload(controller: canopen.RemoteNode, name: str) -> None:
+    image = program(name)
+    controller.sdo.download(0x2000, 1, image)
+    assert controller.sdo.upload(0x2000, 1) == image
+
+
+@pytest.mark.parametrize("size", [1, 4, 5, 7, 8, 14, 888, 889, 890, 1778])
+@pytest.mark.parametrize("block", [True, False], ids=["block", "segmented"])
+def test_a_download_of_any_size_is_judged_whole(
+    controller: canopen.RemoteNode, size: int, block: bool
+) -> None:
+    """The beginning of a program is no program: refused, and the one that is there stays."""
+    good = program("line_tiny")
+    if active(controller)[0] != 2:
+        download(controller, good)
+    before = active(controller)
+    image = program("alpha_quintic")[:size]
+    if block:
+        code = abort_code(lambda: download(controller, image))
+    else:
+        code = abort_code(lambda: controller.sdo.download(0x2000, 1, image, force_segment=True))
+    assert code == VALUE
+    assert active(controller) == before
+    assert controller.sdo[0x2000][3].raw < 0
+
+
+def test_values_by_every_kind_of_transfer(controller: canopen.RemoteNode) -> None:
+    for value in (0, 1, -1, 2**62 + 12345, -(2**63)):
+        raw = struct.pack("<q", value)
+        controller.sdo.download(0x2011, 0, raw)
+        assert controller.sdo.upload(0x2011, 0) == raw
+        with controller.sdo.open(
+            0x2011, 0, "wb", size=8, block_transfer=True, buffering=0
+        ) as stream:
+            stream.write(raw[:7])
+            stream.write(raw[7:])
+        with controller.sdo.open(0x2011, 0, "rb", block_transfer=True) as stream:
+            assert stream.read() == raw
+
+
+def test_small_values_segmented(drive: canopen.RemoteNode) -> None:
+    """A client need not send expedited what would fit."""
+    for index, sub, raw in ((0x6040, 0, b"\6\0"), (0x607D, 1, b"\1\2\3\x84"), (0x6060, 0, b"\x08")):
+        drive.sdo.download(index, sub, raw, force_segment=True)
+        assert drive.sdo.upload(index, sub) == raw
+
+
+def test_strings(drive: canopen.RemoteNode, controller: canopen.RemoteNode) -> None:
+    for node, name in ((drive, "Hodograph simulated drive"), (controller, "Hodograph controller")):
+        assert node.sdo[0x1008].raw == name
+        with node.sdo.open(0x1008, 0, "rb", block_transfer=True) as stream:
+            assert stream.read() == name.encode()
+
+
+# -- faults of a client ----------------------------------------------------------------------------
+
+
+def initiate_block(by_hand: Hand, size: int, crc: bool = True) -> int:
+    """Begins a block download; segments a block."""
+    answer = by_hand.ask(bytes([0xC2 | 4 * crc]) + PROGRAM + struct.pack("<I", size))
+    assert answer[:4] == b"\xa4" + PROGRAM
+    return answer[4]
+
+
+def segments_of(image: bytes) -> list[bytes]:
+    return [image[at : at + 7].ljust(7, b"\0") for at in range(0, len(image), 7)]
+
+
+def end_block(by_hand: Hand, image: bytes, crc: int) -> bytes:
+    unused = -len(image) % 7
+    return by_hand.ask(bytes([0xC1 | unused << 2]) + struct.pack("<H", crc))
+
+
+def xmodem(data: bytes) -> int:
+    """The CRC of block transfers."""
+    return binascii.crc_hqx(data, 0)
+
+
+def send_blocks(by_hand: Hand, image: bytes, size: int, lose: frozenset[int] = frozenset()) -> int:
+    """Sends an image in blocks, without the segments `lose` the first time; the number of blocks."""
+    segments, done, blocks, lost = segments_of(image), 0, 0, set(lose)
+    while done < len(segments):
+        block = segments[done : done + size]
+        for number, data in enumerate(block, start=1):
+            last = done + number == len(segments)
+            if done + number - 1 in lost:
+                lost.discard(done + number - 1)
+                continue
+            by_hand.send(bytes([number | 0x80 * last]) + data)
+        answer = by_hand.answer()
+        assert answer[0] == 0xA2, answer.hex(" ")
+        done += answer[1]
+        blocks += 1
+    assert not lost
+    return blocks
+
+
+def test_block_download_by_hand(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+    image = program("line_slow")
+    size = initiate_block(by_hand, len(image))
+    assert size == SEGMENTS
+    assert send_blocks(by_hand, image, size) == 4
+    assert end_block(by_hand, image, xmodem(image))[0] == 0xA1
+    assert is_active(controller, image)
+
+
+@pytest.mark.parametrize(
+    "lose",
+    [{0}, {1}, {63}, {125}, {126}, {0, 126}, {10, 11, 12}, {126, 127}, {443}, {5, 200, 443}],
+    ids=str,
+)
+def test_block_download_with_lost_segments(
+    controller: canopen.RemoteNode, by_hand: Hand, lose: set[int]
+) -> None:
+    """The answer at the block's end names the last good segment; the client goes on behind it."""
+    image = program("line_slow")
+    size = initiate_block(by_hand, len(image))
+    assert len(segments_of(image)) == 444
+    assert send_blocks(by_hand, image, size, frozenset(lose)) >= 4
+    assert end_block(by_hand, image, xmodem(image))[0] == 0xA1
+    assert is_active(controller, image)
+
+
+def test_block_download_with_a_wrong_crc(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+    image = program("line_slow")
+    send_blocks(by_hand, image, initiate_block(by_hand, len(image)))
+    assert by_hand.aborted(end_block(by_hand, image, xmodem(image) ^ 1)) == CRC
+    assert is_active(controller, program("line_tiny"))
+
+
+def test_block_download_without_crc(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+    image = program("line_slow")
+    send_blocks(by_hand, image, initiate_block(by_hand, len(image), crc=False))
+    assert end_block(by_hand, image, 0)[0] == 0xA1
+    assert is_active(controller, image)
+
+
+def test_block_download_out_of_sequence(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+    initiate_block(by_hand, 2000)
+    by_hand.send(b"\0" + bytes(7))
+    assert by_hand.aborted(by_hand.answer()) == SEQUENCE
+    assert is_active(controller, program("line_tiny"))
+
+
+@pytest.mark.parametrize(("told", "code"), [(100, TOO_LONG), (5000, TOO_SHORT)])
+def test_block_download_of_another_size_than_told(
+    controller: canopen.RemoteNode, by_hand: Hand, told: int, code: int
+) -> None:
+    image = program("line_tiny")
+    initiate_block(by_hand, told)
+    for number, data in enumerate(segments_of(image)[:126], start=1):
+        by_hand.send(bytes([number]) + data)
+    if code == TOO_SHORT:
+        by_hand.send(b"\xff" + bytes(7))
+        assert by_hand.answer()[:2] == b"\xa2\x7f"
+        found = by_hand.aborted(by_hand.ask(b"\xc1\0\0"))
+        assert found in (TOO_SHORT, CRC)
+    else:
+        assert by_hand.aborted(by_hand.answer()) == TOO_LONG
+    by_hand.silence()
+    assert is_active(controller, image)
+
+
+def test_a_client_aborts_in_mid_transfer(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+    image = program("line_slow")
+    begun = by_hand.ask(b"\x21" + PROGRAM + struct.pack("<I", len(image)))
+    assert begun[0] == 0x60
+    assert by_hand.ask(b"\0" + image[:7])[0] == 0x20
+    by_hand.send(b"\x80" + PROGRAM + struct.pack("<I", 0x08000000))
+    by_hand.silence()
+    assert by_hand.aborted(by_hand.ask(b"\x10" + image[7:14])) == COMMAND
+    initiate_block(by_hand, len(image))
+    by_hand.send(b"\1" + image[:7])
+    by_hand.send(b"\x80" + PROGRAM + struct.pack("<I", 0x08000000))
+    by_hand.silence()
+    assert is_active(controller, program("line_tiny"))
+    download(controller, image)
+    assert is_active(controller, image)
+
+
+def test_toggle_bits_that_do_not_toggle(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+    assert by_hand.ask(b"\x21" + PROGRAM + struct.pack("<I", 2000))[0] == 0x60
+    assert by_hand.ask(b"\x00" + bytes(7))[0] == 0x20
+    assert by_hand.aborted(by_hand.ask(b"\x00" + bytes(7))) == TOGGLE
+    assert by_hand.ask(b"\x40" + NAME)[0] == 0x41
+    assert by_hand.ask(b"\x60")[1:] == b"Hodogra"
+    assert by_hand.aborted(by_hand.ask(b"\x60")) == TOGGLE
+    assert by_hand.aborted(by_hand.ask(b"\x70")) == COMMAND
+    assert is_active(controller, program("line_tiny"))
+
+
+@pytest.mark.parametrize("kind", ["download", "upload", "block download", "block upload"])
+def test_a_client_that_falls_silent(
+    controller: canopen.RemoteNode, by_hand: Hand, kind: str
+) -> None:
+    """The server gives up by itself (a block first gets its answer) and is ready for the next transfer."""
+    first = {
+        "download": b"\x21" + PROGRAM + struct.pack("<I", 2000),
+        "upload": b"\x40" + PROGRAM,
+        "block download": b"\xc6" + PROGRAM + struct.pack("<I", 2000),
+        "block upload": b"\xa4" + PROGRAM + b"\x7f",
+    }[kind]
+    answer = by_hand.ask(first)
+    assert answer[0] != 0x80
+    if kind == "block download":
+        by_hand.send(b"\1" + bytes(7))
+        assert by_hand.answer(10.0)[:2] == b"\xa2\1"
+    assert by_hand.aborted(by_hand.answer(10.0)) == TIMEOUT
+    by_hand.silence()
+    assert is_active(controller, program("line_tiny"))
+
+
+def test_a_new_transfer_replaces_the_one_under_way(
+    controller: canopen.RemoteNode, by_hand: Hand
+) -> None:
+    """A client that lost an answer may simply begin again."""
+    assert by_hand.ask(b"\x21" + PROGRAM + struct.pack("<I", 2000))[0] == 0x60
+    settle(controller)
+    assert controller.sdo[0x1000].raw == 0
+    assert by_hand.ask(b"\xa4" + PROGRAM + b"\x7f")[0] == 0xC6
+    assert is_active(controller, program("line_tiny"))
+
+
+@pytest.mark.parametrize("command", [0x00, 0x10, 0x60, 0x70, 0xA1, 0xA2, 0xA3, 0xC1, 0xE0, 0xFF])
+def test_commands_that_begin_nothing(
+    controller: canopen.RemoteNode, by_hand: Hand, command: int
+) -> None:
+    assert by_hand.aborted(by_hand.ask(bytes([command]) + PROGRAM)) == COMMAND
+    settle(controller)
+    assert controller.sdo[0x1000].raw == 0
+
+
+@pytest.mark.parametrize("length", range(8))
+def test_short_requests_are_no_requests(by_hand: Hand, length: int) -> None:
+    by_hand.send((b"\x40" + NAME)[:length], length=length)
+    by_hand.silence()
+
+
+def test_expedited_without_a_size(drive: canopen.RemoteNode) -> None:
+    """The dictionary knows how many of the four bytes count (CiA 301, 7.2.4.3.3)."""
+    with hand(DRIVE) as by_hand:
+        assert by_hand.ask(b"\x22" + object_bytes(0x6065, 0) + b"\1\2\3\4")[0] == 0x60
+        assert by_hand.ask(b"\x22" + object_bytes(0x6066, 0) + b"\5\6\7\x08")[0] == 0x60
+    settle(drive)
+    assert drive.sdo[0x6065].raw == 0x04030201
+    assert drive.sdo[0x6066].raw == 0x0605
+
+
+def read_blocks(by_hand: Hand, size: int, lose: frozenset[int]) -> tuple[bytes, int]:
+    """A block upload by hand that loses segments the first time; the bytes and the end's CRC."""
+    answer = by_hand.ask(b"\xa4" + PROGRAM + bytes([size]))
+    assert answer[:4] == b"\xc6" + PROGRAM
+    total = struct.unpack_from("<I", answer, 4)[0]
+    by_hand.send(b"\xa3")
+    data, lost, last = b"", set(lose), False
+    while not last:
+        good, number = 0, 0
+        while True:
+            segment = by_hand.answer()
+            number = segment[0] & 0x7F
+            ended = bool(segment[0] & 0x80)
+            position = len(data) // 7
+            if number == good + 1 and position in lost:
+                lost.discard(position)
+            elif number == good + 1:
+                data += segment[1:]
+                good = number
+                last = ended
+            if ended or number == size:
+                break
+        by_hand.send(bytes([0xA2, good, size]))
+    answer = by_hand.answer()
+    assert answer[0] & 0xE3 == 0xC1, answer.hex(" ")
+    assert not lost
+    unused = answer[0] >> 2 & 7
+    by_hand.send(b"\xa1")
+    assert len(data) - unused == total
+    return data[: len(data) - unused], struct.unpack_from("<H", answer, 1)[0]
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 126, 127])
+def test_block_upload_in_blocks_of_any_size(by_hand: Hand, size: int) -> None:
+    image = program("line_tiny")
+    assert read_blocks(by_hand, size, frozenset()) == (image, xmodem(image))
+
+
+@pytest.mark.parametrize("lose", [{0}, {5}, {126}, {127}, {229}, {0, 100, 229}], ids=str)
+def test_block_upload_with_lost_segments(by_hand: Hand, lose: set[int]) -> None:
+    """The server repeats from behind the last good segment, and its CRC counts each byte once."""
+    image = program("line_tiny")
+    assert len(segments_of(image)) == 230
+    assert read_blocks(by_hand, 127, frozenset(lose)) == (image, xmodem(image))
+
+
+@pytest.mark.parametrize("size", [0, 128, 255])
+def test_block_upload_with_impossible_blocks(by_hand: Hand, size: int) -> None:
+    assert by_hand.aborted(by_hand.ask(b"\xa4" + PROGRAM + bytes([size]))) == BLOCK_SIZE
+
+
+def test_block_upload_with_an_answer_beyond_the_block(by_hand: Hand) -> None:
+    assert by_hand.ask(b"\xa4" + PROGRAM + b"\x04")[0] == 0xC6
+    by_hand.send(b"\xa3")
+    assert [by_hand.answer()[0] for _ in range(4)] == [1, 2, 3, 4]
+    assert by_hand.aborted(by_hand.ask(b"\xa2\x05\x04")) == SEQUENCE
+
+
+def test_a_late_client_finds_the_drive_ready(drive: canopen.RemoteNode) -> None:
+    """The drive's server has a second; then the same dialogue works again."""
+    with hand(DRIVE) as by_hand:
+        assert by_hand.ask(b"\x40" + NAME)[0] == 0x41
+        assert by_hand.aborted(by_hand.answer(5.0)) == TIMEOUT
+    settle(drive)
+    assert drive.sdo[0x1008].raw == "Hodograph simulated drive"
