@@ -77,7 +77,10 @@ class Soak:
                 self.repetitions += 1
                 self.program_ticks += run.motion.ticks
                 self.deadline_misses += run.deadline_misses or 0
+                known = len(self.checker.findings)
                 self.checker.take(tap.take())
+                for finding in self.checker.findings[known:]:
+                    self.note(finding)
                 self.wall_s = time.monotonic() - begun
                 if time.monotonic() - told > _REPORT_S:
                     told = time.monotonic()
@@ -131,8 +134,6 @@ def main(arguments: list[str]) -> int:
         return 4
     if options.json is not None:
         options.json.write_text(json.dumps(soak.summary(), indent=2) + "\n", encoding="utf-8")
-    for finding in soak.checker.findings:
-        print(finding)
     print(soak.line())
     return 1 if soak.checker.finding_count else 0
 

@@ -152,13 +152,14 @@ def hand(node: int) -> Iterator[Hand]:
 
 
 def settle(node: canopen.RemoteNode) -> None:
-    """python canopen forgets the answers to a client by hand, which it has heard too."""
-    end = time.monotonic() + 0.05
-    while time.monotonic() < end:
-        while not node.sdo.responses.empty():
-            node.sdo.responses.get_nowait()
-            end = time.monotonic() + 0.05
-        time.sleep(0.005)
+    """python canopen forgets the answers to a client by hand, which it has heard too.
+
+    All that came before the answer to a question of its own is old.
+    """
+    question = object_bytes(0x1018, 2)
+    node.network.send_message(0x600 + node.id, b"\x40" + question + bytes(4))
+    while node.sdo.responses.get(timeout=5.0)[:4] != b"\x43" + question:
+        pass
 
 
 def object_bytes(index: int, sub: int) -> bytes:
