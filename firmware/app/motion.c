@@ -6,6 +6,8 @@
 #include "core/counts.h"
 #include "core/program_time.h"
 
+#define FEED_MAX_Q32_MM_S (INT64_MAX / 1000) /* 2^31 um/s */
+
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config)
 {
     memset(motion, 0, sizeof *motion);
@@ -82,12 +84,23 @@ bool motion_over(const struct motion *motion)
     return state == TIMEBASE_ENDED || state == TIMEBASE_STOPPED;
 }
 
+static int64_t saturated(int64_t value, int64_t most)
+{
+    if (value > most) {
+        return most;
+    }
+    return value < -most ? -most : value;
+}
+
 int32_t motion_feed_um_s(const struct motion *motion)
 {
     if (motion_over(motion)) {
         return 0;
     }
-    const int64_t feed_um_s = motion->point.feed_q32_mm_s * 1000 / INT64_C(4294967296);
-    return (int32_t)(feed_um_s * (int64_t)timebase_rate_q30(&motion->timebase) /
-                     INT64_C(1073741824));
+    /* saturated before each product: below 2^31 um/s times a rate of at most 2^31 stays below 2^62 */
+    const int64_t feed_um_s =
+        saturated(motion->point.feed_q32_mm_s, FEED_MAX_Q32_MM_S) * 1000 / INT64_C(4294967296);
+    const int64_t scaled_um_s =
+        feed_um_s * (int64_t)timebase_rate_q30(&motion->timebase) / INT64_C(1073741824);
+    return (int32_t)saturated(scaled_um_s, INT32_MAX);
 }

@@ -51,7 +51,7 @@ bool motion_held(const struct motion *motion);
 /* True when the last setpoint given was the last one: end of the program or of the stop. */
 bool motion_over(const struct motion *motion);
 
-/* Feed along the path at the last setpoint, in um/s. Under the lock. */
+/* Feed along the path at the last setpoint, in um/s, held at 2^31 - 1 (2147 m/s). Under the lock. */
 int32_t motion_feed_um_s(const struct motion *motion);
 
 #endif

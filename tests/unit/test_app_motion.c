@@ -165,6 +165,24 @@ static void test_start_from_where_it_stopped(void)
     finish_at_the_end();
 }
 
+/* Such feeds pass the check of a program where no limit is configured. */
+static void test_feed_saturates(void)
+{
+    static struct motion motion;
+    command(COMMAND_START);
+    app_bench_periods(&bench, 250);
+    motion = bench.controller.machine.motion;
+    TEST_ASSERT_INT_WITHIN(20, 15000, motion_feed_um_s(&motion));
+    motion.point.feed_q32_mm_s = INT64_C(2147483) << 32;
+    TEST_ASSERT_EQUAL_INT32(2147483000, motion_feed_um_s(&motion));
+    motion.point.feed_q32_mm_s = INT64_C(2147484) << 32;
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, motion_feed_um_s(&motion));
+    motion.point.feed_q32_mm_s = INT64_MAX;
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, motion_feed_um_s(&motion));
+    motion.point.feed_q32_mm_s = INT64_MIN;
+    TEST_ASSERT_EQUAL_INT32(-INT32_MAX, motion_feed_um_s(&motion));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -175,6 +193,7 @@ int main(void)
     RUN_TEST(test_hold_near_the_end);
     RUN_TEST(test_override);
     RUN_TEST(test_no_override_beyond_200);
+    RUN_TEST(test_feed_saturates);
     RUN_TEST(test_start_from_where_it_stopped);
     return UNITY_END();
 }
