@@ -6,11 +6,12 @@
 #define COEFFICIENTS (BERNSTEIN_MOST_DEGREE + 1)
 #define MOST_DEPTH   9
 
-/* scale / C(n,k) for n = 4, 5, 6 */
-static const int64_t scaled_inverse[3][COEFFICIENTS] = {
-    {12, 3, 2, 3, 12, 0, 0},
-    {10, 2, 1, 1, 2, 10, 0},
-    {60, 10, 4, 3, 4, 10, 60},
+/* scale / C(n,k) for n = 4, 5, 6, 7 */
+static const int64_t scaled_inverse[4][COEFFICIENTS] = {
+    {12, 3, 2, 3, 12, 0, 0, 0},
+    {10, 2, 1, 1, 2, 10, 0, 0},
+    {60, 10, 4, 3, 4, 10, 60, 0},
+    {105, 15, 5, 3, 3, 5, 15, 105},
 };
 
 int64_t bernstein_from_powers(const int64_t *a, int degree, int64_t *b)

@@ -9,10 +9,10 @@
 
 #include <stdint.h>
 
-#define BERNSTEIN_MOST_DEGREE 6
+#define BERNSTEIN_MOST_DEGREE 7
 
 /* Coefficients on [0, 1] from powers: b[j] = scale * sum over k <= j of C(j,k)/C(n,k) a[k], with
- * the scale that makes every factor an integer; returned: 60 for degree 6, 10 for 5, 12 for 4.
+ * the scale that makes every factor an integer; returned: 105 for degree 7, 60 for 6, 10 for 5, 12 for 4.
  * Others are not supported (returns 0). */
 int64_t bernstein_from_powers(const int64_t *a, int degree, int64_t *b);
 

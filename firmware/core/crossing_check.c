@@ -3,6 +3,9 @@
 
 #include "core/feed_bounds.h"
 
+/* How far a piece may reach beyond its two ends (piece_check: 2^-24 mm), and a gap at a joint. */
+#define REACH_Q40 ((int64_t)1 << 17)
+
 static int64_t piece_start(const struct program *p, uint32_t i)
 {
     struct program_piece c;
@@ -18,7 +21,7 @@ static int64_t crossing_feed_q24(const struct program *p, int64_t length_q40)
     return (length_q40 >> 16) * (int64_t)half_frequency / 8 - 1;
 }
 
-/* Pieces from *first on that touch the stretch [from, to] stay below the feed; *first moves on past
+/* Pieces from *first on that reach into the stretch [from, to] stay below the feed; *first moves on past
  * those that end before it. */
 static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32_t *first)
 {
@@ -26,13 +29,13 @@ static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32
     if (feed < FEED_LEAST_Q24) {
         return 0;
     }
-    while (*first + 1 < p->header.piece_count && piece_start(p, *first + 1u) < from) {
+    while (*first + 1 < p->header.piece_count && piece_start(p, *first + 1u) < from - REACH_Q40) {
         (*first)++;
     }
     for (uint32_t i = *first; i < p->header.piece_count; i++) {
         struct program_piece c;
         program_piece_get(p, i, &c);
-        if (c.start_q40_mm > to) {
+        if (c.start_q40_mm > to + REACH_Q40) {
             break;
         }
         if (!feed_bounds_within(&c, FEED_VELOCITY, -FEED_NO_BOUND_Q24, feed)) {

@@ -83,23 +83,41 @@ static int64_t scaled_bound(int64_t bound_q24, int64_t scale, int order, int exp
     return qmath_shift_clamp(bound_q24 * scale, 12 + order * exponent);
 }
 
-int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
-                       int64_t low_q24, int64_t high_q24)
+/* Bernstein coefficients of a derivative of F on the whole piece, in q36; returns their scale and sets the degree. */
+static int64_t bernstein_of(const struct program_piece *piece, int order, int64_t b[8], int *degree)
 {
-    int order = (int)derivative;
-    int e = program_piece_exponent(piece->duration_q32_s);
     uint64_t tau = end_tau_q64(piece);
     int64_t a[8] = {0};
-    int64_t b[8];
-    int degree = derive(piece, order, a);
-    for (int k = 0; k <= degree; k++) {
+    *degree = derive(piece, order, a);
+    for (int k = 0; k <= *degree; k++) {
         /* power k of the end of the interval, so that it becomes [0, 1] */
         for (int i = 0; i < k; i++) {
             a[k] = times_tau(a[k], tau);
         }
         a[k] >>= 4;
     }
-    int64_t scale = bernstein_from_powers(a, degree, b);
+    return bernstein_from_powers(a, *degree, b);
+}
+
+int feed_bounds_contained(const struct program_piece *piece)
+{
+    int64_t b[8];
+    int degree = 0;
+    int64_t scale = bernstein_of(piece, 0, b, &degree);
+    int64_t slack = scale * FEED_WAY_SLACK_Q36;
+    int64_t low = b[degree] < 0 ? b[degree] : 0;
+    int64_t high = b[degree] < 0 ? 0 : b[degree];
+    return bernstein_within(b, degree, low - slack, high + slack);
+}
+
+int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
+                       int64_t low_q24, int64_t high_q24)
+{
+    int order = (int)derivative;
+    int e = program_piece_exponent(piece->duration_q32_s);
+    int64_t b[8];
+    int degree = 0;
+    int64_t scale = bernstein_of(piece, order, b, &degree);
     return bernstein_within(b, degree, scaled_bound(low_q24, scale, order, e),
                             scaled_bound(high_q24, scale, order, e));
 }

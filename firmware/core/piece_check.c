@@ -45,7 +45,8 @@ static int check_bounds(const struct program_piece *c, const struct program_limi
     int64_t feed = milli_q24(limits->feed_um_s);
     int64_t acceleration = milli_q24(limits->acceleration_um_s2);
     int64_t jerk = limits->jerk_mm_s3 == 0 ? FEED_NO_BOUND_Q24 : (int64_t)limits->jerk_mm_s3 << 24;
-    if (!feed_bounds_within(c, FEED_VELOCITY, -FEED_LEAST_Q24, FEED_NO_BOUND_Q24)) {
+    if (!feed_bounds_within(c, FEED_VELOCITY, -FEED_LEAST_Q24, FEED_NO_BOUND_Q24) ||
+        !feed_bounds_contained(c)) {
         return PROGRAM_ERR_BACKWARDS;
     }
     if (!feed_bounds_within(c, FEED_VELOCITY, -FEED_LEAST_Q24, feed)) {

@@ -113,11 +113,47 @@ static void test_extreme_durations(void)
     }
 }
 
+static void test_a_piece_stays_between_its_ends(void)
+{
+    struct program_piece c = {.duration_q32_s = UINT64_C(64) << 32};
+    TEST_ASSERT_TRUE(feed_bounds_contained(&c));
+    c.c_q40_mm[0] = INT64_C(32) << 40;
+    TEST_ASSERT_TRUE(feed_bounds_contained(&c));
+    c.c_q40_mm[0] = -(INT64_C(32) << 40); /* backwards is somebody else's concern */
+    TEST_ASSERT_TRUE(feed_bounds_contained(&c));
+    for (int64_t slack_q40 = 1 << 14; slack_q40 <= 1 << 18; slack_q40 *= 2) {
+        /* 4 s (tau^2 - tau): back by s, and there again */
+        c.c_q40_mm[0] = -4 * slack_q40;
+        c.c_q40_mm[1] = 4 * slack_q40;
+        TEST_ASSERT_EQUAL_INT(slack_q40 <= 1 << 16, feed_bounds_contained(&c));
+        /* the same beyond an end at 8 mm */
+        c.c_q40_mm[0] = (INT64_C(8) << 40) + 4 * slack_q40;
+        c.c_q40_mm[1] = -4 * slack_q40;
+        TEST_ASSERT_TRUE_MESSAGE(feed_bounds_contained(&c), "never at rest: not beyond");
+    }
+}
+
+/* With the largest coefficients nothing leaves 64 bits (the sanitizer looks). */
+static void test_the_way_of_extreme_coefficients(void)
+{
+    struct program_piece c = {.duration_q32_s = UINT64_C(1) << 32};
+    for (int k = 0; k < 7; k++) {
+        c.c_q40_mm[k] = (k % 2 == 0 ? 1 : -1) * (INT64_C(1) << 54);
+    }
+    TEST_ASSERT_FALSE(feed_bounds_contained(&c));
+    for (int k = 0; k < 7; k++) {
+        c.c_q40_mm[k] = INT64_C(1) << 54;
+    }
+    TEST_ASSERT_TRUE(feed_bounds_contained(&c));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_bounds_are_tight_to_half_a_percent);
     RUN_TEST(test_ends);
     RUN_TEST(test_extreme_durations);
+    RUN_TEST(test_a_piece_stays_between_its_ends);
+    RUN_TEST(test_the_way_of_extreme_coefficients);
     return UNITY_END();
 }

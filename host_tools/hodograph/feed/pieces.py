@@ -116,6 +116,25 @@ def derivative_extremes(
     return (lows[0], lows[1], lows[2]), (highs[0], highs[1], highs[2])
 
 
+def way_excess(duration_q32_s: Int, c_q40: Int, halvings: int = 4) -> Real:
+    """How far (M,) each piece goes at most behind its start or beyond its end, in mm, of its bounds after halving."""
+    seconds = np.ldexp(duration_q32_s.astype(np.float64), -32)
+    feed = derivative_bounds(duration_q32_s, c_q40)[0]
+    way = np.zeros((len(seconds), DEGREE + 1))
+    way[:, 1:] = np.cumsum(feed, axis=1) * (seconds / DEGREE)[:, None]
+    low, high = np.minimum(way[:, -1], 0.0), np.maximum(way[:, -1], 0.0)
+    curved = np.flatnonzero(c_q40[:, 1:].any(axis=1))
+    parts = way[curved]
+    for _ in range(halvings):
+        parts = _halved(parts)
+    axes = tuple(range(1, parts.ndim))
+    excess: Real = np.zeros(len(seconds))
+    excess[curved] = np.maximum(
+        low[curved] - parts.min(axis=axes), parts.max(axis=axes) - high[curved]
+    )
+    return excess
+
+
 def derivative_peaks(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]:
     """Bounds (M,) of the magnitudes of feed, acceleration and jerk over each piece."""
     lows, highs = derivative_extremes(duration_q32_s, c_q40)

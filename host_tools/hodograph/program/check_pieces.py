@@ -6,7 +6,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed.pieces import DEGREE, derivative_bounds, derivative_extremes, exponents
+from ..feed.pieces import (
+    DEGREE,
+    derivative_bounds,
+    derivative_extremes,
+    exponents,
+    way_excess,
+)
 from .codes import ProgramError
 from .image import Program
 from .limits import ProgramLimits
@@ -25,6 +31,8 @@ JOIN_FEED_Q24 = 2.0**8
 JOIN_ACCELERATION_Q16 = 2.0**10
 """2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
 BACKWARDS_MM_S = -(2.0**-10)
+WAY_SLACK_MM = 2.0**-24
+"""What a piece may go behind its start or beyond its end."""
 ONE_Q24 = 1 << 24
 
 
@@ -104,7 +112,9 @@ def _bound_faults(duration: Int, c: Int, limits: ProgramLimits | None) -> list[R
 
 def _bound_masks(duration: Int, c: Int, limits: ProgramLimits | None, halvings: int) -> list[Rule]:
     lows, highs = derivative_extremes(duration, c, halvings)
-    out: list[Rule] = [(np.asarray(lows[0] < BACKWARDS_MM_S), 0, ProgramError.BACKWARDS)]
+    excess = way_excess(duration, c, halvings)
+    backwards = (lows[0] < BACKWARDS_MM_S) | (excess > WAY_SLACK_MM)
+    out: list[Rule] = [(np.asarray(backwards), 0, ProgramError.BACKWARDS)]
     if limits is None:
         return out
     peaks = highs[0], np.maximum(-lows[1], highs[1]), np.maximum(-lows[2], highs[2])

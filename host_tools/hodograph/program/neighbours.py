@@ -15,6 +15,9 @@ Real = NDArray[np.float64]
 LEAST_FEED_MM_S = 2.0**-10
 """A slower feed counts as this one: pairs that are too short for it are too short at any feed."""
 
+REACH_Q40 = 1 << 17
+"""How far a piece may reach beyond its ends: 2^-24 mm of rounding, and a gap at a joint."""
+
 _LEAST_FEED_Q24 = 1 << 14
 
 
@@ -43,10 +46,12 @@ def _crossing_feed_q24(way_q40: Int, period_us: int) -> Int:
 
 
 def highest_feed(low_q40: Int, high_q40: Int, pieces: FeedPieces) -> Real:
-    """Bound of the feed (K,) over stretches low … high of arc length, from the pieces that touch them."""
+    """Bound of the feed (K,) over stretches low … high of arc length, from the pieces that reach into them."""
     peak = derivative_extremes(pieces.duration_q32_s, pieces.c_q40)[1][0]
-    first = np.clip(np.searchsorted(pieces.start_q40, low_q40, side="left") - 1, 0, None)
-    last = np.searchsorted(pieces.start_q40, high_q40, side="right")
+    first = np.clip(
+        np.searchsorted(pieces.start_q40, low_q40 - REACH_Q40, side="left") - 1, 0, None
+    )
+    last = np.searchsorted(pieces.start_q40, high_q40 + REACH_Q40, side="right")
     ranges = np.column_stack((first, np.maximum(last, first + 1))).ravel()
     padded = np.append(peak, 0.0)
     return np.asarray(np.maximum.reduceat(padded, ranges)[::2])
