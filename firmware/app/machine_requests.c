@@ -30,6 +30,9 @@ enum machine_refusal machine_enable(struct machine *machine)
 
 enum machine_refusal machine_disable(struct machine *machine)
 {
+    if (machine->state == MACHINE_HOMING) {
+        return machine_quick_stop(machine);
+    }
     const enum machine_refusal refusal = not_available(machine);
     if (refusal == MACHINE_ACCEPTED) {
         machine_command(machine, CIA402_GOAL_OFF);

@@ -42,6 +42,10 @@ static uint32_t write_hook(void *context, const struct od_entry *entry, const ui
     if (object == drive->refuses) {
         return SDO_ABORT_VALUE;
     }
+    if (entry->index == 0x6060u && drive->values.modes_of_operation == CIA402_MODE_HOMING) {
+        drive->state.flags &= (uint16_t)~CIA402_STATUS_HOMING_ERROR;
+        drive->state.flags |= CIA402_STATUS_FOLLOWS; /* the same bit as HOMING_ATTAINED */
+    }
     const struct fake_write write = {object, (uint32_t)cob_get(value, size)};
     drive->writes[drive->write_count++ % FAKE_DRIVE_WRITES] = write;
     return SDO_OK;
@@ -195,7 +199,12 @@ int fake_drive_receive(struct fake_drive *drive, const struct can_msg *in, struc
         return take_sync(drive, out);
     }
     if (pdo_decode_setpoint(in, &setpoint) == drive->node) {
+        drive->setpoint_size = in->len;
+        (void)pdo_decode_torque(in, &drive->torque_permille);
         take_setpoint(drive, &setpoint);
+    } else if (in->id == COB_RPDO2 + drive->node) {
+        (void)pdo_decode_velocity(in, &drive->velocity_counts_s);
+        drive->velocities++;
     }
     return 0;
 }

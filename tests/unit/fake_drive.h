@@ -38,8 +38,12 @@ struct fake_drive {
     uint32_t setpoints;         /* received */
     uint32_t worst_step_counts; /* greatest difference between setpoints followed in a row */
     uint8_t node;
-    bool following;        /* the last setpoint was one to follow */
-    bool mute;             /* sends no process data */
+    bool following;            /* the last setpoint was one to follow */
+    bool mute;                 /* sends no process data */
+    int32_t velocity_counts_s; /* offsets received last */
+    int16_t torque_permille;
+    uint32_t velocities;   /* RPDO2 received */
+    uint8_t setpoint_size; /* bytes of the last RPDO1 */
     uint32_t homing_syncs; /* how long it takes to find home: then its position is the offset */
     uint32_t homing_left;
     bool homing_fails;

@@ -182,6 +182,36 @@ static void test_a_silent_drive_is_a_fault(void)
     TEST_ASSERT_FALSE(homing_busy(&bench.controller.homing));
 }
 
+/* Whatever breaks it off: no axis stays under power, and the drives are themselves again. */
+static void break_off(unsigned command)
+{
+    app_bench_init(&bench, 10000000, -5000000);
+    want(1, 17, 0);
+    bench.drives[0].homing_syncs = 100000;
+    boot();
+    home();
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_INT(HOMING_MOVE, bench.controller.homing.phase);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, command));
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1000);
+    TEST_ASSERT_FALSE(axis_enabled(&machine()->axes[0]));
+    TEST_ASSERT_NOT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.drives[0].state.state);
+    boot();
+    TEST_ASSERT_FALSE(homing_busy(&bench.controller.homing));
+    TEST_ASSERT_EQUAL_INT(8, bench.drives[0].values.modes_of_operation);
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2017, 1));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2003, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_ENABLE));
+    (void)app_bench_until(&bench, MACHINE_READY, 100);
+}
+
+static void test_stop_and_quick_stop_break_it_off(void)
+{
+    break_off(COMMAND_STOP);
+    break_off(COMMAND_QUICK_STOP);
+    break_off(COMMAND_DISABLE);
+}
+
 static void test_time_for_the_way_there_and_back(void)
 {
     struct config config = {0};
@@ -206,6 +236,7 @@ int main(void)
     RUN_TEST(test_no_end_is_a_fault);
     RUN_TEST(test_a_mode_that_is_not_taken_is_a_fault);
     RUN_TEST(test_a_silent_drive_is_a_fault);
+    RUN_TEST(test_stop_and_quick_stop_break_it_off);
     RUN_TEST(test_time_for_the_way_there_and_back);
     return UNITY_END();
 }
