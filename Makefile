@@ -101,7 +101,7 @@ c: $(HOST_LIBS) $(BINS:%=$(BUILD)/bin/hodograph-%) ## the C archives and program
 # Property tests with so many cases that the sanitized build runs only a part of them: optimised, in full.
 PLAIN_BINS := $(BUILD)/host/tests/test_override
 UNIT_BINS := $(UNIT_NAMES:%=$(BUILD)/asan/tests/%) $(PLAIN_BINS)
-test: build $(UNIT_BINS) $(BINS:%=$(BUILD)/asan/bin/hodograph-%) ## every test, C and Python; ends with "N passed, N failed"
+test: build $(STAMPS)/packages-test $(UNIT_BINS) $(BINS:%=$(BUILD)/asan/bin/hodograph-%) ## every test, C and Python; ends with "N passed, N failed"
 	@$(PY) tools/run_tests.py --build $(BUILD)
 
 unit: $(UNIT_BINS) ## the C tests only, under the sanitizers
@@ -109,7 +109,7 @@ unit: $(UNIT_BINS) ## the C tests only, under the sanitizers
 
 unit-plain: $(UNIT_NAMES:%=$(BUILD)/host/tests/%)
 
-pytest: build ## the Python tests only
+pytest: build $(STAMPS)/packages-test ## the Python tests only
 	@$(PY) tools/run_tests.py --build $(BUILD) --only python
 
 # RUN="..." adds options of `hodograph run`
@@ -140,6 +140,10 @@ packages: $(STAMPS)/packages
 $(STAMPS)/packages: tools/packages.py
 	@mkdir -p $(@D)
 	@$(PYTHON) tools/packages.py build
+	@touch $@
+
+$(STAMPS)/packages-test: tools/packages.py | $(STAMPS)/packages
+	@$(PYTHON) tools/packages.py test
 	@touch $@
 
 $(STAMPS)/packages-lint: tools/packages.py | $(STAMPS)/packages
@@ -245,11 +249,12 @@ $(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph
 
 C_FILES    := $(OWN_C) $(OWN_H) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(wildcard tests/fuzz/*.h)
 PY_TREES   := $(wildcard host_tools tools tests benchmarks)
+JS_FILES   := $(wildcard host_tools/hodograph/monitor/page/*.js)
 SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)
 LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC)
 # Every C file under the warning flags of gcc and of clang; the fuzz drivers too, though not linked.
 LINT_OBJ   := $(foreach v,host clang,$(call object_of,$(v),$(LINTED_C) $(OD_C)))
-LINT_PARTS := warnings tidy cppcheck clang-format ruff mypy shellcheck directions eds
+LINT_PARTS := warnings tidy cppcheck clang-format ruff mypy shellcheck js directions eds
 .PHONY: $(LINT_PARTS:%=lint-%)
 
 lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, formats, ruff, mypy, directions, EDS files
@@ -282,6 +287,9 @@ lint-mypy: $(VENV)/.editable
 lint-shellcheck: $(STAMPS)/packages-lint
 	$(call say,shell,$(SH_FILES))
 	$(Q)shellcheck $(SH_FILES)
+lint-js: $(STAMPS)/packages-lint
+	$(call say,js,$(JS_FILES))
+	$(Q)for file in $(JS_FILES); do node --input-type=module --check < $$file || { echo "in $$file"; exit 1; }; done
 lint-directions:
 	$(call say,who,may use whom)
 	$(Q)$(PYTHON) tools/check_directions.py

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus` or `lint`. Missing Debian packages are installed when this runs as
+A set is `build` (compile, .venv, bus), `bus`, `test` or `lint`. Missing Debian packages are installed when this runs as
 root or with passwordless sudo; otherwise the command to type is printed and the exit status is 1. Standard
 library only: it runs before anything is installed.
 """
@@ -55,6 +55,7 @@ _PACKAGE_OF = {
     "insmod": "kmod",
     "taskset": "util-linux",
     "ar": "binutils",
+    "node": "nodejs",
 }
 
 BUS = (
@@ -72,8 +73,9 @@ BUILD = (
     Need("the Python modules venv and ensurepip", _has_venv, "python3-venv"),
     *BUS,
 )
-LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"))
-SETS = {"build": BUILD, "bus": BUS, "lint": LINT}
+TEST = (_program("chromium"),)
+LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"), _program("node"))
+SETS = {"build": BUILD, "bus": BUS, "test": TEST, "lint": LINT}
 
 
 def _missing(needs: Sequence[Need]) -> list[Need]:

@@ -97,6 +97,7 @@ class Page:
         height: int,
     ) -> None:
         self._loop, self._ids = loop, 0
+        self._opened = (loop, session, port, url.partition("#")[0], width, height)
         self.complaints: list[str] = []
         self._socket = loop.run_until_complete(_attach(session, port))
         for domain in ("Page", "Runtime", "Log", "Network"):
@@ -130,7 +131,12 @@ class Page:
 
     def go(self, url: str) -> None:
         """Loads another address."""
-        self.call("Page.navigate", url=url)
+        assert "errorText" not in (answer := self.call("Page.navigate", url=url)), answer
+        self.wait("location.href !== 'about:blank' && document.readyState === 'complete'")
+
+    def again(self) -> Page:
+        """Another tab with the same address, without what is behind the #, as a browser of its own would."""
+        return Page(*self._opened)
 
     def js(self, expression: str) -> Any:
         """The value of an expression; promises are waited for."""
@@ -140,8 +146,9 @@ class Page:
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
-    def wait(self, condition: str, wait_s: float = 60.0) -> Any:
-        """Waits until an expression is truthy; its value."""
+    def wait(self, condition: str, wait_s: float = 120.0) -> Any:
+        """Waits until an expression is truthy, this tab being the one that is seen and so drawn; its value."""
+        self.call("Page.bringToFront")
         deadline = time.monotonic() + wait_s
         while not (value := self.js(condition)):
             assert time.monotonic() < deadline, (

@@ -12,7 +12,7 @@ from hodograph.bus.frames import FRAME_DTYPE, RECORD_DTYPE, Frames
 from hodograph.chain import load_chain
 from hodograph.simulate import simulate
 
-EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 ENABLED = 0x1237
 
 
