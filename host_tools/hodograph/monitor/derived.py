@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,13 +122,18 @@ class Derivation:
             return none, none, none
         window = self._targets[first - self._half : last + self._half, :2] / self._counts_per_mm
         chords = np.hypot.reduce(np.diff(window, axis=0), axis=1)
-        way = np.concatenate([[0.0], np.cumsum(chords)])
-        windows: NDArray[np.float64] = np.lib.stride_tricks.sliding_window_view(
-            way, 2 * self._half + 1
-        )
-        centred = windows - windows[:, [self._half]]
+        missing = np.isnan(chords)
+        way = _windows(np.nancumsum(chords), self._half)
+        centred = way - way[:, [self._half]]
+        centred[np.ptp(_windows(np.cumsum(missing), self._half), axis=1) > 0] = np.nan
         feed, acceleration, jerk = (
             centred @ weights / self._dt_s**power
             for power, weights in enumerate(self._weights, start=1)
         )
         return feed, acceleration, jerk
+
+
+def _windows(sums: NDArray[Any], half: int) -> Floats:
+    """The sums from 0 on, as rows of 2 half + 1."""
+    whole = np.concatenate([[0.0], sums])
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(whole, 2 * half + 1))

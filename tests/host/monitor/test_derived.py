@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""What the plots show agrees with what `simulate` computes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hodograph.chain import load_chain
+from hodograph.errors import InputError
+from hodograph.monitor.decoder import Decoder
+from hodograph.monitor.derived import Derivation, Rows, derivative_weights
+from hodograph.monitor.path import ProgramPath
+from hodograph.simulate import Motion, simulate
+from traffic import EXAMPLES, alpha
+
+STILL = 300
+COUNTS_PER_MM = 1_000_000
+
+
+def rows_of(chunk: int, path: ProgramPath | None) -> Rows:
+    _, frames = alpha()
+    decoder, derivation = Decoder((2, 3)), Derivation(2, COUNTS_PER_MM, 1000)
+    parts = [
+        derivation.feed(decoder.feed(part), path)
+        for part in np.split(frames, range(chunk, frames.size, chunk))
+    ]
+    names = Rows.__dataclass_fields__
+    return Rows(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names})
+
+
+def motion() -> Motion:
+    chain = load_chain(EXAMPLES / "alpha.toml", None)
+    drives = [axis.drive for axis in chain.machine.axes if axis.drive is not None]
+    return simulate(chain.image, drives)
+
+
+@pytest.mark.parametrize("chunk", [200, 333, 100_000])
+def test_contour_and_following_errors_are_those_of_simulate(chunk: int) -> None:
+    expected = motion()
+    rows = rows_of(chunk, ProgramPath(alpha()[0], COUNTS_PER_MM))
+    first = STILL - round(rows.t_s[0] * 1000)
+    count = rows.count - first
+    assert count > 1200
+    contour = rows.contour_um[first:]
+    assert not np.isnan(contour).any()
+    assert contour == pytest.approx(expected.contour_error_um[:count], abs=1e-4)
+    assert rows.following_um[first:] == pytest.approx(expected.following_error_um[:count], abs=1e-6)
+    assert np.nanmax(rows.contour_um) == pytest.approx(expected.contour_error_um.max(), abs=1e-4)
+
+
+def test_feed_acceleration_and_jerk_are_the_programs() -> None:
+    expected = motion()
+    rows = rows_of(500, None)
+    first = STILL - round(rows.t_s[0] * 1000)
+    feed = rows.feed_mm_s[first : first + 1000]
+    assert feed == pytest.approx(expected.feed_mm_s[:1000], abs=0.3)
+    middle = slice(first + 300, first + 700)  # constant feed
+    assert rows.feed_mm_s[middle] == pytest.approx(100, abs=1e-3)
+    assert np.abs(rows.acceleration_mm_s2[middle]).max() < 1
+    assert np.abs(rows.jerk_mm_s3[middle]).max() < 100
+    assert 1000 < rows.acceleration_mm_s2.max() < 2500
+    assert np.isnan(rows.contour_um).all()
+
+
+def test_off_the_path_there_is_no_contour_error() -> None:
+    path = ProgramPath(alpha()[0], COUNTS_PER_MM)
+    away = np.array([[5e6, -2e6], [5.1e6, -2e6]])
+    assert np.isnan(path.contour_errors_um(away, away)).all()
+    start = np.array([[0.0, 0.0], [0.0, 0.0]])
+    assert path.contour_errors_um(start, start) == pytest.approx([0, 0], abs=1e-3)
+    assert path.arc_length_mm == pytest.approx(0, abs=1e-6)
+
+
+def test_the_drawing_is_the_curve_from_start_to_end() -> None:
+    path = ProgramPath(alpha()[0], COUNTS_PER_MM)
+    points = path.drawing()
+    assert points[0] == pytest.approx([0, 0], abs=1e-9)
+    assert points[-1] == pytest.approx([0, 18], abs=1e-6)
+    assert path.name == "alpha"
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    assert steps.sum() == pytest.approx(path.length_mm, rel=1e-4)
+
+
+def test_what_is_no_program_is_refused() -> None:
+    with pytest.raises(InputError):
+        ProgramPath(b"nothing", COUNTS_PER_MM)
+
+
+@pytest.mark.parametrize("derivative", [1, 2, 3])
+def test_the_fit_is_exact_for_polynomials(derivative: int) -> None:
+    weights = derivative_weights(10, 4, derivative)
+    steps = np.arange(-10.0, 11.0)
+    values = np.polynomial.Polynomial([1, 2, 3, 4, 5])(steps)
+    expected = np.polynomial.Polynomial([1, 2, 3, 4, 5]).deriv(derivative)(0)
+    assert weights @ values == pytest.approx(expected)
+
+
+def test_missing_values_do_not_spread_for_ever() -> None:
+    _, frames = alpha()
+    frames = np.delete(frames, slice(2500, 2525))  # five SYNCs
+    decoder, derivation = Decoder((2, 3)), Derivation(2, COUNTS_PER_MM, 1000)
+    rows = derivation.feed(decoder.feed(frames), None)
+    assert np.count_nonzero(np.isnan(rows.feed_mm_s)) < 40
+    assert np.all(np.diff(rows.t_s) > 0)
