@@ -86,7 +86,7 @@ VARIANTS := host asan clang
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c test unit pytest run lint format soak bench clean distclean help lock packages venv FORCE
+.PHONY: build c test unit pytest run faults lint format soak bench clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -122,6 +122,11 @@ run: build ## run the alpha and the heart on a CAN bus, write a report to out/, 
 SOAK_S ?= 3600
 soak: build ## programs over and over for SOAK_S seconds of bus time (an hour), every frame looked at
 	@tools/with-vcan $(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
+
+SEEDS ?= 5
+SCENARIO ?=
+faults: build ## inject faults into simulated machines, judge what comes of them, print a table (SEEDS=5, SCENARIO=...)
+	@$(PY) tools/run_faults.py --seeds $(SEEDS) --output $(BUILD)/faults.json $(SCENARIO)
 
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/bench.py --build $(BUILD)

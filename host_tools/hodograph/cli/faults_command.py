@@ -23,7 +23,11 @@ def faults(options: Namespace) -> None:
     seeds = range(first, first + (options.seeds if options.seed is None else 1))
     verdicts = []
     for verdict in run_campaign(
-        scenarios, seeds, parse_address(options.bus), parse_address(options.drives_bus)
+        scenarios,
+        seeds,
+        parse_address(options.bus),
+        parse_address(options.drives_bus),
+        options.part,
     ):
         verdicts.append(verdict)
         if options.verbose:

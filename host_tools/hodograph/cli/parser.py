@@ -70,6 +70,14 @@ def count(text: str) -> int:
     return int(text)
 
 
+def part(text: str) -> tuple[int, int]:
+    """One of several equal parts."""
+    match = re.fullmatch(r"(\d{1,3})/(\d{1,3})", text)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise argparse.ArgumentTypeError(f'"{text}" is no part such as 1/2')
+    return int(match[1]), int(match[2])
+
+
 def node_number(text: str) -> int:
     """A CANopen node number."""
     if not text.isdigit() or not 1 <= int(text) <= 127:
@@ -383,6 +391,13 @@ def make_parser() -> argparse.ArgumentParser:
         default="socketcan:vcan1",
         metavar="INTERFACE:CHANNEL",
         help="the drives' side (default socketcan:vcan1)",
+    )
+    faults.add_argument(
+        "--part",
+        type=part,
+        default=(1, 1),
+        metavar="K/N",
+        help="every N-th case only, from the K-th on",
     )
     faults.add_argument("--verbose", action="store_true", help="a line for each case on stderr")
     _bus(faults)

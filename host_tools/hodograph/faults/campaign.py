@@ -15,13 +15,20 @@ Progress = Callable[[Verdict], None]
 
 
 def run_campaign(
-    scenarios: Sequence[Scenario], seeds: Sequence[int], bus: BusAddress, drives_bus: BusAddress
+    scenarios: Sequence[Scenario],
+    seeds: Sequence[int],
+    bus: BusAddress,
+    drives_bus: BusAddress,
+    part: tuple[int, int] = (1, 1),
 ) -> Iterator[Verdict]:
-    """Runs and judges every scenario with every seed. Raises BusError when the buses are not two virtual ones."""
+    """Runs and judges every scenario with every seed; of `part` (k, n) every n-th case, from the k-th on.
+
+    Raises BusError when the buses are not two virtual ones.
+    """
     for address in (bus, drives_bus):
         check_socketcan(address)
         if not is_virtual(address):
             raise BusError(f"{address}: not a virtual CAN: faults are for simulated machines only")
-    for scenario in scenarios:
-        for seed in seeds:
-            yield judge(run_case(draw(scenario, seed), bus, drives_bus))
+    cases = [draw(scenario, seed) for scenario in scenarios for seed in seeds]
+    for case in cases[part[0] - 1 :: part[1]]:
+        yield judge(run_case(case, bus, drives_bus))

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +43,12 @@ class Verdict:
     def detected(self) -> bool:
         """Whether a fault was raised."""
         return bool(self.codes)
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any]) -> Verdict:
+        """The verdict that `summary` was made from."""
+        lists = {key: tuple(summary[key]) for key in ("codes", "violations")}
+        return cls(**{**summary, **lists})
 
     def summary(self) -> dict[str, object]:
         """For JSON."""

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""The judge finds each kind of violation in a made-up record, and none in a good one."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hodograph.bus.frames import RECORD_DTYPE, Frames
+from hodograph.faults.evidence import Evidence
+from hodograph.faults.judge import Verdict, judge
+from hodograph.faults.run_case import Job, Record, load_job
+from hodograph.faults.scenario import Case, Expectation, Scenario
+from hodograph.faults.table import text
+
+FOLDER = Path(__file__).resolve().parents[3] / "examples" / "faults"
+FOREVER = 10**9
+OE = 0x1237
+EXPECT = Expectation((0x8250,), False, 30, FOREVER, 80, FOREVER)
+BEGAN_US = 1_000_000
+INJECTED = [{"t_ns": 0, "tick": 50, "line": 1, "kind": "drop"}]
+
+
+@cache
+def job() -> Job:
+    return load_job(FOLDER / "path.toml")
+
+
+def frames(rows: list[tuple[int, int, bytes]]) -> Frames:
+    array = np.zeros(len(rows), dtype=RECORD_DTYPE)
+    for i, (time_us, identifier, data) in enumerate(rows):
+        array[i]["time_us"], array[i]["id"], array[i]["length"] = time_us, identifier, len(data)
+        array[i]["data"][: len(data)] = list(data)
+    return array
+
+
+def recording(
+    setpoints: NDArray[np.int32], emergency_tick: int | None, enabled_until: int, code: int = 0x8250
+) -> Frames:
+    """A tick is a millisecond; the first 5 stand. The drives answer with where they shall be."""
+    rows: list[tuple[int, int, bytes]] = []
+    path = np.concatenate([np.repeat(setpoints[:1], 5, axis=0), setpoints])
+    for k, target in enumerate(path):
+        us = BEGAN_US + 1000 * k
+        rows.append((us, 0x80, bytes([k % 240 + 1])))
+        if emergency_tick is not None and k == emergency_tick + 5:
+            rows.append((us, 0x81, struct.pack("<H6x", code)))
+        for node, counts in enumerate(target.tolist(), start=2):
+            control = 0x0F if k < enabled_until + 5 else 0x06
+            rows.append((us, 0x180 + node, struct.pack("<Hi", OE, counts)))
+            rows.append((us, 0x200 + node, struct.pack("<Hi", control, counts)))
+    return frames(rows)
+
+
+def record(recorded: Frames, expect: Expectation = EXPECT, *, at: int = 50) -> Record:
+    scenario = Scenario(
+        "made-up", "x", FOLDER / "path.toml", ("drop at=50 id=1",), {}, "none", expect
+    )
+    made = Record(Case(scenario, 0, {"seed": 1}), job())
+    made.injections = list(INJECTED)
+    made.evidence = Evidence(recorded, recorded, (2, 3))
+    made.began_us = BEGAN_US + 1000 * (5 + at)
+    made.again = job().clean
+    return made
+
+
+def stopped(at: int) -> NDArray[np.int32]:
+    """The setpoints of a program that comes to rest on the path from tick `at` on."""
+    time = np.arange(2 * len(job().setpoints), dtype=np.float64)
+    ahead = np.clip(time - at, 0, 60)
+    tick = np.where(time < at, time, at + ahead - ahead**2 / 120)
+    nominal = job().setpoints.astype(np.float64)
+    return np.stack(
+        [np.interp(tick, np.arange(len(nominal)), nominal[:, i]) for i in range(2)], axis=1
+    ).astype(np.int32)
+
+
+def violations(made: Record) -> list[str]:
+    return list(judge(made).violations)
+
+
+def test_a_tolerated_fault_has_no_violation() -> None:
+    made = record(recording(job().setpoints, None, FOREVER), replace(EXPECT, codes=()))
+    made.finished = True
+    assert violations(made) == []
+
+
+def test_latencies_are_counted_in_ticks() -> None:
+    verdict = judge(record(recording(stopped(60), 62, 200)))
+    assert verdict.codes == (0x8250,)
+    assert verdict.latency_ticks == 12
+    assert verdict.rest_ticks is not None
+    assert 50 < verdict.rest_ticks < 62
+    # Setpoints between two nominal ones lie on the chord, beside the curve by some nanometres.
+    assert all("away from the curve" in words for words in verdict.violations)
+
+
+def test_no_fault_late_fault_and_a_wrong_one() -> None:
+    made = record(recording(job().setpoints, None, FOREVER))
+    made.finished = True
+    assert violations(made) == ["no fault was raised"]
+    late = violations(record(recording(stopped(100), 100, 200)))
+    assert "fault raised after 50 ticks, 30 are allowed" in late
+    wrong = violations(record(recording(stopped(60), 60, 200, code=0x1000)))
+    assert "fault 0x1000 was raised, which is none of those expected" in wrong
+
+
+def test_axes_that_move_on() -> None:
+    found = violations(record(recording(job().setpoints, 60, 60)))
+    assert any(words.startswith("axes at rest after") for words in found)
+
+
+def test_a_jump_and_a_way_beside_the_path() -> None:
+    moved = job().setpoints.copy()
+    moved[300:] += 20_000
+    made = record(recording(moved, None, FOREVER), replace(EXPECT, codes=()))
+    made.finished = True
+    found = violations(made)
+    assert any(words.startswith("setpoint jump at SYNC 305") for words in found)
+    assert any("away from the curve" in words for words in found)
+
+
+def test_what_did_not_happen_or_not_recover() -> None:
+    made = record(recording(job().setpoints, None, FOREVER), replace(EXPECT, codes=()))
+    made.injections = []
+    made.again = None
+    assert violations(made) == [
+        "nothing was injected",
+        "the program did not come to its end, and no fault says why",
+        "no clean run afterwards",
+    ]
+    made.injections, made.finished = list(INJECTED), True
+    made.again = replace(job().clean, encoders_sha256="0", setpoints_sha256="1")
+    assert violations(made) == [
+        "the run afterwards has other setpoints",
+        "the run afterwards has other encoder positions",
+    ]
+
+
+def test_the_table_has_the_worst_of_each_scenario() -> None:
+    one = judge(record(recording(stopped(60), 62, 200)))
+    quick: Verdict = replace(one, seed=1, latency_ticks=3, violations=())
+    slow: Verdict = replace(one, seed=2, latency_ticks=17, violations=("it broke",))
+    lines = text([quick, slow]).splitlines()
+    row = next(line for line in lines if line.startswith("made-up"))
+    assert row.split()[1:6] == ["2", "2", "2", "8250", "17"]
+    assert row.split()[-1] == "1"
+    assert lines[-1] == "violation: made-up seed 2 (): it broke"

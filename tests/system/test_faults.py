@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""Some scenarios of `make faults`, one seed each: what is injected is detected or survived, without a violation."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from hodograph.bus.address import parse_address
+from hodograph.cli.main import main
+from hodograph.data import EXAMPLES
+from hodograph.faults.campaign import run_campaign
+from hodograph.faults.scenario import find_scenarios
+
+pytestmark = pytest.mark.bus
+
+SOME = [
+    "bus-off",
+    "bus-off-tick",
+    "controller-heartbeat-lost",
+    "cut-upload",
+    "drive-fault",
+    "drive-restarts",
+    "drive-stops",
+    "encoder-jumps",
+    "flood",
+    "kill-controller",
+    "kill-drives",
+    "kill-host",
+    "kill-one-drive",
+    "limit-switch",
+    "rpdo1-corrupt-target",
+    "rpdo1-lost",
+    "sync-lost",
+    "tpdo1-late",
+    "tpdo1-lost",
+    "tpdo1-lost-once",
+]
+BUS, DRIVES_BUS = parse_address("socketcan:vcan0"), parse_address("socketcan:vcan1")
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_no_violation(name: str) -> None:
+    scenarios = find_scenarios(EXAMPLES / "faults", [name])
+    (verdict,) = run_campaign(scenarios, [0], BUS, DRIVES_BUS)
+    assert verdict.injected > 0
+    assert verdict.violations == (), verdict.summary()
+
+
+def test_the_command_fails_where_there_are_violations(
+    capsys: pytest.CaptureFixture[str], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """A scenario that expects a fault where none can be."""
+    folder = tmp_path_factory.mktemp("scenarios")
+    path = EXAMPLES / "faults" / "path.toml"
+    (folder / "wrong.toml").write_text(
+        f'text = "volts get lost"\npath = "{path}"\nrules = ["drop at=50 id=0x282"]\n'
+        "[expect]\ncodes = [0x8250]\n"
+    )
+    assert main(["faults", str(folder / "wrong.toml"), "--seeds", "1", "--json"]) == 6
+    out, err = capsys.readouterr()
+    result = json.loads(out)
+    assert result["violations"] == 1
+    assert result["cases"][0]["violations"] == ["no fault was raised"]
+    assert "1 violations in 1 cases" in err
