@@ -46,6 +46,7 @@ _LIMIT_S = 30.0
 _LOOK_S = 0.02
 _TAKE_S = 0.05
 _SYNCS, _TICK = 1, 2
+SDO_ASK = 0x600
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ def run_case(case: Case, bus: BusAddress, drives_bus: BusAddress) -> Record:
         Recorder(drives_bus, _TAKE_S) as drives,
     ):
         try:
-            _disturbed(record, stand, controller)
+            _disturbed(record, stand, controller, control)
         except HodographError as error:
             record.troubles.append(f"disturbed run: {error}")
         _gather(record, stand, control, drives)
@@ -134,7 +135,7 @@ def _gather(record: Record, stand: Stand, control: Recorder, drives: Recorder) -
         record.began_us = (ns + time.time_ns() - time.monotonic_ns()) // 1000
 
 
-def _disturbed(record: Record, stand: Stand, controller: Controller) -> None:
+def _disturbed(record: Record, stand: Stand, controller: Controller, control: Recorder) -> None:
     job, case = record.job, record.case
     controller.require(5.0)
     controller.configure(job.machine, "fixed")
@@ -142,7 +143,7 @@ def _disturbed(record: Record, stand: Stand, controller: Controller) -> None:
     controller.enable()
     controller.upload(job.image)
     if case.scenario.action in ("cut-upload", "kill-upload"):
-        _disturb_upload(record, stand, controller)
+        _disturb_upload(record, stand, controller, control)
         return
     process = None
     if case.scenario.action == "kill-host":
@@ -187,6 +188,9 @@ def _follow(
 def _act(record: Record, stand: Stand, process: subprocess.Popen[bytes] | None) -> bool:
     """Does what the scenario asks of the host; whether there still is a controller."""
     action = record.case.scenario.action
+    if action == "watch-drives":
+        _watch_drives(record, stand)
+        return True
     record.began_us = time.time_ns() // 1000
     if action == "kill-drives":
         for drive in stand.drives:
@@ -197,12 +201,16 @@ def _act(record: Record, stand: Stand, process: subprocess.Popen[bytes] | None) 
         kill(process)
     elif action == "kill-controller":
         stand.controller.kill()
-        machine = record.job.machine
-        with drives_at(stand.drives_bus, machine.nodes, machine.bitrate) as clients:
-            rest_s = await_rest(clients, REST_TOLERANCE_COUNTS, _LIMIT_S)
-        record.rest_us = int((rest_s + time.time() - time.monotonic()) * 1e6)
+        _watch_drives(record, stand)
         return False
     return True
+
+
+def _watch_drives(record: Record, stand: Stand) -> None:
+    machine = record.job.machine
+    with drives_at(stand.drives_bus, machine.nodes, machine.bitrate) as clients:
+        rest_s = await_rest(clients, REST_TOLERANCE_COUNTS, _LIMIT_S)
+    record.rest_us = int((rest_s + time.time() - time.monotonic()) * 1e6)
 
 
 def _await_end_of_rules(record: Record, controller: Controller) -> None:
@@ -217,14 +225,18 @@ def _await_end_of_rules(record: Record, controller: Controller) -> None:
     time.sleep(case.longest_ms / 1000 + QUIET_S)
 
 
-def _disturb_upload(record: Record, stand: Stand, controller: Controller) -> None:
+def _disturb_upload(
+    record: Record, stand: Stand, controller: Controller, control: Recorder
+) -> None:
     """Breaks an upload of another program off; what was there must stay."""
     other = load_job(record.job.other).image
     at = int(record.case.drawn["permille"]) * len(other) // 1000
     record.began_us = time.time_ns() // 1000
     if record.case.scenario.action == "kill-upload":
         process = spawn_upload(record.job.other, stand.bus)
-        time.sleep(int(record.case.drawn["ms"]) / 1000)
+        _await_frames(
+            control, SDO_ASK + controller.node_id, int(record.case.drawn["frames"]), process
+        )
         kill(process)
     else:
         cut_upload(controller, other, at, polite=record.case.drawn["manner"] == "abort")
@@ -238,6 +250,20 @@ def _disturb_upload(record: Record, stand: Stand, controller: Controller) -> Non
     if controller.program_crc() != zlib.crc32(other[16:]):
         record.troubles.append("the upload after the broken one did not arrive")
     record.finished = True
+
+
+def _await_frames(
+    control: Recorder, identifier: int, more: int, process: subprocess.Popen[bytes]
+) -> None:
+    """Until so many frames have come since now, or the process has ended."""
+
+    def count() -> int:
+        return int(np.count_nonzero(control.frames()["id"] == identifier))
+
+    wanted = count() + more
+    deadline = time.monotonic() + _LIMIT_S
+    while count() < wanted and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(_LOOK_S)
 
 
 def _crc_after_cut(controller: Controller) -> int | None:

@@ -37,11 +37,12 @@ ACTIONS = (
     "kill-drives",
     "kill-one-drive",
     "kill-host",
+    "watch-drives",
     "cut-upload",
     "kill-upload",
 )
 _NO_LIMIT = 10**9
-_EXPECT = ("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms")
+_EXPECT = ("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders")
 
 Drawn = int | str
 
@@ -56,6 +57,7 @@ class Expectation:
     within_ms: int
     rest_ticks: int
     rest_ms: int
+    same_encoders: bool = True
 
 
 @dataclass(frozen=True)
@@ -160,6 +162,7 @@ def _expectation(table: Table, raw: Mapping[str, Any]) -> Expectation:
         within_ms=limit("within_ms"),
         rest_ticks=limit("rest_ticks"),
         rest_ms=limit("rest_ms"),
+        same_encoders=table.flag("same_encoders", True),
     )
 
 
