@@ -96,10 +96,14 @@ bool drive_pdo_op(const struct drive_pdo *pdo, uint8_t node, uint16_t setpoint_t
     default:
         break;
     }
-    const uint32_t entry = item - (uint32_t)ITEM_ENTRIES;
+    uint32_t entry = item - (uint32_t)ITEM_ENTRIES;
     if (entry < pdo->count) {
         write_number(op, pdo->communication + MAPPING, entry + 1u, 4, pdo->entries[entry]);
         return true;
     }
-    return after_entries(pdo, node, setpoint_timeout_ms, entry - pdo->count, op);
+    entry -= pdo->count;
+    if (pdo->inhibit_ms == 0u && entry >= AFTER_INHIBIT) {
+        entry++;
+    }
+    return after_entries(pdo, node, setpoint_timeout_ms, entry, op);
 }
