@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: MIT
+"""The server as a browser, or somebody who is none, meets it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import aiohttp
+import pytest
+from aiohttp import WSMsgType
+from aiohttp.test_utils import TestClient, TestServer
+
+from hodograph.errors import InputError, RefusedError
+from hodograph.monitor.commands import read_command
+from hodograph.monitor.hub import Hub
+from hodograph.monitor.security import Guard
+from hodograph.monitor.server import MOST_CLIENTS, Server
+
+TOKEN = "a-token-for-these-tests"
+
+Browser = TestClient[Any, Any]
+
+
+class Case:
+    """A server, and what it was told to obey."""
+
+    def __init__(self, host: str = "127.0.0.1") -> None:
+        self.obeyed: list[dict[str, Any]] = []
+        self.guard = Guard(host, TOKEN)
+        self.hub: Hub
+
+    async def obey(self, request: dict[str, Any]) -> str:
+        if request.get("name") == "refuse":
+            raise RefusedError("not now")
+        self.obeyed.append(request)
+        return "done"
+
+    def run(self, scenario: Callable[[Browser], Awaitable[None]]) -> None:
+        async def whole() -> None:
+            self.hub = Hub(asyncio.get_running_loop())
+            server = Server(self.guard, self.hub, {"mode": "live"}, self.obey)
+            async with TestClient(TestServer(server.app)) as browser:
+                await scenario(browser)
+
+        asyncio.run(whole())
+
+
+def origin(browser: Browser) -> str:
+    return str(browser.make_url("/")).rstrip("/")
+
+
+async def hello(browser: Browser, **more: Any) -> aiohttp.ClientWebSocketResponse:
+    socket = await browser.ws_connect("/ws", headers={"Origin": origin(browser)})
+    await socket.send_json({"type": "hello"} | more)
+    return socket
+
+
+async def answer(socket: aiohttp.ClientWebSocketResponse, kind: str) -> Any:
+    while True:
+        message = await socket.receive_json(timeout=5)
+        if message["type"] == kind:
+            return message
+
+
+def test_the_page_and_nothing_else_is_served() -> None:
+    async def scenario(browser: Browser) -> None:
+        for name in ("/", "/index.html", "/page.js", "/style.css", "/icon.svg"):
+            found = await browser.get(name)
+            assert found.status == 200, name
+            assert "default-src 'none'" in found.headers["Content-Security-Policy"]
+            assert found.headers["X-Frame-Options"] == "DENY"
+            assert TOKEN not in await found.text()
+        for name in ("/server.py", "/../server.py", "/%2e%2e/server.py", "/page/page.js", "/x"):
+            assert (await browser.get(name)).status == 404, name
+        assert (await browser.post("/")).status == 405
+
+    Case().run(scenario)
+
+
+def test_foreign_hosts_and_origins_get_nothing() -> None:
+    async def scenario(browser: Browser) -> None:
+        for path in ("/", "/ws"):
+            found = await browser.get(path, headers={"Host": "evil.example:8402"})
+            assert found.status == 421
+        for foreign in ("http://evil.example", "null", "http://localhost:1"):
+            with pytest.raises(aiohttp.WSServerHandshakeError) as caught:
+                await browser.ws_connect("/ws", headers={"Origin": foreign})
+            assert caught.value.status == 403
+        with pytest.raises(aiohttp.WSServerHandshakeError):
+            await browser.ws_connect("/ws")
+
+    Case().run(scenario)
+
+
+def test_with_the_token_commands_are_obeyed() -> None:
+    case = Case()
+
+    async def scenario(browser: Browser) -> None:
+        socket = await hello(browser, token=TOKEN)
+        assert (await answer(socket, "hello"))["may_command"] is True
+        await socket.send_json({"type": "command", "id": 7, "name": "hold"})
+        found = await answer(socket, "answer")
+        assert found == {"type": "answer", "id": 7, "ok": True, "text": "done"}
+        await socket.send_json({"type": "command", "id": 8, "name": "refuse"})
+        assert (await answer(socket, "answer"))["text"] == "not now"
+
+    case.run(scenario)
+    assert [request["name"] for request in case.obeyed] == ["hold"]
+
+
+def test_without_the_token_loopback_may_look_on_only() -> None:
+    case = Case()
+
+    async def scenario(browser: Browser) -> None:
+        socket = await hello(browser)
+        assert (await answer(socket, "hello"))["may_command"] is False
+        for name in ("hold", "override", "quick-stop"):
+            await socket.send_json({"type": "command", "id": 1, "name": name, "token": TOKEN})
+            found = await answer(socket, "answer")
+            assert not found["ok"]
+            assert "token" in found["text"]
+        case.hub.publish({"type": "rows", "i": 1})
+        assert (await answer(socket, "rows"))["i"] == 1
+
+    case.run(scenario)
+    assert case.obeyed == []
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+@pytest.mark.parametrize("token", ["wrong", TOKEN + "x", 5, [TOKEN]])
+def test_a_wrong_token_is_refused(host: str, token: Any) -> None:
+    async def scenario(browser: Browser) -> None:
+        socket = await hello(browser, token=token)
+        message = await socket.receive(timeout=5)
+        assert message.type is WSMsgType.CLOSE
+        assert socket.close_code == 4401
+
+    Case(host).run(scenario)
+
+
+def test_an_open_server_shows_nothing_without_the_token() -> None:
+    case = Case("0.0.0.0")
+
+    async def scenario(browser: Browser) -> None:
+        socket = await hello(browser)
+        assert (await socket.receive(timeout=5)).type is WSMsgType.CLOSE
+        assert socket.close_code == 4401
+        socket = await hello(browser, token=TOKEN)
+        assert (await answer(socket, "hello"))["may_command"] is True
+
+    case.run(scenario)
+
+
+@pytest.mark.parametrize("text", ["no json", "[]", "5", "x" * 10000, '{"type":"hello","token":'])
+def test_nonsense_ends_the_connection_and_not_the_server(text: str) -> None:
+    async def scenario(browser: Browser) -> None:
+        for first in (True, False):
+            socket = await browser.ws_connect("/ws", headers={"Origin": origin(browser)})
+            if not first:
+                await socket.send_json({"type": "hello", "token": TOKEN})
+                await answer(socket, "hello")
+            await socket.send_str(text)
+            while (message := await socket.receive(timeout=5)).type is WSMsgType.TEXT:
+                assert json.loads(message.data)["type"] == "history"
+            assert message.type in (WSMsgType.CLOSE, WSMsgType.CLOSED)
+        assert (await browser.get("/")).status == 200
+
+    Case().run(scenario)
+
+
+def test_several_browsers_but_not_any_number() -> None:
+    async def scenario(browser: Browser) -> None:
+        sockets = [await hello(browser) for _ in range(MOST_CLIENTS)]
+        for socket in sockets:
+            await answer(socket, "hello")
+        one_more = await hello(browser)
+        assert (await one_more.receive(timeout=5)).type is WSMsgType.CLOSE
+        await sockets[0].close()
+        await asyncio.sleep(0.1)
+        assert (await answer(await hello(browser), "hello"))["mode"] == "live"
+
+    Case().run(scenario)
+
+
+def test_pings_come_back() -> None:
+    async def scenario(browser: Browser) -> None:
+        socket = await hello(browser)
+        await socket.send_json({"type": "ping", "at": 12.5})
+        assert (await answer(socket, "pong"))["at"] == 12.5
+
+    Case().run(scenario)
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {},
+        {"name": "format"},
+        {"name": ["hold"]},
+        {"name": "override"},
+        {"name": "override", "percent": 201},
+        {"name": "override", "percent": -1},
+        {"name": "override", "percent": 12.5},
+        {"name": "override", "percent": True},
+        {"name": "override", "percent": "100"},
+    ],
+)
+def test_what_is_no_command_is_refused(request_: dict[str, Any]) -> None:
+    with pytest.raises(InputError):
+        read_command(request_)
+
+
+def test_commands_are_the_controllers() -> None:
+    class Told:
+        def __init__(self) -> None:
+            self.told: list[Any] = []
+
+        def command(self, number: int) -> None:
+            self.told.append(number)
+
+        def override(self, percent: int) -> None:
+            self.told.append(("override", percent))
+
+    controller: Any = Told()
+    names = ("enable", "start", "stop", "disable", "reset", "hold", "resume", "quick-stop")
+    for name in names:
+        read_command({"name": name})(controller)
+    read_command({"name": "override", "percent": 150})(controller)
+    assert controller.told == [1, 2, 3, 4, 5, 6, 7, 9, ("override", 150)]
