@@ -17,6 +17,7 @@ int axis_motion_init(struct axis_motion *axis, const struct drive_config *config
         return error;
     }
     axis->config = *config;
+    axis->rated_torque_nm = drive_config_rated_torque_nm(config);
     axis->brake_volts = config->plant.volts_limit;
     axis->machine_mm = 0.0;
     influence_none(&axis->influence, config);
@@ -79,11 +80,10 @@ void axis_motion_shift(struct axis_motion *axis, int32_t from, int32_t to)
     axis_motion_rest(axis);
 }
 
-void axis_motion_offsets(struct axis_motion *axis, int32_t speed_counts_s, double volts)
+void axis_motion_offsets(struct axis_motion *axis, int32_t speed_counts_s, int16_t torque_permille)
 {
-    const double mm_s = (double)speed_counts_s * axis->drive.mm_per_count;
-    axis->influence.speed_offset_rad_s = mm_s / axis->config.plant.screw_mm_rad;
-    axis->influence.volts_offset = volts;
+    influence_offsets(&axis->influence, &axis->drive, &axis->config, speed_counts_s,
+                      torque_permille, axis->rated_torque_nm);
 }
 
 void axis_motion_follow(struct axis_motion *axis, int32_t target_counts)

@@ -17,7 +17,8 @@
 struct axis_motion {
     struct drive_config config;
     struct drive drive;
-    struct influence influence;  /* set by axis_motion_influence, and the faults */
+    struct influence influence; /* set by axis_motion_influence, and the faults */
+    double rated_torque_nm;
     double brake_volts;          /* of the holding brake, as friction; more than 0 */
     double machine_mm;           /* place of the drive's zero in the machine: moved by homing */
     int32_t target_counts;       /* of the last period */
@@ -40,9 +41,8 @@ bool axis_motion_set_scale(struct axis_motion *axis, double counts_per_mm);
  * `to` from now on. */
 void axis_motion_shift(struct axis_motion *axis, int32_t from, int32_t to);
 
-/* Feedforward for the periods that follow: counts/s added to the speed reference, volts to the
- * output. */
-void axis_motion_offsets(struct axis_motion *axis, int32_t speed_counts_s, double volts);
+/* Feedforward for the periods that follow: counts/s, and per mille of the rated torque. */
+void axis_motion_offsets(struct axis_motion *axis, int32_t speed_counts_s, int16_t torque_permille);
 
 /* One period towards a target. */
 void axis_motion_follow(struct axis_motion *axis, int32_t target_counts);

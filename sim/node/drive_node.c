@@ -35,7 +35,7 @@ static void drive_node_reset(void *context)
     cia402_device_init(&node->device);
     (void)cia402_device_ready(&node->device);
     (void)axis_motion_set_scale(&node->axis, 0.0);
-    axis_motion_offsets(&node->axis, 0, 0.0);
+    axis_motion_offsets(&node->axis, 0, 0);
     drive_node_homing_leave(node);
     node->silence_us = 0;
     node->following_us = 0;
@@ -91,6 +91,7 @@ bool drive_node_equip(struct drive_node *node, const struct equipment *equipment
     const struct drive_plant *plant = &node->axis.config.plant;
     const double rated_volts = equipment->rated_torque_nm * plant->torque_to_volts;
     node->equipment = *equipment;
+    node->axis.rated_torque_nm = equipment->rated_torque_nm;
     node->axis.brake_volts = equipment->brake_volts;
     node->axis.influence.friction_volts = equipment->friction_volts;
     node->load_per_volt = 1.0 / rated_volts;

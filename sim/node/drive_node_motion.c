@@ -63,7 +63,7 @@ static void drive_node_offsets(struct drive_node *node, bool on)
     const int16_t torque = on ? node->values.torque_offset : 0;
     const bool act = speed != 0 || torque != 0;
     if (act || node->offsets_act) {
-        axis_motion_offsets(&node->axis, speed, 0.001 * (double)torque / node->load_per_volt);
+        axis_motion_offsets(&node->axis, speed, torque);
     }
     node->offsets_act = act;
 }

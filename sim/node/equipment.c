@@ -3,16 +3,15 @@
 
 void equipment_init(struct equipment *e, const struct drive_config *config)
 {
-    const struct drive_plant *plant = &config->plant;
     e->limit_negative_mm = -EQUIPMENT_NOWHERE;
     e->limit_positive_mm = EQUIPMENT_NOWHERE;
     e->home_from_mm = EQUIPMENT_NOWHERE;
     e->home_to_mm = -EQUIPMENT_NOWHERE;
-    e->rated_torque_nm = 0.5 * plant->volts_limit / plant->torque_to_volts;
+    e->rated_torque_nm = drive_config_rated_torque_nm(config);
     e->rated_current_a = 5.0;
     e->overload_s = 10.0;
     e->friction_volts = 0.0;
-    e->brake_volts = plant->volts_limit;
+    e->brake_volts = config->plant.volts_limit;
     e->serial = 0;
 }
 

@@ -36,6 +36,11 @@ static bool drive_encoder_ok(const struct drive_config *c)
            c->counts_per_mm >= 1 && c->counts_per_mm <= UINT32_C(1000000000);
 }
 
+double drive_config_rated_torque_nm(const struct drive_config *c)
+{
+    return 0.5 * c->plant.volts_limit / c->plant.torque_to_volts;
+}
+
 uint32_t drive_config_samples(const struct drive_config *c)
 {
     const uint64_t scaled = (uint64_t)c->loop_rate_hz * c->period_us;

@@ -22,6 +22,16 @@ bool influence_acts(const struct influence *in, const struct drive *drive)
            in->volts_limit != drive->pdff.volts_limit;
 }
 
+void influence_offsets(struct influence *in, const struct drive *drive,
+                       const struct drive_config *config, int32_t speed_counts_s,
+                       int16_t torque_permille, double rated_torque_nm)
+{
+    const double mm_s = (double)speed_counts_s * drive->mm_per_count;
+    const double torque_nm = 0.001 * (double)torque_permille * rated_torque_nm;
+    in->speed_offset_rad_s = mm_s / config->plant.screw_mm_rad;
+    in->volts_offset = torque_nm * config->plant.torque_to_volts;
+}
+
 double influence_read_mm(const struct influence *in, const struct drive *drive)
 {
     if (in->encoder_frozen) {

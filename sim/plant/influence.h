@@ -30,6 +30,12 @@ void influence_none(struct influence *influence, const struct drive_config *conf
 /* Whether anything acts that drive_period does not know. */
 bool influence_acts(const struct influence *influence, const struct drive *drive);
 
+/* The feedforward of the periods that follow: 0x60B1 in bus counts a second, 0x60B2 in per mille of
+ * the rated torque. */
+void influence_offsets(struct influence *influence, const struct drive *drive,
+                       const struct drive_config *config, int32_t speed_counts_s,
+                       int16_t torque_permille, double rated_torque_nm);
+
 /* The position that the drive reads, mm; and in bus counts, rounded and saturated. */
 double influence_read_mm(const struct influence *influence, const struct drive *drive);
 int32_t influence_read_counts(const struct influence *influence, const struct drive *drive);

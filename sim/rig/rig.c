@@ -43,6 +43,8 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
     }
     rig->counts_per_mm = drives[0].counts_per_mm;
     rig->tick = 0;
+    rig->feedforward = false;
+    rig->program_ticks = program_ticks(program);
     if (interp_begin(&rig->interp, program, kernel) != 0) {
         return RIG_ERR_KERNEL;
     }
@@ -52,10 +54,22 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
     }
     for (int axis = 0; axis < 2; axis++) {
         drive_place(&rig->drives[axis], start[axis]);
+        rig->configs[axis] = drives[axis];
+        influence_none(&rig->influences[axis], &drives[axis]);
     }
     timebase_begin(&rig->timebase, program, program->header.period_us);
     contour_begin(&rig->contour, program, segments);
     return 0;
+}
+
+void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2])
+{
+    for (int axis = 0; axis < 2; axis++) {
+        rig->gains[axis] = gains[axis];
+        rig->gains[axis].period_us = rig->configs[axis].period_us;
+        rig->gains[axis].counts_per_mm = rig->counts_per_mm;
+    }
+    rig->feedforward = true;
 }
 
 static int rig_command(struct rig *rig, struct rig_row *row)
@@ -75,9 +89,42 @@ static int rig_command(struct rig *rig, struct rig_row *row)
     return 0;
 }
 
+/* As the controller sends it: from the program's first setpoint to its last, the first at rest. */
+static struct feedforward_offset rig_offset(struct rig *rig, const struct rig_row *row, int axis)
+{
+    const struct feedforward_offset none = {0, 0};
+    if (row->tick == 0) {
+        feedforward_begin(&rig->feedforwards[axis], row->cmd_q40_mm[axis]);
+    }
+    return row->tick < rig->program_ticks
+               ? feedforward_next(&rig->feedforwards[axis], &rig->gains[axis],
+                                  row->cmd_q40_mm[axis])
+               : none;
+}
+
+static void rig_move_forward(struct rig *rig, const struct rig_row *row)
+{
+    for (int axis = 0; axis < 2; axis++) {
+        struct influence *influence = &rig->influences[axis];
+        const struct feedforward_offset offset = rig_offset(rig, row, axis);
+        influence_offsets(influence, &rig->drives[axis], &rig->configs[axis],
+                          offset.velocity_counts_s, offset.torque_permille,
+                          drive_config_rated_torque_nm(&rig->configs[axis]));
+        if (influence_acts(influence, &rig->drives[axis])) {
+            influence_period(influence, &rig->drives[axis], row->set_counts[axis]);
+        } else {
+            drive_period(&rig->drives[axis], row->set_counts[axis]);
+        }
+    }
+}
+
 static void rig_move(struct rig *rig, struct rig_row *row)
 {
-    drive_period_pair(&rig->drives[0], &rig->drives[1], row->set_counts);
+    if (rig->feedforward) {
+        rig_move_forward(rig, row);
+    } else {
+        drive_period_pair(&rig->drives[0], &rig->drives[1], row->set_counts);
+    }
     for (int axis = 0; axis < 2; axis++) {
         row->act_counts[axis] = drive_position_counts(&rig->drives[axis]);
         row->volts_mv[axis] = drive_volts_mv(&rig->drives[axis]);

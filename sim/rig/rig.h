@@ -14,12 +14,15 @@
 #ifndef HODOGRAPH_RIG_RIG_H
 #define HODOGRAPH_RIG_RIG_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
+#include "core/feedforward.h"
 #include "core/interp.h"
 #include "core/program.h"
 #include "core/timebase.h"
 #include "plant/drive.h"
+#include "plant/influence.h"
 #include "rig/contour.h"
 
 /* One tick; 64 bytes without holes. Python maps it as a numpy record. */
@@ -48,6 +51,12 @@ struct rig {
     struct timebase timebase;
     struct contour contour;
     struct drive drives[2];
+    struct drive_config configs[2];
+    struct influence influences[2];
+    struct feedforward feedforwards[2];
+    struct feedforward_gains gains[2];
+    bool feedforward;
+    uint32_t program_ticks;
     uint32_t counts_per_mm;
     uint32_t tick;
 };
@@ -56,6 +65,10 @@ struct rig {
  * 0 or an error. */
 int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
               const struct drive_config drives[2], struct contour_segment *segments);
+
+/* The controller's feedforward of both axes (0x2018 ... 0x201A), right after rig_begin; period and
+ * counts per mm in the gains are the rig's. The rated torque is drive_config_rated_torque_nm. */
+void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
 
 /* The next n ticks. Returns 0 or RIG_ERR_INTERP. */
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);

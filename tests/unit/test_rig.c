@@ -167,6 +167,30 @@ static void test_times_do_not_drift_in_long_programs(void)
     TEST_ASSERT_EQUAL_UINT64((UINT64_C(3999999) << 42) + UINT64_C(4362862139015), time);
 }
 
+/* The drive is told what it would have to find out: with the velocity's missing share it follows more closely,
+ * and with no gains the bits are the plain ones. */
+static void test_feedforward(void)
+{
+    const struct feedforward_gains none[2] = {{0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}};
+    struct feedforward_gains gains[2] = {{0, 0, 500, 0, 0}, {0, 0, 500, 0, 0}};
+    static struct rig_row forward[ROWS];
+    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    rig_feedforward(&rig, none);
+    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, memcmp(rows, forward, sizeof rows));
+    configs[0].pdff.k_pf_rad_mm = 0.3; /* 0.3 + 0.5 * 1/1.59 is near the 1/1.59 of the screw */
+    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    rig_feedforward(&rig, gains);
+    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
+    const int32_t plain = rows[500].set_counts[0] - rows[500].act_counts[0];
+    const int32_t better = forward[500].set_counts[0] - forward[500].act_counts[0];
+    TEST_ASSERT_TRUE(plain > 10000 && better < plain / 4 && better > -plain / 4);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -175,5 +199,6 @@ int main(void)
     RUN_TEST(test_faulty_set_up_is_refused);
     RUN_TEST(test_times_and_points);
     RUN_TEST(test_times_do_not_drift_in_long_programs);
+    RUN_TEST(test_feedforward);
     return UNITY_END();
 }

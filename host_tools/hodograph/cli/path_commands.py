@@ -176,6 +176,7 @@ def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) 
             machine.models(machine.plane),
             kernel=kernel or machine.kernel,
             counts_per_mm=machine.counts_per_mm,
+            feedforward=machine.plane_feedforward,
             keep_rows=keep_rows,
             progress=lambda done, total: bar(done),
         )

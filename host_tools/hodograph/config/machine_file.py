@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..names import KERNELS
-from .axis_table import Axis, read_axes
+from .axis_table import Axis, Feedforward, read_axes
 from .drive_file import Drive
 from .table import Table, read_toml
 
@@ -73,6 +73,12 @@ class Machine:
                 f"{self.file}: has one axis ({self.axes[0].name}), a path needs two: add a second [[axis]]"
             )
         return self.axes[0], self.axes[1]
+
+    @property
+    def plane_feedforward(self) -> tuple[Feedforward, Feedforward] | None:
+        """The feedforward of the axes that follow a path; None: they have none."""
+        x, y = (axis.feedforward for axis in self.plane)
+        return (x, y) if any(f.velocity or f.has_torque for f in (x, y)) else None
 
     def models(self, axes: Sequence[Axis]) -> tuple[Drive, ...]:
         """The drives of these axes as simulated. Raises InputError: one has no drive file."""

@@ -94,6 +94,7 @@ def load_job(path: Path) -> Job:
         image,
         machine.models(machine.plane),
         counts_per_mm=machine.counts_per_mm,
+        feedforward=machine.plane_feedforward,
         keep_rows=False,
     )
     return Job(machine, image, path.with_name("other.toml"), clean, setpoints)

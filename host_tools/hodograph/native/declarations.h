@@ -92,6 +92,11 @@ struct rig {
 };
 int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
               const struct drive_config drives[2], struct contour_segment *segments);
+struct feedforward_gains {
+    uint32_t period_us, counts_per_mm, velocity_permille;
+    int32_t torque_per_acceleration_q16, torque_per_velocity_q16;
+};
+void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
 int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);

@@ -14,6 +14,7 @@ from .library import library, text
 from .program import NativeProgram, kernel_code
 
 if TYPE_CHECKING:
+    from ..config.axis_table import Feedforward
     from ..config.drive_file import Drive
 
 ROW = np.dtype(
@@ -35,9 +36,17 @@ class Rig:
     """Interpolator, two drives and contour error; begins with the drives parked at the start point."""
 
     def __init__(
-        self, program: NativeProgram, kernel: str, drives: tuple[Drive, Drive], counts_per_mm: int
+        self,
+        program: NativeProgram,
+        kernel: str,
+        drives: tuple[Drive, Drive],
+        counts_per_mm: int,
+        feedforward: tuple[Feedforward, Feedforward] | None = None,
     ) -> None:
-        """Set up. Raises InputError: unknown kernel, figures out of range, program not acceptable."""
+        """Set up, with the controller's feedforward (None: none).
+
+        Raises InputError: unknown kernel, figures out of range, program not acceptable.
+        """
         ffi, lib = library()
         program.require()
         code = kernel_code(kernel)
@@ -54,6 +63,11 @@ class Rig:
         )
         if error != 0:
             raise InputError(_begin_error(error))
+        if feedforward is not None:
+            lib.rig_feedforward(
+                self._rig,
+                ffi.new("struct feedforward_gains[2]", [_gains(axis) for axis in feedforward]),
+            )
 
     def run(self, rows: NDArray[np.void]) -> None:
         """Fill `rows` (contiguous, of ROW) with the next ticks."""
@@ -67,6 +81,15 @@ class Rig:
             raise HodographError(
                 f"simulation: the interpolator failed (code {error}): report a bug"
             )
+
+
+def _gains(feedforward: Feedforward) -> dict[str, int]:
+    """Struct feedforward_gains with the figures that the controller is given; the rig adds the rest."""
+    return {
+        "velocity_permille": round(feedforward.velocity * 1000),
+        "torque_per_acceleration_q16": round(feedforward.torque_permille_s2_m * 65536),
+        "torque_per_velocity_q16": round(feedforward.torque_permille_s_m * 65536),
+    }
 
 
 def _begin_error(code: int) -> str:

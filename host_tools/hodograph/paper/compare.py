@@ -112,6 +112,7 @@ def _contour_rows(chain: Chain, printed: Printed, row: Any) -> None:
         machine.models(machine.plane),
         kernel=machine.kernel,
         counts_per_mm=machine.counts_per_mm,
+        feedforward=machine.plane_feedforward,
     )
     row("contour_error_um", "um", printed.contour_error_um, motion.max_contour_error_um)
     row("max_volts", "V", None, motion.max_volts)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import InputError
 from ..native import ROW, NativeProgram, Rig
@@ -22,6 +23,7 @@ def simulate(
     *,
     kernel: str = "fixed",
     counts_per_mm: int = 1_000_000,
+    feedforward: tuple[Feedforward, Feedforward] | None = None,
     keep_rows: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Motion:
@@ -34,7 +36,7 @@ def simulate(
     if len(drives) != 2:
         raise InputError(f"simulate: needs the drives of 2 axes, not {len(drives)}")
     program = NativeProgram(image)
-    rig = Rig(program, kernel, (drives[0], drives[1]), counts_per_mm)
+    rig = Rig(program, kernel, (drives[0], drives[1]), counts_per_mm, feedforward)
     total = program.ticks + settling_ticks(program.period_us)
     tally = Tally(program.ticks, counts_per_mm)
     rows = np.empty(total if keep_rows else min(total, CHUNK_TICKS), dtype=ROW)
