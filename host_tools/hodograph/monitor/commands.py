@@ -6,11 +6,10 @@ from __future__ import annotations
 from typing import Any
 
 from ..bus.controller import Controller
-from ..bus.objects import DISABLE, ENABLE, HOLD, RESET, RESUME, START, STOP
+from ..bus.objects import DISABLE, ENABLE, HOLD, HOME, QUICK_STOP, RESET, RESUME, START, STOP
 from ..errors import InputError
 from .link import Command
 
-QUICK_STOP = 9
 MOST_PERCENT = 200
 
 _BUTTONS = {
@@ -22,6 +21,7 @@ _BUTTONS = {
     "stop": STOP,
     "quick-stop": QUICK_STOP,
     "reset": RESET,
+    "home": HOME,
 }
 """Names as in the page, and commands of object 0x2001."""
 

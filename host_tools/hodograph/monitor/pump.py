@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..bus.decode import SYNC_ID
-from ..bus.texts import drive_state, fault_text
+from ..bus.texts import drive_state, fault_words
 from ..bustime import exact_bits
 from ..errors import BusError, InputError
 from .decoder import Decoder, Samples
@@ -181,7 +181,10 @@ class Pump:
         for frame in taken.frames[found][:50]:
             code = int(frame["data"][0]) | int(frame["data"][1]) << 8
             node = int(frame["id"]) - _EMCY
-            text = "no error any more" if code == 0 else f"{fault_text(code)} (0x{code:04X})"
+            text = "no error any more"
+            if code != 0:
+                words = fault_words(code)
+                text = f"{words.text} (0x{code:04X}): {words.remedy}"
             self._publish({"type": "event", "text": f"node {node}: {text}", "fault": code != 0})
 
     def _tell(self, taken: Taken) -> None:

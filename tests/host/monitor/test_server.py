@@ -225,8 +225,8 @@ def test_commands_are_the_controllers() -> None:
             self.told.append(("override", percent))
 
     controller: Any = Told()
-    names = ("enable", "start", "stop", "disable", "reset", "hold", "resume", "quick-stop")
+    names = ("enable", "start", "stop", "disable", "reset", "hold", "resume", "quick-stop", "home")
     for name in names:
         read_command({"name": name})(controller)
     read_command({"name": "override", "percent": 150})(controller)
-    assert controller.told == [1, 2, 3, 4, 5, 6, 7, 9, ("override", 150)]
+    assert controller.told == [1, 2, 3, 4, 5, 6, 7, 9, 10, ("override", 150)]

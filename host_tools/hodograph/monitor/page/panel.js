@@ -8,7 +8,7 @@ const MOST_EVENTS = 60;
 
 /** Commands that make sense in a state; quick stop always does. */
 const POSSIBLE = {
-  off: ["enable"], enabling: ["stop", "disable"], ready: ["start", "disable"], running: ["hold", "stop"],
+  off: ["enable", "home"], enabling: ["stop", "disable"], ready: ["start", "disable"], running: ["hold", "stop"],
   holding: ["resume", "stop"], held: ["resume", "stop"], fault: ["reset"], stopping: [], boot: [], homing: ["stop"],
 };
 const LOOKS = { running: "good", ready: "good", fault: "bad", holding: "warn", held: "warn", stopping: "warn", homing: "warn", "quick stop": "bad" };
@@ -57,6 +57,8 @@ export class Panel {
     this.buttons(connected ? status.state : null);
     if (!connected) return;
     this.reason("fault", status.fault ? faultWords(status.fault) : "", true);
+    const trouble = status.boot_trouble;
+    this.reason("boot", trouble ? `Not ready, node ${trouble.node}: ${trouble.text}. What to do: ${trouble.remedy}.` : "");
     this.program(status);
     this.override(status.override);
   }
@@ -125,8 +127,9 @@ export class Panel {
 }
 
 function faultWords(fault) {
-  const remedy = fault.remedy ? ` ${fault.remedy}` : "";
-  return `Fault: ${fault.text} (0x${fault.code.toString(16).toUpperCase().padStart(4, "0")}, node ${fault.node}).${remedy}`;
+  const code = `0x${fault.code.toString(16).toUpperCase().padStart(4, "0")}`;
+  const detail = fault.detail_text ? `, ${fault.detail_text}` : "";
+  return `Fault: ${fault.text} (${code}, node ${fault.node}${detail}). What to do: ${fault.remedy}, then reset the fault.`;
 }
 
 function facts(rows) {

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""What the monitor's pump costs: frames to samples, derived figures, contour error, decimation, JSON.
+
+The alpha's traffic over and over at 1 kHz, five frames a tick, taken 40 ticks at a time as the pump does. Figures:
+processor time of one thread for a tick, the share of a processor that 1000 ticks a second take, bytes a second to a
+browser.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hodograph.bus.frames import FRAME_DTYPE, Frames
+from hodograph.chain import load_chain
+from hodograph.monitor.decoder import Decoder
+from hodograph.monitor.derived import Derivation
+from hodograph.monitor.messages import encode, rows_message
+from hodograph.monitor.path import ProgramPath
+from hodograph.simulate import simulate
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+LAPS = 20
+FRAMES_A_TICK = 5
+LOOK_TICKS = 40
+
+
+def traffic() -> tuple[bytes, Frames]:
+    """Program image and frames of the alpha, run and begun again."""
+    chain = load_chain(EXAMPLES / "alpha.toml", None)
+    motion = simulate(chain.image, chain.machine.models(chain.machine.plane))
+    rows = motion.rows
+    frames = np.zeros((LAPS * len(rows), FRAMES_A_TICK), dtype=FRAME_DTYPE)
+    frames["id"] = [0x080, 0x202, 0x203, 0x182, 0x183]
+    frames["length"] = [1, 6, 6, 6, 6]
+    frames["data"][:, 0, 0] = np.arange(len(frames)) % 240 + 1
+    values = [rows["set_counts"][:, 0], rows["set_counts"][:, 1]]
+    values += [rows["act_counts"][:, 0], rows["act_counts"][:, 1]]
+    for column, counts in enumerate(values, start=1):
+        data = np.tile(counts.astype("<i4"), LAPS).view(np.uint8).reshape(-1, 4)
+        frames["data"][:, column, 2:6] = data
+    return chain.image, frames.reshape(-1)
+
+
+def main() -> None:
+    """Prints the figures, or writes them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    image, frames = traffic()
+    path = ProgramPath(image, 1_000_000)
+    decoder, derivation = Decoder((2, 3)), Derivation(2, 1_000_000, 1000)
+    ticks, size = len(frames) // FRAMES_A_TICK, 0
+    begun = time.thread_time()
+    for part in np.split(
+        frames, range(LOOK_TICKS * FRAMES_A_TICK, len(frames), LOOK_TICKS * FRAMES_A_TICK)
+    ):
+        rows = derivation.feed(decoder.feed(part), path)
+        size += len(encode(rows_message(rows, 0.001, 0.0)))
+    seconds = time.thread_time() - begun
+    figures: dict[str, Any] = {
+        "pump_us_a_tick": 1e6 * seconds / ticks,
+        "percent_of_a_processor_at_1_khz": 100 * 1000 * seconds / ticks,
+        "bytes_a_second_to_a_browser": size / (ticks / 1000),
+    }
+    if options.json is None:
+        print(json.dumps(figures, indent=2))
+    else:
+        options.json.write_text(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()
