@@ -36,6 +36,7 @@ static int rig_drives(struct rig *rig, const struct program *program,
 int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
               const struct drive_config drives[2], struct contour_segment *segments)
 {
+    const struct feedforward_gains without = {.period_us = drives[0].period_us};
     int32_t start[2];
     int error = rig_drives(rig, program, drives);
     if (error != 0) {
@@ -43,7 +44,7 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
     }
     rig->counts_per_mm = drives[0].counts_per_mm;
     rig->tick = 0;
-    rig->feedforward = false;
+    rig->influenced = false;
     rig->program_ticks = program_ticks(program);
     if (interp_begin(&rig->interp, program, kernel) != 0) {
         return RIG_ERR_KERNEL;
@@ -55,6 +56,8 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
     for (int axis = 0; axis < 2; axis++) {
         drive_place(&rig->drives[axis], start[axis]);
         rig->configs[axis] = drives[axis];
+        rig->gains[axis] = without;
+        rig->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
         influence_none(&rig->influences[axis], &drives[axis]);
     }
     timebase_begin(&rig->timebase, program, program->header.period_us);
@@ -69,7 +72,14 @@ void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2])
         rig->gains[axis].period_us = rig->configs[axis].period_us;
         rig->gains[axis].counts_per_mm = rig->counts_per_mm;
     }
-    rig->feedforward = true;
+    rig->influenced = true;
+}
+
+void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts)
+{
+    rig->rated_torque_nm[axis] = rated_torque_nm;
+    rig->influences[axis].friction_volts = friction_volts;
+    rig->influenced = rig->influenced || friction_volts > 0.0;
 }
 
 static int rig_command(struct rig *rig, struct rig_row *row)
@@ -109,7 +119,7 @@ static void rig_move_forward(struct rig *rig, const struct rig_row *row)
         const struct feedforward_offset offset = rig_offset(rig, row, axis);
         influence_offsets(influence, &rig->drives[axis], &rig->configs[axis],
                           offset.velocity_counts_s, offset.torque_permille,
-                          drive_config_rated_torque_nm(&rig->configs[axis]));
+                          rig->rated_torque_nm[axis]);
         if (influence_acts(influence, &rig->drives[axis])) {
             influence_period(influence, &rig->drives[axis], row->set_counts[axis]);
         } else {
@@ -120,7 +130,7 @@ static void rig_move_forward(struct rig *rig, const struct rig_row *row)
 
 static void rig_move(struct rig *rig, struct rig_row *row)
 {
-    if (rig->feedforward) {
+    if (rig->influenced) {
         rig_move_forward(rig, row);
     } else {
         drive_period_pair(&rig->drives[0], &rig->drives[1], row->set_counts);

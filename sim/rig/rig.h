@@ -55,7 +55,8 @@ struct rig {
     struct influence influences[2];
     struct feedforward feedforwards[2];
     struct feedforward_gains gains[2];
-    bool feedforward;
+    double rated_torque_nm[2];
+    bool influenced; /* by feedforward or friction */
     uint32_t program_ticks;
     uint32_t counts_per_mm;
     uint32_t tick;
@@ -67,8 +68,12 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
               const struct drive_config drives[2], struct contour_segment *segments);
 
 /* The controller's feedforward of both axes (0x2018 ... 0x201A), right after rig_begin; period and
- * counts per mm in the gains are the rig's. The rated torque is drive_config_rated_torque_nm. */
+ * counts per mm in the gains are the rig's. */
 void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
+
+/* Rated torque of an axis (0, 1; more than 0; drive_config_rated_torque_nm if this is not called), and
+ * Coulomb friction as volts (0 or more; none); right after rig_begin. */
+void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts);
 
 /* The next n ticks. Returns 0 or RIG_ERR_INTERP. */
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);

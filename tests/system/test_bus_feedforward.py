@@ -23,15 +23,17 @@ def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     return json.loads(out)
 
 
-def alpha(folder: Path, gains: dict[str, str]) -> str:
+def alpha(folder: Path, gains: dict[str, str], equipment: str = "") -> str:
     """The alpha on a machine with these tables of feedforward; two frames more a tick want 2 ms."""
+    folder.mkdir()
     machine = (EXAMPLES / "machines" / "paper_alpha.toml").read_text()
     machine = machine.replace("period_us = 1000", "period_us = 2000")
     for axis in ("x", "y"):
         drive = f'drive = "../drives/alpha_{axis}.toml"'
-        model = f'drive = "{EXAMPLES}/drives/alpha_{axis}.toml"\n'
+        model = f'drive = "alpha_{axis}.toml"\n'
+        text = (EXAMPLES / "drives" / f"alpha_{axis}.toml").read_text()
+        (folder / f"alpha_{axis}.toml").write_text(f"{text}\n[equipment]\n{equipment}\n")
         machine = machine.replace(drive, model + gains.get(axis, ""))
-    folder.mkdir()
     (folder / "machine.toml").write_text(machine)
     path = (EXAMPLES / "alpha.toml").read_text()
     file = folder / "alpha.toml"
@@ -51,3 +53,14 @@ def test_the_same_bits_as_without_a_bus(capsys: pytest.CaptureFixture[str], tmp_
     plain = result(capsys, "simulate", alpha(tmp_path / "plain", {}), "--json")
     assert plain["setpoints_sha256"] == simulated["setpoints_sha256"]
     assert plain["encoders_sha256"] != simulated["encoders_sha256"]
+
+
+def test_friction_and_rating_too(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    gains = {"x": "feedforward = { torque_permille_s_m = 500 }"}
+    file = alpha(tmp_path / "equipped", gains, "friction_volts = 0.2\nrated_torque_nm = 2")
+    simulated = result(capsys, "simulate", file, "--json")
+    recorded = result(capsys, "run", file, "--json", "--pace", "fast")
+    assert {key: recorded[key] for key in simulated} == simulated
+    for other in ("friction_volts = 0.2", "rated_torque_nm = 2"):
+        less = result(capsys, "simulate", alpha(tmp_path / other[:8], gains, other), "--json")
+        assert less["encoders_sha256"] != simulated["encoders_sha256"]

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from ..config import Axis, Machine
 
 WINDOW_OFF = 2**32 - 1
-_Q16 = 2**16
 
 
 def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
@@ -59,9 +58,9 @@ def _axis(axis: Axis, counts_per_mm: int) -> Iterator[tuple[int, int]]:
     yield objects.HOMING_SPEED, counts(homing.speed_mm_s)
     yield objects.HOMING_SLOW, counts(homing.slow_mm_s)
     yield objects.HOMING_ACCELERATION, counts(homing.acceleration_mm_s2)
-    yield objects.VELOCITY_FEEDFORWARD, round(forward.velocity * 1000)
-    yield objects.TORQUE_PER_ACCELERATION, round(forward.torque_permille_s2_m * _Q16)
-    yield objects.TORQUE_PER_VELOCITY, round(forward.torque_permille_s_m * _Q16)
+    yield objects.VELOCITY_FEEDFORWARD, forward.velocity_permille
+    yield objects.TORQUE_PER_ACCELERATION, forward.torque_per_acceleration_q16
+    yield objects.TORQUE_PER_VELOCITY, forward.torque_per_velocity_q16
     window = axis.following_window_mm
     yield objects.FOLLOWING_WINDOW, WINDOW_OFF if window is None else counts(window)
     yield objects.FOLLOWING_TIMEOUT, axis.following_timeout_ms

@@ -69,6 +69,7 @@ def _axis_text(node: int, drive: Drive, machine: Machine) -> str:
         "loop_rate_hz": drive.loop_rate_hz,
         "counts_per_mm": machine.counts_per_mm,
         "position_mm": 0,
+        **drive.equipment.given(),
     }
     return ",".join(f"{key}={value:.17g}" for key, value in values.items())
 

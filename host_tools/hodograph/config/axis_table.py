@@ -37,6 +37,21 @@ class Feedforward:
     torque_permille_s_m: float = 0.0
 
     @property
+    def velocity_permille(self) -> int:
+        """As the controller has it: object 0x2018."""
+        return round(self.velocity * 1000)
+
+    @property
+    def torque_per_acceleration_q16(self) -> int:
+        """Object 0x2019."""
+        return round(self.torque_permille_s2_m * 2**16)
+
+    @property
+    def torque_per_velocity_q16(self) -> int:
+        """Object 0x201A."""
+        return round(self.torque_permille_s_m * 2**16)
+
+    @property
     def has_torque(self) -> bool:
         """Whether RPDO1 carries a torque offset for this axis."""
         return bool(self.torque_permille_s2_m or self.torque_permille_s_m)

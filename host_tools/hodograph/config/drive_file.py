@@ -3,10 +3,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from .table import Table, read_toml
+
+
+@dataclass(frozen=True)
+class Equipment:
+    """What stands around a simulated motor (sim/node/equipment.h). None: no switch, or what belongs to the motor."""
+
+    limit_negative_mm: float | None = None
+    limit_positive_mm: float | None = None
+    home_from_mm: float | None = None
+    home_to_mm: float | None = None
+    rated_torque_nm: float | None = None
+    rated_current_a: float | None = None
+    overload_s: float | None = None
+    friction_volts: float | None = None
+    brake_volts: float | None = None
+
+    def given(self) -> dict[str, float]:
+        """What the file says, by name."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -29,9 +48,17 @@ class Drive:
     k_vf: float
     encoder_counts_per_rev: int
     loop_rate_hz: int
+    equipment: Equipment = Equipment()
+
+    @property
+    def rated_torque_nm(self) -> float:
+        """What torque offsets are per mille of: given, or half of what the voltage limit makes."""
+        if self.equipment.rated_torque_nm is not None:
+            return self.equipment.rated_torque_nm
+        return 0.5 * self.volts_limit / self.torque_to_volts
 
 
-_SECTIONS = ("plant", "pdff", "encoder", "servo")
+_SECTIONS = ("plant", "pdff", "encoder", "servo", "equipment")
 _PLANT = ("gain_rad_s_v", "time_constant_s", "screw_mm_rad", "torque_to_volts", "volts_limit")
 _PDFF = ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s", "k_pf_rad_mm", "k_vf")
 
@@ -56,7 +83,38 @@ def load_drive(file: Path) -> Drive:
         k_vf=pdff.number("k_vf", low=0, high=1e3),
         encoder_counts_per_rev=encoder.integer("counts_per_rev", 2**20, low=16, high=2**26),
         loop_rate_hz=_loop_rate(servo),
+        equipment=_equipment(root),
     )
+
+
+def _equipment(root: Table) -> Equipment:
+    names = tuple(field.name for field in fields(Equipment))
+    table = root.table("equipment", names, required=False)
+
+    def place(key: str) -> float | None:
+        return table.optional_number(key, low=-1e6, high=1e6)
+
+    def amount(key: str, low: float) -> float | None:
+        return table.optional_number(key, low=low, high=1e6)
+
+    found = Equipment(
+        limit_negative_mm=place("limit_negative_mm"),
+        limit_positive_mm=place("limit_positive_mm"),
+        home_from_mm=place("home_from_mm"),
+        home_to_mm=place("home_to_mm"),
+        rated_torque_nm=amount("rated_torque_nm", 1e-9),
+        rated_current_a=amount("rated_current_a", 1e-9),
+        overload_s=amount("overload_s", 0),
+        friction_volts=amount("friction_volts", 0),
+        brake_volts=amount("brake_volts", 1e-9),
+    )
+    for low, high in (("limit_negative_mm", "limit_positive_mm"), ("home_from_mm", "home_to_mm")):
+        ends = getattr(found, low), getattr(found, high)
+        if None not in ends and not ends[0] < ends[1]:
+            raise table.error(low, f"is {ends[0]:g}: must be below {high} = {ends[1]:g}")
+    if (found.home_from_mm is None) != (found.home_to_mm is None):
+        raise table.error("home_from_mm", "and home_to_mm go together: give both or none")
+    return found
 
 
 def _loop_rate(servo: Table) -> int:

@@ -97,6 +97,7 @@ struct feedforward_gains {
     int32_t torque_per_acceleration_q16, torque_per_velocity_q16;
 };
 void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
+void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts);
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
 int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);

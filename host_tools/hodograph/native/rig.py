@@ -63,6 +63,10 @@ class Rig:
         )
         if error != 0:
             raise InputError(_begin_error(error))
+        for axis, drive in enumerate(drives):
+            lib.rig_equip(
+                self._rig, axis, drive.rated_torque_nm, drive.equipment.friction_volts or 0.0
+            )
         if feedforward is not None:
             lib.rig_feedforward(
                 self._rig,
@@ -86,9 +90,9 @@ class Rig:
 def _gains(feedforward: Feedforward) -> dict[str, int]:
     """Struct feedforward_gains with the figures that the controller is given; the rig adds the rest."""
     return {
-        "velocity_permille": round(feedforward.velocity * 1000),
-        "torque_per_acceleration_q16": round(feedforward.torque_permille_s2_m * 65536),
-        "torque_per_velocity_q16": round(feedforward.torque_permille_s_m * 65536),
+        "velocity_permille": feedforward.velocity_permille,
+        "torque_per_acceleration_q16": feedforward.torque_per_acceleration_q16,
+        "torque_per_velocity_q16": feedforward.torque_per_velocity_q16,
     }
 
 

@@ -146,7 +146,28 @@ def test_scaling_from_the_screw(tmp_path: Path) -> None:
     assert load_machine(file).axes[0].scaling == Scaling(8192, 9_990_265, 0, 0)  # 2 pi 1.59 mm
 
 
+def test_equipment_of_a_simulated_drive(tmp_path: Path) -> None:
+    text = (EXAMPLES / "drives" / "alpha_x.toml").read_text()
+    file = tmp_path / "drive.toml"
+    file.write_text(text + "\n[equipment]\nlimit_negative_mm = -210\nfriction_volts = 0.2\n")
+    drive = load_drive(file)
+    assert drive.equipment.given() == {"limit_negative_mm": -210, "friction_volts": 0.2}
+    assert drive.rated_torque_nm == pytest.approx(0.5 * 5.0 * 0.716)
+    assert load_drive(EXAMPLES / "drives" / "alpha_x.toml").equipment.given() == {}
+
+
 DRIVE_MISTAKES = [
+    (
+        "[servo]",
+        "[equipment]\nhome_from_mm = 1\n[servo]",
+        r"home_from_mm and home_to_mm go together",
+    ),
+    (
+        "[servo]",
+        "[equipment]\nlimit_negative_mm = 1\nlimit_positive_mm = 1\n[servo]",
+        r"limit_negative_mm is 1: must be below limit_positive_mm = 1",
+    ),
+    ("[servo]", "[equipment]\nfriction = 1\n[servo]", r'did you mean "friction_volts"\?'),
     ("gain_rad_s_v = 83.0089", "gain_rad_s_v = 0", r"gain_rad_s_v must be from"),
     (
         "gain_rad_s_v = 83.0089",
