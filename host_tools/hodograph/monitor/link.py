@@ -72,7 +72,6 @@ class Link:
         self._wake = threading.Event()
         self._ending = threading.Event()
         self._in_command = False
-        self._connected = False
         self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
 
     def start(self) -> None:
@@ -128,13 +127,16 @@ class Link:
                 )
                 continue
             begun_s = time.monotonic()
-            if status is None or begun_s >= whole_due_s or _changed(controller, status):
-                status = read_status(controller)
-                self._look_at_program(controller, status["program"])
-                took_s = time.monotonic() - begun_s
-                whole_due_s = begun_s + max(WHOLE_S, 5 * took_s)
-            else:
-                status = status | _moving_part(controller)
+            try:
+                if status is None or begun_s >= whole_due_s or _changed(controller, status):
+                    status = read_status(controller)
+                    self._look_at_program(controller, status["program"])
+                    took_s = time.monotonic() - begun_s
+                    whole_due_s = begun_s + max(WHOLE_S, 5 * took_s)
+                else:
+                    status = status | _moving_part(controller)
+            except BusError:
+                continue  # one answer that was too late; whether more are is found out above
             self._publish({"type": "status", "connected": True, "note": "", "status": status})
             self._obey(controller)
             # However slow the bus or this computer is, others find the controller's channel free most of the time.
@@ -142,7 +144,6 @@ class Link:
             self._wake.clear()
 
     def _lost(self, note: str) -> None:
-        self._connected = False
         self._publish({"type": "status", "connected": False, "note": note, "status": None})
         self._fail_commands(BusError(note))
 

@@ -16,10 +16,10 @@ from .path import ProgramPath
 
 GROUP_S = 0.010
 """Time that one group of the plots covers at the machine's own pace."""
-MOST_GROUPS = 16
-"""Groups in a message at most: at full pace they become longer."""
+MOST_GROUPS = 100
+"""Groups in a message at most: at full pace, and after a stall of more than a second, they become longer."""
 POINT_S = 0.004
-MOST_POINTS = 40
+MOST_POINTS = 250
 """The same for the points of the plane."""
 
 

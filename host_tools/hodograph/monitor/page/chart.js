@@ -4,6 +4,7 @@
 import { digitsOf, prepare, roundUp, text } from "./scale.js";
 
 const LEFT = 62, TOP = 4, BOTTOM = 4;
+const LONGEST_BRIDGE_S = 1; // over more time without any word nothing is drawn
 
 export class Chart {
   /** `lines`: [{series, label, colour}]; `least`: smallest top of the scale; `signed`: whether values may be negative. */
@@ -107,29 +108,36 @@ function rowAt(groups, t) {
 
 function reduce(groups, series, end, seconds, columns) {
   const low = new Float64Array(columns).fill(Infinity), high = new Float64Array(columns).fill(-Infinity);
+  const missing = new Uint8Array(columns);
   let greatest = 0;
   for (let i = groups.end - 1; i >= groups.start; i -= 1) {
     const t = groups.get("t", i);
     if (t > end) continue;
     if (t < end - seconds) break;
     const least = groups.get(`${series}.low`, i), most = groups.get(`${series}.high`, i);
-    if (Number.isNaN(least)) continue;
     const column = Math.min(columns - 1, Math.floor(((t - end) / seconds + 1) * columns));
+    if (Number.isNaN(least)) {
+      missing[column] = 1;
+      continue;
+    }
     low[column] = Math.min(low[column], least);
     high[column] = Math.max(high[column], most);
     greatest = Math.max(greatest, Math.abs(least), Math.abs(most));
   }
-  return { low, high, greatest, gap: (0.1 * columns) / seconds };
+  return { low, high, missing, greatest, gap: (LONGEST_BRIDGE_S * columns) / seconds };
 }
 
-function stroke(context, { low, high, gap }, at, colour) {
+function stroke(context, { low, high, missing, gap }, at, colour) {
   context.strokeStyle = colour;
   context.lineWidth = 1.5;
   context.lineJoin = "round";
   context.beginPath();
   let last = -Infinity, before = 0;
   for (let column = 0; column < low.length; column += 1) {
-    if (low[column] === Infinity) continue;
+    if (low[column] === Infinity) {
+      if (missing[column]) last = -Infinity;
+      continue;
+    }
     const x = LEFT + column + 0.5;
     const rising = Math.abs(low[column] - before) <= Math.abs(high[column] - before);
     const [first, second] = rising ? [low[column], high[column]] : [high[column], low[column]];
