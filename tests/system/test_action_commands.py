@@ -52,6 +52,23 @@ def test_home_without_a_method(make_bench: MakeBench, capsys: pytest.CaptureFixt
     assert controller.state() == OFF
 
 
+def test_home_at_a_switch(
+    make_bench: MakeBench, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Method 17: towards the negative limit switch 2 mm away, home where it goes off again."""
+    drive = tmp_path / "x.toml"
+    text = (EXAMPLES / "drives" / "alpha_x.toml").read_text()
+    drive.write_text(f"{text}\n[equipment]\nlimit_negative_mm = -2\n")
+    file = homing_machine(tmp_path, "[axis.homing]\nmethod = 17\nspeed_mm_s = 50", "")
+    file.write_text(file.read_text().replace(f"{EXAMPLES}/drives/alpha_x.toml", str(drive)))
+    controller = make_bench("real-time", file).controller
+    assert command(["home", str(file)]) == 0
+    assert capsys.readouterr().out == "homed: node 2; drives off\n"
+    assert abs(controller.read(ACTUAL, 1)) < 200_000  # it passed home slowly
+    assert controller.read(HOMED, 1) == 1
+    assert controller.read(HOMED, 2) == 0
+
+
 def test_home_here(
     make_bench: MakeBench, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
