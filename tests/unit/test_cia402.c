@@ -188,6 +188,69 @@ static void test_actions(void)
     }
 }
 
+static void test_leaving_with_a_stop(void)
+{
+    static const struct {
+        uint16_t command;
+        enum cia402_state to;
+    } rows[] = {{CIA402_SHUTDOWN, CIA402_READY_TO_SWITCH_ON},
+                {CIA402_SWITCH_ON, CIA402_SWITCHED_ON}};
+
+    for (int i = 0; i < 2; i++) {
+        put_in(CIA402_OPERATION_ENABLED);
+        device.options.shutdown = 1;
+        device.options.disable = 1;
+        TEST_ASSERT_FALSE(cia402_device_control(&device, rows[i].command));
+        TEST_ASSERT_EQUAL_INT(CIA402_SLOW_DOWN, cia402_device_action(&device));
+        TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, device.state);
+        TEST_ASSERT_FALSE(cia402_device_control(&device, CIA402_ENABLE_OPERATION));
+        TEST_ASSERT_EQUAL_INT(CIA402_FOLLOW, cia402_device_action(&device));
+        TEST_ASSERT_FALSE(cia402_device_stopped(&device)); /* called off */
+        cia402_device_control(&device, rows[i].command);
+        TEST_ASSERT_TRUE(cia402_device_stopped(&device));
+        TEST_ASSERT_EQUAL_INT(rows[i].to, device.state);
+    }
+    put_in(CIA402_OPERATION_ENABLED);
+    device.options.disable = 1;
+    cia402_device_control(&device, CIA402_SWITCH_ON);
+    TEST_ASSERT_TRUE(cia402_device_control(&device, CIA402_DISABLE_VOLTAGE)); /* does not wait */
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, device.state);
+    TEST_ASSERT_FALSE(device.leaving);
+}
+
+static void test_power_off_from_inside(void)
+{
+    for (int state = 0; state < STATES; state++) {
+        put_in((enum cia402_state)state);
+        const bool has_power =
+            state >= CIA402_READY_TO_SWITCH_ON && state <= CIA402_QUICK_STOP_ACTIVE;
+        TEST_ASSERT_EQUAL_INT(has_power, cia402_device_power_off(&device));
+        TEST_ASSERT_EQUAL_INT(has_power ? CIA402_SWITCH_ON_DISABLED : state, device.state);
+    }
+}
+
+static void test_a_cause_that_persists(void)
+{
+    put_in(CIA402_FAULT);
+    device.fault_persists = true;
+    TEST_ASSERT_FALSE(cia402_device_control(&device, CIA402_FAULT_RESET));
+    cia402_device_control(&device, 0);
+    device.fault_persists = false;
+    TEST_ASSERT_TRUE(cia402_device_control(&device, CIA402_FAULT_RESET));
+}
+
+static void test_standing_after_a_quick_stop_is_target_reached(void)
+{
+    put_in(CIA402_OPERATION_ENABLED);
+    device.options.quick_stop = 6;
+    cia402_device_control(&device, CIA402_QUICK_STOP);
+    TEST_ASSERT_EQUAL_HEX16(0, cia402_device_statusword(&device) & CIA402_STATUS_TARGET_REACHED);
+    TEST_ASSERT_FALSE(cia402_device_stopped(&device));
+    TEST_ASSERT_TRUE((cia402_device_statusword(&device) & CIA402_STATUS_TARGET_REACHED) != 0);
+    TEST_ASSERT_TRUE(cia402_device_control(&device, CIA402_ENABLE_OPERATION));
+    TEST_ASSERT_EQUAL_HEX16(0, cia402_device_statusword(&device) & CIA402_STATUS_TARGET_REACHED);
+}
+
 static void test_statusword_carries_the_flags(void)
 {
     put_in(CIA402_OPERATION_ENABLED);
@@ -299,6 +362,10 @@ int main(void)
     RUN_TEST(test_faults);
     RUN_TEST(test_fault_reset_needs_a_rising_edge);
     RUN_TEST(test_actions);
+    RUN_TEST(test_leaving_with_a_stop);
+    RUN_TEST(test_power_off_from_inside);
+    RUN_TEST(test_a_cause_that_persists);
+    RUN_TEST(test_standing_after_a_quick_stop_is_target_reached);
     RUN_TEST(test_statusword_carries_the_flags);
     RUN_TEST(test_master_reaches_each_goal_from_each_state);
     RUN_TEST(test_master_enables_in_three_steps);
