@@ -58,7 +58,9 @@ struct controller {
     uint32_t polled_us;             /* port_time_us() of the last poll */
     uint32_t reported_serial;       /* machine.fault_serial that the last EMCY told of */
     enum machine_state noted_state; /* last one logged */
-    enum machine_refusal refusal;   /* of the last command */
+    enum cia402_state noted_drive[AXES_MAX];
+    struct drive_trouble noted_trouble;
+    enum machine_refusal refusal; /* of the last command */
     uint8_t node;
     bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
     bool same_value;            /* the write under way changes nothing */

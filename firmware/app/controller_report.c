@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+#include "canopen/cia402.h"
+#include "canopen/sdo_abort.h"
 #include "port/port.h"
 
 void controller_start_itself(struct controller *controller)
@@ -76,6 +78,39 @@ static void note_limits(struct controller *controller)
     }
 }
 
+/* Why the drives are not ready yet: object 0x2025 in words. */
+static void note_trouble(struct controller *controller)
+{
+    const struct drive_trouble *trouble = &controller->boot.trouble;
+    struct drive_trouble *noted = &controller->noted_trouble;
+    const bool same = trouble->node == noted->node && trouble->object == noted->object &&
+                      trouble->abort_code == noted->abort_code;
+    *noted = *trouble;
+    if (same || trouble->node == 0u) {
+        return;
+    }
+    port_log(PORT_NOTE, "drives not ready because of node", trouble->node);
+    port_log(PORT_NOTE,
+             trouble->abort_code == SDO_OK ? "it answered with another value"
+                                           : sdo_abort_text(trouble->abort_code),
+             (int32_t)trouble->value);
+}
+
+static void note_drives(struct controller *controller)
+{
+    for (uint8_t i = 0; i < controller->config.axis_count; ++i) {
+        port_lock();
+        const struct axis *axis = &controller->machine.axes[i];
+        const enum cia402_state state = cia402_decode(axis->statusword);
+        const uint8_t node = axis->node;
+        port_unlock();
+        if (state != controller->noted_drive[i]) {
+            controller->noted_drive[i] = state;
+            port_log(PORT_NOTE, cia402_state_name(state), node);
+        }
+    }
+}
+
 static bool bus_takes_frames(const struct controller *controller)
 {
     port_lock();
@@ -98,5 +133,7 @@ void controller_report(struct controller *controller)
     report_fault(controller);
     send_emergencies(controller);
     note_state(controller);
+    note_trouble(controller);
+    note_drives(controller);
     note_limits(controller);
 }
