@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""Random frames while a program runs: setpoints and encoders stay those of the simulation."""
+
+from __future__ import annotations
+
+import random
+import struct
+import threading
+import time
+from pathlib import Path
+
+import can
+import pytest
+
+from hodograph.bus.address import BusAddress
+from hodograph.bus.run import run_program, station
+from hodograph.chain import load_chain
+from hodograph.simulate import simulate
+
+pytestmark = pytest.mark.bus
+
+FRAMES_S = 400
+"""Random frames a second of wall time."""
+OUR_NODES = (2, 3)
+
+
+def random_frame(chance: random.Random) -> can.Message:
+    """What a careless device may send: to the SDO servers of the drives, EMCY and heartbeats of unknown nodes,
+    foreign PDOs, frames of wrong length, remote and extended ones. Nothing that is a valid command to the machine."""
+    kind = chance.randrange(7)
+    data = chance.randbytes(chance.randrange(9))
+    if kind == 0:  # an SDO request to a drive, reads of anything, or nonsense
+        node = chance.choice(OUR_NODES)
+        command = chance.choice([0x40, 0xA0, 0xA4, 0x60, 0x70, 0xA1, 0xA2, 0xE0, 0x80])
+        data = struct.pack("<BHB4s", command, chance.randrange(0x1000, 0x7000), 0, data[:4])
+        return can.Message(arbitration_id=0x600 + node, data=data, is_extended_id=False)
+    if kind == 1:  # too short for a request
+        node = chance.choice((1, *OUR_NODES))
+        return can.Message(arbitration_id=0x600 + node, data=data[:7], is_extended_id=False)
+    if kind == 2:  # nodes that nobody knows
+        base = chance.choice([0x080, 0x180, 0x200, 0x280, 0x300, 0x380, 0x400, 0x480, 0x580, 0x700])
+        identifier = base + chance.randrange(20, 120)
+        return can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+    if kind == 3:  # answers to questions that the controller did not ask
+        identifier = 0x580 + chance.choice(OUR_NODES)
+        data = struct.pack("<BHB4x", 0x43, chance.randrange(0x2000, 0x6000), 0)
+        return can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+    if kind == 4:  # NMT to others, or no NMT command at all
+        data = chance.choice([bytes([1, 99]), bytes([77, 2]), bytes([2]), bytes([2, 2, 0]), b""])
+        return can.Message(arbitration_id=0, data=data, is_extended_id=False)
+    identifier = chance.choice([0x000, 0x080, 0x182, 0x202, 0x203, 0x602, 0x601, 0x702])
+    if kind == 5:
+        return can.Message(
+            arbitration_id=identifier, is_remote_frame=True, dlc=8, is_extended_id=False
+        )
+    return can.Message(arbitration_id=identifier, data=data, is_extended_id=True)
+
+
+class Noise:
+    """Sends random frames from a thread."""
+
+    def __init__(self, seed: int) -> None:
+        self.sent = 0
+        self.ended = threading.Event()
+        self.chance = random.Random(seed)
+        self.thread = threading.Thread(target=self._work, daemon=True)
+
+    def _work(self) -> None:
+        with can.Bus(interface="socketcan", channel="vcan0") as bus:
+            while not self.ended.is_set():
+                for _ in range(FRAMES_S // 100):
+                    bus.send(random_frame(self.chance))
+                    self.sent += 1
+                time.sleep(0.01)
+
+    def __enter__(self) -> Noise:
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.ended.set()
+        self.thread.join()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_frames_change_nothing(root: Path, seed: int) -> None:
+    chain = load_chain(root / "examples/alpha.toml")
+    machine = chain.machine
+    drives = [axis.drive for axis in machine.plane if axis.drive is not None]
+    expected = simulate(chain.image, drives, counts_per_mm=machine.counts_per_mm)
+    address = BusAddress("socketcan", "vcan0")
+    with station(machine, address, "fast", 10.0, print) as at:
+        at.controller.configure(machine, "fixed")
+        at.controller.enable()
+        with Noise(seed) as noise:
+            motion = run_program(at, machine, chain.image, "fixed").motion
+            at.controller.read(0x2002)
+        assert noise.sent > 200
+    assert motion.setpoints_sha256 == expected.setpoints_sha256
+    assert motion.encoders_sha256 == expected.encoders_sha256
