@@ -91,6 +91,21 @@ def test_home_here(
     assert command(["goto", str(EXAMPLES / "alpha.toml"), "--machine", str(file)]) == 0
 
 
+def test_quick_stop(
+    make_bench: MakeBench, alpha_at: MakeAlpha, capsys: pytest.CaptureFixture[str]
+) -> None:
+    controller = make_bench("real-time").controller
+    slow = str(alpha_at(10))
+    assert command(["goto", slow]) == 0
+    assert command(["start"]) == 0
+    time.sleep(1.0)
+    assert command(["quick-stop"]) == 0
+    assert capsys.readouterr().out.endswith("stopped by the drives, drives off\n")
+    assert controller.state() == OFF
+    assert command(["start"]) == 5  # away from the start
+    assert command(["goto", slow]) == 0
+
+
 @pytest.fixture
 def faulty(make_bench: MakeBench, alpha_at: MakeAlpha) -> Bench:
     """A machine whose drives fell silent in motion, and speak again."""

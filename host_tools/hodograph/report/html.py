@@ -41,7 +41,7 @@ class _Figure:
 def write_report(cases: Sequence[Case], directory: Path) -> Path:
     """Writes report.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
     with styled():
-        shown_cases = [_case(*case) for case in cases]
+        shown_cases = _once([_case(*case) for case in cases])
     text = _render(cases, shown_cases)
     report = directory / "report.html"
     try:
@@ -53,6 +53,18 @@ def write_report(cases: Sequence[Case], directory: Path) -> Path:
     except OSError as error:
         raise InputError(f"{directory}: cannot write the report: {error.strerror}") from None
     return report
+
+
+def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Leaves out figures that an earlier case has already: paths of one profile share its search."""
+    first: dict[bytes, str] = {}
+    for case in shown_cases:
+        for figure in list(case["figures"]):
+            owner = first.setdefault(figure.png, case["name"])
+            if owner != case["name"]:
+                case["figures"].remove(figure)
+                case["notes"] = (*case["notes"], f"figure of the {figure.name}: as for {owner}")
+    return shown_cases
 
 
 def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
