@@ -58,7 +58,7 @@ static void bring(enum cia402_state to)
         return;
     }
     const uint16_t words[] = {CIA402_SHUTDOWN, CIA402_SWITCH_ON, CIA402_ENABLE_OPERATION};
-    for (int k = 0; k < (int)to - (int)CIA402_SWITCH_ON_DISABLED && k < 3; k++) {
+    for (int k = 0; k < (int)to - CIA402_SWITCH_ON_DISABLED && k < 3; k++) {
         put(0x6040, words[k]);
     }
     if (to == CIA402_QUICK_STOP_ACTIVE) {
