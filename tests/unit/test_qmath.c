@@ -122,17 +122,20 @@ static void test_exact_products(void)
 /* Binomial coefficients: (1 + t)^n has b[j] = 2^j-like values that are known: all a[k] = C(n,k) give 2^j. */
 static void test_bernstein_of_a_binomial(void)
 {
-    const int64_t powers[3][7] = {{1, 4, 6, 4, 1}, {1, 5, 10, 10, 5, 1}, {1, 6, 15, 20, 15, 6, 1}};
-    const int64_t scales[3] = {12, 10, 60};
-    int64_t b[7];
-    for (int n = 4; n <= 6; n++) {
+    const int64_t powers[4][8] = {{1, 4, 6, 4, 1},
+                                  {1, 5, 10, 10, 5, 1},
+                                  {1, 6, 15, 20, 15, 6, 1},
+                                  {1, 7, 21, 35, 35, 21, 7, 1}};
+    const int64_t scales[4] = {12, 10, 60, 105};
+    int64_t b[8];
+    for (int n = 4; n <= 7; n++) {
         TEST_ASSERT_EQUAL_INT64(scales[n - 4], bernstein_from_powers(powers[n - 4], n, b));
         for (int j = 0; j <= n; j++) {
             TEST_ASSERT_EQUAL_INT64(scales[n - 4] << j, b[j]);
         }
     }
     TEST_ASSERT_EQUAL_INT64(0, bernstein_from_powers(powers[0], 3, b));
-    TEST_ASSERT_EQUAL_INT64(0, bernstein_from_powers(powers[0], 7, b));
+    TEST_ASSERT_EQUAL_INT64(0, bernstein_from_powers(powers[0], 8, b));
 }
 
 /* 4 t (1 - t) has its maximum 1 at 1/2, where no coefficient shows it; the bound finds it to 1e-5. */
