@@ -16,6 +16,9 @@ NEEDED = (
     "hodograph/data/examples/*.toml",
     "hodograph/data/examples/machines/*.toml",
     "hodograph/data/examples/drives/*.toml",
+    "hodograph/monitor/page/index.html",
+    "hodograph/monitor/page/page.js",
+    "hodograph/monitor/page/style.css",
     "hodograph/native/_native.abi3.so",
 )
 
