@@ -111,6 +111,11 @@ static void test_options_themselves(void)
     char *unknown[] = {"hodograph-drive", "--bos", "vcan0"};
     char *lacking[] = {"hodograph-drive", "--bus"};
     char *none[] = {"hodograph-drive", "--bus", "vcan0"};
+    char axis[] = "node=2," FIGURES;
+    char *faults[] = {"hodograph-drive", "--bus", "vcan0", "--faults", "f", "--axis", axis};
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_OK,
+                          node_options_parse(&options, 7, faults, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_STRING("f", options.faults);
     TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_HELP,
                           node_options_parse(&options, 2, help, reason, sizeof reason));
     TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
@@ -124,6 +129,7 @@ static void test_options_themselves(void)
     TEST_ASSERT_NOT_NULL(strstr(reason, "'--axis'"));
     TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
                           node_options_parse(&options, 1, none, reason, sizeof reason));
+    TEST_ASSERT_NULL(options.faults);
     TEST_ASSERT_NOT_NULL(strstr(node_options_help, "Exit status"));
 }
 

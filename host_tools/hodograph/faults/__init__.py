@@ -3,8 +3,9 @@
 
 scenario   what a scenario file says, and what a seed makes of it
 stand      controller, injector and drives as processes
-run_case   one scenario with one seed: run, disturb, look, recover, run again
-actions    what the host does to the processes or to an upload meanwhile
+run_case   one scenario with one seed, by disturb (uploads), and recover
+actions    what the host does to processes and uploads meanwhile
+record     what a case works with and leaves
 evidence   what the recordings of both buses tell
 judge      what of that must not be
 campaign   all scenarios with all seeds

@@ -12,7 +12,7 @@ import numpy as np
 from ..bus.setpoint_check import find_jumps, step_limits
 from ..native import Contour, NativeProgram
 from .evidence import Evidence
-from .run_case import REST_TOLERANCE_COUNTS, Record
+from .record import REST_TOLERANCE_COUNTS, Record
 
 CONTROLLER_KILLED = "kill-controller"
 _PATH_TOLERANCE_MM = 3e-6
@@ -124,7 +124,8 @@ def _bad_setpoints(record: Record, evidence: Evidence) -> list[str]:
     """Jumps, and setpoints away from the curve."""
     machine = record.job.machine
     limits = step_limits(machine, record.job.setpoints)
-    bad = [str(jump) for jump in find_jumps(evidence.control, machine.nodes, limits)[:3]]
+    frames = evidence.control if record.control is None else record.control
+    bad = [str(jump) for jump in find_jumps(frames, machine.nodes, limits)[:3]]
     if not evidence.moved:
         return bad
     (x, x_sent), (y, y_sent) = evidence.setpoints()[:2]

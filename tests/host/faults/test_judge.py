@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hodograph.bus.frames import RECORD_DTYPE, Frames
 from hodograph.faults.evidence import Evidence
 from hodograph.faults.judge import Verdict, judge
-from hodograph.faults.run_case import Job, Record, load_job
+from hodograph.faults.record import Job, Record, load_job
 from hodograph.faults.scenario import Case, Expectation, Scenario
 from hodograph.faults.table import text
 

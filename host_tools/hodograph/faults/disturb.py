@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""The first run of a case: bring up, start, disturb, and wait until all is over."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+import zlib
+
+from ..bus.controller import BOOT, FAULT_STATE, OFF, READY, Controller
+from ..bus.objects import FAULT, MOVING, STATISTICS
+from ..bus.recorder import Recorder
+from ..bus.texts import STATES
+from ..errors import BusError, RunError
+from .actions import await_rest, drives_at, kill, spawn_command
+from .record import LIMIT_S, LOOK_S, REST_TOLERANCE_COUNTS, Record
+from .stand import Stand
+from .uploads import disturb_upload
+
+QUIET_S = 0.25
+"""Recorded after everything has come to an end, so that what still moves is seen."""
+_SYNCS, _TICK = 1, 2
+
+
+def disturb(record: Record, stand: Stand, controller: Controller, control: Recorder) -> None:
+    """Runs the case's program, or its upload, with what its scenario does to it. Raises what the bus tools raise."""
+    job, case = record.job, record.case
+    controller.require(5.0)
+    controller.configure(job.machine, "fixed")
+    controller.override(100)
+    controller.enable()
+    controller.upload(job.image)
+    if case.scenario.action in ("cut-upload", "kill-upload"):
+        disturb_upload(record, stand, controller, control)
+        return
+    process = None
+    if case.scenario.action == "kill-host":
+        process = spawn_command("start", "--follow", "--bus", str(stand.bus))
+    else:
+        controller.start()
+    try:
+        state = _follow(record, stand, controller, process)
+    finally:
+        if process is not None:
+            kill(process)
+    if state is None:  # a fresh controller: nothing to ask it
+        return
+    record.finished = state == READY and controller.read(STATISTICS, _TICK) == job.clean.ticks - 1
+    _await_end_of_rules(record, controller)
+    if controller.state() == FAULT_STATE:
+        record.fault_codes.append(controller.read(FAULT, 1))
+    if controller.program_crc() != zlib.crc32(job.image[16:]):
+        record.troubles.append("the program is not the one that was uploaded")
+
+
+def _follow(
+    record: Record, stand: Stand, controller: Controller, process: subprocess.Popen[bytes] | None
+) -> int | None:
+    """Until the controller is at rest again, acting on the way; its state, None when it was killed."""
+    action, started, acted = record.case.scenario.action, False, False
+    deadline = time.monotonic() + LIMIT_S
+    while True:
+        state = controller.state()
+        started = started or state in MOVING
+        if state in MOVING and not acted and action != "none":
+            acted = controller.read(STATISTICS, _TICK) >= record.case.at
+            if acted and not _act(record, stand, process):
+                return None
+        if state in (FAULT_STATE, OFF, BOOT) or (started and state == READY):
+            return state
+        if time.monotonic() > deadline:
+            raise RunError(f"still {STATES.get(state, state)} after {LIMIT_S:g} s")
+        time.sleep(LOOK_S)
+
+
+def _act(record: Record, stand: Stand, process: subprocess.Popen[bytes] | None) -> bool:
+    """Does what the scenario asks of the host; whether there still is a controller."""
+    action = record.case.scenario.action
+    if action == "watch-drives":
+        _watch_drives(record, stand)
+        return True
+    record.began_us = time.time_ns() // 1000
+    if action == "kill-drives":
+        for drive in stand.drives:
+            drive.kill()
+    elif action == "kill-one-drive":
+        stand.drives[record.job.machine.nodes.index(int(record.case.drawn["node"]))].kill()
+    elif process is not None:
+        kill(process)
+    elif action == "kill-controller":
+        stand.controller.kill()
+        _watch_drives(record, stand)
+        return False
+    return True
+
+
+def _watch_drives(record: Record, stand: Stand) -> None:
+    machine = record.job.machine
+    with drives_at(stand.drives_bus, machine.nodes, machine.bitrate) as clients:
+        rest_s = await_rest(clients, REST_TOLERANCE_COUNTS, LIMIT_S)
+    record.rest_us = int((rest_s + time.time() - time.monotonic()) * 1e6)
+
+
+def _await_end_of_rules(record: Record, controller: Controller) -> None:
+    """Until no rule acts any more, and a little longer; ticks go on as long as there is a controller."""
+    case = record.case
+    base = controller.read(STATISTICS, _SYNCS) - controller.read(STATISTICS, _TICK)
+    deadline = time.monotonic() + LIMIT_S
+    while controller.read(STATISTICS, _SYNCS) < base + case.last_tick:
+        if time.monotonic() > deadline:
+            raise BusError("SYNCs have stopped")
+        time.sleep(LOOK_S)
+    time.sleep(case.longest_ms / 1000 + QUIET_S)

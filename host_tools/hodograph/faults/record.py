@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""What a case works with, and what it leaves for the judge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bus.frames import Frames
+from ..chain import load_chain
+from ..config import Machine
+from ..native import NativeProgram
+from ..simulate import Motion, simulate
+from .evidence import Evidence
+from .scenario import Case
+
+REST_TOLERANCE_COUNTS = 2000
+"""An axis that stays within so little is at rest: 2 um, some encoder increments and the last of the settling."""
+LIMIT_S = 30.0
+"""Whatever takes longer hangs."""
+LOOK_S = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A program with its machine and what a clean run of it gives."""
+
+    machine: Machine
+    image: bytes
+    other: Path
+    """Another path for the same machine."""
+    clean: Motion
+    setpoints: NDArray[np.int32]
+
+
+@dataclass
+class Record:
+    """What happened in a case, for the judge."""
+
+    case: Case
+    job: Job
+    injections: list[dict[str, object]] = field(default_factory=list)
+    evidence: Evidence | None = None
+    """Of the disturbed run."""
+    control: Frames | None = None
+    """The controller's bus from the beginning to the end, recovery included."""
+    began_us: int = 0
+    """When the first thing was injected or done; 0: nothing was."""
+    fault_codes: list[int] = field(default_factory=list)
+    """Codes that object 0x2003 showed."""
+    rest_us: int | None = None
+    """When the drives were at rest, asked one by one."""
+    troubles: list[str] = field(default_factory=list)
+    """What went wrong on the way, each a violation."""
+    again: Motion | None = None
+    """The run after the recovery."""
+    finished: bool = False
+    """The disturbed program came to its end."""
+    wall_s: float = 0.0
+
+
+@lru_cache(maxsize=8)
+def load_job(path: Path) -> Job:
+    """The program of a path file; raises InputError, PlanError."""
+    chain = load_chain(path)
+    machine, image = chain.machine, chain.image
+    _, setpoints = NativeProgram(image).setpoints("fixed", machine.counts_per_mm)
+    clean = simulate(
+        image,
+        machine.models(machine.plane),
+        counts_per_mm=machine.counts_per_mm,
+        feedforward=machine.plane_feedforward,
+        keep_rows=False,
+    )
+    return Job(machine, image, path.with_name("other.toml"), clean, setpoints)

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""The way out of a fault: what has ended is started anew, the fault is reset, the program runs again."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+
+from ..bus.controller import FAULT_STATE, OFF, READY, RESET, CommandRefusedError, Controller
+from ..bus.run import Station, run_program
+from ..bus.texts import STATES
+from ..errors import RunError
+from .record import LIMIT_S, Record
+from .stand import Stand
+
+
+def recover(record: Record, stand: Stand, controller: Controller) -> None:
+    """Resets what is left of the fault, and runs the program again from its start."""
+    job = record.job
+    if stand.controller.ended():
+        stand.start_controller()
+        controller.require(5.0)
+    if any(drive.ended() for drive in stand.drives):
+        for drive in stand.drives:
+            drive.end()
+        stand.start_drives(faulty=False)
+    _reset(controller)
+    run = run_program(Station(controller, "fast", None), job.machine, job.image, "fixed")
+    record.again = run.motion
+
+
+def _reset(controller: Controller) -> None:
+    """Resets until the fault is gone and the drives are found: braking comes first, drives take their time."""
+    deadline = time.monotonic() + LIMIT_S
+    while (state := controller.state()) not in (OFF, READY):
+        if time.monotonic() > deadline:
+            raise RunError(
+                f"{STATES.get(state, state)} after {LIMIT_S:g} s of resets: {controller.fault_text()}"
+            )
+        if state == FAULT_STATE:
+            with suppress(CommandRefusedError):
+                controller.command(RESET)
+        time.sleep(0.05)
