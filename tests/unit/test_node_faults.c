@@ -77,15 +77,15 @@ static void test_a_rule_acts_on_its_drive_for_its_ticks(void)
 {
     begin("saturate at=2 for=3 node=3 volts=1.5\ndrop at=0 id=0x182\n");
     frame(0x080, 11, 0);
-    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 5.0);
+    TEST_ASSERT_TRUE(nodes[1].axis.influence.volts_limit == 5.0);
     frame(0x080, 12, 0);
-    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 1.5);
-    TEST_ASSERT_TRUE(nodes[0].axis.drive.pdff.volts_limit == 5.0);
+    TEST_ASSERT_TRUE(nodes[1].axis.influence.volts_limit == 1.5);
+    TEST_ASSERT_TRUE(nodes[0].axis.influence.volts_limit == 5.0);
     TEST_ASSERT_EQUAL_INT64(2, last_tick);
     frame(0x080, 14, 0);
-    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 1.5);
+    TEST_ASSERT_TRUE(nodes[1].axis.influence.volts_limit == 1.5);
     frame(0x080, 15, 0);
-    TEST_ASSERT_TRUE(nodes[1].axis.drive.pdff.volts_limit == 5.0);
+    TEST_ASSERT_TRUE(nodes[1].axis.influence.volts_limit == 5.0);
     TEST_ASSERT_EQUAL_UINT(1, begun);
     TEST_ASSERT_EQUAL_UINT(1, ended);
 }
