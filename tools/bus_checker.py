@@ -59,10 +59,8 @@ _FROM_TO = {
 }
 _MAY_REFUSE = {
     (0x1005, 0x06010002),  # the COB-ID of SYNC is fixed
-    (0x1006, 0x06090032),  # and so is the counter, whatever the period: it need not be 0 before
     (0x100C, 0x06020000),  # no node guarding
     (0x100D, 0x06020000),
-    (0x1400, 0x06090011),  # no inhibit time of an RPDO
 }
 """What a simulated drive has not, and the controller asks every drive for at its configuration."""
 _KEPT_FINDINGS = 50

@@ -154,6 +154,15 @@ def test_a_reset_that_was_asked_for_is_no_fault() -> None:
     assert seen(frames).findings == []
 
 
+def test_a_drive_may_refuse_what_it_has_not_while_it_is_configured() -> None:
+    refused = (0x582, struct.pack("<BHBI", 0x80, 0x100C, 0, 0x06020000))
+    frames = good()
+    checker = seen([*frames[:5], refused, *frames[5:]])
+    assert checker.findings == []
+    assert checker.kinds["SDO refused by a drive while it was configured"] == 1
+    assert len(seen([*frames, refused]).findings) == 1
+
+
 def test_a_host_that_waits_for_the_controller_is_no_fault() -> None:
     abort = struct.pack("<BHBI", 0x80, 0, 0, 0x05040000)
     asked = [(0x601, bytes(8)), (0x601, abort)]
