@@ -74,6 +74,12 @@ def _axis_text(node: int, drive: Drive, machine: Machine) -> str:
     return ",".join(f"{key}={value:.17g}" for key, value in values.items())
 
 
+def guarded(command: list[str]) -> list[str]:
+    """The same command, that gets SIGTERM when we die, where the system can do that."""
+    guard = shutil.which("setpriv")
+    return [guard, "--pdeathsig", "TERM", "--", *command] if guard else command
+
+
 class Rig:
     """Controller and drives as child processes; ends them on leaving.
 
@@ -107,10 +113,8 @@ class Rig:
 
     def _spawn(self, command: list[str]) -> None:
         output = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the child)
-        guard = shutil.which("setpriv")
-        prefix = [guard, "--pdeathsig", "TERM", "--"] if guard else []
         child = subprocess.Popen(
-            prefix + command,
+            guarded(command),
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,

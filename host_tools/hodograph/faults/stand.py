@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any
 
 from ..bus.address import BusAddress
-from ..bus.processes import controller_command, drive_command, find_program
+from ..bus.processes import controller_command, drive_command, find_program, guarded
 from ..config import Machine
 
 INJECTOR = "hodograph-injector"
@@ -27,7 +27,7 @@ class Process:
     def __init__(self, command: list[str]) -> None:
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the child)
         self.child = subprocess.Popen(
-            command,
+            guarded(command),
             stdin=subprocess.DEVNULL,
             stdout=self._output,
             stderr=subprocess.STDOUT,
