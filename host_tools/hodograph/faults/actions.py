@@ -12,6 +12,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
 from ..bus.address import BusAddress
 from ..bus.controller import Controller
 from ..bus.network import open_network
@@ -82,7 +84,10 @@ def await_rest(clients: Sequence[Any], tolerance_counts: int, wait_s: float) -> 
     while True:
         for client in clients:
             place, since_s, looks = rests[id(client)]
-            word, now = int(client[_STATUSWORD].raw), int(client[_POSITION].raw)
+            try:
+                word, now = int(client[_STATUSWORD].raw), int(client[_POSITION].raw)
+            except (SdoCommunicationError, SdoAbortedError):  # the controller asks it as well
+                continue
             off = word & _STATE_MASK != _OPERATION_ENABLED
             if off and abs(now - place) <= tolerance_counts and looks > 0:
                 rests[id(client)] = (place, since_s, looks + 1)

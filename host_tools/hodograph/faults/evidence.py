@@ -14,6 +14,8 @@ from ..bus.frames import Frames
 
 _ENABLED = 0x0F
 _EMCY = 0x080
+_GAP_US = 150_000
+"""More than answer_wait_ms, for which lock step waits for a lost answer."""
 
 
 @dataclass(frozen=True)
@@ -67,16 +69,22 @@ class Evidence:
         return sorted(found, key=lambda emergency: emergency.time_us)
 
     def last_motion_us(self, tolerance_counts: int) -> int | None:
-        """When an axis was last seen away from where it ended, by the drives' own words; None: it never was."""
+        """When an axis was last seen away from where it ended, by the drives' own words.
+
+        None: it never was, or a drive said nothing for a while thereafter, so that nobody knows.
+        """
         last = []
         for node in self.nodes:
             at = np.flatnonzero((self.drives["id"] == TPDO1 + node) & (self.drives["length"] >= 6))
             if not at.size:
                 continue
-            place = _integers(self.drives["data"][at])
+            place, time_us = _integers(self.drives["data"][at]), self.drives["time_us"][at]
             away = np.flatnonzero(np.abs(place - place[-1]) > tolerance_counts)
-            if away.size:
-                last.append(int(self.drives["time_us"][at[away[-1]]]))
+            if not away.size:
+                continue
+            if time_us[away[-1] + 1] - time_us[away[-1]] > _GAP_US:
+                return None
+            last.append(int(time_us[away[-1]]))
         return max(last, default=None)
 
     def setpoints(self) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:

@@ -105,13 +105,14 @@ def _reaction(record: Record, evidence: Evidence) -> tuple[list[int], Times, Tim
     else:
         found = evidence.emergencies(evidence.control, (record.job.machine.node,))
     found = [emergency for emergency in found if emergency.time_us >= record.began_us]
+    rest: Times
     codes = sorted({e.code for e in found} | set(record.fault_codes))
     if not found:
         return codes, (None, None), (None, None)
     fault_us = found[0].time_us
     latency = _between(evidence, record.began_us, fault_us)
     rest_us = record.rest_us or evidence.last_motion_us(REST_TOLERANCE_COUNTS)
-    rest = (0, 0.0) if rest_us is None else _between(evidence, record.began_us, rest_us)
+    rest = (None, None) if rest_us is None else _between(evidence, record.began_us, rest_us)
     return codes, latency, rest
 
 
