@@ -19,7 +19,7 @@ import numpy as np
 from hodograph.config import Drive, load_machine, load_path_file
 from hodograph.feed import ControllerLimits, plan_feed
 from hodograph.native import KERNELS
-from hodograph.program import compile_program, encode
+from hodograph.program import ProgramOptions, compile_program, encode
 from hodograph.simulate import Motion, simulate
 from hodograph.spline import from_control_polygon
 
@@ -43,7 +43,7 @@ def example(name: str, laps: int = 1) -> tuple[bytes, tuple[Drive, Drive]]:
         machine.feed_mm_s, machine.acceleration_mm_s2, machine.jerk_mm_s3, machine.reserve
     )
     plan = plan_feed(spline.length_mm, path.feed, path.limits, controller)
-    image = encode(compile_program(spline, plan, name=name))
+    image = encode(compile_program(spline, plan, ProgramOptions(name=name)))
     x, y = machine.models(machine.plane)
     return image, (x, y)
 

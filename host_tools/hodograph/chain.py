@@ -12,7 +12,15 @@ from pathlib import Path
 from .config import Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
 from .feed import ControllerLimits, FeedPlan, FeedRequest, plan_feed
-from .program import Compilation, Program, ProgramLimits, compile_path, encode, fit_plan
+from .program import (
+    Compilation,
+    Program,
+    ProgramLimits,
+    ProgramOptions,
+    compile_path,
+    encode,
+    fit_plan,
+)
 from .spline import SplineResult, from_control_polygon, through_points
 
 
@@ -126,10 +134,7 @@ class Chain:
             return compile_path(
                 spline,
                 plan,
-                period_us=machine.period_us,
-                offset_mm=machine.offset_mm,
-                limits=limits,
-                name=self.file.name,
+                ProgramOptions(self.file.name, machine.offset_mm, limits, machine.period_us),
             )
 
     @property

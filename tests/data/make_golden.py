@@ -22,7 +22,7 @@ import numpy as np
 
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.pieces import FeedPieces
-from hodograph.program import Program, ProgramLimits, compile_program, encode
+from hodograph.program import Program, ProgramLimits, ProgramOptions, compile_program, encode
 from hodograph.program.check import Fault, check_image
 from hodograph.program.codes import ProgramError
 from hodograph.program.image import HEADER_SIZE, PIECE_SIZE, SEGMENT_SIZE, with_crc
@@ -58,7 +58,7 @@ def program(
     """A program of `request` along `spline`, checked against the format but no controller."""
     limits = Limits(None, 2000.0, 50000.0, "report")
     plan = plan_feed(spline.length_mm, request, limits, controller, period_us=period_us)
-    return compile_program(spline, plan, offset_mm=offset_mm, name=name)
+    return compile_program(spline, plan, ProgramOptions(offset_mm=offset_mm, name=name))
 
 
 def good() -> dict[str, Program]:
@@ -187,7 +187,7 @@ def shortened(p: Program) -> Program:
     spline = line(0, 60)
     fine = spline.split(60.0 / 400, 2.0)
     plan = plan_feed(spline.length_mm, FeedRequest("minimax", 100.0, 0.1), None, CONTROLLER)
-    slow = compile_program(fine, plan, name="broken")
+    slow = compile_program(fine, plan, ProgramOptions(name="broken"))
     fast = plan_feed(slow.length_mm, FeedRequest("minimax", 200.0, 0.1), None, CONTROLLER)
     whole = fast.pieces_over(slow.length_q40)
     return replace(slow, pieces=whole, duration_q32_s=whole.total_q32_s)
@@ -200,7 +200,7 @@ def uneven() -> Program:
     whole = PHSpline(origin, w, False)
     spline = whole.split(31.0, 2.0)
     plan = plan_feed(spline.length_mm, FeedRequest("minimax", 20.0, 0.1), None, CONTROLLER)
-    p = compile_program(spline, plan, name="broken")
+    p = compile_program(spline, plan, ProgramOptions(name="broken"))
     u = np.array([[2, 3, 4]], dtype=np.int64) << 44
     first = put(slice(None), 0)
     one = segments(p, start_q40=first, x_q40=first, y_q40=first)
@@ -331,7 +331,7 @@ def _turned(p: Program) -> Program:
         False,
     )
     plan = plan_feed(spline.length_mm, FeedRequest("minimax", 50.0, 0.1), None, CONTROLLER)
-    straight = compile_program(line(0, 18), plan, name="broken")
+    straight = compile_program(line(0, 18), plan, ProgramOptions(name="broken"))
     u = np.rint(spline.w.real * 2.0**44).astype(np.int64)
     v = np.rint(spline.w.imag * 2.0**44).astype(np.int64)
     two = np.array([0, 9 * MM])

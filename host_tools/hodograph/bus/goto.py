@@ -10,7 +10,7 @@ from ..chain import controller_limits, program_limits
 from ..config import Machine
 from ..errors import InputError, RefusedError
 from ..feed import FeedRequest, Limits, plan_feed
-from ..program import compile_path, encode
+from ..program import ProgramOptions, compile_path, encode
 from ..spline import line
 from .controller import Controller
 from .objects import OVERRIDE, READY
@@ -40,7 +40,7 @@ def line_image(start_mm: complex, end_mm: complex, machine: Machine) -> bytes:
     )
     return encode(
         compile_path(
-            spline, plan, period_us=machine.period_us, limits=program_limits(machine), name="goto"
+            spline, plan, ProgramOptions("goto", 0j, program_limits(machine), machine.period_us)
         ).program
     )
 

@@ -2,7 +2,7 @@
 """The uploaded program: compile, encode, decode, check, print; docs/protocol.md section 1."""
 
 from .check import Fault, check
-from .compiler import Compilation, compile_path, compile_program, fit_plan
+from .compiler import Compilation, ProgramOptions, compile_path, compile_program, fit_plan
 from .image import Program, decode, encode
 from .inspection import inspect_dict, inspect_text
 from .limits import ProgramLimits
@@ -12,6 +12,7 @@ __all__ = [
     "Fault",
     "Program",
     "ProgramLimits",
+    "ProgramOptions",
     "check",
     "compile_path",
     "compile_program",

@@ -16,16 +16,12 @@ from ..spline import PHSpline
 from .check import Fault, check
 from .check_segments import boxes_q40
 from .codes import ProgramError
-from .exactmath import cumulative, segment_ways, way_to_q40
+from .geometry import quantise
 from .image import NAME_SIZE, Program
 from .limits import ProgramLimits
 from .neighbours import LEAST_FEED_MM_S, brief_pairs
 
 Int = NDArray[np.int64]
-
-LONGEST_SEGMENT_MM = 31.875
-_ANCHOR_Q40 = 16
-"""Points may be moved to those of the ideal curve by this much per joint, 2^-36 mm."""
 
 _FEED_MARGIN_MM_S = 2.0**-22
 """The controller compares feeds in 2^-24 mm/s."""
@@ -46,54 +42,43 @@ class Compilation:
     drift_mm: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Geometry:
-    start_q40: Int  # (N + 1,), the last is the length
-    x_q40: Int
-    y_q40: Int
-    u_q44: Int
-    v_q44: Int
-    drift_mm: float
+@dataclass(frozen=True)
+class ProgramOptions:
+    """What a program holds beside path and feed.
+
+    `limits` of the controller, travel included; without, only the rules of the format are checked. `period_us`, when
+    given, must be the plan's.
+    """
+
+    name: str = ""
+    offset_mm: complex = 0j
+    limits: ProgramLimits | None = None
+    period_us: int | None = None
 
 
-def compile_program(
-    spline: PHSpline,
-    plan: FeedPlan,
-    *,
-    period_us: int | None = None,
-    offset_mm: complex = 0j,
-    limits: ProgramLimits | None = None,
-    name: str = "",
-) -> Program:
+_USUAL = ProgramOptions()
+
+
+def compile_program(spline: PHSpline, plan: FeedPlan, options: ProgramOptions = _USUAL) -> Program:
     """The program of `compile_path`, for callers that need nothing else."""
-    return compile_path(
-        spline, plan, period_us=period_us, offset_mm=offset_mm, limits=limits, name=name
-    ).program
+    return compile_path(spline, plan, options).program
 
 
-def compile_path(
-    spline: PHSpline,
-    plan: FeedPlan,
-    *,
-    period_us: int | None = None,
-    offset_mm: complex = 0j,
-    limits: ProgramLimits | None = None,
-    name: str = "",
-) -> Compilation:
+def compile_path(spline: PHSpline, plan: FeedPlan, options: ProgramOptions = _USUAL) -> Compilation:
     """Compiles `plan` along `spline`, shifted by the work offset into machine coordinates.
 
-    limits  of the controller, travel included; without, only the rules of the format are checked
     Under policy "respect" the feed is lowered where two neighbouring segments would pass within one tick at
-    200 %. Raises InputError (period, name, offset) and PlanError (travel left, segments too short, and whatever
+    200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, and whatever
     `check` finds).
     """
+    name, offset_mm, period_us = options.name, options.offset_mm, options.period_us
     if period_us is not None and period_us != plan.period_us:
         raise InputError(
             f"period_us {period_us} differs from the plan's {plan.period_us}: plan again"
         )
     if len(name.encode()) > NAME_SIZE:
         name = name.encode()[:NAME_SIZE].decode(errors="ignore")
-    geometry = _quantise(spline.split(LONGEST_SEGMENT_MM, 2.0), offset_mm)
+    geometry = quantise(spline, offset_mm)
     length_q40 = int(geometry.start_q40[-1])
     if abs(length_q40 * 2.0**-40 - plan.length_mm) > 1e-6:
         raise InputError(
@@ -118,9 +103,9 @@ def compile_path(
         v_q44=geometry.v_q44,
         pieces=pieces,
     )
-    fault = check(program, limits)
+    fault = check(program, options.limits)
     if fault is not None:
-        raise PlanError(_advice(fault, program, limits, spline))
+        raise PlanError(_advice(fault, program, options.limits, spline))
     return Compilation(program, plan, plan.notes, geometry.drift_mm)
 
 
@@ -129,37 +114,8 @@ def fit_plan(spline: PHSpline, plan: FeedPlan) -> FeedPlan:
 
     Raises PlanError as `compile_path` does for them, and InputError for a path beyond the format.
     """
-    geometry = _quantise(spline.split(LONGEST_SEGMENT_MM, 2.0), 0j)
+    geometry = quantise(spline, 0j)
     return _fit_feed(plan, geometry.start_q40, spline)[0]
-
-
-def _quantise(spline: PHSpline, offset_mm: complex) -> _Geometry:
-    """Integer segments: w rounded, then everything else from exact sums of the rounded w."""
-    far = np.abs(np.concatenate((spline.origin, [offset_mm])))
-    if not np.all(far < 8192.0):
-        raise InputError("path or work offset: a coordinate is beyond the 4096 mm of the format")
-    if np.abs(spline.w.view(np.float64)).max(initial=0.0) >= 2.0**18:
-        raise InputError("path: a segment is too long for the format")
-    u = np.rint(spline.w.real * 2.0**44).astype(np.int64)
-    v = np.rint(spline.w.imag * 2.0**44).astype(np.int64)
-    dx, dy, ds = (cumulative(way) for way in segment_ways(u, v))
-    x, x_drift = _anchored(way_to_q40(dx)[:-1], spline.origin.real, offset_mm.real)
-    y, y_drift = _anchored(way_to_q40(dy)[:-1], spline.origin.imag, offset_mm.imag)
-    return _Geometry(way_to_q40(ds), x, y, u, v, float(np.hypot(x_drift, y_drift).max()))
-
-
-def _anchored(
-    way_q40: Int, ideal_mm: NDArray[np.float64], offset_mm: float
-) -> tuple[Int, NDArray[np.float64]]:
-    """Start points from exact ways, drawn to the ideal ones as far as joints stay within 2^-36 mm."""
-    offset = round(offset_mm * 2**40)
-    ideal = np.rint(ideal_mm * 2.0**40).astype(np.int64)
-    chained = ideal[0] + way_q40
-    pull = ideal - chained
-    if np.abs(np.diff(pull)).max(initial=0) > _ANCHOR_Q40:
-        pull = np.zeros_like(pull)
-    points = chained + pull
-    return points + offset, (points - ideal) * 2.0**-40
 
 
 def _fit_feed(plan: FeedPlan, joints_q40: Int, spline: PHSpline) -> tuple[FeedPlan, FeedPieces]:

@@ -14,6 +14,7 @@ from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.program import (
     Program,
     ProgramLimits,
+    ProgramOptions,
     check,
     compile_path,
     compile_program,
@@ -48,7 +49,9 @@ def wavy(count: int, seed: int = 0, closed: bool = False) -> PHSpline:
 
 def compiled(spline: PHSpline, request: FeedRequest = REQUEST, offset_mm: complex = 0j) -> Program:
     plan = plan_feed(spline.length_mm, request, None, CONTROLLER)
-    return compile_program(spline, plan, offset_mm=offset_mm, limits=LIMITS, name="test")
+    return compile_program(
+        spline, plan, ProgramOptions(offset_mm=offset_mm, limits=LIMITS, name="test")
+    )
 
 
 @settings(max_examples=25, deadline=None)
@@ -72,7 +75,7 @@ def test_joints_meet_far_within_the_tolerance(count, seed, closed) -> None:
 def test_program_is_the_path_in_50_digits(count, seed, offset) -> None:
     spline = wavy(count, seed)
     plan = plan_feed(spline.length_mm, REQUEST, None, CONTROLLER)
-    program = compile_program(spline, plan, offset_mm=offset, limits=LIMITS)
+    program = compile_program(spline, plan, ProgramOptions(offset_mm=offset, limits=LIMITS))
     exact = ExactProgram(program)
     for share in (0.0, 0.03, 0.3, 0.71, 0.999, 1.0):
         time_q32 = round(share * program.duration_q32_s)
@@ -109,8 +112,8 @@ def test_work_offset_moves_everything_and_travel_is_kept() -> None:
     plan = plan_feed(50.0, REQUEST, None, CONTROLLER)
     narrow = ProgramLimits(1000, 500_000, 5_000_000, 200_000, (0, 0), (120 * MM, 120 * MM))
     with pytest.raises(PlanError, match=r"travel.* span 1 .* x 1.* mm \(travel 0 … 120\)"):
-        compile_program(line(0, 50), plan, offset_mm=100 + 20j, limits=narrow)
-    compile_program(line(0, 50), plan, offset_mm=10 + 20j, limits=narrow)
+        compile_program(line(0, 50), plan, ProgramOptions(offset_mm=100 + 20j, limits=narrow))
+    compile_program(line(0, 50), plan, ProgramOptions(offset_mm=10 + 20j, limits=narrow))
 
 
 def test_short_segments_lower_the_feed_under_respect_only() -> None:
@@ -141,19 +144,19 @@ def test_plan_and_path_must_belong_together() -> None:
     with pytest.raises(InputError, match="the plan is for"):
         compile_program(line(0, 51), plan)
     with pytest.raises(InputError, match="period"):
-        compile_program(line(0, 50), plan, period_us=2000)
+        compile_program(line(0, 50), plan, ProgramOptions(period_us=2000))
 
 
 def test_controller_refuses_what_was_planned_for_another() -> None:
     plan = plan_feed(50.0, REQUEST, None, CONTROLLER)
     weak = ProgramLimits(1000, 50_000, 5_000_000, 200_000, (-(2**50),) * 2, (2**50,) * 2)
     with pytest.raises(PlanError, match="FEED"):
-        compile_program(line(0, 50), plan, limits=weak)
+        compile_program(line(0, 50), plan, ProgramOptions(limits=weak))
 
 
 def test_long_names_are_cut_at_whole_characters() -> None:
     plan = plan_feed(50.0, REQUEST, None, CONTROLLER)
-    program = compile_program(line(0, 50), plan, name="ü" * 40)
+    program = compile_program(line(0, 50), plan, ProgramOptions(name="ü" * 40))
     assert program.name == "ü" * 16
     assert decode(encode(program)).name == program.name
     assert check_image(encode(program)) is None
@@ -212,7 +215,7 @@ def test_compile_and_check_take_linear_time() -> None:
         spline = PHSpline(origin, w, False)
         plan = plan_feed(spline.length_mm, REQUEST, None, CONTROLLER)
         begin = time.perf_counter()
-        image = encode(compile_program(spline, plan, limits=LIMITS))
+        image = encode(compile_program(spline, plan, ProgramOptions(limits=LIMITS)))
         assert decode(image).segment_count >= count
         return time.perf_counter() - begin
 

@@ -8,7 +8,7 @@ import pytest
 
 from hodograph.config import Drive, load_machine, load_path_file
 from hodograph.feed import ControllerLimits, plan_feed
-from hodograph.program import compile_program, encode
+from hodograph.program import ProgramOptions, compile_program, encode
 from hodograph.simulate import Motion, simulate
 from hodograph.spline import PHSpline, from_control_polygon
 
@@ -32,7 +32,7 @@ def make_case(name: str) -> Case:
         machine.feed_mm_s, machine.acceleration_mm_s2, machine.jerk_mm_s3, machine.reserve
     )
     plan = plan_feed(spline.length_mm, path.feed, path.limits, limits)
-    image = encode(compile_program(spline, plan, name=name))
+    image = encode(compile_program(spline, plan, ProgramOptions(name=name)))
     x, y = machine.models(machine.plane)
     drives = (x, y)
     return Case(image, drives, spline, simulate(image, drives))
