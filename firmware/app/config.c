@@ -57,6 +57,7 @@ static void read_axis(struct config_axis *axis, const struct od *od, uint8_t sub
 void config_read(struct config *config, const struct od *od)
 {
     config->period_us = (uint32_t)number(od, 0x1006, 0);
+    config->own_node = (uint8_t)(number(od, 0x1200, 1) & NODE_ID_MAX);
     config->axis_count = (uint8_t)number(od, 0x2004, 1);
     config->feed_limit_um_s = (uint32_t)number(od, 0x2004, 2);
     config->acceleration_limit_um_s2 = (uint32_t)number(od, 0x2004, 3);

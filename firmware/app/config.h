@@ -53,6 +53,7 @@ struct config {
     uint16_t answer_wait_ms;      /* wall time before an answer counts as missed */
     uint16_t setpoint_timeout_ms; /* a drive without setpoints for so long stops by itself */
     uint8_t node[AXES_MAX];
+    uint8_t own_node;    /* the controller itself */
     uint8_t axis_count;  /* 1 ... AXES_MAX */
     uint8_t kernel;      /* enum interp_kernel */
     uint8_t missed_max;  /* so many answers in a row may be missed */

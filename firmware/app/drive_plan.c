@@ -83,6 +83,8 @@ static uint32_t value_of(const struct drive_plan *plan, const struct drive_row *
         return (uint32_t)config->travel_min_counts[plan->axis];
     case FROM_TRAVEL_MAX:
         return (uint32_t)config->travel_max_counts[plan->axis];
+    case FROM_OWN_NODE:
+        return ((uint32_t)config->own_node << 16) | row->argument;
     case FROM_SETPOINT_TIMEOUT:
         return config->setpoint_timeout_ms;
     case FROM_ROW:

@@ -9,14 +9,11 @@
 #include "canopen/cia402.h"
 #include "canopen/cob.h"
 
-#define CONTROLLER_NODE 1u
-#define PROFILE_DRIVE   402u /* low half of 0x1000 */
-#define SYNC_COUNTER    240u
-#define SYNCHRONOUS     1u /* transmission types */
-#define ON_CHANGE       255u
-#define INHIBIT_MS      10u
-
-#define HEARTBEAT_CONSUMER ((CONTROLLER_NODE << 16) | DRIVE_CONTROLLER_SILENT_MS)
+#define PROFILE_DRIVE 402u /* low half of 0x1000 */
+#define SYNC_COUNTER  240u
+#define SYNCHRONOUS   1u /* transmission types */
+#define ON_CHANGE     255u
+#define INHIBIT_MS    10u
 
 enum { NO_CHANGE = 1 };      /* 0x1029: stays operational, so that its TPDOs tell what it does */
 enum { QUICK_STOP = 3 };     /* 0x6007: what it does then */
@@ -78,7 +75,7 @@ const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_MAY, 0x100C, 0, 2, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
-    {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_ROW, HEARTBEAT_CONSUMER},
+    {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_SILENT_MS},
     {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NO_CHANGE},
     {WHEN_ALWAYS, ROW_MAY, 0x6007, 0, 2, FROM_ROW, QUICK_STOP},
     /* process data */

@@ -46,6 +46,7 @@ enum drive_source {
     FROM_TRAVEL_MIN,
     FROM_TRAVEL_MAX,
     FROM_SETPOINT_TIMEOUT,
+    FROM_OWN_NODE, /* 0x1016: this controller, silent for `argument` ms */
 };
 
 struct drive_row {

@@ -74,9 +74,10 @@ def drive_process(node: int = DRIVE, axis: str = "") -> Any:
     return process(node, str(ROOT / "build/bin/hodograph-drive"), "--bus", "vcan0", "--axis", axis)
 
 
-def controller_process() -> Any:
-    """A controller without drives: it stays in state boot."""
-    return process(CONTROLLER, str(ROOT / "build/bin/hodograph-controller"), "--bus", "vcan0")
+def controller_process(node: int = CONTROLLER) -> Any:
+    """A controller; without drives it stays in state boot."""
+    program = str(ROOT / "build/bin/hodograph-controller")
+    return process(node, program, "--bus", "vcan0", "--node", str(node))
 
 
 @contextmanager

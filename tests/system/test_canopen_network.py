@@ -273,3 +273,15 @@ def test_foreign_frames_do_no_harm(drive: Listened) -> None:
     until(lambda: len(drive.beats) >= 3)
     assert {state for _, state in drive.beats} == {PRE_OPERATIONAL}
     assert node.sdo[0x1000].raw == 0x00020192
+
+
+def test_drives_watch_the_controller_whatever_its_node() -> None:
+    """0x1016 of the drives names the node that configured them."""
+    with drive_process(2), drive_process(3):
+        with (
+            controller_process(5),
+            client(canopen.RemoteNode(5, str(CONTROLLER_EDS))) as network,
+        ):
+            until(lambda: network[5].sdo[0x2002].raw == 1)
+        with client(canopen.RemoteNode(2, str(DRIVE_EDS))) as network:
+            assert network[2].sdo[0x1016][1].raw >> 16 == 5
