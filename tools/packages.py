@@ -56,6 +56,8 @@ _PACKAGE_OF = {
     "taskset": "util-linux",
     "ar": "binutils",
     "node": "nodejs",
+    "candump": "can-utils",
+    "cansend": "can-utils",
 }
 
 BUS = (
@@ -73,7 +75,7 @@ BUILD = (
     Need("the Python modules venv and ensurepip", _has_venv, "python3-venv"),
     *BUS,
 )
-TEST = (_program("chromium"),)
+TEST = (_program("chromium"), _program("candump"), _program("cansend"))
 LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"), _program("node"))
 SETS = {"build": BUILD, "bus": BUS, "test": TEST, "lint": LINT}
 

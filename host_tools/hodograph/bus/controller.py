@@ -54,7 +54,7 @@ from .objects import (
     STOP,
     TARGET,
 )
-from .texts import PROGRAM_STATES, REFUSALS, STATES, fault_text
+from .texts import PROGRAM_STATES, REFUSALS, STATES, detail_text, fault_text, fault_words
 from .upload import Progress, upload
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ class Controller(Node):
             reason = self.read(FAULT, 4)
             text = REFUSALS.get(reason, str(error))
             if reason == 5:
-                text = f"{self.fault_text()}; fix the cause, then hodograph start --reset"
+                text = self.fault_advice()
             raise CommandRefusedError(f"{self.who()} refused: {text}", reason) from error
         except SdoCommunicationError as error:
             raise BusError(f"{self.who()} stopped answering a command") from error
@@ -154,7 +154,7 @@ class Controller(Node):
             if state in states:
                 return state
             if state == FAULT_STATE:
-                raise RunError(f"{self.who()} is in fault: {self.fault_text()}")
+                raise RunError(f"{self.who()} is in fault: {self.fault_advice()}")
             if time.monotonic() > deadline:
                 names = " or ".join(STATES[s] for s in states)
                 raise BusError(
@@ -174,7 +174,14 @@ class Controller(Node):
     def fault_text(self) -> str:
         """The present fault in words."""
         code, node, detail = (self.read(FAULT, sub) for sub in (1, 2, 3))
-        return f"{fault_text(code)} (code 0x{code:04X}, node {node}, detail {detail})"
+        more = detail_text(code, detail)
+        where = f"node {node}" if node else "the controller"
+        return f"{fault_text(code)} (code 0x{code:04X}, {where}{', ' if more else ''}{more})"
+
+    def fault_advice(self) -> str:
+        """The present fault and what to do."""
+        remedy = fault_words(self.read(FAULT, 1)).remedy
+        return f"{self.fault_text()}: {remedy}; then hodograph reset"
 
     def require_standing(self) -> None:
         """Raises RefusedError while axes move: that is somebody's doing, and goes on."""
@@ -189,7 +196,7 @@ class Controller(Node):
         state = self.state()
         if state == BOOT:
             state = self.wait_for((OFF, READY), 10.0)
-        if state == OFF:
+        if state in (OFF, FAULT_STATE):  # refused in a fault, with the reason
             self.command(ENABLE)
         self.wait_for((READY,), 10.0)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Emergency error codes (CiA 301 table 26, CiA 402-2, and our own 0xFFxx) in words: what it is, and what to do.
 
-When that is done, `hodograph start --reset` resets the fault.
+When that is done, `hodograph reset` resets the fault.
 
 Single codes come before the classes that contain them. The codes that the controller (firmware/app/fault.h) and the
 simulated drives (firmware/canopen/emcy.h) can raise are all single codes here.
@@ -256,14 +256,16 @@ def fault_text(code: int) -> str:
     return fault_words(code).text
 
 
-_STATUSWORD_CODES = (0x1000, 0xFF01, 0xFF02, 0xFF04, 0xFF05, 0xFF06, 0xFF11, 0xFF12)
 _COUNTS = {0x8250: "positions missed in a row", 0xFF07: "ticks in a row"}
+_PLAIN = (0x6100, 0xFF10)
 
 
 def detail_text(code: int, detail: int) -> str:
-    """What object 0x2003 sub 3 says beside a code of the controller, empty when nothing."""
-    if code in _STATUSWORD_CODES and detail:
-        return f"statusword 0x{detail:04X}, {state_of_statusword(detail)}"
+    """What object 0x2003 sub 3 says beside a code of the controller, empty when nothing: mostly the statusword."""
     if code in _COUNTS:
         return f"{detail} {_COUNTS[code]}"
-    return f"detail {detail}" if detail else ""
+    if not detail:
+        return ""
+    if code in _PLAIN:
+        return f"detail 0x{detail:X}"
+    return f"statusword 0x{detail:04X}, {state_of_statusword(detail)}"

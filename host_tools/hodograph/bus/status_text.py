@@ -39,7 +39,7 @@ def _trouble_rows(status: Status) -> list[Row]:
         where = f"node {fault.node}" if fault.node else "the controller"
         detail = f", {fault.detail_text}" if fault.detail_text else ""
         rows.append(("fault", f"{fault.text} (code 0x{fault.code:04X}, {where}{detail})"))
-        rows.append(("remedy", f"{fault.remedy}; then hodograph start --reset"))
+        rows.append(("remedy", f"{fault.remedy}; then hodograph reset"))
     else:
         rows.append(("fault", "none"))
     if status.boot_trouble is not None:

@@ -36,9 +36,9 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     print("\n".join(aligned(rows)))
 
 
-def aligned(rows: Sequence[tuple[str, str]]) -> list[str]:
-    """The lines of names and values in two columns."""
-    width = max(len(name) for name, _ in rows)
+def aligned(rows: Sequence[tuple[str, str]], least: int = 0) -> list[str]:
+    """The lines of names and values in two columns, the first at least so wide."""
+    width = max(least, *(len(name) for name, _ in rows))
     return [f"{name:<{width}}  {value}" for name, value in rows]
 
 

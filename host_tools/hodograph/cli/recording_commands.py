@@ -36,8 +36,8 @@ def record(options: Namespace) -> None:
 
 def _record(address: BusAddress, options: Namespace) -> tuple[int, int, float]:
     """Until the time is over or Ctrl-C, which is how it is meant to end: frames, dropped ones, time."""
-    begun = time.monotonic()
     with RecordingWriter(options.file, address.channel) as writer, Recorder(address) as recorder:
+        begun = recorder.started_s
         try:
             while options.seconds is None or time.monotonic() - begun < options.seconds:
                 left_s = _WRITE_EVERY_S

@@ -21,6 +21,8 @@ from ..errors import BusError
 from .output import aligned, print_json
 from .targets import Target, target
 
+_NAME_WIDTH = 12
+"""Of the longest name, so that lines stand where they stood."""
 _HOME, _CLEAR_LINE, _CLEAR_BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 
@@ -52,7 +54,7 @@ def _once(controller: Controller, meter: LoadMeter | None, to: Target, options: 
     if options.json:
         print_json(_document(found, load))
     else:
-        print("\n".join(aligned(status_rows(found, load, to.axis_names))))
+        print("\n".join(aligned(status_rows(found, load, to.axis_names), _NAME_WIDTH)))
 
 
 def _document(found: Status, load: BusLoad | None) -> dict[str, Any]:
@@ -85,7 +87,7 @@ class _Screen:
         sys.stdout.flush()
 
     def _draw(self, rows: list[Row]) -> None:
-        lines = [*aligned([("time", _now()), *rows]), "", "Ctrl-C ends"]
+        lines = [*aligned([("time", _now()), *rows], _NAME_WIDTH), "", "Ctrl-C ends"]
         sys.stdout.write(_HOME + "".join(f"{line}{_CLEAR_LINE}\n" for line in lines) + _CLEAR_BELOW)
 
 
