@@ -42,7 +42,7 @@ LIBS        := app node injector faults port canopen sim core od
 core_SRC    := $(wildcard firmware/core/*.c)
 canopen_SRC := $(wildcard firmware/canopen/*.c)
 sim_SRC     := $(wildcard sim/plant/*.c sim/rig/*.c)
-app_SRC     := $(filter-out %/main.c,$(wildcard firmware/app/*.c))
+app_SRC     := $(filter-out %/main.c,$(wildcard firmware/app/*.c firmware/app/*/*.c))
 port_SRC    := $(filter-out %/main.c,$(wildcard firmware/port/linux/*.c))
 node_SRC    := $(filter-out %/main.c,$(wildcard sim/node/*.c))
 faults_SRC  := $(wildcard sim/faults/*.c)
@@ -60,7 +60,7 @@ UNIT_SUPPORT  := $(filter-out $(UNIT_SRC),$(wildcard tests/unit/*.c))
 UNIT_NAMES    := $(UNIT_SRC:tests/unit/%.c=%)
 
 OWN_C    := $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
-OWN_H    := $(wildcard firmware/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
+OWN_H    := $(wildcard firmware/*/*.h firmware/app/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
 FUZZ_SRC := $(wildcard tests/fuzz/*.c)
 
 ## ---- flags -----------------------------------------------------------------------------------

@@ -23,10 +23,25 @@ C_RULES: dict[str, set[str]] = {
     "firmware/canopen": {"firmware/can"},
     "firmware/port/port.h": {"firmware/can"},
     "firmware/port/*": {"firmware/port/port.h", "firmware/can"},  # each board; not one another
+    "firmware/app/machine": {
+        "firmware/can",
+        "firmware/core",
+        "firmware/canopen",
+        "generated",
+    },
+    "firmware/app/drives": {
+        "firmware/can",
+        "firmware/canopen",
+        "firmware/app/machine",
+        "firmware/port/port.h",
+        "generated",
+    },
     "firmware/app": {
         "firmware/can",
         "firmware/core",
         "firmware/canopen",
+        "firmware/app/machine",
+        "firmware/app/drives",
         "firmware/port/port.h",
         "generated",
     },

@@ -15,12 +15,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drive_boot.h"
-#include "app/drive_look.h"
-#include "app/drive_watch.h"
+#include "app/drives/drive_boot.h"
+#include "app/drives/drive_look.h"
+#include "app/drives/drive_watch.h"
+#include "app/drives/homing.h"
 #include "app/frame_queue.h"
-#include "app/homing.h"
-#include "app/machine.h"
+#include "app/machine/machine.h"
 #include "app/program_slot.h"
 #include "app/tick.h"
 #include "canopen/emcy.h"

@@ -12,7 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/config.h"
+#include "app/machine/config.h"
 #include "core/program.h"
 #include "core/program_check.h"
 

@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/machine.h"
-#include "app/offsets.h"
+#include "app/machine/machine.h"
+#include "app/machine/offsets.h"
 #include "canopen/sync.h"
 
 struct tick {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/answers.h"
+#include "app/machine/answers.h"
 
 #include "unity.h"
 

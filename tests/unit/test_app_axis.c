@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/axis.h"
+#include "app/machine/axis.h"
 
 #include "unity.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/config.h"
+#include "app/machine/config.h"
 
 #include "od_controller.h"
 #include "unity.h"

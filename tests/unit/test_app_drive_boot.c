@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Configuration of the drives by SDO: order, what is optional, what is told when it fails. */
-#include "app/drive_boot.h"
+#include "app/drives/drive_boot.h"
 
 #include "canopen/pdo.h"
 #include "canopen/sdo_abort.h"

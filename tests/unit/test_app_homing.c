@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/homing.h"
+#include "app/drives/homing.h"
 
 #include "app/commands.h"
 #include "canopen/sdo_abort.h"

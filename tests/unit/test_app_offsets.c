@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/offsets.h"
+#include "app/machine/offsets.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/status_watch.h"
+#include "app/machine/status_watch.h"
 
-#include "app/fault.h"
+#include "app/machine/fault.h"
 #include "canopen/cia402.h"
 #include "unity.h"
 

@@ -3,7 +3,7 @@
 
 When that is done, `hodograph reset` resets the fault.
 
-Single codes come before the classes that contain them. The codes that the controller (firmware/app/fault.h) and the
+Single codes come before the classes that contain them. The codes that the controller (firmware/app/machine/fault.h) and the
 simulated drives (firmware/canopen/emcy.h) can raise are all single codes here.
 """
 

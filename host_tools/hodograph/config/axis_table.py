@@ -11,7 +11,7 @@ from .table import Table
 
 MAX_AXES = 6
 COUNTS_PER_MM_MAX = 2**23
-"""The controller's own bound (firmware/app/config.h)."""
+"""The controller's own bound (firmware/app/machine/config.h)."""
 I32_MAX, U32_MAX = 2**31 - 1, 2**32 - 1
 HOMING_METHODS = (0, 17, 18, 19, 20, 21, 22, 35, 37)
 """Of CiA 402: 0 not homed, 17, 18 limit switches, 19 to 22 home switch, 35 and 37 here."""

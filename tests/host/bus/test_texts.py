@@ -36,7 +36,7 @@ def codes() -> dict[str, int]:
     base = found["EMCY_MANUFACTURER"]
     for name, value in re.findall(
         r"#define (FAULT_[A-Z0-9_]+)[ \\\n]+\(EMCY_MANUFACTURER \| (0x[0-9A-F]+)u\)",
-        header("app/fault.h"),
+        header("app/machine/fault.h"),
     ):
         found[name] = base | int(value, 16)
     del found["EMCY_NO_ERROR"]
@@ -81,14 +81,14 @@ def test_every_class_of_the_standard_has_words() -> None:
 def test_states_are_those_of_the_firmware() -> None:
     found = {
         int(value): name.lower().replace("_", " ")
-        for name, value in re.findall(r"^    MACHINE_(\w+) = (\d+),", header("app/machine.h"), re.M)
+        for name, value in re.findall(r"^    MACHINE_(\w+) = (\d+),", header("app/machine/machine.h"), re.M)
         if name not in reasons()
     }
     assert found == STATES
 
 
 def reasons() -> dict[str, int]:
-    block = re.search(r"MACHINE_ACCEPTED = 0,(.*?)\};", header("app/machine.h"), re.S)
+    block = re.search(r"MACHINE_ACCEPTED = 0,(.*?)\};", header("app/machine/machine.h"), re.S)
     assert block is not None
     return {"ACCEPTED": 0} | {
         name: int(value) for name, value in re.findall(r"MACHINE_(\w+) = (\d+),", block[1])

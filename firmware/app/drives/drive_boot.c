@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/drives/drive_boot.h"
+
+#include <string.h>
+
+#include "canopen/nmt.h"
+#include "canopen/sdo_abort.h"
+
+static void pause(struct drive_boot *boot, uint32_t pause_us)
+{
+    boot->phase = DRIVE_BOOT_PAUSE;
+    boot->pause_us = pause_us;
+    sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
+}
+
+void drive_boot_init(struct drive_boot *boot)
+{
+    memset(boot, 0, sizeof *boot);
+    boot->phase = DRIVE_BOOT_IDLE;
+}
+
+void drive_boot_begin(struct drive_boot *boot, const struct config *config)
+{
+    boot->config = *config;
+    memset(&boot->trouble, 0, sizeof boot->trouble);
+    pause(boot, DRIVE_BOOT_PAUSE_US);
+}
+
+static uint8_t node_of(const struct drive_boot *boot)
+{
+    return boot->config.node[boot->axis];
+}
+
+static void give_up(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
+{
+    boot->trouble = (struct drive_trouble){
+        .node = node_of(boot),
+        .object = ((uint32_t)boot->op.index << 8) + boot->op.sub,
+        .abort_code = abort_code,
+        .value = value,
+    };
+    pause(boot, DRIVE_BOOT_RETRY_US);
+}
+
+static void begin_drive(struct drive_boot *boot)
+{
+    drive_plan_begin(&boot->plan, &boot->config, boot->axis, &boot->facts[boot->axis]);
+    boot->reading_back = false;
+    boot->reads = 0;
+}
+
+/* The drive is configured: to the next one, or on to starting them all. */
+static void finish_drive(struct drive_boot *boot)
+{
+    boot->simulated = boot->simulated && drive_is_simulated(&boot->facts[boot->axis]);
+    boot->axis++;
+    if (boot->axis == boot->config.axis_count) {
+        boot->axis = 0;
+        boot->phase = DRIVE_BOOT_START;
+    } else {
+        begin_drive(boot);
+    }
+}
+
+static void advance(struct drive_boot *boot)
+{
+    boot->client.status = SDO_CLIENT_IDLE;
+    boot->reading_back = false;
+    boot->reads = 0;
+    drive_plan_advance(&boot->plan);
+}
+
+static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
+{
+    boot->client.status = SDO_CLIENT_IDLE;
+    boot->reading_back = false;
+    if (!drive_plan_refused(&boot->plan)) {
+        give_up(boot, abort_code, value);
+    }
+}
+
+static bool as_wanted(const struct drive_op *op, uint32_t value)
+{
+    return ((value ^ op->value) & op->mask) == 0u;
+}
+
+/* What a write should have made so, or what only the drive knows. */
+static void judge_read(struct drive_boot *boot)
+{
+    const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
+    if (as_wanted(&boot->op, value)) {
+        drive_facts_learn(boot->plan.facts, boot->op.fact, value);
+        advance(boot);
+    } else if (boot->reading_back) {
+        refused(boot, boot->refused_code, value);
+    } else if (++boot->reads < DRIVE_BOOT_READS) {
+        boot->client.status = SDO_CLIENT_IDLE;
+        boot->pause_us = DRIVE_BOOT_READ_AGAIN_US;
+    } else {
+        refused(boot, SDO_OK, value);
+    }
+}
+
+static void judge_refusal(struct drive_boot *boot, uint32_t abort_code)
+{
+    const bool missing = abort_code == SDO_ABORT_NO_OBJECT || abort_code == SDO_ABORT_NO_SUB;
+    if (boot->op.kind == DRIVE_OP_PREPARE || (boot->op.optional && missing)) {
+        advance(boot);
+    } else if (boot->op.kind == DRIVE_OP_WRITE && !missing && !boot->reading_back) {
+        boot->client.status = SDO_CLIENT_IDLE;
+        boot->reading_back = true;
+        boot->refused_code = abort_code;
+    } else {
+        refused(boot, boot->reading_back ? boot->refused_code : abort_code, 0);
+    }
+}
+
+static void judge(struct drive_boot *boot)
+{
+    if (boot->client.status == SDO_CLIENT_FAILED) {
+        give_up(boot, boot->client.abort_code, 0);
+    } else if (boot->client.status == SDO_CLIENT_REFUSED) {
+        judge_refusal(boot, boot->client.abort_code);
+    } else if (boot->op.kind == DRIVE_OP_READ || boot->reading_back) {
+        judge_read(boot);
+    } else {
+        advance(boot);
+    }
+}
+
+static int begin_op(struct drive_boot *boot, struct can_msg *out)
+{
+    const struct drive_op *op = &boot->op;
+    const uint8_t node = node_of(boot);
+    if (op->kind == DRIVE_OP_NMT_PRE_OPERATIONAL) {
+        nmt_master_command(NMT_ENTER_PRE_OPERATIONAL, node, out);
+        advance(boot);
+        return 1;
+    }
+    const int sent = op->kind == DRIVE_OP_READ || boot->reading_back
+                         ? sdo_client_read_number(&boot->client, node, op->index, op->sub, out)
+                         : sdo_client_write_number(&boot->client, node, op->index, op->sub,
+                                                   op->value, op->size, out);
+    return sent > 0 ? 1 : 0;
+}
+
+static bool waits(struct drive_boot *boot, uint32_t elapsed_us)
+{
+    boot->pause_us -= elapsed_us < boot->pause_us ? elapsed_us : boot->pause_us;
+    return boot->pause_us > 0u;
+}
+
+static int configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
+{
+    if (boot->client.status == SDO_CLIENT_BUSY) {
+        return sdo_client_process(&boot->client, elapsed_us, out);
+    }
+    if (boot->client.status != SDO_CLIENT_IDLE) {
+        judge(boot);
+    }
+    if (boot->phase != DRIVE_BOOT_CONFIGURE || waits(boot, elapsed_us)) {
+        return 0;
+    }
+    while (!drive_plan_op(&boot->plan, &boot->op)) {
+        finish_drive(boot);
+        if (boot->phase != DRIVE_BOOT_CONFIGURE) {
+            return 0;
+        }
+    }
+    return begin_op(boot, out);
+}
+
+static int start_next(struct drive_boot *boot, struct can_msg *out)
+{
+    nmt_master_command(NMT_START, node_of(boot), out);
+    boot->axis++;
+    if (boot->axis == boot->config.axis_count) {
+        boot->phase = DRIVE_BOOT_DONE;
+        memset(&boot->trouble, 0, sizeof boot->trouble);
+    }
+    return 1;
+}
+
+static void begin_attempt(struct drive_boot *boot)
+{
+    boot->axis = 0;
+    boot->simulated = true;
+    boot->phase = DRIVE_BOOT_CONFIGURE;
+    begin_drive(boot);
+}
+
+int drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out)
+{
+    return boot->phase == DRIVE_BOOT_CONFIGURE ? sdo_client_receive(&boot->client, in, out) : 0;
+}
+
+int drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
+{
+    if (boot->phase == DRIVE_BOOT_PAUSE && !waits(boot, elapsed_us)) {
+        begin_attempt(boot);
+    }
+    if (boot->phase == DRIVE_BOOT_CONFIGURE) {
+        const int sent = configure(boot, elapsed_us, out);
+        if (sent != 0 || boot->phase != DRIVE_BOOT_START) {
+            return sent;
+        }
+    }
+    return boot->phase == DRIVE_BOOT_START ? start_next(boot, out) : 0;
+}
+
+bool drive_boot_finished(struct drive_boot *boot)
+{
+    if (boot->phase != DRIVE_BOOT_DONE) {
+        return false;
+    }
+    boot->phase = DRIVE_BOOT_IDLE;
+    return true;
+}

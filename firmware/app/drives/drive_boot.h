@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * drive_boot: finds the drives, configures them by SDO (drive_plan) and starts them (NMT), one after
+ * the other, and begins again from the first when one does not answer or refuses.
+ *
+ * A write that is refused is fine when the object reads back as wanted: so a drive with a fixed
+ * mapping passes if it is the right one.
+ *
+ * Frames in, frames out; mainline.
+ */
+#ifndef APP_DRIVES_DRIVE_BOOT_H
+#define APP_DRIVES_DRIVE_BOOT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/drives/drive_facts.h"
+#include "app/drives/drive_plan.h"
+#include "app/machine/config.h"
+#include "canopen/sdo_client.h"
+
+#define DRIVE_BOOT_SDO_TIMEOUT_US 500000u
+#define DRIVE_BOOT_PAUSE_US      20000u /* hosts write several objects at once: wait for the last */
+#define DRIVE_BOOT_RETRY_US      200000u
+#define DRIVE_BOOT_READ_AGAIN_US 5000u /* a value that a drive takes over in its own cycle */
+#define DRIVE_BOOT_READS         20u
+
+enum drive_boot_phase {
+    DRIVE_BOOT_IDLE,
+    DRIVE_BOOT_PAUSE,     /* before the first drive, or before the next attempt */
+    DRIVE_BOOT_CONFIGURE, /* the drive of `plan` */
+    DRIVE_BOOT_START,     /* all are configured; `axis` is to be started next */
+    DRIVE_BOOT_DONE,
+};
+
+/* Object 0x2025: what the last attempt failed at. */
+struct drive_trouble {
+    uint8_t node;        /* 0: none */
+    uint32_t object;     /* index << 8 + sub */
+    uint32_t abort_code; /* SDO_OK: it answered with another value */
+    uint32_t value;      /* that value, where there is one */
+};
+
+struct drive_boot {
+    struct sdo_client client;
+    struct config config;
+    struct drive_plan plan;
+    struct drive_op op;
+    struct drive_facts facts[AXES_MAX]; /* of the drives configured so far */
+    struct drive_trouble trouble;
+    enum drive_boot_phase phase;
+    uint32_t pause_us;
+    uint32_t refused_code; /* why the write was refused that is now read back */
+    uint8_t axis;
+    uint8_t reads; /* of the present object, without the right answer */
+    bool reading_back;
+    bool simulated; /* every drive so far is one of ours (0x1018) */
+};
+
+void drive_boot_init(struct drive_boot *boot);
+
+/* Begins, also in the middle of an attempt. */
+void drive_boot_begin(struct drive_boot *boot, const struct config *config);
+
+/* Takes a frame; others than SDO answers are ignored. Returns 1 when *out is to be sent, else 0. */
+int drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out);
+
+/* Lets time pass. Returns 1 when *out is to be sent: then call again with elapsed_us 0; else 0. */
+int drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out);
+
+/* True once after an attempt that reached every drive. */
+bool drive_boot_finished(struct drive_boot *boot);
+
+#endif

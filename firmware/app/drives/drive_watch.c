@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/drives/drive_watch.h"
+
+#include <stddef.h>
+
+#include "canopen/cia402.h"
+#include "canopen/emcy.h"
+#include "port/port.h"
+
+static uint32_t time_of(uint8_t node, const uint32_t entries[AXES_MAX])
+{
+    for (uint8_t i = 0; i < AXES_MAX; ++i) {
+        struct heartbeat_consumer entry;
+        heartbeat_consumer_init_entry(&entry, entries[i]);
+        if (entry.node == node && entry.time_us != 0u) {
+            return entries[i] & 0xFFFFu;
+        }
+    }
+    return DRIVE_WATCH_HEARTBEAT_MS;
+}
+
+void drive_watch_begin(struct drive_watch *watch, const struct config *config,
+                       const uint32_t entries[AXES_MAX])
+{
+    watch->count = config->axis_count;
+    for (uint8_t i = 0; i < watch->count; ++i) {
+        const uint8_t node = config->node[i];
+        heartbeat_consumer_init(&watch->consumers[i], node, (uint16_t)time_of(node, entries));
+    }
+}
+
+/* Drives that are off may come and go: they are found again. With power on it is a fault. */
+static void gone(struct machine *machine, uint16_t code, uint8_t node)
+{
+    const bool boots = machine->state == MACHINE_BOOT;
+    if (machine->state == MACHINE_OFF || (boots && machine->configured)) {
+        machine_enter_boot(machine);
+    } else if (!boots) {
+        machine_raise(machine, code, node, 0);
+    }
+}
+
+/* What it said last is no longer true: it is not even ready to switch on. */
+static void restarted(struct machine *machine, uint8_t node)
+{
+    struct axis *axis = machine_axis(machine, node);
+    if (axis != NULL) {
+        axis->statusword = cia402_status_bits(CIA402_NOT_READY);
+    }
+    gone(machine, FAULT_REBOOTED, node);
+}
+
+static void take_event(struct machine *machine, const struct heartbeat_consumer *consumer,
+                       enum heartbeat_event event)
+{
+    port_lock();
+    if (event == HEARTBEAT_BOOTED) {
+        restarted(machine, consumer->node);
+    } else if (event == HEARTBEAT_LOST) {
+        gone(machine, EMCY_HEARTBEAT, consumer->node);
+    }
+    port_unlock();
+}
+
+void drive_watch_receive(struct drive_watch *watch, struct machine *machine,
+                         const struct can_msg *in)
+{
+    struct emcy emcy;
+    const uint8_t node = emcy_decode(in, &emcy);
+    if (node != 0u) {
+        port_lock();
+        machine_note_emergency(machine, node, emcy.code);
+        port_unlock();
+        return;
+    }
+    for (uint8_t i = 0; i < watch->count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->consumers[i];
+        take_event(machine, consumer, heartbeat_consumer_receive(consumer, in));
+    }
+}
+
+void drive_watch_process(struct drive_watch *watch, struct machine *machine, uint32_t elapsed_us)
+{
+    for (uint8_t i = 0; i < watch->count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->consumers[i];
+        take_event(machine, consumer, heartbeat_consumer_process(consumer, elapsed_us));
+    }
+}

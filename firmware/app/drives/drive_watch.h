@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* drive_watch: heartbeats and emergency messages of the drives. Mainline; takes the port's lock
+ * where it touches the machine. */
+#ifndef APP_DRIVES_DRIVE_WATCH_H
+#define APP_DRIVES_DRIVE_WATCH_H
+
+#include <stdint.h>
+
+#include "app/machine/machine.h"
+#include "canopen/heartbeat.h"
+
+/* Consumer time of a drive that has no entry in 0x1016; the drives send ten times as often. */
+#define DRIVE_WATCH_HEARTBEAT_MS 1000u
+
+struct drive_watch {
+    struct heartbeat_consumer consumers[AXES_MAX];
+    uint8_t count;
+};
+
+/* Begins to watch the drives of the configuration, all unknown: each from its first heartbeat on. `entries` as in
+ * 0x1016: bits 16 ... 23 node, 0 ... 15 time in ms; other nodes in it are of no interest. */
+void drive_watch_begin(struct drive_watch *watch, const struct config *config,
+                       const uint32_t entries[AXES_MAX]);
+
+/* Takes any frame. A drive that restarts, or reports an error, makes a fault or a new boot. */
+void drive_watch_receive(struct drive_watch *watch, struct machine *machine,
+                         const struct can_msg *in);
+
+/* Lets time pass; a drive that has fallen silent likewise. */
+void drive_watch_process(struct drive_watch *watch, struct machine *machine, uint32_t elapsed_us);
+
+#endif

@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/drives/homing.h"
+
+#include <string.h>
+
+#include "canopen/cia402.h"
+#include "canopen/sdo_abort.h"
+#include "port/port.h"
+
+#define MODE_OF_OPERATION         0x6060u
+#define MODE_OF_OPERATION_DISPLAY 0x6061u
+
+void homing_init(struct homing *homing)
+{
+    memset(homing, 0, sizeof *homing);
+    sdo_client_init(&homing->client, HOMING_SDO_TIMEOUT_US);
+}
+
+bool homing_busy(const struct homing *homing)
+{
+    return homing->phase != HOMING_IDLE;
+}
+
+uint32_t homing_time_s(const struct config *config, uint8_t axis)
+{
+    const struct config_axis *settings = &config->axis[axis];
+    const uint32_t travel_counts =
+        (uint32_t)config->travel_max_counts[axis] - (uint32_t)config->travel_min_counts[axis];
+    const uint64_t time_s = (uint64_t)travel_counts / settings->homing_speed_towards_counts_s +
+                            travel_counts / settings->homing_speed_away_counts_s + HOMING_SPARE_S;
+    return time_s < HOMING_MAX_S ? (uint32_t)time_s : HOMING_MAX_S;
+}
+
+static bool wanted(const struct machine *machine, uint8_t axis)
+{
+    return machine->config.axis[axis].homing_method != 0;
+}
+
+static uint8_t next_axis(const struct machine *machine, uint8_t axis)
+{
+    while (axis < machine->config.axis_count && !wanted(machine, axis)) {
+        axis++;
+    }
+    return axis;
+}
+
+static enum machine_refusal drives_refusal(const struct machine *machine,
+                                           const struct drive_facts *facts)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (wanted(machine, i) && !drive_supports(&facts[i], CIA402_MODE_HOMING)) {
+            return MACHINE_NO_HOMING_MODE;
+        }
+    }
+    return next_axis(machine, 0) < machine->config.axis_count ? MACHINE_ACCEPTED
+                                                              : MACHINE_NOTHING_TO_HOME;
+}
+
+static void enter(struct homing *homing, const struct machine *machine, enum homing_phase phase)
+{
+    homing->phase = phase;
+    homing->began_syncs = machine->statistics.syncs;
+    homing->checking = false;
+    homing->reads = 0;
+    homing->pause_us = 0;
+    homing->client.status = SDO_CLIENT_IDLE;
+}
+
+enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
+                                  const struct drive_facts *facts)
+{
+    port_lock();
+    enum machine_refusal refusal = machine_begin_homing(machine);
+    if (refusal == MACHINE_ACCEPTED) {
+        refusal = drives_refusal(machine, facts);
+        if (refusal != MACHINE_ACCEPTED) {
+            machine_end_homing(machine);
+        }
+    }
+    if (refusal == MACHINE_ACCEPTED) {
+        homing_init(homing);
+        homing->axis = next_axis(machine, 0);
+        enter(homing, machine, HOMING_MODE);
+    }
+    port_unlock();
+    return refusal;
+}
+
+static void fail(struct homing *homing, struct machine *machine, uint16_t code, uint32_t detail)
+{
+    homing->phase = HOMING_IDLE;
+    port_lock();
+    machine_raise(machine, code, machine->config.node[homing->axis], detail);
+    port_unlock();
+}
+
+/* True when the phase has lasted longer. Under the lock. */
+static bool over(const struct homing *homing, const struct machine *machine, uint64_t time_us)
+{
+    const uint32_t syncs = machine->statistics.syncs - homing->began_syncs;
+    return (uint64_t)syncs * machine->config.period_us > time_us;
+}
+
+static int ask(struct homing *homing, const struct machine *machine, uint8_t mode,
+               struct can_msg *out)
+{
+    const uint8_t node = machine->config.node[homing->axis];
+    const int sent =
+        homing->checking
+            ? sdo_client_read_number(&homing->client, node, MODE_OF_OPERATION_DISPLAY, 0, out)
+            : sdo_client_write_number(&homing->client, node, MODE_OF_OPERATION, 0, mode, 1, out);
+    return sent > 0 ? 1 : 0;
+}
+
+/* The mode has been written, or read. Returns true when it is the wanted one. */
+static bool judge_mode(struct homing *homing, struct machine *machine, uint8_t mode)
+{
+    const bool read = homing->checking;
+    homing->client.status = SDO_CLIENT_IDLE;
+    homing->checking = true;
+    if (!read) {
+        return false;
+    }
+    const uint8_t display = (uint8_t)sdo_client_unsigned(&homing->client);
+    if (display != mode && ++homing->reads == HOMING_READS) {
+        fail(homing, machine, FAULT_HOMING_MODE, display);
+    }
+    homing->pause_us = HOMING_READ_AGAIN_US;
+    return display == mode;
+}
+
+static bool waits(struct homing *homing, uint32_t elapsed_us)
+{
+    homing->pause_us -= elapsed_us < homing->pause_us ? elapsed_us : homing->pause_us;
+    return homing->pause_us > 0u;
+}
+
+/* Brings the drive into a mode; then *done. */
+static int set_mode(struct homing *homing, struct machine *machine, uint8_t mode,
+                    uint32_t elapsed_us, struct can_msg *out, bool *done)
+{
+    switch (homing->client.status) {
+    case SDO_CLIENT_BUSY:
+        return sdo_client_process(&homing->client, elapsed_us, out);
+    case SDO_CLIENT_DONE:
+        *done = judge_mode(homing, machine, mode);
+        break;
+    case SDO_CLIENT_REFUSED:
+    case SDO_CLIENT_FAILED:
+        fail(homing, machine, FAULT_HOMING_MODE, homing->client.abort_code);
+        break;
+    case SDO_CLIENT_IDLE:
+    default:
+        break;
+    }
+    if (*done || homing->phase == HOMING_IDLE || waits(homing, elapsed_us)) {
+        return 0;
+    }
+    return ask(homing, machine, mode, out);
+}
+
+/* CiA 402-2: bit 13 error, bits 12 and 10 together: attained. Returns a fault code or 0. */
+static uint16_t judge_move(struct homing *homing, struct machine *machine)
+{
+    struct axis *axis = &machine->axes[homing->axis];
+    const uint16_t attained = CIA402_STATUS_HOMING_ATTAINED | CIA402_STATUS_TARGET_REACHED;
+    const uint64_t time_us = UINT64_C(1000000) * homing_time_s(&machine->config, homing->axis);
+    if (machine->statistics.syncs - homing->began_syncs < HOMING_SYNCS_BEFORE_ANSWER) {
+        return 0;
+    }
+    if ((axis->statusword & CIA402_STATUS_HOMING_ERROR) != 0u) {
+        return FAULT_HOMING_FAILED;
+    }
+    if ((axis->statusword & attained) == attained) {
+        axis->homed = true;
+        axis->control_extra = 0;
+        axis->goal = CIA402_GOAL_OFF;
+        enter(homing, machine, HOMING_DISABLE);
+        return 0;
+    }
+    return over(homing, machine, time_us) ? FAULT_HOMING_LATE : 0u;
+}
+
+static uint16_t step_enable(struct homing *homing, struct machine *machine)
+{
+    struct axis *axis = &machine->axes[homing->axis];
+    axis->goal = CIA402_GOAL_ENABLED;
+    if (axis_enabled(axis)) {
+        axis->control_extra = CIA402_CONTROL_START_HOMING;
+        enter(homing, machine, HOMING_MOVE);
+    }
+    return over(homing, machine, HOMING_SWITCH_US) ? FAULT_NOT_ENABLED : 0u;
+}
+
+static uint16_t step_disable(struct homing *homing, struct machine *machine)
+{
+    if (cia402_master_reached(CIA402_GOAL_OFF, machine->axes[homing->axis].statusword)) {
+        enter(homing, machine, HOMING_MODE_BACK);
+    }
+    return over(homing, machine, HOMING_SWITCH_US) ? FAULT_HOMING_LATE : 0u;
+}
+
+/* What the process data of the drive decide. */
+static void step_drive(struct homing *homing, struct machine *machine)
+{
+    port_lock();
+    const uint16_t statusword = machine->axes[homing->axis].statusword;
+    uint16_t code = 0;
+    if (homing->phase == HOMING_ENABLE) {
+        code = step_enable(homing, machine);
+    } else if (homing->phase == HOMING_MOVE) {
+        code = judge_move(homing, machine);
+    } else {
+        code = step_disable(homing, machine);
+    }
+    port_unlock();
+    if (code != 0u) {
+        fail(homing, machine, code, statusword);
+    }
+}
+
+static void mode_done(struct homing *homing, struct machine *machine)
+{
+    port_lock();
+    if (homing->phase == HOMING_MODE) {
+        enter(homing, machine, HOMING_ENABLE);
+    } else {
+        homing->axis = next_axis(machine, (uint8_t)(homing->axis + 1u));
+        if (homing->axis < machine->config.axis_count) {
+            enter(homing, machine, HOMING_MODE);
+        } else {
+            homing->phase = HOMING_IDLE;
+            machine_end_homing(machine);
+        }
+    }
+    port_unlock();
+}
+
+static bool still_homing(const struct machine *machine)
+{
+    port_lock();
+    const bool result = machine->state == MACHINE_HOMING;
+    port_unlock();
+    return result;
+}
+
+int homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out)
+{
+    return homing_busy(homing) ? sdo_client_receive(&homing->client, in, out) : 0;
+}
+
+int homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
+                   struct can_msg *out)
+{
+    if (homing_busy(homing) && !still_homing(machine)) {
+        homing->phase = HOMING_IDLE;
+    }
+    if (homing->phase == HOMING_MODE || homing->phase == HOMING_MODE_BACK) {
+        const uint8_t mode = homing->phase == HOMING_MODE ? CIA402_MODE_HOMING : CIA402_MODE_CSP;
+        bool done = false;
+        const int sent = set_mode(homing, machine, mode, elapsed_us, out, &done);
+        if (sent != 0 || !done) {
+            return sent;
+        }
+        mode_done(homing, machine);
+    } else if (homing_busy(homing)) {
+        step_drive(homing, machine);
+    }
+    return 0;
+}

@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * homing: command 10: each axis with a homing method (0x2012) is homed by its drive, one after the other, from OFF to
+ * OFF:
+ *
+ *     mode 6 -> enable -> controlword bit 4, until the drive has its zero -> disable -> mode 8 -> next axis
+ *
+ * Methods, speeds and offset have been written when the drive was found (CiA 402-2, homing mode). The machine is in HOMING
+ * meanwhile; when it leaves that state by itself (stop, quick stop, a fault) homing is over: before the drives are enabled
+ * again they are configured anew, which brings mode 8 back.
+ *
+ * Mainline; takes the port's lock where it touches the machine. Times are counted in ticks, so they mean the same on a
+ * host that is too slow.
+ */
+#ifndef APP_DRIVES_HOMING_H
+#define APP_DRIVES_HOMING_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/drives/drive_facts.h"
+#include "app/machine/config.h"
+#include "app/machine/machine.h"
+#include "canopen/sdo_client.h"
+
+#define HOMING_SDO_TIMEOUT_US 500000u
+#define HOMING_READ_AGAIN_US  5000u
+#define HOMING_READS          20u      /* of 0x6061, until it is the mode */
+#define HOMING_SWITCH_US      2000000u /* to switch a drive on, or off */
+#define HOMING_SPARE_S        10u      /* beside the way there and back */
+#define HOMING_MAX_S          600u
+
+/* A controlword this long on its way is in the next statusword: sent, latched, answered. */
+#define HOMING_SYNCS_BEFORE_ANSWER 4u
+
+enum homing_phase {
+    HOMING_IDLE,
+    HOMING_MODE,   /* 0x6060 = 6, until 0x6061 says so */
+    HOMING_ENABLE, /* to Operation enabled */
+    HOMING_MOVE,   /* the drive seeks its zero */
+    HOMING_DISABLE,
+    HOMING_MODE_BACK, /* 0x6060 = 8 */
+};
+
+struct homing {
+    struct sdo_client client;
+    enum homing_phase phase;
+    uint8_t axis;
+    uint8_t reads;
+    bool checking; /* 0x6061 is being read */
+    uint32_t pause_us;
+    uint32_t began_syncs; /* when the phase began */
+};
+
+void homing_init(struct homing *homing);
+
+/* Begins, or says why not; `facts` of each axis. */
+enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
+                                  const struct drive_facts *facts);
+
+/* True while it uses the SDO channels of the drives. */
+bool homing_busy(const struct homing *homing);
+
+/* Takes a frame; others than SDO answers are ignored. 1 when *out is to be sent, else 0. */
+int homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out);
+
+/* Lets time pass. 1 when *out is to be sent: then call again with elapsed_us 0; else 0. */
+int homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
+                   struct can_msg *out);
+
+/* How long the drive may seek its zero, s: the whole travel at both speeds, and some. Pure. */
+uint32_t homing_time_s(const struct config *config, uint8_t axis);
+
+#endif

@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/machine/axis.h"
+
+#include <string.h>
+
+static uint32_t distance(int32_t a, int32_t b)
+{
+    return a > b ? (uint32_t)a - (uint32_t)b : (uint32_t)b - (uint32_t)a;
+}
+
+void axis_init(struct axis *axis, uint8_t node)
+{
+    memset(axis, 0, sizeof *axis);
+    axis->node = node;
+    axis->goal = CIA402_GOAL_OFF;
+}
+
+void axis_command(struct axis *axis, enum cia402_goal goal)
+{
+    axis->goal = goal;
+    axis->control_extra = 0;
+    axis->by_itself = false;
+}
+
+void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us)
+{
+    axis->statusword = actual->statusword;
+    axis->position_counts = actual->position_counts;
+    answers_take(&axis->answers, now_us);
+    if (axis_enabled(axis) && axis->goal == CIA402_GOAL_ENABLED) {
+        status_watch_take(&axis->watch, axis->statusword, !axis->by_itself);
+    }
+}
+
+static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
+{
+    const bool still = axis_enabled(axis) && axis->target_counts == axis->target_sent_counts &&
+                       distance(axis->target_counts, axis->position_counts) <= tolerance_counts;
+    if (!still) {
+        axis->still_syncs = 0;
+    } else if (axis->still_syncs < AXIS_STANDSTILL_SYNCS) {
+        axis->still_syncs++;
+    }
+}
+
+/* A statusword that once says "not enabled" must not move the target of a drive that may follow it still. */
+static void note_engaged(struct axis *axis)
+{
+    if (axis->goal == CIA402_GOAL_ENABLED) {
+        axis->engaged = axis->engaged || axis_enabled(axis);
+    } else if (axis->goal != CIA402_GOAL_QUICK_STOP && !axis_enabled(axis)) {
+        axis->engaged = false;
+        status_watch_init(&axis->watch);
+    }
+}
+
+static void follow_position(struct axis *axis)
+{
+    if (axis->goal == CIA402_GOAL_QUICK_STOP) {
+        axis->target_counts = axis->target_sent_counts;
+    } else if (axis->by_itself || !axis->engaged) {
+        axis->target_counts = axis->position_counts;
+    }
+}
+
+static uint16_t next_controlword(const struct axis *axis)
+{
+    const uint16_t word =
+        cia402_master_controlword(axis->goal, axis->statusword, axis->controlword);
+    const uint16_t extra = word == CIA402_ENABLE_OPERATION ? axis->control_extra : 0u;
+    return (uint16_t)(word | extra);
+}
+
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg *out)
+{
+    axis->controlword = next_controlword(axis);
+    note_engaged(axis);
+    follow_position(axis);
+    count_standstill(axis, tolerance_counts);
+    const struct pdo_setpoint setpoint = {.controlword = axis->controlword,
+                                          .target_counts = axis->target_counts};
+    pdo_encode_setpoint(axis->node, &setpoint, out);
+}
+
+void axis_sent(struct axis *axis)
+{
+    axis->target_sent_counts = axis->target_counts;
+}
+
+bool axis_gone(const struct axis *axis, uint32_t now_us)
+{
+    return axis->answers.lost && now_us - axis->answers.last_us > AXIS_GONE_US;
+}
+
+bool axis_in_fault(const struct axis *axis)
+{
+    const enum cia402_state state = cia402_decode(axis->statusword);
+    return state == CIA402_FAULT || state == CIA402_FAULT_REACTION_ACTIVE;
+}
+
+bool axis_enabled(const struct axis *axis)
+{
+    return cia402_decode(axis->statusword) == CIA402_OPERATION_ENABLED;
+}
+
+bool axis_dropped_out(const struct axis *axis)
+{
+    return axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis_enabled(axis);
+}
+
+bool axis_obeys(const struct axis *axis)
+{
+    return axis_enabled(axis) && !axis->answers.lost && status_watch_obeys(&axis->watch);
+}
+
+bool axis_left(const struct axis *axis)
+{
+    const enum cia402_state state = cia402_decode(axis->statusword);
+    return axis->answers.lost ||
+           (state != CIA402_OPERATION_ENABLED && state != CIA402_QUICK_STOP_ACTIVE &&
+            state != CIA402_FAULT_REACTION_ACTIVE);
+}
+
+bool axis_reached(const struct axis *axis)
+{
+    const bool follows = axis->goal != CIA402_GOAL_ENABLED || axis->by_itself ||
+                         (axis->statusword & CIA402_STATUS_FOLLOWS) != 0u;
+    return follows && cia402_master_reached(axis->goal, axis->statusword);
+}
+
+bool axis_still(const struct axis *axis)
+{
+    return axis->still_syncs >= AXIS_STANDSTILL_SYNCS;
+}
+
+uint32_t axis_distance(const struct axis *axis, int32_t place_counts)
+{
+    const uint32_t target = distance(axis->target_counts, place_counts);
+    const uint32_t actual = distance(axis->position_counts, place_counts);
+    return target > actual ? target : actual;
+}

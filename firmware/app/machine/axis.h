@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * axis: one drive as the tick sees it: what it last said, where it is wanted, what it is sent.
+ *
+ * Guarded by the port's lock: written by the receive and timer interrupts, read by the mainline in
+ * a critical section. Positions in counts.
+ */
+#ifndef APP_MACHINE_AXIS_H
+#define APP_MACHINE_AXIS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/machine/answers.h"
+#include "app/machine/status_watch.h"
+#include "can/can_frame.h"
+#include "canopen/cia402_master.h"
+#include "canopen/pdo.h"
+
+#define AXIS_STANDSTILL_SYNCS 250u
+
+/* With power off a drive that is lost may still come back by itself within this time. */
+#define AXIS_GONE_US 1000000u
+
+struct axis {
+    uint8_t node;
+    struct answers answers;
+    struct status_watch watch;
+    uint16_t statusword;
+    uint16_t controlword; /* sent last */
+    uint16_t
+        control_extra;   /* more controlword bits while the drive is told to be enabled: homing */
+    uint16_t error_code; /* of the drive's last EMCY; 0: none */
+    int32_t position_counts;
+    int32_t target_counts;      /* to be sent in this tick */
+    int32_t target_sent_counts; /* sent in the last one */
+    enum cia402_goal goal;
+    bool
+        engaged; /* seen in Operation enabled since it was told to go there: its target is its own */
+    bool by_itself; /* it homes: moves by its own motion, its target follows its position */
+    uint32_t digital_inputs;        /* 0x60FD */
+    int32_t following_error_counts; /* 0x60F4, looked at a few times a second */
+    bool homed;                     /* since it was found */
+    uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
+};
+
+void axis_init(struct axis *axis, uint8_t node);
+
+/* A new goal, which ends homing: by_itself and control_extra are cleared. Under the lock. */
+void axis_command(struct axis *axis, enum cia402_goal goal);
+
+/* Takes the drive's TPDO1. Receive. */
+void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us);
+
+/* Makes the setpoint frame of this tick. Until the drive has been seen in Operation enabled its target follows its
+ * position, so that switching on moves nothing; from then on it stays where it is put, in a quick stop too. Once the
+ * drive is off it follows again. Timer. */
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg *out);
+
+/* The port has taken that frame. Timer. */
+void axis_sent(struct axis *axis);
+
+/* All pure, under the lock. */
+bool axis_gone(const struct axis *axis, uint32_t now_us); /* lost for long */
+bool axis_in_fault(const struct axis *axis);              /* Fault, or on the way there */
+bool axis_enabled(const struct axis *axis);               /* Operation enabled */
+bool axis_dropped_out(const struct axis *axis); /* was enabled, shall be, and is not any more */
+bool axis_obeys(const struct axis *axis);       /* enabled, answers, follows its target */
+bool axis_left(const struct axis *axis);    /* moves no more by its own power: off, or in Fault */
+bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
+bool axis_still(const struct axis *axis);
+
+/* Distance of both target and position from a place, whichever is larger. */
+uint32_t axis_distance(const struct axis *axis, int32_t place_counts);
+
+#endif

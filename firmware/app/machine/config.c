@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/machine/config.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "canopen/cob.h"
+#include "core/qmath.h"
+
+struct axis_field {
+    uint16_t index;
+    uint16_t offset; /* in struct config_axis */
+};
+
+#define AXIS_FIELD(index, name) {index, offsetof(struct config_axis, name)}
+
+static const struct axis_field axis_fields[] = {
+    AXIS_FIELD(0x2012, homing_method),
+    AXIS_FIELD(0x2013, home_offset_counts),
+    AXIS_FIELD(0x2014, homing_speed_towards_counts_s),
+    AXIS_FIELD(0x2015, homing_speed_away_counts_s),
+    AXIS_FIELD(0x2016, homing_acceleration_counts_s2),
+    AXIS_FIELD(0x2018, velocity_permille),
+    AXIS_FIELD(0x2019, torque_per_acceleration_q16),
+    AXIS_FIELD(0x201A, torque_per_velocity_q16),
+    AXIS_FIELD(0x201D, following_window_counts),
+    AXIS_FIELD(0x201E, following_timeout_ms),
+    AXIS_FIELD(0x201F, quick_stop_counts_s2),
+    AXIS_FIELD(0x2020, encoder_increments),
+    AXIS_FIELD(0x2021, feed_constant_counts),
+    AXIS_FIELD(0x2022, gear_motor_revolutions),
+    AXIS_FIELD(0x2023, gear_shaft_revolutions),
+};
+
+#define AXIS_FIELDS (sizeof axis_fields / sizeof axis_fields[0])
+
+/* The value with its sign, if it has one. */
+static int64_t number(const struct od *od, uint16_t index, uint8_t sub)
+{
+    const struct od_entry *entry = od_find(od, index, sub);
+    if (entry == NULL) {
+        return 0;
+    }
+    const uint64_t raw = od_number(od, entry);
+    const bool is_signed = entry->type >= OD_INTEGER8 && entry->type <= OD_INTEGER32;
+    return is_signed ? cob_signed(raw, entry->size) : (int64_t)raw;
+}
+
+static void read_axis(struct config_axis *axis, const struct od *od, uint8_t sub)
+{
+    for (size_t i = 0; i < AXIS_FIELDS; ++i) {
+        const uint32_t value = (uint32_t)(uint64_t)number(od, axis_fields[i].index, sub);
+        memcpy((uint8_t *)axis + axis_fields[i].offset, &value, sizeof value);
+    }
+}
+
+void config_read(struct config *config, const struct od *od)
+{
+    config->period_us = (uint32_t)number(od, 0x1006, 0);
+    config->own_node = (uint8_t)(number(od, 0x1200, 1) & NODE_ID_MAX);
+    config->axis_count = (uint8_t)number(od, 0x2004, 1);
+    config->feed_limit_um_s = (uint32_t)number(od, 0x2004, 2);
+    config->acceleration_limit_um_s2 = (uint32_t)number(od, 0x2004, 3);
+    config->jerk_limit_mm_s3 = (uint32_t)number(od, 0x2004, 4);
+    config->kernel = (uint8_t)number(od, 0x2004, 5);
+    config->start_tolerance_counts = (uint32_t)number(od, 0x2004, 6);
+    config->counts_per_mm = (uint32_t)number(od, 0x2004, 7);
+    config->answer_wait_ms = (uint16_t)number(od, 0x2004, 8);
+    config->missed_max = (uint8_t)number(od, 0x2004, 9);
+    config->setpoint_timeout_ms = (uint16_t)number(od, 0x2004, 10);
+    config->feedforward = (uint8_t)number(od, 0x2004, 11);
+    for (uint8_t i = 0; i < AXES_MAX; ++i) {
+        const uint8_t sub = (uint8_t)(i + 1u);
+        config->node[i] = (uint8_t)number(od, 0x2005, sub);
+        config->travel_min_counts[i] = (int32_t)number(od, 0x2006, sub);
+        config->travel_max_counts[i] = (int32_t)number(od, 0x2007, sub);
+        read_axis(&config->axis[i], od, sub);
+    }
+}
+
+bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value)
+{
+    if (index == 0x1006) {
+        return value == 1000u || value == 2000u || value == 4000u || value == 8000u;
+    }
+    if (index == 0x2004 && sub == 7) {
+        return value >= 1u && value <= CONFIG_COUNTS_PER_MM_MAX;
+    }
+    return true;
+}
+
+bool config_concerns_drives(uint16_t index, uint8_t sub)
+{
+    if (index == 0x2004) {
+        return sub == 1 || sub == 10 || sub == 11;
+    }
+    return index < 0x2018 || index > 0x201A;
+}
+
+bool config_contains(uint16_t index)
+{
+    for (size_t i = 0; i < AXIS_FIELDS; ++i) {
+        if (axis_fields[i].index == index) {
+            return true;
+        }
+    }
+    return index == 0x1006 || (index >= 0x2004 && index <= 0x2007);
+}
+
+/* magnitude * 2^40 / counts_per_mm; rest < counts_per_mm <= 2^23 keeps the shift inside. */
+static uint64_t q40_from_magnitude(uint32_t magnitude, uint32_t counts_per_mm, bool round_up)
+{
+    const uint64_t whole = magnitude / counts_per_mm;
+    const uint64_t rest = magnitude % counts_per_mm;
+    const uint64_t bias = round_up ? counts_per_mm - 1u : 0u;
+    return (whole << 40) + qmath_div_u64((rest << 40) + bias, counts_per_mm);
+}
+
+static int64_t q40_from_counts(int32_t counts, uint32_t counts_per_mm, bool upwards)
+{
+    const bool negative = counts < 0;
+    const uint32_t magnitude = negative ? 0u - (uint32_t)counts : (uint32_t)counts;
+    const uint64_t q40 = q40_from_magnitude(magnitude, counts_per_mm, upwards != negative);
+    return negative ? -(int64_t)q40 : (int64_t)q40;
+}
+
+void config_limits(const struct config *config, struct program_limits *limits)
+{
+    limits->period_us = config->period_us;
+    limits->feed_um_s = config->feed_limit_um_s;
+    limits->acceleration_um_s2 = config->acceleration_limit_um_s2;
+    limits->jerk_mm_s3 = config->jerk_limit_mm_s3;
+    for (uint8_t i = 0; i < PLANE_AXES; ++i) {
+        limits->min_q40_mm[i] =
+            q40_from_counts(config->travel_min_counts[i], config->counts_per_mm, true);
+        limits->max_q40_mm[i] =
+            q40_from_counts(config->travel_max_counts[i], config->counts_per_mm, false);
+    }
+}

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: MIT */
+/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023), as one
+ * value. */
+#ifndef APP_MACHINE_CONFIG_H
+#define APP_MACHINE_CONFIG_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "canopen/od.h"
+#include "core/program_check.h"
+
+#define AXES_MAX   6u
+#define PLANE_AXES 2u /* axes 0 and 1 follow the path, the others hold */
+
+/* Above it the conversion of travel limits to q40 mm would leave 64 bits. */
+#define CONFIG_COUNTS_PER_MM_MAX 8388608u
+
+/* Bits of feedforward. */
+#define CONFIG_TORQUE_FEEDFORWARD   1u
+#define CONFIG_VELOCITY_FEEDFORWARD 2u
+
+/* What belongs to one axis beside node and travel. Every field has 32 bits, so that tables can name
+ * one by its offset. */
+struct config_axis {
+    int32_t homing_method;                  /* 0x6098; 0: not homed by the command */
+    int32_t home_offset_counts;             /* 0x607C */
+    uint32_t homing_speed_towards_counts_s; /* 0x6099 sub 1 */
+    uint32_t homing_speed_away_counts_s;    /* 0x6099 sub 2 */
+    uint32_t homing_acceleration_counts_s2; /* 0x609A */
+    uint32_t velocity_permille;             /* 0 ... 2000, of the setpoint's velocity */
+    int32_t torque_per_acceleration_q16;    /* per mille of the rated torque for 1 m/s^2 */
+    int32_t torque_per_velocity_q16;        /* the same for 1 m/s */
+    uint32_t following_window_counts;       /* 0x6065; UINT32_MAX: off */
+    uint32_t following_timeout_ms;          /* 0x6066 */
+    uint32_t quick_stop_counts_s2;          /* 0x6085 */
+    uint32_t encoder_increments;            /* 0x608F; 0, here and below: the drive keeps its own */
+    uint32_t feed_constant_counts;          /* 0x6092 */
+    uint32_t gear_motor_revolutions;        /* 0x6091 sub 1 */
+    uint32_t gear_shaft_revolutions;        /* 0x6091 sub 2 */
+};
+
+struct config {
+    uint32_t period_us; /* 1000, 2000, 4000 or 8000 */
+    uint32_t feed_limit_um_s;
+    uint32_t acceleration_limit_um_s2;
+    uint32_t jerk_limit_mm_s3;
+    uint32_t start_tolerance_counts;
+    uint32_t counts_per_mm;
+    int32_t travel_min_counts[AXES_MAX];
+    int32_t travel_max_counts[AXES_MAX];
+    struct config_axis axis[AXES_MAX];
+    uint16_t answer_wait_ms;      /* wall time before an answer counts as missed */
+    uint16_t setpoint_timeout_ms; /* a drive without setpoints for so long stops by itself */
+    uint8_t node[AXES_MAX];
+    uint8_t own_node;    /* the controller itself */
+    uint8_t axis_count;  /* 1 ... AXES_MAX */
+    uint8_t kernel;      /* enum interp_kernel */
+    uint8_t missed_max;  /* so many answers in a row may be missed */
+    uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
+};
+
+/* Copies the present values out of the dictionary. Mainline. */
+void config_read(struct config *config, const struct od *od);
+
+/* Whether a value for the object is one that the dictionary's own ranges would let pass but that
+ * makes no sense: a period that is not 1, 2, 4 or 8 ms; too many counts per mm. Pure. */
+bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value);
+
+/* Whether a change of the object concerns the drives, so that they must be configured anew. Pure.
+ */
+bool config_concerns_drives(uint16_t index, uint8_t sub);
+
+/* True for all objects above. Pure. */
+bool config_contains(uint16_t index);
+
+/* The limits in the form that program_check takes; travel is rounded inwards. Mainline. */
+void config_limits(const struct config *config, struct program_limits *limits);
+
+#endif

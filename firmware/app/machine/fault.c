@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/machine/fault.h"
+
+const char *fault_text(uint16_t code)
+{
+    switch (code) {
+    case FAULT_NOT_ENABLED:
+        return "drive did not switch on in time, statusword";
+    case FAULT_DROPPED_OUT:
+        return "drive left Operation enabled by itself, statusword";
+    case FAULT_REBOOTED:
+        return "drive restarted by itself, detail";
+    case FAULT_HOMING_MODE:
+        return "drive does not change its mode of operation for homing, abort code or mode";
+    case FAULT_HOMING_FAILED:
+        return "drive reports a homing error, statusword";
+    case FAULT_HOMING_LATE:
+        return "drive did not find its home in time, statusword";
+    case FAULT_NOT_REMOTE:
+        return "drive does not obey its controlword (remote off), statusword";
+    case FAULT_NOT_FOLLOWING:
+        return "drive is enabled but does not follow its target, statusword";
+    case FAULT_NOT_STOPPED:
+        return "drive did not end its quick stop in time, statusword";
+    case FAULT_NOT_SENT:
+        return "the bus takes no frames of the controller, ticks in a row";
+    default:
+        return emcy_text(code);
+    }
+}
+
+bool fault_is_vague(uint16_t code)
+{
+    return code == EMCY_GENERIC || code == FAULT_DROPPED_OUT || code == FAULT_NOT_FOLLOWING;
+}

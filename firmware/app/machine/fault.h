@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* fault: what stopped the machine (object 0x2003 subs 1 to 3). */
+#ifndef APP_MACHINE_FAULT_H
+#define APP_MACHINE_FAULT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "canopen/emcy.h"
+
+/* Codes that only this controller uses, beside those of canopen/emcy.h. Detail: the statusword, where nothing else is
+ * said. */
+#define FAULT_NOT_ENABLED   (EMCY_MANUFACTURER | 0x01u) /* did not switch on in time */
+#define FAULT_DROPPED_OUT   (EMCY_MANUFACTURER | 0x02u) /* left Operation enabled */
+#define FAULT_REBOOTED      (EMCY_MANUFACTURER | 0x03u) /* a drive restarted by itself; 0 */
+#define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 gone: controlword not obeyed */
+#define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
+#define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
+#define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
+
+/* Homing. */
+#define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */
+#define FAULT_HOMING_FAILED (EMCY_MANUFACTURER | 0x11u) /* the drive says so; statusword */
+#define FAULT_HOMING_LATE   (EMCY_MANUFACTURER | 0x12u) /* no end in time; statusword */
+
+struct fault {
+    uint16_t code;   /* CANopen emergency error code; 0: none */
+    uint8_t node;    /* the node it is about; 0: the controller */
+    uint32_t detail; /* depends on the code */
+};
+
+/* One English phrase for a fault code, never NULL. Pure. */
+const char *fault_text(uint16_t code);
+
+/* Whether a drive's own emergency code says more than this one: a state seen in its statusword. Pure. */
+bool fault_is_vague(uint16_t code);
+
+#endif

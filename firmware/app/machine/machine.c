@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: MIT */
+/* The machine's parts: what it is, what others may ask of it. */
+#include "app/machine/machine.h"
+
+#include <string.h>
+
+#include "app/machine/machine_private.h"
+
+#define US_PER_MS 1000u
+
+void machine_command(struct machine *machine, enum cia402_goal goal)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        axis_command(&machine->axes[i], goal);
+    }
+}
+
+void machine_enter_boot(struct machine *machine)
+{
+    for (uint8_t i = 0; i < AXES_MAX; ++i) {
+        axis_init(&machine->axes[i], machine->config.node[i]);
+    }
+    machine->state = MACHINE_BOOT;
+    machine->configured = false;
+    machine->mode_left = false;
+    machine->boot_due = true;
+}
+
+void machine_init(struct machine *machine, const struct config *config)
+{
+    memset(machine, 0, sizeof *machine);
+    machine->config = *config;
+    machine->override_percent = 100;
+    machine_enter_boot(machine);
+}
+
+static bool in_fault_phase(const struct machine *machine, enum machine_fault_phase phase)
+{
+    return machine->state == MACHINE_FAULT && machine->fault_phase == phase;
+}
+
+bool machine_on_path(const struct machine *machine)
+{
+    return machine->state == MACHINE_RUNNING || machine->state == MACHINE_STOPPING ||
+           machine->state == MACHINE_HOLDING || machine->state == MACHINE_HELD ||
+           in_fault_phase(machine, MACHINE_FAULT_BRAKING);
+}
+
+bool machine_moving(const struct machine *machine)
+{
+    return machine_on_path(machine) || machine->state == MACHINE_HOMING ||
+           machine->state == MACHINE_QUICK_STOP || in_fault_phase(machine, MACHINE_FAULT_QUICK);
+}
+
+bool machine_configurable(const struct machine *machine)
+{
+    return machine->state == MACHINE_BOOT || machine->state == MACHINE_OFF ||
+           in_fault_phase(machine, MACHINE_FAULT_OFF);
+}
+
+void machine_configure(struct machine *machine, const struct config *config, bool drives)
+{
+    machine->config = *config;
+    if (drives && machine->state != MACHINE_FAULT) {
+        machine_enter_boot(machine);
+    }
+}
+
+void machine_drives_configured(struct machine *machine, bool simulated)
+{
+    if (machine->state == MACHINE_BOOT) {
+        machine->simulated = simulated;
+        machine->configured = true;
+    }
+}
+
+bool machine_drives_answer(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (!machine->axes[i].answers.present) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool machine_drives_operational(const struct machine *machine)
+{
+    return machine->state != MACHINE_BOOT;
+}
+
+bool machine_busy(const struct machine *machine)
+{
+    if (machine->state != MACHINE_READY && machine->state != MACHINE_HELD) {
+        return machine->state == MACHINE_ENABLING || machine_moving(machine);
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (!axis_still(&machine->axes[i])) {
+            return true;
+        }
+    }
+    return false;
+}
+
+struct axis *machine_axis(struct machine *machine, uint8_t node)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (machine->axes[i].node == node) {
+            return &machine->axes[i];
+        }
+    }
+    return NULL;
+}
+
+uint32_t machine_answer_wait_us(const struct machine *machine)
+{
+    const uint32_t wait_ms = machine->config.answer_wait_ms;
+    const bool real = !machine->simulated && wait_ms > MACHINE_REAL_WAIT_MAX_MS;
+    return (real ? MACHINE_REAL_WAIT_MAX_MS : wait_ms) * US_PER_MS;
+}
+
+bool machine_awaits_drives(const struct machine *machine)
+{
+    if (machine->state == MACHINE_BOOT || !machine->simulated || !machine->sync_sent) {
+        return false;
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (!machine->axes[i].answers.lost) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* A drive that is lost is not waited for: the others have to be braked in time. */
+static bool all_answered(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const struct answers *answers = &machine->axes[i].answers;
+        if (answers->count == 0u && !answers->lost) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool machine_receive(struct machine *machine, const struct can_msg *in, uint32_t now_us)
+{
+    struct pdo_actual actual;
+    const int node = pdo_decode_actual(in, &actual);
+    struct axis *axis = node > 0 ? machine_axis(machine, (uint8_t)node) : NULL;
+    if (axis == NULL || (machine->state == MACHINE_BOOT && !machine->configured)) {
+        return false;
+    }
+    axis_receive(axis, &actual, now_us);
+    return all_answered(machine);
+}

@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * machine: the axes as one machine: its state (object 0x2002), what it is told to do, what it does
+ * each tick.
+ *
+ *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
+ *                                       RUNNING -> STOPPING -> READY
+ *                                       RUNNING -> HOLDING -> HELD -> RUNNING, STOPPING
+ *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
+ *
+ * The state changes in two places only: in the requests (mainline, under the lock; machine_requests.c) and in the
+ * timer's functions (machine_tick.c, machine_supervise.c, machine_fault.c). The whole struct is guarded by the port's
+ * lock.
+ */
+#ifndef APP_MACHINE_MACHINE_H
+#define APP_MACHINE_MACHINE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/machine/axis.h"
+#include "app/machine/config.h"
+#include "app/machine/fault.h"
+#include "app/machine/motion.h"
+#include "app/machine/statistics.h"
+
+/* Values of object 0x2002. */
+enum machine_state {
+    MACHINE_BOOT = 0,     /* drives not yet found or configured */
+    MACHINE_OFF = 1,      /* drives configured, not enabled */
+    MACHINE_ENABLING = 2, /* on the way to READY */
+    MACHINE_READY = 3,    /* enabled, standstill */
+    MACHINE_RUNNING = 4,  /* a program runs, or its last point is being settled at */
+    MACHINE_STOPPING = 5, /* the same for a stop along the path */
+    MACHINE_FAULT = 6,
+    MACHINE_HOLDING = 7,     /* a feed hold brings the path to rest, or the program ended first */
+    MACHINE_HELD = 8,        /* at rest on the path until resumed or stopped */
+    MACHINE_HOMING = 9,      /* drives home by their own motion; the mainline leads them */
+    MACHINE_QUICK_STOP = 10, /* all drives brake by their own ramps; then OFF */
+};
+
+/* What goes on inside FAULT. */
+enum machine_fault_phase {
+    MACHINE_FAULT_BRAKING,   /* all drives obey: stop along the path, settle */
+    MACHINE_FAULT_QUICK,     /* else: quick stop of all that still hear; targets stay */
+    MACHINE_FAULT_OFF,       /* drives are switched off; waits for the reset */
+    MACHINE_FAULT_RESETTING, /* drives are being reset; then BOOT, or OFF when the cause persists */
+};
+
+/* Why a request was refused: values of object 0x2003 sub 4. */
+enum machine_refusal {
+    MACHINE_ACCEPTED = 0,
+    MACHINE_NO_PROGRAM = 1,
+    MACHINE_AWAY_FROM_START = 2,
+    MACHINE_MOVING = 3,
+    MACHINE_DRIVES_OFF = 4,
+    MACHINE_FAULT_PRESENT = 5,
+    MACHINE_DRIVES_MISSING = 6,
+    MACHINE_OUTSIDE_LIMITS = 7,
+    MACHINE_NOT_RUNNING = 8,
+    MACHINE_DRIVES_ON = 9,        /* homing wants them off */
+    MACHINE_NO_HOMING_MODE = 10,  /* an axis shall be homed whose drive has no homing mode */
+    MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */
+};
+
+#define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
+#define MACHINE_ENABLE_TICKS 2000u /* time for the drives to switch on */
+#define MACHINE_QUICK_TICKS  2000u /* time for the drives to end a quick stop */
+#define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
+#define MACHINE_UNSENT_MAX   3u    /* so many ticks in a row the port may refuse frames */
+
+/* Drives that are not simulated are never waited for: what is later than this is missed. */
+#define MACHINE_REAL_WAIT_MAX_MS 5u
+
+struct machine {
+    struct config config;
+    struct axis axes[AXES_MAX]; /* config.axis_count of them */
+    struct motion motion;
+    struct statistics statistics;
+    struct fault fault;
+    uint32_t fault_serial; /* counts every change of `fault` */
+    enum machine_state state;
+    enum machine_fault_phase fault_phase; /* in FAULT */
+    uint32_t ticks_left;                  /* settling, enabling, quick stop, resetting */
+    uint32_t override_percent;            /* wanted, object 0x2010 sub 1; for every program */
+    uint32_t sync_us;                     /* time of the last SYNC */
+    uint32_t unsent_ticks;                /* in a row with a frame that the port refused */
+    bool sync_sent;                       /* the last SYNC has left */
+    bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
+    bool configured; /* drives are configured; BOOT then waits for their first answers */
+    bool boot_due;   /* the mainline shall find and configure the drives (anew) */
+    bool
+        mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
+};
+
+void machine_init(struct machine *machine, const struct config *config);
+
+/* --- Requests, mainline under the lock; MACHINE_ACCEPTED or why not, then nothing has changed ---
+ */
+
+enum machine_refusal machine_enable(struct machine *machine);
+enum machine_refusal machine_disable(struct machine *machine);
+/* Never refused; without effect when nothing runs. From ENABLING it leads back to OFF, HOMING ends by a quick stop. */
+enum machine_refusal machine_request_stop(struct machine *machine);
+/* Never refused: all drives that are on brake by their own ramps (0x6085), then OFF; in FAULT a stop along the path
+ * becomes such a one. Without effect where drives are off. */
+enum machine_refusal machine_quick_stop(struct machine *machine);
+/* Feed hold and its end; accepted as well when there is nothing to change. */
+enum machine_refusal machine_hold(struct machine *machine);
+enum machine_refusal machine_resume(struct machine *machine);
+/* Out of FAULT by way of BOOT; refused while something still brakes. */
+enum machine_refusal machine_reset(struct machine *machine);
+/* Starts a prepared motion whose first setpoint is at start_counts: copied, if the axes are
+ * enabled, stand still and are within the configured tolerance. */
+enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
+                                   const int32_t start_counts[PLANE_AXES]);
+
+/* Homing, from OFF to OFF. In between the mainline sets each axis's `goal` and `control_extra`
+ * (under the lock); the targets follow the positions. It has failed when the state has left HOMING
+ * before machine_end_homing, which then changes nothing. */
+enum machine_refusal machine_begin_homing(struct machine *machine);
+void machine_end_homing(struct machine *machine);
+
+/* The feed override, 0 ... 200 per cent, at any time. Under the lock. */
+void machine_override(struct machine *machine, uint32_t percent);
+
+/* True where 0x1006 and 0x2004 ... 0x2007 may be written: BOOT, OFF, FAULT with the axes at rest.
+ */
+bool machine_configurable(const struct machine *machine);
+/* True while setpoints come from the program: from start until READY, and while braking on the path in a fault. */
+bool machine_on_path(const struct machine *machine);
+/* The same, or the drives move by themselves: homing, quick stop. The program must stay as it is. */
+bool machine_moving(const struct machine *machine);
+
+/* New configuration, where machine_configurable. When it concerns the drives: to BOOT. */
+void machine_configure(struct machine *machine, const struct config *config, bool drives);
+/* Forgets the drives; the mainline has to find and configure them. Under the lock. */
+void machine_enter_boot(struct machine *machine);
+/* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF as soon as
+ * each has answered a SYNC. */
+void machine_drives_configured(struct machine *machine, bool simulated);
+
+/* Something is wrong: FAULT. With a program running and every drive obeying it stops along the path, else by quick stop.
+ * Only the first fault counts, but a further one turns the stop along the path into a quick stop when a drive no longer
+ * obeys. Any context, under the lock. */
+void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail);
+
+/* The drive's own emergency code has come: kept, and it takes the place of a vaguer code of the present fault. */
+void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code);
+
+/* In FAULT: gives every stop up and switches the drives off. Any context, under the lock. */
+void machine_switch_off(struct machine *machine);
+
+/* --- Timer --- */
+
+/* The SYNC before this tick is over: counts missing answers, watches the drives. */
+void machine_supervise(struct machine *machine, uint32_t now_us);
+/* Whether SYNC, and every frame, of this tick left. More than MACHINE_UNSENT_MAX ticks in a row with a refused frame are
+ * a fault when drives are on. */
+void machine_note_sent(struct machine *machine, bool sync, bool all);
+/* Moves on by one tick: states, goals and targets of the axes. */
+void machine_step(struct machine *machine);
+/* How long answers may be late, from the configuration. */
+uint32_t machine_answer_wait_us(const struct machine *machine);
+/* Whether every drive has answered a SYNC since BOOT began. */
+bool machine_drives_answer(const struct machine *machine);
+/* Whether setpoints are to be sent in this state. */
+bool machine_drives_operational(const struct machine *machine);
+/* Whether the next tick should wait for the drives' answers: they are simulated and not all lost. */
+bool machine_awaits_drives(const struct machine *machine);
+/* Whether at lock step the next tick should come as soon as the drives have answered: something
+ * moves, switches or has to be waited for. */
+bool machine_busy(const struct machine *machine);
+
+/* --- Receive --- */
+
+/* Takes a TPDO1; true when all drives have now answered the present SYNC. */
+bool machine_receive(struct machine *machine, const struct can_msg *in, uint32_t now_us);
+
+/* The axis of a node, or NULL. Pure. */
+struct axis *machine_axis(struct machine *machine, uint8_t node);
+
+#endif

@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: MIT */
+/* What the mainline asks of the machine. docs/architecture.md has the table of requests by state. */
+#include "app/machine/machine.h"
+
+#include "app/machine/machine_private.h"
+
+/* What keeps most requests from being looked at any further. */
+static enum machine_refusal not_available(const struct machine *machine)
+{
+    if (machine->state == MACHINE_FAULT) {
+        return MACHINE_FAULT_PRESENT;
+    }
+    if (machine_moving(machine)) {
+        return MACHINE_MOVING;
+    }
+    return machine->state == MACHINE_BOOT ? MACHINE_DRIVES_MISSING : MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_enable(struct machine *machine)
+{
+    const enum machine_refusal refusal = not_available(machine);
+    if (refusal != MACHINE_ACCEPTED || machine->state != MACHINE_OFF) {
+        return refusal;
+    }
+    machine_command(machine, CIA402_GOAL_ENABLED);
+    machine->ticks_left = MACHINE_ENABLE_TICKS;
+    machine->state = MACHINE_ENABLING;
+    return MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_disable(struct machine *machine)
+{
+    if (machine->state == MACHINE_HOMING) {
+        return machine_quick_stop(machine);
+    }
+    const enum machine_refusal refusal = not_available(machine);
+    if (refusal == MACHINE_ACCEPTED) {
+        machine_command(machine, CIA402_GOAL_OFF);
+        machine->state = MACHINE_OFF;
+    }
+    return refusal;
+}
+
+enum machine_refusal machine_quick_stop(struct machine *machine)
+{
+    if (machine->state == MACHINE_FAULT) {
+        if (machine->fault_phase == MACHINE_FAULT_BRAKING) {
+            machine_fault_quick(machine);
+        }
+    } else if (machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF &&
+               machine->state != MACHINE_QUICK_STOP) {
+        machine->mode_left = machine->state == MACHINE_HOMING;
+        machine_command(machine, CIA402_GOAL_QUICK_STOP);
+        machine->ticks_left = MACHINE_QUICK_TICKS;
+        machine->state = MACHINE_QUICK_STOP;
+    }
+    return MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_request_stop(struct machine *machine)
+{
+    if (machine->state == MACHINE_RUNNING || machine->state == MACHINE_HOLDING ||
+        machine->state == MACHINE_HELD) {
+        motion_stop(&machine->motion);
+        machine->state = MACHINE_STOPPING;
+    } else if (machine->state == MACHINE_ENABLING) {
+        return machine_disable(machine);
+    } else if (machine->state == MACHINE_HOMING) {
+        return machine_quick_stop(machine);
+    }
+    return MACHINE_ACCEPTED;
+}
+
+static enum machine_refusal nothing_runs(const struct machine *machine)
+{
+    return machine->state == MACHINE_FAULT ? MACHINE_FAULT_PRESENT : MACHINE_NOT_RUNNING;
+}
+
+enum machine_refusal machine_hold(struct machine *machine)
+{
+    if (machine->state == MACHINE_HOLDING || machine->state == MACHINE_HELD) {
+        return MACHINE_ACCEPTED;
+    }
+    if (machine->state != MACHINE_RUNNING) {
+        return nothing_runs(machine);
+    }
+    motion_hold(&machine->motion);
+    machine->state = MACHINE_HOLDING;
+    return MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_resume(struct machine *machine)
+{
+    if (machine->state == MACHINE_RUNNING) {
+        return MACHINE_ACCEPTED;
+    }
+    if (machine->state != MACHINE_HOLDING && machine->state != MACHINE_HELD) {
+        return nothing_runs(machine);
+    }
+    motion_resume(&machine->motion);
+    machine->state = MACHINE_RUNNING;
+    return MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_begin_homing(struct machine *machine)
+{
+    const enum machine_refusal refusal = not_available(machine);
+    if (refusal != MACHINE_ACCEPTED) {
+        return refusal;
+    }
+    if (machine->state != MACHINE_OFF) {
+        return MACHINE_DRIVES_ON;
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        machine->axes[i].by_itself = true;
+    }
+    machine->state = MACHINE_HOMING;
+    return MACHINE_ACCEPTED;
+}
+
+void machine_end_homing(struct machine *machine)
+{
+    if (machine->state == MACHINE_HOMING) {
+        machine_command(machine, CIA402_GOAL_OFF);
+        machine->state = MACHINE_OFF;
+    }
+}
+
+void machine_override(struct machine *machine, uint32_t percent)
+{
+    machine->override_percent = percent;
+    if (machine_on_path(machine)) {
+        motion_override(&machine->motion, percent);
+    }
+}
+
+static enum machine_refusal start_refusal(const struct machine *machine,
+                                          const int32_t start_counts[PLANE_AXES])
+{
+    const enum machine_refusal refusal = not_available(machine);
+    if (refusal != MACHINE_ACCEPTED) {
+        return refusal;
+    }
+    if (machine->state != MACHINE_READY) {
+        return MACHINE_DRIVES_OFF;
+    }
+    if (machine->config.axis_count < PLANE_AXES) {
+        return MACHINE_DRIVES_MISSING;
+    }
+    const uint32_t tolerance_counts = machine->config.start_tolerance_counts;
+    for (uint8_t i = 0; i < PLANE_AXES; ++i) {
+        if (axis_distance(&machine->axes[i], start_counts[i]) > tolerance_counts) {
+            return MACHINE_AWAY_FROM_START;
+        }
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (!axis_still(&machine->axes[i])) {
+            return MACHINE_MOVING;
+        }
+    }
+    return MACHINE_ACCEPTED;
+}
+
+enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
+                                   const int32_t start_counts[PLANE_AXES])
+{
+    const enum machine_refusal refusal = start_refusal(machine, start_counts);
+    if (refusal == MACHINE_ACCEPTED) {
+        machine->motion = *prepared;
+        motion_override(&machine->motion, machine->override_percent);
+        machine->ticks_left = MACHINE_SETTLE_TICKS;
+        statistics_restart(&machine->statistics);
+        machine->state = MACHINE_RUNNING;
+    }
+    return refusal;
+}

@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: MIT */
+/* Supervision of the drives, once a tick: answers, states, bits of the statusword, own frames. */
+#include "app/machine/machine.h"
+
+#include "app/machine/machine_private.h"
+
+uint16_t machine_code_of(const struct axis *axis, uint16_t code)
+{
+    return axis->error_code != EMCY_NO_ERROR && fault_is_vague(code) ? axis->error_code : code;
+}
+
+static uint16_t trouble_of(const struct axis *axis)
+{
+    if (axis_in_fault(axis)) {
+        return EMCY_GENERIC;
+    }
+    return axis_dropped_out(axis) ? FAULT_DROPPED_OUT : status_watch_trouble(&axis->watch);
+}
+
+/* With power off drives may come and go: they are found again. */
+static void supervise_axis(struct machine *machine, const struct axis *axis, uint32_t now_us)
+{
+    const uint16_t trouble = trouble_of(axis);
+    if (machine->state == MACHINE_OFF && axis->answers.lost) {
+        if (axis_gone(axis, now_us)) {
+            machine_enter_boot(machine);
+        }
+    } else if (axis->answers.lost) {
+        machine_raise(machine, EMCY_RPDO_TIMEOUT, axis->node, axis->answers.absent_in_row);
+    } else if (trouble != EMCY_NO_ERROR) {
+        machine_raise(machine, machine_code_of(axis, trouble), axis->node, axis->statusword);
+    }
+}
+
+/* Where the SYNC itself did not leave, no answer is missing. */
+static void close_sync(struct machine *machine, struct axis *axis, uint32_t now_us)
+{
+    if (!machine->sync_sent) {
+        axis->answers.count = 0;
+        return;
+    }
+    const uint32_t missed =
+        answers_close_sync(&axis->answers, now_us, machine->sync_us,
+                           machine_answer_wait_us(machine), machine->config.missed_max);
+    if (machine_on_path(machine)) {
+        machine->statistics.missed_tpdos += missed;
+    }
+}
+
+void machine_supervise(struct machine *machine, uint32_t now_us)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        close_sync(machine, &machine->axes[i], now_us);
+    }
+    machine->sync_us = now_us;
+    for (uint8_t i = 0; i < machine->config.axis_count && machine->state != MACHINE_BOOT; ++i) {
+        supervise_axis(machine, &machine->axes[i], now_us);
+    }
+}
+
+void machine_note_sent(struct machine *machine, bool sync, bool all)
+{
+    machine->sync_sent = sync;
+    if (all) {
+        machine->unsent_ticks = 0;
+    } else if (machine->unsent_ticks < UINT32_MAX) {
+        machine->unsent_ticks++;
+    }
+    const bool on = machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF;
+    if (on && machine->unsent_ticks > MACHINE_UNSENT_MAX) {
+        machine_raise(machine, FAULT_NOT_SENT, 0, machine->unsent_ticks);
+    }
+}

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+/* The states that time moves on. */
+#include "app/machine/machine.h"
+
+#include "app/machine/machine_private.h"
+
+const struct axis *machine_straggler(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const struct axis *axis = &machine->axes[i];
+        if (!axis->answers.lost && !axis_reached(axis)) {
+            return axis;
+        }
+    }
+    return NULL;
+}
+
+bool machine_time_is_up(struct machine *machine)
+{
+    if (machine->ticks_left > 0u) {
+        machine->ticks_left--;
+    }
+    return machine->ticks_left == 0u;
+}
+
+/* While they were being configured nobody waited for their answers. */
+static void step_boot(struct machine *machine)
+{
+    if (!machine->configured || !machine_drives_answer(machine)) {
+        return;
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        answers_restart(&machine->axes[i].answers);
+    }
+    machine->state = MACHINE_OFF;
+}
+
+static void step_enabling(struct machine *machine)
+{
+    const struct axis *late = machine_straggler(machine);
+    if (late == NULL) {
+        machine->state = MACHINE_READY;
+    } else if (machine_time_is_up(machine)) {
+        machine_raise(machine, FAULT_NOT_ENABLED, late->node, late->statusword);
+    }
+}
+
+/* Without a point there is nothing to brake along. */
+void machine_next_targets(struct machine *machine)
+{
+    int32_t target_counts[PLANE_AXES];
+    const int result = motion_step(&machine->motion, target_counts);
+    if (result < 0) {
+        machine_raise_quick(machine, EMCY_SOFTWARE, 0, (uint32_t)-result);
+        return;
+    }
+    for (uint8_t i = 0; i < PLANE_AXES; ++i) {
+        machine->axes[i].target_counts = target_counts[i];
+    }
+    machine->statistics.program_tick = machine->motion.setpoints - 1u;
+}
+
+static void step_motion(struct machine *machine)
+{
+    if (!motion_over(&machine->motion)) {
+        machine_next_targets(machine);
+        if (machine->state == MACHINE_HOLDING && motion_held(&machine->motion)) {
+            machine->state = MACHINE_HELD;
+        }
+    } else if (machine_time_is_up(machine)) {
+        machine->state = MACHINE_READY;
+    }
+}
+
+static void step_quick_stop(struct machine *machine)
+{
+    const struct axis *moving = machine_not_stopped(machine);
+    if (moving != NULL) {
+        if (machine_time_is_up(machine)) {
+            machine_raise_quick(machine, FAULT_NOT_STOPPED, moving->node, moving->statusword);
+            machine_switch_off(machine);
+        }
+    } else if (machine->mode_left) {
+        machine_enter_boot(machine);
+    } else {
+        machine_command(machine, CIA402_GOAL_OFF);
+        machine->state = MACHINE_OFF;
+    }
+}
+
+void machine_step(struct machine *machine)
+{
+    switch (machine->state) {
+    case MACHINE_ENABLING:
+        step_enabling(machine);
+        break;
+    case MACHINE_RUNNING:
+    case MACHINE_STOPPING:
+    case MACHINE_HOLDING:
+    case MACHINE_HELD:
+        step_motion(machine);
+        break;
+    case MACHINE_QUICK_STOP:
+        step_quick_stop(machine);
+        break;
+    case MACHINE_FAULT:
+        machine_step_fault(machine);
+        break;
+    case MACHINE_BOOT:
+        step_boot(machine);
+        break;
+    case MACHINE_OFF:
+    case MACHINE_READY:
+    case MACHINE_HOMING: /* led by the mainline */
+    default:
+        break;
+    }
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * motion: a program on its way: program time, point on the path and targets of the plane's axes,
+ * tick by tick.
+ *
+ * Prepared by the mainline, then owned by the tick (under the port's lock).
+ */
+#ifndef APP_MACHINE_MOTION_H
+#define APP_MACHINE_MOTION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/machine/config.h"
+#include "core/interp.h"
+#include "core/timebase.h"
+
+struct motion {
+    struct interp interp;
+    struct timebase timebase;
+    struct interp_point point; /* of the last setpoint */
+    uint64_t time_q32_s;       /* of the last setpoint */
+    uint32_t setpoints;        /* given so far */
+    uint32_t counts_per_mm;
+};
+
+/* Sets up the first setpoint. The program must have passed program_check; it must stay while the
+ * motion lasts. 0 or a negative INTERP_ERR_... Mainline; linear in the number of pieces. */
+int motion_begin(struct motion *motion, const struct program *program, const struct config *config);
+
+/* The same, but to go on from rest at an arc length of the program. Gives where that is, in counts.
+ * Mainline. */
+int motion_begin_at(struct motion *motion, const struct program *program,
+                    const struct config *config, int64_t arc_length_q40_mm,
+                    int32_t start_counts[PLANE_AXES]);
+
+/* The next setpoint. 0, or a negative INTERP_ERR_... with targets unchanged. Timer. */
+int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES]);
+
+/* Asks for a stop along the path. Under the lock. */
+void motion_stop(struct motion *motion);
+
+/* Feed hold, the end of it, the rate wanted (0 ... 200 %). Under the lock. */
+void motion_hold(struct motion *motion);
+void motion_resume(struct motion *motion);
+void motion_override(struct motion *motion, uint32_t percent);
+
+/* True while a hold has the path at rest. */
+bool motion_held(const struct motion *motion);
+
+/* True when the last setpoint given was the last one: end of the program or of the stop. */
+bool motion_over(const struct motion *motion);
+
+/* Feed along the path at the last setpoint, in um/s, held at 2^31 - 1 (2147 m/s). Under the lock. */
+int32_t motion_feed_um_s(const struct motion *motion);
+
+#endif

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/machine/statistics.h"
+
+void statistics_restart(struct statistics *statistics)
+{
+    *statistics = (struct statistics){.syncs = statistics->syncs};
+}
+
+void statistics_tick(struct statistics *statistics, uint32_t late_ns, uint32_t tick_ns,
+                     uint32_t period_us)
+{
+    if (late_ns > period_us * 1000u) {
+        statistics->deadline_misses++;
+    }
+    if (late_ns > statistics->worst_late_ns) {
+        statistics->worst_late_ns = late_ns;
+    }
+    if (tick_ns > statistics->worst_tick_ns) {
+        statistics->worst_tick_ns = tick_ns;
+    }
+}
