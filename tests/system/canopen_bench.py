@@ -37,7 +37,7 @@ def frames_of(*bases: int, node: int) -> list[dict[str, int]]:
     return [{"can_id": base + node, "can_mask": 0x7FF} for base in bases]
 
 
-def until(happened: Callable[[], Any], limit_s: float = 10.0) -> None:
+def until(happened: Callable[[], Any], limit_s: float = 30.0) -> None:
     """Waits for what a thread or process does."""
     end = time.monotonic() + limit_s
     while not happened():
@@ -88,7 +88,7 @@ def client(node: canopen.RemoteNode) -> Iterator[canopen.Network]:
     filters = frames_of(0x080, 0x180, 0x280, 0x380, 0x580, 0x700, node=node.id)
     network.connect(interface="socketcan", channel="vcan0", can_filters=filters)
     network.add_node(node)
-    node.sdo.RESPONSE_TIMEOUT = 3.0
+    node.sdo.RESPONSE_TIMEOUT = 10.0
     try:
         yield network
     finally:
