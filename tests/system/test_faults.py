@@ -44,7 +44,7 @@ BUS, DRIVES_BUS = parse_address("socketcan:vcan0"), parse_address("socketcan:vca
 def test_no_violation(name: str) -> None:
     scenarios = find_scenarios(EXAMPLES / "faults", [name])
     (verdict,) = run_campaign(scenarios, [0], BUS, DRIVES_BUS)
-    assert verdict.injected > 0
+    assert verdict.injected > 0, verdict.summary()
     assert verdict.violations == (), verdict.summary()
 
 

@@ -68,6 +68,8 @@ def _follow(
                 return None
         if state in (FAULT_STATE, OFF, BOOT) or (started and state == READY):
             return state
+        if process is not None and not started and process.poll() is not None:
+            raise RunError(f"hodograph start ended with status {process.returncode}")
         if time.monotonic() > deadline:
             raise RunError(f"still {STATES.get(state, state)} after {LIMIT_S:g} s")
         time.sleep(LOOK_S)
