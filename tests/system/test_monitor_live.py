@@ -257,7 +257,18 @@ def test_a_controller_that_comes_back_is_found_again(bus: Bus, page: Page) -> No
         page.wait(f"{STATE} === 'off'")
         before = points(page)
         page.wait(f"Number(document.querySelector('#plane-canvas').dataset.points) !== {before}")
+        _a_fault_says_what_to_do(bus, page)
     assert page.complaints == []
+
+
+def _a_fault_says_what_to_do(bus: Bus, page: Page) -> None:
+    page.click("[data-command=enable]")
+    page.wait(f"{STATE} === 'ready'")
+    bus.run("sh", "-c", "kill -STOP $(pidof hodograph-drive)")
+    page.wait(f"{STATE} === 'fault'")
+    page.wait("document.querySelector('#banner').innerText.includes('What to do:')")
+    assert re.search(r"Fault: .+ \(0x[0-9A-F]{4}, node [23]", page.text("#banner"))
+    picture(page, "fault")
 
 
 def test_a_wrong_token_is_refused(browser: Browser, url: str) -> None:

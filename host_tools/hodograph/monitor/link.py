@@ -30,7 +30,7 @@ from .pump import Publish
 PAUSE_S = 0.2
 WHOLE_S = 1.5
 """Between two looks at the state and what moves; between two at everything."""
-_ANSWER_S = 1.0
+_ANSWER_S = 3.0
 _RETRY_S = 1.0
 LONGEST_UPLOAD = 256 * 1024
 """A program up to this size is fetched from the controller to be drawn; larger ones would take the bus too long."""
