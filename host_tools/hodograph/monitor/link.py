@@ -119,6 +119,7 @@ class Link:
     def _attend(self, controller: _Prompt) -> None:
         status: dict[str, Any] | None = None
         whole_due_s = 0.0
+        failures = 0
         while not self._ending.is_set():
             if not controller.answers(_ANSWER_S):
                 status = None
@@ -135,8 +136,12 @@ class Link:
                     whole_due_s = begun_s + max(WHOLE_S, 5 * took_s)
                 else:
                     status = status | _moving_part(controller)
-            except BusError:
-                continue  # one answer that was too late; whether more are is found out above
+            except BusError as error:
+                failures += 1
+                if failures > 1:  # one answer may be late
+                    self._lost(str(error))
+                continue
+            failures = 0
             self._publish({"type": "status", "connected": True, "note": "", "status": status})
             self._obey(controller)
             # However slow the bus or this computer is, others find the controller's channel free most of the time.
