@@ -72,6 +72,8 @@ def test_run_record_replay(capsys: pytest.CaptureFixture[str], tmp_path: Path) -
     status, line = failed(capsys, "replay", str(log), str(image))
     assert (status, "needs --machine" in line) == (2, True), line
     status, line = failed(capsys, "replay", str(log), str(EXAMPLES / "heart.toml"))
+    assert (status, "recording: holds " in line) == (6, True), line
+    status, line = failed(capsys, "replay", str(log), ALPHA, "--kernel", "float")
     assert (status, "is it this program and this kernel?" in line) == (6, True), line
 
     assert main(["replay", str(log), ALPHA, "--report", str(tmp_path / "report")]) == 0
