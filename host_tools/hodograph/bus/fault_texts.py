@@ -3,8 +3,8 @@
 
 When that is done, `hodograph reset` resets the fault.
 
-Single codes come before the classes that contain them. The codes that the controller (firmware/app/machine/fault.h) and the
-simulated drives (firmware/canopen/emcy.h) can raise are all single codes here.
+Single codes come before the classes that contain them. The codes that the controller (firmware/app/machine/fault.h)
+and the simulated drives (firmware/canopen/emcy.h) can raise are all single codes here.
 """
 
 from __future__ import annotations
