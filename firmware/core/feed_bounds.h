@@ -33,8 +33,9 @@ enum feed_derivative { FEED_VELOCITY = 1, FEED_ACCELERATION = 2, FEED_JERK = 3 }
 int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24, int64_t high_q24);
 
-/* The way a piece may go behind its start or beyond its end: 2^-24 mm of rounding. */
-#define FEED_WAY_SLACK_Q36 ((int64_t)1 << 12)
+/* The way a piece may go behind its start or beyond its end: 2^-14 mm. The exponential ramp begins with a step back of
+ * some 2e-8 of feed times ramp time (docs/numerics.md section 9). */
+#define FEED_WAY_SLACK_Q36 ((int64_t)1 << 22)
 
 /* 1 when F stays between its values at both ends of the piece, to that slack: a feed that is nowhere far below 0 may
  * still creep back for long. For a piece whose way is at most 32 mm. */

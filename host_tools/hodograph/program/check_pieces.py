@@ -31,7 +31,7 @@ JOIN_FEED_Q24 = 2.0**8
 JOIN_ACCELERATION_Q16 = 2.0**10
 """2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
 BACKWARDS_MM_S = -(2.0**-10)
-WAY_SLACK_MM = 2.0**-24
+WAY_SLACK_MM = 2.0**-14
 """What a piece may go behind its start or beyond its end."""
 ONE_Q24 = 1 << 24
 

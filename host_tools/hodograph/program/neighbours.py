@@ -15,8 +15,8 @@ Real = NDArray[np.float64]
 LEAST_FEED_MM_S = 2.0**-10
 """A slower feed counts as this one: pairs that are too short for it are too short at any feed."""
 
-REACH_Q40 = 1 << 17
-"""How far a piece may reach beyond its ends: 2^-24 mm of rounding, and a gap at a joint."""
+REACH_Q40 = 1 << 27
+"""How far a piece may reach beyond its ends: 2^-14 mm (check_pieces.WAY_SLACK_MM), and a gap at a joint."""
 
 _LEAST_FEED_Q24 = 1 << 14
 

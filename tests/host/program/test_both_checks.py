@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hodograph.errors import PlanError
@@ -67,6 +67,7 @@ def test_one_number_of_a_segment_moved(segment: int, column: int, by: int, sign:
     assert python == native
 
 
+@example("exponential", 19.0, 1.0, 5, 1000, 0)
 @settings(max_examples=60, deadline=None)
 @given(
     st.sampled_from(("quintic", "exponential", "minimax")),
