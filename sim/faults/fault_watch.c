@@ -19,6 +19,13 @@ bool fault_watch_acts(struct fault_watch *watch, int64_t tick, uint64_t now_ns)
     return now_ns - watch->began_ns < 1000000ull * rule->for_ms;
 }
 
+uint64_t fault_watch_end_ns(const struct fault_watch *watch)
+{
+    const uint32_t lasts_ms = watch->rule->for_ms;
+    return lasts_ms == 0u || watch->began_ns == 0u ? UINT64_MAX
+                                                   : watch->began_ns + 1000000ull * lasts_ms;
+}
+
 /* SplitMix64 (Steele, Lea, Flood 2014): any seed is a good one. In [0, 1). */
 static double draw(uint64_t *state)
 {

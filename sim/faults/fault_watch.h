@@ -19,6 +19,9 @@ void fault_watch_init(struct fault_watch *watch, const struct fault_rule *rule);
  * for every tick, so that wall time counts from the first. */
 bool fault_watch_acts(struct fault_watch *watch, int64_t tick, uint64_t now_ns);
 
+/* When a rule that acts for some ms ends; UINT64_MAX: it goes by ticks, or has not begun. */
+uint64_t fault_watch_end_ns(const struct fault_watch *watch);
+
 /* Whether this frame is one of the rule's, which acts; counts it. Draws one random number for each
  * frame of the rule's identifier, so that the same traffic has the same faults. */
 bool fault_watch_takes(struct fault_watch *watch, const struct can_msg *frame);

@@ -160,6 +160,11 @@ uint64_t bridge_due_ns(const struct bridge *bridge)
             due_ns = limit_ns;
         }
     }
+    for (uint32_t i = 0; i < bridge->count; i++) {
+        const uint64_t end_ns =
+            bridge->acts[i] ? fault_watch_end_ns(&bridge->watches[i]) : UINT64_MAX;
+        due_ns = end_ns < due_ns ? end_ns : due_ns;
+    }
     return due_ns;
 }
 

@@ -21,7 +21,7 @@
  * ordinary. */
 #define PRIORITY 10
 
-enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, SEND_TRIES = 200, WAKE_MS = 20 };
+enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, SEND_TRIES = 200 };
 
 struct outbox {
     struct can_msg frames[CAN_SOCKET_BATCH];
@@ -123,18 +123,18 @@ static int receive(struct injector *injector, enum fault_side from)
     return 0;
 }
 
-/* Until something is due, but no longer than WAKE_MS: rules in ms end without traffic too. */
-static struct timespec patience(const struct injector *injector)
+/* Until something is due. Without a limit where nothing is: to set and unset a timer for every frame costs. */
+static int await(const struct injector *injector, struct pollfd wait[3])
 {
     const uint64_t due_ns = bridge_due_ns(&injector->bridge);
-    const uint64_t now_ns = due_ns == UINT64_MAX ? 0u : clock_ns();
-    uint64_t wait_ns = WAKE_MS * 1000000ull;
-    if (due_ns <= now_ns) {
-        wait_ns = 0;
-    } else if (due_ns - now_ns < wait_ns) {
-        wait_ns = due_ns - now_ns;
+    if (due_ns == UINT64_MAX) {
+        return poll(wait, 3, -1);
     }
-    return (struct timespec){.tv_sec = 0, .tv_nsec = (long)wait_ns};
+    const uint64_t now_ns = clock_ns();
+    const uint64_t left_ns = due_ns > now_ns ? due_ns - now_ns : 0u;
+    const struct timespec limit = {.tv_sec = (time_t)(left_ns / 1000000000u),
+                                   .tv_nsec = (long)(left_ns % 1000000000u)};
+    return ppoll(wait, 3, &limit, NULL);
 }
 
 static int run(struct injector *injector, int signals)
@@ -143,8 +143,7 @@ static int run(struct injector *injector, int signals)
                              {.fd = injector->sockets[1].fd, .events = POLLIN},
                              {.fd = signals, .events = POLLIN}};
     while (injector->failed == 0) {
-        const struct timespec limit = patience(injector);
-        const int ready = ppoll(wait, 3, &limit, NULL);
+        const int ready = await(injector, wait);
         if (ready < 0 && errno != EINTR) {
             injector->failed = -errno;
         } else if (ready > 0 && wait[2].revents != 0) {

@@ -226,9 +226,11 @@ static void test_bus_off_for_a_time(void)
     frame_from(CONTROLLER, 0x202, 2);
     TEST_ASSERT_EQUAL_UINT(0, sent_count);
     TEST_ASSERT_EQUAL_UINT(1, on_count);
+    TEST_ASSERT_TRUE(bridge_due_ns(&bridge) == now_ns - 2000 + 5000000);
     now_ns += 5000000;
     bridge_process(&bridge, now_ns);
     TEST_ASSERT_EQUAL_UINT(2, note_count);
+    TEST_ASSERT_TRUE(bridge_due_ns(&bridge) == UINT64_MAX);
     frame_from(DRIVES, 0x182, 3);
     TEST_ASSERT_EQUAL_UINT(1, sent_count);
     expect(0, CONTROLLER, 0x182, 3);
