@@ -20,7 +20,7 @@ from ..bus.frames import FRAME_DTYPE, Frames
 HELD_BACK = 3
 """SYNCs that wait for late answers."""
 _MOST_TAIL = 4096
-"""Frames kept while no SYNC comes."""
+"""Setpoints and answers kept while no SYNC comes: with more of them something else is wrong, and they are forgotten."""
 
 Floats = NDArray[np.float64]
 
@@ -56,6 +56,7 @@ class Decoder:
     def __init__(self, nodes: Sequence[int]) -> None:
         self._nodes = tuple(nodes)
         self._tail = np.empty(0, dtype=FRAME_DTYPE)
+        self._wanted = np.array([SYNC_ID, *self._identifiers()])
         self._used = dict.fromkeys(
             self._identifiers(), 0
         )  # frames of the tail that are samples already
@@ -67,15 +68,22 @@ class Decoder:
 
     def feed(self, frames: Frames) -> Samples:
         """The samples that are complete with these frames."""
-        frames = np.concatenate([self._tail, frames])
+        frames = np.concatenate([self._tail, frames[np.isin(frames["id"], self._wanted)]])
         sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
         done = max(0, sync_at.size - HELD_BACK)
         if done == 0:
-            self._tail = frames[-_MOST_TAIL:] if sync_at.size == 0 else frames
+            self._keep(frames)
             return self._samples(np.empty(0, dtype=np.int64), frames, sync_at, 0)
         samples = self._samples(self._count(frames, sync_at[:done]), frames, sync_at, done)
         self._tail = frames[sync_at[done] :].copy()
         return samples
+
+    def _keep(self, frames: Frames) -> None:
+        """Until more SYNCs come; they may never, so this is bounded."""
+        if frames.size > _MOST_TAIL:
+            frames = frames[:0]
+            self._used = dict.fromkeys(self._used, 0)
+        self._tail = frames
 
     def _count(self, frames: Frames, sync_at: NDArray[np.intp]) -> NDArray[np.int64]:
         """Running numbers of these SYNCs; the counter tells of lost ones."""

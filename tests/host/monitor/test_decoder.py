@@ -113,3 +113,20 @@ def test_without_syncs_memory_stays_bounded() -> None:
 
 def test_nodes_are_found() -> None:
     assert nodes_in(machine_frames(*positions())) == (2, 3)
+
+
+def test_what_waits_for_a_sync_is_bounded() -> None:
+    """The controller has gone: heartbeats, SDO and even answers go on, for days."""
+    targets, actual = positions()
+    frames = machine_frames(targets, actual)
+    decoder = Decoder((2, 3))
+    decoder.feed(frames)
+    for identifier in (0x581, 0x702, 0x182):
+        others = np.zeros(1000, dtype=frames.dtype)
+        others["id"], others["length"] = identifier, 8
+        for _ in range(10):
+            assert decoder.feed(others).count == 0
+        assert decoder._tail.size <= 4096, hex(identifier)
+    again = decoder.feed(frames)  # and it goes on when there is one again
+    assert np.array_equal(again.targets, targets[:-HELD_BACK])
+    assert np.array_equal(again.actual, actual[:-HELD_BACK])
