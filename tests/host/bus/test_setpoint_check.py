@@ -143,6 +143,21 @@ def test_a_sharp_turn_shows_where_the_program_is_known() -> None:
     assert "turn@12" in jumps(stream, StepLimits(1000.0, 100.0, normal=200.0))
 
 
+def test_a_jump_of_the_only_axis_that_still_follows() -> None:
+    """The other drive is in fault: there is no path any more, yet no step beyond the limits either."""
+    limits = StepLimits(1000.0, 100.0, normal=200.0)
+
+    def one_left(*targets: int) -> Stream:
+        stream = standing()
+        for x in targets:
+            stream.tick(x, 0)
+            stream.frames[-2] = (0x183, struct.pack("<Hi", 0x1238, 0))
+        return stream
+
+    assert jumps(one_left(0, 100, 300, 500), limits) == []
+    assert jumps(one_left(0, 600, 1200), limits) == ["turn@3"]
+
+
 def test_third_axis_by_itself() -> None:
     stream = Stream().tick(0, 0, 7).tick(0, 0, 7).tick(0, 0, 7).tick(0, 0, 500)
     found = find_jumps(stream.packed(), (2, 3, 4), LIMITS)
