@@ -16,6 +16,7 @@ _ENABLED = 0x0F
 _EMCY = 0x080
 _GAP_US = 150_000
 """More than answer_wait_ms, for which lock step waits for a lost answer."""
+_LAST_LOOK_US = 50_000
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,19 @@ class Evidence:
                 return None
             last.append(int(time_us[away[-1]]))
         return max(last, default=None)
+
+    def still_moving(self, tolerance_counts: int) -> tuple[int, ...]:
+        """Nodes that went on moving to the end of the recording, by their own words; silent ones are not known."""
+        if not self.drives.size:
+            return ()
+        begin_us = int(self.drives["time_us"][-1]) - _LAST_LOOK_US
+        last = self.drives[self.drives["time_us"] >= begin_us]
+        found = []
+        for node in self.nodes:
+            data = last["data"][(last["id"] == TPDO1 + node) & (last["length"] >= 6)]
+            if data.size and np.ptp(_integers(data)) > tolerance_counts:
+                found.append(node)
+        return tuple(found)
 
     def setpoints(self) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
         """By axis: the targets by SYNC from tick 0 on, and where one was sent that the drive was told to follow."""

@@ -79,6 +79,10 @@ def judge(record: Record) -> Verdict:
     else:
         codes, latency, rest = _reaction(record, evidence)
         violations += _bad_setpoints(record, evidence)
+        violations += [
+            f"node {node} still moves at the end of the recording"
+            for node in evidence.still_moving(REST_TOLERANCE_COUNTS)
+        ]
     violations += _unexpected(record, codes, latency, rest)
     violations += _not_recovered(record)
     return Verdict(

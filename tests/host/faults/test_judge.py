@@ -40,11 +40,17 @@ def frames(rows: list[tuple[int, int, bytes]]) -> Frames:
 
 
 def recording(
-    setpoints: NDArray[np.int32], emergency_tick: int | None, enabled_until: int, code: int = 0x8250
+    setpoints: NDArray[np.int32],
+    emergency_tick: int | None,
+    enabled_until: int,
+    code: int = 0x8250,
+    stands: int = 100,
 ) -> Frames:
-    """A tick is a millisecond; the first 5 stand. The drives answer with where they shall be."""
+    """A tick is a millisecond; the first 5 and the last stand. The drives answer with where they shall be."""
     rows: list[tuple[int, int, bytes]] = []
-    path = np.concatenate([np.repeat(setpoints[:1], 5, axis=0), setpoints])
+    path = np.concatenate(
+        [np.repeat(setpoints[:1], 5, axis=0), setpoints, np.repeat(setpoints[-1:], stands, axis=0)]
+    )
     for k, target in enumerate(path):
         us = BEGAN_US + 1000 * k
         rows.append((us, 0x80, bytes([k % 240 + 1])))
@@ -113,6 +119,17 @@ def test_no_fault_late_fault_and_a_wrong_one() -> None:
 def test_axes_that_move_on() -> None:
     found = violations(record(recording(job().setpoints, 60, 60)))
     assert any(words.startswith("axes at rest after") for words in found)
+
+
+def test_axes_that_move_on_to_the_end_of_the_recording() -> None:
+    """However short the recording: the time to rest is measured to its end, which may be within the limit."""
+    made = record(recording(job().setpoints[:120], 60, 60, stands=0))
+    found = violations(made)
+    assert "node 2 still moves at the end of the recording" in found
+    assert not any(words.startswith("axes at rest after") for words in found)
+    silent = recording(job().setpoints, 60, 60)
+    gone = silent[(silent["id"] < 0x182) | (silent["time_us"] < BEGAN_US + 100_000)]
+    assert not any("still moves" in words for words in violations(record(gone)))
 
 
 def test_a_jump_and_a_way_beside_the_path() -> None:
