@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The controller by SDO, in a thread of its own: its state a few times a second, commands in between.
 
-A command does not wait until a state has been read: it goes between two objects of it.
+A command does not wait until a state has been read: it goes between two objects of it; a program that is just being
+fetched is given up for it.
 """
 
 from __future__ import annotations
@@ -85,6 +86,11 @@ class Link:
         if self._thread.is_alive():
             self._thread.join()
         self._fail_commands(BusError("the monitor has ended"))
+
+    @property
+    def alive(self) -> bool:
+        """Whether the thread works; it ends by `close` alone."""
+        return self._thread.is_alive()
 
     def submit(self, command: Command) -> Future[None]:
         """Gives a command; the future has a HodographError when it was not taken."""
@@ -184,8 +190,16 @@ class Link:
         elif program["size"] > LONGEST_UPLOAD:
             self._show_program(None, "the program is too long to be fetched: give it as --program")
         else:
+            image = None
             with suppress(RefusedError, BusError):
-                self._show_program(_fetch(controller), "")
+                image = _fetch(controller, self._has_other_work)
+            if image is None:
+                self._crc32 = None  # once more at the next look
+            else:
+                self._show_program(image, "")
+
+    def _has_other_work(self) -> bool:
+        return self._ending.is_set() or not self._commands.empty()
 
 
 def _changed(controller: Controller, status: dict[str, Any]) -> bool:
@@ -208,11 +222,18 @@ def _moving_part(controller: Controller) -> dict[str, Any]:
     }
 
 
-def _fetch(controller: Controller) -> bytes:
-    """The image of the active program."""
+def _fetch(controller: Controller, give_up: Callable[[], bool]) -> bytes | None:
+    """The image of the active program; None when it was given up, since a large one takes seconds."""
     try:
         with controller.turn():
-            return bytes(controller.sdo.upload(PROGRAM, 1))
+            stream = controller.sdo.open(PROGRAM, 1, "rb", buffering=0)
+            segments = []
+            while segment := stream.read(7):
+                segments.append(segment)
+                if give_up():
+                    controller.sdo.abort()
+                    return None
+            return b"".join(segments)
     except SdoAbortedError as error:
         raise RefusedError(f"{controller.who()} gives no program: {error}") from error
     except SdoError as error:

@@ -77,6 +77,11 @@ class Pump:
         if self._thread.is_alive():
             self._thread.join()
 
+    @property
+    def alive(self) -> bool:
+        """Whether the thread works; it ends by `close` alone."""
+        return self._thread.is_alive()
+
     def restart(self) -> None:
         """Opens the source anew: a recording begins again."""
         self._again.set()

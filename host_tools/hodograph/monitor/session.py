@@ -13,7 +13,7 @@ from aiohttp import web
 
 from .. import __version__
 from ..bus.address import BusAddress
-from ..errors import InputError
+from ..errors import HodographError, InputError
 from .commands import read_command
 from .hub import Hub
 from .link import Link
@@ -58,7 +58,7 @@ class Place:
 
 
 class Session:
-    """Serves until SIGINT or SIGTERM. `crc32` is that of the program given, None without one."""
+    """Serves until SIGINT or SIGTERM. `image` is the program given, None without one."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class Session:
         self._image, self._say = image, say
 
     async def serve(self) -> None:
-        """Raises InputError when the place is taken."""
+        """Raises InputError when the place is taken, HodographError when a thread has broken down."""
         loop = asyncio.get_running_loop()
         ending = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -95,6 +95,7 @@ class Session:
                 link.start()
             self._say(f"monitor: {self._place.url}")
             while not ending.is_set():
+                _require_alive(pump, link)
                 hub.publish(usage.message(hub.count))
                 with_timeout = asyncio.wait_for(ending.wait(), 1.0)
                 try:
@@ -160,6 +161,14 @@ def _obey(link: Link | None, pump: Pump) -> Callable[[dict[str, Any]], Any]:
         return f"{name}: done"
 
     return obey
+
+
+def _require_alive(pump: Pump, link: Link | None) -> None:
+    """A page that shows the past and takes no commands looks sound: rather none. Raises HodographError."""
+    if not (pump.alive and (link is None or link.alive)):
+        raise HodographError(
+            "monitor: a part of it has broken down, see above: start it again, and report this bug"
+        )
 
 
 def _close(link: Link | None, pump: Pump) -> None:
