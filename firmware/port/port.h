@@ -100,8 +100,7 @@ void port_tick_ready(void);
 void port_lock(void);
 void port_unlock(void);
 
-/* Sleeps until port_wake(), a wish to stop, or timeout_us. Mainline, outside the critical section.
- */
+/* Sleeps until port_wake(), a wish to stop, or timeout_us; sometimes less. Mainline, outside the critical section. */
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 

@@ -136,6 +136,91 @@ static void test_a_stall_counts_as_one_slice_of_20_ms(void)
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(due_ns, schedule.due_ns, "nobody is waited for any more");
 }
 
+/* Whether the tick that is due is put off; the mainline has had `had_ns` of the processor. */
+static bool put_off(uint64_t now_ns, uint32_t turns, uint64_t had_ns)
+{
+    return schedule_overdue(&schedule, now_ns, turns) && schedule_yield(&schedule, now_ns, had_ns);
+}
+
+static void test_a_mainline_that_sleeps_now_and_then_delays_nothing(void)
+{
+    for (uint32_t k = 1; k < 1000u; ++k) {
+        TEST_ASSERT_FALSE(put_off(schedule.due_ns, k / 10u, 0));
+        (void)tick(0);
+    }
+}
+
+static void test_a_mainline_that_computes_delays_nothing(void)
+{
+    for (uint32_t k = 1; k < 1000u; ++k) {
+        const uint64_t now_ns = schedule.due_ns;
+        TEST_ASSERT_FALSE(put_off(now_ns, 1, now_ns / SCHEDULE_MAINLINE_SHARE));
+        (void)tick(0);
+    }
+}
+
+/* Ticks until the first one that is put off. */
+static void starve(void)
+{
+    uint32_t ticks = 0;
+    TEST_ASSERT_FALSE(put_off(schedule.due_ns, 1, 0));
+    while (!put_off(schedule.due_ns, 1, 0)) {
+        (void)tick(0);
+        TEST_ASSERT_TRUE_MESSAGE(++ticks < 30u, "nobody gives way");
+    }
+    TEST_ASSERT_TRUE(ticks > SCHEDULE_TURN_NS / MS);
+}
+
+static void test_a_starved_mainline_gets_10_ms_before_each_tick(void)
+{
+    starve();
+    for (unsigned ms = 1; ms < 10u; ++ms) {
+        const uint64_t due_ns = schedule.due_ns;
+        TEST_ASSERT_TRUE(put_off(due_ns, 1, 0));
+        TEST_ASSERT_EQUAL_UINT64(due_ns + MS, schedule.due_ns);
+    }
+    TEST_ASSERT_FALSE(put_off(schedule.due_ns, 1, 0));
+    (void)tick(0);
+    TEST_ASSERT_TRUE_MESSAGE(put_off(schedule.due_ns, 1, 0), "and before the next one");
+}
+
+static void test_after_its_turn_the_mainline_is_not_waited_for(void)
+{
+    starve();
+    TEST_ASSERT_FALSE(put_off(schedule.due_ns, 2, 0));
+    (void)tick(0);
+    TEST_ASSERT_FALSE(put_off(schedule.due_ns, 2, 0));
+}
+
+/* 5 s without any processor: of the 10 ms two are gone. */
+static void test_a_stall_is_no_time_for_the_mainline(void)
+{
+    starve();
+    const uint64_t now_ns = schedule.due_ns + 5000u * (uint64_t)MS;
+    TEST_ASSERT_TRUE(put_off(now_ns, 1, 0));
+    for (uint64_t ms = 1; ms < 8u; ++ms) {
+        TEST_ASSERT_TRUE(put_off(now_ns + ms * MS, 1, 0));
+    }
+    TEST_ASSERT_FALSE(put_off(now_ns + 8u * (uint64_t)MS, 1, 0));
+}
+
+static void test_a_mainline_that_is_stuck_is_left(void)
+{
+    unsigned yields = 0;
+    starve();
+    for (unsigned wake = 0; wake < 1000u; ++wake) {
+        if (put_off(schedule.due_ns, 1, 0)) {
+            yields++;
+        } else {
+            (void)tick(0);
+        }
+    }
+    TEST_ASSERT_TRUE(yields >= 150u && yields <= SCHEDULE_YIELDS_NS / MS + 1u);
+    TEST_ASSERT_FALSE(put_off(schedule.due_ns, 1, 0));
+    TEST_ASSERT_FALSE(put_off(schedule.due_ns, 2, 0));
+    starve();
+}
+
 static void lock_step_tick(bool await, bool hurry)
 {
     const uint64_t now_ns = schedule.due_ns;
@@ -179,6 +264,12 @@ int main(void)
     RUN_TEST(test_whoever_is_never_ready_is_left_after_the_guard);
     RUN_TEST(test_the_guard_is_counted_in_slices);
     RUN_TEST(test_a_stall_counts_as_one_slice_of_20_ms);
+    RUN_TEST(test_a_mainline_that_sleeps_now_and_then_delays_nothing);
+    RUN_TEST(test_a_mainline_that_computes_delays_nothing);
+    RUN_TEST(test_a_starved_mainline_gets_10_ms_before_each_tick);
+    RUN_TEST(test_after_its_turn_the_mainline_is_not_waited_for);
+    RUN_TEST(test_a_stall_is_no_time_for_the_mainline);
+    RUN_TEST(test_a_mainline_that_is_stuck_is_left);
     RUN_TEST(test_lock_step_in_a_hurry_is_due_when_all_are_ready);
     RUN_TEST(test_lock_step_without_hurry_goes_by_the_clock);
     return UNITY_END();

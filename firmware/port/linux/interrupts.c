@@ -8,6 +8,7 @@
 #include <sched.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <time.h>
 
 #include "port/linux/clock.h"
 #include "port/linux/schedule.h"
@@ -27,6 +28,8 @@ static struct {
     struct schedule schedule;
     uint64_t now_ns; /* of the present interrupt */
     bool lock_step;
+    clockid_t mainline_clock;
+    uint32_t mainline_turns; /* atomic too */
 } self;
 
 void port_lock(void)
@@ -104,6 +107,26 @@ static uint64_t time_to_sleep_ns(void)
     return wait_ns < longest_ns ? wait_ns : longest_ns;
 }
 
+void interrupts_mainline_sleeps(void)
+{
+    (void)__atomic_add_fetch(&self.mainline_turns, 1u, __ATOMIC_RELAXED);
+}
+
+static uint64_t mainline_had_ns(void)
+{
+    struct timespec had = {0, 0};
+    (void)clock_gettime(self.mainline_clock, &had);
+    return (uint64_t)had.tv_sec * CLOCK_NS_PER_S + (uint64_t)had.tv_nsec;
+}
+
+/* At lock step no thread here is a real-time one, and the scheduler is fair. */
+static bool gives_way(void)
+{
+    const uint32_t turns = __atomic_load_n(&self.mainline_turns, __ATOMIC_RELAXED);
+    return !self.lock_step && schedule_overdue(&self.schedule, self.now_ns, turns) &&
+           schedule_yield(&self.schedule, self.now_ns, mainline_had_ns());
+}
+
 static void *run(void *unused)
 {
     (void)unused;
@@ -116,7 +139,7 @@ static void *run(void *unused)
             receive_waiting();
         }
         schedule_wait(&self.schedule, self.now_ns);
-        if (self.now_ns >= self.schedule.due_ns) {
+        if (self.now_ns >= self.schedule.due_ns && !gives_way()) {
             run_tick();
         }
     }
@@ -189,6 +212,9 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
 {
     self.handlers = *handlers;
     self.now_ns = clock_ns();
+    if (pthread_getcpuclockid(pthread_self(), &self.mainline_clock) != 0) {
+        return PORT_ERR_SYSTEM;
+    }
     schedule_begin(&self.schedule, self.now_ns, (uint64_t)period_us * 1000u, self.lock_step);
     const int error = self.lock_step ? pthread_create(&self.thread, NULL, run_lock_step, NULL)
                                      : create_real_time_thread();

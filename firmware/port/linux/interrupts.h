@@ -6,7 +6,7 @@
  * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the
  * tick. Both handlers run with the lock of port_lock() held. At real-time pace it asks for
  * SCHED_FIFO and locked memory; where that is not permitted it says so once and runs as an ordinary
- * thread. At fast pace it is a batch thread: it shall not take the processor from the simulated
+ * thread. Ticks give way to a mainline that gets no turn (schedule.h). At fast pace it is a batch thread: it shall not take the processor from the simulated
  * drives it waits for.
  */
 #ifndef PORT_LINUX_INTERRUPTS_H
@@ -20,8 +20,12 @@
 /* Prepares the lock. 0 or PORT_ERR_SYSTEM. */
 int interrupts_begin(struct can_socket *socket, bool lock_step);
 
-/* Starts the thread. 0 or PORT_ERR_SYSTEM. */
+/* Starts the thread; the caller is the mainline. 0 or PORT_ERR_SYSTEM. */
 int interrupts_start(const struct port_handlers *handlers, uint32_t period_us);
+
+/* The mainline goes to sleep, for INTERRUPTS_SLEEP_MAX_US at most: it has had its turn. */
+#define INTERRUPTS_SLEEP_MAX_US 10000u
+void interrupts_mainline_sleeps(void);
 
 /* Ends the thread and waits for it. Harmless when it never started. */
 void interrupts_end(void);

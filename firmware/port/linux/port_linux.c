@@ -140,6 +140,8 @@ int port_start(const struct port_handlers *handlers, uint32_t period_us)
 
 void port_wait(uint32_t timeout_us)
 {
+    timeout_us = timeout_us < INTERRUPTS_SLEEP_MAX_US ? timeout_us : INTERRUPTS_SLEEP_MAX_US;
+    interrupts_mainline_sleeps();
     struct pollfd waited = {.fd = self.wake_fd, .events = POLLIN, .revents = 0};
     const struct timespec timeout = clock_timespec((uint64_t)timeout_us * 1000u);
     if (ppoll(&waited, 1, &timeout, NULL) > 0) {

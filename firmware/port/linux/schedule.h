@@ -16,6 +16,12 @@
  * Real-time threads take all they ask for. So that the mainline still gets its turn on a machine too slow for the
  * period, what a tick took, up to the moment when everybody was ready, is followed by a rest of half of that (10 ms at
  * most). Where a tick takes less than two thirds of a period this changes nothing.
+ *
+ * That rest is no promise: whoever else runs at real-time priority (the simulated drives, behind with their SYNCs while
+ * nobody waits for their answers) may take all of it. So the mainline is watched: when it has not gone to sleep for
+ * SCHEDULE_TURN_NS, and has had less than an eighth of the processor since, ticks are put off, each by SCHEDULE_YIELD_NS
+ * at most, until it has had its turn. A mainline that computes for long does not delay ticks, as it has the processor;
+ * one that is stuck somewhere does so for SCHEDULE_YIELDS_NS, no longer.
  */
 #ifndef PORT_LINUX_SCHEDULE_H
 #define PORT_LINUX_SCHEDULE_H
@@ -26,6 +32,23 @@
 #define SCHEDULE_SLICE_NS     10000000u
 #define SCHEDULE_SLICE_MAX_NS 20000000u
 #define SCHEDULE_REST_MAX_NS  10000000u
+
+#define SCHEDULE_TURN_NS        20000000u
+#define SCHEDULE_YIELD_NS       10000000u
+#define SCHEDULE_YIELDS_NS      200000000u
+#define SCHEDULE_YIELD_SLICE_NS 1000000u
+#define SCHEDULE_MAINLINE_SHARE 8u
+
+/* How the mainline fares. */
+struct schedule_mainline {
+    uint64_t turn_ns;   /* when it was last seen to have had its turn */
+    uint64_t judged_ns; /* since when its share is judged; 0: not judged */
+    uint64_t had_ns;    /* what it had had of the processor then */
+    uint64_t slept_ns;  /* when this thread last gave way */
+    uint64_t tick_ns;   /* how long the present tick may still be put off */
+    uint64_t left_ns;   /* and ticks all in all, until it has had its turn */
+    uint32_t turns;
+};
 
 struct schedule {
     uint64_t period_ns;
@@ -38,6 +61,7 @@ struct schedule {
     bool awaiting;        /* somebody is waited for, since the present tick */
     bool hurry;           /* its other wish */
     bool lock_step;       /* whether ticks may be faster than the clock */
+    struct schedule_mainline mainline;
 };
 
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step);
@@ -51,6 +75,13 @@ void schedule_wait(struct schedule *schedule, uint64_t now_ns);
 
 /* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the wishes of the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);
+
+/* Before a due tick; `turns` counts how often the mainline has gone to sleep. True when it is overdue: then ask
+ * schedule_yield, too. */
+bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t turns);
+
+/* `had_ns`: processor time of the mainline, all in all. True: the tick is put off, due_ns moved. */
+bool schedule_yield(struct schedule *schedule, uint64_t now_ns, uint64_t had_ns);
 
 /* The tick is over: sets due_ns of the next one. */
 void schedule_finish(struct schedule *schedule, uint64_t now_ns);
