@@ -80,9 +80,13 @@ void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code
     }
 }
 
+/* A drive that does not answer may still hear, and brake: power is not taken from it. */
 void machine_switch_off(struct machine *machine)
 {
-    machine_command(machine, CIA402_GOAL_OFF);
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        struct axis *axis = &machine->axes[i];
+        axis_command(axis, axis->answers.lost ? CIA402_GOAL_QUICK_STOP : CIA402_GOAL_OFF);
+    }
     machine->fault_phase = MACHINE_FAULT_OFF;
 }
 
