@@ -84,6 +84,32 @@ static void test_configured_drives_that_do_not_answer_are_missing(void)
     TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
 }
 
+/* The command that starts a drive is a frame that may be lost: then nothing else would start it. */
+static void test_drives_that_do_not_answer_are_started_again(void)
+{
+    bench.drives[1].mute = true;
+    app_bench_periods(&bench, MACHINE_ANSWER_TICKS);
+    TEST_ASSERT_EQUAL_UINT32(2, bench.starts);
+    app_bench_periods(&bench, 1000);
+    TEST_ASSERT_EQUAL_UINT32(4, bench.starts);
+}
+
+/* The first drive restarts while the second one is being configured, and takes its time. */
+static void test_a_drive_that_restarts_in_boot_is_configured_again(void)
+{
+    bench.drives[1].mode_stuck = 6;
+    for (unsigned k = 0; bench.controller.boot.axis == 0u; ++k) {
+        TEST_ASSERT_TRUE(k < 1000u);
+        app_bench_period(&bench);
+    }
+    fake_drive_init(&bench.drives[0], 2, X_COUNTS);
+    app_bench_period(&bench);
+    bench.drives[1].mode_stuck = 0;
+    (void)app_bench_until(&bench, MACHINE_OFF, 2000);
+    uint32_t first = 0;
+    TEST_ASSERT_EQUAL_UINT32(1, fake_drive_written(&bench.drives[0], 0x606000, &first));
+}
+
 static void test_travel_limits_reach_the_drives(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, (uint32_t)-7, 4));
@@ -497,6 +523,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_boot_configures_each_drive_then_starts_it);
     RUN_TEST(test_configured_drives_that_do_not_answer_are_missing);
+    RUN_TEST(test_drives_that_do_not_answer_are_started_again);
+    RUN_TEST(test_a_drive_that_restarts_in_boot_is_configured_again);
     RUN_TEST(test_travel_limits_reach_the_drives);
     RUN_TEST(test_a_missing_drive_is_named_and_found_later);
     RUN_TEST(test_a_device_that_is_no_drive_is_refused);

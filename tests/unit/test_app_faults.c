@@ -257,6 +257,22 @@ static void test_a_drive_lost_while_braking_makes_it_a_quick_stop(void)
     until_phase(MACHINE_FAULT_OFF, 10);
 }
 
+/* It hears, it brakes, only its answers are lost: power is not taken from it while it moves. */
+static void test_a_drive_that_is_not_heard_may_finish_its_quick_stop(void)
+{
+    run_some(250);
+    drive(0)->quick_stop_syncs = 50;
+    drive(0)->mute = true;
+    (void)app_bench_until(&bench, MACHINE_FAULT, 10);
+    until_phase(MACHINE_FAULT_OFF, 10);
+    app_bench_periods(&bench, 20);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, drive(0)->state.state);
+    app_bench_periods(&bench, 40);
+    expect_off();
+    drive(0)->mute = false;
+    recover();
+}
+
 static void test_a_drive_in_fault_makes_a_quick_stop_of_the_others(void)
 {
     run_some(250);
@@ -629,6 +645,18 @@ static void test_a_reset_without_the_drive_leaves_it_to_boot(void)
     (void)app_bench_until(&bench, MACHINE_OFF, 2000);
 }
 
+/* An axis configured in FAULT has no drive yet: it is no reason to stay there. */
+static void test_a_reset_with_one_more_axis_leads_to_boot(void)
+{
+    run_some(100);
+    drive(1)->dead = true;
+    (void)app_bench_until(&bench, MACHINE_FAULT, 10);
+    until_phase(MACHINE_FAULT_OFF, 10);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2004, 1, 3, 1));
+    command(COMMAND_RESET);
+    (void)app_bench_until(&bench, MACHINE_BOOT, 10);
+}
+
 /* The same fault of another drive is told again. */
 static void test_each_fault_is_told(void)
 {
@@ -674,6 +702,7 @@ int main(void)
     RUN_TEST(test_off_has_more_patience);
     RUN_TEST(test_a_fault_with_all_drives_obeying_stops_on_the_path);
     RUN_TEST(test_a_drive_lost_while_braking_makes_it_a_quick_stop);
+    RUN_TEST(test_a_drive_that_is_not_heard_may_finish_its_quick_stop);
     RUN_TEST(test_a_drive_in_fault_makes_a_quick_stop_of_the_others);
     RUN_TEST(test_a_drive_that_stops_quickly_by_itself);
     RUN_TEST(test_a_drive_that_restarts_is_not_braked_along_the_path);
@@ -698,6 +727,7 @@ int main(void)
     RUN_TEST(test_a_frame_now_and_then_is_counted_only);
     RUN_TEST(test_a_reset_while_the_cause_persists_gives_the_fault_again);
     RUN_TEST(test_a_reset_without_the_drive_leaves_it_to_boot);
+    RUN_TEST(test_a_reset_with_one_more_axis_leads_to_boot);
     RUN_TEST(test_each_fault_is_told);
     RUN_TEST(test_heartbeat_time_is_object_1016);
     return UNITY_END();

@@ -47,7 +47,11 @@ static void restarted(struct machine *machine, uint8_t node)
     if (axis != NULL) {
         axis->statusword = cia402_status_bits(CIA402_NOT_READY);
     }
-    gone(machine, FAULT_REBOOTED, node);
+    if (machine->state == MACHINE_BOOT) { /* it has lost what was configured so far */
+        machine_enter_boot(machine);
+    } else {
+        gone(machine, FAULT_REBOOTED, node);
+    }
 }
 
 static void take_event(struct machine *machine, const struct heartbeat_consumer *consumer,

@@ -60,6 +60,9 @@ bool machine_configurable(const struct machine *machine)
 
 void machine_configure(struct machine *machine, const struct config *config, bool drives)
 {
+    for (uint8_t i = machine->config.axis_count; i < config->axis_count; ++i) {
+        axis_init(&machine->axes[i], config->node[i]);
+    }
     machine->config = *config;
     if (drives && machine->state != MACHINE_FAULT) {
         machine_enter_boot(machine);
@@ -70,6 +73,7 @@ void machine_drives_configured(struct machine *machine, bool simulated)
 {
     if (machine->state == MACHINE_BOOT) {
         machine->simulated = simulated;
+        machine->ticks_left = MACHINE_ANSWER_TICKS;
         machine->configured = true;
     }
 }

@@ -67,6 +67,7 @@ enum machine_refusal {
 #define MACHINE_ENABLE_TICKS 2000u /* time for the drives to switch on */
 #define MACHINE_QUICK_TICKS  2000u /* time for the drives to end a quick stop */
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
+#define MACHINE_ANSWER_TICKS 5000u /* time for configured drives to answer a SYNC */
 #define MACHINE_UNSENT_MAX   3u    /* so many ticks in a row the port may refuse frames */
 
 /* Drives that are not simulated are never waited for: what is later than this is missed. */
@@ -81,11 +82,11 @@ struct machine {
     uint32_t fault_serial; /* counts every change of `fault` */
     enum machine_state state;
     enum machine_fault_phase fault_phase; /* in FAULT */
-    uint32_t ticks_left;                  /* settling, enabling, quick stop, resetting */
-    uint32_t override_percent;            /* wanted, object 0x2010 sub 1; for every program */
-    uint32_t sync_us;                     /* time of the last SYNC */
-    uint32_t unsent_ticks;                /* in a row with a frame that the port refused */
-    bool sync_sent;                       /* the last SYNC has left */
+    uint32_t ticks_left;       /* settling, enabling, quick stop, resetting, first answers */
+    uint32_t override_percent; /* wanted, object 0x2010 sub 1; for every program */
+    uint32_t sync_us;          /* time of the last SYNC */
+    uint32_t unsent_ticks;     /* in a row with a frame that the port refused */
+    bool sync_sent;            /* the last SYNC has left */
     bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
     bool configured; /* drives are configured; BOOT then waits for their first answers */
     bool boot_due;   /* the mainline shall find and configure the drives (anew) */
@@ -137,7 +138,7 @@ void machine_configure(struct machine *machine, const struct config *config, boo
 /* Forgets the drives; the mainline has to find and configure them. Under the lock. */
 void machine_enter_boot(struct machine *machine);
 /* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF as soon as
- * each has answered a SYNC. */
+ * each has answered a SYNC; when one does not, they are configured and started anew. */
 void machine_drives_configured(struct machine *machine, bool simulated);
 
 /* Something is wrong: FAULT. With a program running and every drive obeying it stops along the path, else by quick stop.
@@ -148,7 +149,8 @@ void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_
 /* The drive's own emergency code has come: kept, and it takes the place of a vaguer code of the present fault. */
 void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code);
 
-/* In FAULT: gives every stop up and switches the drives off. Any context, under the lock. */
+/* In FAULT: gives every stop up and switches the drives off; those that do not answer are told to stop quickly until the
+ * reset. Any context, under the lock. */
 void machine_switch_off(struct machine *machine);
 
 /* --- Timer --- */

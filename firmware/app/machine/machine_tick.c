@@ -8,7 +8,7 @@ const struct axis *machine_straggler(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (!axis->answers.lost && !axis_reached(axis)) {
+        if (axis->answers.present && !axis->answers.lost && !axis_reached(axis)) {
             return axis;
         }
     }
@@ -23,10 +23,16 @@ bool machine_time_is_up(struct machine *machine)
     return machine->ticks_left == 0u;
 }
 
-/* While they were being configured nobody waited for their answers. */
+/* While they were being configured nobody waited for their answers. Where none comes the start may have been lost. */
 static void step_boot(struct machine *machine)
 {
-    if (!machine->configured || !machine_drives_answer(machine)) {
+    if (!machine->configured) {
+        return;
+    }
+    if (!machine_drives_answer(machine)) {
+        if (machine_time_is_up(machine)) {
+            machine_enter_boot(machine);
+        }
         return;
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
