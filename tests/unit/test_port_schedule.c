@@ -87,6 +87,22 @@ static void test_a_slow_machine_rests_half_of_what_it_worked(void)
     TEST_ASSERT_EQUAL_UINT64(next_ns + 3u * MS, schedule.due_ns);
 }
 
+/* Answers of real drives take bus time, no processor; of a flood of answers only the first one counts. */
+static void test_who_is_not_waited_for_delays_nothing(void)
+{
+    const uint64_t start_ns = schedule.due_ns;
+    (void)tick(0);
+    schedule_ready(&schedule, start_ns + 9u * MS / 10u);
+    TEST_ASSERT_EQUAL_UINT64(start_ns + MS, schedule.due_ns);
+    (void)schedule_start(&schedule, schedule.due_ns);
+    schedule_await(&schedule, 100u * MS, false);
+    schedule_finish(&schedule, start_ns + MS);
+    for (uint64_t tenth = 5; tenth < 100u; ++tenth) {
+        schedule_ready(&schedule, start_ns + MS + tenth * MS / 10u);
+        TEST_ASSERT_EQUAL_UINT64(start_ns + 2u * MS, schedule.due_ns);
+    }
+}
+
 static void test_the_rest_after_a_stall_is_short(void)
 {
     const uint64_t start_ns = schedule.due_ns;
@@ -260,6 +276,7 @@ int main(void)
     RUN_TEST(test_after_a_miss_the_clock_is_set_anew);
     RUN_TEST(test_who_is_not_ready_in_time_makes_the_tick_late);
     RUN_TEST(test_a_slow_machine_rests_half_of_what_it_worked);
+    RUN_TEST(test_who_is_not_waited_for_delays_nothing);
     RUN_TEST(test_the_rest_after_a_stall_is_short);
     RUN_TEST(test_whoever_is_never_ready_is_left_after_the_guard);
     RUN_TEST(test_the_guard_is_counted_in_slices);

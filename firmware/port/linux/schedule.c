@@ -48,6 +48,9 @@ static void rest_after_work(struct schedule *schedule, uint64_t now_ns)
 
 void schedule_ready(struct schedule *schedule, uint64_t now_ns)
 {
+    if (!schedule->awaiting) {
+        return;
+    }
     if (!schedule->hurry) {
         rest_after_work(schedule, now_ns);
     }

@@ -66,7 +66,8 @@ struct schedule {
 
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step);
 
-/* Wishes of the application, from inside a tick; and from the receive handler. */
+/* Wishes of the application, from inside a tick; and from the receive handler, without effect where nobody is waited for
+ * (any more). */
 void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry);
 void schedule_ready(struct schedule *schedule, uint64_t now_ns);
 
