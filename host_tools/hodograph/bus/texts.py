@@ -41,7 +41,7 @@ REFUSALS = {
     7: "the program is not within the limits now configured: upload it again",
     8: "no program runs: hodograph start",
     9: "the drives are on, homing wants them off: hodograph stop --off",
-    10: "a drive that shall be homed has no homing mode: set homing_method to 0 in the machine file",
+    10: "a drive that shall be homed has no homing mode: set method = 0 in its [axis.homing] of the machine file",
     11: "no axis has a homing method: add it to the machine file",
 }
 """Object 0x2003 sub 4, and the remedy."""
