@@ -7,7 +7,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -130,6 +130,14 @@ def _look(controller: Controller, meter: LoadMeter | None, screen: _Screen) -> N
         screen.show(found, None if meter is None else meter.measure())
     except BusError as error:
         screen.lost(str(error))
+        _forget(meter)
+
+
+def _forget(meter: LoadMeter | None) -> None:
+    """What was heard meanwhile: other nodes may talk on for hours."""
+    with suppress(BusError):  # the bus is down as well, which the next look tells
+        if meter is not None:
+            meter.measure(0.0)
 
 
 COMMANDS = {"status": status}
