@@ -87,7 +87,10 @@ class Guard:
         """Whether a request comes from our own page. Browsers always say where a WebSocket comes from."""
         if origin is None or host_header is None:
             return False
-        parts = urlsplit(origin)
+        try:
+            parts = urlsplit(origin)
+        except ValueError:
+            return False
         return parts.scheme in ("http", "https") and parts.netloc.lower() == host_header.lower()
 
 

@@ -160,7 +160,10 @@ async def _send(socket: web.WebSocketResponse, client: Client) -> None:
 
 def _read(text: str) -> dict[str, Any]:
     """A JSON object. Raises ValueError."""
-    request = json.loads(text)
+    try:
+        request = json.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
     if not isinstance(request, dict):
         raise ValueError("not an object")
     return request

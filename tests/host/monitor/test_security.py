@@ -100,6 +100,7 @@ def test_hosts_of_an_open_server(header: str, known: bool) -> None:
         ("", False),
         ("http://evil.example", False),
         ("http://127.0.0.1:8402.evil.example", False),
+        ("http://[", False),
     ],
 )
 def test_only_our_own_page_is_an_origin(origin: str | None, known: bool) -> None:

@@ -154,7 +154,9 @@ def test_an_open_server_shows_nothing_without_the_token() -> None:
     case.run(scenario)
 
 
-@pytest.mark.parametrize("text", ["no json", "[]", "5", "x" * 10000, '{"type":"hello","token":'])
+@pytest.mark.parametrize(
+    "text", ["no json", "[]", "5", "x" * 10000, "[" * 4000, '{"type":"hello","token":']
+)
 def test_nonsense_ends_the_connection_and_not_the_server(text: str) -> None:
     async def scenario(browser: Browser) -> None:
         for first in (True, False):
