@@ -11,8 +11,8 @@ acceleration  | |d_k| - |d_(k-1)| | <= a T^2: the second difference of arc lengt
               periods, and F'' is within the limit. Rounding counts twice. A chord is shorter than its arc by
               s theta^2 / 24 (theta: the turn of the path within the step), so where the path turns, that much
               is added for both; theta counts up to half a radian, so that a step aside is not excused by its own turn.
-turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greatest normal acceleration n is known. It holds
-              for each axis, so it is checked too while only one of the plane's drives follows.
+turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greatest normal acceleration n is known. It
+              holds for each axis, so it is checked too while only one of the plane's drives follows.
 
 Where SYNCs passed without a setpoint a step is spread over them. Axes beyond the plane hold their position: they are
 checked for speed and acceleration one by one.
