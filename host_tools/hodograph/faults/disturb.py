@@ -8,7 +8,7 @@ import time
 import zlib
 
 from ..bus.controller import BOOT, FAULT_STATE, OFF, READY, Controller
-from ..bus.objects import FAULT, MOVING, STATISTICS
+from ..bus.objects import ACTUAL, FAULT, MOVING, STATISTICS
 from ..bus.recorder import Recorder
 from ..bus.texts import STATES
 from ..errors import BusError, RunError
@@ -20,6 +20,7 @@ from .uploads import disturb_upload
 QUIET_S = 0.25
 """Recorded after everything has come to an end, so that what still moves is seen."""
 _SYNCS, _TICK = 1, 2
+_STILL_LOOKS = 5
 
 
 def disturb(record: Record, stand: Stand, controller: Controller, control: Recorder) -> None:
@@ -112,4 +113,17 @@ def _await_end_of_rules(record: Record, controller: Controller) -> None:
         if time.monotonic() > deadline:
             raise BusError("SYNCs have stopped")
         time.sleep(LOOK_S)
-    time.sleep(case.longest_ms / 1000 + QUIET_S)
+    time.sleep(case.longest_ms / 1000)
+    _await_rest(controller, len(record.job.machine.axes))
+    time.sleep(QUIET_S)
+
+
+def _await_rest(controller: Controller, axes: int) -> None:
+    """Until the axes stand, by what the controller hears: one that is off rolls on. If they do not, the judge sees."""
+    deadline = time.monotonic() + LIMIT_S
+    place, looks = [0] * axes, 0
+    while looks < _STILL_LOOKS and time.monotonic() < deadline:
+        now = [controller.read(ACTUAL, axis) for axis in range(1, axes + 1)]
+        away = max(abs(a - b) for a, b in zip(now, place, strict=True))
+        place, looks = (place, looks + 1) if away <= REST_TOLERANCE_COUNTS else (now, 0)
+        time.sleep(LOOK_S)

@@ -11,7 +11,7 @@ side = ["controller", "drives"]     # one of these words
 [host]
 action = "kill-controller"          # what the host does, at tick {at}
 [expect]
-codes = [0x8250]                    # fault codes of which one must be raised; none: no fault at all
+codes = [0x8250]                    # fault codes of which one must be raised, and no other; none: no fault at all
 may = true                          # a fault is allowed, not required
 within_ticks = 5                    # from the first injection to the fault
 within_ms = 300                     # the same in wall time, where ticks do not go on
@@ -43,6 +43,9 @@ ACTIONS = (
 )
 _NO_LIMIT = 10**9
 _EXPECT = ("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders")
+
+_OF_SCENARIOS = {"rules", "random", "host", "expect"}
+"""Keys that path and machine files beside the scenarios do not have."""
 
 Drawn = int | str
 
@@ -184,7 +187,9 @@ def draw(scenario: Scenario, seed: int) -> Case:
 def find_scenarios(folder: Path, names: list[str]) -> list[Scenario]:
     """The scenarios of a folder, or those named (a name may also be a file). Raises InputError."""
     known = {
-        file.stem: file for file in sorted(folder.glob("*.toml")) if "rules" in read_toml(file)
+        file.stem: file
+        for file in sorted(folder.glob("*.toml"))
+        if _OF_SCENARIOS & set(read_toml(file))
     }
     if not names:
         return [load_scenario(file) for file in known.values()]

@@ -116,6 +116,19 @@ def test_no_fault_late_fault_and_a_wrong_one() -> None:
     assert "fault 0x1000 was raised, which is none of those expected" in wrong
 
 
+def test_a_fault_beside_the_expected_one() -> None:
+    both = recording(stopped(60), 60, 200)
+    both = np.concatenate([both, both[-1:]])
+    both[-1]["id"], both[-1]["length"] = 0x81, 8
+    for code, told in (
+        (0x4210, True),
+        (0x1000, False),
+    ):  # the second only until a drive tells its own
+        both[-1]["data"] = list(struct.pack("<H6x", code))
+        words = f"fault 0x{code:04X} was raised, which is none of those expected"
+        assert (words in violations(record(both))) is told
+
+
 def test_axes_that_move_on() -> None:
     found = violations(record(recording(job().setpoints, 60, 60)))
     assert any(words.startswith("axes at rest after") for words in found)

@@ -91,6 +91,15 @@ def test_an_unknown_name_lists_those_there_are() -> None:
     assert [s.name for s in find_scenarios(FOLDER, ["drive-stops"])] == ["drive-stops"]
 
 
+def test_a_scenario_without_rules_is_one_too(tmp_path: Path) -> None:
+    for name in ("path.toml", "other.toml", "machine.toml"):
+        (tmp_path / name).write_bytes((FOLDER / name).read_bytes())
+    (tmp_path / "killed.toml").write_text(
+        'text = "x"\npath = "path.toml"\n[host]\naction = "kill-host"\n'
+    )
+    assert [s.name for s in find_scenarios(tmp_path, [])] == ["killed"]
+
+
 def test_the_examples_have_every_kind_of_fault_and_rules_that_are_understood(
     tmp_path: Path,
 ) -> None:
