@@ -33,21 +33,17 @@
 
 #include "can/can_frame.h"
 #include "canopen/od.h"
+#include "canopen/pdo_field.h"
 
 #define PDO_MAP_ENTRIES 8u
 
 /* Bit 31 of the COB-ID: the PDO does not exist. */
 #define PDO_MAP_OFF UINT32_C(0x80000000)
 
-struct pdo_map_field {
-    uint8_t *value; /* in the od's storage */
-    uint8_t size;   /* bytes: 1, 2, 4, 8 */
-};
-
 /* Read `valid`, `cob_id`, `type` and `length`; the rest is private. */
 struct pdo_map {
     struct od *od;
-    struct pdo_map_field fields[PDO_MAP_ENTRIES];
+    struct pdo_field fields[PDO_MAP_ENTRIES];
     uint32_t waited_us;  /* sent: since the last frame; received: since the last one */
     uint32_t inhibit_us; /* 0: none */
     uint32_t event_us;   /* 0: none */

@@ -2,10 +2,10 @@
 #include "faults/fault_keys.h"
 
 #include <assert.h>
-#include <errno.h>
 #include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include "faults/fault_value.h"
 
 enum {
     AT = 1 << 0,
@@ -27,36 +27,34 @@ enum {
     CODE = 1 << 16
 };
 
-enum field { FIELD_U8, FIELD_U16, FIELD_U32, FIELD_I32, FIELD_NUMBER, FIELD_SIDE };
-
 struct key {
     const char *name;
     size_t offset; /* in struct fault_rule */
     double low, high;
-    enum field field;
+    enum fault_field field;
 };
 
 #define IN(member) offsetof(struct fault_rule, member)
 
 /* In the order of the bits. An hour of ticks is enough for any scenario. */
 static const struct key keys[] = {
-    {"at", IN(at), 0, 4e6, FIELD_U32},
-    {"for", IN(for_ticks), 1, 4e6, FIELD_U32},
-    {"for_ms", IN(for_ms), 1, 4e6, FIELD_U32},
-    {"count", IN(count), 1, 4e6, FIELD_U32},
-    {"p", IN(p), 0, 1, FIELD_NUMBER},
-    {"seed", IN(seed), 0, 4294967295.0, FIELD_U32},
-    {"id", IN(id), 0, 0x7FF, FIELD_U16},
-    {"node", IN(node), 1, 127, FIELD_U8},
-    {"us", IN(delay_us), 1, 10e6, FIELD_U32},
-    {"byte", IN(byte), 0, 7, FIELD_U8},
-    {"xor", IN(mask), 1, 0xFF, FIELD_U8},
-    {"len", IN(len), 0, 7, FIELD_U8},
-    {"per_tick", IN(per_tick), 1, 100, FIELD_U32},
-    {"side", IN(side), 0, 0, FIELD_SIDE},
-    {"counts", IN(counts), -2147483648.0, 2147483647.0, FIELD_I32},
-    {"volts", IN(volts), -1000, 1000, FIELD_NUMBER},
-    {"code", IN(code), 1, 0xFFFF, FIELD_U16},
+    {"at", IN(at), 0, 4e6, FAULT_FIELD_U32},
+    {"for", IN(for_ticks), 1, 4e6, FAULT_FIELD_U32},
+    {"for_ms", IN(for_ms), 1, 4e6, FAULT_FIELD_U32},
+    {"count", IN(count), 1, 4e6, FAULT_FIELD_U32},
+    {"p", IN(p), 0, 1, FAULT_FIELD_NUMBER},
+    {"seed", IN(seed), 0, 4294967295.0, FAULT_FIELD_U32},
+    {"id", IN(id), 0, 0x7FF, FAULT_FIELD_U16},
+    {"node", IN(node), 1, 127, FAULT_FIELD_U8},
+    {"us", IN(delay_us), 1, 10e6, FAULT_FIELD_U32},
+    {"byte", IN(byte), 0, 7, FAULT_FIELD_U8},
+    {"xor", IN(mask), 1, 0xFF, FAULT_FIELD_U8},
+    {"len", IN(len), 0, 7, FAULT_FIELD_U8},
+    {"per_tick", IN(per_tick), 1, 100, FAULT_FIELD_U32},
+    {"side", IN(side), 0, 0, FAULT_FIELD_SIDE},
+    {"counts", IN(counts), -2147483648.0, 2147483647.0, FAULT_FIELD_I32},
+    {"volts", IN(volts), -1000, 1000, FAULT_FIELD_NUMBER},
+    {"code", IN(code), 1, 0xFFFF, FAULT_FIELD_U16},
 };
 
 enum { KEYS = sizeof keys / sizeof keys[0], TIMES = AT | FOR | FOR_MS };
@@ -138,26 +136,6 @@ int fault_keys_settle(struct fault_rule *rule, uint32_t seen)
     return 0;
 }
 
-/* Decimal, or hexadecimal behind 0x; a leading zero means nothing. */
-static bool read_value(const struct key *key, const char *text, double *out)
-{
-    char *end = NULL;
-    const bool negative = text[0] == '-';
-    const char *digits = negative ? text + 1 : text;
-    const bool hex = digits[0] == '0' && (digits[1] == 'x' || digits[1] == 'X');
-    if (!hex && !((digits[0] >= '0' && digits[0] <= '9') || digits[0] == '.')) {
-        return false;
-    }
-    errno = 0;
-    if (key->field == FIELD_NUMBER && !hex) {
-        *out = strtod(digits, &end);
-    } else {
-        *out = (double)strtoull(digits, &end, hex ? 16 : 10);
-    }
-    *out = negative ? -*out : *out;
-    return end != digits && *end == '\0' && errno == 0 && *out >= key->low && *out <= key->high;
-}
-
 /* Each kind has its own two sides: the words of the other kind are refused. */
 static bool store_side(struct fault_rule *rule, const char *value)
 {
@@ -176,37 +154,15 @@ bool fault_key_store(struct fault_rule *rule, uint32_t key, const char *value)
 {
     const struct key *it = key_of(key);
     double number = 0.0;
-    if (it->field == FIELD_SIDE) {
+    if (it->field == FAULT_FIELD_SIDE) {
         return store_side(rule, value);
     }
-    if (!read_value(it, value, &number)) {
+    if (!fault_value_read(value, it->field, &number) || number < it->low || number > it->high) {
         return false;
     }
     if (key == VOLTS && rule->kind == FAULT_KIND_SATURATE && number <= 0.0) {
         return false;
     }
-    unsigned char *field = (unsigned char *)rule + it->offset;
-    const int64_t whole = (int64_t)number;
-    const uint8_t u8 = (uint8_t)whole;
-    const uint16_t u16 = (uint16_t)whole;
-    const uint32_t u32 = (uint32_t)whole;
-    const int32_t i32 = (int32_t)whole;
-    switch (it->field) {
-    case FIELD_U8:
-        memcpy(field, &u8, sizeof u8);
-        break;
-    case FIELD_U16:
-        memcpy(field, &u16, sizeof u16);
-        break;
-    case FIELD_U32:
-        memcpy(field, &u32, sizeof u32);
-        break;
-    case FIELD_I32:
-        memcpy(field, &i32, sizeof i32);
-        break;
-    default:
-        memcpy(field, &number, sizeof number);
-        break;
-    }
+    fault_value_store((unsigned char *)rule + it->offset, it->field, number);
     return true;
 }
