@@ -152,15 +152,20 @@ static void seek_home(struct fake_drive *drive)
     if ((drive->state.controlword & CIA402_CONTROL_START_HOMING) == 0u) {
         drive->homing_left = drive->homing_syncs;
         drive->state.flags &= (uint16_t)~told;
+        drive->state.flags |=
+            drive->homed ? CIA402_STATUS_TARGET_REACHED | CIA402_STATUS_HOMING_ATTAINED : 0u;
         return;
     }
+    drive->homed = drive->homed && drive->homing_left == 0u;
     if (drive->homing_left > 0u) {
+        drive->state.flags &= (uint16_t)~told;
         drive->homing_left--;
     } else if (drive->homing_fails) {
         drive->state.flags |= CIA402_STATUS_HOMING_ERROR;
     } else {
         drive->state.flags |= CIA402_STATUS_TARGET_REACHED | CIA402_STATUS_HOMING_ATTAINED;
         drive->position_counts = drive->values.home_offset;
+        drive->homed = true;
     }
 }
 
@@ -198,7 +203,9 @@ int fake_drive_receive(struct fake_drive *drive, const struct can_msg *in, struc
     if (in->id == COB_SYNC) {
         return take_sync(drive, out);
     }
-    if (pdo_decode_setpoint(in, &setpoint) == drive->node) {
+    if (in->id == COB_RPDO1 + drive->node && drive->deaf > 0u) {
+        drive->deaf--;
+    } else if (pdo_decode_setpoint(in, &setpoint) == drive->node) {
         drive->setpoint_size = in->len;
         (void)pdo_decode_torque(in, &drive->torque_permille);
         take_setpoint(drive, &setpoint);

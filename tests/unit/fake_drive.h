@@ -47,6 +47,8 @@ struct fake_drive {
     uint32_t homing_syncs; /* how long it takes to find home: then its position is the offset */
     uint32_t homing_left;
     bool homing_fails;
+    bool homed;         /* once it has, it says so whenever it is enabled in homing mode */
+    uint32_t deaf;      /* so many of the next setpoint frames are lost */
     bool fixed_mapping; /* PDO parameters are read-only */
     uint16_t lacks[8];  /* objects that it has not */
     uint32_t refuses;   /* object (index << 8 + sub) that takes no value */

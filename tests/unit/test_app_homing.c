@@ -225,6 +225,24 @@ static void test_time_for_the_way_there_and_back(void)
     TEST_ASSERT_EQUAL_UINT32(HOMING_MAX_S, homing_time_s(&config, 2));
 }
 
+/* Homed before, the drive says so until it hears that it shall home again; frames of that command are lost. */
+static void test_an_old_success_is_not_taken_for_a_new_one(void)
+{
+    want(1, 37, 1000);
+    boot();
+    home();
+    (void)app_bench_until(&bench, MACHINE_OFF, 500);
+    bench.drives[0].position_counts = 7000;
+    home();
+    for (unsigned k = 0; bench.controller.homing.phase != HOMING_MOVE; ++k) {
+        TEST_ASSERT_TRUE(k < 100u);
+        app_bench_period(&bench);
+    }
+    bench.drives[0].deaf = 4;
+    (void)app_bench_until(&bench, MACHINE_OFF, 500);
+    TEST_ASSERT_EQUAL_INT32(1000, bench.drives[0].position_counts);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -238,5 +256,6 @@ int main(void)
     RUN_TEST(test_a_silent_drive_is_a_fault);
     RUN_TEST(test_stop_and_quick_stop_break_it_off);
     RUN_TEST(test_time_for_the_way_there_and_back);
+    RUN_TEST(test_an_old_success_is_not_taken_for_a_new_one);
     return UNITY_END();
 }

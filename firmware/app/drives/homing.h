@@ -30,8 +30,9 @@
 #define HOMING_SPARE_S        10u      /* beside the way there and back */
 #define HOMING_MAX_S          600u
 
-/* A controlword this long on its way is in the next statusword: sent, latched, answered. */
-#define HOMING_SYNCS_BEFORE_ANSWER 4u
+/* A controlword this long on its way is in the next statusword: sent, latched, answered takes 4, the others are for frames
+ * that are lost. Until then "attained" may be that of an earlier homing. */
+#define HOMING_SYNCS_BEFORE_ANSWER 10u
 
 enum homing_phase {
     HOMING_IDLE,
