@@ -12,7 +12,6 @@ from eds_standard import area_of
 _BAUD_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)
 _TIME = r"(0[1-9]|1[0-2]):[0-5]\d(AM|PM)"
 _DATE = r"(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])-\d{4}"
-_ANY = r".+"
 _FLAG = r"[01]"
 _NUMBER = r"\d+|0x[0-9A-Fa-f]+"
 

@@ -7,10 +7,9 @@ import json
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,8 +97,3 @@ def write_file(file: Path, data: bytes) -> None:
     except OSError as error:
         fresh.unlink(missing_ok=True) if fresh.parent.is_dir() else None
         raise InputError(f"{file}: cannot be written: {error.strerror}") from None
-
-
-def without_keys(data: Mapping[str, Any], *keys: str) -> dict[str, Any]:
-    """`data` less some keys."""
-    return {key: value for key, value in data.items() if key not in keys}
