@@ -19,9 +19,11 @@ def home(options: Namespace) -> None:
     address = parse_address(options.bus)
     machine = None
     if options.file is not None:
+        from ..bustime import require_fit
         from .motion_commands import machine_of
 
         machine = machine_of(options.file, None)
+        require_fit(machine)
     node, bitrate = (
         (options.node, DEFAULT_BITRATE) if machine is None else (machine.node, machine.bitrate)
     )

@@ -7,7 +7,7 @@ from argparse import Namespace
 
 from ..bus.address import parse_address
 from ..data import EXAMPLES
-from ..errors import RunError
+from ..errors import InputError, RunError
 from ..faults.campaign import run_campaign
 from ..faults.scenario import find_scenarios
 from ..faults.table import text
@@ -19,6 +19,8 @@ SCENARIOS = EXAMPLES / "faults"
 def faults(options: Namespace) -> None:
     """Runs scenarios, prints the table; raises RunError when there is a violation."""
     scenarios = find_scenarios(options.folder or SCENARIOS, options.scenarios)
+    if options.seed is None and options.seeds < 1:
+        raise InputError("--seeds: must be at least 1, or nothing is tried")
     first = 0 if options.seed is None else options.seed
     seeds = range(first, first + (options.seeds if options.seed is None else 1))
     verdicts = []

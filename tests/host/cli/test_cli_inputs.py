@@ -217,3 +217,25 @@ def test_run_needs_socketcan(capsys: pytest.CaptureFixture[str]) -> None:
     status, line = failed(capsys, "run", ALPHA, "--bus", "virtual:x")
     assert status == 4
     assert "takes SocketCAN" in line
+
+
+def test_home_checks_the_bus_time_of_its_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """It configures the controller, as `upload` does."""
+    machines = Path(ALPHA).parent / "machines"
+    text = (
+        (machines / "paper_alpha.toml").read_text().replace('"../drives', f'"{machines}/../drives')
+    )
+    file = tmp_path / "slow.toml"
+    file.write_text(re.sub(r"bitrate = \d+", "bitrate = 125000", text))
+    assert "bitrate = 125000" in file.read_text()
+    status, line = failed(capsys, "home", str(file), "--bus", "virtual:x")
+    assert status == 2
+    assert "at 125000 bit/s, but period_us is 1000" in line
+
+
+def test_no_cases_are_no_success(capsys: pytest.CaptureFixture[str]) -> None:
+    status, line = failed(capsys, "faults", "sync-lost", "--seeds", "0")
+    assert status == 2
+    assert "--seeds" in line
