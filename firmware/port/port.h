@@ -127,7 +127,4 @@ enum port_level {
 /* One line to the console: a fixed text and a number. Mainline. */
 void port_log(enum port_level level, const char *text, int32_t value);
 
-/* A broken assumption of the firmware itself: says so and stops everything. Does not return. */
-void port_fatal(const char *text);
-
 #endif

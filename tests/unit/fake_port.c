@@ -236,8 +236,3 @@ void port_log(enum port_level level, const char *text, int32_t value)
     (void)value;
     TEST_ASSERT_FALSE_MESSAGE(self.locked, "logs inside a critical section");
 }
-
-void port_fatal(const char *text)
-{
-    TEST_FAIL_MESSAGE(text);
-}

@@ -4,16 +4,12 @@
 #include <string.h>
 
 #include "canopen/cia402.h"
-#include "canopen/sdo_abort.h"
 #include "port/port.h"
-
-#define MODE_OF_OPERATION         0x6060u
-#define MODE_OF_OPERATION_DISPLAY 0x6061u
 
 void homing_init(struct homing *homing)
 {
     memset(homing, 0, sizeof *homing);
-    sdo_client_init(&homing->client, HOMING_SDO_TIMEOUT_US);
+    homing_mode_init(&homing->mode);
 }
 
 bool homing_busy(const struct homing *homing)
@@ -60,10 +56,7 @@ static void enter(struct homing *homing, const struct machine *machine, enum hom
 {
     homing->phase = phase;
     homing->began_syncs = machine->statistics.syncs;
-    homing->checking = false;
-    homing->reads = 0;
-    homing->pause_us = 0;
-    homing->client.status = SDO_CLIENT_IDLE;
+    homing_mode_begin(&homing->mode);
 }
 
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
@@ -99,64 +92,6 @@ static bool over(const struct homing *homing, const struct machine *machine, uin
 {
     const uint32_t syncs = machine->statistics.syncs - homing->began_syncs;
     return (uint64_t)syncs * machine->config.period_us > time_us;
-}
-
-static int ask(struct homing *homing, const struct machine *machine, uint8_t mode,
-               struct can_msg *out)
-{
-    const uint8_t node = machine->config.node[homing->axis];
-    const int sent =
-        homing->checking
-            ? sdo_client_read_number(&homing->client, node, MODE_OF_OPERATION_DISPLAY, 0, out)
-            : sdo_client_write_number(&homing->client, node, MODE_OF_OPERATION, 0, mode, 1, out);
-    return sent > 0 ? 1 : 0;
-}
-
-/* The mode has been written, or read. Returns true when it is the wanted one. */
-static bool judge_mode(struct homing *homing, struct machine *machine, uint8_t mode)
-{
-    const bool read = homing->checking;
-    homing->client.status = SDO_CLIENT_IDLE;
-    homing->checking = true;
-    if (!read) {
-        return false;
-    }
-    const uint8_t display = (uint8_t)sdo_client_unsigned(&homing->client);
-    if (display != mode && ++homing->reads == HOMING_READS) {
-        fail(homing, machine, FAULT_HOMING_MODE, display);
-    }
-    homing->pause_us = HOMING_READ_AGAIN_US;
-    return display == mode;
-}
-
-static bool waits(struct homing *homing, uint32_t elapsed_us)
-{
-    homing->pause_us -= elapsed_us < homing->pause_us ? elapsed_us : homing->pause_us;
-    return homing->pause_us > 0u;
-}
-
-/* Brings the drive into a mode; then *done. */
-static int set_mode(struct homing *homing, struct machine *machine, uint8_t mode,
-                    uint32_t elapsed_us, struct can_msg *out, bool *done)
-{
-    switch (homing->client.status) {
-    case SDO_CLIENT_BUSY:
-        return sdo_client_process(&homing->client, elapsed_us, out);
-    case SDO_CLIENT_DONE:
-        *done = judge_mode(homing, machine, mode);
-        break;
-    case SDO_CLIENT_REFUSED:
-    case SDO_CLIENT_FAILED:
-        fail(homing, machine, FAULT_HOMING_MODE, homing->client.abort_code);
-        break;
-    case SDO_CLIENT_IDLE:
-    default:
-        break;
-    }
-    if (*done || homing->phase == HOMING_IDLE || waits(homing, elapsed_us)) {
-        return 0;
-    }
-    return ask(homing, machine, mode, out);
 }
 
 /* CiA 402-2: bit 13 error, bits 12 and 10 together: attained. Returns a fault code or 0. */
@@ -246,7 +181,23 @@ static bool still_homing(const struct machine *machine)
 
 int homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out)
 {
-    return homing_busy(homing) ? sdo_client_receive(&homing->client, in, out) : 0;
+    return homing_busy(homing) ? sdo_client_receive(&homing->mode.client, in, out) : 0;
+}
+
+/* Brings the drive into a mode. */
+static int step_mode(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
+                     struct can_msg *out)
+{
+    const uint8_t mode = homing->phase == HOMING_MODE ? CIA402_MODE_HOMING : CIA402_MODE_CSP;
+    const uint8_t node = machine->config.node[homing->axis];
+    enum homing_mode_result result = HOMING_MODE_PENDING;
+    const int sent = homing_mode_process(&homing->mode, node, mode, elapsed_us, out, &result);
+    if (result == HOMING_MODE_SET) {
+        mode_done(homing, machine);
+    } else if (result == HOMING_MODE_REFUSED) {
+        fail(homing, machine, FAULT_HOMING_MODE, homing->mode.detail);
+    }
+    return sent;
 }
 
 int homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
@@ -256,14 +207,9 @@ int homing_process(struct homing *homing, struct machine *machine, uint32_t elap
         homing->phase = HOMING_IDLE;
     }
     if (homing->phase == HOMING_MODE || homing->phase == HOMING_MODE_BACK) {
-        const uint8_t mode = homing->phase == HOMING_MODE ? CIA402_MODE_HOMING : CIA402_MODE_CSP;
-        bool done = false;
-        const int sent = set_mode(homing, machine, mode, elapsed_us, out, &done);
-        if (sent != 0 || !done) {
-            return sent;
-        }
-        mode_done(homing, machine);
-    } else if (homing_busy(homing)) {
+        return step_mode(homing, machine, elapsed_us, out);
+    }
+    if (homing_busy(homing)) {
         step_drive(homing, machine);
     }
     return 0;

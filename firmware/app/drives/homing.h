@@ -19,16 +19,14 @@
 #include <stdint.h>
 
 #include "app/drives/drive_facts.h"
+#include "app/drives/homing_mode.h"
 #include "app/machine/config.h"
 #include "app/machine/machine.h"
-#include "canopen/sdo_client.h"
+#include "can/can_frame.h"
 
-#define HOMING_SDO_TIMEOUT_US 500000u
-#define HOMING_READ_AGAIN_US  5000u
-#define HOMING_READS          20u      /* of 0x6061, until it is the mode */
-#define HOMING_SWITCH_US      2000000u /* to switch a drive on, or off */
-#define HOMING_SPARE_S        10u      /* beside the way there and back */
-#define HOMING_MAX_S          600u
+#define HOMING_SWITCH_US 2000000u /* to switch a drive on, or off */
+#define HOMING_SPARE_S   10u      /* beside the way there and back */
+#define HOMING_MAX_S     600u
 
 /* A controlword this long on its way is in the next statusword: sent, latched, answered takes 4, the others are for frames
  * that are lost. Until then "attained" may be that of an earlier homing. */
@@ -44,12 +42,9 @@ enum homing_phase {
 };
 
 struct homing {
-    struct sdo_client client;
+    struct homing_mode mode;
     enum homing_phase phase;
     uint8_t axis;
-    uint8_t reads;
-    bool checking; /* 0x6061 is being read */
-    uint32_t pause_us;
     uint32_t began_syncs; /* when the phase began */
 };
 

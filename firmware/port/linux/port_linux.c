@@ -166,9 +166,3 @@ void port_log(enum port_level level, const char *text, int32_t value)
         (void)fprintf(stderr, "hodograph-controller: %s %ld\n", text, (long)value);
     }
 }
-
-void port_fatal(const char *text)
-{
-    (void)fprintf(stderr, "hodograph-controller: %s\n", text);
-    abort();
-}
