@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import math
 import re
 from pathlib import Path
 from typing import NoReturn
@@ -14,6 +13,7 @@ from .. import __version__
 from ..bus.address import DEFAULT_BUS
 from ..errors import InputError
 from ..names import KERNELS, PACES
+from .values import count, finite, node_number, part, percentage, port_number, seconds
 
 DESCRIPTION = (
     "From a control polygon to encoder counts: jerk-limited motion on PH splines over CAN."
@@ -30,59 +30,11 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         match = re.match(r"argument COMMAND: invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if match:
-            names = re.findall(r"\w+", match[2])
+            names = re.findall(r"[\w-]+", match[2])
             near = difflib.get_close_matches(match[1], names, n=1)
             advice = f'did you mean "{near[0]}"?' if near else "one of: " + ", ".join(names)
             message = f'there is no command "{match[1]}"; {advice}'
         raise InputError(f"{message} (see {self.prog} --help)")
-
-
-def finite(text: str) -> float:
-    """A finite number on the command line."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a number') from None
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'"{text}" is not finite')
-    return value
-
-
-def seconds(text: str) -> float:
-    """A time above zero."""
-    value = finite(text)
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a time above 0')
-    return value
-
-
-def percentage(text: str) -> int:
-    """A feed override."""
-    if not text.isdigit() or int(text) > 200:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 0 to 200')
-    return int(text)
-
-
-def count(text: str) -> int:
-    """A number of things."""
-    if not text.isdigit() or int(text) > 100_000:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 0 to 100000')
-    return int(text)
-
-
-def part(text: str) -> tuple[int, int]:
-    """One of several equal parts."""
-    match = re.fullmatch(r"(\d{1,3})/(\d{1,3})", text)
-    if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise argparse.ArgumentTypeError(f'"{text}" is no part such as 1/2')
-    return int(match[1]), int(match[2])
-
-
-def node_number(text: str) -> int:
-    """A CANopen node number."""
-    if not text.isdigit() or not 1 <= int(text) <= 127:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a node number (1 to 127)')
-    return int(text)
 
 
 def _bus_name(parser: argparse.ArgumentParser) -> None:
@@ -139,13 +91,6 @@ def _kernel(parser: argparse.ArgumentParser) -> None:
 
 def _at(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--at", type=finite, nargs="+", metavar="V", help=what)
-
-
-def port_number(text: str) -> int:
-    """A TCP port that an ordinary user may serve."""
-    if not text.isdigit() or not 1 <= int(text) <= 65535:
-        raise argparse.ArgumentTypeError(f'"{text}" is not a port (1 to 65535)')
-    return int(text)
 
 
 def _monitor(parser: argparse.ArgumentParser) -> None:

@@ -55,6 +55,7 @@ def failed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, st
 USAGE = [
     ((), r"COMMAND"),
     (("simulat",), r'no command "simulat"; did you mean "simulate"\?'),
+    (("quik-stop",), r'did you mean "quick-stop"\?'),
     (("spline",), r"FILE"),
     (("spline", ALPHA, "--jsn"), r"--jsn"),
     (("spline", ALPHA, "--at", "x"), r'"x" is not a number'),
