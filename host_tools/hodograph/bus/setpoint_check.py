@@ -108,6 +108,35 @@ def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list
     return sorted(jumps, key=lambda jump: jump.sync)
 
 
+def find_rough_starts(frames: Frames, nodes: Sequence[int], tolerance_counts: int) -> list[str]:
+    """Where a drive began to follow at a target that is not where it said it was."""
+    found = []
+    for node in nodes:
+        at, control, target = _setpoints(frames, node)
+        follows = _commanded(control) & _enabled(frames, node, at)
+        begins = np.flatnonzero(follows[1:] & ~follows[:-1]) + 1
+        said = np.flatnonzero((frames["id"] == TPDO1 + node) & (frames["length"] >= 6))
+        last = np.searchsorted(said, at[begins]) - 1
+        begins, last = begins[last >= 0], last[last >= 0]
+        away = np.abs(target[begins] - _integers(frames["data"][said[last]]))
+        found += [
+            f"node {node} began to follow {away[i]:.0f} counts from where it was"
+            for i in np.flatnonzero(away > tolerance_counts)
+        ]
+    return found
+
+
+def _setpoints(frames: Frames, node: int) -> tuple[NDArray[np.intp], NDArray[np.uint16], Float]:
+    """Of one node: places in the recording, controlwords, targets."""
+    at = np.flatnonzero((frames["id"] == RPDO1 + node) & (frames["length"] >= 6))
+    control = np.ascontiguousarray(frames["data"][at, 0:2]).view("<u2")[:, 0]
+    return at, control, _integers(frames["data"][at])
+
+
+def _integers(data: NDArray[np.uint8]) -> Float:
+    return np.ascontiguousarray(data[:, 2:6]).view("<i4")[:, 0].astype(np.float64)
+
+
 def _steps(
     frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]
 ) -> tuple[Float, NDArray[np.bool_]]:
@@ -115,14 +144,11 @@ def _steps(
     steps = np.zeros((sync_at.size, len(nodes)))
     followed = np.zeros((sync_at.size, len(nodes)), dtype=np.bool_)
     for axis, node in enumerate(nodes):
-        at = np.flatnonzero((frames["id"] == RPDO1 + node) & (frames["length"] >= 6))
-        sync = np.searchsorted(sync_at, at) - 1
-        at, sync = at[sync >= 0], sync[sync >= 0]
+        at, control, target = _setpoints(frames[sync_at[0] :], node)
+        at += sync_at[0]
         if at.size < 2:
             continue
-        data = frames["data"][at]
-        control = np.ascontiguousarray(data[:, 0:2]).view("<u2")[:, 0]
-        target = np.ascontiguousarray(data[:, 2:6]).view("<i4")[:, 0].astype(np.float64)
+        sync = np.searchsorted(sync_at, at) - 1
         commanded = _commanded(control)
         follows = commanded & _enabled(frames, node, at)
         periods = np.maximum(np.diff(sync), 1)

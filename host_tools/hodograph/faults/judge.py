@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bus.setpoint_check import find_jumps, step_limits
+from ..bus.setpoint_check import find_jumps, find_rough_starts, step_limits
 from ..native import Contour, NativeProgram
 from .evidence import Evidence
 from .record import REST_TOLERANCE_COUNTS, Record
@@ -133,6 +133,7 @@ def _bad_setpoints(record: Record, evidence: Evidence) -> list[str]:
     limits = step_limits(machine, record.job.setpoints)
     frames = evidence.control if record.control is None else record.control
     bad = [str(jump) for jump in find_jumps(frames, machine.nodes, limits)[:3]]
+    bad += find_rough_starts(frames, machine.nodes, REST_TOLERANCE_COUNTS)[:3]
     if not evidence.moved:
         return bad
     (x, x_sent), (y, y_sent) = evidence.setpoints()[:2]

@@ -14,7 +14,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hodograph.bus.recorder import FRAME_DTYPE, Frames
-from hodograph.bus.setpoint_check import StepLimits, find_jumps, require_no_jump, step_limits
+from hodograph.bus.setpoint_check import (
+    StepLimits,
+    find_jumps,
+    find_rough_starts,
+    require_no_jump,
+    step_limits,
+)
 from hodograph.chain import load_chain
 from hodograph.errors import RunError
 from hodograph.native import NativeProgram
@@ -107,6 +113,23 @@ def test_before_the_drive_follows_targets_are_free() -> None:
 def test_a_step_as_soon_as_the_drive_follows() -> None:
     stream = Stream().tick(0, 0, control=ENABLED, status=STANDBY).tick(300, 0)
     assert jumps(stream) == ["acceleration@1"]
+
+
+def test_a_start_away_from_where_the_drive_is() -> None:
+    """The drives of these streams say that they are at 0."""
+
+    def begun(x: int) -> Stream:
+        stream = Stream().tick(x, 0, control=SWITCHED_ON, status=STANDBY)
+        return stream.tick(x, 0, status=STANDBY).tick(x, 0).tick(x, 0)
+
+    assert jumps(begun(5000)) == []  # which looks at steps only
+    assert find_rough_starts(begun(100).packed(), NODES, 100) == []
+    assert find_rough_starts(begun(-101).packed(), NODES, 100) == [
+        "node 2 began to follow 101 counts from where it was"
+    ]
+    moving = Stream().tick(5000, 0).tick(5100, 0)  # begun before the recording: nobody knows
+    assert find_rough_starts(moving.packed(), NODES, 100) == []
+    assert find_rough_starts(np.zeros(0, dtype=FRAME_DTYPE), NODES, 100) == []
 
 
 def test_homing_is_left_out_and_what_comes_after_is_not() -> None:
