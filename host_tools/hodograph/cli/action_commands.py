@@ -11,7 +11,7 @@ from ..bus.address import parse_address
 from ..bus.objects import BOOT, OFF, READY
 from .bus_commands import reached, stopping
 from .output import note
-from .targets import DEFAULT_BITRATE
+from .targets import target
 
 
 def home(options: Namespace) -> None:
@@ -22,12 +22,10 @@ def home(options: Namespace) -> None:
         from ..bustime import require_fit
         from .motion_commands import machine_of
 
-        machine = machine_of(options.file, None)
+        machine = machine_of(options.file, options.machine)
         require_fit(machine)
-    node, bitrate = (
-        (options.node, DEFAULT_BITRATE) if machine is None else (machine.node, machine.bitrate)
-    )
-    with reached(address, node, bitrate, options.wait) as controller:
+    to = target(options) if machine is None else machine
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         controller.require_standing()
         if machine is not None:
             controller.configure(machine, machine.kernel)
@@ -40,7 +38,8 @@ def home(options: Namespace) -> None:
 def quick_stop(options: Namespace) -> None:
     """hodograph quick-stop."""
     address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+    to = target(options)
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         actions.quick_stop(controller, options.timeout or actions.BOOT_S)
     print("stopped by the drives, drives off")
 
@@ -48,7 +47,8 @@ def quick_stop(options: Namespace) -> None:
 def reset(options: Namespace) -> None:
     """hodograph reset."""
     address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+    to = target(options)
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         had_fault = actions.reset(controller, options.timeout or actions.BOOT_S)
     if not had_fault:
         note("no fault was present")

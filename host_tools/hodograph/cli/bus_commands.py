@@ -24,7 +24,7 @@ from ..bus.follow import Follower
 from ..bus.signals import unbroken
 from ..errors import HodographError
 from .output import note
-from .targets import DEFAULT_BITRATE
+from .targets import target
 
 
 @contextmanager
@@ -49,7 +49,8 @@ def stopping(controller: Controller) -> Iterator[None]:
 def start(options: Namespace) -> None:
     """hodograph start."""
     address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+    to = target(options)
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         if options.reset:
             actions.reset(controller)
         with stopping(controller):
@@ -63,7 +64,8 @@ def start(options: Namespace) -> None:
 def stop(options: Namespace) -> None:
     """hodograph stop."""
     address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+    to = target(options)
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         was_running = controller.state() in ON_PATH
         controller.stop_and_wait()
         if options.off and controller.state() == READY:
@@ -75,7 +77,8 @@ def stop(options: Namespace) -> None:
 def hold(options: Namespace) -> None:
     """hodograph hold."""
     address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+    to = target(options)
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         held = actions.hold(controller, options.timeout or math.inf)
     print("held" if held else "the program had ended")
 
@@ -83,7 +86,8 @@ def hold(options: Namespace) -> None:
 def resume(options: Namespace) -> None:
     """hodograph resume."""
     address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+    to = target(options)
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         controller.command(RESUME)
     print("running")
 
@@ -91,7 +95,8 @@ def resume(options: Namespace) -> None:
 def override(options: Namespace) -> None:
     """hodograph override."""
     address = parse_address(options.bus)
-    with reached(address, options.node, DEFAULT_BITRATE, options.wait) as controller:
+    to = target(options)
+    with reached(address, to.node, to.bitrate, options.wait) as controller:
         controller.override(options.percent)
     print(f"override {options.percent} %")
 

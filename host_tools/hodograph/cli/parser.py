@@ -63,9 +63,8 @@ def _timeout(parser: argparse.ArgumentParser, usual: str) -> None:
 
 
 def _node(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--node", type=node_number, default=1, help="the controller's node number (default 1)"
-    )
+    parser.add_argument("--node", type=node_number, help="the controller's node number (default 1)")
+    parser.add_argument("--machine", type=Path, metavar="FILE", help="for node number and bit rate")
 
 
 def _file(parser: argparse.ArgumentParser, *, many: bool = False, what: str = "path file") -> None:

@@ -8,7 +8,9 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import can
 import pytest
 
 from hodograph.cli.main import main
@@ -240,3 +242,44 @@ def test_no_cases_are_no_success(capsys: pytest.CaptureFixture[str]) -> None:
     status, line = failed(capsys, "faults", "sync-lost", "--seeds", "0")
     assert status == 2
     assert "--seeds" in line
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("start",),
+        ("stop",),
+        ("hold",),
+        ("resume",),
+        ("override", "50"),
+        ("home",),
+        ("quick-stop",),
+        ("reset",),
+        ("status",),
+    ],
+)
+def test_every_command_takes_node_and_bit_rate_from_a_machine_file(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: tuple[str, ...],
+) -> None:
+    machines = Path(ALPHA).parent / "machines"
+    text = (machines / "paper_alpha.toml").read_text()
+    text = text.replace('"../drives', f'"{machines}/../drives')
+    text = re.sub(r"bitrate = \d+", "bitrate = 500000", text)
+    file = tmp_path / "other.toml"
+    file.write_text(text.replace("node = 1\n", "node = 77\n"))
+    opened: list[int] = []
+    real = can.Bus
+
+    def opening(*args: Any, **options: Any) -> Any:
+        opened.append(options["bitrate"])
+        return real(*args, **options)
+
+    monkeypatch.setattr(can, "Bus", opening)
+    more = ("--machine", str(file), "--bus", "virtual:empty", "--wait", "0.1")
+    status, line = failed(capsys, *words, *more)
+    assert status == 4
+    assert "node 77" in line
+    assert opened == [500_000]
