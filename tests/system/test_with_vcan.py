@@ -233,14 +233,19 @@ def test_inside_the_bus_that_is_there_is_used(bus: OpenBus) -> None:
     assert bus.run(WITH_VCAN, "sh", "-c", name).stdout == plain
 
 
-def test_a_kernel_with_can_gives_a_bus_in_a_namespace(bus: OpenBus) -> None:
+def test_a_kernel_with_can_gives_a_bus_in_a_namespace(bus: OpenBus, tmp_path: Path) -> None:
     """Inside user-mode Linux is a kernel with CAN: its namespaces stand for those of such a machine."""
     receive, send = f"{sys.executable} -c '{RECEIVE}'", f"{sys.executable} -c '{SEND}'"
-    script = f"{WITH_VCAN} --own {receive} & sleep 1.5; {send} 3 2; kill $!; wait $!"
+    heard = tmp_path / "heard"
+    ready = f"until grep -q listening {heard}; do sleep 0.05; done"
+    script = (
+        f"{WITH_VCAN} --own {receive} >{heard} & {ready}; {send} 3 2; kill $!; wait $!; cat {heard}"
+    )
     done = bus.run("sh", "-c", script)
     assert done.stdout == b"listening\n"  # and no frame from the bus outside
     for name in ("vcan0", "vcan1"):
-        inner = f"{receive} {name} & sleep 0.5; {send} 4 1 {name}; wait"
+        heard.write_text("")
+        inner = f"{receive} {name} >{heard} & {ready}; {send} 4 1 {name}; wait; cat {heard}"
         done = bus.run(WITH_VCAN, "--own", "sh", "-c", inner)
         assert done.stdout == b"listening\n4\n"
 
@@ -295,7 +300,9 @@ def test_ctrl_c_while_booting_ends_at_once() -> None:
     process = subprocess.Popen(
         [WITH_VCAN, "--user-mode", "--name", name, "sleep", "600"], stdin=subprocess.DEVNULL
     )
-    time.sleep(0.7)
+    limit = time.monotonic() + LIMIT_S
+    while not (folder_of(name) / "info.json").exists() and time.monotonic() < limit:
+        time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     assert process.wait(LIMIT_S) == 130
     assert processes_of(name) == []
