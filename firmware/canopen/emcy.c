@@ -24,10 +24,22 @@ void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *e
     emcy_producer_forget(producer);
 }
 
+/* Room for the newest: the oldest of its code has nothing new to say, else the oldest of all goes. */
+static void make_room(struct emcy_producer *producer, uint16_t code)
+{
+    uint8_t victim = 0;
+    for (uint8_t i = (uint8_t)QUEUE_SIZE; i-- > 0u;) {
+        victim = producer->queue[i].code == code ? i : victim;
+    }
+    producer->queued--;
+    memmove(&producer->queue[victim], &producer->queue[victim + 1u],
+            (size_t)(producer->queued - victim) * sizeof producer->queue[0]);
+}
+
 static void queue(struct emcy_producer *producer, uint16_t code, const uint8_t *detail)
 {
     if (producer->queued == QUEUE_SIZE) {
-        return;
+        make_room(producer, code);
     }
     struct emcy *emcy = &producer->queue[producer->queued];
     emcy->code = code;

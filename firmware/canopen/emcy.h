@@ -48,8 +48,9 @@ struct emcy {
 };
 
 /* Producer. The values behind 0x1001 and 0x1003 belong to the object dictionary; the producer
- * writes them. A few messages wait in a queue for the port; when it is full the newest is dropped
- * from the bus, not from the history. */
+ * writes them. A few messages wait in a queue for the port; when it is full the newest takes the
+ * place of the oldest of the same code, else of the oldest: dropped from the bus, not from the
+ * history. */
 struct emcy_producer {
     uint8_t *error_register; /* 0x1001 */
     uint32_t

@@ -76,7 +76,7 @@ static void test_messages_keep_their_order(void)
     }
 }
 
-static void test_a_full_queue_drops_the_newest(void)
+static void test_a_full_queue_keeps_the_newest(void)
 {
     int frames = 0;
 
@@ -88,7 +88,27 @@ static void test_a_full_queue_drops_the_newest(void)
         frames++;
     }
     TEST_ASSERT_EQUAL_INT(4, frames);
-    TEST_ASSERT_EQUAL_UINT8(4, out.data[0]);
+    TEST_ASSERT_EQUAL_UINT8(10, out.data[0]);
+}
+
+static void test_a_flood_of_one_code_does_not_push_out_another(void)
+{
+    emcy_producer_raise(&producer, 1, 0, NULL);
+    emcy_producer_raise(&producer, 2, 0, NULL);
+    emcy_producer_raise(&producer, 2, 0, NULL);
+    emcy_producer_raise(&producer, 3, 0, NULL);
+    for (int i = 0; i < 5; i++) {
+        emcy_producer_raise(&producer, 2, 0, NULL);
+    }
+    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_EQUAL_UINT8(1, out.data[0]);
+    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_EQUAL_UINT8(3, out.data[0]);
+    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_EQUAL_UINT8(2, out.data[0]);
+    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_EQUAL_UINT8(2, out.data[0]);
+    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
 }
 
 static void test_no_error_when_the_last_one_is_gone(void)
@@ -145,7 +165,8 @@ int main(void)
     RUN_TEST(test_message_on_the_wire);
     RUN_TEST(test_history_has_the_newest_first);
     RUN_TEST(test_messages_keep_their_order);
-    RUN_TEST(test_a_full_queue_drops_the_newest);
+    RUN_TEST(test_a_full_queue_keeps_the_newest);
+    RUN_TEST(test_a_flood_of_one_code_does_not_push_out_another);
     RUN_TEST(test_no_error_when_the_last_one_is_gone);
     RUN_TEST(test_decode_ignores_other_frames);
     RUN_TEST(test_texts);
