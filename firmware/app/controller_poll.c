@@ -99,8 +99,8 @@ static bool boot_requested(struct machine *machine)
     return due;
 }
 
-/* What the inputs of a drive were that is about to be started: TPDO3 tells changes only. */
-static void note_inputs(struct controller *controller, const struct can_msg *command)
+/* Of a drive that is about to be started: what it maps, and its inputs, since TPDO3 tells changes only. */
+static void note_facts(struct controller *controller, const struct can_msg *command)
 {
     if (command->id != COB_NMT || command->data[0] != (uint8_t)NMT_START) {
         return;
@@ -109,7 +109,10 @@ static void note_inputs(struct controller *controller, const struct can_msg *com
     struct axis *axis = machine_axis(&controller->machine, command->data[1]);
     if (axis != NULL) {
         const uint32_t i = (uint32_t)(axis - controller->machine.axes);
-        axis->digital_inputs = controller->boot.facts[i].value[DRIVE_INPUTS];
+        const struct drive_facts *facts = &controller->boot.facts[i];
+        axis->digital_inputs = facts->value[DRIVE_INPUTS];
+        axis->torque_mapped = facts->known[DRIVE_TORQUE_MAPPED];
+        axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
     }
     port_unlock();
 }
@@ -124,7 +127,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
     struct can_msg out;
     int due = drive_boot_process(&controller->boot, elapsed_us, &out);
     while (due != 0) {
-        note_inputs(controller, &out);
+        note_facts(controller, &out);
         controller_send(&out);
         due = drive_boot_process(&controller->boot, 0, &out);
     }

@@ -50,12 +50,11 @@ static void find_offsets(struct tick *tick, struct feedforward_offset offset[AXE
 static void send_setpoints(struct tick *tick, const struct feedforward_offset *offset)
 {
     struct machine *machine = tick->machine;
-    const bool torque = (machine->config.feedforward & CONFIG_TORQUE_FEEDFORWARD) != 0u;
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
         struct can_msg setpoint;
         axis_setpoint(axis, machine->config.start_tolerance_counts, &setpoint);
-        if (torque) {
+        if (axis->torque_mapped) {
             pdo_add_torque(&setpoint, offset[i].torque_permille);
         }
         if (send(tick, &setpoint)) {
@@ -69,6 +68,9 @@ static void send_velocities(struct tick *tick, const struct feedforward_offset *
     const struct machine *machine = tick->machine;
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         struct can_msg velocity;
+        if (!machine->axes[i].velocity_mapped) {
+            continue;
+        }
         pdo_encode_velocity(machine->axes[i].node, offset[i].velocity_counts_s, &velocity);
         (void)send(tick, &velocity);
     }
@@ -84,9 +86,7 @@ static void send_process_data(struct tick *tick)
         return;
     }
     send_setpoints(tick, offset);
-    if ((machine->config.feedforward & CONFIG_VELOCITY_FEEDFORWARD) != 0u) {
-        send_velocities(tick, offset);
-    }
+    send_velocities(tick, offset);
 }
 
 /* At lock step nothing but this time keeps the next SYNC from coming at once. */

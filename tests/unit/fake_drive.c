@@ -39,6 +39,10 @@ static uint32_t write_hook(void *context, const struct od_entry *entry, const ui
     if (drive->fixed_mapping && entry->index >= 0x1400u && entry->index < 0x1C00u) {
         return SDO_ABORT_READ_ONLY;
     }
+    if (drive->unmappable != 0u && entry->index >= 0x1600u && entry->index < 0x1800u &&
+        cob_get(value, size) == drive->unmappable) {
+        return SDO_ABORT_NOT_MAPPABLE;
+    }
     if (object == drive->refuses) {
         return SDO_ABORT_VALUE;
     }

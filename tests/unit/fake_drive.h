@@ -47,13 +47,14 @@ struct fake_drive {
     uint32_t homing_syncs; /* how long it takes to find home: then its position is the offset */
     uint32_t homing_left;
     bool homing_fails;
-    bool homed;         /* once it has, it says so whenever it is enabled in homing mode */
-    uint32_t deaf;      /* so many of the next setpoint frames are lost */
-    bool fixed_mapping; /* PDO parameters are read-only */
-    uint16_t lacks[8];  /* objects that it has not */
-    uint32_t refuses;   /* object (index << 8 + sub) that takes no value */
-    int8_t mode_stuck;  /* mode that 0x6061 never leaves; 0: none */
-    uint32_t reads;     /* of objects, by SDO */
+    bool homed;          /* once it has, it says so whenever it is enabled in homing mode */
+    uint32_t deaf;       /* so many of the next setpoint frames are lost */
+    bool fixed_mapping;  /* PDO parameters are read-only */
+    uint16_t lacks[8];   /* objects that it has not */
+    uint32_t refuses;    /* object (index << 8 + sub) that takes no value */
+    uint32_t unmappable; /* mapping entry that no PDO takes */
+    int8_t mode_stuck;   /* mode that 0x6061 never leaves; 0: none */
+    uint32_t reads;      /* of objects, by SDO */
     uint32_t write_count;
     struct fake_write writes[FAKE_DRIVE_WRITES];
     bool late;                 /* answers each SYNC only when the next one has come */

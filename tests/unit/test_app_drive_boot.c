@@ -132,6 +132,23 @@ static void test_feedforward_changes_the_mapping(void)
     TEST_ASSERT_EQUAL_HEX32(0x80000302, drive(0)->values.rpdo2_communication_parameter.cob_id);
 }
 
+static void test_an_offset_that_cannot_be_mapped_is_left_out(void)
+{
+    drive(0)->unmappable = 0x60B20010;
+    drive(1)->lacks[0] = 0x1401;
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2004, 11, 3, 1));
+    boot();
+    TEST_ASSERT_EQUAL_UINT8(2, drive(0)->values.rpdo1_mapping_parameter.count);
+    TEST_ASSERT_EQUAL_HEX32(0x202, drive(0)->values.rpdo1_communication_parameter.cob_id);
+    TEST_ASSERT_EQUAL_HEX32(0x302, drive(0)->values.rpdo2_communication_parameter.cob_id);
+    TEST_ASSERT_EQUAL_UINT8(3, drive(1)->values.rpdo1_mapping_parameter.count);
+    app_bench_periods(&bench, 3);
+    TEST_ASSERT_EQUAL_UINT8(6, drive(0)->setpoint_size);
+    TEST_ASSERT_EQUAL_UINT8(8, drive(1)->setpoint_size);
+    TEST_ASSERT_NOT_EQUAL_UINT32(0, drive(0)->velocities);
+    TEST_ASSERT_EQUAL_UINT32(0, drive(1)->velocities);
+}
+
 static void test_a_fixed_mapping_passes_if_it_is_the_right_one(void)
 {
     drive(0)->fixed_mapping = true;
@@ -272,6 +289,7 @@ int main(void)
     RUN_TEST(test_times_heartbeats_and_reactions);
     RUN_TEST(test_settings_of_an_axis_reach_its_drive_only);
     RUN_TEST(test_feedforward_changes_the_mapping);
+    RUN_TEST(test_an_offset_that_cannot_be_mapped_is_left_out);
     RUN_TEST(test_a_fixed_mapping_passes_if_it_is_the_right_one);
     RUN_TEST(test_inputs_without_their_pdo);
     RUN_TEST(test_inputs_by_their_pdo);

@@ -74,7 +74,7 @@ static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value
 {
     boot->client.status = SDO_CLIENT_IDLE;
     boot->reading_back = false;
-    if (!drive_plan_refused(&boot->plan)) {
+    if (!drive_plan_refused(&boot->plan, abort_code)) {
         give_up(boot, abort_code, value);
     }
 }

@@ -13,10 +13,12 @@ enum drive_fact {
     DRIVE_PRODUCT,
     DRIVE_REVISION,
     DRIVE_SERIAL,
-    DRIVE_MODES,         /* 0x6502 */
-    DRIVE_INPUTS,        /* 0x60FD exists; its value then */
-    DRIVE_INPUTS_MAPPED, /* and TPDO3 tells its changes */
-    DRIVE_NO_FACT,       /* of a step that learns nothing */
+    DRIVE_MODES,           /* 0x6502 */
+    DRIVE_INPUTS,          /* 0x60FD exists; its value then */
+    DRIVE_INPUTS_MAPPED,   /* and TPDO3 tells its changes */
+    DRIVE_TORQUE_MAPPED,   /* RPDO1 takes 0x60B2 */
+    DRIVE_VELOCITY_MAPPED, /* RPDO2 takes 0x60B1 */
+    DRIVE_NO_FACT,         /* of a step that learns nothing */
 };
 
 #define DRIVE_FACTS ((unsigned)DRIVE_NO_FACT)

@@ -24,6 +24,7 @@ struct drive_pdo {
     uint8_t inhibit_ms;                  /* TPDO; 0: the drive's own */
     bool event_timer;                    /* RPDO: the drive watches for it (0x2004 sub 10) */
     uint32_t entries[DRIVE_PDO_ENTRIES]; /* index << 16 | sub << 8 | bits */
+    uint8_t fact; /* enum drive_fact: known of a drive that has taken all of it */
 };
 
 /* Kinds of operation on a drive's dictionary. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "app/drives/drive_rows.h"
+#include "canopen/sdo_abort.h"
 
 static uint8_t node_of(const struct drive_plan *plan)
 {
@@ -52,9 +53,9 @@ static bool concerns(const struct drive_plan *plan, enum drive_when when)
     case WHEN_NOT_MAPPED:
         return !plan->facts->known[DRIVE_INPUTS_MAPPED];
     case WHEN_NO_TORQUE:
-        return !configured(plan, WHEN_TORQUE);
+        return !plan->facts->known[DRIVE_TORQUE_MAPPED];
     case WHEN_NO_VELOCITY:
-        return !configured(plan, WHEN_VELOCITY);
+        return !plan->facts->known[DRIVE_VELOCITY_MAPPED];
     case WHEN_NO_WINDOW:
         return !configured(plan, WHEN_WINDOW);
     default:
@@ -131,7 +132,7 @@ static void plain_op(const struct drive_plan *plan, const struct drive_row *row,
 
 static bool is_pdo(const struct drive_row *row)
 {
-    return row->kind == ROW_PDO || row->kind == ROW_PDO_MAY;
+    return row->kind == ROW_PDO || row->kind == ROW_PDO_MAY || row->kind == ROW_PDO_OFFSET;
 }
 
 /* The row's present operation; false: it has no more. */
@@ -171,8 +172,8 @@ bool drive_plan_op(struct drive_plan *plan, struct drive_op *op)
         if (row_op(plan, row, op)) {
             return true;
         }
-        if (row->kind == ROW_PDO_MAY && concerns(plan, row->when)) {
-            drive_facts_learn(plan->facts, DRIVE_INPUTS_MAPPED, 1);
+        if (is_pdo(row) && concerns(plan, row->when)) {
+            drive_facts_learn(plan->facts, drive_pdos[row->argument].fact, 1);
         }
         next_row(plan);
     }
@@ -184,9 +185,16 @@ void drive_plan_advance(struct drive_plan *plan)
     plan->item++;
 }
 
-bool drive_plan_refused(struct drive_plan *plan)
+static bool can_do_without(enum drive_row_kind kind, uint32_t abort_code)
 {
-    if (drive_rows[plan->row].kind != ROW_PDO_MAY) {
+    return kind == ROW_PDO_MAY ||
+           (kind == ROW_PDO_OFFSET &&
+            (abort_code == SDO_ABORT_NO_OBJECT || abort_code == SDO_ABORT_NOT_MAPPABLE));
+}
+
+bool drive_plan_refused(struct drive_plan *plan, uint32_t abort_code)
+{
+    if (!can_do_without(drive_rows[plan->row].kind, abort_code)) {
         return false;
     }
     next_row(plan);

@@ -41,7 +41,7 @@ bool drive_plan_op(struct drive_plan *plan, struct drive_op *op);
 /* The present operation is done; a read has brought `value`. */
 void drive_plan_advance(struct drive_plan *plan);
 
-/* The drive refuses the present operation: true when the plan can do without it, and has gone on. */
-bool drive_plan_refused(struct drive_plan *plan);
+/* The drive refuses the present operation with the abort code: true when the plan can do without it, and has gone on. */
+bool drive_plan_refused(struct drive_plan *plan, uint32_t abort_code);
 
 #endif

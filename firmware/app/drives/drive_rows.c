@@ -35,21 +35,38 @@ enum pdo_number {
     TPDO4_OFF,
 };
 
-/* docs/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries */
+/* docs/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries, fact */
 const struct drive_pdo drive_pdos[] = {
-    [RPDO1] = {0x1400, COB_RPDO1, SYNCHRONOUS, 2, 0, true, {0x60400010, 0x607A0020, 0}},
-    [RPDO1_TORQUE] =
-        {0x1400, COB_RPDO1, SYNCHRONOUS, 3, 0, true, {0x60400010, 0x607A0020, 0x60B20010}},
-    [RPDO2_VELOCITY] = {0x1401, COB_RPDO2, SYNCHRONOUS, 1, 0, false, {0x60B10020, 0, 0}},
-    [RPDO2_OFF] = {0x1401, COB_RPDO2, 0, 0, 0, false, {0, 0, 0}},
-    [RPDO3_OFF] = {0x1402, COB_RPDO3, 0, 0, 0, false, {0, 0, 0}},
-    [RPDO4_OFF] = {0x1403, COB_RPDO4, 0, 0, 0, false, {0, 0, 0}},
-    [TPDO1] = {0x1800, COB_TPDO1, SYNCHRONOUS, 2, 0, false, {0x60410010, 0x60640020, 0}},
-    [TPDO2_VOLTS] = {0x1801, COB_TPDO2, SYNCHRONOUS, 1, 0, false, {0x21000010, 0, 0}},
-    [TPDO2_OFF] = {0x1801, COB_TPDO2, 0, 0, 0, false, {0, 0, 0}},
-    [TPDO3_OFF] = {0x1802, COB_TPDO3, 0, 0, 0, false, {0, 0, 0}},
-    [TPDO3_INPUTS] = {0x1802, COB_TPDO3, ON_CHANGE, 1, INHIBIT_MS, false, {0x60FD0020, 0, 0}},
-    [TPDO4_OFF] = {0x1803, COB_TPDO4, 0, 0, 0, false, {0, 0, 0}},
+    [RPDO1] =
+        {0x1400, COB_RPDO1, SYNCHRONOUS, 2, 0, true, {0x60400010, 0x607A0020, 0}, DRIVE_NO_FACT},
+    [RPDO1_TORQUE] = {0x1400,
+                      COB_RPDO1,
+                      SYNCHRONOUS,
+                      3,
+                      0,
+                      true,
+                      {0x60400010, 0x607A0020, 0x60B20010},
+                      DRIVE_TORQUE_MAPPED},
+    [RPDO2_VELOCITY] =
+        {0x1401, COB_RPDO2, SYNCHRONOUS, 1, 0, false, {0x60B10020, 0, 0}, DRIVE_VELOCITY_MAPPED},
+    [RPDO2_OFF] = {0x1401, COB_RPDO2, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
+    [RPDO3_OFF] = {0x1402, COB_RPDO3, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
+    [RPDO4_OFF] = {0x1403, COB_RPDO4, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO1] =
+        {0x1800, COB_TPDO1, SYNCHRONOUS, 2, 0, false, {0x60410010, 0x60640020, 0}, DRIVE_NO_FACT},
+    [TPDO2_VOLTS] =
+        {0x1801, COB_TPDO2, SYNCHRONOUS, 1, 0, false, {0x21000010, 0, 0}, DRIVE_NO_FACT},
+    [TPDO2_OFF] = {0x1801, COB_TPDO2, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO3_OFF] = {0x1802, COB_TPDO3, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO3_INPUTS] = {0x1802,
+                      COB_TPDO3,
+                      ON_CHANGE,
+                      1,
+                      INHIBIT_MS,
+                      false,
+                      {0x60FD0020, 0, 0},
+                      DRIVE_INPUTS_MAPPED},
+    [TPDO4_OFF] = {0x1803, COB_TPDO4, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
 };
 
 #define FIELD(name) offsetof(struct config_axis, name)
@@ -79,9 +96,9 @@ const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NO_CHANGE},
     {WHEN_ALWAYS, ROW_MAY, 0x6007, 0, 2, FROM_ROW, QUICK_STOP},
     /* process data */
+    {WHEN_TORQUE, ROW_PDO_OFFSET, 0, 0, 0, FROM_ROW, RPDO1_TORQUE},
     {WHEN_NO_TORQUE, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO1},
-    {WHEN_TORQUE, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO1_TORQUE},
-    {WHEN_VELOCITY, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO2_VELOCITY},
+    {WHEN_VELOCITY, ROW_PDO_OFFSET, 0, 0, 0, FROM_ROW, RPDO2_VELOCITY},
     {WHEN_NO_VELOCITY, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO2_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO3_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO4_OFF},

@@ -12,14 +12,14 @@ enum drive_when {
     WHEN_ALWAYS,
     WHEN_SIMULATED, /* the project's own drive */
     WHEN_REAL,
-    WHEN_INPUTS,     /* the drive has 0x60FD */
-    WHEN_NOT_MAPPED, /* and TPDO3 does not tell it */
-    WHEN_TORQUE,     /* torque feedforward is on */
-    WHEN_NO_TORQUE,
-    WHEN_VELOCITY, /* velocity feedforward is on */
-    WHEN_NO_VELOCITY,
-    WHEN_HOMING, /* homing is asked for, and the drive has the mode */
-    WHEN_WINDOW, /* a following error window is set */
+    WHEN_INPUTS,      /* the drive has 0x60FD */
+    WHEN_NOT_MAPPED,  /* and TPDO3 does not tell it */
+    WHEN_TORQUE,      /* torque feedforward is on */
+    WHEN_NO_TORQUE,   /* it is not, or the drive does not map it */
+    WHEN_VELOCITY,    /* velocity feedforward is on */
+    WHEN_NO_VELOCITY, /* as WHEN_NO_TORQUE */
+    WHEN_HOMING,      /* homing is asked for, and the drive has the mode */
+    WHEN_WINDOW,      /* a following error window is set */
     WHEN_NO_WINDOW,
     WHEN_ENCODER, /* the encoder's increments, gear, feed constant are set */
     WHEN_GEAR,
@@ -35,7 +35,8 @@ enum drive_row_kind {
     ROW_MAY,             /* writes; a drive without the object is fine */
     ROW_TRY,             /* writes; a refusal is fine */
     ROW_PDO,             /* drive_pdos[argument] */
-    ROW_PDO_MAY,         /* the same; left off (and not DRIVE_INPUTS_MAPPED) when refused */
+    ROW_PDO_MAY,         /* the same; left off (and its fact unknown) when refused */
+    ROW_PDO_OFFSET,      /* the same; only when an object is missing or cannot be mapped */
 };
 
 enum drive_source {

@@ -37,7 +37,9 @@ struct axis {
     enum cia402_goal goal;
     bool
         engaged; /* seen in Operation enabled since it was told to go there: its target is its own */
-    bool by_itself; /* it homes: moves by its own motion, its target follows its position */
+    bool by_itself;       /* it homes: moves by its own motion, its target follows its position */
+    bool torque_mapped;   /* its RPDO1 takes a torque offset */
+    bool velocity_mapped; /* its RPDO2 takes a velocity offset */
     uint32_t digital_inputs;        /* 0x60FD */
     int32_t following_error_counts; /* 0x60F4, looked at a few times a second */
     bool homed;                     /* since it was found */
