@@ -84,7 +84,8 @@ struct drive_node {
     bool supply_failed;
     bool silent;
     bool no_heartbeat;
-    uint8_t rpdo_count; /* PDOs in use: those above are off */
+    uint8_t rpdos_short; /* a bit for each RPDO whose last frame was too short */
+    uint8_t rpdo_count;  /* PDOs in use: those above are off */
     uint8_t tpdo_count;
     uint8_t id;
 };

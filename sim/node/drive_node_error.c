@@ -96,5 +96,6 @@ void drive_node_forgive(struct drive_node *node)
     node->values.error_code = EMCY_NO_ERROR;
     node->following_us = 0;
     node->limit_switch_hit = false;
+    node->rpdos_short = 0;
     emcy_producer_clear(&node->emcy, 0xFF);
 }

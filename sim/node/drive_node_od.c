@@ -50,6 +50,13 @@ void drive_node_od_refresh_cyclic(struct drive_node *node)
     v->motor_voltage = drive_volts_mv(&node->axis.drive);
 }
 
+static int16_t drive_node_permille(double ratio)
+{
+    const int32_t permille = encoder_to_i32(1000.0 * ratio);
+    const int32_t low = permille < INT16_MIN ? INT16_MIN : permille;
+    return (int16_t)(low > INT16_MAX ? INT16_MAX : low);
+}
+
 void drive_node_od_refresh(struct drive_node *node)
 {
     struct od_drive *v = &node->values;
@@ -62,7 +69,7 @@ void drive_node_od_refresh(struct drive_node *node)
     v->following_error_actual_value =
         encoder_to_i32((double)v->position_demand_value - (double)v->position_actual_value);
     v->velocity_actual_value = axis_motion_speed(&node->axis);
-    v->torque_actual_value = (int16_t)encoder_to_i32(1000.0 * load);
+    v->torque_actual_value = drive_node_permille(load);
     v->current_actual_value = v->torque_actual_value;
     v->simulation.parked = drive_parked(drive) ? 1 : 0;
     v->simulation.overload = overload_permille(&node->overload);

@@ -89,12 +89,28 @@ static void drive_node_pdo_applied(struct drive_node *node, const struct pdo_map
     }
 }
 
-static void drive_node_pdo_short(struct drive_node *node, const struct pdo_map *map,
-                                 const struct can_msg *in)
+/* Told once, not for every frame. */
+static void drive_node_pdo_short(struct drive_node *node, int i, const struct can_msg *in)
 {
+    const struct pdo_map *map = &node->rpdos[i];
+    const bool told = node->rpdos_short != 0u;
+    node->rpdos_short |= (uint8_t)(1u << i);
+    if (told) {
+        return;
+    }
     const uint8_t detail[EMCY_DETAIL_SIZE] = {(uint8_t)(map->index & 0xFFu),
                                               (uint8_t)(map->index >> 8), in->len, map->length, 0};
     emcy_producer_raise(&node->emcy, EMCY_PDO_LENGTH, EMCY_REGISTER_COMMUNICATION, detail);
+}
+
+/* The error is over with good frames, unless communication failed otherwise too. */
+static void drive_node_pdo_long_enough(struct drive_node *node, int i)
+{
+    const bool was_short = node->rpdos_short != 0u;
+    node->rpdos_short &= (uint8_t)~(1u << i);
+    if (was_short && node->rpdos_short == 0u && node->values.error_code == EMCY_NO_ERROR) {
+        emcy_producer_clear(&node->emcy, EMCY_REGISTER_COMMUNICATION);
+    }
 }
 
 bool drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in)
@@ -105,8 +121,13 @@ bool drive_node_pdo_receive(struct drive_node *node, const struct can_msg *in)
         const enum pdo_map_result result = pdo_map_receive(map, in);
         ours = ours || result != PDO_MAP_NOT;
         if (result == PDO_MAP_SHORT) {
-            drive_node_pdo_short(node, map, in);
-        } else if (result == PDO_MAP_TAKEN && !map->pending) {
+            drive_node_pdo_short(node, i, in);
+            continue;
+        }
+        if (result == PDO_MAP_TAKEN) {
+            drive_node_pdo_long_enough(node, i);
+        }
+        if (result == PDO_MAP_TAKEN && !map->pending) {
             drive_node_pdo_applied(node, map);
             drive_node_control(node, node->values.controlword);
         }

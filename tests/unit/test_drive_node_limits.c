@@ -217,6 +217,35 @@ static void test_a_short_frame_is_not_processed(void)
     TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
 }
 
+static void test_short_frames_are_told_once_until_a_good_one(void)
+{
+    struct can_msg frame;
+    drive_bench_enable();
+    cob_frame(&frame, COB_RPDO1 + DRIVE_BENCH_ID, 5);
+    drive_node_receive(&bench.node, &frame);
+    drive_bench_expect_emcy(EMCY_PDO_LENGTH, EMCY_REGISTER_COMMUNICATION | EMCY_REGISTER_GENERIC);
+    drive_bench_sync();
+    for (int i = 0; i < 5; i++) {
+        drive_node_receive(&bench.node, &frame);
+    }
+    drive_node_process(&bench.node, 0);
+    TEST_ASSERT_NULL(drive_bench_newest(COB_EMCY));
+    drive_bench_setpoint(bench.word, bench.target);
+    drive_bench_expect_emcy(EMCY_NO_ERROR, 0);
+    drive_node_receive(&bench.node, &frame);
+    drive_bench_expect_emcy(EMCY_PDO_LENGTH, EMCY_REGISTER_COMMUNICATION | EMCY_REGISTER_GENERIC);
+}
+
+static void test_torque_that_leaves_its_object(void)
+{
+    drive_bench_enable();
+    bench.node.load_per_volt = 1e9;
+    bench.node.axis.drive.state.volts = 1.0;
+    TEST_ASSERT_EQUAL_INT64(INT16_MAX, drive_bench_read(0x6077, 0));
+    bench.node.axis.drive.state.volts = -1.0;
+    TEST_ASSERT_EQUAL_INT64(INT16_MIN, drive_bench_read(0x6077, 0));
+}
+
 /* SYNC goes on, setpoints do not: 0x1400 sub 5. */
 static void test_setpoints_that_stay_away(void)
 {
@@ -344,6 +373,8 @@ int main(void)
     RUN_TEST(test_a_switch_that_is_forced);
     RUN_TEST(test_software_limits);
     RUN_TEST(test_a_short_frame_is_not_processed);
+    RUN_TEST(test_short_frames_are_told_once_until_a_good_one);
+    RUN_TEST(test_torque_that_leaves_its_object);
     RUN_TEST(test_setpoints_that_stay_away);
     RUN_TEST(test_scaling);
     RUN_TEST(test_a_scaled_axis_moves);
