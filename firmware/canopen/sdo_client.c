@@ -47,6 +47,7 @@ static int begin(struct sdo_client *client, uint8_t node, uint16_t index, uint8_
     client->silence_us = 0;
     client->moved = 0;
     client->toggle = 0;
+    client->empty_segments = 0;
     return 1;
 }
 

@@ -51,7 +51,8 @@ struct sdo_client {
     uint8_t sub;
     uint8_t node;
     uint8_t toggle;
-    uint8_t number[8]; /* of the _number calls */
+    uint8_t empty_segments; /* read: in a row; a server that goes on so is given up */
+    uint8_t number[8];      /* of the _number calls */
 };
 
 void sdo_client_init(struct sdo_client *client, uint32_t timeout_us);

@@ -8,6 +8,8 @@
 #define ASK_DOWNLOAD_SEGMENT 0x00u
 #define ASK_UPLOAD_SEGMENT   0x60u
 
+#define EMPTY_SEGMENTS_MAX 8u
+
 /* Command specifiers of answers, bits 5 ... 7. */
 #define SPECIFIER               0xE0u
 #define ANSWER_DOWNLOAD         0x60u
@@ -71,13 +73,18 @@ static int answer_upload(struct sdo_client *client, const uint8_t *data, struct 
 static int answer_upload_segment(struct sdo_client *client, const uint8_t *data,
                                  struct can_msg *out)
 {
-    int aborted = take(client, data + 1, SEGMENT_BYTES - ((data[0] >> 1) & 7u), out);
+    const uint32_t size = SEGMENT_BYTES - ((data[0] >> 1) & 7u);
+    int aborted = take(client, data + 1, size, out);
 
     if (aborted != 0) {
         return aborted;
     }
     if ((data[0] & LAST_SEGMENT) != 0) {
         return client->size == 0 ? sdo_client_cancel(client, SDO_ABORT_NO_DATA, out) : done(client);
+    }
+    client->empty_segments = size == 0u ? (uint8_t)(client->empty_segments + 1u) : 0u;
+    if (client->empty_segments > EMPTY_SEGMENTS_MAX) {
+        return sdo_client_cancel(client, SDO_ABORT_NO_DATA, out);
     }
     client->toggle ^= TOGGLE;
     return ask_segment(client, out);

@@ -176,6 +176,25 @@ static void test_wrong_answers_end_the_transfer(void)
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
 }
 
+static void test_a_server_that_sends_nothing_for_ever_is_given_up(void)
+{
+    const uint8_t upload_answer[8] = {0x41, 0x06, 0x20, 0x00, 12};
+    uint8_t empty_segment[8] = {0x0E};
+    uint8_t buffer[20];
+
+    sdo_client_read(&client, TALK_NODE, 0x2006, 0, buffer, sizeof buffer, &frame);
+    TEST_ASSERT_EQUAL_INT(1, hear(upload_answer));
+    for (int i = 0; i < 8; i++) {
+        TEST_ASSERT_EQUAL_INT(1, hear(empty_segment));
+        TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
+        empty_segment[0] ^= 0x10;
+    }
+    TEST_ASSERT_EQUAL_INT(1, hear(empty_segment));
+    TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_NO_DATA, client.abort_code);
+    TEST_ASSERT_EQUAL_HEX8(0x80, frame.data[0]);
+}
+
 static void test_cancel(void)
 {
     TEST_ASSERT_EQUAL_INT(0, sdo_client_cancel(&client, SDO_ABORT_GENERAL, &frame));
@@ -196,6 +215,7 @@ int main(void)
     RUN_TEST(test_arguments);
     RUN_TEST(test_ignores_late_and_foreign_frames);
     RUN_TEST(test_wrong_answers_end_the_transfer);
+    RUN_TEST(test_a_server_that_sends_nothing_for_ever_is_given_up);
     RUN_TEST(test_cancel);
     return UNITY_END();
 }
