@@ -98,6 +98,20 @@ static void test_a_quick_stop_leaves_the_target_until_the_drive_is_off(void)
     TEST_ASSERT_EQUAL_INT32(80, sent().target_counts);
 }
 
+static void test_a_garbled_statusword_has_to_come_twice_to_mean_stopped(void)
+{
+    const struct pdo_actual garbled = {.statusword = 0x0002, .position_counts = 70};
+    answer(CIA402_QUICK_STOP_ACTIVE, 70, 0);
+    axis_receive(&axis, &garbled, 0);
+    TEST_ASSERT_FALSE(axis_left(&axis));
+    axis_receive(&axis, &garbled, 0);
+    TEST_ASSERT_TRUE(axis_left(&axis));
+    answer(CIA402_QUICK_STOP_ACTIVE, 70, 0);
+    TEST_ASSERT_FALSE(axis_left(&axis));
+    answer(CIA402_FAULT, 70, 0);
+    TEST_ASSERT_TRUE(axis_left(&axis));
+}
+
 static void test_homing_adds_its_bits_and_follows_the_position(void)
 {
     axis.by_itself = true;
@@ -203,6 +217,7 @@ int main(void)
     RUN_TEST(test_a_quick_stop_takes_the_target_that_was_sent);
     RUN_TEST(test_a_statusword_that_lies_once_does_not_move_the_target);
     RUN_TEST(test_a_quick_stop_leaves_the_target_until_the_drive_is_off);
+    RUN_TEST(test_a_garbled_statusword_has_to_come_twice_to_mean_stopped);
     RUN_TEST(test_homing_adds_its_bits_and_follows_the_position);
     RUN_TEST(test_enabled_means_that_the_target_is_followed);
     RUN_TEST(test_switching_off_lets_the_target_follow_again);

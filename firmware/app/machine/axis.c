@@ -24,6 +24,7 @@ void axis_command(struct axis *axis, enum cia402_goal goal)
 
 void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us)
 {
+    axis->statusword_before = axis->statusword;
     axis->statusword = actual->statusword;
     axis->position_counts = actual->position_counts;
     answers_take(&axis->answers, now_us);
@@ -113,12 +114,20 @@ bool axis_obeys(const struct axis *axis)
     return axis_enabled(axis) && !axis->answers.lost && status_watch_obeys(&axis->watch);
 }
 
+static bool moves_in(enum cia402_state state)
+{
+    return state == CIA402_OPERATION_ENABLED || state == CIA402_QUICK_STOP_ACTIVE ||
+           state == CIA402_FAULT_REACTION_ACTIVE;
+}
+
+/* A statusword that means nothing, once, does not make a moving drive a stopped one. */
 bool axis_left(const struct axis *axis)
 {
     const enum cia402_state state = cia402_decode(axis->statusword);
-    return axis->answers.lost ||
-           (state != CIA402_OPERATION_ENABLED && state != CIA402_QUICK_STOP_ACTIVE &&
-            state != CIA402_FAULT_REACTION_ACTIVE);
+    if (state == CIA402_NOT_READY && moves_in(cia402_decode(axis->statusword_before))) {
+        return axis->answers.lost;
+    }
+    return axis->answers.lost || !moves_in(state);
 }
 
 bool axis_reached(const struct axis *axis)

@@ -27,7 +27,8 @@ struct axis {
     struct answers answers;
     struct status_watch watch;
     uint16_t statusword;
-    uint16_t controlword; /* sent last */
+    uint16_t statusword_before; /* the one before it */
+    uint16_t controlword;       /* sent last */
     uint16_t
         control_extra;   /* more controlword bits while the drive is told to be enabled: homing */
     uint16_t error_code; /* of the drive's last EMCY; 0: none */
