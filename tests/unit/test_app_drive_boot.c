@@ -266,6 +266,29 @@ static void test_a_value_that_is_refused_is_told(void)
     boot();
 }
 
+static void test_a_node_that_is_given_twice_is_told(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2005, 2, 2, 1));
+    expect_trouble(2, 0x200502, SDO_ABORT_INCOMPATIBLE);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2005, 2, 3, 1));
+    boot();
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
+}
+
+static void test_an_axis_at_the_controllers_own_node_is_told(void)
+{
+    struct drive_boot attempt;
+    struct config config = bench.controller.config;
+    struct can_msg out;
+    config.own_node = config.node[1];
+    drive_boot_init(&attempt);
+    drive_boot_begin(&attempt, &config);
+    TEST_ASSERT_EQUAL_INT(0, drive_boot_process(&attempt, DRIVE_BOOT_PAUSE_US, &out));
+    TEST_ASSERT_EQUAL_UINT8(config.own_node, attempt.trouble.node);
+    TEST_ASSERT_EQUAL_HEX32(0x200502, attempt.trouble.object);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_INCOMPATIBLE, attempt.trouble.abort_code);
+}
+
 static void test_what_a_drive_says_of_itself_is_kept(void)
 {
     drive(1)->values.identity_object.vendor_id = 0x123;
@@ -300,6 +323,8 @@ int main(void)
     RUN_TEST(test_a_drive_without_the_mode);
     RUN_TEST(test_a_mode_that_is_not_taken);
     RUN_TEST(test_a_value_that_is_refused_is_told);
+    RUN_TEST(test_a_node_that_is_given_twice_is_told);
+    RUN_TEST(test_an_axis_at_the_controllers_own_node_is_told);
     RUN_TEST(test_what_a_drive_says_of_itself_is_kept);
     return UNITY_END();
 }

@@ -6,6 +6,8 @@
 #include "canopen/nmt.h"
 #include "canopen/sdo_abort.h"
 
+#define AXIS_NODE 0x2005u
+
 static void pause(struct drive_boot *boot, uint32_t pause_us)
 {
     boot->phase = DRIVE_BOOT_PAUSE;
@@ -181,8 +183,35 @@ static int start_next(struct drive_boot *boot, struct can_msg *out)
     return 1;
 }
 
+/* Two axes at one node, or one at the controller's own: nothing may be sent there. */
+static bool node_is_taken(const struct config *config, uint8_t axis)
+{
+    bool taken = config->node[axis] == config->own_node;
+    for (uint8_t i = 0; i < axis; ++i) {
+        taken = taken || config->node[i] == config->node[axis];
+    }
+    return taken;
+}
+
+static bool nodes_clash(struct drive_boot *boot)
+{
+    for (uint8_t i = 0; i < boot->config.axis_count; ++i) {
+        if (node_is_taken(&boot->config, i)) {
+            boot->axis = i;
+            boot->op.index = AXIS_NODE;
+            boot->op.sub = (uint8_t)(i + 1u);
+            give_up(boot, SDO_ABORT_INCOMPATIBLE, node_of(boot));
+            return true;
+        }
+    }
+    return false;
+}
+
 static void begin_attempt(struct drive_boot *boot)
 {
+    if (nodes_clash(boot)) {
+        return;
+    }
     boot->axis = 0;
     boot->simulated = true;
     boot->phase = DRIVE_BOOT_CONFIGURE;

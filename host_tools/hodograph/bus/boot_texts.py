@@ -35,6 +35,7 @@ _OBJECTS = {
     0x1018: ("identity", "this is another device than before: correct the node numbers"),
     0x1019: ("SYNC counter", "the drive must accept a SYNC with counter"),
     0x1029: ("error behaviour", "see the drive's manual"),
+    0x2005: ("axis node", "correct the node numbers in the machine file"),
     0x6007: ("reaction to lost communication", "see the drive's manual"),
     0x605A: ("quick stop reaction", "see the drive's manual"),
     0x605E: ("fault reaction", "see the drive's manual"),
@@ -100,6 +101,8 @@ def boot_trouble(node: int, place: int, abort_code: int, value: int) -> BootTrou
         at = f" (asked for {where})" if index else ""
         text = f"the drive at node {node} does not answer{at}"
         remedy = f"is it powered and connected, is its node number {node}, is its bit rate that of the bus? {_RETRY}"
+    elif index == 0x2005:
+        text = f"axis {sub} has node {node}, which another axis or the controller has too"
     elif abort_code == 0:
         text = f"the drive at node {node} has 0x{value:X} in {where}, which was not expected"
     else:
