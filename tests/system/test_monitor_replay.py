@@ -87,8 +87,11 @@ def test_a_recording_shows_the_run(browser: Browser, files: Path, ending: str) -
         assert page.js("document.querySelector('#controls').hidden")
         assert page.text("#drive-rows").count("operation enabled") == 2
         _the_path_is_drawn(page)
+        assert "from the beginning" not in page.text("#event-rows")
         page.click("#again")
-        page.wait("document.querySelector('#replay-state').textContent === ''")
+        page.wait(
+            "document.querySelector('#event-rows').textContent.includes('from the beginning')"
+        )
         replayed(page)
         assert page.complaints == []
 
