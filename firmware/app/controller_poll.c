@@ -117,6 +117,14 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
     port_unlock();
 }
 
+static void note_silence(struct controller *controller)
+{
+    port_lock();
+    const uint8_t node = controller->machine.silent_node;
+    port_unlock();
+    drive_boot_silent(&controller->boot, node);
+}
+
 static void poll_boot(struct controller *controller, uint32_t elapsed_us)
 {
     if (boot_requested(&controller->machine)) {
@@ -138,6 +146,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
         }
         port_unlock();
     }
+    note_silence(controller);
 }
 
 static void poll_homing(struct controller *controller, uint32_t elapsed_us)

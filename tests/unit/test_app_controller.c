@@ -92,6 +92,13 @@ static void test_drives_that_do_not_answer_are_started_again(void)
     TEST_ASSERT_EQUAL_UINT32(2, bench.starts);
     app_bench_periods(&bench, 1000);
     TEST_ASSERT_EQUAL_UINT32(4, bench.starts);
+    TEST_ASSERT_EQUAL_INT64(bench.drives[1].node, app_bench_read(&bench, 0x2025, 1));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 2));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TIMEOUT, app_bench_read(&bench, 0x2025, 3));
+    bench.drives[1].mute = false;
+    app_bench_periods(&bench, 5);
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
 }
 
 /* The first drive restarts while the second one is being configured, and takes its time. */

@@ -237,6 +237,16 @@ int drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_
     return boot->phase == DRIVE_BOOT_START ? start_next(boot, out) : 0;
 }
 
+void drive_boot_silent(struct drive_boot *boot, uint8_t node)
+{
+    if (boot->phase == DRIVE_BOOT_IDLE) {
+        boot->trouble = (struct drive_trouble){
+            .node = node,
+            .abort_code = node != 0u ? SDO_ABORT_TIMEOUT : SDO_OK,
+        };
+    }
+}
+
 bool drive_boot_finished(struct drive_boot *boot)
 {
     if (boot->phase != DRIVE_BOOT_DONE) {

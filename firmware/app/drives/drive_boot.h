@@ -68,6 +68,10 @@ int drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct
 /* Lets time pass. Returns 1 when *out is to be sent: then call again with elapsed_us 0; else 0. */
 int drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out);
 
+/* Names a drive that was configured and started but gives no process data: trouble of object 0 until
+ * the next attempt begins; node 0: no trouble. Only between attempts; else nothing happens. */
+void drive_boot_silent(struct drive_boot *boot, uint8_t node);
+
 /* True once after an attempt that reached every drive. */
 bool drive_boot_finished(struct drive_boot *boot);
 

@@ -23,6 +23,7 @@ void machine_enter_boot(struct machine *machine)
     machine->state = MACHINE_BOOT;
     machine->configured = false;
     machine->mode_left = false;
+    machine->silent_node = 0;
     machine->boot_due = true;
 }
 

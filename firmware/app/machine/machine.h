@@ -87,9 +87,10 @@ struct machine {
     uint32_t sync_us;          /* time of the last SYNC */
     uint32_t unsent_ticks;     /* in a row with a frame that the port refused */
     bool sync_sent;            /* the last SYNC has left */
-    bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
-    bool configured; /* drives are configured; BOOT then waits for their first answers */
-    bool boot_due;   /* the mainline shall find and configure the drives (anew) */
+    bool simulated;      /* every drive is a simulated one: the port may let ticks wait for them */
+    bool configured;     /* drives are configured; BOOT then waits for their first answers */
+    uint8_t silent_node; /* BOOT again because this one was started and did not answer; 0: none */
+    bool boot_due;       /* the mainline shall find and configure the drives (anew) */
     bool
         mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
 };

@@ -23,6 +23,15 @@ bool machine_time_is_up(struct machine *machine)
     return machine->ticks_left == 0u;
 }
 
+static uint8_t silent_node(const struct machine *machine)
+{
+    uint8_t i = 0;
+    while (i + 1u < machine->config.axis_count && machine->axes[i].answers.present) {
+        ++i;
+    }
+    return machine->axes[i].node;
+}
+
 /* While they were being configured nobody waited for their answers. Where none comes the start may have been lost. */
 static void step_boot(struct machine *machine)
 {
@@ -31,13 +40,16 @@ static void step_boot(struct machine *machine)
     }
     if (!machine_drives_answer(machine)) {
         if (machine_time_is_up(machine)) {
+            const uint8_t silent = silent_node(machine);
             machine_enter_boot(machine);
+            machine->silent_node = silent;
         }
         return;
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         answers_restart(&machine->axes[i].answers);
     }
+    machine->silent_node = 0;
     machine->state = MACHINE_OFF;
 }
 
