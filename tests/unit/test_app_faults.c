@@ -374,6 +374,16 @@ static void emergency_of(uint8_t node, uint16_t code)
     app_bench_settle(&bench);
 }
 
+static void test_an_error_that_was_cleared_is_not_the_cause_of_a_later_fault(void)
+{
+    switch_on();
+    emergency_of(3, EMCY_PDO_LENGTH);
+    emergency_of(3, EMCY_NO_ERROR);
+    (void)cia402_device_fault(&drive(1)->state);
+    app_bench_periods(&bench, 2);
+    expect_fault(EMCY_GENERIC, 3);
+}
+
 static void test_the_drives_own_code_replaces_a_vague_one_only(void)
 {
     run_some(100);
@@ -730,5 +740,6 @@ int main(void)
     RUN_TEST(test_a_reset_with_one_more_axis_leads_to_boot);
     RUN_TEST(test_each_fault_is_told);
     RUN_TEST(test_heartbeat_time_is_object_1016);
+    RUN_TEST(test_an_error_that_was_cleared_is_not_the_cause_of_a_later_fault);
     return UNITY_END();
 }
