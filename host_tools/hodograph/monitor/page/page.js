@@ -136,7 +136,10 @@ const link = new Link({
   },
 });
 
+let overrideTimer = null;
+/** Gives a command after the override that waits, so that a program starts as slowly as the slider shows. */
 async function command(name, more) {
+  if (overrideTimer) giveOverride();
   const answer = await link.command(name, more);
   if (!answer.ok || name !== "override") panel.event(answer.text, !answer.ok);
 }
@@ -145,17 +148,18 @@ for (const button of document.querySelectorAll("[data-command]")) {
   button.addEventListener("click", () => command(button.dataset.command));
 }
 
-let overrideTimer = null;
 function slide(percent) {
   panel.sliding = true;
   $("override-value").textContent = `${percent} %`;
   clearTimeout(panel.slidingTimer);
   panel.slidingTimer = setTimeout(() => { panel.sliding = false; }, 1500);
   if (overrideTimer) return;
-  overrideTimer = setTimeout(() => {
-    overrideTimer = null;
-    command("override", { percent: Number($("override").value) });
-  }, OVERRIDE_MS);
+  overrideTimer = setTimeout(giveOverride, OVERRIDE_MS);
+}
+function giveOverride() {
+  clearTimeout(overrideTimer);
+  overrideTimer = null;
+  command("override", { percent: Number($("override").value) });
 }
 $("override").addEventListener("input", () => slide(Number($("override").value)));
 $("override-100").addEventListener("click", () => { $("override").value = "100"; slide(100); });
