@@ -151,6 +151,11 @@ $(STAMPS)/packages-test: tools/packages.py | $(STAMPS)/packages
 	@$(PYTHON) tools/packages.py test
 	@touch $@
 
+$(STAMPS)/packages-firmware: tools/packages.py | $(STAMPS)/packages
+	@mkdir -p $(@D)
+	@$(PYTHON) tools/packages.py firmware
+	@touch $@
+
 $(STAMPS)/packages-lint: tools/packages.py | $(STAMPS)/packages
 	@$(PYTHON) tools/packages.py lint
 	@touch $@
@@ -249,6 +254,8 @@ $(foreach b,$(BINS),$(eval $(call BIN_RULE,host,$(b),$(BUILD)/bin/hodograph-$(b)
 $(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph-$(b))))
 
 -include $(foreach v,$(VARIANTS),$(patsubst %.o,%.d,$(call object_of,$(v),$(OWN_C) $(OD_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))))
+
+include firmware/targets/targets.mk
 
 ## ---- lint ------------------------------------------------------------------------------------------
 

@@ -22,7 +22,14 @@ C_RULES: dict[str, set[str]] = {
     "firmware/core": set(),
     "firmware/canopen": {"firmware/can"},
     "firmware/port/port.h": {"firmware/can"},
-    "firmware/port/*": {"firmware/port/port.h", "firmware/can"},  # each board; not one another
+    "firmware/port/semihost": set(),
+    "firmware/port/cortex_m": set(),
+    "firmware/port/*": {  # each board; not one another
+        "firmware/can",
+        "firmware/port/port.h",
+        "firmware/port/cortex_m",
+        "firmware/port/semihost",
+    },
     "firmware/app/machine": {
         "firmware/can",
         "firmware/core",
@@ -197,7 +204,7 @@ def _c_allowed(path: str, layer: str, target: str) -> bool:
         return "generated" in C_RULES[layer]
     if layer == "firmware/port/*" and target.startswith("firmware/port/"):
         same_board = path.split("/")[2] == target.split("/")[2]
-        return same_board or target == "firmware/port/port.h"
+        return same_board or c_layer(target) in C_RULES[layer]
     other = c_layer(target)
     return other == layer or other in C_RULES[layer] or target in C_RULES[layer]
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus`, `test` or `lint`. Missing Debian packages are installed when this runs as
+A set is `build` (compile, .venv, bus), `bus`, `test`, `lint` or `firmware`. Missing Debian packages are installed when this runs as
 root or with passwordless sudo; otherwise the command to type is printed and the exit status is 1. Standard
 library only: it runs before anything is installed.
 """
@@ -58,6 +58,9 @@ _PACKAGE_OF = {
     "node": "nodejs",
     "candump": "can-utils",
     "cansend": "can-utils",
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi",
+    "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf",
+    "qemu-system-riscv32": "qemu-system-misc",
 }
 
 BUS = (
@@ -77,7 +80,15 @@ BUILD = (
 )
 TEST = (_program("chromium"), _program("candump"), _program("cansend"))
 LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"), _program("node"))
-SETS = {"build": BUILD, "bus": BUS, "test": TEST, "lint": LINT}
+FIRMWARE = (
+    _program("arm-none-eabi-gcc"),
+    _file("/usr/lib/picolibc/arm-none-eabi/picolibc.specs", "picolibc-arm-none-eabi"),
+    _program("riscv64-unknown-elf-gcc"),
+    _file("/usr/lib/picolibc/riscv64-unknown-elf/picolibc.specs", "picolibc-riscv64-unknown-elf"),
+    _program("qemu-system-arm"),
+    _program("qemu-system-riscv32"),
+)
+SETS = {"build": BUILD, "bus": BUS, "test": TEST, "lint": LINT, "firmware": FIRMWARE}
 
 
 def _missing(needs: Sequence[Need]) -> list[Need]:

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: MIT */
+#include "port/cortex_m/startup.h"
+
+#include <stdint.h>
+#include <string.h>
+
+/* From the linker script. */
+extern uint32_t startup_stack_top[];
+extern uint32_t startup_data_load[], startup_data_begin[], startup_data_end[];
+extern uint32_t startup_bss_begin[], startup_bss_end[];
+
+#define CPACR (*(volatile uint32_t *)0xE000ED88u)
+#define CPACR_FPU_FULL (0xFu << 20)
+
+int main(int argc, char **argv);
+
+static size_t bytes(const uint32_t *begin, const uint32_t *end)
+{
+    return (size_t)((uintptr_t)end - (uintptr_t)begin);
+}
+
+void startup_reset(void)
+{
+#if defined(__ARM_FP)
+    CPACR |= CPACR_FPU_FULL;
+    __asm__ volatile("dsb\nisb" ::: "memory");
+#endif
+    memcpy(startup_data_begin, startup_data_load, bytes(startup_data_begin, startup_data_end));
+    memset(startup_bss_begin, 0, bytes(startup_bss_begin, startup_bss_end));
+    startup_exit(main(0, NULL));
+    for (;;) {
+    }
+}
+
+void startup_halt(void)
+{
+    for (;;) {
+    }
+}
+
+__attribute__((section(".vectors"), used)) const startup_vector startup_vectors[16] = {
+    (startup_vector)(uintptr_t)startup_stack_top,
+    startup_reset,
+    startup_nmi,
+    startup_hard_fault,
+    startup_hard_fault, /* memory management */
+    startup_hard_fault, /* bus */
+    startup_hard_fault, /* usage */
+    NULL,
+    NULL,
+    NULL,
+    NULL,
+    startup_halt, /* SVCall */
+    startup_halt, /* debug monitor */
+    NULL,
+    startup_halt, /* PendSV */
+    startup_systick,
+};
+
+void startup_nmi(void) __attribute__((weak, alias("startup_halt")));
+void startup_hard_fault(void) __attribute__((weak, alias("startup_halt")));
+void startup_systick(void) __attribute__((weak, alias("startup_halt")));

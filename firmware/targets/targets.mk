@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+# The firmware for machines other than this one; included by the Makefile. A target is a core with its flags, a linker
+# script of its name beside this file, and the folders of firmware/port that it is made from.
+#
+#   build/firmware/TARGET/IMAGE.elf
+
+TARGETS := an385 an386 an500 an505 microbit rv32
+
+an385_CPU    := -mcpu=cortex-m3 -mthumb
+an386_CPU    := -mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard
+an500_CPU    := -mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
+an505_CPU    := -mcpu=cortex-m33 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
+microbit_CPU := -mcpu=cortex-m0 -mthumb
+rv32_CPU     := -march=rv32imc_zicsr -mabi=ilp32 -mno-relax -mcmodel=medany
+# Debian's libraries have no build for rv32imc: those for rv32im are linked.
+rv32_LINK    := -march=rv32im -mabi=ilp32
+
+$(foreach t,$(TARGETS),$(eval $(t)_CROSS := $(if $(filter rv32,$(t)),riscv64-unknown-elf-,arm-none-eabi-)))
+$(foreach t,$(TARGETS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_m)))
+
+# An image is a main with what it is linked from besides core, canopen, app and the dictionary.
+IMAGES := setpoints
+setpoints_MAIN := tests/target/setpoints.c
+setpoints_SRC  := $(wildcard tests/target/exit.c firmware/port/semihost/*.c)
+
+TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -DNDEBUG $(INCLUDES)
+TARGET_SRC    := $(core_SRC) $(canopen_SRC) $(app_SRC) $(OD_C)
+
+target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
+
+define TARGET_RULES # target
+$(call NOTE,$(BUILD)/firmware/$(1)/obj/flags,$($(1)_CROSS) $($(1)_CPU) $(TARGET_CFLAGS))
+$(BUILD)/firmware/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages-firmware
+	@mkdir -p $$(@D)
+	$$(call say,$(1),$$<)
+	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) -MMD -MP -c -o $$@ $$<
+$(BUILD)/firmware/$(1)/obj/%.o: %.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages-firmware
+	@mkdir -p $$(@D)
+	$$(call say,$(1),$$<)
+	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) -MMD -MP -c -o $$@ $$<
+$(BUILD)/firmware/$(1)/libhodograph.a: $(call target_object,$(1),$(TARGET_SRC)) $(BUILD)/firmware/$(1)/obj/list
+	@rm -f $$@
+	@$($(1)_CROSS)ar rcs $$@ $$(filter %.o,$$^)
+$(call NOTE,$(BUILD)/firmware/$(1)/obj/list,$(TARGET_SRC))
+-include $(patsubst %.o,%.d,$(call target_object,$(1),$(TARGET_SRC)))
+endef
+$(foreach t,$(TARGETS),$(eval $(call TARGET_RULES,$(t))))
+
+define IMAGE_RULE # target, image
+$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$($(2)_MAIN) $($(2)_SRC) $(wildcard firmware/port/$($(1)_CORE)/*.c)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld
+	$$(call say,link,$$@)
+	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $(or $($(1)_LINK),$($(1)_CPU)) -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,-Map,$$(@:.elf=.map) \
+	    -Lfirmware/port/$($(1)_CORE) -Tfirmware/targets/$(1).ld -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
+-include $(patsubst %.o,%.d,$(call target_object,$(1),$($(2)_MAIN) $($(2)_SRC) $(wildcard firmware/port/$($(1)_CORE)/*.c)))
+endef
+$(foreach t,$(TARGETS),$(foreach i,$(IMAGES),$(eval $(call IMAGE_RULE,$(t),$(i)))))
+
+.PHONY: firmware
+firmware: $(foreach t,$(TARGETS),$(IMAGES:%=$(BUILD)/firmware/$(t)/%.elf)) ## the images for all microcontroller targets
