@@ -15,8 +15,8 @@
 
 enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_MOTION = 6 };
 
-#define STORE_SIZE 0x20000u /* at least as much on every target */
-#define BATCH 64
+#define STORE_SIZE    0x20000u /* at least as much on every target */
+#define BATCH         64
 #define COUNTS_PER_MM 1000000u /* 1 nm, as on the bus by default */
 
 extern const uint8_t startup_store_base[];

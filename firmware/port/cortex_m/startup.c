@@ -9,7 +9,7 @@ extern uint32_t startup_stack_top[];
 extern uint32_t startup_data_load[], startup_data_begin[], startup_data_end[];
 extern uint32_t startup_bss_begin[], startup_bss_end[];
 
-#define CPACR (*(volatile uint32_t *)0xE000ED88u)
+#define CPACR          (*(volatile uint32_t *)0xE000ED88u)
 #define CPACR_FPU_FULL (0xFu << 20)
 
 int main(int argc, char **argv);

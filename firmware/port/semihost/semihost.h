@@ -12,8 +12,8 @@
 #include <stdint.h>
 
 enum semihost_mode { /* fopen's, always binary */
-    SEMIHOST_READ = 1,
-    SEMIHOST_WRITE = 5,
+                     SEMIHOST_READ = 1,
+                     SEMIHOST_WRITE = 5,
 };
 
 /* Returns a handle, or a negative number when the host cannot open it. */
