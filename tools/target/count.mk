@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: MIT
+# Instructions of the tick, counted in the emulator; included by the Makefile.
+
+COUNT_PLUGIN := $(BUILD)/target/count_plugin.so
+
+$(COUNT_PLUGIN): tools/target/count_plugin.c
+	@mkdir -p $(@D)
+	$(call say,plugin,$@)
+	$(Q)$(CC) -std=c99 $(WARN) -O2 -shared -fPIC -fvisibility=hidden -o $@ $<
+
+.PHONY: counter
+counter: firmware $(COUNT_PLUGIN) ## what tools/count_tick.py needs

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""Which instruction of an image belongs to which part of the tick: the map that count_plugin.c reads.
+
+The compiler merges functions, so an address is asked for the functions it was inlined from (DWARF, addr2line). The
+innermost of them that has a rule below gives the part. A function without a rule (helpers, the compiler's own library)
+counts for whatever part calls it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+# Numbers of the plugin are positions in this list.
+PARTS = ("rest", "rate", "feed", "search", "newton", "position", "frames", "supervision")
+
+# FILE:FUNCTION, the first that is found; those of one file from the most special to the most general.
+RULES = (
+    (r"core/(timebase|rate\w*)\.\w:", "rate"),
+    (r"core/feed_piece\.\w:feed_piece_at", "feed"),
+    (r"core/interp\.\w:evaluate_feed", "feed"),
+    (r"core/kernel_\w+\.\w:\w+_set$", "search"),
+    (r"core/feed_piece\.\w:\w+_set$", "search"),
+    (r"core/ph_segment\.\w:", "search"),
+    (r"core/interp\.\w:(find|load)_", "search"),
+    (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),
+    (r"core/kernel_\w+\.\w:\w+_at$", "position"),
+    (r"core/counts\.\w:", "position"),
+)
+_RULES = tuple((re.compile(pattern), PARTS.index(part)) for pattern, part in RULES)
+_LABEL = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
+_INSTRUCTION = re.compile(r"^ *([0-9a-f]+):\t[0-9a-f ]+\t(\S+)\s*(.*)$")
+_CALLS = ("bl", "blx", "jal", "jalr", "c.jal", "c.jalr")
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """A line of the disassembly."""
+
+    address: int
+    function: str
+    name: str
+    operands: str
+
+
+def disassemble(cross: str, image: Path) -> list[Instruction]:
+    """All instructions of an image."""
+    text = _tool(f"{cross}objdump", "-d", str(image))
+    found = []
+    function = ""
+    for line in text.splitlines():
+        label = _LABEL.match(line)
+        if label:
+            function = label[2]
+        instruction = _INSTRUCTION.match(line)
+        if instruction:
+            address, name, operands = instruction.groups()
+            found.append(Instruction(int(address, 16), function, name, operands))
+    return found
+
+
+def returns_to(code: list[Instruction], function: str) -> list[int]:
+    """Addresses behind the calls of a function."""
+    after = [
+        behind.address
+        for call, behind in itertools.pairwise(code)
+        if call.name in _CALLS and call.operands.endswith(f"<{function}>")
+    ]
+    if not after:
+        raise RuntimeError(f"{function} is called from nowhere: was it inlined?")
+    return after
+
+
+def frames(cross: str, image: Path, code: list[Instruction]) -> Iterator[list[str]]:
+    """For each instruction the functions it comes from, innermost first, as FILE:FUNCTION."""
+    asked = "".join(f"{i.address:x}\n" for i in code)
+    text = _tool(f"{cross}addr2line", "-a", "-f", "-i", "-e", str(image), given=asked)
+    chain: list[str] = []
+    lines = iter(text.splitlines())
+    next(lines)
+    for line in lines:
+        if line.startswith("0x"):
+            yield chain
+            chain = []
+        else:
+            chain.append(f"{next(lines).rsplit(':', 1)[0]}:{line}")
+    yield chain
+
+
+def part_of(chain: list[str]) -> int:
+    """The part of an instruction, 0 when no rule names it."""
+    for frame in chain:
+        for pattern, part in _RULES:
+            if pattern.search(frame):
+                return part
+    return 0
+
+
+def part_lines(cross: str, image: Path, code: list[Instruction]) -> Iterator[str]:
+    """`part LOW HIGH N` for each stretch of one part."""
+    low, high, part = 0, 0, 0
+    for instruction, chain in zip(code, frames(cross, image, code), strict=True):
+        new = part_of(chain)
+        if new != part:
+            if part:
+                yield f"part {low:x} {high:x} {part}"
+            low, part = instruction.address, new
+        high = instruction.address + 1
+    if part:
+        yield f"part {low:x} {high:x} {part}"
+
+
+def write_map(cross: str, image: Path, entry: str, target: Path) -> None:
+    """The map of an image whose counted call is the function `entry`."""
+    code = disassemble(cross, image)
+    begin = [i.address for i in code if i.function == entry][:1]
+    lines = [f"begin {a:x}" for a in begin]
+    lines += [f"end {a:x}" for a in returns_to(code, entry)]
+    lines += part_lines(cross, image, code)
+    target.write_text("".join(f"{line}\n" for line in lines))
+
+
+def _tool(*command: str, given: str | None = None) -> str:
+    return subprocess.run(command, input=given, capture_output=True, text=True, check=True).stdout
