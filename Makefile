@@ -257,6 +257,7 @@ $(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph
 
 include firmware/targets/targets.mk
 include tools/target/count.mk
+include tests/target/target.mk
 
 ## ---- lint ------------------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ $(foreach t,$(TARGETS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_
 # An image is a main with what it is linked from besides core, canopen, app and the dictionary.
 IMAGES := setpoints
 setpoints_MAIN := tests/target/setpoints.c
-setpoints_SRC  := $(wildcard tests/target/exit.c firmware/port/semihost/*.c)
+setpoints_SRC  := tests/target/commands.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
 
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -DNDEBUG $(INCLUDES)
 TARGET_SRC    := $(core_SRC) $(canopen_SRC) $(app_SRC) $(OD_C)
