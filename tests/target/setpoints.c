@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * An image that runs programs without a bus: KERNEL FILE [COMMANDS], KERNEL 0 fixed or 1 float. The store (which the
+ * An image that runs programs without a bus: KERNEL FILE [COMMANDS [TIMES]], KERNEL 0 fixed or 1 float. The store (which the
  * emulator fills) holds one program image, or several one behind the other; the setpoints of all ticks of all of them,
  * i32 x and y, go to FILE on the host. So every target can be asked for its bits, however little memory it has. What
  * is run is what the controller's tick runs.
  *
  * COMMANDS is a file (commands.h) that each of the programs is run with. A hold that nothing ends lasts until the last
- * command; then the run of that program is over.
+ * command; then the run of that program is over. COMMANDS is - for none. TIMES gets a u32 for each tick: what it took by
+ * the core's own clock (clock.h).
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -14,12 +15,13 @@
 
 #include "app/machine/config.h"
 #include "app/machine/motion.h"
+#include "clock.h"
 #include "commands.h"
 #include "core/program.h"
 #include "port/semihost/semihost.h"
 
 enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_MOTION = 6 };
-enum { WORD_KERNEL, WORD_FILE, WORD_COMMANDS, WORD_COUNT };
+enum { WORD_KERNEL, WORD_FILE, WORD_COMMANDS, WORD_TIMES, WORD_COUNT };
 
 #define STORE_SIZE    0x20000u /* at least as much on every target */
 #define BATCH         64
@@ -31,11 +33,30 @@ static struct motion motion;
 static struct program program;
 static struct commands commands;
 static int32_t counts[BATCH][PLANE_AXES];
+static uint32_t times[BATCH];
+static int times_file = -1;
 
 /* The counted part: time in, two setpoints out. */
 __attribute__((noinline)) static int tick(int32_t target_counts[PLANE_AXES])
 {
     return motion_step(&motion, target_counts);
+}
+
+/* A tick between two looks at the clock. */
+static int timed_tick(size_t slot)
+{
+    const uint32_t before = clock_now();
+    const int result = tick(counts[slot]);
+    times[slot] = (clock_now() - before) & CLOCK_MASK;
+    return result;
+}
+
+static int write_batch(int file, size_t filled)
+{
+    if (times_file >= 0 && semihost_write(times_file, times, filled * sizeof times[0]) != 0) {
+        return -1;
+    }
+    return semihost_write(file, counts, filled * sizeof counts[0]);
 }
 
 static int run(int file)
@@ -44,13 +65,13 @@ static int run(int file)
     bool over = false;
     for (uint32_t k = 0; !over; k++) {
         commands_give(&commands, k, &motion);
-        if (tick(counts[filled]) < 0) {
+        if (timed_tick(filled) < 0) {
             return STATUS_MOTION;
         }
         filled++;
         over = motion_over(&motion) || (motion_held(&motion) && !commands.more);
         if (filled == BATCH || over) {
-            if (semihost_write(file, counts, filled * sizeof counts[0]) != 0) {
+            if (write_batch(file, filled) != 0) {
                 return STATUS_FILE;
             }
             filled = 0;
@@ -81,7 +102,8 @@ static int run_all(char *words[WORD_COUNT], int file)
     uint32_t done = 0;
     int status = 0;
     do {
-        if (words[WORD_COMMANDS] != NULL && commands_open(&commands, words[WORD_COMMANDS]) != 0) {
+        if (words[WORD_COMMANDS] != NULL && words[WORD_COMMANDS][0] != '-' &&
+            commands_open(&commands, words[WORD_COMMANDS]) != 0) {
             return STATUS_FILE;
         }
         status = run_image(startup_store_base + done, STORE_SIZE - done,
@@ -112,13 +134,23 @@ int main(void)
     char *words[WORD_COUNT];
     split_line(words);
     if (words[WORD_FILE] == NULL || words[WORD_KERNEL][0] < '0' || words[WORD_KERNEL][0] > '2') {
-        semihost_print("usage: KERNEL FILE [COMMANDS]\n");
+        semihost_print("usage: KERNEL FILE [COMMANDS [TIMES]]\n");
         return STATUS_USAGE;
     }
     const int file = semihost_open(words[WORD_FILE], SEMIHOST_WRITE);
     if (file < 0) {
         return STATUS_FILE;
     }
+    if (words[WORD_TIMES] != NULL) {
+        times_file = semihost_open(words[WORD_TIMES], SEMIHOST_WRITE);
+        if (times_file < 0) {
+            return STATUS_FILE;
+        }
+    }
+    clock_begin();
     const int status = run_all(words, file);
+    if (times_file >= 0 && semihost_close(times_file) != 0) {
+        return STATUS_FILE;
+    }
     return semihost_close(file) == 0 ? status : STATUS_FILE;
 }
