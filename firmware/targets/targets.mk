@@ -18,10 +18,15 @@ rv32_LINK    := -march=rv32im -mabi=ilp32
 $(foreach t,$(TARGETS),$(eval $(t)_CROSS := $(if $(filter rv32,$(t)),riscv64-unknown-elf-,arm-none-eabi-)))
 $(foreach t,$(TARGETS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_m)))
 
-# An image is a main with what it is linked from besides core, canopen, app and the dictionary.
-IMAGES := setpoints
+# An image is a main with what it is linked from besides core, canopen, app and the dictionary; and the targets that it is
+# for, where not all.
+IMAGES := setpoints controller
 setpoints_MAIN := tests/target/setpoints.c
 setpoints_SRC  := tests/target/commands.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+
+controller_MAIN    := firmware/app/main.c
+controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/can/*.c)
+controller_TARGETS := an385 an386 an500 an505
 
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -DNDEBUG $(INCLUDES)
 TARGET_SRC    := $(core_SRC) $(canopen_SRC) $(app_SRC) $(OD_C)
@@ -53,7 +58,7 @@ $(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$($(2)_MAIN) $($(2)_S
 	    -Lfirmware/port/$($(1)_CORE) -Tfirmware/targets/$(1).ld -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
 -include $(patsubst %.o,%.d,$(call target_object,$(1),$($(2)_MAIN) $($(2)_SRC) $(wildcard firmware/port/$($(1)_CORE)/*.c)))
 endef
-$(foreach t,$(TARGETS),$(foreach i,$(IMAGES),$(eval $(call IMAGE_RULE,$(t),$(i)))))
+$(foreach i,$(IMAGES),$(foreach t,$(or $($(i)_TARGETS),$(TARGETS)),$(eval $(call IMAGE_RULE,$(t),$(i)))))
 
 .PHONY: firmware
-firmware: $(foreach t,$(TARGETS),$(IMAGES:%=$(BUILD)/firmware/$(t)/%.elf)) ## the images for all microcontroller targets
+firmware: $(foreach i,$(IMAGES),$(foreach t,$(or $($(i)_TARGETS),$(TARGETS)),$(BUILD)/firmware/$(t)/$(i).elf)) ## the images for all microcontroller targets

@@ -61,6 +61,13 @@ int semihost_read(int handle, void *data, size_t size)
     return transfer(SYS_READ, handle, (uintptr_t)data, size);
 }
 
+int semihost_read_some(int handle, void *data, size_t size)
+{
+    const uintptr_t block[3] = {(uintptr_t)handle, (uintptr_t)data, size};
+    const intptr_t left = call(SYS_READ, block);
+    return left < 0 || (size_t)left >= size ? -1 : (int)(size - (size_t)left);
+}
+
 int semihost_write(int handle, const void *data, size_t size)
 {
     return transfer(SYS_WRITE, handle, (uintptr_t)data, size);

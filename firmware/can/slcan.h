@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * slcan: CAN frames as lines of text, as LAWICEL's adapters and their many descendants have them.
+ *
+ *   tiiildd...\r    a frame: identifier (three hex digits), length (one), data (two for each byte)
+ *   Sn\r O\r C\r    to an adapter: bit rate (8: 1 Mbit/s), open, close
+ *
+ * Other lines (extended and remote frames, answers of an adapter) are passed over. A time stamp (four hex digits behind
+ * the data) is allowed. Pure; the two directions are independent.
+ */
+#ifndef CAN_SLCAN_H
+#define CAN_SLCAN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+
+#define SLCAN_LINE_MAX 22u /* of a frame, with its end */
+
+/* Writes the line, without a 0 at the end. Returns its length. */
+uint32_t slcan_encode(const struct can_msg *message, char line[SLCAN_LINE_MAX]);
+
+/* Takes characters one by one. All zero is the beginning. */
+struct slcan_decoder {
+    char line[SLCAN_LINE_MAX + 4u];
+    uint32_t length;  /* so far; more than fits: the line is passed over */
+    uint32_t refused; /* lines that began like a frame and were none */
+};
+
+/* True when the character completed a frame: it is in *message. */
+bool slcan_decode(struct slcan_decoder *decoder, char character, struct can_msg *message);
+
+#endif

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: MIT */
+/* What every Cortex-M has at the same addresses: SysTick, interrupt controller, the mask of all interrupts. */
+#ifndef PORT_CORTEX_M_CORE_H
+#define PORT_CORTEX_M_CORE_H
+
+#include <stdint.h>
+
+#define CORE_SYST_CSR (*(volatile uint32_t *)0xE000E010u)
+#define CORE_SYST_RVR (*(volatile uint32_t *)0xE000E014u)
+#define CORE_SYST_CVR (*(volatile uint32_t *)0xE000E018u)
+#define CORE_ICSR     (*(volatile uint32_t *)0xE000ED04u)
+#define CORE_SHPR3    (*(volatile uint32_t *)0xE000ED20u)
+#define CORE_ISER     ((volatile uint32_t *)0xE000E100u)
+#define CORE_ISPR     ((volatile uint32_t *)0xE000E200u)
+#define CORE_IPR      ((volatile uint32_t *)0xE000E400u)
+
+#define CORE_SYST_CSR_RUN    7u         /* the core's clock, interrupt, enable */
+#define CORE_ICSR_PENDSTSET  (1u << 26) /* SysTick is pending */
+#define CORE_SHPR3_SYST(pri) ((pri) << 24)
+
+/* Holds off all interrupts. Returns what core_unmask() wants back; so these two nest. */
+static inline uint32_t core_mask(void)
+{
+    uint32_t before = 0;
+    __asm__ volatile("mrs %0, primask\n\tcpsid i" : "=r"(before)::"memory");
+    return before;
+}
+
+static inline void core_unmask(uint32_t before)
+{
+    __asm__ volatile("msr primask, %0\n\tisb" ::"r"(before) : "memory");
+}
+
+/* Sleeps until an interrupt is pending, masked or not. */
+static inline void core_sleep(void)
+{
+    __asm__ volatile("dsb\n\twfi" ::: "memory");
+}
+
+/* Enables a board's interrupt (0 ... 239) with a priority, 0 the highest; in the upper bits, as many as the core has. */
+static inline void core_enable(uint32_t number, uint8_t priority)
+{
+    const uint32_t shift = 8u * (number % 4u);
+    CORE_IPR[number / 4u] =
+        (CORE_IPR[number / 4u] & ~(0xFFu << shift)) | ((uint32_t)priority << shift);
+    CORE_ISER[number / 32u] = 1u << (number % 32u);
+}
+
+/* As if the board had asked for it. */
+static inline void core_pend(uint32_t number)
+{
+    CORE_ISPR[number / 32u] = 1u << (number % 32u);
+}
+
+#endif

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+/* What differs between the boards: each linker script of firmware/targets sets these as addresses of symbols. */
+#ifndef PORT_MPS2_BOARD_H
+#define PORT_MPS2_BOARD_H
+
+#include <stdint.h>
+
+extern const uint8_t mps2_clock_mhz[]; /* of the core, which drives SysTick */
+extern const uint8_t mps2_uart[];      /* registers of UART 0 */
+extern const uint8_t
+    mps2_uart_number[]; /* its receive interrupt; that of its transmitter is the next */
+
+#define BOARD_CLOCK_MHZ   ((uint32_t)(uintptr_t)mps2_clock_mhz)
+#define BOARD_UART        ((uint32_t)(uintptr_t)mps2_uart)
+#define BOARD_UART_NUMBER ((uint32_t)(uintptr_t)mps2_uart_number)
+
+#endif

@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: MIT */
+#include "port/mps2/interrupts.h"
+
+#include <string.h>
+
+#include "port/cortex_m/core.h"
+#include "port/cortex_m/startup.h"
+#include "port/mps2/clock.h"
+
+static struct {
+    const struct link *link;
+    struct port_handlers handlers;
+    struct link_wish wish;
+    uint32_t late_ns; /* of the next tick */
+    volatile bool woken;
+} self;
+
+void interrupts_begin(const struct link *link)
+{
+    memset(&self, 0, sizeof self);
+    self.link = link;
+}
+
+void interrupts_end(void)
+{
+    clock_end();
+}
+
+int port_start(const struct port_handlers *handlers, uint32_t period_us)
+{
+    const uint32_t before = core_mask();
+    self.handlers = *handlers;
+    CORE_SHPR3 &= ~CORE_SHPR3_SYST(0xFFu);
+    clock_begin(period_us);
+    core_unmask(before);
+    return 0;
+}
+
+void port_tick_period(uint32_t period_us)
+{
+    clock_period(period_us);
+}
+
+void port_tick_await(uint32_t guard_us, bool hurry)
+{
+    self.wish = (struct link_wish){.guard_us = guard_us, .awaiting = true, .hurry = hurry};
+}
+
+void port_tick_ready(void)
+{
+    self.wish.awaiting = false;
+}
+
+void interrupts_receive(const struct can_msg *message)
+{
+    const uint32_t before = core_mask();
+    if (self.handlers.receive != NULL) {
+        self.handlers.receive(self.handlers.self, message, clock_us());
+    }
+    core_unmask(before);
+}
+
+/* Apart from the link, so that its instructions can be counted by themselves. */
+__attribute__((noinline)) static void run_tick(void)
+{
+    self.handlers.tick(self.handlers.self, clock_us(), self.late_ns + clock_late_ns());
+}
+
+void startup_systick(void)
+{
+    clock_tick();
+    self.wish = (struct link_wish){.awaiting = false};
+    run_tick();
+    self.late_ns = self.link->after_tick(&self.wish);
+}
+
+/* The mask does not nest with itself here: port.h has it so. */
+void port_lock(void)
+{
+    __asm__ volatile("cpsid i" ::: "memory");
+}
+
+void port_unlock(void)
+{
+    __asm__ volatile("cpsie i\n\tisb" ::: "memory");
+}
+
+/* An interrupt that comes between the look and the sleep is pending then, and ends the sleep. */
+void port_wait(uint32_t timeout_us)
+{
+    const uint32_t began_us = clock_us();
+    while (clock_us() - began_us < timeout_us) {
+        const uint32_t before = core_mask();
+        const bool woken = self.woken || self.link->stop_requested();
+        if (!woken) {
+            core_sleep();
+        }
+        core_unmask(before);
+        if (woken) {
+            break;
+        }
+    }
+    self.woken = false;
+}
+
+void port_wake(void)
+{
+    self.woken = true;
+}

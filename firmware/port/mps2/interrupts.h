@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * interrupts: the tick, and what both links do with a frame that came.
+ *
+ * Priorities: SysTick 0, the UART below it. So a tick interrupts the taking of characters, never the receive handler, which runs with all
+ * interrupts masked. The FPU keeps its state lazily, as after reset: an interrupt reserves room on the stack, and the registers are saved only
+ * when it computes with floats while the mainline was doing so.
+ */
+#ifndef PORT_MPS2_INTERRUPTS_H
+#define PORT_MPS2_INTERRUPTS_H
+
+#include <stdint.h>
+
+#include "port/mps2/link.h"
+#include "port/port.h"
+
+#define INTERRUPTS_UART_PRIORITY 0x80u
+
+/* Which link there is; once, before the others. */
+void interrupts_begin(const struct link *link);
+
+void interrupts_end(void);
+
+/* A frame for the receive handler. Any interrupt; harmless before port_start(). */
+void interrupts_receive(const struct can_msg *message);
+
+#endif

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line (docs/target.md):
+ *
+ *   link_fifo   records on two FIFOs, exchanged in the tick's interrupt while the clock of the guest stands still
+ *   link_slcan  text on a UART, received by interrupt in real time
+ */
+#ifndef PORT_MPS2_LINK_H
+#define PORT_MPS2_LINK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "port/mps2/command_line.h"
+#include "port/port.h"
+
+/* What the tick wishes of the next one: port_tick_await(). */
+struct link_wish {
+    uint32_t guard_us;
+    bool awaiting; /* until port_tick_ready() */
+    bool hurry;
+};
+
+struct link {
+    /* Mainline, in this order. 0 or PORT_ERR_SYSTEM. */
+    int (*begin)(const struct command_line *line);
+    int (*accept)(const struct port_filter *filters, size_t count);
+
+    /* Any context. 0 or PORT_ERR_FULL. */
+    int (*send)(const struct can_msg *message);
+
+    /* In the tick's interrupt, after the tick. `wish` changes when a frame that was received ends the waiting. Returns how late the next tick
+     * will be, in ns. */
+    uint32_t (*after_tick)(const struct link_wish *wish);
+
+    /* What was sent last leaves. Mainline, with the tick ended. */
+    void (*end)(void);
+
+    bool (*stop_requested)(void);
+    bool (*failed)(void); /* the other end is gone */
+};
+
+extern const struct link link_fifo;
+extern const struct link link_slcan;
+
+#endif

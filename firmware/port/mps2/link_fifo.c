@@ -1,0 +1,145 @@
+/* SPDX-License-Identifier: MIT */
+/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right behind the tick. */
+#include "port/cortex_m/core.h"
+#include "port/mps2/clock.h"
+#include "port/mps2/exchange.h"
+#include "port/mps2/interrupts.h"
+#include "port/mps2/link.h"
+#include "port/semihost/semihost.h"
+
+static struct {
+    struct exchange_message out; /* gathers what is sent between two exchanges */
+    struct exchange_message in;
+    int out_handle;
+    int in_handle;
+    bool fast;
+    volatile bool stop;
+    volatile bool failed;
+} self;
+
+/* The bridge opens them in the same order; each waits for the other there. */
+static int begin(const struct command_line *line)
+{
+    self.fast = line->fast;
+    self.out_handle = semihost_open(line->out, SEMIHOST_WRITE);
+    self.in_handle = self.out_handle >= 0 ? semihost_open(line->in, SEMIHOST_READ) : -1;
+    return self.in_handle >= 0 ? 0 : PORT_ERR_SYSTEM;
+}
+
+/* A reply may come in several pieces. */
+static bool read_reply(void)
+{
+    size_t got = 0;
+    while (got < sizeof self.in.header || got < exchange_size(&self.in)) {
+        const int more =
+            semihost_read_some(self.in_handle, (uint8_t *)&self.in + got, sizeof self.in - got);
+        if (more <= 0) {
+            return false;
+        }
+        got += (size_t)more;
+        if (got >= sizeof self.in.header && self.in.header.count > EXCHANGE_FRAMES) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void receive_frames(void)
+{
+    for (uint32_t i = 0; i < self.in.header.count; ++i) {
+        struct can_msg message;
+        exchange_unpack(&message, &self.in.frames[i]);
+        interrupts_receive(&message);
+    }
+}
+
+/* One request and its reply, whose frames are received. With a bridge that is gone the board is alone for ever. */
+static void exchange(uint16_t flags, uint32_t guard_us)
+{
+    self.out.header.flags = flags;
+    self.out.header.period_us = clock_period_us();
+    self.out.header.guard_us = guard_us;
+    if (self.failed || semihost_write(self.out_handle, &self.out, exchange_size(&self.out)) != 0 ||
+        !read_reply()) {
+        self.failed = true;
+        self.in.header = (struct exchange_header){.flags = EXCHANGE_DUE | EXCHANGE_STOP};
+    }
+    self.out.header.count = 0;
+    if ((self.in.header.flags & EXCHANGE_STOP) != 0u) {
+        self.stop = true;
+    }
+    receive_frames();
+}
+
+static int accept(const struct port_filter *filters, size_t count)
+{
+    for (size_t i = 0; i < count && i < EXCHANGE_FRAMES; ++i) {
+        self.out.frames[i] = (struct exchange_frame){
+            .id = filters[i].id,
+            .data = {(uint8_t)(filters[i].mask & 0xFFu), (uint8_t)(filters[i].mask >> 8)}};
+    }
+    self.out.header.count = (uint16_t)count;
+    exchange(EXCHANGE_FILTER, 0);
+    return self.failed ? PORT_ERR_SYSTEM : 0;
+}
+
+static int send(const struct can_msg *message)
+{
+    int result = PORT_ERR_FULL;
+    const uint32_t before = core_mask();
+    if (self.out.header.count < EXCHANGE_FRAMES && !self.failed) {
+        exchange_pack(&self.out.frames[self.out.header.count++], message);
+        result = 0;
+    }
+    core_unmask(before);
+    return result;
+}
+
+static uint16_t tick_flags(const struct link_wish *wish)
+{
+    const unsigned await = wish->awaiting ? EXCHANGE_AWAIT : 0u;
+    const unsigned hurry = wish->awaiting && wish->hurry && self.fast ? EXCHANGE_HURRY : 0u;
+    return (uint16_t)(EXCHANGE_TICK | await | hurry);
+}
+
+/* Until the next tick is due; at lock step that is when all have answered, which need not be said. */
+static uint32_t after_tick(const struct link_wish *wish)
+{
+    const uint16_t flags = tick_flags(wish);
+    exchange(flags, wish->guard_us);
+    while ((self.in.header.flags & EXCHANGE_DUE) == 0u) {
+        if (wish->awaiting) {
+            exchange(EXCHANGE_AWAIT, 0);
+        } else if ((flags & EXCHANGE_HURRY) != 0u) {
+            return 0;
+        } else {
+            exchange(EXCHANGE_READY, 0);
+        }
+    }
+    return (flags & EXCHANGE_HURRY) != 0u ? 0u : self.in.header.late_ns;
+}
+
+static void end(void)
+{
+    exchange(EXCHANGE_END, 0);
+}
+
+static bool stop_requested(void)
+{
+    return self.stop;
+}
+
+static bool failed(void)
+{
+    return self.failed;
+}
+
+const struct link link_fifo = {
+    .begin = begin,
+    .accept = accept,
+    .send = send,
+    .after_tick = after_tick,
+    .end = end,
+    .stop_requested = stop_requested,
+    .failed = failed,
+};

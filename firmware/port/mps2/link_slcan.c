@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: MIT */
+/* link_slcan: SLCAN on the UART, in real time. The board behaves as a host does towards an adapter: it opens the bus. */
+#include "can/slcan.h"
+#include "port/cortex_m/core.h"
+#include "port/mps2/interrupts.h"
+#include "port/mps2/link.h"
+#include "port/mps2/uart.h"
+
+static struct {
+    struct slcan_decoder decoder;
+    struct port_filter filters[PORT_FILTERS];
+    size_t filter_count;
+} self;
+
+static bool passes(const struct can_msg *message)
+{
+    for (size_t i = 0; i < self.filter_count; ++i) {
+        if (((message->id ^ self.filters[i].id) & self.filters[i].mask) == 0u) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void take(char character)
+{
+    struct can_msg message;
+    if (slcan_decode(&self.decoder, character, &message) && passes(&message)) {
+        interrupts_receive(&message);
+    }
+}
+
+/* An adapter may have been left open. */
+static int begin(const struct command_line *line)
+{
+    static const char open[] = "C\rS8\rO\r";
+    (void)line;
+    uart_begin(take);
+    (void)uart_send(open, sizeof open - 1u);
+    return 0;
+}
+
+static int accept(const struct port_filter *filters, size_t count)
+{
+    const uint32_t before = core_mask();
+    for (size_t i = 0; i < count; ++i) {
+        self.filters[i] = filters[i];
+    }
+    self.filter_count = count;
+    core_unmask(before);
+    return 0;
+}
+
+static int send(const struct can_msg *message)
+{
+    char line[SLCAN_LINE_MAX];
+    return uart_send(line, slcan_encode(message, line)) ? 0 : PORT_ERR_FULL;
+}
+
+/* The clock alone says when the next tick is due. */
+static uint32_t after_tick(const struct link_wish *wish)
+{
+    (void)wish;
+    return 0;
+}
+
+static void end(void)
+{
+    static const char close[] = "C\r";
+    (void)uart_send(close, sizeof close - 1u);
+    while (!uart_idle()) {
+    }
+}
+
+static bool never(void)
+{
+    return false;
+}
+
+const struct link link_slcan = {
+    .begin = begin,
+    .accept = accept,
+    .send = send,
+    .after_tick = after_tick,
+    .end = end,
+    .stop_requested = never,
+    .failed = never,
+};

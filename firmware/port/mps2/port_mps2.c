@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: MIT */
+/* QEMU's mps2 boards: command line, console and end by semihosting. */
+#include "port/port.h"
+
+#include <string.h>
+
+#include "port/cortex_m/startup.h"
+#include "port/mps2/clock.h"
+#include "port/mps2/command_line.h"
+#include "port/mps2/interrupts.h"
+#include "port/mps2/link.h"
+#include "port/semihost/semihost.h"
+
+enum exit_status { EXIT_USAGE = 2, EXIT_BUS = 4 };
+
+#define LINE_SIZE   192u
+#define NUMBER_SIZE 12u
+
+static struct {
+    char text[LINE_SIZE];
+    struct command_line line;
+    const struct link *link;
+} self;
+
+static void say(const char *what, const char *more)
+{
+    semihost_print("hodograph-controller: ");
+    semihost_print(what);
+    semihost_print(" ");
+    semihost_print(more);
+    semihost_print("\n");
+}
+
+/* Without a command line all has its default. */
+static int read_line(void)
+{
+    const char *wrong = "";
+    if (semihost_command_line(self.text, sizeof self.text) != 0) {
+        self.text[0] = '\0';
+    }
+    if (!command_line_parse(&self.line, self.text, &wrong)) {
+        say("this is no argument of an emulated board:", wrong);
+        return EXIT_USAGE;
+    }
+    return 0;
+}
+
+int port_begin(int argc, char **argv)
+{
+    (void)argc;
+    (void)argv;
+    const int status = read_line();
+    if (status != 0) {
+        return status;
+    }
+    self.link = self.line.fifo ? &link_fifo : &link_slcan;
+    interrupts_begin(self.link);
+    if (self.link->begin(&self.line) != 0) {
+        say("cannot open the FIFOs", self.line.out);
+        return EXIT_BUS;
+    }
+    port_log(PORT_NOTE, "this board is node", self.line.node);
+    return 0;
+}
+
+int port_end(void)
+{
+    interrupts_end();
+    self.link->end();
+    if (!self.link->failed()) {
+        return 0;
+    }
+    say("the bridge is gone:", "no bus");
+    return EXIT_BUS;
+}
+
+bool port_stop_requested(void)
+{
+    return self.link->stop_requested() || self.link->failed();
+}
+
+uint8_t port_node_id(void)
+{
+    return self.line.node;
+}
+
+int port_can_accept(const struct port_filter *filters, size_t count)
+{
+    return count <= PORT_FILTERS ? self.link->accept(filters, count) : PORT_ERR_SYSTEM;
+}
+
+int port_can_send(const struct can_msg *message)
+{
+    return self.link->send(message);
+}
+
+uint32_t port_time_ns(void)
+{
+    return clock_ns();
+}
+
+uint32_t port_time_us(void)
+{
+    return clock_us();
+}
+
+static const char *number(int32_t value, char text[NUMBER_SIZE])
+{
+    uint32_t rest = value < 0 ? 0u - (uint32_t)value : (uint32_t)value;
+    char *at = text + NUMBER_SIZE - 1;
+    *at = '\0';
+    do {
+        *--at = (char)('0' + rest % 10u);
+        rest /= 10u;
+    } while (rest != 0u);
+    if (value < 0) {
+        *--at = '-';
+    }
+    return at;
+}
+
+void port_log(enum port_level level, const char *text, int32_t value)
+{
+    char digits[NUMBER_SIZE];
+    if (level == PORT_WARNING || self.line.verbose) {
+        say(text, number(value, digits));
+    }
+}
+
+void startup_exit(int status)
+{
+    semihost_exit(status);
+}
