@@ -2,31 +2,32 @@
 # SPDX-License-Identifier: MIT
 """count_tick.py: instructions of the tick of one program on one emulated core, whole and in parts.
 
-    .venv/bin/python tools/count_tick.py an386 float PROGRAM [--worst N]
+    .venv/bin/python tools/count_tick.py an386 float examples/alpha.toml
+    .venv/bin/python tools/count_tick.py microbit fixed ladder --commands restless --worst 5
 
-Needs `make build firmware counter`. PROGRAM is a path file (examples/alpha.toml) or an image (.hdgp).
+Needs `make counter`. The program is a path file, an image (.hdgp) or the name of one of the programs made to be dear
+(target/adversary.py), which also has the commands: overrides, holds and resumes.
 """
 
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from hodograph.cli.main import main as hodograph
-from target import counting, emulator
+from hodograph.chain import load_chain
+from target import adversary, counting, emulator
 from target.parts import PARTS
 
 
-def image_of(program: Path, folder: Path) -> Path:
-    """The program's image, compiled if it is a path file."""
-    if program.suffix != ".toml":
-        return program
-    image = folder / f"{program.stem}.hdgp"
-    hodograph(["compile", str(program), "-o", str(image)])
-    return image
+def image_of(program: str) -> bytes:
+    """The program's image, made if need be."""
+    for row in adversary.ADVERSARIES:
+        if row.name == program:
+            return adversary.image(row)
+    path = Path(program)
+    return load_chain(path).image if path.suffix == ".toml" else path.read_bytes()
 
 
 def show(counts: counting.Counts, worst: int) -> None:
@@ -46,14 +47,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("target", choices=emulator.TARGETS)
     parser.add_argument("kernel", choices=emulator.KERNELS)
-    parser.add_argument("program", type=Path)
+    parser.add_argument("program", help="path file, image, or a name of target/adversary.py")
+    parser.add_argument("--commands", choices=adversary.COMMANDS)
     parser.add_argument("--build", type=Path, default=Path("build"))
     parser.add_argument("--worst", type=int, default=3, help="show so many of the worst ticks")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        image = image_of(options.program, Path(name))
-        target = emulator.TARGETS[options.target]
-        show(counting.count(options.build, target, options.kernel, image), options.worst)
+    commands = adversary.COMMANDS[options.commands]() if options.commands else []
+    counter = counting.Counter(options.build, emulator.TARGETS[options.target])
+    show(counter.count(options.kernel, image_of(options.program), commands), options.worst)
 
 
 if __name__ == "__main__":

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import struct
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -13,24 +15,60 @@ import numpy.typing as npt
 from target import emulator, parts
 
 Counts = npt.NDArray[np.uint32]
+Command = tuple[
+    int, int
+]  # before this tick; per cent of override, or what tests/target/commands.h has
 _WORDS = 32  # of a record of the plugin
 
 
-def count(
-    build: Path,
-    target: emulator.Target,
-    kernel: str,
-    program: Path,
-    events: Sequence[str] = (),
-    options: Sequence[str] = (),
-) -> Counts:
-    """Instructions of each tick of a program, (ticks, len(PARTS)); `build` is the build folder."""
-    image = build / "firmware" / target.name / "setpoints.elf"
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        parts.write_map(target.cross, image, "tick", folder / "map")
-        plugin = f"{build / 'target/count_plugin.so'},map={folder / 'map'},out={folder / 'out'}"
-        words = [str(emulator.KERNELS[kernel]), str(folder / "setpoints"), *events]
-        emulator.run(target, image, words, program, ["-plugin", plugin, *options])
-        records = np.fromfile(folder / "out", "<u4").reshape(-1, _WORDS)
-    return records[:, : len(parts.PARTS)]
+def stored(commands: Iterable[Command]) -> bytes:
+    """Commands as setpoints.elf reads them."""
+    return b"".join(struct.pack("<II", *command) for command in commands)
+
+
+@dataclass
+class Counter:
+    """Counts on one target; a map of its image is made once."""
+
+    build: Path
+    target: emulator.Target
+    image: str = "setpoints"
+    entry: str = "tick"
+    _map: str | None = field(default=None, init=False)
+
+    @property
+    def elf(self) -> Path:
+        return self.build / "firmware" / self.target.name / f"{self.image}.elf"
+
+    def map_text(self) -> str:
+        """For count_plugin.c."""
+        if self._map is None:
+            self._map = parts.map_text(self.target.cross, self.elf, self.entry)
+        return self._map
+
+    def count(
+        self,
+        kernel: str,
+        programs: bytes,
+        commands: Sequence[Command] = (),
+        options: Sequence[str] = (),
+        times: Path | None = None,
+    ) -> Counts:
+        """Instructions of each tick of one or more images one behind the other, (ticks, len(PARTS)).
+
+        `times` gets what the image's own clock says.
+        """
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "map").write_text(self.map_text())
+            (folder / "store").write_bytes(programs)
+            (folder / "commands").write_bytes(stored(commands))
+            plugin = self.build / "target/count_plugin.so"
+            words = [str(emulator.KERNELS[kernel]), str(folder / "setpoints")]
+            words += [str(folder / "commands") if commands else "-"]
+            words += [str(times)] if times else []
+            count = f"{plugin},map={folder / 'map'},out={folder / 'out'}"
+            options = ["-plugin", count, *options]
+            emulator.run(self.target, self.elf, words, folder / "store", options)
+            records = np.fromfile(folder / "out", "<u4").reshape(-1, _WORDS)
+        return records[:, : len(parts.PARTS)]

@@ -114,14 +114,14 @@ def part_lines(cross: str, image: Path, code: list[Instruction]) -> Iterator[str
         yield f"part {low:x} {high:x} {part}"
 
 
-def write_map(cross: str, image: Path, entry: str, target: Path) -> None:
+def map_text(cross: str, image: Path, entry: str) -> str:
     """The map of an image whose counted call is the function `entry`."""
     code = disassemble(cross, image)
     begin = [i.address for i in code if i.function == entry][:1]
     lines = [f"begin {a:x}" for a in begin]
     lines += [f"end {a:x}" for a in returns_to(code, entry)]
     lines += part_lines(cross, image, code)
-    target.write_text("".join(f"{line}\n" for line in lines))
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _tool(*command: str, given: str | None = None) -> str:

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""Programs made to be as dear as the controller accepts them, and the commands to run them with.
+
+At 200 % a tick of these crosses two ends of segments and two of pieces again and again: neighbours are a very short and
+a long one, together just longer than docs/protocol.md 1.2 and 1.3 ask for. Segments have the greatest speed ratio. The
+override bounds of the pieces make the look-ahead of the rate as long as it can be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hodograph.feed.pieces import FeedPieces
+from hodograph.program import Program, check, encode
+
+Complex = NDArray[np.complex128]
+
+HOLD, RESUME = 1000, 1001  # tests/target/commands.h
+_FEED_MM_S = 100.0
+_PERIOD_S = 1e-3
+_RAMP_Q32 = 1 << 27  # 2^-5 s
+_PAIR_MM = 2 * _FEED_MM_S * _PERIOD_S * 1.002
+_PAIR_S = 2 * _PERIOD_S * 1.001
+_Q32, _Q40, _Q44 = 2.0**32, 2.0**40, 2.0**44
+_SEED = 4
+
+Bounds = tuple[float, float, float]  # factor, rate per s, second rate per s^2
+
+
+@dataclass(frozen=True)
+class Adversary:
+    """A program and what it is after."""
+
+    name: str
+    bounds: Callable[[np.random.Generator, int], Bounds]
+    pieces: int = 250
+    short_s: float = 2e-5
+    short_mm: float = 2e-3
+
+
+def _wide(_rng: np.random.Generator, _index: int) -> Bounds:
+    return 2.0, 200.0, 2e5
+
+
+def _scattered(rng: np.random.Generator, _index: int) -> Bounds:
+    factor = 1.0 + rng.random() * (rng.random() < 0.5)
+    return factor, 10 ** rng.uniform(0.7, 2.7), 10 ** rng.uniform(3, 6)
+
+
+def _ladder(_rng: np.random.Generator, index: int) -> Bounds:
+    """Sixteen pieces, each tighter than the one before: every look a little further finds less."""
+    step = index % 16
+    return 2.0 - step / 32, 150.0 * 0.8**step, 3e5 * 0.7**step
+
+
+def _narrow(rng: np.random.Generator, index: int) -> Bounds:
+    """One piece that allows little among many that allow all: an attempt above it, and back, again and again."""
+    return (1.0, 20.0, 2e4) if index % 60 == 0 else (2.0, 300.0 + rng.random(), 1e6)
+
+
+ADVERSARIES = (
+    Adversary("dense", _wide),
+    Adversary("scattered", _scattered),
+    Adversary("ladder", _ladder),
+    Adversary("narrow", _narrow),
+)
+
+
+def image(adversary: Adversary) -> bytes:
+    """The program's image; it is one that the controller accepts."""
+    rng = np.random.default_rng(_SEED)
+    pieces = _durations(adversary)
+    length_mm = _FEED_MM_S * (_RAMP_Q32 + sum(pieces)) / _Q32
+    path = _path(rng, adversary, length_mm)
+    program = _program(adversary, path, _feed(rng, adversary, pieces, path.end[2]), sum(pieces))
+    fault = check(program)
+    if fault is not None:
+        raise RuntimeError(f"{adversary.name}: {fault}")
+    return encode(program)
+
+
+def _durations(adversary: Adversary) -> list[int]:
+    """Of the pieces of constant feed, q32 s."""
+    return [
+        round((adversary.short_s if i % 2 == 0 else _PAIR_S - adversary.short_s) * _Q32)
+        for i in range(adversary.pieces)
+    ]
+
+
+class _Path:
+    """Segments that meet exactly, in image units."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[int, ...]] = []
+        self.end = (0, 0, 0)
+        self.direction: complex = 1.0
+
+    def add(self, w: Complex) -> None:
+        """A segment along `w` (mm^(1/2)), turned so that it goes on where the path ends."""
+        w = w * (self.direction / w[0]) * abs(w[0]) / abs(self.direction)
+        u = [round(c.real * _Q44) for c in w]
+        v = [round(c.imag * _Q44) for c in w]
+        self.rows.append((self.end[2], self.end[0], self.end[1], *u, *v))
+        total = [0, 0, 0]
+        for i, j, weight in ((0, 0, 3), (0, 1, 3), (0, 2, 1), (1, 1, 2), (1, 2, 3), (2, 2, 3)):
+            total[0] += weight * (u[i] * u[j] - v[i] * v[j])
+            total[1] += weight * (u[i] * v[j] + v[i] * u[j])
+            total[2] += weight * (u[i] * u[j] + v[i] * v[j])
+        half = 15 << 47
+        x, y, s = ((a + half) // (15 << 48) for a in total)
+        self.end = (self.end[0] + x, self.end[1] + y, self.end[2] + s)
+        self.direction = complex(u[2], v[2])
+
+
+def _path(rng: np.random.Generator, adversary: Adversary, length_mm: float) -> _Path:
+    """Short and long segments in turn until about this length."""
+    path = _Path()
+    long_mm = _PAIR_MM - adversary.short_mm
+    pairs = int(length_mm / _PAIR_MM)
+    for k in range(pairs):
+        path.add(_hard(rng, adversary.short_mm))
+        path.add(_hard(rng, long_mm if k + 1 < pairs else length_mm - pairs * _PAIR_MM + long_mm))
+    return path
+
+
+def _hard(rng: np.random.Generator, length_mm: float) -> Complex:
+    """w of a segment close to the greatest speed ratio."""
+    while True:
+        w = rng.normal(size=3) + 1j * rng.normal(size=3)
+        sigma = np.array(
+            [
+                abs(w[0]) ** 2,
+                (w[0] * w[1].conjugate()).real,
+                ((w[0] * w[2].conjugate()).real + 2 * abs(w[1]) ** 2) / 3,
+                (w[1] * w[2].conjugate()).real,
+                abs(w[2]) ** 2,
+            ]
+        )
+        if sigma.min() > 0 and 1.8 < sigma.max() / sigma.min() < 1.999:
+            scaled: Complex = w * np.sqrt(length_mm / sigma.mean())
+            return scaled
+
+
+@dataclass(frozen=True)
+class _Piece:
+    duration: int
+    start: int
+    c: tuple[int, ...]
+    bounds: Bounds
+
+
+def _feed(
+    rng: np.random.Generator, adversary: Adversary, durations: Iterable[int], length_q40: int
+) -> list[_Piece]:
+    """A ramp, the constant pieces and a ramp that ends at the path's end."""
+    way = _FEED_MM_S * _RAMP_Q32 / _Q32 * _Q40
+    up = (0, 0, 0, round(2.5 * way), round(-3 * way), round(way), 0)
+    ramp_bounds = (2.0, 300.0, 1e6)
+    pieces = [_Piece(_RAMP_Q32, 0, up, ramp_bounds)]
+    at = sum(up)
+    for index, duration in enumerate(durations):
+        exponent = (duration - 1).bit_length() - 32
+        slope = round(_FEED_MM_S * 2.0**exponent * _Q40)
+        pieces.append(_Piece(duration, at, (slope, *[0] * 6), adversary.bounds(rng, index)))
+        at += (slope * duration) >> (32 + exponent)
+    way = 2.0 * (length_q40 - at)
+    down = (round(way), 0, 0, round(-2.5 * way), round(3 * way), round(-way), 0)
+    return [*pieces, _Piece(_RAMP_Q32, at, down, ramp_bounds)]
+
+
+def _program(adversary: Adversary, path: _Path, pieces: list[_Piece], middle: int) -> Program:
+    rows = np.array(path.rows, dtype=np.int64)
+    bounds = np.array([p.bounds for p in pieces])
+    return Program(
+        name=adversary.name,
+        period_us=1000,
+        closed=False,
+        duration_q32_s=middle + 2 * _RAMP_Q32,
+        length_q40=path.end[2],
+        offset_x_q40=0,
+        offset_y_q40=0,
+        feed_limit_um_s=0,
+        acceleration_limit_um_s2=0,
+        jerk_limit_mm_s3=0,
+        start_q40=rows[:, 0],
+        x_q40=rows[:, 1],
+        y_q40=rows[:, 2],
+        u_q44=rows[:, 3:6],
+        v_q44=rows[:, 6:9],
+        pieces=FeedPieces(
+            np.array([p.duration for p in pieces]),
+            np.array([p.start for p in pieces]),
+            np.array([p.c for p in pieces]),
+            *((bounds * (2**24, 2**16, 2**8)).astype(np.uint32).T),
+        ),
+    )
+
+
+def steady() -> list[tuple[int, int]]:
+    """200 % from the start: two ends in every tick."""
+    return [(0, 200)]
+
+
+def restless(ticks: int = 3000) -> list[tuple[int, int]]:
+    """The rate is on its way nearly always, mostly high up; holds and resumes in between."""
+    rng = np.random.default_rng(_SEED)
+    commands: list[tuple[int, int]] = [(0, 200)]
+    tick = 30
+    while tick < ticks:
+        if rng.random() < 0.1:
+            commands += [(tick, HOLD), (tick + int(rng.integers(1, 30)), RESUME)]
+            tick += 30
+        else:
+            commands.append((tick, int(rng.choice((200, 198, 190, 150, 110, 60, 30)))))
+        tick += int(rng.choice((2, 3, 7, 20, 60)))
+    return [*commands, (ticks, RESUME), (ticks, 200)]
+
+
+def jitter(ticks: int = 3000) -> list[tuple[int, int]]:
+    """Near 200 %, another wish every second tick."""
+    return [(k, 200 - k % 4 * 2) for k in range(0, ticks, 2)]
+
+
+COMMANDS = {"steady": steady, "restless": restless, "jitter": jitter}
