@@ -43,6 +43,7 @@ void controller_init(struct controller *controller, uint8_t node)
     tick_init(&controller->tick, &controller->machine);
     frame_queue_init(&controller->queue);
     program_slot_init(&controller->slot);
+    program_slot_recover(&controller->slot);
     drive_boot_init(&controller->boot);
     drive_look_init(&controller->look);
     homing_init(&controller->homing);

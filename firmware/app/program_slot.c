@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "app/program_record.h"
 #include "core/counts.h"
 #include "core/interp.h"
 #include "port/port.h"
@@ -27,7 +28,7 @@ static unsigned spare_bank(const struct program_slot *slot)
 
 int program_slot_begin(struct program_slot *slot, uint32_t size)
 {
-    if (size > port_store_size() || port_store_erase(spare_bank(slot)) != 0) {
+    if (size > program_record_room() || port_store_erase(spare_bank(slot)) != 0) {
         return PORT_ERR_STORE;
     }
     slot->receiving = true;
@@ -72,6 +73,15 @@ static void find_ends(struct program_slot *slot, const struct config *config)
     point_at(slot, config, slot->program.header.duration_q32_s, slot->end_counts);
 }
 
+static void adopt(struct program_slot *slot, const struct program *program, unsigned bank,
+                  uint32_t sequence)
+{
+    slot->program = *program;
+    slot->bank = bank;
+    slot->sequence = sequence;
+    slot->present = true;
+}
+
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config)
 {
     const unsigned bank = spare_bank(slot);
@@ -84,17 +94,49 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
     if (slot->refused.code == 0) {
         (void)check(&candidate, config, &slot->refused);
     }
+    const struct program_record record = {.sequence = slot->sequence + 1u, .image_size = size};
+    if (slot->refused.code == 0 && program_record_write(bank, &record) != 0) {
+        slot->refused.code = PROGRAM_ERR_STORE;
+    }
     slot->receiving = false;
     if (slot->refused.code != 0) {
         return slot->refused.code;
     }
-    slot->program = candidate;
-    slot->bank = bank;
-    slot->present = true;
+    adopt(slot, &candidate, bank, record.sequence);
     slot->acceptable = true;
     slot->checked = true;
     find_ends(slot, config);
     return 0;
+}
+
+/* Limits are those of a configuration, and may change; these hold for every program. */
+static bool sound(const struct program *program)
+{
+    static const struct program_limits none = {.min_q40_mm = {INT64_MIN, INT64_MIN},
+                                               .max_q40_mm = {INT64_MAX, INT64_MAX}};
+    struct program_fault fault;
+    return program_check(program, &none, &fault) == 0;
+}
+
+static void recover_bank(struct program_slot *slot, unsigned bank)
+{
+    struct program_record record;
+    struct program candidate;
+    const struct program_record best = {.sequence = slot->sequence, .image_size = 0};
+    if (program_record_read(bank, &record) &&
+        (!slot->present || program_record_newer(&record, &best)) &&
+        program_open(&candidate, port_store_data(bank), record.image_size) == 0 &&
+        candidate.header.image_size == record.image_size && sound(&candidate)) {
+        adopt(slot, &candidate, bank, record.sequence);
+    }
+}
+
+void program_slot_recover(struct program_slot *slot)
+{
+    for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
+        recover_bank(slot, bank);
+    }
+    slot->checked = false;
 }
 
 void program_slot_stale(struct program_slot *slot)

@@ -3,7 +3,9 @@
  * program_slot: the active program and the upload of its successor (object 0x2000).
  *
  * An upload goes to the spare bank of the port's store; only a complete image that passes every
- * check takes over, so a broken or refused one leaves the active program as it was. Mainline.
+ * check takes over, so a broken or refused one leaves the active program as it was. What has taken over carries a record
+ * (program_record.h), by which it is found again after a loss of power at any moment: it, or its predecessor.
+ * Mainline.
  * Nobody may run the program while an upload ends (see machine_moving).
  */
 #ifndef APP_PROGRAM_SLOT_H
@@ -28,7 +30,8 @@ struct program_slot {
     struct program_fault refused;     /* last refusal; code 0: none */
     int32_t start_counts[PLANE_AXES]; /* first and last setpoint with the present configuration */
     int32_t end_counts[PLANE_AXES];
-    unsigned bank; /* of the active program */
+    unsigned bank;     /* of the active program */
+    uint32_t sequence; /* of its record */
     bool present;
     bool receiving;
     bool checked;    /* the three below hold for the present configuration */
@@ -36,6 +39,10 @@ struct program_slot {
 };
 
 void program_slot_init(struct program_slot *slot);
+
+/* The newest whole program of the store, if there is one, becomes the active one: after power-on, before the first
+ * upload. Costs a whole check of each program it looks at. */
+void program_slot_recover(struct program_slot *slot);
 
 enum program_slot_state program_slot_state(const struct program_slot *slot);
 

@@ -20,6 +20,7 @@ enum program_error {
     PROGRAM_ERR_VERSION = -3, /* version or header size unknown */
     PROGRAM_ERR_CRC = -4,     /* CRC-32 of the contents is wrong */
     PROGRAM_ERR_COUNT = -5,   /* no segment or no piece */
+    PROGRAM_ERR_STORE = -6,   /* the program store did not keep it (app/program_slot) */
     /* header */
     PROGRAM_ERR_PERIOD = -10,      /* period not 1000, 2000, 4000 or 8000 us */
     PROGRAM_ERR_PERIOD_USED = -11, /* period is not the one configured in the controller */

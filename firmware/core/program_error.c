@@ -15,6 +15,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_VERSION, "version or header size unknown"},
     {PROGRAM_ERR_CRC, "CRC-32 of the contents is wrong"},
     {PROGRAM_ERR_COUNT, "no segment or no piece"},
+    {PROGRAM_ERR_STORE, "the program store did not keep it"},
     {PROGRAM_ERR_PERIOD, "period not 1000, 2000, 4000 or 8000 us"},
     {PROGRAM_ERR_PERIOD_USED, "period is not the one configured in the controller"},
     {PROGRAM_ERR_FLAGS, "unknown flag, or a reserved field of the header is not 0"},

@@ -110,7 +110,8 @@ void port_wake(void);
 
 uint32_t port_store_size(void); /* bytes per bank */
 
-/* Erases a bank; then writes go in ascending order, without gaps. 0 or PORT_ERR_STORE. */
+/* Erases a bank; then writes go in ascending order. The one gap that may be left is before the last 16 bytes, which are
+ * written at once. What is written can be read at multiples of 8 bytes, and after the last write. 0 or PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 

@@ -22,6 +22,7 @@ static struct {
     uint32_t sent_tail;
     struct can_msg sent[SENT_MAX];
     uint8_t banks[PORT_STORE_BANKS][FAKE_PORT_BANK_BYTES];
+    const struct fake_port_store *store;
     void (*wait_hook)(void *context);
     void *wait_context;
 } self;
@@ -96,6 +97,16 @@ void fake_port_fail_send(bool fail)
 void fake_port_fail_store(bool fail)
 {
     self.fail_store = fail;
+}
+
+void fake_port_spoil_store(unsigned bank, uint32_t offset)
+{
+    self.banks[bank][offset] ^= 0xFFu;
+}
+
+void fake_port_use_store(const struct fake_port_store *store)
+{
+    self.store = store;
 }
 
 void fake_port_on_wait(void (*hook)(void *context), void *context)
@@ -204,12 +215,15 @@ void port_wake(void)
 
 uint32_t port_store_size(void)
 {
-    return FAKE_PORT_BANK_BYTES;
+    return self.store != NULL ? self.store->bank_bytes : FAKE_PORT_BANK_BYTES;
 }
 
 int port_store_erase(unsigned bank)
 {
     TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS);
+    if (self.store != NULL) {
+        return self.store->erase(bank);
+    }
     memset(self.banks[bank], 0xFF, FAKE_PORT_BANK_BYTES);
     return 0;
 }
@@ -217,6 +231,9 @@ int port_store_erase(unsigned bank)
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
 {
     TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS);
+    if (self.store != NULL) {
+        return self.store->write(bank, offset, data, size);
+    }
     if (self.fail_store || offset > FAKE_PORT_BANK_BYTES || size > FAKE_PORT_BANK_BYTES - offset) {
         return PORT_ERR_STORE;
     }
@@ -226,7 +243,7 @@ int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32
 
 const uint8_t *port_store_data(unsigned bank)
 {
-    return self.banks[bank];
+    return self.store != NULL ? self.store->data(bank) : self.banks[bank];
 }
 
 void port_log(enum port_level level, const char *text, int32_t value)

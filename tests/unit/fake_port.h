@@ -35,6 +35,18 @@ unsigned fake_port_wakes(void);
 void fake_port_fail_send(bool fail);
 void fake_port_fail_store(bool fail);
 
+/* Turns the bits of one byte of the store. */
+void fake_port_spoil_store(unsigned bank, uint32_t offset);
+
+/* The store from now on, instead of memory; NULL: memory again. */
+struct fake_port_store {
+    uint32_t bank_bytes;
+    int (*erase)(unsigned bank);
+    int (*write)(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
+    const uint8_t *(*data)(unsigned bank);
+};
+void fake_port_use_store(const struct fake_port_store *store);
+
 /* Called by port_wait; may be NULL. */
 void fake_port_on_wait(void (*hook)(void *context), void *context);
 

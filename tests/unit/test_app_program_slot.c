@@ -128,6 +128,50 @@ static void test_a_new_configuration_is_applied_to_the_old_program(void)
     TEST_ASSERT_EQUAL_INT32(10000, slot.start_counts[0]);
 }
 
+static void power_on(void)
+{
+    program_slot_init(&slot);
+    program_slot_recover(&slot);
+    program_slot_refresh(&slot, &config);
+}
+
+static void test_after_power_on_the_newest_program_is_there(void)
+{
+    static uint8_t first[APP_IMAGE_SIZE];
+    power_on();
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+    for (int32_t x = 0; x < 5; ++x) {
+        memcpy(first, image, sizeof first);
+        app_image_make(image, x, 20);
+        TEST_ASSERT_EQUAL_INT(0, upload());
+        power_on();
+        expect_active(image);
+        TEST_ASSERT_TRUE(slot.acceptable);
+        TEST_ASSERT_EQUAL_INT32(x * 1000000, slot.start_counts[0]);
+    }
+    const unsigned bank = slot.bank;
+    fake_port_spoil_store(bank, 200);
+    power_on();
+    expect_active(first);
+    fake_port_spoil_store(1u - bank, FAKE_PORT_BANK_BYTES - 9u);
+    power_on();
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+    TEST_ASSERT_EQUAL_INT(0, upload());
+}
+
+static void test_a_program_without_its_record_is_refused(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, sizeof image));
+    TEST_ASSERT_EQUAL_INT(0, program_slot_write(&slot, 0, image, sizeof image));
+    power_on();
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+    TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, sizeof image));
+    TEST_ASSERT_EQUAL_INT(0, program_slot_write(&slot, 0, image, sizeof image));
+    fake_port_fail_store(true);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_STORE, program_slot_finish(&slot, sizeof image, &config));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -137,5 +181,7 @@ int main(void)
     RUN_TEST(test_a_refusal_says_what_and_where);
     RUN_TEST(test_what_the_store_cannot_take);
     RUN_TEST(test_a_new_configuration_is_applied_to_the_old_program);
+    RUN_TEST(test_after_power_on_the_newest_program_is_there);
+    RUN_TEST(test_a_program_without_its_record_is_refused);
     return UNITY_END();
 }

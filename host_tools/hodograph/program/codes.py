@@ -17,6 +17,7 @@ class ProgramError(IntEnum):
     VERSION = -3
     CRC = -4
     COUNT = -5
+    STORE = -6
     PERIOD = -10
     PERIOD_USED = -11
     FLAGS = -12
@@ -68,6 +69,7 @@ _TEXTS = {
     ProgramError.VERSION: "version or header size unknown",
     ProgramError.CRC: "CRC-32 of the contents is wrong",
     ProgramError.COUNT: "no segment or no piece",
+    ProgramError.STORE: "the program store did not keep it",
     ProgramError.PERIOD: "period not 1000, 2000, 4000 or 8000 us",
     ProgramError.PERIOD_USED: "period is not the one configured in the controller",
     ProgramError.FLAGS: "unknown flag, or a reserved field of the header is not 0",
