@@ -36,7 +36,10 @@ def test_check_says_what_the_table_says(row: list[str]) -> None:
 
 def test_every_file_is_in_the_table_and_every_code_in_a_file() -> None:
     assert {row[0] for row in ROWS} == {p.name for p in (DATA / "programs").glob("*.hdgp")}
-    assert {row[1] for row in ROWS} - {"OK"} == {code.name for code in ProgramError}
+    of_programs = {code.name for code in ProgramError} - {
+        "STORE"
+    }  # that one is the machine's fault
+    assert {row[1] for row in ROWS} - {"OK"} == of_programs
 
 
 def test_codes_are_those_of_the_controller() -> None:
