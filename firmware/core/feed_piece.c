@@ -34,3 +34,13 @@ void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_poi
     out->arc_length_q40_mm = f->start_q40_mm + qmath_round(arc, 4);
     out->feed_q32_mm_s = qmath_shift_clamp(slope, -12 - f->exponent);
 }
+
+void feed_piece_make(void *piece, const struct program_piece *from)
+{
+    feed_piece_set(piece, from);
+}
+
+void feed_piece_point(const void *piece, uint64_t t_q42_s, struct feed_point *out)
+{
+    feed_piece_at(piece, t_q42_s, out);
+}

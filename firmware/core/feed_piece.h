@@ -28,4 +28,8 @@ void feed_piece_set(struct feed_piece *f, const struct program_piece *piece);
  * no division. */
 void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_point *out);
 
+/* The same two for struct kernel: `piece` is a struct feed_piece. */
+void feed_piece_make(void *piece, const struct program_piece *from);
+void feed_piece_point(const void *piece, uint64_t t_q42_s, struct feed_point *out);
+
 #endif

@@ -15,11 +15,7 @@ static void load_piece(struct interp *it, uint32_t i, uint64_t start_q32_s)
     it->piece = i;
     it->piece_start_q32_s = start_q32_s;
     it->piece_end_q32_s = start_q32_s + piece.duration_q32_s;
-    if (it->kernel == INTERP_DOUBLE) {
-        kernel_double_piece_set(&it->feed.doubles, &piece);
-    } else {
-        feed_piece_set(&it->feed.integers, &piece);
-    }
+    it->kernel->piece_set(&it->feed, &piece);
 }
 
 static void load_segment(struct interp *it, uint32_t i)
@@ -33,48 +29,17 @@ static void load_segment(struct interp *it, uint32_t i)
     it->segment_end_q40_mm = i + 1 == it->program->header.segment_count
                                  ? INT64_MAX
                                  : program_segment_start(it->program, i + 1);
-    switch (it->kernel) {
-    case INTERP_FIXED:
-        kernel_fixed_segment_set(&it->path.fixed, &ph);
-        break;
-    case INTERP_FLOAT:
-        kernel_float_segment_set(&it->path.floats, &ph);
-        break;
-    case INTERP_DOUBLE:
-    default:
-        kernel_double_segment_set(&it->path.doubles, &ph);
-        break;
-    }
+    it->kernel->segment_set(&it->path, &ph);
 }
 
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
 static void evaluate_feed(const struct interp *it, uint64_t time_q42_s, struct feed_point *f)
 {
     uint64_t t = time_q42_s - (it->piece_start_q32_s << FINE_BITS);
-    if (it->kernel == INTERP_DOUBLE) {
-        kernel_double_piece_at(&it->feed.doubles, t, f);
-    } else {
-        feed_piece_at(&it->feed.integers, t, f);
-    }
+    it->kernel->piece_at(&it->feed, t, f);
     int64_t length = it->program->header.length_q40_mm;
     f->arc_length_q40_mm = f->arc_length_q40_mm < 0 ? 0 : f->arc_length_q40_mm;
     f->arc_length_q40_mm = f->arc_length_q40_mm > length ? length : f->arc_length_q40_mm;
-}
-
-static void evaluate_path(const struct interp *it, int64_t arc_length_q40_mm, int64_t point[2])
-{
-    switch (it->kernel) {
-    case INTERP_FIXED:
-        kernel_fixed_segment_at(&it->path.fixed, arc_length_q40_mm, point);
-        break;
-    case INTERP_FLOAT:
-        kernel_float_segment_at(&it->path.floats, arc_length_q40_mm, point);
-        break;
-    case INTERP_DOUBLE:
-    default:
-        kernel_double_segment_at(&it->path.doubles, arc_length_q40_mm, point);
-        break;
-    }
 }
 
 /* Makes the piece of this time the loaded one, crossing `most` ends at most. The last piece has no
@@ -150,11 +115,11 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
     if (p == NULL || p->image == NULL) {
         return INTERP_ERR_PROGRAM;
     }
-    if (kernel != INTERP_FIXED && kernel != INTERP_FLOAT && kernel != INTERP_DOUBLE) {
+    it->kernel = kernel_find((uint32_t)kernel);
+    if (it->kernel == NULL) {
         return INTERP_ERR_KERNEL;
     }
     it->program = p;
-    it->kernel = kernel;
     set_end(it);
     load_piece(it, 0, 0);
     load_segment(it, 0);
@@ -177,7 +142,7 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
         return INTERP_ERR_JUMP;
     }
     int64_t point[2];
-    evaluate_path(it, f.arc_length_q40_mm, point);
+    it->kernel->segment_at(&it->path, f.arc_length_q40_mm, point);
     out->arc_length_q40_mm = f.arc_length_q40_mm;
     out->x_q40_mm = point[0];
     out->y_q40_mm = point[1];

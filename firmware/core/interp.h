@@ -15,21 +15,16 @@
 #include <stdint.h>
 
 #include "core/feed_piece.h"
+#include "core/kernel.h"
 #include "core/kernel_double.h"
 #include "core/kernel_fixed.h"
 #include "core/kernel_float.h"
 #include "core/program.h"
 
-enum interp_kernel {
-    INTERP_FIXED = 0,  /* integers only, the same bits everywhere, within 1 nm */
-    INTERP_FLOAT = 1,  /* single precision and integers, within 10 nm */
-    INTERP_DOUBLE = 2, /* the host's reference, within 1e-9 mm */
-};
-
 enum interp_result {
     INTERP_OK = 0,
     INTERP_END = 1,          /* time is at or beyond the end: the point is the exact end point */
-    INTERP_ERR_KERNEL = -1,  /* no such kernel */
+    INTERP_ERR_KERNEL = -1,  /* this image has no such kernel */
     INTERP_ERR_PROGRAM = -2, /* no program */
     INTERP_ERR_JUMP = -3, /* time is before the cursor, or more than two ends ahead: seek first */
 };
@@ -45,7 +40,7 @@ struct interp_point {
 /* Caller allocates (about 0.6 KiB); contents private. */
 struct interp {
     const struct program *program;
-    enum interp_kernel kernel;
+    const struct kernel *kernel;
     uint32_t piece; /* the one expanded below */
     uint32_t segment;
     uint64_t piece_start_q32_s;

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/kernel_double.h"
 
+#include "core/kernel.h"
+
 #define Q40   1099511627776.0
 #define Q48   281474976710656.0
 #define Q50   1125899906842624.0
@@ -123,3 +125,32 @@ void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc
         point_q40_mm[axis] = k->origin_q40_mm[axis] + round_scaled(horner(k->c_mm[axis], z), Q40);
     }
 }
+
+static void set_piece(void *piece, const struct program_piece *from)
+{
+    kernel_double_piece_set(piece, from);
+}
+
+static void piece_at(const void *piece, uint64_t t_q42_s, struct feed_point *out)
+{
+    kernel_double_piece_at(piece, t_q42_s, out);
+}
+
+static void set_segment(void *segment, const struct ph_segment *from)
+{
+    kernel_double_segment_set(segment, from);
+}
+
+static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
+{
+    kernel_double_segment_at(segment, arc_length_q40_mm, point_q40_mm);
+}
+
+const struct kernel kernel_double = {
+    .piece_size = sizeof(struct kernel_double_piece),
+    .segment_size = sizeof(struct kernel_double_segment),
+    .piece_set = set_piece,
+    .segment_set = set_segment,
+    .piece_at = piece_at,
+    .segment_at = segment_at,
+};

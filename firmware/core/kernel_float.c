@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/kernel_float.h"
 
+#include "core/kernel.h"
 #include "core/qmath.h"
 
 #define STEPS 2
@@ -137,3 +138,22 @@ void kernel_float_segment_at(const struct kernel_float_segment *k, int64_t arc_l
         point_q40_mm[axis] = k->origin_q40_mm[axis] + qmath_round(local, 8);
     }
 }
+
+static void set_segment(void *segment, const struct ph_segment *from)
+{
+    kernel_float_segment_set(segment, from);
+}
+
+static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
+{
+    kernel_float_segment_at(segment, arc_length_q40_mm, point_q40_mm);
+}
+
+const struct kernel kernel_float = {
+    .piece_size = sizeof(struct feed_piece),
+    .segment_size = sizeof(struct kernel_float_segment),
+    .piece_set = feed_piece_make,
+    .segment_set = set_segment,
+    .piece_at = feed_piece_point,
+    .segment_at = segment_at,
+};

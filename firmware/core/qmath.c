@@ -1,19 +1,55 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/qmath.h"
 
-uint64_t qmath_div_u64(uint64_t a, uint32_t b)
+/* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and what is left. The first
+ * estimate, from the upper half of b, is at most 2 too large (Knuth, TAOCP 2, 4.3.1, theorem B). */
+static uint32_t digit(uint32_t *high, uint32_t next, uint32_t b)
 {
-    uint64_t rest = 0;
-    uint64_t quotient = 0;
-    for (int bit = 63; bit >= 0; bit--) {
-        rest = rest << 1 | ((a >> bit) & 1u);
-        quotient <<= 1;
-        if (rest >= b) {
-            rest -= b;
-            quotient |= 1u;
+    uint32_t upper = b >> 16;
+    uint32_t lower = b & 0xFFFFu;
+    uint32_t q = *high / upper;
+    uint32_t rest = *high - q * upper;
+    for (int i = 0; i < 2; i++) {
+        if (rest < 0x10000u && (q > 0xFFFFu || q * lower > (rest << 16 | next))) {
+            q--;
+            rest += upper;
         }
     }
-    return quotient;
+    *high = (*high << 16 | next) - q * b;
+    return q;
+}
+
+/* floor((high 2^32 + low) / b), high < b, b with its highest bit set. */
+static uint32_t divide_normalised(uint32_t high, uint32_t low, uint32_t b)
+{
+    uint32_t q = digit(&high, low >> 16, b) << 16;
+    return q | digit(&high, low & 0xFFFFu, b);
+}
+
+static uint64_t divide_by_word(uint64_t a, uint32_t b)
+{
+    int shift = qmath_clz32(b);
+    uint32_t high = (uint32_t)(a >> 32);
+    uint32_t q = high / b;
+    uint64_t rest = ((uint64_t)(high - q * b) << 32 | (uint32_t)a) << shift;
+    return (uint64_t)q << 32 |
+           divide_normalised((uint32_t)(rest >> 32), (uint32_t)rest, b << shift);
+}
+
+uint64_t qmath_div_u64(uint64_t a, uint64_t b)
+{
+    if (b >> 32 == 0) {
+        return divide_by_word(a, (uint32_t)b);
+    }
+    /* By the upper 32 bits of b, a halved so that the quotient fits: at most one too large (Warren, Hacker's Delight,
+     * 9-5). */
+    int shift = qmath_clz64(b);
+    uint64_t half = a >> 1;
+    uint32_t upper = (uint32_t)(b << shift >> 32);
+    uint64_t q =
+        (uint64_t)divide_normalised((uint32_t)(half >> 32), (uint32_t)half, upper) << shift >> 31;
+    q -= q != 0 ? 1u : 0u;
+    return q + (a - q * b >= b ? 1u : 0u);
 }
 
 int64_t qmath_shift_clamp(int64_t a, int shift)

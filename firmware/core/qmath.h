@@ -93,9 +93,8 @@ static inline int32_t qmath_clamp32(int64_t a)
     return low == a ? low : a < 0 ? INT32_MIN : INT32_MAX;
 }
 
-/* floor(a / b), b not 0: shift and subtract, for targets without a 64-bit division. 64 rounds: not
- * in the tick. */
-uint64_t qmath_div_u64(uint64_t a, uint32_t b);
+/* floor(a / b), b not 0: for targets without a 64-bit division. At most four 32-bit divisions, no loop. */
+uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 
 /* floor of the square root; 32 rounds of additions. */
 uint64_t qmath_root(uint64_t a);

@@ -32,10 +32,10 @@ struct rate_bounds rate_bounds_least(const struct rate_bounds *a, const struct r
  * it, when b falls to 0 evenly in ceil(b / second) ticks. */
 static int64_t greatest_slope(int64_t room, int64_t second)
 {
-    uint64_t ratio = (uint64_t)room / (uint64_t)second;
+    uint64_t ratio = qmath_div_u64((uint64_t)room, (uint64_t)second);
     uint64_t n = qmath_root(ratio);
     n -= n * (n + 1u) > ratio ? 1u : 0u;
-    return (int64_t)((uint64_t)room / (n + 2u));
+    return (int64_t)qmath_div_u64((uint64_t)room, n + 2u);
 }
 
 int64_t rate_next_slope(const struct rate *rate, int64_t target_q57,
@@ -54,10 +54,16 @@ void rate_move(struct rate *rate, int64_t slope_q56)
     rate->slope_q56 = slope_q56;
 }
 
+/* floor(a / b) of numbers that are not negative */
+static int64_t quotient(int64_t a, int64_t b)
+{
+    return (int64_t)qmath_div_u64((uint64_t)a, (uint64_t)b);
+}
+
 /* ceil(|slope| / second) */
 static int64_t rest_ticks(int64_t slope, int64_t second)
 {
-    return slope == 0 ? 0 : (magnitude(slope) - 1) / second + 1;
+    return slope == 0 ? 0 : quotient(magnitude(slope) - 1, second) + 1;
 }
 
 int64_t rate_rest(const struct rate *rate, int64_t second_q56)
@@ -75,14 +81,15 @@ int64_t rate_rest(const struct rate *rate, int64_t second_q56)
 /* Ticks from rest to rest over a way in rate units, at most (section 12, "How long it takes"). */
 static int64_t way_ticks(int64_t way_q57, const struct rate_bounds *bounds)
 {
-    int64_t corner = (int64_t)qmath_root((uint64_t)(way_q57 / 2 / bounds->second_q56)) + 1;
+    int64_t corner = (int64_t)qmath_root((uint64_t)quotient(way_q57 / 2, bounds->second_q56)) + 1;
     if (way_q57 == 0) {
         return 0;
     }
     if (corner * bounds->second_q56 <= bounds->slope_q56) {
         return 2 * corner + 2;
     }
-    return way_q57 / 2 / bounds->slope_q56 + bounds->slope_q56 / bounds->second_q56 + 5;
+    return quotient(way_q57 / 2, bounds->slope_q56) +
+           quotient(bounds->slope_q56, bounds->second_q56) + 5;
 }
 
 int64_t rate_span_q12(const struct rate *rate, int64_t target_q57, const struct rate_bounds *bounds)

@@ -12,6 +12,9 @@ an500_CPU    := -mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 an505_CPU    := -mcpu=cortex-m33 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 microbit_CPU := -mcpu=cortex-m0 -mthumb
 rv32_CPU     := -march=rv32imc_zicsr -mabi=ilp32 -mno-relax -mcmodel=medany
+# The kernels that a target's images link: fixed, or with an FPU fixed and float (core/kernel.h).
+$(foreach t,an386 an500 an505,$(eval $(t)_KERNELS := firmware/core/kernels_float.c))
+$(foreach t,an385 microbit rv32,$(eval $(t)_KERNELS := firmware/core/kernels_fixed.c))
 # Debian's libraries have no build for rv32imc: those for rv32im are linked.
 rv32_LINK    := -march=rv32im -mabi=ilp32
 
@@ -29,7 +32,7 @@ controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*
 controller_TARGETS := an385 an386 an500 an505
 
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -DNDEBUG $(INCLUDES)
-TARGET_SRC    := $(core_SRC) $(canopen_SRC) $(app_SRC) $(OD_C)
+TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
 
 target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
 
@@ -52,7 +55,7 @@ endef
 $(foreach t,$(TARGETS),$(eval $(call TARGET_RULES,$(t))))
 
 define IMAGE_RULE # target, image
-$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$($(2)_MAIN) $($(2)_SRC) $(wildcard firmware/port/$($(1)_CORE)/*.c)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld
+$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$($(2)_MAIN) $($(2)_SRC) $($(1)_KERNELS) $(wildcard firmware/port/$($(1)_CORE)/*.c)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld
 	$$(call say,link,$$@)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $(or $($(1)_LINK),$($(1)_CPU)) -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,-Map,$$(@:.elf=.map) \
 	    -Lfirmware/port/$($(1)_CORE) -Tfirmware/targets/$(1).ld -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)

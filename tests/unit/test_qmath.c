@@ -76,6 +76,14 @@ static void test_divisions(void)
         TEST_ASSERT_INT64_WITHIN(2, a / 5, qmath_fifth(a));
     }
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, qmath_div_u64(UINT64_MAX, 1));
+    for (int i = 0; i < 200000; i++) {
+        uint64_t a = golden_random(&seed) >> (golden_random(&seed) % 64u);
+        uint64_t b = golden_random(&seed) >> (golden_random(&seed) % 64u);
+        uint64_t c = a - a % (b | 1u);
+        TEST_ASSERT_EQUAL_UINT64(a / (b | 1u), qmath_div_u64(a, b | 1u));
+        TEST_ASSERT_EQUAL_UINT64(c / (b | 1u), qmath_div_u64(c, b | 1u));
+        TEST_ASSERT_EQUAL_UINT64((c - 1u) / (b | 1u), qmath_div_u64(c - 1u, b | 1u));
+    }
 }
 
 static void test_shifts(void)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "canopen/cob.h"
+#include "core/kernel.h"
 #include "core/qmath.h"
 
 struct axis_field {
@@ -82,6 +83,9 @@ bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value)
 {
     if (index == 0x1006) {
         return value == 1000u || value == 2000u || value == 4000u || value == 8000u;
+    }
+    if (index == 0x2004 && sub == 5) {
+        return kernel_find((uint32_t)value) != NULL;
     }
     if (index == 0x2004 && sub == 7) {
         return value >= 1u && value <= CONFIG_COUNTS_PER_MM_MAX;

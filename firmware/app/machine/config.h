@@ -64,7 +64,8 @@ struct config {
 void config_read(struct config *config, const struct od *od);
 
 /* Whether a value for the object is one that the dictionary's own ranges would let pass but that
- * makes no sense: a period that is not 1, 2, 4 or 8 ms; too many counts per mm. Pure. */
+ * makes no sense: a period that is not 1, 2, 4 or 8 ms; too many counts per mm; a kernel that this image does not
+ * have. Pure. */
 bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value);
 
 /* Whether a change of the object concerns the drives, so that they must be configured anew. Pure.

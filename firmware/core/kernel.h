@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What a kernel is: how a segment and a feed piece are made ready and then evaluated. core/interp.h drives one of them.
+ *
+ * An image links the kernels that it names: its `kernels_linked` is in core/kernels_fixed.c, kernels_float.c or
+ * kernels_all.c (one of them per image: firmware/targets/targets.mk; the host has all). Pure, any context.
+ */
+#ifndef HODOGRAPH_CORE_KERNEL_H
+#define HODOGRAPH_CORE_KERNEL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/feed_piece.h"
+#include "core/ph_segment.h"
+
+/* Numbers as in object 0x2004 sub 5. */
+enum interp_kernel {
+    INTERP_FIXED = 0,  /* integers only, the same bits everywhere, within 1 nm */
+    INTERP_FLOAT = 1,  /* single precision and integers, within 10 nm */
+    INTERP_DOUBLE = 2, /* the host's reference, within 1e-9 mm */
+};
+
+#define KERNELS 3u
+
+/* Contents of a piece or segment that was made ready are the kernel's own: `*_size` bytes, aligned to 8. */
+struct kernel {
+    size_t piece_size;
+    size_t segment_size;
+    void (*piece_set)(void *piece, const struct program_piece *from);
+    void (*segment_set)(void *segment, const struct ph_segment *from);
+    /* At local time t, 0 <= t < duration. */
+    void (*piece_at)(const void *piece, uint64_t t_q42_s, struct feed_point *out);
+    /* At an arc length of this segment (from the start of the program). */
+    void (*segment_at)(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2]);
+};
+
+extern const struct kernel kernel_fixed;
+extern const struct kernel kernel_float;
+extern const struct kernel kernel_double;
+
+/* The kernels of this image by number; NULL where it has none. */
+extern const struct kernel *const kernels_linked[KERNELS];
+
+/* NULL when this image has no kernel of that number. */
+const struct kernel *kernel_find(uint32_t number);
+
+#endif
