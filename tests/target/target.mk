@@ -19,3 +19,9 @@ $(foreach c,gcc clang,$(foreach l,O0 O2,$(eval $(call TARGET_HOST_RULE,$(c),$(l)
 
 .PHONY: target-hosts
 target-hosts: $(TARGET_HOST_BINS)
+
+# What the tests of the bits run; and the hashes they compare with, for when a kernel is meant to change its bits.
+test pytest: firmware target-hosts
+.PHONY: golden
+golden: build target-hosts ## write the golden hashes of tests/data/bits anew
+	@$(PY) tests/support/target_bits.py $(BUILD)
