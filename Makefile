@@ -39,7 +39,7 @@ OD_C     := $(OD_NAMES:%=$(BUILD)/generated/od_%.c)
 OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
 
 LIBS        := app node injector faults port canopen sim core od
-core_SRC    := $(filter-out %/kernels_fixed.c %/kernels_float.c,$(wildcard firmware/core/*.c))
+core_SRC    := $(wildcard firmware/core/*.c)
 canopen_SRC := $(wildcard firmware/canopen/*.c)
 sim_SRC     := $(wildcard sim/plant/*.c sim/rig/*.c)
 app_SRC     := $(filter-out %/main.c,$(wildcard firmware/app/*.c firmware/app/*/*.c))
@@ -59,7 +59,7 @@ UNIT_SRC      := $(wildcard tests/unit/test_*.c)
 UNIT_SUPPORT  := $(filter-out $(UNIT_SRC),$(wildcard tests/unit/*.c))
 UNIT_NAMES    := $(UNIT_SRC:tests/unit/%.c=%)
 
-OWN_C    := $(wildcard firmware/core/kernels_f*.c) $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
+OWN_C    := $(wildcard firmware/targets/*.c) $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
 OWN_H    := $(wildcard firmware/*/*.h firmware/app/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
 FUZZ_SRC := $(wildcard tests/fuzz/*.c)
 

@@ -20,6 +20,7 @@ from pathlib import Path
 C_RULES: dict[str, set[str]] = {
     "firmware/can": set(),
     "firmware/core": set(),
+    "firmware/targets": {"firmware/core"},
     "firmware/canopen": {"firmware/can"},
     "firmware/port/port.h": {"firmware/can"},
     "firmware/port/semihost": set(),

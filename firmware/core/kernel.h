@@ -2,8 +2,8 @@
 /*
  * What a kernel is: how a segment and a feed piece are made ready and then evaluated. core/interp.h drives one of them.
  *
- * An image links the kernels that it names: its `kernels_linked` is in core/kernels_fixed.c, kernels_float.c or
- * kernels_all.c (one of them per image: firmware/targets/targets.mk; the host has all). Pure, any context.
+ * An image links the kernels that it names: its `kernels_linked` is core/kernels_all.c on a host, one of
+ * firmware/targets/kernels_*.c on a microcontroller. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_H
 #define HODOGRAPH_CORE_KERNEL_H

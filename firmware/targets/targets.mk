@@ -13,8 +13,8 @@ an505_CPU    := -mcpu=cortex-m33 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 microbit_CPU := -mcpu=cortex-m0 -mthumb
 rv32_CPU     := -march=rv32imc_zicsr -mabi=ilp32 -mno-relax -mcmodel=medany
 # The kernels that a target's images link: fixed, or with an FPU fixed and float (core/kernel.h).
-$(foreach t,an386 an500 an505,$(eval $(t)_KERNELS := firmware/core/kernels_float.c))
-$(foreach t,an385 microbit rv32,$(eval $(t)_KERNELS := firmware/core/kernels_fixed.c))
+$(foreach t,an386 an500 an505,$(eval $(t)_KERNELS := firmware/targets/kernels_float.c))
+$(foreach t,an385 microbit rv32,$(eval $(t)_KERNELS := firmware/targets/kernels_fixed.c))
 # Debian's libraries have no build for rv32imc: those for rv32im are linked.
 rv32_LINK    := -march=rv32im -mabi=ilp32
 
