@@ -4,20 +4,23 @@
 At 200 % a tick of these crosses two ends of segments and two of pieces again and again: neighbours are a very short and
 a long one, together just longer than docs/protocol.md 1.2 and 1.3 ask for. Segments have the greatest speed ratio. The
 override bounds of the pieces make the look-ahead of the rate as long as it can be.
+
+Only + - * / and roots of Python's own numbers: the same bytes on every machine.
 """
 
 from __future__ import annotations
 
+import math
+import random
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hodograph.feed.pieces import FeedPieces
 from hodograph.program import Program, check, encode
 
-Complex = NDArray[np.complex128]
+W = tuple[complex, complex, complex]
 
 HOLD, RESUME = 1000, 1001  # tests/target/commands.h
 _FEED_MM_S = 100.0
@@ -36,28 +39,28 @@ class Adversary:
     """A program and what it is after."""
 
     name: str
-    bounds: Callable[[np.random.Generator, int], Bounds]
-    pieces: int = 250
+    bounds: Callable[[random.Random, int], Bounds]
+    pieces: int = 160
     short_s: float = 2e-5
     short_mm: float = 2e-3
 
 
-def _wide(_rng: np.random.Generator, _index: int) -> Bounds:
+def _wide(_rng: random.Random, _index: int) -> Bounds:
     return 2.0, 200.0, 2e5
 
 
-def _scattered(rng: np.random.Generator, _index: int) -> Bounds:
+def _scattered(rng: random.Random, _index: int) -> Bounds:
     factor = 1.0 + rng.random() * (rng.random() < 0.5)
-    return factor, 10 ** rng.uniform(0.7, 2.7), 10 ** rng.uniform(3, 6)
+    return factor, rng.choice((5.0, 20.0, 80.0, 300.0)), rng.choice((1e3, 1e4, 1e5, 1e6))
 
 
-def _ladder(_rng: np.random.Generator, index: int) -> Bounds:
+def _ladder(_rng: random.Random, index: int) -> Bounds:
     """Sixteen pieces, each tighter than the one before: every look a little further finds less."""
     step = index % 16
-    return 2.0 - step / 32, 150.0 * 0.8**step, 3e5 * 0.7**step
+    return 2.0 - step / 32, 150.0 * math.ldexp(1.0, -step // 3), 3e5 * math.ldexp(1.0, -step // 2)
 
 
-def _narrow(rng: np.random.Generator, index: int) -> Bounds:
+def _narrow(rng: random.Random, index: int) -> Bounds:
     """One piece that allows little among many that allow all: an attempt above it, and back, again and again."""
     return (1.0, 20.0, 2e4) if index % 60 == 0 else (2.0, 300.0 + rng.random(), 1e6)
 
@@ -72,7 +75,7 @@ ADVERSARIES = (
 
 def image(adversary: Adversary) -> bytes:
     """The program's image; it is one that the controller accepts."""
-    rng = np.random.default_rng(_SEED)
+    rng = random.Random(_SEED)
     pieces = _durations(adversary)
     length_mm = _FEED_MM_S * (_RAMP_Q32 + sum(pieces)) / _Q32
     path = _path(rng, adversary, length_mm)
@@ -99,11 +102,12 @@ class _Path:
         self.end = (0, 0, 0)
         self.direction: complex = 1.0
 
-    def add(self, w: Complex) -> None:
+    def add(self, w: W) -> None:
         """A segment along `w` (mm^(1/2)), turned so that it goes on where the path ends."""
-        w = w * (self.direction / w[0]) * abs(w[0]) / abs(self.direction)
-        u = [round(c.real * _Q44) for c in w]
-        v = [round(c.imag * _Q44) for c in w]
+        turn = self.direction * w[0].conjugate()
+        turn /= _size(turn)
+        u = [round((c * turn).real * _Q44) for c in w]
+        v = [round((c * turn).imag * _Q44) for c in w]
         self.rows.append((self.end[2], self.end[0], self.end[1], *u, *v))
         total = [0, 0, 0]
         for i, j, weight in ((0, 0, 3), (0, 1, 3), (0, 2, 1), (1, 1, 2), (1, 2, 3), (2, 2, 3)):
@@ -116,7 +120,7 @@ class _Path:
         self.direction = complex(u[2], v[2])
 
 
-def _path(rng: np.random.Generator, adversary: Adversary, length_mm: float) -> _Path:
+def _path(rng: random.Random, adversary: Adversary, length_mm: float) -> _Path:
     """Short and long segments in turn until about this length."""
     path = _Path()
     long_mm = _PAIR_MM - adversary.short_mm
@@ -127,22 +131,23 @@ def _path(rng: np.random.Generator, adversary: Adversary, length_mm: float) -> _
     return path
 
 
-def _hard(rng: np.random.Generator, length_mm: float) -> Complex:
+def _size(a: complex) -> float:
+    return math.sqrt(a.real * a.real + a.imag * a.imag)
+
+
+def _hard(rng: random.Random, length_mm: float) -> W:
     """w of a segment close to the greatest speed ratio."""
     while True:
-        w = rng.normal(size=3) + 1j * rng.normal(size=3)
-        sigma = np.array(
-            [
-                abs(w[0]) ** 2,
-                (w[0] * w[1].conjugate()).real,
-                ((w[0] * w[2].conjugate()).real + 2 * abs(w[1]) ** 2) / 3,
-                (w[1] * w[2].conjugate()).real,
-                abs(w[2]) ** 2,
-            ]
-        )
-        if sigma.min() > 0 and 1.8 < sigma.max() / sigma.min() < 1.999:
-            scaled: Complex = w * np.sqrt(length_mm / sigma.mean())
-            return scaled
+        a, b, c = (complex(rng.uniform(-1, 1), rng.uniform(-1, 1)) for _ in range(3))
+        middle = (_dot(a, c) + 2 * _dot(b, b)) / 3
+        sigma = (_dot(a, a), _dot(a, b), middle, _dot(b, c), _dot(c, c))
+        if min(sigma) > 0 and 1.8 < max(sigma) / min(sigma) < 1.999:
+            scale = math.sqrt(length_mm * 5 / sum(sigma))
+            return a * scale, b * scale, c * scale
+
+
+def _dot(a: complex, b: complex) -> float:
+    return a.real * b.real + a.imag * b.imag
 
 
 @dataclass(frozen=True)
@@ -154,7 +159,7 @@ class _Piece:
 
 
 def _feed(
-    rng: np.random.Generator, adversary: Adversary, durations: Iterable[int], length_q40: int
+    rng: random.Random, adversary: Adversary, durations: Iterable[int], length_q40: int
 ) -> list[_Piece]:
     """A ramp, the constant pieces and a ramp that ends at the path's end."""
     way = _FEED_MM_S * _RAMP_Q32 / _Q32 * _Q40
@@ -207,16 +212,16 @@ def steady() -> list[tuple[int, int]]:
 
 def restless(ticks: int = 3000) -> list[tuple[int, int]]:
     """The rate is on its way nearly always, mostly high up; holds and resumes in between."""
-    rng = np.random.default_rng(_SEED)
+    rng = random.Random(_SEED)
     commands: list[tuple[int, int]] = [(0, 200)]
     tick = 30
     while tick < ticks:
         if rng.random() < 0.1:
-            commands += [(tick, HOLD), (tick + int(rng.integers(1, 30)), RESUME)]
+            commands += [(tick, HOLD), (tick + rng.randrange(1, 30), RESUME)]
             tick += 30
         else:
-            commands.append((tick, int(rng.choice((200, 198, 190, 150, 110, 60, 30)))))
-        tick += int(rng.choice((2, 3, 7, 20, 60)))
+            commands.append((tick, rng.choice((200, 198, 190, 150, 110, 60, 30))))
+        tick += rng.choice((2, 3, 7, 20, 60))
     return [*commands, (ticks, RESUME), (ticks, 200)]
 
 

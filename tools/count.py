@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""count.py: `make count`: instructions of the tick on all cores, compared with the committed ones.
+
+Prints the tables, writes them as JSON, and compares with tests/data/counts.json with no tolerance. Exit status 1 when
+a count differs; `--update` takes the new ones over, there and into docs/counts.md. Counts belong to a compiler: with
+another version nothing is compared, and this is said.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from target import campaign, tables
+
+ROOT = Path(__file__).resolve().parents[1]
+COMMITTED = ROOT / "tests/data/counts.json"
+DOCUMENT = ROOT / "docs/counts.md"
+_SHOWN = "an386 float"
+
+
+def blocks(figures: dict[str, Any]) -> dict[str, str]:
+    """The generated parts of the document, by name."""
+    bars = tables.histogram(figures, _SHOWN, campaign.BIN)
+    versions = ", ".join(f"{name} {version}" for name, version in figures["compilers"].items())
+    return {
+        "compilers": f"Compilers: {versions}; -O2.\n",
+        "goals": tables.goal_lines(figures),
+        "motion": tables.motion_table(figures),
+        "parts": tables.parts_table(figures),
+        "histogram": f"```\n{bars}```\n",
+    }
+
+
+def write_document(figures: dict[str, Any]) -> None:
+    """Puts the blocks between their marks."""
+    text = DOCUMENT.read_text(encoding="utf-8")
+    for name, block in blocks(figures).items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->\n"
+        before, rest = text.split(begin)
+        text = before + begin + block + end + rest.split(end)[1]
+    DOCUMENT.write_text(text, encoding="utf-8")
+
+
+def differences(figures: dict[str, Any], committed: dict[str, Any]) -> list[str]:
+    """Lines that differ, as a diff; empty when the counts are equal."""
+    old, new = (tables.stored(f).splitlines() for f in (committed, figures))
+    return list(difflib.unified_diff(old, new, "committed", "counted", lineterm="", n=0))
+
+
+def incomparable(figures: dict[str, Any], committed: dict[str, Any]) -> str | None:
+    """Why counts cannot be compared, None when they can."""
+    if figures["compilers"] != committed["compilers"]:
+        return f"counted with {figures['compilers']}, committed with {committed['compilers']}"
+    return None
+
+
+def judge(figures: dict[str, Any]) -> int:
+    """Compares with the committed counts; exit status."""
+    committed = json.loads(COMMITTED.read_text(encoding="utf-8"))
+    reason = incomparable(figures, committed)
+    if reason is not None:
+        print(f"count: not compared with {COMMITTED.relative_to(ROOT)}: {reason}")
+        return 0
+    found = differences(figures, committed)
+    for line in found:
+        print(line)
+    if found:
+        print("count: the counts have changed; `make count UPDATE=1` takes them over")
+    else:
+        print(f"count: the same as in {COMMITTED.relative_to(ROOT)}, every one")
+    return 1 if found else 0
+
+
+def main() -> int:
+    """Exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--build", type=Path, default=Path("build"))
+    parser.add_argument("--update", action="store_true")
+    options = parser.parse_args()
+    figures = campaign.Campaign(options.build).run()
+    (options.build / "count.json").write_text(tables.stored(figures), encoding="utf-8")
+    for block in blocks(figures).values():
+        print(block)
+    if not options.update:
+        return judge(figures)
+    COMMITTED.write_text(tables.stored(figures), encoding="utf-8")
+    write_document(figures)
+    print(f"count: written to {COMMITTED.relative_to(ROOT)} and {DOCUMENT.relative_to(ROOT)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

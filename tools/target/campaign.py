@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""All that `make count` counts: each kernel on each core, over the example programs and those made to be dear."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hodograph.chain import load_chain
+from target import adversary
+from target.counting import Command, Counter, Counts
+from target.emulator import TARGETS, Target
+from target.parts import PARTS
+
+ROOT = Path(__file__).resolve().parents[2]
+BIN = 100  # instructions of a bin of the histogram
+
+# (target, kernel): most instructions of the motion part in a plain tick; docs/counts.md says where it is from.
+GOALS = {("an386", "float"): 600, ("an385", "fixed"): 1500, ("microbit", "fixed"): 4000}
+OVERRIDE_GOAL = 1.5  # times that with the override active
+SPREAD_GOAL = 1.5  # worst over median
+FLOOR = 26  # 25 multiply-adds and a division
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Programs, and the commands that they are run with (each list is one run)."""
+
+    name: str
+    programs: str
+    commands: tuple[str | None, ...]
+
+
+SCENARIOS = (
+    Scenario("plain", "examples", (None,)),
+    Scenario("plain, adversary", "adversary", (None,)),
+    Scenario("override", "examples", ("steady", "restless")),
+    Scenario("override, adversary", "adversary", ("steady", "restless", "jitter")),
+)
+
+
+class Campaign:
+    """Images of the programs, each made once, and the counting."""
+
+    def __init__(self, build: Path) -> None:
+        self.build = build
+
+    @cached_property
+    def images(self) -> dict[str, dict[str, bytes]]:
+        """Name of a group, name of a program, image."""
+        examples = sorted((ROOT / "examples").glob("*.toml"))
+        return {
+            "examples": {p.stem: load_chain(p).image for p in examples},
+            "adversary": {a.name: adversary.image(a) for a in adversary.ADVERSARIES},
+        }
+
+    def checksums(self) -> dict[str, str]:
+        """First 16 digits of SHA-256 of each image: counts can be compared where these are equal."""
+        return {
+            name: hashlib.sha256(image).hexdigest()[:16]
+            for group in self.images.values()
+            for name, image in group.items()
+        }
+
+    def scenario(self, counter: Counter, kernel: str, scenario: Scenario) -> Counts:
+        """All ticks of a scenario."""
+        programs = b"".join(self.images[scenario.programs].values())
+        runs = [counter.count(kernel, programs, _commands(name)) for name in scenario.commands]
+        return np.concatenate(runs)
+
+    def pair(self, target: Target, kernel: str) -> dict[str, Any]:
+        """The figures of one kernel on one core."""
+        counter = Counter(self.build, target)
+        return {s.name: figures(self.scenario(counter, kernel, s)) for s in SCENARIOS}
+
+    def run(self) -> dict[str, Any]:
+        """Everything."""
+        pairs = [(t, k) for t in TARGETS.values() for k in t.kernels]
+        checksums = self.checksums()
+        with ThreadPoolExecutor(2) as pool:
+            done = list(pool.map(lambda pair: self.pair(*pair), pairs))
+        return {
+            "compilers": compilers(),
+            "programs": checksums,
+            "motion": {f"{t.name} {k}": d for (t, k), d in zip(pairs, done, strict=True)},
+        }
+
+
+def _commands(name: str | None) -> Sequence[Command]:
+    return adversary.COMMANDS[name]() if name else ()
+
+
+def compilers() -> dict[str, str]:
+    """Version of the compiler for each family of cores: counts are those of one compiler."""
+    crosses = sorted({t.cross for t in TARGETS.values()})
+    return {cross + "gcc": _first_line([f"{cross}gcc", "--version"]) for cross in crosses}
+
+
+def _first_line(command: list[str]) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()[0].split(") ", 1)[-1]
+
+
+def figures(counts: Counts) -> dict[str, Any]:
+    """Least, median and most of the whole and of the parts that there are, and the histogram of the whole."""
+    whole = counts.sum(axis=1)
+    bins, ticks = np.unique(whole // BIN * BIN, return_counts=True)
+    out: dict[str, Any] = {"ticks": len(whole), "motion": _three(whole)}
+    out |= {p: _three(counts[:, i]) for i, p in enumerate(PARTS) if counts[:, i].any()}
+    return out | {"histogram": {str(b): int(n) for b, n in zip(bins, ticks, strict=True)}}
+
+
+def _three(column: Counts) -> list[int]:
+    middle = np.sort(column)[(len(column) - 1) // 2]
+    return [int(column.min()), int(middle), int(column.max())]
