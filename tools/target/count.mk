@@ -11,6 +11,8 @@ $(COUNT_PLUGIN): tools/target/count_plugin.c
 .PHONY: counter
 counter: firmware $(COUNT_PLUGIN) ## what tools/count_tick.py needs
 
+test pytest: counter
+
 UPDATE ?=
 .PHONY: count
 count: counter $(VENV)/.editable native ## instructions of the tick on all cores; differs from tests/data/counts.json: fails (UPDATE=1: written there)

@@ -24,6 +24,7 @@ class Target:
     core: str
     machine: str
     store: int  # where the program lies
+    clock_mhz: int  # of SysTick; of minstret, in QEMU, a nanosecond
     kernels: tuple[str, ...]
 
     @property
@@ -48,12 +49,12 @@ _QUIET = ("-nographic", "-monitor", "none", "-serial", "none")
 TARGETS = {
     t.name: t
     for t in (
-        Target("an386", "M4F", "mps2-an386", 0x21000000, ("float", "fixed")),
-        Target("an385", "M3", "mps2-an385", 0x21000000, ("fixed",)),
-        Target("microbit", "M0", "microbit", 0x20000, ("fixed",)),
-        Target("an500", "M7", "mps2-an500", 0x60000000, ("float", "fixed")),
-        Target("an505", "M33", "mps2-an505", 0x80000000, ("float", "fixed")),
-        Target("rv32", "RV32", "virt", 0x82000000, ("fixed",)),
+        Target("an386", "M4F", "mps2-an386", 0x21000000, 25, ("float", "fixed")),
+        Target("an385", "M3", "mps2-an385", 0x21000000, 25, ("fixed",)),
+        Target("microbit", "M0", "microbit", 0x20000, 16, ("fixed",)),
+        Target("an500", "M7", "mps2-an500", 0x60000000, 25, ("float", "fixed")),
+        Target("an505", "M33", "mps2-an505", 0x80000000, 20, ("float", "fixed")),
+        Target("rv32", "RV32", "virt", 0x82000000, 1000, ("fixed",)),
     )
 }
 

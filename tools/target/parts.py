@@ -21,10 +21,10 @@ PARTS = ("rest", "rate", "feed", "search", "newton", "position", "frames", "supe
 # FILE:FUNCTION, the first that is found; those of one file from the most special to the most general.
 RULES = (
     (r"core/(timebase|rate\w*)\.\w:", "rate"),
-    (r"core/feed_piece\.\w:feed_piece_at", "feed"),
+    (r"core/feed_piece\.\w:feed_piece_(at|point)", "feed"),
     (r"core/interp\.\w:evaluate_feed", "feed"),
-    (r"core/kernel_\w+\.\w:\w+_set$", "search"),
-    (r"core/feed_piece\.\w:\w+_set$", "search"),
+    (r"core/kernel_\w+\.\w:(set_|\w+_set$)", "search"),
+    (r"core/feed_piece\.\w:\w+_(set|make)$", "search"),
     (r"core/ph_segment\.\w:", "search"),
     (r"core/interp\.\w:(find|load)_", "search"),
     (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""The counter of instructions agrees with the clock of the core that is counted."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from target import adversary  # noqa: E402
+from target.counting import Counter  # noqa: E402
+from target.emulator import TARGETS, Target  # noqa: E402
+
+BUILD = ROOT / "build"
+INSTRUCTION_NS = 128  # -icount shift=7
+ICOUNT = ("-icount", "shift=7,sleep=off")
+MOST_OF_THE_CALL = 10  # instructions between two looks at the clock that are not the tick's
+
+
+@pytest.mark.parametrize("target", TARGETS.values(), ids=lambda t: t.name)
+def test_the_clock_of_the_core_counts_the_same(target: Target, tmp_path: Path) -> None:
+    program = adversary.image(adversary.ADVERSARIES[0])
+    counts = Counter(BUILD, target).count(
+        target.kernels[0], program, adversary.restless(), ICOUNT, tmp_path / "times"
+    )
+    times = np.fromfile(tmp_path / "times", "<u4") * 1000.0 / target.clock_mhz / INSTRUCTION_NS
+    assert len(times) == len(counts) > 100
+    beside = times - counts.sum(axis=1)
+    # a look at the clock rounds to a cycle, which is less than half an instruction
+    assert len(np.unique(np.round(beside))) == 1
+    assert 0 < np.round(beside[0]) <= MOST_OF_THE_CALL
+
+
+def test_the_counts_of_a_run_are_those_of_the_next() -> None:
+    counter = Counter(BUILD, TARGETS["an386"])
+    program = adversary.image(adversary.ADVERSARIES[2])
+    first, second = (counter.count("float", program, adversary.jitter()) for _ in range(2))
+    assert np.array_equal(first, second)
