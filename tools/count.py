@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from target import campaign, tables
+from target import campaign, tables, taylor
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMITTED = ROOT / "tests/data/counts.json"
@@ -33,8 +33,14 @@ def blocks(figures: dict[str, Any]) -> dict[str, str]:
         "goals": tables.goal_lines(figures),
         "motion": tables.motion_table(figures),
         "parts": tables.parts_table(figures),
+        "taylor": tables.taylor_table(figures),
         "histogram": f"```\n{bars}```\n",
     }
+
+
+def everything(build: Path) -> dict[str, Any]:
+    """All that is counted."""
+    return campaign.Campaign(build).run() | {"taylor": taylor.compare(build)}
 
 
 def write_document(figures: dict[str, Any]) -> None:
@@ -83,7 +89,7 @@ def main() -> int:
     parser.add_argument("--build", type=Path, default=Path("build"))
     parser.add_argument("--update", action="store_true")
     options = parser.parse_args()
-    figures = campaign.Campaign(options.build).run()
+    figures = everything(options.build)
     (options.build / "count.json").write_text(tables.stored(figures), encoding="utf-8")
     for block in blocks(figures).values():
         print(block)

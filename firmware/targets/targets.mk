@@ -23,9 +23,13 @@ $(foreach t,$(TARGETS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_
 
 # An image is a main with what it is linked from besides core, canopen, app and the dictionary; and the targets that it is
 # for, where not all.
-IMAGES := setpoints controller
+IMAGES := setpoints controller taylor
 setpoints_MAIN := tests/target/setpoints.c
 setpoints_SRC  := tests/target/commands.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+
+taylor_MAIN    := tests/target/taylor.c
+taylor_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+taylor_TARGETS := an385 an386
 
 controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/can/*.c)

@@ -53,20 +53,29 @@ class Counter:
         commands: Sequence[Command] = (),
         options: Sequence[str] = (),
         times: Path | None = None,
+        setpoints: Path | None = None,
     ) -> Counts:
         """Instructions of each tick of one or more images one behind the other, (ticks, len(PARTS)).
 
-        `times` gets what the image's own clock says.
+        `times` gets what the image's own clock says, `setpoints` its setpoints.
         """
+        with tempfile.TemporaryDirectory() as name:
+            given = Path(name) / "commands"
+            given.write_bytes(stored(commands))
+            words = [str(emulator.KERNELS[kernel]), str(setpoints or Path(name) / "setpoints")]
+            words += [str(given) if commands else "-"]
+            words += [str(times)] if times else []
+            return self.count_words(words, programs, options)
+
+    def count_words(
+        self, words: Sequence[str], store: bytes, options: Sequence[str] = ()
+    ) -> Counts:
+        """The same of any image: with these words, and this in its store."""
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             (folder / "map").write_text(self.map_text())
-            (folder / "store").write_bytes(programs)
-            (folder / "commands").write_bytes(stored(commands))
+            (folder / "store").write_bytes(store)
             plugin = self.build / "target/count_plugin.so"
-            words = [str(emulator.KERNELS[kernel]), str(folder / "setpoints")]
-            words += [str(folder / "commands") if commands else "-"]
-            words += [str(times)] if times else []
             count = f"{plugin},map={folder / 'map'},out={folder / 'out'}"
             options = ["-plugin", count, *options]
             emulator.run(self.target, self.elf, words, folder / "store", options)

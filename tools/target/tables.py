@@ -125,3 +125,19 @@ def histogram(figures: Figures, pair: str, bin_width: int) -> str:
             bar = "#" * max(1, round(50 * ticks / total))
             lines.append(f"  {int(low):6} … {int(low) + bin_width - 1:6} {ticks:6} {bar}")
     return "\n".join(lines) + "\n"
+
+
+def taylor_table(figures: Figures) -> str:
+    """The usual NURBS interpolator beside ours."""
+    head = ["core", "interpolator", "min", "median", "max", "max / median", "feed ripple"]
+
+    def rows() -> Iterator[list[str]]:
+        for target, both in figures["taylor"].items():
+            for name, row in both.items():
+                least, median, most = row["motion"]
+                title = f"{TARGETS[target].core} ({target})"
+                ratio = f"{most / median:.2f}"
+                cells = [*map(str, (least, median, most)), ratio, f"{row['ripple']:.1e}"]
+                yield [title, name, *cells]
+
+    return _table(head, rows())

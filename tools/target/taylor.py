@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""The usual NURBS interpolator (tests/target/taylor.c) beside ours: instructions of a tick and ripple of the feed.
+
+Both run the alpha at its feed of 100 mm/s: ours the PH spline, without its ramps, the other
+the B-spline of the same control polygon, which our spline meets at its knots.
+"""
+
+from __future__ import annotations
+
+import struct
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hodograph.chain import load_chain
+from target.campaign import figures
+from target.counting import Counter
+from target.emulator import TARGETS
+
+ROOT = Path(__file__).resolve().parents[2]
+ALPHA = ROOT / "examples/alpha.toml"
+FEED_MM_S = 100.0
+PERIOD_S = 1e-3
+RAMP_S = 0.1
+CORES = (("an386", "float"), ("an385", "fixed"))  # and our kernel there
+
+Setpoints = npt.NDArray[np.int32]
+
+
+def stored(points_mm: npt.NDArray[np.complex128]) -> bytes:
+    """struct path of taylor.c."""
+    points = np.column_stack((points_mm.real, points_mm.imag)).astype("<f4")
+    return struct.pack("<2f", len(points), FEED_MM_S * PERIOD_S) + points.tobytes() + bytes(512)
+
+
+def ripple(setpoints: Setpoints) -> float:
+    """Greatest |chord feed - feed| / feed."""
+    chords_mm = np.hypot(*np.diff(setpoints.astype(float), axis=0).T) * 1e-6
+    return float(np.abs(chords_mm / (FEED_MM_S * PERIOD_S) - 1.0).max())
+
+
+def compare(build: Path) -> dict[str, Any]:
+    """For each core: figures of the other's tick and of ours, and both ripples."""
+    chain = load_chain(ALPHA)
+    polygon = stored(chain.file.path.points)
+    out: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as name:
+        setpoints = Path(name) / "setpoints"
+        for core, kernel in CORES:
+            other = Counter(build, TARGETS[core], "taylor")
+            theirs = figures(other.count_words([str(setpoints)], polygon))
+            # the last step ends at the end of the curve, and is shorter
+            theirs["ripple"] = ripple(_read(setpoints)[:-1])
+            counter = Counter(build, TARGETS[core])
+            counts = counter.count(kernel, chain.image, setpoints=setpoints)
+            first = round(RAMP_S / PERIOD_S) + 1
+            ours = figures(counts[first:-first])
+            ours["ripple"] = ripple(_read(setpoints)[first:-first])
+            out[core] = {"taylor": theirs, f"hodograph {kernel}": ours}
+    return out
+
+
+def _read(file: Path) -> Setpoints:
+    return np.fromfile(file, "<i4").reshape(-1, 2)
