@@ -4,6 +4,7 @@
 
     .venv/bin/python tools/count_tick.py an386 float examples/alpha.toml
     .venv/bin/python tools/count_tick.py microbit fixed ladder --commands restless --worst 5
+    .venv/bin/python tools/count_tick.py an386 float ladder --isr --functions  # the whole interrupt, by functions
 
 Needs `make counter`. The program is a path file, an image (.hdgp) or the name of one of the programs made to be dear
 (target/adversary.py), which also has the commands: overrides, holds and resumes.
@@ -12,13 +13,13 @@ Needs `make counter`. The program is a path file, an image (.hdgp) or the name o
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from hodograph.chain import load_chain
 from target import adversary, counting, emulator
-from target.parts import PARTS
 
 
 def image_of(program: str) -> bytes:
@@ -30,16 +31,16 @@ def image_of(program: str) -> bytes:
     return load_chain(path).image if path.suffix == ".toml" else path.read_bytes()
 
 
-def show(counts: counting.Counts, worst: int) -> None:
+def show(names: Sequence[str], counts: counting.Counts, worst: int) -> None:
     whole = counts.sum(axis=1)
-    print(f"{len(counts)} ticks   {'min':>8} {'median':>8} {'max':>8}")
-    rows = [("motion", whole), *((p, counts[:, i]) for i, p in enumerate(PARTS))]
-    for name, column in rows:
+    print(f"{len(counts)} ticks   {'min':>24} {'median':>8} {'max':>8}")
+    rows = [("whole", whole), *((p, counts[:, i]) for i, p in enumerate(names))]
+    for name, column in sorted(rows, key=lambda row: -int(row[1].sum(dtype=np.int64))):
         if column.any():
             median = int(np.median(column))
-            print(f"{name:12} {column.min():8} {median:8} {column.max():8}")
+            print(f"{name:28} {column.min():8} {median:8} {column.max():8}")
     for tick in np.argsort(whole)[::-1][:worst]:
-        split = " ".join(f"{p} {n}" for p, n in zip(PARTS, counts[tick], strict=True) if n)
+        split = " ".join(f"{p} {n}" for p, n in zip(names, counts[tick], strict=True) if n)
         print(f"tick {tick}: {whole[tick]}: {split}")
 
 
@@ -49,12 +50,17 @@ def main() -> None:
     parser.add_argument("kernel", choices=emulator.KERNELS)
     parser.add_argument("program", help="path file, image, or a name of target/adversary.py")
     parser.add_argument("--commands", choices=adversary.COMMANDS)
+    parser.add_argument("--isr", action="store_true", help="the whole interrupt, not only motion")
+    parser.add_argument("--functions", action="store_true", help="by functions, not by parts")
     parser.add_argument("--build", type=Path, default=Path("build"))
     parser.add_argument("--worst", type=int, default=3, help="show so many of the worst ticks")
     options = parser.parse_args()
     commands = adversary.COMMANDS[options.commands]() if options.commands else []
-    counter = counting.Counter(options.build, emulator.TARGETS[options.target])
-    show(counter.count(options.kernel, image_of(options.program), commands), options.worst)
+    image, entry = ("isr", "isr") if options.isr else ("setpoints", "tick")
+    target = emulator.TARGETS[options.target]
+    counter = counting.Counter(options.build, target, image, entry, options.functions)
+    counts = counter.count(options.kernel, image_of(options.program), commands)
+    show(counter.names, counts, options.worst)
 
 
 if __name__ == "__main__":

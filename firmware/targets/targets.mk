@@ -23,9 +23,12 @@ $(foreach t,$(TARGETS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_
 
 # An image is a main with what it is linked from besides core, canopen, app and the dictionary; and the targets that it is
 # for, where not all.
-IMAGES := setpoints controller taylor
+IMAGES := setpoints controller isr taylor
 setpoints_MAIN := tests/target/setpoints.c
 setpoints_SRC  := tests/target/commands.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+
+isr_MAIN := tests/target/isr.c
+isr_SRC  := $(filter-out %/setpoints.c,$(setpoints_SRC))
 
 taylor_MAIN    := tests/target/taylor.c
 taylor_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)

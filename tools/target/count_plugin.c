@@ -6,7 +6,7 @@
  *
  * MAP has a line for each label and part, addresses in hexadecimal, ends not included:
  *
- *   part LOW HIGH N       instructions from LOW to HIGH belong to part N (1 ... 31); those that no line names belong to
+ *   part LOW HIGH N       instructions from LOW to HIGH belong to part N (1 ... 127); those that no line names belong to
  *                         the part before them in time: a helper counts for who calls it
  *   begin ADDRESS         a call begins with this instruction, in part 0
  *   end ADDRESS           a call has ended before this instruction
@@ -14,7 +14,7 @@
  *   pause ADDRESS         an interrupt begins with this instruction: not counted ...
  *   resume ADDRESS        ... up to and with this one; interrupts may nest
  *
- * OUT gets 32 words of 32 bits for each call that has ended: the instructions of each part. An instruction that is
+ * OUT gets 128 words of 32 bits for each call that has ended: the instructions of each part. An instruction that is
  * skipped by its condition counts like one that is executed: it is fetched and takes its time.
  *
  * Debian's QEMU has no header for plugins, so what is used of version 1 of that interface is declared here.
@@ -41,7 +41,7 @@ int qemu_plugin_install(plugin_id id, const void *info, int argc, char **argv);
 
 __attribute__((visibility("default"))) int qemu_plugin_version = 1;
 
-enum { PARTS = 32, LINES = 1 << 16 };
+enum { PARTS = 128, LINES = 1 << 16 };
 enum kind { PART, BEGIN, END, LAST, PAUSE, RESUME };
 static const char *const kinds[] = {"part", "begin", "end", "last", "pause", "resume"};
 

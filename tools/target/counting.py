@@ -18,7 +18,7 @@ Counts = npt.NDArray[np.uint32]
 Command = tuple[
     int, int
 ]  # before this tick; per cent of override, or what tests/target/commands.h has
-_WORDS = 32  # of a record of the plugin
+_WORDS = 128  # of a record of the plugin
 
 
 def stored(commands: Iterable[Command]) -> bytes:
@@ -34,17 +34,25 @@ class Counter:
     target: emulator.Target
     image: str = "setpoints"
     entry: str = "tick"
-    _map: str | None = field(default=None, init=False)
+    functions: bool = False  # count by functions as they are linked, not by parts
+    _map: parts.Map | None = field(default=None, init=False)
 
     @property
     def elf(self) -> Path:
         return self.build / "firmware" / self.target.name / f"{self.image}.elf"
 
-    def map_text(self) -> str:
+    @property
+    def map(self) -> parts.Map:
         """For count_plugin.c."""
         if self._map is None:
-            self._map = parts.map_text(self.target.cross, self.elf, self.entry)
+            make = parts.function_map if self.functions else parts.part_map
+            self._map = make(self.target.cross, self.elf, self.entry)
         return self._map
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Of the columns of what is counted."""
+        return self.map.names
 
     def count(
         self,
@@ -55,7 +63,7 @@ class Counter:
         times: Path | None = None,
         setpoints: Path | None = None,
     ) -> Counts:
-        """Instructions of each tick of one or more images one behind the other, (ticks, len(PARTS)).
+        """Instructions of each tick of one or more images one behind the other, (ticks, len(names)).
 
         `times` gets what the image's own clock says, `setpoints` its setpoints.
         """
@@ -73,11 +81,11 @@ class Counter:
         """The same of any image: with these words, and this in its store."""
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            (folder / "map").write_text(self.map_text())
+            (folder / "map").write_text(self.map.text)
             (folder / "store").write_bytes(store)
             plugin = self.build / "target/count_plugin.so"
             count = f"{plugin},map={folder / 'map'},out={folder / 'out'}"
             options = ["-plugin", count, *options]
             emulator.run(self.target, self.elf, words, folder / "store", options)
             records = np.fromfile(folder / "out", "<u4").reshape(-1, _WORDS)
-        return records[:, : len(parts.PARTS)]
+        return records[:, : len(self.names)]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +30,10 @@ RULES = (
     (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),
     (r"core/kernel_\w+\.\w:\w+_at$", "position"),
     (r"core/counts\.\w:", "position"),
+    (r"app/machine/axis\.\w:(axis_setpoint|axis_sent)", "frames"),
+    (r"app/tick\.\w:(send|find)_", "frames"),
+    (r"canopen/(sync|pdo\w*|cob)\.\w:", "frames"),
+    (r"app/machine/(machine_|status_watch|answers|statistics)\w*\.\w:", "supervision"),
 )
 _RULES = tuple((re.compile(pattern), PARTS.index(part)) for pattern, part in RULES)
 _LABEL = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
@@ -114,14 +118,55 @@ def part_lines(cross: str, image: Path, code: list[Instruction]) -> Iterator[str
         yield f"part {low:x} {high:x} {part}"
 
 
-def map_text(cross: str, image: Path, entry: str) -> str:
-    """The map of an image whose counted call is the function `entry`."""
-    code = disassemble(cross, image)
+@dataclass(frozen=True)
+class Map:
+    """What count_plugin.c reads, and the names of what it counts."""
+
+    text: str
+    names: tuple[str, ...]
+
+
+def _map(code: list[Instruction], entry: str, ranges: Iterable[str], names: Iterable[str]) -> Map:
     begin = [i.address for i in code if i.function == entry][:1]
     lines = [f"begin {a:x}" for a in begin]
     lines += [f"end {a:x}" for a in returns_to(code, entry)]
-    lines += part_lines(cross, image, code)
-    return "".join(f"{line}\n" for line in lines)
+    return Map("".join(f"{line}\n" for line in (*lines, *ranges)), tuple(names))
+
+
+def part_map(cross: str, image: Path, entry: str) -> Map:
+    """By parts; the counted call is the function `entry`."""
+    code = disassemble(cross, image)
+    return _map(code, entry, part_lines(cross, image, code), PARTS)
+
+
+def function_map(cross: str, image: Path, entry: str) -> Map:
+    """By functions as they are linked, those that the entry can reach by calls, directly or through a pointer."""
+    code = disassemble(cross, image)
+    spans: dict[str, list[int]] = {}
+    for instruction in code:
+        spans.setdefault(instruction.function, []).append(instruction.address)
+    names = _reachable(code, entry)
+    ranges = [
+        f"part {spans[name][0]:x} {spans[name][-1] + 1:x} {number}"
+        for number, name in enumerate(names, 1)
+    ]
+    return _map(code, entry, ranges, ["?", *names])
+
+
+def _reachable(code: list[Instruction], entry: str) -> list[str]:
+    """Names of functions, at most as many as the plugin has parts for."""
+    uses: dict[str, set[str]] = {}
+    for i in code:
+        used = re.search(r"<([^>+]+)>", i.operands)
+        uses.setdefault(i.function, set()).update({used[1]} if used else set())
+    wanted, found = [entry], [entry]
+    hidden = [name for name in uses if re.search(r"_(at|set|point|make)$|^set_segment$", name)]
+    while wanted:
+        for name in sorted(uses.get(wanted.pop(), set())) + (hidden if not wanted else []):
+            if name in uses and name not in found:
+                found.append(name)
+                wanted.append(name)
+    return found[:127]
 
 
 def _tool(*command: str, given: str | None = None) -> str:

@@ -1,0 +1,201 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * An image that runs the whole tick of the controller, with two drives that always obey, on a port that is only memory:
+ * to count what the timer interrupt costs on every core, also where no emulated board has a CAN bus. The words are those
+ * of setpoints.c, KERNEL FILE COMMANDS, of which FILE is not written; the store holds one program image or several.
+ *
+ * What a real port adds: its own handler, and writing a frame into the controller's registers instead of memory.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "app/machine/machine.h"
+#include "app/tick.h"
+#include "commands.h"
+#include "core/program.h"
+#include "port/port.h"
+#include "port/semihost/semihost.h"
+
+enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_STATE = 6 };
+enum { DRIVES = 2, FRAMES = 8, LONGEST_WAIT_TICKS = 1000 };
+
+/* Statuswords with voltage, remote and, in Operation enabled, "follows" (CiA 402). */
+enum { SWITCH_ON_DISABLED = 0x250, READY = 0x231, SWITCHED_ON = 0x233, ENABLED = 0x1237 };
+
+#define STORE_SIZE    0x20000u
+#define COUNTS_PER_MM 1000000u
+
+extern const uint8_t startup_store_base[];
+
+static struct program program;
+static struct motion prepared;
+static struct machine machine;
+static struct tick tick;
+static struct commands commands;
+static struct {
+    struct can_msg frames[FRAMES];
+    uint32_t count;
+    uint32_t time_ns;
+} bus;
+static struct {
+    uint16_t statusword;
+    int32_t latched_counts; /* reached at the next SYNC */
+    int32_t position_counts;
+} drives[DRIVES];
+
+int port_can_send(const struct can_msg *message)
+{
+    bus.frames[bus.count++ % FRAMES] = *message;
+    return 0;
+}
+
+uint32_t port_time_ns(void)
+{
+    return bus.time_ns;
+}
+
+void port_tick_await(uint32_t guard_us, bool hurry)
+{
+    (void)guard_us;
+    (void)hurry;
+}
+
+/* The counted part: what a port's timer interrupt calls. */
+__attribute__((noinline)) static void isr(uint32_t now_us)
+{
+    tick_run(&tick, now_us, 0);
+}
+
+/* The other counted part: what its receive interrupt calls. */
+__attribute__((noinline)) static void receive(const struct can_msg *answer, uint32_t now_us)
+{
+    (void)machine_receive(&machine, answer, now_us);
+}
+
+static uint16_t obey(uint16_t controlword)
+{
+    switch (controlword & 0xFu) {
+    case 0x6u:
+        return READY;
+    case 0x7u:
+        return SWITCHED_ON;
+    case 0xFu:
+        return ENABLED;
+    default:
+        return SWITCH_ON_DISABLED;
+    }
+}
+
+/* Drives answer the SYNC of this tick and take the setpoints that followed it. */
+static void drives_answer(uint32_t now_us)
+{
+    for (uint32_t i = 0; i < DRIVES; i++) {
+        const struct axis *axis = &machine.axes[i];
+        struct can_msg answer = {.id = 0x180u + axis->node, .len = 6};
+        drives[i].position_counts = drives[i].latched_counts;
+        drives[i].latched_counts = axis->target_sent_counts;
+        answer.data[0] = (uint8_t)drives[i].statusword;
+        answer.data[1] = (uint8_t)(drives[i].statusword >> 8);
+        for (uint32_t k = 0; k < 4; k++) {
+            answer.data[2 + k] = (uint8_t)((uint32_t)drives[i].position_counts >> (8 * k));
+        }
+        drives[i].statusword = obey(axis->controlword);
+        receive(&answer, now_us);
+    }
+}
+
+static void period(void)
+{
+    const uint32_t period_us = machine.config.period_us;
+    bus.time_ns += period_us * 1000u;
+    if (machine_on_path(&machine)) {
+        isr(bus.time_ns / 1000u);
+    } else {
+        tick_run(&tick, bus.time_ns / 1000u, 0);
+    }
+    drives_answer(bus.time_ns / 1000u);
+}
+
+static bool wait_for(enum machine_state state)
+{
+    for (uint32_t k = 0; k < LONGEST_WAIT_TICKS && machine.state != state; k++) {
+        period();
+    }
+    return machine.state == state;
+}
+
+static bool switch_on(const struct config *config)
+{
+    machine_init(&machine, config);
+    tick_init(&tick, &machine);
+    machine_drives_configured(&machine, false);
+    if (!wait_for(MACHINE_OFF) || machine_enable(&machine) != MACHINE_ACCEPTED ||
+        !wait_for(MACHINE_READY)) {
+        return false;
+    }
+    for (uint32_t k = 0; k < LONGEST_WAIT_TICKS && machine_busy(&machine); k++) {
+        period();
+    }
+    return true;
+}
+
+static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel)
+{
+    const int32_t anywhere[PLANE_AXES] = {0, 0};
+    struct config config;
+    if (program_open(&program, image, size) != 0) {
+        return STATUS_PROGRAM;
+    }
+    memset(&config, 0, sizeof config);
+    config.period_us = program.header.period_us;
+    config.counts_per_mm = COUNTS_PER_MM;
+    config.kernel = kernel;
+    config.start_tolerance_counts = UINT32_MAX;
+    config.axis_count = DRIVES;
+    config.node[0] = 2;
+    config.node[1] = 3;
+    config.missed_max = 1;
+    if (motion_begin(&prepared, &program, &config) < 0) {
+        return STATUS_PROGRAM;
+    }
+    if (!switch_on(&config) || machine_start(&machine, &prepared, anywhere) != MACHINE_ACCEPTED) {
+        return STATUS_STATE;
+    }
+    for (uint32_t k = 0; machine_on_path(&machine); k++) {
+        commands_give(&commands, k, &machine.motion);
+        period();
+        if (motion_held(&machine.motion) && !commands.more) {
+            break;
+        }
+    }
+    return machine.state == MACHINE_FAULT ? STATUS_STATE : 0;
+}
+
+static int run_all(const char *commands_path, uint8_t kernel)
+{
+    uint32_t done = 0;
+    int status = 0;
+    do {
+        if (commands_path != NULL && commands_open(&commands, commands_path) != 0) {
+            return STATUS_FILE;
+        }
+        status = run_image(startup_store_base + done, STORE_SIZE - done, kernel);
+        commands_close(&commands);
+        done += program.header.image_size;
+    } while (status == 0 && STORE_SIZE - done >= PROGRAM_HEADER_SIZE &&
+             memcmp(startup_store_base + done, "HDGP", 4) == 0);
+    return status;
+}
+
+int main(void)
+{
+    static char line[384];
+    const bool there = semihost_command_line(line, sizeof line) == 0;
+    const char *last = there ? strrchr(line, ' ') : NULL;
+    if (last == NULL || line[0] < '0' || line[0] > '1') {
+        semihost_print("usage: KERNEL FILE COMMANDS\n");
+        return STATUS_USAGE;
+    }
+    return run_all(last[1] == '-' ? NULL : last + 1, (uint8_t)(line[0] - '0'));
+}
