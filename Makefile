@@ -120,7 +120,7 @@ run: build ## run the alpha and the heart on a CAN bus, write a report to out/, 
 
 # SOAK_S: bus time in seconds
 SOAK_S ?= 3600
-soak: build ## programs over and over for SOAK_S seconds of bus time (an hour), every frame looked at
+soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame looked at
 	@tools/with-vcan $(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
 
 SEEDS ?= 5

@@ -2,20 +2,24 @@
 # SPDX-License-Identifier: MIT
 """Runs programs over and over on a virtual bus and looks at every frame.
 
-    tools/with-vcan .venv/bin/python tools/soak.py [--seconds 3600] [--json FILE] [--bus vcan0]
+    tools/with-vcan .venv/bin/python tools/soak.py [--seconds 3600] [--periods 1000,2000] [--json FILE] [--bus vcan0]
 
-`--seconds` is bus time: SYNCs times period. Setpoints and encoders of each repetition must have the hashes that
-`hodograph simulate` gives for the program. Prints a summary; exit status 1 when anything unexpected was on the bus, 4
-when the machine failed.
+`--seconds` is bus time: SYNCs times period. It is shared equally by the periods. Setpoints and encoders of each
+repetition must have the hashes that `hodograph simulate` gives for the program. Prints a summary; exit status 1 when
+anything unexpected was on the bus, 4 when the machine failed.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
+import shutil
 import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from bus_checker import BusChecker
@@ -28,6 +32,7 @@ from hodograph.simulate import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 MACHINE = ROOT / "examples" / "machines" / "paper_alpha.toml"
+PERIODS_US = (1000, 2000, 4000, 8000)
 PROGRAMS = tuple(ROOT / "examples" / name for name in ("alpha.toml", "heart.toml", "star.toml"))
 KERNEL = "fixed"
 _REPORT_S = 60.0
@@ -36,11 +41,11 @@ _REPORT_S = 60.0
 class Soak:
     """One soak: its programs, their hashes, what was seen."""
 
-    def __init__(self, address: BusAddress, note: Callable[[str], None]) -> None:
+    def __init__(self, address: BusAddress, machine: Path, note: Callable[[str], None]) -> None:
         """Plans and simulates the programs. Raises HodographError."""
         self.address = address
         self.note = note
-        self.chains = [load_chain(file, MACHINE) for file in PROGRAMS]
+        self.chains = [load_chain(file, machine) for file in PROGRAMS]
         self.machine = self.chains[0].machine
         self.expected = [self._simulated(chain) for chain in self.chains]
         self.checker = BusChecker(self.machine)
@@ -62,7 +67,7 @@ class Soak:
         return self.checker.syncs * self.machine.period_us / 1e6
 
     def run(self, seconds: float) -> None:
-        """Runs until so much bus time has passed, the last program to its end. Raises HodographError."""
+        """Runs until so much bus time has passed and the last program has ended. Raises HodographError."""
         begun = told = time.monotonic()
         with (
             Tap(self.address) as tap,
@@ -94,13 +99,14 @@ class Soak:
     def line(self) -> str:
         """Where it stands, in a line."""
         return (
-            f"{self.bus_s:.0f} s of bus time in {self.wall_s:.0f} s, {self.checker.frames} frames, "
-            f"{self.repetitions} programs, {self.checker.finding_count} unexpected"
+            f"{self.machine.period_us} us: {self.bus_s:.0f} s of bus time in {self.wall_s:.0f} s, "
+            f"{self.checker.frames} frames, {self.repetitions} programs, {self.checker.finding_count} unexpected"
         )
 
     def summary(self) -> dict[str, object]:
         """Figures for --json."""
         return {
+            "period_us": self.machine.period_us,
             "bus_s": self.bus_s,
             "wall_s": self.wall_s,
             "frames": self.checker.frames,
@@ -116,26 +122,64 @@ class Soak:
         }
 
 
-def main(arguments: list[str]) -> int:
-    """Command line; returns the exit status."""
+@contextmanager
+def _machine_with(period_us: int) -> Iterator[Path]:
+    """The machine's file with another period, beside copies of its drives."""
+    with tempfile.TemporaryDirectory() as folder:
+        examples = Path(folder) / "examples"
+        shutil.copytree(ROOT / "examples", examples)
+        file = examples / MACHINE.relative_to(ROOT / "examples")
+        text = file.read_text(encoding="utf-8")
+        file.write_text(
+            re.sub(r"^period_us = .*$", f"period_us = {period_us}", text, count=1, flags=re.M),
+            encoding="utf-8",
+        )
+        yield file
+
+
+def _note(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _periods(text: str) -> list[int]:
+    periods = [int(word) for word in text.split(",")]
+    if not periods or any(period not in PERIODS_US for period in periods):
+        raise ValueError
+    return periods
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="programs over and over, every frame looked at")
     parser.add_argument("--seconds", type=float, default=3600.0, help="bus time (%(default)g)")
+    parser.add_argument(
+        "--periods", type=_periods, default=list(PERIODS_US), help="in us, some of %(default)s"
+    )
     parser.add_argument("--bus", default="vcan0")
     parser.add_argument("--json", type=Path, help="write the figures there")
-    options = parser.parse_args(arguments)
+    return parser
+
+
+def main(arguments: list[str]) -> int:
+    """Command line; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    soaks = []
     try:
-        soak = Soak(
-            BusAddress("socketcan", options.bus),
-            lambda text: print(text, file=sys.stderr, flush=True),
-        )
-        soak.run(options.seconds)
+        for period_us in options.periods:
+            with _machine_with(period_us) as machine:
+                soak = Soak(BusAddress("socketcan", options.bus), machine, _note)
+                soak.run(options.seconds / len(options.periods))
+            soaks.append(soak)
+            print(soak.line(), flush=True)
     except HodographError as error:
         print(f"soak: {error}", file=sys.stderr)
         return 4
     if options.json is not None:
-        options.json.write_text(json.dumps(soak.summary(), indent=2) + "\n", encoding="utf-8")
-    print(soak.line())
-    return 1 if soak.checker.finding_count else 0
+        figures = [soak.summary() for soak in soaks]
+        options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    unexpected = sum(soak.checker.finding_count for soak in soaks)
+    bus_s = sum(soak.bus_s for soak in soaks)
+    print(f"{bus_s:.0f} s of bus time, {unexpected} unexpected")
+    return 1 if unexpected else 0
 
 
 if __name__ == "__main__":
