@@ -37,14 +37,18 @@ static bool send_sync(struct tick *tick)
 }
 
 /* Axes that hold have none. */
-static void find_offsets(struct tick *tick, struct feedforward_offset offset[AXES_MAX])
+static const struct feedforward_offset *find_offsets(struct tick *tick,
+                                                     struct feedforward_offset offset[AXES_MAX])
 {
+    static const struct feedforward_offset none[AXES_MAX];
     const struct machine *machine = tick->machine;
-    memset(offset, 0, AXES_MAX * sizeof offset[0]);
-    if (machine->config.feedforward != 0u) {
-        offsets_step(&tick->offsets, &machine->config,
-                     machine_on_path(machine) ? &machine->motion : NULL, offset);
+    if (machine->config.feedforward == 0u) {
+        return none;
     }
+    memset(offset, 0, AXES_MAX * sizeof offset[0]);
+    offsets_step(&tick->offsets, &machine->config,
+                 machine_on_path(machine) ? &machine->motion : NULL, offset);
+    return offset;
 }
 
 static void send_setpoints(struct tick *tick, const struct feedforward_offset *offset)
@@ -80,8 +84,8 @@ static void send_velocities(struct tick *tick, const struct feedforward_offset *
 static void send_process_data(struct tick *tick)
 {
     struct machine *machine = tick->machine;
-    struct feedforward_offset offset[AXES_MAX];
-    find_offsets(tick, offset);
+    struct feedforward_offset found[AXES_MAX];
+    const struct feedforward_offset *offset = find_offsets(tick, found);
     if (!machine_drives_operational(machine)) {
         return;
     }

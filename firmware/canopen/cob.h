@@ -39,6 +39,29 @@ uint64_t cob_get(const uint8_t *from, uint32_t size);
 /* Stores the low `size` (0 ... 8) bytes of `value` at `to`, least significant first. */
 void cob_put(uint8_t *to, uint64_t value, uint32_t size);
 
+/* The same for what process data are made of, in the tick. */
+static inline uint16_t cob_get16(const uint8_t *from)
+{
+    return (uint16_t)(from[0] | (uint32_t)from[1] << 8);
+}
+
+static inline uint32_t cob_get32(const uint8_t *from)
+{
+    return cob_get16(from) | (uint32_t)cob_get16(from + 2) << 16;
+}
+
+static inline void cob_put16(uint8_t *to, uint16_t value)
+{
+    to[0] = (uint8_t)value;
+    to[1] = (uint8_t)(value >> 8);
+}
+
+static inline void cob_put32(uint8_t *to, uint32_t value)
+{
+    cob_put16(to, (uint16_t)value);
+    cob_put16(to + 2, (uint16_t)(value >> 16));
+}
+
 /* Two's complement reading of the low `size` (1 ... 8) bytes of `value`. */
 int64_t cob_signed(uint64_t value, uint32_t size);
 

@@ -13,8 +13,8 @@ static void put_word_and_position(struct can_msg *out, uint32_t cob, uint8_t dri
                                   int32_t position)
 {
     cob_frame(out, cob + drive, WORD_AND_POSITION_BYTES);
-    cob_put(out->data, word, 2);
-    cob_put(out->data + 2, (uint32_t)position, 4);
+    cob_put16(out->data, word);
+    cob_put32(out->data + 2, (uint32_t)position);
 }
 
 /* Node id, 0 or PDO_ERR_SHORT, as pdo.h has it. */
@@ -28,7 +28,7 @@ static int node_of(const struct can_msg *in, uint32_t cob, uint8_t bytes)
 
 static int32_t get_position(const struct can_msg *in)
 {
-    return (int32_t)cob_signed(cob_get(in->data + 2, 4), 4);
+    return (int32_t)cob_get32(in->data + 2);
 }
 
 void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out)
@@ -41,7 +41,7 @@ int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint)
     int drive = node_of(in, COB_RPDO1, WORD_AND_POSITION_BYTES);
 
     if (drive > 0) {
-        setpoint->controlword = (uint16_t)cob_get(in->data, 2);
+        setpoint->controlword = cob_get16(in->data);
         setpoint->target_counts = get_position(in);
     }
     return drive;
@@ -50,7 +50,7 @@ int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint)
 void pdo_add_torque(struct can_msg *out, int16_t torque_permille)
 {
     out->len = WITH_TORQUE_BYTES;
-    cob_put(out->data + WORD_AND_POSITION_BYTES, (uint16_t)torque_permille, 2);
+    cob_put16(out->data + WORD_AND_POSITION_BYTES, (uint16_t)torque_permille);
 }
 
 int pdo_decode_torque(const struct can_msg *in, int16_t *torque_permille)
@@ -66,7 +66,7 @@ int pdo_decode_torque(const struct can_msg *in, int16_t *torque_permille)
 void pdo_encode_velocity(uint8_t drive, int32_t velocity_counts_s, struct can_msg *out)
 {
     cob_frame(out, COB_RPDO2 + drive, VELOCITY_BYTES);
-    cob_put(out->data, (uint32_t)velocity_counts_s, VELOCITY_BYTES);
+    cob_put32(out->data, (uint32_t)velocity_counts_s);
 }
 
 int pdo_decode_velocity(const struct can_msg *in, int32_t *velocity_counts_s)
@@ -105,7 +105,7 @@ int pdo_decode_actual(const struct can_msg *in, struct pdo_actual *actual)
     int drive = node_of(in, COB_TPDO1, WORD_AND_POSITION_BYTES);
 
     if (drive > 0) {
-        actual->statusword = (uint16_t)cob_get(in->data, 2);
+        actual->statusword = cob_get16(in->data);
         actual->position_counts = get_position(in);
     }
     return drive;

@@ -33,25 +33,27 @@ static void supervise_axis(struct machine *machine, const struct axis *axis, uin
 }
 
 /* Where the SYNC itself did not leave, no answer is missing. */
-static void close_sync(struct machine *machine, struct axis *axis, uint32_t now_us)
+static void close_sync(struct machine *machine, uint32_t now_us)
 {
-    if (!machine->sync_sent) {
-        axis->answers.count = 0;
-        return;
+    const uint32_t wait_us = machine_answer_wait_us(machine);
+    uint32_t missed = 0;
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        struct answers *answers = &machine->axes[i].answers;
+        if (machine->sync_sent) {
+            missed += answers_close_sync(answers, now_us, machine->sync_us, wait_us,
+                                         machine->config.missed_max);
+        } else {
+            answers->count = 0;
+        }
     }
-    const uint32_t missed =
-        answers_close_sync(&axis->answers, now_us, machine->sync_us,
-                           machine_answer_wait_us(machine), machine->config.missed_max);
-    if (machine_on_path(machine)) {
+    if (missed != 0u && machine_on_path(machine)) {
         machine->statistics.missed_tpdos += missed;
     }
 }
 
 void machine_supervise(struct machine *machine, uint32_t now_us)
 {
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        close_sync(machine, &machine->axes[i], now_us);
-    }
+    close_sync(machine, now_us);
     machine->sync_us = now_us;
     for (uint8_t i = 0; i < machine->config.axis_count && machine->state != MACHINE_BOOT; ++i) {
         supervise_axis(machine, &machine->axes[i], now_us);
