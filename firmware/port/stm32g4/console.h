@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * console: LPUART1 on PA2, which the board's ST-LINK shows as a serial port: 115200 bit/s, 8 data bits, no parity. Sending
+ * only. A character takes 87 us and the functions wait for it: for the mainline and for handlers that do not return.
+ */
+#ifndef PORT_STM32G4_CONSOLE_H
+#define PORT_STM32G4_CONSOLE_H
+
+#include <stdint.h>
+
+/* Needs HSI and the pins' port clock. */
+void console_begin(void);
+
+/* "hodograph: TEXT VALUE", a line. */
+void console_number(const char *text, int32_t value);
+void console_hex(const char *text, uint32_t value);
+
+#endif

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+#include "port/stm32g4/cpu.h"
+
+#include "port/stm32g4/reg.h"
+
+#define NVIC_ISER 0xE000E100u
+#define NVIC_ICER 0xE000E180u
+#define NVIC_IPR  0xE000E400u
+#define SCB_AIRCR 0xE000ED0Cu
+
+#define AIRCR_SYSRESETREQ 0x05FA0004u
+#define PRIORITY_SHIFT    4u /* the chip has the upper four of eight bits */
+
+void cpu_interrupt_on(uint32_t number, uint8_t priority)
+{
+    const uint32_t field = 0xFFu << (8u * (number % 4u));
+    reg_put(NVIC_IPR + (number & ~3u), field, (uint32_t)priority << PRIORITY_SHIFT);
+    reg_write(NVIC_ISER + 4u * (number / 32u), 1u << (number % 32u));
+}
+
+void cpu_interrupt_off(uint32_t number)
+{
+    reg_write(NVIC_ICER + 4u * (number / 32u), 1u << (number % 32u));
+    __asm__ volatile("dsb\n\tisb" ::: "memory");
+}
+
+uint8_t cpu_hold(uint8_t priority)
+{
+    uint32_t before = 0;
+    const uint32_t now = (uint32_t)priority << PRIORITY_SHIFT;
+    __asm__ volatile("mrs %0, basepri\n\tmsr basepri, %1\n\tisb"
+                     : "=&r"(before)
+                     : "r"(now)
+                     : "memory");
+    return (uint8_t)(before >> PRIORITY_SHIFT);
+}
+
+bool cpu_in_handler(void)
+{
+    uint32_t number = 0;
+    __asm__ volatile("mrs %0, ipsr" : "=r"(number));
+    return number != 0u;
+}
+
+/* The return from an interrupt sets the event that wfe waits for: none is missed between a look and the sleep. */
+void cpu_sleep(void)
+{
+    __asm__ volatile("dsb\n\twfe" ::: "memory");
+}
+
+void cpu_reset(void)
+{
+    __asm__ volatile("dsb" ::: "memory");
+    reg_write(SCB_AIRCR, AIRCR_SYSRESETREQ);
+    for (;;) {
+    }
+}

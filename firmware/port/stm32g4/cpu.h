@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * cpu: what the core itself does for the port (ARMv7-M Architecture Reference Manual B1, B3). On any other machine the
+ * tests define these functions.
+ *
+ * Priorities: 0 is the highest, the chip knows 16. NMI and hard fault are above all of them.
+ */
+#ifndef PORT_STM32G4_CPU_H
+#define PORT_STM32G4_CPU_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define CPU_PRIORITY_TICK    1u
+#define CPU_PRIORITY_RECEIVE 2u
+
+/* Holds off interrupts of this priority and lower ones; 0: none. Returns what to hand to cpu_hold afterwards. */
+uint8_t cpu_hold(uint8_t priority);
+
+/* True in an interrupt handler. */
+bool cpu_in_handler(void);
+
+/* Turns a board's interrupt on, and off. */
+void cpu_interrupt_on(uint32_t number, uint8_t priority);
+void cpu_interrupt_off(uint32_t number);
+
+/* Sleeps until an interrupt has been served since the last call. */
+void cpu_sleep(void);
+
+/* Starts anew, as after power-on. Does not return. */
+void cpu_reset(void);
+
+#endif

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * fdcan: FDCAN1 for classic frames with 11-bit identifiers.
+ *
+ * Sending. Two queues, one for the interrupts (SYNC, setpoints) and one for the mainline (SDO, heartbeats), each in
+ * order. The chip's own FIFO of three takes all that the interrupts send, but from the mainline only one frame, when it is
+ * empty: so SYNC never waits for more than the frame that is on the wire and one of the mainline, however much
+ * the mainline has to say.
+ *
+ * Receiving. The chip's FIFO of three, 141 us of the shortest frames at 1 Mbit/s: the receive interrupt must not be held
+ * off longer. What matches no filter is rejected by the chip, as are remote and extended frames.
+ *
+ * Bus-off. The chip leaves the bus by itself. All frames that wait are dropped, as they are old when the bus is back,
+ * sending is refused, and the chip is told to come back, which it does after 129 times 11 recessive bits (1.4 ms at 1 Mbit/s): without
+ * limit and without help, as CiA 301 leaves it to the node. The application sees a port that refuses its frames.
+ *
+ * Pins, clock and interrupt lines are the caller's business. "Any context": interrupts of priority CPU_PRIORITY_TICK and
+ * lower, and the mainline; the functions hold these off where they must.
+ */
+#ifndef PORT_STM32G4_FDCAN_H
+#define PORT_STM32G4_FDCAN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "can/can_frame.h"
+#include "port/stm32g4/fdcan_queue.h"
+
+struct fdcan_filter {
+    uint16_t id;
+    uint16_t mask; /* a frame passes when (frame.id & mask) == (id & mask) */
+};
+
+/* Since they were last taken. */
+struct fdcan_events {
+    uint32_t bus_offs;
+    uint32_t error_passives; /* entered or left */
+    uint32_t lost;           /* at least so many times a frame came and the FIFO was full */
+};
+
+struct fdcan {
+    struct fdcan_queue urgent;   /* of the interrupts */
+    struct fdcan_queue ordinary; /* of the mainline */
+    struct fdcan_events events;
+    bool off; /* not on the bus: not started, or bus-off */
+};
+
+enum fdcan_sender { FDCAN_URGENT, FDCAN_ORDINARY };
+
+/* Configures the chip and stays off the bus. False: a bit rate it cannot keep, or the chip does not answer (no clock). Mainline. */
+bool fdcan_begin(struct fdcan *can, uint32_t bits_s);
+
+/* Between begin and start. False: more filters than the chip has (28). No filter: nothing passes. */
+bool fdcan_accept(const struct fdcan_filter *filters, size_t count);
+
+/* Enters the bus (after 11 recessive bits), leaves it. Mainline. */
+void fdcan_start(struct fdcan *can);
+void fdcan_stop(struct fdcan *can);
+
+/* False: off the bus, or no room; the frame is not queued. Any context. */
+bool fdcan_send(struct fdcan *can, const struct can_msg *message, enum fdcan_sender sender);
+
+/* Receive interrupt: first acknowledge, then fetch until there is none, then attend to what was acknowledged. */
+uint32_t fdcan_acknowledge(void);
+bool fdcan_fetch(struct can_msg *message);
+void fdcan_attend(struct fdcan *can, uint32_t acknowledged);
+
+/* Mainline. */
+struct fdcan_events fdcan_take_events(struct fdcan *can);
+
+/* Error counters of the chip: transmit, receive (0 to 255, 0 to 127). Any context. */
+void fdcan_errors(uint8_t *transmit, uint8_t *receive);
+
+#endif

@@ -1,0 +1,238 @@
+/* SPDX-License-Identifier: MIT */
+/* The port for NUCLEO-G474RE: what port.h asks for, from the modules of this folder. */
+#include "port/port.h"
+
+#include "port/cortex_m/startup.h"
+#include "port/stm32g4/clock.h"
+#include "port/stm32g4/console.h"
+#include "port/stm32g4/cpu.h"
+#include "port/stm32g4/fdcan.h"
+#include "port/stm32g4/flash.h"
+#include "port/stm32g4/flash_store.h"
+#include "port/stm32g4/interrupts.h"
+#include "port/stm32g4/pins.h"
+#include "port/stm32g4/reg_clock.h"
+#include "port/stm32g4/reg_io.h"
+#include "port/stm32g4/tick_timer.h"
+#include "port/stm32g4/watchdog.h"
+
+/* make NODE=... CAN_BITS_S=... */
+#if !defined(BOARD_NODE)
+#define BOARD_NODE 1
+#endif
+#if !defined(BOARD_CAN_BITS_S)
+#define BOARD_CAN_BITS_S 1000000
+#endif
+typedef char node_is_a_can_open_one[BOARD_NODE >= 1 && BOARD_NODE <= 127 ? 1 : -1];
+
+static struct {
+    struct fdcan can;
+    volatile bool started;
+    volatile bool awake;
+    uint32_t spoiled_words; /* seen before the start */
+} self;
+
+static int fail(const char *text)
+{
+    port_log(PORT_WARNING, text, 0);
+    return PORT_ERR_SYSTEM;
+}
+
+static void begin_can_hardware(void)
+{
+    reg_put(RCC_BASE + RCC_CCIPR, RCC_CCIPR_FDCANSEL, RCC_CCIPR_FDCANSEL_HSE);
+    reg_set(RCC_BASE + RCC_APB1ENR1, RCC_APB1ENR1_FDCANEN);
+    reg_set(RCC_BASE + RCC_APB1RSTR1, RCC_APB1RSTR1_FDCANRST);
+    reg_clear(RCC_BASE + RCC_APB1RSTR1, RCC_APB1RSTR1_FDCANRST);
+    pins_alternate(11, PIN_PA11_FDCAN1_RX);
+    pins_alternate(12, PIN_PA12_FDCAN1_TX);
+}
+
+int port_begin(int argc, char **argv)
+{
+    (void)argc;
+    (void)argv;
+    pins_begin();
+    const bool clocked = clock_begin();
+    console_begin();
+    if (watchdog_has_bitten()) {
+        port_log(PORT_WARNING, "restarted by the watchdog", 0);
+    }
+    if (!clocked) {
+        return fail("the 24 MHz crystal or the PLL does not start");
+    }
+    if (!flash_is_dual()) {
+        return fail("the flash is not in dual-bank mode: set option bit DBANK");
+    }
+    reg_set(RCC_BASE + RCC_APB1ENR1, RCC_APB1ENR1_TIM2EN | RCC_APB1ENR1_TIM5EN);
+    (void)reg_read(RCC_BASE + RCC_APB1ENR1);
+    tick_timer_begin(CLOCK_MHZ);
+    begin_can_hardware();
+    return fdcan_begin(&self.can, BOARD_CAN_BITS_S) ? 0 : fail("FDCAN1 cannot be configured");
+}
+
+int port_end(void)
+{
+    interrupts_stop();
+    fdcan_stop(&self.can);
+    self.started = false;
+    return 0;
+}
+
+bool port_stop_requested(void)
+{
+    return false;
+}
+
+uint8_t port_node_id(void)
+{
+    return BOARD_NODE;
+}
+
+int port_can_accept(const struct port_filter *filters, size_t count)
+{
+    struct fdcan_filter copies[PORT_FILTERS];
+    if (count > PORT_FILTERS) {
+        return PORT_ERR_SYSTEM;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        copies[i] = (struct fdcan_filter){.id = filters[i].id, .mask = filters[i].mask};
+    }
+    return fdcan_accept(copies, count) ? 0 : PORT_ERR_SYSTEM;
+}
+
+int port_can_send(const struct can_msg *message)
+{
+    const enum fdcan_sender sender = cpu_in_handler() ? FDCAN_URGENT : FDCAN_ORDINARY;
+    return fdcan_send(&self.can, message, sender) ? 0 : PORT_ERR_FULL;
+}
+
+uint32_t port_time_ns(void)
+{
+    return tick_timer_ns();
+}
+
+uint32_t port_time_us(void)
+{
+    return tick_timer_us();
+}
+
+int port_start(const struct port_handlers *handlers, uint32_t period_us)
+{
+    if (self.spoiled_words != 0u) {
+        port_log(PORT_WARNING, "spoiled words in the program store", (int32_t)self.spoiled_words);
+    }
+    watchdog_start();
+    self.started = true;
+    interrupts_start(&self.can, handlers, period_us);
+    return 0;
+}
+
+void port_tick_period(uint32_t period_us)
+{
+    interrupts_period(period_us);
+}
+
+void port_tick_await(uint32_t guard_us, bool hurry)
+{
+    (void)guard_us;
+    (void)hurry;
+}
+
+void port_tick_ready(void)
+{
+}
+
+void port_lock(void)
+{
+    (void)cpu_hold(CPU_PRIORITY_TICK);
+}
+
+void port_unlock(void)
+{
+    (void)cpu_hold(0);
+}
+
+static void tell(const char *text, uint32_t count)
+{
+    if (count != 0u) {
+        port_log(PORT_WARNING, text, (int32_t)count);
+    }
+}
+
+static void tell_events(void)
+{
+    const struct fdcan_events events = fdcan_take_events(&self.can);
+    tell("left the CAN bus after too many errors, times", events.bus_offs);
+    tell("error passive on the CAN bus began or ended, times", events.error_passives);
+    tell("frames came too fast, lost", events.lost);
+}
+
+void port_wait(uint32_t timeout_us)
+{
+    const uint32_t began_us = port_time_us();
+    watchdog_feed(interrupts_ticks());
+    tell_events();
+    while (!self.awake && port_time_us() - began_us < timeout_us) {
+        if (self.started) {
+            cpu_sleep();
+        }
+    }
+    self.awake = false;
+}
+
+void port_wake(void)
+{
+    self.awake = true;
+}
+
+uint32_t port_store_size(void)
+{
+    return FLASH_STORE_BYTES;
+}
+
+int port_store_erase(unsigned bank)
+{
+    return flash_store_erase(bank) ? 0 : PORT_ERR_STORE;
+}
+
+int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
+{
+    return flash_store_write(bank, offset, data, size) ? 0 : PORT_ERR_STORE;
+}
+
+const uint8_t *port_store_data(unsigned bank)
+{
+    return flash_store_data(bank);
+}
+
+void port_log(enum port_level level, const char *text, int32_t value)
+{
+    if (level == PORT_WARNING) {
+        console_number(text, value);
+    }
+}
+
+/* Before the start the store is looked through for a whole program: a word that lost its power half written is found
+ * then, and its CRC tells. Later nobody reads what was not checked: the memory itself has failed. */
+void startup_nmi(void)
+{
+    if (flash_take_ecc_error() && !self.started) {
+        self.spoiled_words++;
+        return;
+    }
+    console_number("the flash memory has failed", 0);
+    cpu_reset();
+}
+
+/* SYNC stops, so the drives stop by themselves. */
+void startup_hard_fault(void)
+{
+    console_hex("hard fault, CFSR", reg_read(0xE000ED28u));
+    cpu_reset();
+}
+
+void startup_exit(int status)
+{
+    console_number("ends with status", status);
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: MIT */
+/* Clocks, resets, supply, watchdog (RM0440 chapters 6, 7 and 42). */
+#ifndef PORT_STM32G4_REG_CLOCK_H
+#define PORT_STM32G4_REG_CLOCK_H
+
+#include "port/stm32g4/reg.h"
+
+#define RCC_BASE 0x40021000u
+
+#define RCC_CR                 0x00u
+#define RCC_CR_HSION           BIT(8)
+#define RCC_CR_HSEON           BIT(16)
+#define RCC_CR_HSERDY          BIT(17)
+#define RCC_CR_PLLON           BIT(24)
+#define RCC_CR_PLLRDY          BIT(25)
+#define RCC_CFGR               0x08u
+#define RCC_CFGR_SW            BITS(0, 2)
+#define RCC_CFGR_SWS           BITS(2, 2)
+#define RCC_CFGR_HPRE          BITS(4, 4)
+#define RCC_PLLCFGR            0x0Cu
+#define RCC_PLLCFGR_PLLSRC     BITS(0, 2)
+#define RCC_PLLCFGR_PLLM       BITS(4, 4)
+#define RCC_PLLCFGR_PLLN       BITS(8, 7)
+#define RCC_PLLCFGR_PLLREN     BIT(24)
+#define RCC_PLLCFGR_PLLR       BITS(25, 2)
+#define RCC_APB1RSTR1          0x38u
+#define RCC_APB1RSTR1_FDCANRST BIT(25)
+#define RCC_AHB2ENR            0x4Cu
+#define RCC_AHB2ENR_GPIOAEN    BIT(0)
+#define RCC_APB1ENR1           0x58u
+#define RCC_APB1ENR1_TIM2EN    BIT(0)
+#define RCC_APB1ENR1_TIM5EN    BIT(3)
+#define RCC_APB1ENR1_FDCANEN   BIT(25)
+#define RCC_APB1ENR1_PWREN     BIT(28)
+#define RCC_APB1ENR2           0x5Cu
+#define RCC_APB1ENR2_LPUART1EN BIT(0)
+#define RCC_CCIPR              0x88u
+#define RCC_CCIPR_LPUART1SEL   BITS(10, 2)
+#define RCC_CCIPR_FDCANSEL     BITS(24, 2)
+#define RCC_CSR                0x94u
+#define RCC_CSR_RMVF           BIT(23)
+#define RCC_CSR_IWDGRSTF       BIT(29)
+
+/* Values, as the reference manual calls them: REGISTER_FIELD_MEANING. */
+#define RCC_CFGR_SW_PLL          3u
+#define RCC_CFGR_HPRE_DIV1       0u
+#define RCC_CFGR_HPRE_DIV2       8u
+#define RCC_PLLCFGR_PLLSRC_HSE   3u
+#define RCC_PLLCFGR_PLLM_DIV6    5u
+#define RCC_PLLCFGR_PLLN_MUL85   85u
+#define RCC_PLLCFGR_PLLR_DIV2    0u
+#define RCC_CCIPR_LPUART1SEL_HSI 2u
+#define RCC_CCIPR_FDCANSEL_HSE   0u
+
+#define PWR_BASE 0x40007000u
+
+#define PWR_CR5        0x80u
+#define PWR_CR5_R1MODE BIT(0) /* 0: boost */
+
+#define IWDG_BASE 0x40003000u
+
+#define IWDG_KR     0x00u
+#define IWDG_PR     0x04u
+#define IWDG_PR_PR  BITS(0, 3)
+#define IWDG_RLR    0x08u
+#define IWDG_RLR_RL BITS(0, 12)
+#define IWDG_SR     0x0Cu
+#define IWDG_SR_PVU BIT(0)
+#define IWDG_SR_RVU BIT(1)
+
+/* What IWDG_KR takes. */
+#define IWDG_KEY_FEED   0xAAAAu
+#define IWDG_KEY_UNLOCK 0x5555u
+#define IWDG_KEY_START  0xCCCCu
+
+#endif
