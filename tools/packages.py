@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus`, `test`, `lint` or `firmware`. Missing Debian packages are installed
+A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `firmware` or `flash`. Missing Debian packages are installed
 when this runs as root or with passwordless sudo; otherwise the command to type is printed and the exit status is 1.
 Standard library only: it runs before anything is installed.
 """
@@ -88,7 +88,15 @@ FIRMWARE = (
     _program("qemu-system-arm"),
     _program("qemu-system-riscv32"),
 )
-SETS = {"build": BUILD, "bus": BUS, "test": TEST, "lint": LINT, "firmware": FIRMWARE}
+FLASH = (_program("openocd"),)
+SETS = {
+    "build": BUILD,
+    "bus": BUS,
+    "test": TEST,
+    "lint": LINT,
+    "firmware": FIRMWARE,
+    "flash": FLASH,
+}
 
 
 def _missing(needs: Sequence[Need]) -> list[Need]:

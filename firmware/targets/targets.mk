@@ -18,8 +18,18 @@ $(foreach t,an385 microbit rv32,$(eval $(t)_KERNELS := firmware/targets/kernels_
 # Debian's libraries have no build for rv32imc: those for rv32im are linked.
 rv32_LINK    := -march=rv32im -mabi=ilp32
 
-$(foreach t,$(TARGETS),$(eval $(t)_CROSS := $(if $(filter rv32,$(t)),riscv64-unknown-elf-,arm-none-eabi-)))
-$(foreach t,$(TARGETS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_m)))
+# Boards to hold in one's hands. They have a port of their own, and of the images the controller.
+#   make firmware NODE=2 CAN_BITS_S=500000
+BOARDS     := nucleo_g474re
+NODE       ?= 1
+CAN_BITS_S ?= 1000000
+nucleo_g474re_CPU     := $(an386_CPU) -DBOARD_NODE=$(NODE) -DBOARD_CAN_BITS_S=$(CAN_BITS_S)
+nucleo_g474re_KERNELS := firmware/targets/kernels_float.c
+nucleo_g474re_SRC     := $(wildcard firmware/port/stm32g4/*.c)
+nucleo_g474re_OPENOCD := board/st_nucleo_g4.cfg
+
+$(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CROSS := $(if $(filter rv32,$(t)),riscv64-unknown-elf-,arm-none-eabi-)))
+$(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_m)))
 
 # An image is a main with what it is linked from besides core, canopen, app and the dictionary; and the targets that it is
 # for, where not all.
@@ -36,7 +46,7 @@ taylor_TARGETS := an385 an386
 
 controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/can/*.c)
-controller_TARGETS := an385 an386 an500 an505
+controller_TARGETS := an385 an386 an500 an505 $(BOARDS)
 
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -DNDEBUG $(INCLUDES)
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
@@ -59,16 +69,22 @@ $(BUILD)/firmware/$(1)/libhodograph.a: $(call target_object,$(1),$(TARGET_SRC)) 
 $(call NOTE,$(BUILD)/firmware/$(1)/obj/list,$(TARGET_SRC))
 -include $(patsubst %.o,%.d,$(call target_object,$(1),$(TARGET_SRC)))
 endef
-$(foreach t,$(TARGETS),$(eval $(call TARGET_RULES,$(t))))
+$(foreach t,$(TARGETS) $(BOARDS),$(eval $(call TARGET_RULES,$(t))))
 
 define IMAGE_RULE # target, image
-$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$($(2)_MAIN) $($(2)_SRC) $($(1)_KERNELS) $(wildcard firmware/port/$($(1)_CORE)/*.c)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld
+$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$($(2)_MAIN) $(or $($(1)_SRC),$($(2)_SRC)) $($(1)_KERNELS) $(wildcard firmware/port/$($(1)_CORE)/*.c)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld
 	$$(call say,link,$$@)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $(or $($(1)_LINK),$($(1)_CPU)) -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,-Map,$$(@:.elf=.map) \
 	    -Lfirmware/port/$($(1)_CORE) -Tfirmware/targets/$(1).ld -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
--include $(patsubst %.o,%.d,$(call target_object,$(1),$($(2)_MAIN) $($(2)_SRC) $(wildcard firmware/port/$($(1)_CORE)/*.c)))
+-include $(patsubst %.o,%.d,$(call target_object,$(1),$($(2)_MAIN) $(or $($(1)_SRC),$($(2)_SRC)) $(wildcard firmware/port/$($(1)_CORE)/*.c)))
 endef
 $(foreach i,$(IMAGES),$(foreach t,$(or $($(i)_TARGETS),$(TARGETS)),$(eval $(call IMAGE_RULE,$(t),$(i)))))
 
 .PHONY: firmware
 firmware: $(foreach i,$(IMAGES),$(foreach t,$(or $($(i)_TARGETS),$(TARGETS)),$(BUILD)/firmware/$(t)/$(i).elf)) ## the images for all microcontroller targets
+
+BOARD ?= nucleo_g474re
+.PHONY: flash
+flash: $(BUILD)/firmware/$(BOARD)/controller.elf ## put the controller into a board that is plugged in (BOARD=nucleo_g474re NODE=1 CAN_BITS_S=1000000)
+	@$(PYTHON) tools/packages.py flash
+	openocd -f $($(BOARD)_OPENOCD) -c "program $< verify reset exit"

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "port/stm32g4/cpu.h"
 
+#include "port/cortex_m/core.h"
 #include "port/stm32g4/reg.h"
 
-#define NVIC_ISER 0xE000E100u
 #define NVIC_ICER 0xE000E180u
-#define NVIC_IPR  0xE000E400u
 #define SCB_AIRCR 0xE000ED0Cu
 
 #define AIRCR_SYSRESETREQ 0x05FA0004u
@@ -13,9 +12,7 @@
 
 void cpu_interrupt_on(uint32_t number, uint8_t priority)
 {
-    const uint32_t field = 0xFFu << (8u * (number % 4u));
-    reg_put(NVIC_IPR + (number & ~3u), field, (uint32_t)priority << PRIORITY_SHIFT);
-    reg_write(NVIC_ISER + 4u * (number / 32u), 1u << (number % 32u));
+    core_enable(number, (uint8_t)(priority << PRIORITY_SHIFT));
 }
 
 void cpu_interrupt_off(uint32_t number)

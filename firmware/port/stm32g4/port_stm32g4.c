@@ -9,7 +9,7 @@
 #include "port/stm32g4/fdcan.h"
 #include "port/stm32g4/flash.h"
 #include "port/stm32g4/flash_store.h"
-#include "port/stm32g4/interrupts.h"
+#include "port/stm32g4/irq.h"
 #include "port/stm32g4/pins.h"
 #include "port/stm32g4/reg_clock.h"
 #include "port/stm32g4/reg_io.h"
@@ -73,7 +73,7 @@ int port_begin(int argc, char **argv)
 
 int port_end(void)
 {
-    interrupts_stop();
+    irq_stop();
     fdcan_stop(&self.can);
     self.started = false;
     return 0;
@@ -124,13 +124,13 @@ int port_start(const struct port_handlers *handlers, uint32_t period_us)
     }
     watchdog_start();
     self.started = true;
-    interrupts_start(&self.can, handlers, period_us);
+    irq_start(&self.can, handlers, period_us);
     return 0;
 }
 
 void port_tick_period(uint32_t period_us)
 {
-    interrupts_period(period_us);
+    irq_period(period_us);
 }
 
 void port_tick_await(uint32_t guard_us, bool hurry)
@@ -171,7 +171,7 @@ static void tell_events(void)
 void port_wait(uint32_t timeout_us)
 {
     const uint32_t began_us = port_time_us();
-    watchdog_feed(interrupts_ticks());
+    watchdog_feed(irq_ticks());
     tell_events();
     while (!self.awake && port_time_us() - began_us < timeout_us) {
         if (self.started) {

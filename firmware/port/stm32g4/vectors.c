@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* The board's part of the vector table, up to the last interrupt that is used. */
 #include "port/cortex_m/startup.h"
-#include "port/stm32g4/interrupts.h"
+#include "port/stm32g4/irq.h"
 #include "port/stm32g4/reg_fdcan.h"
 #include "port/stm32g4/reg_io.h"
 
 __attribute__((section(".vectors.board"), used)) static const startup_vector board_vectors[] = {
-    [IRQ_FDCAN1_IT0] = interrupts_can,
-    [IRQ_TIM2] = interrupts_tick,
+    [IRQ_FDCAN1_IT0] = irq_can,
+    [IRQ_TIM2] = irq_tick,
 };

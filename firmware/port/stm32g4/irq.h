@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * interrupts: the two of them that the controller lives on, and how they keep out of each other's way.
+ * irq: the two of them that the controller lives on, and how they keep out of each other's way.
  *
  *     TIM2        priority 1: the tick
  *     FDCAN1 IT0  priority 2: frames that came, the next ones to send, bus-off
@@ -9,8 +9,8 @@
  * held off, a frame at a time. The mainline's critical section holds off both. So the application sees what
  * port.h promises, and a tick waits for one call of `receive` at most, a few microseconds.
  */
-#ifndef PORT_STM32G4_INTERRUPTS_H
-#define PORT_STM32G4_INTERRUPTS_H
+#ifndef PORT_STM32G4_IRQ_H
+#define PORT_STM32G4_IRQ_H
 
 #include <stdint.h>
 
@@ -18,17 +18,17 @@
 #include "port/stm32g4/fdcan.h"
 
 /* Both on; the first tick comes one period later. Mainline. */
-void interrupts_start(struct fdcan *can, const struct port_handlers *handlers, uint32_t period_us);
-void interrupts_stop(void);
+void irq_start(struct fdcan *can, const struct port_handlers *handlers, uint32_t period_us);
+void irq_stop(void);
 
 /* From the next tick on. Mainline, or the tick. */
-void interrupts_period(uint32_t period_us);
+void irq_period(uint32_t period_us);
 
 /* Ticks so far. Mainline. */
-uint32_t interrupts_ticks(void);
+uint32_t irq_ticks(void);
 
 /* The handlers themselves, for the vectors. */
-void interrupts_tick(void);
-void interrupts_can(void);
+void irq_tick(void);
+void irq_can(void);
 
 #endif

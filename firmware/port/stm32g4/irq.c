@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "port/stm32g4/interrupts.h"
+#include "port/stm32g4/irq.h"
 
 #include "port/stm32g4/cpu.h"
 #include "port/stm32g4/reg_fdcan.h"
@@ -13,7 +13,7 @@ static struct {
     volatile uint32_t ticks;
 } self;
 
-void interrupts_start(struct fdcan *can, const struct port_handlers *handlers, uint32_t period_us)
+void irq_start(struct fdcan *can, const struct port_handlers *handlers, uint32_t period_us)
 {
     self.can = can;
     self.handlers = *handlers;
@@ -23,26 +23,26 @@ void interrupts_start(struct fdcan *can, const struct port_handlers *handlers, u
     cpu_interrupt_on(IRQ_FDCAN1_IT0, CPU_PRIORITY_RECEIVE);
 }
 
-void interrupts_stop(void)
+void irq_stop(void)
 {
     cpu_interrupt_off(IRQ_TIM2);
     cpu_interrupt_off(IRQ_FDCAN1_IT0);
     tick_timer_stop();
 }
 
-void interrupts_period(uint32_t period_us)
+void irq_period(uint32_t period_us)
 {
     const uint8_t before = cpu_hold(CPU_PRIORITY_TICK);
     tick_timer_period(&self.timer, period_us);
     (void)cpu_hold(before);
 }
 
-uint32_t interrupts_ticks(void)
+uint32_t irq_ticks(void)
 {
     return self.ticks;
 }
 
-void interrupts_tick(void)
+void irq_tick(void)
 {
     const uint32_t late_ns = tick_timer_enter(&self.timer);
     self.handlers.tick(self.handlers.self, tick_timer_us(), late_ns);
@@ -51,7 +51,7 @@ void interrupts_tick(void)
 }
 
 /* A flood must not keep what was acknowledged waiting: it comes again as long as there are frames. */
-void interrupts_can(void)
+void irq_can(void)
 {
     const uint32_t acknowledged = fdcan_acknowledge();
     struct can_msg message;
