@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `firmware` or `flash`. Missing Debian packages are installed
-when this runs as root or with passwordless sudo; otherwise the command to type is printed and the exit status is 1.
-Standard library only: it runs before anything is installed.
+A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `firmware` or `flash`. Missing Debian packages are
+installed when this runs as root or with passwordless sudo; otherwise the command to type is printed and
+the exit status is 1. Standard library only: it runs before anything is installed.
 """
 
 from __future__ import annotations

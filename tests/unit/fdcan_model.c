@@ -149,7 +149,9 @@ static uint32_t read_control(void)
     if (self.no_clock) {
         return self.control & ~INIT;
     }
-    if (self.init_reads > 0u && --self.init_reads == 0u) {
+    const bool last = self.init_reads == 1u;
+    self.init_reads -= self.init_reads > 0u ? 1u : 0u;
+    if (last) {
         self.control = (self.control & ~INIT) | self.init_wanted;
         if (self.init_wanted == 0u) {
             self.control &= ~CCE;

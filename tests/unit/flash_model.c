@@ -313,10 +313,12 @@ uint32_t flash_model_read(uint32_t address)
 
 const uint8_t *flash_model_memory(uint32_t address)
 {
-    if (address < MEMORY || address >= MEMORY + FLASH_MODEL_BYTES) {
+    const uint32_t at = address - MEMORY;
+    if (at >= FLASH_MODEL_BYTES) {
         chip_forbids("outside bank 2", address);
+        return self.memory;
     }
-    return &self.memory[address - MEMORY];
+    return &self.memory[at];
 }
 
 uint32_t flash_model_spoiled(void)

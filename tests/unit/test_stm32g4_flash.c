@@ -302,7 +302,7 @@ static void test_power_lost_at_any_operation_leaves_a_whole_program(void)
     /* the last page, five of the program, a double word for eight bytes of it, two for the record */
     TEST_ASSERT_EQUAL_UINT32(1u + 4u + images[NEW].size / 8u + 2u, operations);
     for (uint32_t operation = 0; operation < operations; ++operation) {
-        for (int remains = 0; remains < (int)FLASH_MODEL_REMAINS; ++remains) {
+        for (int remains = 0; remains < FLASH_MODEL_REMAINS; ++remains) {
             cut_at(operation, operations - 1u, (enum flash_model_remains)remains);
         }
         if (operation % 32u == 0u) {
