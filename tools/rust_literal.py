@@ -24,7 +24,8 @@ class _Reader:
 
     def _step(self) -> None:
         match = next(self._matches, None)
-        self.kind, self.token = (match.lastgroup, match[match.lastgroup]) if match else ("", "")
+        self.kind = match.lastgroup or "" if match else ""
+        self.token = match[self.kind] if match and self.kind else ""
 
     def _take(self) -> str:
         token = self.token
