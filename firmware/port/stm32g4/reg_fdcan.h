@@ -7,11 +7,10 @@
 
 #define FDCAN1_BASE 0x40006400u
 
-#define FDCAN_CCCR                                                                                 \
-    0x018u /* control; the fields below: INIT stops the bus, CCE opens the configuration */
-#define FDCAN_CCCR_INIT BIT(0)
-#define FDCAN_CCCR_CCE  BIT(1)
-#define FDCAN_NBTP      0x01Cu /* nominal bit timing; every value is one less than what it means */
+#define FDCAN_CCCR        0x018u /* INIT stops the bus, CCE opens the configuration */
+#define FDCAN_CCCR_INIT   BIT(0)
+#define FDCAN_CCCR_CCE    BIT(1)
+#define FDCAN_NBTP        0x01Cu /* bit timing; every value is one less than what it means */
 #define FDCAN_NBTP_NTSEG2 BITS(0, 7)
 #define FDCAN_NBTP_NTSEG1 BITS(8, 8)
 #define FDCAN_NBTP_NBRP   BITS(16, 9)
