@@ -38,7 +38,7 @@ OD_NAMES := $(if $(wildcard firmware/app/controller.eds),controller) $(if $(wild
 OD_C     := $(OD_NAMES:%=$(BUILD)/generated/od_%.c)
 OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
 
-LIBS        := app node injector faults port stm32g4 canopen sim core od
+LIBS        := app node injector bridge faults port mps2 stm32g4 canopen can sim core od
 core_SRC    := $(wildcard firmware/core/*.c)
 canopen_SRC := $(wildcard firmware/canopen/*.c)
 sim_SRC     := $(wildcard sim/plant/*.c sim/rig/*.c)
@@ -47,14 +47,18 @@ port_SRC    := $(filter-out %/main.c,$(wildcard firmware/port/linux/*.c))
 node_SRC    := $(filter-out %/main.c,$(wildcard sim/node/*.c))
 faults_SRC  := $(wildcard sim/faults/*.c)
 injector_SRC := $(filter-out %/main.c,$(wildcard sim/injector/*.c))
+bridge_SRC  := $(filter-out %/main.c,$(wildcard sim/bridge/*.c))
+can_SRC     := $(wildcard firmware/can/*.c)
+mps2_SRC    := $(wildcard firmware/port/mps2/command_line.c)
 # Without what is the core's own: tests stand in for that.
 stm32g4_SRC := $(filter-out %/cpu.c %/vectors.c %/port_stm32g4.c,$(wildcard firmware/port/stm32g4/*.c))
 od_SRC      := $(OD_C)
 
-BINS            := controller drive injector
+BINS            := controller drive injector bridge
 controller_MAIN := $(wildcard firmware/app/main.c firmware/port/linux/main.c)
 drive_MAIN      := $(wildcard sim/node/main.c)
 injector_MAIN   := $(wildcard sim/injector/main.c)
+bridge_MAIN     := $(wildcard sim/bridge/main.c)
 BINS            := $(foreach b,$(BINS),$(if $($(b)_MAIN),$(b)))
 
 UNIT_SRC      := $(wildcard tests/unit/test_*.c)
@@ -88,7 +92,7 @@ VARIANTS := host asan clang
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c test unit pytest run faults lint format soak bench clean distclean help lock packages venv FORCE
+.PHONY: build c test unit pytest run til faults lint format soak bench clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -124,6 +128,11 @@ run: build ## run the alpha and the heart on a CAN bus, write a report to out/, 
 SOAK_S ?= 3600
 soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame looked at
 	@tools/with-vcan $(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
+
+# TARGET: one of an385 an386 an500 an505
+TARGET ?= an386
+til: build firmware ## target in the loop: the controller on an emulated board runs alpha and heart, the same bits as here
+	@tools/with-vcan $(PY) tools/til.py --target $(TARGET) examples/alpha.toml examples/heart.toml
 
 SEEDS ?= 5
 SCENARIO ?=

@@ -71,6 +71,13 @@ C_RULES: dict[str, set[str]] = {
         "firmware/port/linux/clock.h",
         "sim/faults",
     },
+    "sim/bridge": {
+        "firmware/can",
+        "firmware/port/linux/can_socket.h",
+        "firmware/port/linux/clock.h",
+        "firmware/port/linux/schedule.h",  # the emulated board's ticks come as the Linux port's do
+        "firmware/port/mps2/exchange.h",
+    },
 }
 
 # Where neither operating system nor heap may be needed: the only system headers allowed.

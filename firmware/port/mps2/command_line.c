@@ -3,11 +3,9 @@
 
 #include <string.h>
 
-/* What follows `name` and "=", or NULL when the word is another. */
-static const char *value_of(const char *word, const char *name)
+static bool is(const char *word, const char *name, size_t length)
 {
-    const size_t length = strlen(name);
-    return strncmp(word, name, length) == 0 && word[length] == '=' ? word + length + 1u : NULL;
+    return strlen(name) == length && strncmp(word, name, length) == 0;
 }
 
 static bool set_node(struct command_line *line, const char *value)
@@ -32,27 +30,32 @@ static bool set_path(const char **path, const char *value)
     return *value != '\0';
 }
 
-static bool take(struct command_line *line, const char *word)
+static bool take_value(struct command_line *line, const char *word, size_t length)
 {
-    const char *value = NULL;
-    if (strcmp(word, "verbose") == 0) {
-        line->verbose = true;
-        return true;
-    }
-    if ((value = value_of(word, "node")) != NULL) {
+    const char *value = word + length + 1u;
+    if (is(word, "node", length)) {
         return set_node(line, value);
     }
-    if ((value = value_of(word, "link")) != NULL) {
+    if (is(word, "link", length)) {
         return choose(&line->fifo, value, "fifo", "slcan");
     }
-    if ((value = value_of(word, "pace")) != NULL) {
+    if (is(word, "pace", length)) {
         return choose(&line->fast, value, "fast", "real-time");
     }
-    if ((value = value_of(word, "out")) != NULL) {
+    if (is(word, "out", length)) {
         return set_path(&line->out, value);
     }
-    value = value_of(word, "in");
-    return value != NULL && set_path(&line->in, value);
+    return is(word, "in", length) && set_path(&line->in, value);
+}
+
+static bool take(struct command_line *line, const char *word)
+{
+    const char *equals = strchr(word, '=');
+    if (equals != NULL) {
+        return take_value(line, word, (size_t)(equals - word));
+    }
+    line->verbose = line->verbose || strcmp(word, "verbose") == 0;
+    return strcmp(word, "verbose") == 0;
 }
 
 bool command_line_parse(struct command_line *line, char *text, const char **wrong)

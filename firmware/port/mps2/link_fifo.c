@@ -102,7 +102,7 @@ static uint16_t tick_flags(const struct link_wish *wish)
     return (uint16_t)(EXCHANGE_TICK | await | hurry);
 }
 
-/* Until the next tick is due; at lock step that is when all have answered, which need not be said. */
+/* Until the next tick is due; at lock step that is when all have answered, which need not be said, and no tick is late. */
 static uint32_t after_tick(const struct link_wish *wish)
 {
     const uint16_t flags = tick_flags(wish);
@@ -116,7 +116,7 @@ static uint32_t after_tick(const struct link_wish *wish)
             exchange(EXCHANGE_READY, 0);
         }
     }
-    return (flags & EXCHANGE_HURRY) != 0u ? 0u : self.in.header.late_ns;
+    return self.fast ? 0u : self.in.header.late_ns;
 }
 
 static void end(void)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -34,10 +35,28 @@ def find_program(name: str) -> Path:
     return Path(found)
 
 
-def controller_command(machine: Machine, address: BusAddress, pace: str) -> list[str]:
-    """Command line of the controller process."""
+def controller_words(given: str | None) -> list[str]:
+    """The program that is started as the controller, with its first arguments: `given` as a shell would take it, else
+    $HODOGRAPH_CONTROLLER, else hodograph-controller. Raises BusError when there is no such program.
+    """
+    text = given or os.environ.get("HODOGRAPH_CONTROLLER")
+    if not text:
+        return [str(find_program(CONTROLLER))]
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise BusError(f"controller {text!r}: {error}") from None
+    if not words or shutil.which(words[0]) is None:
+        raise BusError(f"controller {text!r}: there is no such program here")
+    return words
+
+
+def controller_command(
+    machine: Machine, address: BusAddress, pace: str, controller: str | None = None
+) -> list[str]:
+    """Command line of the controller process; `controller` as for controller_words."""
     return [
-        str(find_program(CONTROLLER)),
+        *controller_words(controller),
         *("--bus", address.channel),
         *("--node", str(machine.node)),
         *("--pace", pace),
@@ -87,10 +106,12 @@ class Rig:
     they get SIGTERM when we die. All are pinned to one core: waking across cores costs more than it gains.
     """
 
-    def __init__(self, machine: Machine, address: BusAddress, pace: str) -> None:
+    def __init__(
+        self, machine: Machine, address: BusAddress, pace: str, controller: str | None = None
+    ) -> None:
         self._commands = [
             drive_command(machine, address),
-            controller_command(machine, address, pace),
+            controller_command(machine, address, pace, controller),
         ]
         self._children: list[tuple[subprocess.Popen[bytes], IO[bytes]]] = []
 

@@ -57,9 +57,16 @@ class Station:
 
 @contextmanager
 def station(
-    machine: Machine, address: BusAddress, pace: str, wait_s: float, note: Callable[[str], None]
+    machine: Machine,
+    address: BusAddress,
+    pace: str,
+    wait_s: float,
+    note: Callable[[str], None],
+    controller_program: str | None = None,
 ) -> Iterator[Station]:
     """The machine's controller on this bus, with a simulated machine started on a virtual bus without one.
+
+    `controller_program`: what is started as its controller, instead of hodograph-controller.
 
     On the way out by an error or an interrupt the axes are stopped, and what was started is ended.
     """
@@ -67,7 +74,7 @@ def station(
         controller = stack.enter_context(connect(address, machine.node, machine.bitrate))
         rig = None
         if is_virtual(address) and not controller.answers(0.3):
-            rig = stack.enter_context(Rig(machine, address, pace))
+            rig = stack.enter_context(Rig(machine, address, pace, controller_program))
             _await_rig(controller, rig, max(wait_s, 5.0))
         elif not is_virtual(address):
             controller.require(wait_s)
@@ -164,7 +171,12 @@ def _settle(controller: Controller, settling: int) -> None:
 
 
 def rig_until_interrupted(
-    machine: Machine, address: BusAddress, pace: str, kernel: str, note: Callable[[str], None]
+    machine: Machine,
+    address: BusAddress,
+    pace: str,
+    kernel: str,
+    note: Callable[[str], None],
+    controller_program: str | None = None,
 ) -> None:
     """Controller and drives on a virtual bus, configured, until Ctrl-C."""
     check_socketcan(address)
@@ -173,7 +185,7 @@ def rig_until_interrupted(
     with connect(address, machine.node, machine.bitrate) as controller:
         if controller.answers(0.3):
             raise BusError(f"{address}: node {machine.node} is there already: end it first")
-        with Rig(machine, address, pace) as rig:
+        with Rig(machine, address, pace, controller_program) as rig:
             _await_rig(controller, rig, 5.0)
             controller.configure(machine, kernel)
             names = ", ".join(f"{axis.name} (node {axis.node})" for axis in machine.axes)

@@ -140,11 +140,15 @@ def _run_one(chain: Chain, address: BusAddress, options: Namespace) -> BusRun:
     machine = chain.machine
     print_notes(chain, chain.compilation.plan)
     with (
-        station(machine, address, options.pace or "real-time", options.wait, note) as at,
+        station(
+            machine, address, options.pace or "real-time", options.wait, note, options.controller
+        ) as at,
         progress(f"run {chain.file.name}", "tick", chain.program.ticks) as bar,
     ):
         if options.pace is not None and at.pace is None:
             note("--pace has no effect on a controller that is running already")
+        if options.controller is not None and at.pace is None:
+            note("--controller has no effect where one is running already")
         kernel = options.kernel or machine.kernel
         return run_program(at, machine, chain.image, kernel, bar, options.record)
 
@@ -190,7 +194,7 @@ def rig(options: Namespace) -> None:
     machine = machine_of(options.file, None)
     require_fit(machine)
     kernel = options.kernel or machine.kernel
-    rig_until_interrupted(machine, address, options.pace, kernel, note)
+    rig_until_interrupted(machine, address, options.pace, kernel, note, options.controller)
 
 
 COMMANDS = {

@@ -53,6 +53,14 @@ def _bus(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _controller(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--controller",
+        metavar="COMMAND",
+        help="program started as the controller, as 'tools/emulate.py an386' (default hodograph-controller)",
+    )
+
+
 def _timeout(parser: argparse.ArgumentParser, usual: str) -> None:
     parser.add_argument(
         "--timeout",
@@ -266,6 +274,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--pace", choices=PACES, help="of a controller started here (default real-time)"
     )
+    _controller(run)
     run.add_argument(
         "--trace", type=Path, metavar="CSV", help="write one row a tick (one FILE only)"
     )
@@ -354,4 +363,5 @@ def make_parser() -> argparse.ArgumentParser:
     _bus(rig)
     _kernel(rig)
     rig.add_argument("--pace", choices=PACES, default="real-time")
+    _controller(rig)
     return parser

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
+#include "bridge/fifo_side.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "bridge/bus.h"
+#include "bridge/turn.h"
+#include "port/linux/clock.h"
+#include "port/mps2/exchange.h"
+
+static struct {
+    struct can_socket *socket;
+    int out; /* as the board sees it */
+    int in;
+    struct turn turn;
+    struct exchange_message request;
+    struct exchange_message reply;
+} self;
+
+static const char gone[] = "the emulated board is gone";
+
+/* Waits until the board opens its end. */
+static int open_fifo(const char *path, int flags)
+{
+    struct stat found;
+    if (stat(path, &found) != 0 || !S_ISFIFO(found.st_mode)) {
+        (void)bus_complain(BRIDGE_GONE, path, "no FIFO of this name: make it with mkfifo");
+        return -1;
+    }
+    const int fd = open(path, flags | O_CLOEXEC);
+    if (fd < 0) {
+        (void)bus_complain(BRIDGE_GONE, path, strerror(errno));
+    }
+    return fd;
+}
+
+/* False when the board is gone, or will not say what it began to. */
+static bool read_request(void)
+{
+    size_t got = 0;
+    while (got < sizeof self.request.header || got < exchange_size(&self.request)) {
+        const ssize_t more =
+            read(self.out, (uint8_t *)&self.request + got, sizeof self.request - got);
+        if (more > 0) {
+            got += (size_t)more;
+        } else if (more == 0 || errno != EINTR || bus_signals() > 1u) {
+            return false;
+        }
+        if (got >= sizeof self.request.header && self.request.header.count > EXCHANGE_FRAMES) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool write_reply(void)
+{
+    const ssize_t size = (ssize_t)exchange_size(&self.reply);
+    ssize_t done = 0;
+    do {
+        done = write(self.in, &self.reply, (size_t)size);
+    } while (done < 0 && errno == EINTR && bus_signals() < 2u);
+    return done == size;
+}
+
+static int set_filters(void)
+{
+    struct can_socket_filter filters[CAN_SOCKET_FILTERS];
+    const size_t count = self.request.header.count;
+    if (count > CAN_SOCKET_FILTERS) {
+        return -EINVAL;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const struct exchange_frame *record = &self.request.frames[i];
+        filters[i].id = (uint16_t)record->id;
+        filters[i].mask = (uint16_t)(record->data[0] | record->data[1] << 8);
+    }
+    return can_socket_filter(self.socket, filters, count);
+}
+
+static int send_frames(void)
+{
+    struct can_msg messages[EXCHANGE_FRAMES];
+    const size_t count = self.request.header.count;
+    for (size_t i = 0; i < count; ++i) {
+        exchange_unpack(&messages[i], &self.request.frames[i]);
+    }
+    return bus_send(self.socket, messages, count);
+}
+
+/* What lies in the socket; what has no room in the reply stays there. 0 or a negative errno. */
+static int take_frames(void)
+{
+    struct can_msg messages[CAN_SOCKET_BATCH];
+    int more = 1;
+    while (more != 0 && self.reply.header.count + CAN_SOCKET_BATCH <= EXCHANGE_FRAMES) {
+        const int count = can_socket_receive(self.socket, messages, &more);
+        if (count < 0) {
+            return count;
+        }
+        for (int i = 0; i < count; ++i) {
+            exchange_pack(&self.reply.frames[self.reply.header.count++], &messages[i]);
+        }
+    }
+    return 0;
+}
+
+/* At lock step the processor belongs to those who are to answer: so no look at the socket before they can have. */
+static int wait_for_turn(void)
+{
+    bool over = false;
+    int error = 0;
+    self.reply.header = (struct exchange_header){.count = 0};
+    for (uint64_t now_ns = clock_ns(); !over && error == 0 && bus_signals() < 2u;) {
+        const uint64_t wait_ns = turn_wait_ns(&self.turn, now_ns);
+        struct pollfd wait = {.fd = self.turn.awaiting ? self.socket->fd : -1, .events = POLLIN};
+        const struct timespec limit = clock_timespec(wait_ns);
+        if (wait_ns > 0u) {
+            (void)ppoll(&wait, 1, &limit, NULL);
+            now_ns = clock_ns();
+        }
+        error = self.turn.at_once ? 0 : take_frames();
+        over = turn_over(&self.turn, self.reply.header.count, now_ns, &self.reply.header);
+    }
+    return error;
+}
+
+/* One request. 0 or a negative errno of the bus. */
+static int serve(void)
+{
+    const uint16_t flags = self.request.header.flags;
+    turn_request(&self.turn, &self.request.header, clock_ns());
+    int error = (flags & EXCHANGE_FILTER) != 0u ? set_filters() : send_frames();
+    if (error == 0) {
+        error = wait_for_turn();
+    }
+    if (bus_signals() > 0u) {
+        self.reply.header.flags |= EXCHANGE_STOP;
+    }
+    return error;
+}
+
+static int run(void)
+{
+    while (read_request()) {
+        const int error = serve();
+        if (error != 0) {
+            return bus_complain(BRIDGE_BUS, "the bus failed", strerror(-error));
+        }
+        if (!write_reply()) {
+            return bus_complain(BRIDGE_GONE, gone, strerror(errno));
+        }
+        if ((self.request.header.flags & EXCHANGE_END) != 0u) {
+            return BRIDGE_OK;
+        }
+    }
+    return bus_complain(BRIDGE_GONE, gone, "it closed its FIFO without a word");
+}
+
+int fifo_side_run(struct can_socket *socket, const char *out, const char *in)
+{
+    memset(&self, 0, sizeof self);
+    self.socket = socket;
+    self.out = open_fifo(out, O_RDONLY);
+    if (self.out < 0) {
+        return BRIDGE_GONE;
+    }
+    self.in = open_fifo(in, O_WRONLY);
+    const int status = self.in < 0 ? BRIDGE_GONE : run();
+    (void)close(self.in);
+    (void)close(self.out);
+    return status;
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: MIT */
+/* hodograph-bridge: between a board that is emulated, or that has no CAN of Linux, and a CAN interface. */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <sched.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "bridge/bridge_options.h"
+#include "bridge/bus.h"
+#include "bridge/fifo_side.h"
+#include "bridge/slcan_side.h"
+
+/* A batch thread is woken once for all answers of the drives, not by the first of them. */
+static void be_patient(void)
+{
+    const struct sched_param none = {.sched_priority = 0};
+    (void)sched_setscheduler(0, SCHED_BATCH, &none);
+}
+
+static int run(const struct bridge_options *options)
+{
+    char reason[512];
+    struct can_socket socket;
+    if (bus_catch_signals() != 0) {
+        return bus_complain(BRIDGE_GONE, "cannot catch signals", strerror(errno));
+    }
+    if (can_socket_open(&socket, options->bus, reason, sizeof reason) != 0) {
+        return bus_complain(BRIDGE_BUS, options->bus, reason);
+    }
+    be_patient();
+    const int status = options->slcan != NULL ? slcan_side_run(&socket, options->slcan)
+                                              : fifo_side_run(&socket, options->out, options->in);
+    can_socket_close(&socket);
+    return status;
+}
+
+int main(int argc, char **argv)
+{
+    char reason[512];
+    struct bridge_options options;
+    switch (bridge_options_parse(&options, argc, argv, reason, sizeof reason)) {
+    case BRIDGE_OPTIONS_OK:
+        return run(&options);
+    case BRIDGE_OPTIONS_HELP:
+        (void)fputs(bridge_options_help, stdout);
+        return 0;
+    default:
+        return bus_complain(BRIDGE_USAGE, "command line", reason);
+    }
+}

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: MIT */
+/* slcan_side: a stream of SLCAN lines (can/slcan.h) on a socket. */
+#ifndef BRIDGE_SLCAN_SIDE_H
+#define BRIDGE_SLCAN_SIDE_H
+
+#include "port/linux/can_socket.h"
+
+/* `address`: a UNIX socket's path, or HOST:PORT. Until a signal or the end of the stream. Returns an exit status; unless 0, a line on stderr
+ * has said why. */
+int slcan_side_run(struct can_socket *socket, const char *address);
+
+#endif
