@@ -26,13 +26,16 @@ _SHOWN = "an386 float"
 
 def blocks(figures: dict[str, Any]) -> dict[str, str]:
     """The generated parts of the document, by name."""
-    bars = tables.histogram(figures, _SHOWN, campaign.BIN)
+    bars = tables.histogram(figures, _SHOWN)
     versions = ", ".join(f"{name} {version}" for name, version in figures["compilers"].items())
     return {
         "compilers": f"Compilers: {versions}; -O2.\n",
         "goals": tables.goal_lines(figures),
-        "motion": tables.motion_table(figures),
-        "parts": tables.parts_table(figures),
+        "motion": tables.whole_table(figures, "motion"),
+        "parts": tables.parts_table(figures, "motion"),
+        "isr": tables.whole_table(figures, "isr"),
+        "isr parts": tables.parts_table(figures, "isr"),
+        "receive": tables.parts_table(figures, "receive"),
         "taylor": tables.taylor_table(figures),
         "histogram": f"```\n{bars}```\n",
     }

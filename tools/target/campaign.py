@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import collections
 import hashlib
 import subprocess
 from collections.abc import Sequence
@@ -21,11 +22,10 @@ from target.emulator import TARGETS, Target
 from target.parts import PARTS
 
 ROOT = Path(__file__).resolve().parents[2]
-BIN = 100  # instructions of a bin of the histogram
-
 # (target, kernel): most instructions of the motion part in a plain tick; docs/counts.md says where it is from.
 GOALS = {("an386", "float"): 600, ("an385", "fixed"): 1500, ("microbit", "fixed"): 4000}
 OVERRIDE_GOAL = 1.5  # times that with the override active
+INTERRUPT_GOAL = 2  # times either for the whole interrupt
 SPREAD_GOAL = 1.5  # worst over median
 FLOOR = 26  # 25 multiply-adds and a division
 
@@ -45,6 +45,9 @@ SCENARIOS = (
     Scenario("override", "examples", ("steady", "restless")),
     Scenario("override, adversary", "adversary", ("steady", "restless", "jitter")),
 )
+
+
+SECTIONS = ("motion", "isr", "receive")
 
 
 class Campaign:
@@ -77,9 +80,14 @@ class Campaign:
         return np.concatenate(runs)
 
     def pair(self, target: Target, kernel: str) -> dict[str, Any]:
-        """The figures of one kernel on one core."""
-        counter = Counter(self.build, target)
-        return {s.name: figures(self.scenario(counter, kernel, s)) for s in SCENARIOS}
+        """The figures of one kernel on one core: of the motion part, of the whole interrupts."""
+        motion, tick = Counter(self.build, target), Counter(self.build, target, "isr", "isr")
+        receive = Counter(self.build, target, "isr", "receive")
+        return {
+            "motion": {s.name: figures(self.scenario(motion, kernel, s)) for s in SCENARIOS},
+            "isr": {s.name: figures(self.scenario(tick, kernel, s)) for s in SCENARIOS},
+            "receive": {"plain": figures(self.scenario(receive, kernel, SCENARIOS[0]))},
+        }
 
     def run(self) -> dict[str, Any]:
         """Everything."""
@@ -87,11 +95,11 @@ class Campaign:
         checksums = self.checksums()
         with ThreadPoolExecutor(2) as pool:
             done = list(pool.map(lambda pair: self.pair(*pair), pairs))
-        return {
-            "compilers": compilers(),
-            "programs": checksums,
-            "motion": {f"{t.name} {k}": d for (t, k), d in zip(pairs, done, strict=True)},
+        sections = {
+            section: {f"{t.name} {k}": d[section] for (t, k), d in zip(pairs, done, strict=True)}
+            for section in SECTIONS
         }
+        return {"compilers": compilers(), "programs": checksums} | sections
 
 
 def _commands(name: str | None) -> Sequence[Command]:
@@ -112,10 +120,16 @@ def _first_line(command: list[str]) -> str:
 def figures(counts: Counts) -> dict[str, Any]:
     """Least, median and most of the whole and of the parts that there are, and the histogram of the whole."""
     whole = counts.sum(axis=1)
-    bins, ticks = np.unique(whole // BIN * BIN, return_counts=True)
-    out: dict[str, Any] = {"ticks": len(whole), "motion": _three(whole)}
+    bins = collections.Counter(_two_digits(int(n)) for n in whole)
+    out: dict[str, Any] = {"ticks": len(whole), "whole": _three(whole)}
     out |= {p: _three(counts[:, i]) for i, p in enumerate(PARTS) if counts[:, i].any()}
-    return out | {"histogram": {str(b): int(n) for b, n in zip(bins, ticks, strict=True)}}
+    return out | {"histogram": {str(low): bins[low] for low in sorted(bins)}}
+
+
+def _two_digits(count: int) -> int:
+    """Rounded down to two digits: the bins of the histogram."""
+    step: int = 10 ** max(len(str(count)) - 2, 0)
+    return count // step * step
 
 
 def _three(column: Counts) -> list[int]:

@@ -11,7 +11,7 @@ $(COUNT_PLUGIN): tools/target/count_plugin.c
 .PHONY: counter
 counter: firmware $(COUNT_PLUGIN) ## what tools/count_tick.py needs
 
-test pytest: counter
+test pytest bench: counter
 
 UPDATE ?=
 .PHONY: count

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Instructions of the controller's tick on microcontrollers, counted in the emulator.
+
+    python benchmarks/counts.py [--json OUT] [--build BUILD]
+
+Needs `make counter`. The main figures of docs/counts.md: for each core and kernel the median over the examples and the
+most over all programs, plain and with the override in use, of the motion part and of the whole interrupt; the same of
+the usual NURBS interpolator, with the ripple of the feed of both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+
+from target import tables, taylor  # noqa: E402
+from target.campaign import FLOOR, Campaign  # noqa: E402
+
+
+def main_figures(counted: dict[str, Any]) -> dict[str, Any]:
+    """Of everything that was counted."""
+    out: dict[str, Any] = {"floor": FLOOR}
+    for section in ("motion", "isr"):
+        for pair, scenarios in counted[section].items():
+            row = out.setdefault(pair, {})
+            for kind in ("plain", "override"):
+                median, most = tables.worst(scenarios, kind)
+                row[f"{section}_{kind}_median"] = median
+                row[f"{section}_{kind}_most"] = most
+    return out
+
+
+def beside(compared: dict[str, Any]) -> dict[str, Any]:
+    """Ours and the other's, by core."""
+    return {
+        f"{core} {name}": {
+            "median": row["whole"][1],
+            "most": row["whole"][2],
+            "feed_ripple": row["ripple"],
+        }
+        for core, both in compared.items()
+        for name, row in both.items()
+    }
+
+
+def main() -> None:
+    """See the head of the file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--build", type=Path, default=ROOT / "build")
+    options = parser.parse_args()
+    figures = main_figures(Campaign(options.build).run())
+    figures["constant_feed"] = beside(taylor.compare(options.build))
+    text = json.dumps(figures, indent=2)
+    print(text)
+    if options.json:
+        options.json.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
