@@ -11,7 +11,7 @@ an386_CPU    := -mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard
 an500_CPU    := -mcpu=cortex-m7 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 an505_CPU    := -mcpu=cortex-m33 -mthumb -mfpu=fpv5-sp-d16 -mfloat-abi=hard
 microbit_CPU := -mcpu=cortex-m0 -mthumb
-rv32_CPU     := -march=rv32imc_zicsr -mabi=ilp32 -mno-relax -mcmodel=medany
+rv32_CPU     := -march=rv32imc_zicsr -mabi=ilp32 -mno-relax -mcmodel=medany -fno-jump-tables
 # The kernels that a target's images link: fixed, or with an FPU fixed and float (core/kernel.h).
 $(foreach t,an386 an500 an505,$(eval $(t)_KERNELS := firmware/targets/kernels_float.c))
 $(foreach t,an385 microbit rv32,$(eval $(t)_KERNELS := firmware/targets/kernels_fixed.c))
@@ -48,7 +48,7 @@ controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/can/*.c)
 controller_TARGETS := an385 an386 an500 an505 $(BOARDS)
 
-TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -DNDEBUG $(INCLUDES)
+TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -fstack-usage -DNDEBUG $(INCLUDES)
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
 
 target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
@@ -71,12 +71,19 @@ $(call NOTE,$(BUILD)/firmware/$(1)/obj/list,$(TARGET_SRC))
 endef
 $(foreach t,$(TARGETS) $(BOARDS),$(eval $(call TARGET_RULES,$(t))))
 
+# What each image is asked after it is linked: no heap, no double, no soft float, no 64-bit division; a stack that fits.
+IMAGE_CHECK := tools/check_image.py firmware/targets/stack.toml $(addprefix tools/target/,effects.py forbidden.py image.py stack.py)
+
+image_src = $($(2)_MAIN) $(or $($(1)_SRC),$($(2)_SRC)) $(or $($(2)_KERNELS),$($(1)_KERNELS)) $(wildcard firmware/port/$($(1)_CORE)/*.c)
+
 define IMAGE_RULE # target, image
-$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$($(2)_MAIN) $(or $($(1)_SRC),$($(2)_SRC)) $($(1)_KERNELS) $(wildcard firmware/port/$($(1)_CORE)/*.c)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld
+$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$(image_src)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld $(IMAGE_CHECK) $(BUILD)/firmware/$(1)/$(2).list
 	$$(call say,link,$$@)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $(or $($(1)_LINK),$($(1)_CPU)) -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,-Map,$$(@:.elf=.map) \
 	    -Lfirmware/port/$($(1)_CORE) -Tfirmware/targets/$(1).ld -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
--include $(patsubst %.o,%.d,$(call target_object,$(1),$($(2)_MAIN) $(or $($(1)_SRC),$($(2)_SRC)) $(wildcard firmware/port/$($(1)_CORE)/*.c)))
+	$$(Q)$(PYTHON) tools/check_image.py $($(2)_CHECK) $$@
+$(call NOTE,$(BUILD)/firmware/$(1)/$(2).list,$(image_src) $($(2)_CHECK))
+-include $(patsubst %.o,%.d,$(call target_object,$(1),$(image_src)))
 endef
 $(foreach i,$(IMAGES),$(foreach t,$(or $($(i)_TARGETS),$(TARGETS)),$(eval $(call IMAGE_RULE,$(t),$(i)))))
 
@@ -88,3 +95,8 @@ BOARD ?= nucleo_g474re
 flash: $(BUILD)/firmware/$(BOARD)/controller.elf ## put the controller into a board that is plugged in (BOARD=nucleo_g474re NODE=1 CAN_BITS_S=1000000)
 	@$(PYTHON) tools/packages.py flash
 	openocd -f $($(BOARD)_OPENOCD) -c "program $< verify reset exit"
+
+UPDATE ?=
+.PHONY: size
+size: firmware ## code, data, RAM and worst stack of every image; what changed since the commit (UPDATE=1: written to firmware/targets/sizes.json)
+	@$(PYTHON) tools/size.py --build $(BUILD) $(if $(UPDATE),--update)
