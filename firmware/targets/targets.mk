@@ -31,11 +31,18 @@ nucleo_g474re_OPENOCD := board/st_nucleo_g4.cfg
 $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CROSS := $(if $(filter rv32,$(t)),riscv64-unknown-elf-,arm-none-eabi-)))
 $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_m)))
 
-# An image is a main with what it is linked from besides core, canopen, app and the dictionary; and the targets that it is
-# for, where not all.
-IMAGES := setpoints controller isr taylor
+# An image is a main with what it is linked from besides core, canopen, app and the dictionary; the targets that it is
+# for, where not all; kernels, where not the target's; and what tools/check_image.py has to allow.
+IMAGES := setpoints setpoints_float controller isr taylor
 setpoints_MAIN := tests/target/setpoints.c
 setpoints_SRC  := tests/target/commands.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+
+# The float kernel where floats are a library's: IEEE single is the same everywhere, which the tests show. Not for use.
+setpoints_float_MAIN    := $(setpoints_MAIN)
+setpoints_float_SRC     := $(setpoints_SRC)
+setpoints_float_TARGETS := an385 microbit rv32
+setpoints_float_KERNELS := firmware/targets/kernels_float.c
+setpoints_float_CHECK   := --soft-float
 
 isr_MAIN := tests/target/isr.c
 isr_SRC  := $(filter-out %/setpoints.c,$(setpoints_SRC))
@@ -43,6 +50,7 @@ isr_SRC  := $(filter-out %/setpoints.c,$(setpoints_SRC))
 taylor_MAIN    := tests/target/taylor.c
 taylor_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
 taylor_TARGETS := an385 an386
+taylor_CHECK   := --soft-float
 
 controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/can/*.c)

@@ -28,9 +28,9 @@ CASES = [(store, run) for store in STORES for run in store.runs]
 MOST_COUNTS = {"fixed": 1, "float": 9}
 
 
-def target_runner(name: str) -> target_bits.Runner:
+def target_runner(name: str, stem: str = "setpoints") -> target_bits.Runner:
     target = emulator.TARGETS[name]
-    image = BUILD / "firmware" / name / "setpoints.elf"
+    image = BUILD / "firmware" / name / f"{stem}.elf"
     return lambda store, words: emulator.run(target, image, words, store)
 
 
@@ -58,6 +58,12 @@ def test_hosts(host: str, kernel: str) -> None:
 )
 def test_targets(name: str, kernel: str) -> None:
     assert wrong(target_runner(name), kernel) == []
+
+
+@pytest.mark.parametrize("name", ["an385", "microbit", "rv32"])
+def test_float_without_an_fpu(name: str) -> None:
+    """IEEE single by a library gives the same bits: images that only this test uses."""
+    assert wrong(target_runner(name, "setpoints_float"), "float") == []
 
 
 def counts(store: Store, run: str, kernel: str) -> np.ndarray:

@@ -12,6 +12,7 @@ from target.image import Function, Image, Instruction
 _CONDITIONS = "eq|ne|cs|hs|cc|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le"
 _ADDRESS = re.compile(r"(?:^|[\s,])([0-9a-f]+) <")
 _NUMBER = re.compile(r"#?(-?(?:0x[0-9a-f]+|\d+))$")
+_MILLICODE = re.compile(r"<__riscv_(save|restore)_(\d+)>")
 _SP_MATH = re.compile(r"(add|sub)w?s?$")
 
 
@@ -117,12 +118,16 @@ def _list_bytes(operands: str) -> int:
 def _constant(image: Image, function: Function, index: int, register: str) -> int:
     """What a register holds that was loaded with a constant shortly before."""
     instruction = function.instructions[index]
+    shift = 0
     for before in reversed(function.instructions[max(index - 8, 0) : index]):
         if not before.operands.startswith(f"{register}, "):
             continue
         number = _NUMBER.search(before.operands.split(", ")[-1])
+        if before.mnemonic == "lsls" and before.operands.startswith(f"{register}, {register}, #"):
+            shift += int(before.operands.rpartition("#")[2])
+            continue
         if before.mnemonic.startswith("mov") and number:
-            return int(number[1], 0)
+            return int(number[1], 0) << shift
         target = re.match(r"\(([0-9a-f]+) <", before.note)
         if before.mnemonic.startswith("ldr") and target and int(target[1], 16) in image.literals:
             value = image.literals[int(target[1], 16)]
@@ -139,11 +144,17 @@ def _riscv(image: Image, function: Function, index: int) -> Effect:
     name, operands = instruction.mnemonic, instruction.operands
     if name in ("ret", "mret", "unimp"):
         return Effect(falls=False)
+    found = _MILLICODE.search(f"{operands} {instruction.note}")
+    if found and name in ("j", "jr"):
+        return Effect(falls=False)  # gives all back and returns
+    if found and name in ("jal", "jalr"):
+        return Effect(16 if found[2] == "0" else 64)  # the larger ones take 64 and give some back
     if name in ("j", "jr"):
         target = _target(instruction)
         if target is None and name == "j":
             raise _unknown(function, instruction)
-        return Effect(falls=False, branch=target, indirect=target is None)
+        pointed = target is None  # at a function, or from a table at another place of this one
+        return Effect(falls=False, branch=target, indirect=pointed, jump=pointed)
     if name in ("jal", "jalr"):
         target = _target(instruction)
         return Effect(call=target, indirect=target is None)

@@ -40,18 +40,11 @@ CLASSES: dict[str, tuple[str, re.Pattern[str]]] = {
     ),
 }
 
-FLOAT_KERNEL = "kernel_float"
-
 
 def forbidden(image: Image) -> dict[str, list[str]]:
-    """Class and names of what an image (or an object) has and may not have.
-
-    An image of a target without FPU may have soft float if it has the float kernel: only tests link that.
-    """
+    """Class and names of what an image (or an object) has and may not have."""
     found = {
         kind: [name for name in sorted(image.symbols) if pattern.fullmatch(name)]
         for kind, (_, pattern) in CLASSES.items()
     }
-    if FLOAT_KERNEL in image.symbols and not image.has_fpu:
-        found["soft float"] = []
     return {kind: names for kind, names in found.items() if names}
