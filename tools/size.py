@@ -85,10 +85,10 @@ def differences(old: Table, new: Table) -> Iterator[str]:
 
 def text(table: Table) -> Iterator[str]:
     """The table to read."""
-    yield f"{'target':10}{'image':18}" + "".join(f"{column:>8}" for column in COLUMNS)
+    yield f"{'target':16}{'image':18}" + "".join(f"{column:>8}" for column in COLUMNS)
     for target, images in table.items():
         for image, row in images.items():
-            yield f"{target:10}{image:18}" + "".join(f"{row[column]:8}" for column in COLUMNS)
+            yield f"{target:16}{image:18}" + "".join(f"{row[column]:8}" for column in COLUMNS)
 
 
 def main() -> None:
