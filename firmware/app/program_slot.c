@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/program_record.h"
+#include "app/program_table.h"
 #include "core/counts.h"
 #include "core/interp.h"
 #include "port/port.h"
@@ -94,6 +95,9 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
     if (slot->refused.code == 0) {
         (void)check(&candidate, config, &slot->refused);
     }
+    if (slot->refused.code == 0) {
+        slot->refused.code = program_table_write(bank, &candidate, config->kernel);
+    }
     const struct program_record record = {.sequence = slot->sequence + 1u, .image_size = size};
     if (slot->refused.code == 0 && program_record_write(bank, &record) != 0) {
         slot->refused.code = PROGRAM_ERR_STORE;
@@ -144,13 +148,46 @@ void program_slot_stale(struct program_slot *slot)
     slot->checked = false;
 }
 
+/* Copies the program to the spare bank, with records for another kernel; the bank it was in stays as it is. */
+static int move(struct program_slot *slot, const struct config *config)
+{
+    const unsigned bank = spare_bank(slot);
+    const struct program_record record = {.sequence = slot->sequence + 1u,
+                                          .image_size = slot->program.header.image_size};
+    struct program moved = slot->program;
+    if (slot->receiving || port_store_erase(bank) != 0 ||
+        port_store_write(bank, 0, slot->program.image, record.image_size) != 0) {
+        return PROGRAM_ERR_STORE;
+    }
+    moved.image = port_store_data(bank);
+    const int result = program_table_write(bank, &moved, config->kernel);
+    if (result != 0 || program_record_write(bank, &record) != 0) {
+        return result != 0 ? result : PROGRAM_ERR_STORE;
+    }
+    adopt(slot, &moved, bank, record.sequence);
+    return 0;
+}
+
+static int prepare(struct program_slot *slot, const struct config *config)
+{
+    const struct kernel *kernel = kernel_find(config->kernel);
+    if ((kernel != NULL && slot->program.prepared_for == kernel) ||
+        program_table_find(slot->bank, &slot->program, config->kernel)) {
+        return 0;
+    }
+    return move(slot, config);
+}
+
 void program_slot_refresh(struct program_slot *slot, const struct config *config)
 {
     if (!slot->present || slot->checked) {
         return;
     }
     struct program_fault fault = {.code = 0, .index = 0};
-    slot->acceptable = check(&slot->program, config, &fault) == 0;
+    if (check(&slot->program, config, &fault) == 0) {
+        fault.code = prepare(slot, config);
+    }
+    slot->acceptable = fault.code == 0;
     if (!slot->acceptable) {
         slot->refused = fault;
     }

@@ -57,7 +57,8 @@ void program_slot_abandon(struct program_slot *slot);
 /* The configuration has changed: the next refresh checks anew. */
 void program_slot_stale(struct program_slot *slot);
 
-/* Brings start, end and `acceptable` up to date; costs a whole check when stale. */
+/* Brings start, end, `acceptable` and the prepared records up to date; costs a whole check when stale, and a copy of the
+ * program in the other bank when the kernel is another one. */
 void program_slot_refresh(struct program_slot *slot, const struct config *config);
 
 #endif

@@ -10,73 +10,95 @@
 
 static void load_piece(struct interp *it, uint32_t i, uint64_t start_q32_s)
 {
-    struct program_piece piece;
-    program_piece_get(it->program, i, &piece);
-    it->piece = i;
-    it->piece_start_q32_s = start_q32_s;
-    it->piece_end_q32_s = start_q32_s + piece.duration_q32_s;
-    it->kernel->piece_set(&it->feed, &piece);
+    prepared_piece_make(&it->own_piece, it->program, it->kernel, i, start_q32_s);
+    it->piece_index = i;
 }
 
 static void load_segment(struct interp *it, uint32_t i)
 {
-    struct program_segment segment;
-    struct ph_segment ph;
-    program_segment_get(it->program, i, &segment);
-    ph_segment_expand(&ph, &segment);
-    it->segment = i;
-    it->segment_start_q40_mm = i == 0 ? INT64_MIN : segment.start_q40_mm;
-    it->segment_end_q40_mm = i + 1 == it->program->header.segment_count
-                                 ? INT64_MAX
-                                 : program_segment_start(it->program, i + 1);
-    it->kernel->segment_set(&it->path, &ph);
+    prepared_segment_make(&it->own_segment, it->program, it->kernel, i);
+    it->segment_index = i;
+}
+
+static const struct prepared_piece *present_piece(const struct interp *it)
+{
+    return it->piece != NULL ? it->piece : &it->own_piece;
+}
+
+static const struct prepared_segment *present_segment(const struct interp *it)
+{
+    return it->segment != NULL ? it->segment : &it->own_segment;
 }
 
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
 static void evaluate_feed(const struct interp *it, uint64_t time_q42_s, struct feed_point *f)
 {
-    uint64_t t = time_q42_s - (it->piece_start_q32_s << FINE_BITS);
-    it->kernel->piece_at(&it->feed, t, f);
-    int64_t length = it->program->header.length_q40_mm;
-    f->arc_length_q40_mm = f->arc_length_q40_mm < 0 ? 0 : f->arc_length_q40_mm;
-    f->arc_length_q40_mm = f->arc_length_q40_mm > length ? length : f->arc_length_q40_mm;
+    const struct prepared_piece *piece = present_piece(it);
+    uint64_t t = time_q42_s - (piece->start_q32_s << FINE_BITS);
+    it->kernel->piece_at(&piece->feed, t, f);
+    if (f->arc_length_q40_mm < 0) {
+        f->arc_length_q40_mm = 0;
+    } else if (f->arc_length_q40_mm > it->length_q40_mm) {
+        f->arc_length_q40_mm = it->length_q40_mm;
+    }
 }
 
-/* Makes the piece of this time the loaded one, crossing `most` ends at most. The last piece has no
- * end here: beyond the duration nothing is evaluated. */
-static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
+/* Expands the piece of this time. */
+static int enter_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
 {
-    uint32_t i = it->piece;
-    uint64_t start = it->piece_start_q32_s;
-    uint64_t end = it->piece_end_q32_s;
-    if (time_q32_s < start) {
-        return INTERP_ERR_JUMP;
-    }
-    while (time_q32_s >= end && i + 1 < it->program->header.piece_count) {
+    uint32_t i = it->piece_index;
+    uint64_t start = it->own_piece.start_q32_s;
+    uint64_t end = it->own_piece.end_q32_s;
+    while (time_q32_s >= end) {
         if (most == 0) {
             return INTERP_ERR_JUMP;
         }
         most--;
         i++;
         start = end;
-        end += program_piece_duration(it->program, i);
+        end = i + 1u == it->program->header.piece_count
+                  ? UINT64_MAX
+                  : end + program_piece_duration(it->program, i);
     }
-    if (i != it->piece) {
-        load_piece(it, i, start);
-    }
+    load_piece(it, i, start);
     return INTERP_OK;
 }
 
-/* Makes the segment of this arc length the loaded one: the last that starts at or before it. Steps
- * back only where the feed dips below zero by rounding. */
-static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
+static const struct prepared_piece *behind_piece(const struct interp *it,
+                                                 const struct prepared_piece *piece)
 {
-    const struct program *p = it->program;
-    uint32_t i = it->segment;
-    if (arc_length_q40_mm >= it->segment_start_q40_mm &&
-        arc_length_q40_mm < it->segment_end_q40_mm) {
+    return (const void *)((const uint8_t *)piece + prepared_piece_size(it->kernel));
+}
+
+/* Makes the piece of this time the present one, crossing `most` ends at most. The last piece has no
+ * end here: beyond the duration nothing is evaluated. */
+static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
+{
+    const struct prepared_piece *piece = present_piece(it);
+    if (time_q32_s < piece->start_q32_s) {
+        return INTERP_ERR_JUMP;
+    }
+    if (time_q32_s < piece->end_q32_s) {
         return INTERP_OK;
     }
+    if (it->piece == NULL) {
+        return enter_piece(it, time_q32_s, most);
+    }
+    for (; time_q32_s >= piece->end_q32_s; most--) {
+        if (most == 0) {
+            return INTERP_ERR_JUMP;
+        }
+        piece = behind_piece(it, piece);
+    }
+    it->piece = piece;
+    return INTERP_OK;
+}
+
+/* Expands the segment of this arc length. */
+static int enter_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
+{
+    const struct program *p = it->program;
+    uint32_t i = it->segment_index;
     while (i + 1 < p->header.segment_count &&
            program_segment_start(p, i + 1) <= arc_length_q40_mm) {
         if (most == 0) {
@@ -96,6 +118,38 @@ static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t m
     return INTERP_OK;
 }
 
+static int step_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
+{
+    const uint32_t size = prepared_segment_size(it->kernel);
+    const struct prepared_segment *segment = it->segment;
+    for (; arc_length_q40_mm >= segment->to_q40_mm; most--) {
+        if (most == 0) {
+            return INTERP_ERR_JUMP;
+        }
+        segment = (const void *)((const uint8_t *)segment + size);
+    }
+    for (; arc_length_q40_mm < segment->from_q40_mm; most--) {
+        if (most == 0) {
+            return INTERP_ERR_JUMP;
+        }
+        segment = (const void *)((const uint8_t *)segment - size);
+    }
+    it->segment = segment;
+    return INTERP_OK;
+}
+
+/* Makes the segment of this arc length the present one: the last that starts at or before it. Steps
+ * back only where the feed dips below zero by rounding. */
+static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
+{
+    const struct prepared_segment *segment = present_segment(it);
+    if (arc_length_q40_mm >= segment->from_q40_mm && arc_length_q40_mm < segment->to_q40_mm) {
+        return INTERP_OK;
+    }
+    return it->segment != NULL ? step_segment(it, arc_length_q40_mm, most)
+                               : enter_segment(it, arc_length_q40_mm, most);
+}
+
 static void set_end(struct interp *it)
 {
     struct program_segment segment;
@@ -110,6 +164,16 @@ static void set_end(struct interp *it)
     it->end.feed_q32_mm_s = 0;
 }
 
+static void go_to_begin(struct interp *it)
+{
+    if (it->program->prepared_for == it->kernel) {
+        it->piece = prepared_piece_at(it->program, it->kernel, 0);
+    } else {
+        it->piece = NULL;
+        load_piece(it, 0, 0);
+    }
+}
+
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel)
 {
     if (p == NULL || p->image == NULL) {
@@ -120,16 +184,23 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
         return INTERP_ERR_KERNEL;
     }
     it->program = p;
+    it->duration_q32_s = p->header.duration_q32_s;
+    it->length_q40_mm = p->header.length_q40_mm;
     set_end(it);
-    load_piece(it, 0, 0);
-    load_segment(it, 0);
+    go_to_begin(it);
+    if (p->prepared_for == it->kernel) {
+        it->segment = prepared_segment_at(p, it->kernel, 0);
+    } else {
+        it->segment = NULL;
+        load_segment(it, 0);
+    }
     return 0;
 }
 
 int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out)
 {
     uint64_t time_q32_s = time_q42_s >> FINE_BITS;
-    if (time_q32_s >= it->program->header.duration_q32_s) {
+    if (time_q32_s >= it->duration_q32_s) {
         *out = it->end;
         return INTERP_END;
     }
@@ -142,7 +213,7 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
         return INTERP_ERR_JUMP;
     }
     int64_t point[2];
-    it->kernel->segment_at(&it->path, f.arc_length_q40_mm, point);
+    it->kernel->segment_at(&present_segment(it)->path, f.arc_length_q40_mm, point);
     out->arc_length_q40_mm = f.arc_length_q40_mm;
     out->x_q40_mm = point[0];
     out->y_q40_mm = point[1];
@@ -152,18 +223,17 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
 
 int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
 {
-    uint64_t duration = it->program->header.duration_q32_s;
-    uint64_t time = time_q32_s < duration ? time_q32_s : duration;
+    uint64_t time = time_q32_s < it->duration_q32_s ? time_q32_s : it->duration_q32_s;
     return interp_at_q42(it, time << FINE_BITS, out);
 }
 
 int interp_seek(struct interp *it, uint64_t time_q32_s)
 {
-    uint64_t last = it->program->header.duration_q32_s - 1u;
+    uint64_t last = it->duration_q32_s - 1u;
     uint64_t time = time_q32_s < last ? time_q32_s : last;
     struct feed_point f;
-    if (time < it->piece_start_q32_s) {
-        load_piece(it, 0, 0);
+    if (time < present_piece(it)->start_q32_s) {
+        go_to_begin(it);
     }
     find_piece(it, time, UINT32_MAX);
     evaluate_feed(it, time << FINE_BITS, &f);

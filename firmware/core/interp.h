@@ -3,10 +3,11 @@
  * The interpolator: program time in, point on the path out.
  *
  * The point is a pure function of (program, time, kernel): the cursor inside struct interp only
- * remembers which segment and piece are expanded. So a run, a seek and a run backwards by seeks
- * give the same bits. Kernels: docs/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
+ * remembers which segment and piece are looked at. So a run, a seek and a run backwards by seeks
+ * give the same bits, and so do a program with prepared records (core/prepared.h) and one without, where the tick
+ * expands what it enters. Kernels: docs/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
  * (the inverse of arc length). The program must have passed program_check with any limits; the
- * image must outlive the struct. interp_at is meant for the tick (interrupt); the other functions
+ * image must outlive the struct. interp_at_q42 is meant for the tick (interrupt); the other functions
  * for the main loop.
  */
 #ifndef HODOGRAPH_CORE_INTERP_H
@@ -16,9 +17,7 @@
 
 #include "core/feed_piece.h"
 #include "core/kernel.h"
-#include "core/kernel_double.h"
-#include "core/kernel_fixed.h"
-#include "core/kernel_float.h"
+#include "core/prepared.h"
 #include "core/program.h"
 
 enum interp_result {
@@ -41,22 +40,15 @@ struct interp_point {
 struct interp {
     const struct program *program;
     const struct kernel *kernel;
-    uint32_t piece; /* the one expanded below */
-    uint32_t segment;
-    uint64_t piece_start_q32_s;
-    uint64_t piece_end_q32_s;
-    int64_t segment_start_q40_mm; /* arc lengths that belong to the segment: from here ... */
-    int64_t segment_end_q40_mm;   /* ... to below here; without end at both ends of the path */
-    struct interp_point end;      /* the exact end point */
-    union {
-        struct feed_piece integers; /* fixed and float */
-        struct kernel_double_piece doubles;
-    } feed;
-    union {
-        struct kernel_fixed_segment fixed;
-        struct kernel_float_segment floats;
-        struct kernel_double_segment doubles;
-    } path;
+    const struct prepared_piece *piece;     /* the present ones of a program with records, */
+    const struct prepared_segment *segment; /* else NULL: those below */
+    uint32_t piece_index;                   /* of those below */
+    uint32_t segment_index;
+    uint64_t duration_q32_s;
+    int64_t length_q40_mm;
+    struct interp_point end; /* the exact end point */
+    struct prepared_piece own_piece;
+    struct prepared_segment own_segment;
 };
 
 /* Starts at time 0. Returns 0 or INTERP_ERR_... Main loop. */

@@ -15,6 +15,8 @@
 
 #include <stdint.h>
 
+struct kernel; /* core/kernel.h */
+
 #define PROGRAM_HEADER_SIZE  128u
 #define PROGRAM_SEGMENT_SIZE 72u
 #define PROGRAM_PIECE_SIZE   88u
@@ -65,6 +67,8 @@ struct program {
     const uint8_t *image;
     uint32_t size;
     struct program_header header;
+    const uint8_t *prepared;           /* records of core/prepared.h, if there are any, */
+    const struct kernel *prepared_for; /* for this kernel; else NULL */
 };
 
 /* Opens an image of `size` bytes: magic, version, header size, counts against the size, CRC. The

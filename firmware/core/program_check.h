@@ -21,6 +21,9 @@ enum program_error {
     PROGRAM_ERR_CRC = -4,     /* CRC-32 of the contents is wrong */
     PROGRAM_ERR_COUNT = -5,   /* no segment or no piece */
     PROGRAM_ERR_STORE = -6,   /* the program store did not keep it (app/program_slot) */
+    PROGRAM_ERR_ROOM =
+        -7, /* it and what is prepared from it do not fit the store (app/program_table) */
+    PROGRAM_ERR_KERNEL = -8, /* this controller's image does not have the kernel configured */
     /* header */
     PROGRAM_ERR_PERIOD = -10,      /* period not 1000, 2000, 4000 or 8000 us */
     PROGRAM_ERR_PERIOD_USED = -11, /* period is not the one configured in the controller */

@@ -115,7 +115,7 @@ uint32_t port_store_size(void); /* bytes per bank */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 
-/* The bank as memory, readable at any time and from any context. */
+/* The bank as memory, aligned to 8, readable at any time and from any context. */
 const uint8_t *port_store_data(unsigned bank);
 
 /* --- Words for a human --- */

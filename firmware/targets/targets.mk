@@ -35,7 +35,7 @@ $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv
 # for, where not all; kernels, where not the target's; and what tools/check_image.py has to allow.
 IMAGES := setpoints setpoints_float controller isr taylor
 setpoints_MAIN := tests/target/setpoints.c
-setpoints_SRC  := tests/target/commands.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+setpoints_SRC  := tests/target/commands.c tests/target/table.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
 
 # The float kernel where floats are a library's: IEEE single is the same everywhere, which the tests show. Not for use.
 setpoints_float_MAIN    := $(setpoints_MAIN)

@@ -19,11 +19,12 @@
 #include "commands.h"
 #include "core/program.h"
 #include "port/semihost/semihost.h"
+#include "table.h"
 
 enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_MOTION = 6 };
 enum { WORD_KERNEL, WORD_FILE, WORD_COMMANDS, WORD_TIMES, WORD_COUNT };
 
-#define STORE_SIZE    0x20000u /* at least as much on every target */
+#define STORE_SIZE    TABLE_AT /* at least as much on every target */
 #define BATCH         64
 #define COUNTS_PER_MM 1000000u /* 1 nm, as on the bus by default */
 
@@ -86,6 +87,7 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel, int fi
     if (program_open(&program, image, size) != 0) {
         return STATUS_PROGRAM;
     }
+    (void)table_make(&program, kernel);
     memset(&config, 0, sizeof config);
     config.period_us = program.header.period_us;
     config.counts_per_mm = COUNTS_PER_MM;

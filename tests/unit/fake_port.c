@@ -17,11 +17,12 @@ static struct {
     bool locked;
     bool fail_send;
     bool fail_store;
+    uint32_t missing; /* bytes of a bank */
     unsigned wakes;
     uint32_t sent_head;
     uint32_t sent_tail;
     struct can_msg sent[SENT_MAX];
-    uint8_t banks[PORT_STORE_BANKS][FAKE_PORT_BANK_BYTES];
+    uint8_t banks[PORT_STORE_BANKS][FAKE_PORT_BANK_BYTES] __attribute__((aligned(8)));
     const struct fake_port_store *store;
     void (*wait_hook)(void *context);
     void *wait_context;
@@ -92,6 +93,11 @@ unsigned fake_port_wakes(void)
 void fake_port_fail_send(bool fail)
 {
     self.fail_send = fail;
+}
+
+void fake_port_shrink_store(uint32_t bytes)
+{
+    self.missing = FAKE_PORT_BANK_BYTES - bytes;
 }
 
 void fake_port_fail_store(bool fail)
@@ -215,7 +221,7 @@ void port_wake(void)
 
 uint32_t port_store_size(void)
 {
-    return self.store != NULL ? self.store->bank_bytes : FAKE_PORT_BANK_BYTES;
+    return self.store != NULL ? self.store->bank_bytes : FAKE_PORT_BANK_BYTES - self.missing;
 }
 
 int port_store_erase(unsigned bank)

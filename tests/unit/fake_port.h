@@ -35,6 +35,9 @@ unsigned fake_port_wakes(void);
 void fake_port_fail_send(bool fail);
 void fake_port_fail_store(bool fail);
 
+/* A bank has only so many bytes now. */
+void fake_port_shrink_store(uint32_t bytes);
+
 /* Turns the bits of one byte of the store. */
 void fake_port_spoil_store(unsigned bank, uint32_t offset);
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "app_image.h"
+#include "core/kernel.h"
 #include "fake_port.h"
 #include "unity.h"
 
@@ -128,6 +129,35 @@ static void test_a_new_configuration_is_applied_to_the_old_program(void)
     TEST_ASSERT_EQUAL_INT32(10000, slot.start_counts[0]);
 }
 
+static void test_the_records_are_those_of_the_kernel(void)
+{
+    struct config other = config;
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    const unsigned bank = slot.bank;
+    TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.prepared_for);
+    other.kernel = 1;
+    program_slot_stale(&slot);
+    program_slot_refresh(&slot, &other);
+    TEST_ASSERT_TRUE(slot.acceptable);
+    TEST_ASSERT_EQUAL_PTR(kernel_find(1), slot.program.prepared_for);
+    TEST_ASSERT_EQUAL_UINT(1u - bank, slot.bank);
+    expect_active(image);
+    fake_port_fail_store(true);
+    program_slot_stale(&slot);
+    program_slot_refresh(&slot, &config);
+    TEST_ASSERT_FALSE(slot.acceptable);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_STORE, slot.refused.code);
+}
+
+static void test_no_room_for_the_records(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, sizeof image));
+    TEST_ASSERT_EQUAL_INT(0, program_slot_write(&slot, 0, image, sizeof image));
+    fake_port_shrink_store(sizeof image + 200u);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_ROOM, program_slot_finish(&slot, sizeof image, &config));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+}
+
 static void power_on(void)
 {
     program_slot_init(&slot);
@@ -181,6 +211,8 @@ int main(void)
     RUN_TEST(test_a_refusal_says_what_and_where);
     RUN_TEST(test_what_the_store_cannot_take);
     RUN_TEST(test_a_new_configuration_is_applied_to_the_old_program);
+    RUN_TEST(test_the_records_are_those_of_the_kernel);
+    RUN_TEST(test_no_room_for_the_records);
     RUN_TEST(test_after_power_on_the_newest_program_is_there);
     RUN_TEST(test_a_program_without_its_record_is_refused);
     return UNITY_END();

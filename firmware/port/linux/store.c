@@ -5,9 +5,9 @@
 
 #include <string.h>
 
-#define BANK_BYTES (16u * 1024u * 1024u)
+#define BANK_BYTES (64u * 1024u * 1024u)
 
-static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES];
+static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES] __attribute__((aligned(8)));
 
 uint32_t port_store_size(void)
 {

@@ -6,7 +6,7 @@
 
 #define BANK_BYTES (8u * 1024u * 1024u)
 
-__attribute__((section(".store"))) static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES];
+__attribute__((section(".store"), aligned(8))) static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES];
 
 uint32_t port_store_size(void)
 {

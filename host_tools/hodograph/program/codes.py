@@ -18,6 +18,8 @@ class ProgramError(IntEnum):
     CRC = -4
     COUNT = -5
     STORE = -6
+    ROOM = -7
+    KERNEL = -8
     PERIOD = -10
     PERIOD_USED = -11
     FLAGS = -12
@@ -70,6 +72,8 @@ _TEXTS = {
     ProgramError.CRC: "CRC-32 of the contents is wrong",
     ProgramError.COUNT: "no segment or no piece",
     ProgramError.STORE: "the program store did not keep it",
+    ProgramError.ROOM: "with what is prepared from it too large for the program store",
+    ProgramError.KERNEL: "the controller does not have the kernel configured",
     ProgramError.PERIOD: "period not 1000, 2000, 4000 or 8000 us",
     ProgramError.PERIOD_USED: "period is not the one configured in the controller",
     ProgramError.FLAGS: "unknown flag, or a reserved field of the header is not 0",

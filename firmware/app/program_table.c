@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/program_table.h"
+
+#include <string.h>
+
+#include "app/program_record.h"
+#include "core/prepared.h"
+#include "core/program_check.h"
+#include "port/port.h"
+
+struct place {
+    unsigned bank;
+    uint32_t offset;
+};
+
+static int put(void *context, const uint8_t *bytes, uint32_t size)
+{
+    struct place *place = context;
+    const int result = port_store_write(place->bank, place->offset, bytes, size);
+    place->offset += size;
+    return result;
+}
+
+static int compare(void *context, const uint8_t *bytes, uint32_t size)
+{
+    struct place *place = context;
+    const int result = memcmp(port_store_data(place->bank) + place->offset, bytes, size);
+    place->offset += size;
+    return result == 0 ? 0 : PORT_ERR_STORE;
+}
+
+/* Sizes of header, segments and pieces are multiples of 8, and so is the image's. */
+static struct place behind(unsigned bank, const struct program *program)
+{
+    return (struct place){.bank = bank, .offset = program->header.image_size};
+}
+
+static bool fits(const struct program *program, const struct kernel *made_for)
+{
+    return program->header.image_size + prepared_size(program, made_for) <= program_record_room();
+}
+
+static void attach(unsigned bank, struct program *program, const struct kernel *made_for)
+{
+    prepared_attach(program, made_for, port_store_data(bank) + program->header.image_size);
+}
+
+int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
+{
+    const struct kernel *made_for = kernel_find(kernel);
+    struct place place = behind(bank, program);
+    if (made_for == NULL) {
+        return PROGRAM_ERR_KERNEL;
+    }
+    if (!fits(program, made_for)) {
+        return PROGRAM_ERR_ROOM;
+    }
+    if (prepared_make(program, made_for, put, &place) != 0) {
+        return PROGRAM_ERR_STORE;
+    }
+    attach(bank, program, made_for);
+    return 0;
+}
+
+bool program_table_find(unsigned bank, struct program *program, uint32_t kernel)
+{
+    const struct kernel *made_for = kernel_find(kernel);
+    struct place place = behind(bank, program);
+    if (made_for == NULL || !fits(program, made_for) ||
+        prepared_make(program, made_for, compare, &place) != 0) {
+        return false;
+    }
+    attach(bank, program, made_for);
+    return true;
+}

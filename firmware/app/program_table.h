@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * program_table: the prepared records (core/prepared.h) of the program in a bank of the store, right behind its image,
+ * for the kernel that the tick uses. The controller makes them itself when an upload has passed its checks; what it
+ * finds there after power-on it compares with what it would write. Mainline.
+ */
+#ifndef APP_PROGRAM_TABLE_H
+#define APP_PROGRAM_TABLE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "core/program.h"
+
+/* Writes the records and gives them to the program. 0, PROGRAM_ERR_ROOM when image and records do not fit the bank,
+ * PROGRAM_ERR_STORE, or PROGRAM_ERR_KERNEL when this image has no such kernel. The bank must be erased behind the image.
+ */
+int program_table_write(unsigned bank, struct program *program, uint32_t kernel);
+
+/* Gives the records that are there to the program, if every byte of them is right. */
+bool program_table_find(unsigned bank, struct program *program, uint32_t kernel);
+
+#endif

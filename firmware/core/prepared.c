@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/prepared.h"
+
+#include <string.h>
+
+#include "core/ph_segment.h"
+
+uint32_t prepared_piece_size(const struct kernel *kernel)
+{
+    return (uint32_t)(offsetof(struct prepared_piece, feed) + kernel->piece_size);
+}
+
+uint32_t prepared_segment_size(const struct kernel *kernel)
+{
+    return (uint32_t)(offsetof(struct prepared_segment, path) + kernel->segment_size);
+}
+
+static uint64_t pieces_size(const struct program *p, const struct kernel *kernel)
+{
+    return (uint64_t)p->header.piece_count * prepared_piece_size(kernel);
+}
+
+uint64_t prepared_size(const struct program *p, const struct kernel *kernel)
+{
+    return pieces_size(p, kernel) +
+           (uint64_t)p->header.segment_count * prepared_segment_size(kernel);
+}
+
+static uint32_t least(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
+static void take_in(struct prepared_bounds *bounds, const struct program *p, uint32_t i)
+{
+    struct prepared_bounds own;
+    program_piece_override(p, i, &own.factor_q24, &own.rate_q16_per_s, &own.second_q8_per_s2);
+    bounds->factor_q24 = least(bounds->factor_q24, own.factor_q24);
+    bounds->rate_q16_per_s = least(bounds->rate_q16_per_s, own.rate_q16_per_s);
+    bounds->second_q8_per_s2 = least(bounds->second_q8_per_s2, own.second_q8_per_s2);
+}
+
+static void look_ahead(struct prepared_bounds ahead[PREPARED_SPANS], const struct program *p,
+                       uint32_t i)
+{
+    struct prepared_bounds bounds = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
+    uint32_t taken = 0;
+    for (uint32_t k = 0; k < PREPARED_SPANS; k++) {
+        while (taken < 1u << k && i + taken < p->header.piece_count) {
+            take_in(&bounds, p, i + taken);
+            taken++;
+        }
+        ahead[k] = bounds;
+    }
+}
+
+void prepared_piece_make(struct prepared_piece *out, const struct program *p,
+                         const struct kernel *kernel, uint32_t i, uint64_t start_q32_s)
+{
+    struct program_piece piece;
+    program_piece_get(p, i, &piece);
+    out->start_q32_s = start_q32_s;
+    out->end_q32_s =
+        i + 1u == p->header.piece_count ? UINT64_MAX : start_q32_s + piece.duration_q32_s;
+    look_ahead(out->ahead, p, i);
+    out->reserved = 0;
+    kernel->piece_set(&out->feed, &piece);
+}
+
+void prepared_segment_make(struct prepared_segment *out, const struct program *p,
+                           const struct kernel *kernel, uint32_t i)
+{
+    struct program_segment segment;
+    struct ph_segment ph;
+    program_segment_get(p, i, &segment);
+    ph_segment_expand(&ph, &segment);
+    out->from_q40_mm = i == 0 ? INT64_MIN : segment.start_q40_mm;
+    out->to_q40_mm =
+        i + 1u == p->header.segment_count ? INT64_MAX : program_segment_start(p, i + 1u);
+    kernel->segment_set(&out->path, &ph);
+}
+
+int prepared_make(const struct program *p, const struct kernel *kernel, prepared_sink *sink,
+                  void *context)
+{
+    union {
+        struct prepared_piece piece;
+        struct prepared_segment segment;
+        uint8_t bytes[sizeof(struct prepared_segment)];
+    } record;
+    uint64_t start_q32_s = 0;
+    int error = 0;
+    memset(&record, 0, sizeof record);
+    for (uint32_t i = 0; error == 0 && i < p->header.piece_count; i++) {
+        prepared_piece_make(&record.piece, p, kernel, i, start_q32_s);
+        start_q32_s = record.piece.end_q32_s;
+        error = sink(context, record.bytes, prepared_piece_size(kernel));
+    }
+    memset(&record, 0, sizeof record);
+    for (uint32_t i = 0; error == 0 && i < p->header.segment_count; i++) {
+        prepared_segment_make(&record.segment, p, kernel, i);
+        error = sink(context, record.bytes, prepared_segment_size(kernel));
+    }
+    return error;
+}
+
+void prepared_attach(struct program *p, const struct kernel *kernel, const uint8_t *records)
+{
+    p->prepared = records;
+    p->prepared_for = kernel;
+}
+
+const struct prepared_piece *prepared_piece_at(const struct program *p, const struct kernel *kernel,
+                                               uint32_t i)
+{
+    return (const void *)(p->prepared + (size_t)i * prepared_piece_size(kernel));
+}
+
+const struct prepared_segment *prepared_segment_at(const struct program *p,
+                                                   const struct kernel *kernel, uint32_t i)
+{
+    const uint8_t *segments =
+        p->prepared + (size_t)p->header.piece_count * prepared_piece_size(kernel);
+    return (const void *)(segments + (size_t)i * prepared_segment_size(kernel));
+}

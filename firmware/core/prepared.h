@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * A program made ready for one kernel: records that the tick reads where they are, so that it expands nothing when it
+ * crosses the end of a segment or of a piece (docs/numerics.md section 12, "Prepared programs").
+ *
+ * The records are made by the controller itself from a program that has passed program_check; they are never uploaded.
+ * Layout: those of the pieces, then those of the segments, each of one size. They hold native structs: for the binary
+ * that made them and no other. Any context but where it says otherwise.
+ */
+#ifndef HODOGRAPH_CORE_PREPARED_H
+#define HODOGRAPH_CORE_PREPARED_H
+
+#include <stdint.h>
+
+#include "core/feed_piece.h"
+#include "core/kernel.h"
+#include "core/kernel_double.h"
+#include "core/kernel_fixed.h"
+#include "core/kernel_float.h"
+#include "core/program.h"
+
+#define PREPARED_ALIGNMENT 8u /* of the first record */
+#define PREPARED_SPANS     5  /* 1, 2, 4, 8, 16 pieces */
+
+/* Override bounds as in struct program_piece. */
+struct prepared_bounds {
+    uint32_t factor_q24;
+    uint32_t rate_q16_per_s;
+    uint32_t second_q8_per_s2;
+};
+
+/* A record ends behind the kernel's own part. */
+struct prepared_piece {
+    uint64_t start_q32_s;
+    uint64_t
+        end_q32_s; /* UINT64_MAX for the last piece: nothing is evaluated beyond the duration */
+    struct prepared_bounds
+        ahead[PREPARED_SPANS]; /* least of this one and those behind it, 2^k pieces in all */
+    uint32_t reserved;
+    union {
+        struct feed_piece integers;
+        struct kernel_double_piece doubles;
+    } feed;
+};
+
+struct prepared_segment {
+    int64_t from_q40_mm; /* arc lengths that belong to it: from here, INT64_MIN in the first, */
+    int64_t to_q40_mm;   /* to below here, INT64_MAX in the last */
+    union {
+        struct kernel_fixed_segment fixed;
+        struct kernel_float_segment floats;
+        struct kernel_double_segment doubles;
+    } path;
+};
+
+/* Bytes of a record. */
+uint32_t prepared_piece_size(const struct kernel *kernel);
+uint32_t prepared_segment_size(const struct kernel *kernel);
+
+/* Bytes of all records of a program; may be above 2^32. */
+uint64_t prepared_size(const struct program *p, const struct kernel *kernel);
+
+/* One record. The piece begins at start_q32_s. Main loop, or a tick without prepared records. */
+void prepared_piece_make(struct prepared_piece *out, const struct program *p,
+                         const struct kernel *kernel, uint32_t i, uint64_t start_q32_s);
+void prepared_segment_make(struct prepared_segment *out, const struct program *p,
+                           const struct kernel *kernel, uint32_t i);
+
+/* Takes the next bytes of the records; 0 or a negative error. */
+typedef int prepared_sink(void *context, const uint8_t *bytes, uint32_t size);
+
+/* Makes all records, in order. Gives the sink's first error, or 0. Main loop; linear. */
+int prepared_make(const struct program *p, const struct kernel *kernel, prepared_sink *sink,
+                  void *context);
+
+/* From now on the program has these records, which must stay; aligned to PREPARED_ALIGNMENT. */
+void prepared_attach(struct program *p, const struct kernel *kernel, const uint8_t *records);
+
+/* A record of a program that has them for this kernel. */
+const struct prepared_piece *prepared_piece_at(const struct program *p, const struct kernel *kernel,
+                                               uint32_t i);
+const struct prepared_segment *prepared_segment_at(const struct program *p,
+                                                   const struct kernel *kernel, uint32_t i);
+
+#endif

@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: MIT */
+/* A program with prepared records gives the bits of one without, at any rate and in any order of times. */
+#include "core/prepared.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/interp.h"
+#include "golden.h"
+#include "unity.h"
+
+static const char *const names[] = {"alpha_exponential.hdgp", "heart_minimax.hdgp",
+                                    "star_minimax.hdgp",      "line_tiny.hdgp",
+                                    "line_slow.hdgp",         "alpha_offset.hdgp"};
+#define NAMES (sizeof names / sizeof names[0])
+
+struct buffer {
+    uint8_t *bytes;
+    uint32_t used;
+    uint32_t room;
+};
+
+static struct program plain, ready;
+static struct buffer records;
+static uint64_t seed = 3;
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+static int append(void *context, const uint8_t *bytes, uint32_t size)
+{
+    struct buffer *buffer = context;
+    if (buffer->used + size > buffer->room) {
+        return -7;
+    }
+    memcpy(buffer->bytes + buffer->used, bytes, size);
+    buffer->used += size;
+    return 0;
+}
+
+static void begin(const char *name, enum interp_kernel kernel)
+{
+    golden_open(&plain, name);
+    const struct kernel *made_for = kernel_find((uint32_t)kernel);
+    records.room = (uint32_t)prepared_size(&plain, made_for);
+    records.bytes = malloc(records.room);
+    records.used = 0;
+    TEST_ASSERT_EQUAL_INT(0, prepared_make(&plain, made_for, append, &records));
+    TEST_ASSERT_EQUAL_UINT32(records.room, records.used);
+    ready = plain;
+    prepared_attach(&ready, made_for, records.bytes);
+}
+
+static void end(void)
+{
+    free(records.bytes);
+    golden_close(&plain);
+}
+
+static void same(struct interp *a, struct interp *b, uint64_t time_q42_s)
+{
+    struct interp_point p, q;
+    memset(&p, 0, sizeof p);
+    memset(&q, 0, sizeof q);
+    TEST_ASSERT_EQUAL_INT(interp_at_q42(a, time_q42_s, &p), interp_at_q42(b, time_q42_s, &q));
+    TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
+}
+
+static void run(void)
+{
+    const uint64_t period = (uint64_t)plain.header.period_us * 4398046u;
+    const uint64_t duration = plain.header.duration_q32_s << 10 | 1u;
+    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
+        struct interp a, b;
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &plain, (enum interp_kernel)kernel));
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready, (enum interp_kernel)kernel));
+        for (uint64_t time = 0; time < duration; time += golden_random(&seed) % (2u * period)) {
+            same(&a, &b, time);
+        }
+        same(&a, &b, duration);
+        for (int i = 0; i < 300; i++) {
+            const uint64_t time = golden_random(&seed) % duration;
+            interp_seek(&a, time >> 10);
+            interp_seek(&b, time >> 10);
+            same(&a, &b, time);
+        }
+        same(&a, &b, golden_random(&seed) % duration); /* mostly a jump: both refuse */
+    }
+}
+
+static void test_same_bits_as_expanded(void)
+{
+    for (size_t i = 0; i < NAMES; i++) {
+        for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
+            begin(names[i], (enum interp_kernel)kernel); /* the others go without */
+            run();
+            end();
+        }
+    }
+}
+
+static void test_spans_hold_the_least_of_their_pieces(void)
+{
+    const struct kernel *fixed = kernel_find(INTERP_FIXED);
+    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    for (uint32_t i = 0; i < plain.header.piece_count; i++) {
+        const struct prepared_piece *piece = prepared_piece_at(&ready, fixed, i);
+        for (uint32_t k = 0; k < PREPARED_SPANS; k++) {
+            uint32_t least[3] = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
+            for (uint32_t j = i; j < i + (1u << k) && j < plain.header.piece_count; j++) {
+                uint32_t own[3];
+                program_piece_override(&plain, j, &own[0], &own[1], &own[2]);
+                for (int n = 0; n < 3; n++) {
+                    least[n] = own[n] < least[n] ? own[n] : least[n];
+                }
+            }
+            TEST_ASSERT_EQUAL_UINT32(least[0], piece->ahead[k].factor_q24);
+            TEST_ASSERT_EQUAL_UINT32(least[1], piece->ahead[k].rate_q16_per_s);
+            TEST_ASSERT_EQUAL_UINT32(least[2], piece->ahead[k].second_q8_per_s2);
+        }
+    }
+    end();
+}
+
+static void test_an_error_of_the_sink_is_passed_on(void)
+{
+    begin("alpha_offset.hdgp", INTERP_FIXED);
+    for (uint32_t room = 0; room < records.used; room += 57u) {
+        struct buffer small = {records.bytes, 0, room};
+        TEST_ASSERT_EQUAL_INT(-7, prepared_make(&plain, kernel_find(INTERP_FIXED), append, &small));
+    }
+    end();
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_same_bits_as_expanded);
+    RUN_TEST(test_spans_hold_the_least_of_their_pieces);
+    RUN_TEST(test_an_error_of_the_sink_is_passed_on);
+    return UNITY_END();
+}
