@@ -84,13 +84,13 @@ def name_of(image: bytes) -> str:
 
 
 def stores() -> list[Store]:
-    """All programs in as few stores as hold them; the first is run with commands too."""
+    """All programs in as few stores as hold them; the first two are run with commands too."""
     groups: list[list[bytes]] = [[]]
     for image in programs():
         if sum(map(len, groups[-1])) + len(image) > STORE_BYTES:
             groups.append([])
         groups[-1].append(image)
-    runs = [tuple(RUNS), *[("plain",)] * (len(groups) - 1)]
+    runs = [tuple(RUNS)] * 2 + [("plain",)] * (len(groups) - 2)
     return [
         Store(tuple(group), tuple(map(name_of, group)), run)
         for group, run in zip(groups, runs, strict=True)
