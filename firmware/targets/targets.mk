@@ -102,7 +102,8 @@ BOARD ?= nucleo_g474re
 .PHONY: flash
 flash: $(BUILD)/firmware/$(BOARD)/controller.elf ## put the controller into a board that is plugged in (BOARD=nucleo_g474re NODE=1 CAN_BITS_S=1000000)
 	@$(PYTHON) tools/packages.py flash
-	openocd -f $($(BOARD)_OPENOCD) -c "program $< verify reset exit"
+	@openocd -f $($(BOARD)_OPENOCD) -c "program $< verify reset exit" || { \
+	    echo "flash: openocd does not reach a $(BOARD): is it plugged in, and may you use it? (docs/flash-and-run.md)"; exit 1; }
 
 UPDATE ?=
 .PHONY: size

@@ -28,9 +28,10 @@ static inline void reg_write(uint32_t address, uint32_t value)
     *(volatile uint32_t *)(uintptr_t)address = value;
 }
 
-/* Memory that is read like any other. */
+/* Memory that is read like any other; as it is now, whatever was read of it before the registers changed it. */
 static inline const uint8_t *reg_memory(uint32_t address)
 {
+    __asm__ volatile("" ::: "memory");
     return (const uint8_t *)(uintptr_t)address;
 }
 
