@@ -58,7 +58,7 @@ def main() -> None:
     commands = adversary.COMMANDS[options.commands]() if options.commands else []
     image, entry = ("isr", "isr") if options.isr else ("setpoints", "tick")
     target = emulator.TARGETS[options.target]
-    counter = counting.Counter(options.build, target, image, entry, options.functions)
+    counter = counting.Counter(options.build, target, image, entry, functions=options.functions)
     counts = counter.count(options.kernel, image_of(options.program), commands)
     show(counter.names, counts, options.worst)
 

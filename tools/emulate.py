@@ -50,6 +50,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="HOST:PORT",
         help="SLCAN on this TCP port instead of a bus, for python-can's slcan:socket://HOST:PORT",
     )
+    parser.add_argument("--plugin", help="a plugin for QEMU, with its words (tools/count_til.py)")
     parser.add_argument("--build", type=Path, default=ROOT / "build", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if (options.bus is None) == (options.serve is None):
@@ -73,6 +74,7 @@ def qemu_command(options: argparse.Namespace, folder: Path) -> list[str]:
         command += ["-serial", f"tcp:{options.serve},server=on,wait=on,nodelay=on"]
     else:
         command += ["-serial", f"unix:{folder / 'uart'},server=on,wait=on"]
+    command += ["-plugin", options.plugin] if options.plugin else []
     command += ["-kernel", str(image(options))]
     semihosting = ["enable=on", "target=native", *(f"arg={word}" for word in words)]
     return [*command, "-semihosting-config", ",".join(semihosting)]

@@ -33,7 +33,7 @@ $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv
 
 # An image is a main with what it is linked from besides core, canopen, app and the dictionary; the targets that it is
 # for, where not all; kernels, where not the target's; and what tools/check_image.py has to allow.
-IMAGES := setpoints setpoints_float controller isr taylor
+IMAGES := setpoints setpoints_float controller isr taylor interrupted
 setpoints_MAIN := tests/target/setpoints.c
 setpoints_SRC  := tests/target/commands.c tests/target/table.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
 
@@ -46,6 +46,10 @@ setpoints_float_CHECK   := --soft-float
 
 isr_MAIN := tests/target/isr.c
 isr_SRC  := $(filter-out %/setpoints.c,$(setpoints_SRC))
+
+interrupted_MAIN    := tests/target/interrupted.c
+interrupted_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+interrupted_TARGETS := an386
 
 taylor_MAIN    := tests/target/taylor.c
 taylor_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)

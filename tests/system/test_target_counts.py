@@ -41,3 +41,15 @@ def test_the_counts_of_a_run_are_those_of_the_next() -> None:
     program = adversary.image(adversary.ADVERSARIES[2])
     first, second = (counter.count("float", program, adversary.jitter()) for _ in range(2))
     assert np.array_equal(first, second)
+
+
+def test_interrupts_inside_do_not_count(tmp_path: Path) -> None:
+    def counted(*interrupts: str) -> set[int]:
+        counter = Counter(BUILD, TARGETS["an386"], "interrupted", interrupts=interrupts)
+        counts = counter.count_words([str(tmp_path / "interrupts")], b"", ICOUNT)
+        assert np.fromfile(tmp_path / "interrupts", "<u4")[0] > 50
+        assert len(counts) == 100
+        return set(counts.sum(axis=1).tolist())
+
+    assert len(counted()) > 1
+    assert len(counted("startup_systick")) == 1

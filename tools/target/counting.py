@@ -26,6 +26,11 @@ def stored(commands: Iterable[Command]) -> bytes:
     return b"".join(struct.pack("<II", *command) for command in commands)
 
 
+def read(out: Path, columns: int) -> Counts:
+    """What count_plugin.c has written."""
+    return np.fromfile(out, "<u4").reshape(-1, _WORDS)[:, :columns]
+
+
 @dataclass
 class Counter:
     """Counts on one target; a map of its image is made once."""
@@ -34,6 +39,7 @@ class Counter:
     target: emulator.Target
     image: str = "setpoints"
     entry: str = "tick"
+    interrupts: tuple[str, ...] = ()  # handlers that may come in between: not counted
     functions: bool = False  # count by functions as they are linked, not by parts
     _map: parts.Map | None = field(default=None, init=False)
 
@@ -45,8 +51,9 @@ class Counter:
     def map(self) -> parts.Map:
         """For count_plugin.c."""
         if self._map is None:
+            counted = parts.Counted(self.entry, self.interrupts)
             make = parts.function_map if self.functions else parts.part_map
-            self._map = make(self.target.cross, self.elf, self.entry)
+            self._map = make(self.target.cross, self.elf, counted)
         return self._map
 
     @property
@@ -83,9 +90,11 @@ class Counter:
             folder = Path(name)
             (folder / "map").write_text(self.map.text)
             (folder / "store").write_bytes(store)
-            plugin = self.build / "target/count_plugin.so"
-            count = f"{plugin},map={folder / 'map'},out={folder / 'out'}"
-            options = ["-plugin", count, *options]
+            plugin = self.plugin_words(folder / "map", folder / "out")
+            options = ["-plugin", plugin, *options]
             emulator.run(self.target, self.elf, words, folder / "store", options)
-            records = np.fromfile(folder / "out", "<u4").reshape(-1, _WORDS)
-        return records[:, : len(self.names)]
+            return read(folder / "out", len(self.names))
+
+    def plugin_words(self, given: Path, out: Path) -> str:
+        """For QEMU's -plugin: the map lies in `given`, records go to `out`."""
+        return f"{self.build.resolve() / 'target/count_plugin.so'},map={given},out={out}"

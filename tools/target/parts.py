@@ -38,6 +38,7 @@ RULES = (
 _RULES = tuple((re.compile(pattern), PARTS.index(part)) for pattern, part in RULES)
 _LABEL = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
 _INSTRUCTION = re.compile(r"^ *([0-9a-f]+):\t[0-9a-f ]+\t(\S+)\s*(.*)$")
+_RETURN = re.compile(r"^bx lr|^(pop|ldmia).*\bpc\b|^(ret|mret)$")
 _CALLS = ("bl", "blx", "jal", "jalr", "c.jal", "c.jalr")
 
 
@@ -119,6 +120,14 @@ def part_lines(cross: str, image: Path, code: list[Instruction]) -> Iterator[str
 
 
 @dataclass(frozen=True)
+class Counted:
+    """The function whose calls are counted, and the handlers of interrupts that do not count."""
+
+    entry: str
+    interrupts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Map:
     """What count_plugin.c reads, and the names of what it counts."""
 
@@ -126,31 +135,48 @@ class Map:
     names: tuple[str, ...]
 
 
-def _map(code: list[Instruction], entry: str, ranges: Iterable[str], names: Iterable[str]) -> Map:
-    begin = [i.address for i in code if i.function == entry][:1]
+def interrupt_lines(code: list[Instruction], handler: str) -> Iterator[str]:
+    """`pause` where a handler begins, `resume` where it returns."""
+    own = [i for i in code if i.function == handler]
+    ends = [i for i in own if _RETURN.search(f"{i.name} {i.operands}")]
+    if not ends or ends[-1].name.endswith(("eq", "ne")):
+        raise RuntimeError(f"{handler}: where it returns cannot be seen")
+    yield f"pause {own[0].address:x}"
+    yield from (f"resume {i.address:x}" for i in ends)
+
+
+def _map(
+    code: list[Instruction],
+    counted: Counted,
+    ranges: Iterable[str],
+    names: Iterable[str],
+) -> Map:
+    begin = [i.address for i in code if i.function == counted.entry][:1]
     lines = [f"begin {a:x}" for a in begin]
-    lines += [f"end {a:x}" for a in returns_to(code, entry)]
+    lines += [f"end {a:x}" for a in returns_to(code, counted.entry)]
+    for handler in counted.interrupts:
+        lines += interrupt_lines(code, handler)
     return Map("".join(f"{line}\n" for line in (*lines, *ranges)), tuple(names))
 
 
-def part_map(cross: str, image: Path, entry: str) -> Map:
-    """By parts; the counted call is the function `entry`."""
+def part_map(cross: str, image: Path, counted: Counted) -> Map:
+    """By parts."""
     code = disassemble(cross, image)
-    return _map(code, entry, part_lines(cross, image, code), PARTS)
+    return _map(code, counted, part_lines(cross, image, code), PARTS)
 
 
-def function_map(cross: str, image: Path, entry: str) -> Map:
+def function_map(cross: str, image: Path, counted: Counted) -> Map:
     """By functions as they are linked, those that the entry can reach by calls, directly or through a pointer."""
     code = disassemble(cross, image)
     spans: dict[str, list[int]] = {}
     for instruction in code:
         spans.setdefault(instruction.function, []).append(instruction.address)
-    names = _reachable(code, entry)
+    names = _reachable(code, counted.entry)
     ranges = [
         f"part {spans[name][0]:x} {spans[name][-1] + 1:x} {number}"
         for number, name in enumerate(names, 1)
     ]
-    return _map(code, entry, ranges, ["?", *names])
+    return _map(code, counted, ranges, ["?", *names])
 
 
 def _reachable(code: list[Instruction], entry: str) -> list[str]:
