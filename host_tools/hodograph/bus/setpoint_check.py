@@ -14,8 +14,10 @@ acceleration  | |d_k| - |d_(k-1)| | <= a T^2: the second difference of arc lengt
 turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greatest normal acceleration n is known. It
               holds for each axis, so it is checked too while only one of the plane's drives follows.
 
-Where SYNCs passed without a setpoint a step is spread over them. Axes beyond the plane hold their position: they are
-checked for speed and acceleration one by one.
+Where SYNCs passed without a setpoint a step is spread over them: a mean over n periods. Two such means that meet are
+(n + m) / 2 periods apart, so that much more acceleration and turn is allowed between them; where the axes' means differ in
+length, there is no chord of the path, and the length of the step is left out. One garbled statusword in a row does not
+hide a drive that follows. Axes beyond the plane hold their position: they are checked for speed and acceleration one by one.
 """
 
 from __future__ import annotations
@@ -97,14 +99,10 @@ def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
     if sync_at.size < 2:
         return []
-    steps, followed = _steps(frames, sync_at, nodes)
+    steps = _steps(frames, sync_at, nodes)
     groups = [tuple(range(min(_PLANE, len(nodes))))]
     groups += [(axis,) for axis in range(_PLANE, len(nodes))]
-    jumps = [
-        jump
-        for group in groups
-        for jump in _check(steps[:, group], followed[:, group], group, limits)
-    ]
+    jumps = [jump for group in groups for jump in _check(steps.of(group), group, limits)]
     return sorted(jumps, key=lambda jump: jump.sync)
 
 
@@ -137,12 +135,21 @@ def _integers(data: NDArray[np.uint8]) -> Float:
     return np.ascontiguousarray(data[:, 2:6]).view("<i4")[:, 0].astype(np.float64)
 
 
-def _steps(
-    frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]
-) -> tuple[Float, NDArray[np.bool_]]:
-    """Rows by SYNC, columns by axis: the step in counts per period, and whether the drive followed it."""
-    steps = np.zeros((sync_at.size, len(nodes)))
-    followed = np.zeros((sync_at.size, len(nodes)), dtype=np.bool_)
+@dataclass(frozen=True)
+class _Steps:
+    """Rows by SYNC, columns by axis: counts per period; whether the drive followed; periods that a step is spread over."""
+
+    counts: Float
+    followed: Bool
+    periods: Float
+
+    def of(self, axes: tuple[int, ...]) -> _Steps:
+        return _Steps(self.counts[:, axes], self.followed[:, axes], self.periods[:, axes])
+
+
+def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _Steps:
+    shape = (sync_at.size, len(nodes))
+    steps = _Steps(np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.ones(shape))
     for axis, node in enumerate(nodes):
         at, control, target = _setpoints(frames[sync_at[0] :], node)
         at += sync_at[0]
@@ -154,13 +161,17 @@ def _steps(
         periods = np.maximum(np.diff(sync), 1)
         valid = follows[1:] & commanded[:-1]
         # Two setpoints for one SYNC: the larger step counts.
-        followed[sync[1:][valid], axis] = True
+        steps.followed[sync[1:][valid], axis] = True
         step = np.where(valid, np.diff(target) / periods, 0.0)
         larger = np.argsort(np.abs(step), kind="stable")
-        steps[sync[1:][larger], axis] = step[larger]
+        steps.counts[sync[1:][larger], axis] = step[larger]
+        for i in np.flatnonzero(valid & (periods > 1)):
+            span = slice(sync[i] + 1, sync[i + 1] + 1)
+            steps.counts[span, axis], steps.followed[span, axis] = step[i], True
+            steps.periods[span, axis] = periods[i]
         if valid[0] and follows[0]:  # begun in motion, perhaps: as fast as it goes on
-            followed[sync[0], axis], steps[sync[0], axis] = True, step[0]
-    return steps, followed
+            steps.followed[sync[0], axis], steps.counts[sync[0], axis] = True, step[0]
+    return steps
 
 
 def _commanded(control: NDArray[np.uint16]) -> Bool:
@@ -172,43 +183,43 @@ def _commanded(control: NDArray[np.uint16]) -> Bool:
 
 
 def _enabled(frames: Frames, node: int, at: NDArray[np.intp]) -> Bool:
-    """Whether the drive's last word before each of these frames was Operation enabled."""
+    """Whether one of the drive's last two words before each of these frames was Operation enabled."""
     said = np.flatnonzero((frames["id"] == TPDO1 + node) & (frames["length"] >= 2))
     if not said.size:
         return np.zeros(at.size, dtype=np.bool_)
     words = np.ascontiguousarray(frames["data"][said, 0:2]).view("<u2")[:, 0]
+    enabled = (words & _STATE_MASK) == _OPERATION_ENABLED
+    enabled[1:] |= enabled[:-1].copy()
     last = np.searchsorted(said, at) - 1
-    return np.asarray((last >= 0) & ((words[last] & _STATE_MASK) == _OPERATION_ENABLED))
+    return np.asarray((last >= 0) & enabled[last])
 
 
-def _check(steps: Float, followed: Bool, axes: tuple[int, ...], limits: StepLimits) -> list[Jump]:
+def _check(steps: _Steps, axes: tuple[int, ...], limits: StepLimits) -> list[Jump]:
     # The step before the first followed one is no step: the axis stood.
-    now, before = steps[1:], np.where(followed[1:] & followed[:-1], steps[:-1], 0.0)
+    followed = steps.followed
+    now, before = (
+        steps.counts[1:],
+        np.where(followed[1:] & followed[:-1], steps.counts[:-1], 0.0),
+    )
     length, length_before = np.linalg.norm(now, axis=1), np.linalg.norm(before, axis=1)
-    whole = np.all(followed[1:], axis=1)
+    periods = np.max(steps.periods, axis=1)
+    apart = (periods[1:] + periods[:-1]) / 2
+    alike = np.all(steps.periods == periods[:, np.newaxis], axis=1)
+    whole = np.all(followed[1:], axis=1) & alike[1:] & alike[:-1]
     turned = np.minimum(_turn(now, before, length, length_before), _LARGEST_TURN)
     bow = (length + length_before) * turned**2 / 24
     change = np.linalg.norm(now - before, axis=1)
+    everywhere = np.ones_like(whole)
+    turn = math.hypot(limits.acceleration, limits.normal) * apart + 2 * _ROUNDING_COUNTS
     rules = (
-        (
-            "speed",
-            length,
-            np.full(length.size, limits.speed + _ROUNDING_COUNTS),
-            np.ones_like(whole),
-        ),
+        ("speed", length, np.full(length.size, limits.speed + _ROUNDING_COUNTS), everywhere),
         (
             "acceleration",
             np.abs(length - length_before),
-            limits.acceleration + 2 * _ROUNDING_COUNTS + bow,
+            limits.acceleration * apart + 2 * _ROUNDING_COUNTS + bow,
             whole,
         ),
-        (
-            "turn",
-            change,
-            np.full(length.size, math.hypot(limits.acceleration, limits.normal))
-            + 2 * _ROUNDING_COUNTS,
-            np.ones_like(whole),
-        ),
+        ("turn", change, turn, everywhere),
     )
     found = []
     for name, value, allowed, checked in rules:

@@ -149,6 +149,51 @@ def test_ticks_without_a_setpoint_spread_the_step() -> None:
     assert jumps(stream) == []
 
 
+def braking_without(*lost: int, axes: tuple[int, ...] = (2, 3)) -> Stream:
+    """From 1000 counts a period to rest at the limit; at these SYNCs the axes get no setpoint."""
+    stream, x = Stream(), 0.0
+    for k in range(20):
+        x += min(1000.0, max(0.0, 100.0 * (15 - k)))
+        stream.tick(x, x / 2)
+        if k in lost:
+            stream.frames = [
+                frame
+                for i, frame in enumerate(stream.frames)
+                if i < len(stream.frames) - 4 or frame[0] not in [0x200 + axis for axis in axes]
+            ]
+    return stream
+
+
+@pytest.mark.parametrize("lost", [(3,), (7,), (8, 9), (6, 8, 11)])
+@pytest.mark.parametrize("axes", [(2, 3), (2,), (3,)])
+def test_a_sync_without_setpoint_in_full_motion_is_no_jump(
+    lost: tuple[int, ...], axes: tuple[int, ...]
+) -> None:
+    limits = StepLimits(1200.0, 120.0, normal=0.0)
+    assert jumps(braking_without(*lost, axes=axes), limits) == []
+
+
+def test_a_jump_behind_a_sync_without_setpoint_is_found() -> None:
+    stream = standing()
+    for k in range(1, 6):
+        stream.tick(50 * k, 0)
+    stream.tick().tick(1500, 0).tick(1550, 0)
+    assert "acceleration@7" in jumps(stream)
+
+
+@pytest.mark.parametrize("word", [0x1233, 0x0000, 0xFFFF])
+def test_one_garbled_statusword_neither_hides_a_jump_nor_makes_one(word: int) -> None:
+    def garbled(jump: int) -> Stream:
+        stream = Stream()
+        for k in range(8):
+            x = 900 * k + (jump if k >= 5 else 0)
+            stream.tick(x, 0, status=word if k == 5 else OE)
+        return stream
+
+    assert jumps(garbled(0)) == []
+    assert jumps(garbled(300))[0] == "speed@5"
+
+
 def test_two_setpoints_for_one_sync_are_two_steps() -> None:
     stream = standing().tick(0, 0)
     stream.frames.append((0x202, struct.pack("<Hi", ENABLED, 900)))
