@@ -15,9 +15,10 @@ turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greate
               holds for each axis, so it is checked too while only one of the plane's drives follows.
 
 Where SYNCs passed without a setpoint a step is spread over them: a mean over n periods. Two such means that meet are
-(n + m) / 2 periods apart, so that much more acceleration and turn is allowed between them; where the axes' means differ in
-length, there is no chord of the path, and the length of the step is left out. One garbled statusword in a row does not
-hide a drive that follows. Axes beyond the plane hold their position: they are checked for speed and acceleration one by one.
+(n + m) / 2 periods apart, so that much more acceleration and turn is allowed between them; where the axes' means differ
+in length, there is no chord of the path, and the length of the step is left out. One garbled statusword in a row does
+not hide a drive that follows. Axes beyond the plane hold their position: they are checked for speed and acceleration
+one by one.
 """
 
 from __future__ import annotations
@@ -137,7 +138,7 @@ def _integers(data: NDArray[np.uint8]) -> Float:
 
 @dataclass(frozen=True)
 class _Steps:
-    """Rows by SYNC, columns by axis: counts per period; whether the drive followed; periods that a step is spread over."""
+    """Rows by SYNC, columns by axis: counts per period; whether the drive followed; periods that it is spread over."""
 
     counts: Float
     followed: Bool

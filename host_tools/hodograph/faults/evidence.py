@@ -69,24 +69,26 @@ class Evidence:
                     found.append(Emergency(node, code, int(frames["time_us"][at])))
         return sorted(found, key=lambda emergency: emergency.time_us)
 
-    def last_motion_us(self, tolerance_counts: int) -> int | None:
-        """When an axis was last seen away from where it ended, by the drives' own words.
+    def last_motions_us(self, tolerance_counts: int) -> dict[int, int | None]:
+        """By node: when its axis was last seen away from where it ended, by the drive's own words; 0: it never was.
 
-        None: it never was, or a drive said nothing for a while thereafter, so that nobody knows.
+        None: it said nothing at all, nothing for a while thereafter, or nothing at the end, so that nobody knows.
         """
-        last = []
-        for node in self.nodes:
-            at = np.flatnonzero((self.drives["id"] == TPDO1 + node) & (self.drives["length"] >= 6))
-            if not at.size:
-                continue
-            place, time_us = _integers(self.drives["data"][at]), self.drives["time_us"][at]
-            away = np.flatnonzero(np.abs(place - place[-1]) > tolerance_counts)
-            if not away.size:
-                continue
-            if time_us[away[-1] + 1] - time_us[away[-1]] > _GAP_US:
-                return None
-            last.append(int(time_us[away[-1]]))
-        return max(last, default=None)
+        return {node: self._last_motion_us(node, tolerance_counts) for node in self.nodes}
+
+    def _last_motion_us(self, node: int, tolerance_counts: int) -> int | None:
+        at = np.flatnonzero((self.drives["id"] == TPDO1 + node) & (self.drives["length"] >= 6))
+        if not at.size:
+            return None
+        place, time_us = _integers(self.drives["data"][at]), self.drives["time_us"][at]
+        if int(self.drives["time_us"][-1]) - int(time_us[-1]) > _GAP_US:
+            return None
+        away = np.flatnonzero(np.abs(place - place[-1]) > tolerance_counts)
+        if not away.size:
+            return 0
+        if time_us[away[-1] + 1] - time_us[away[-1]] > _GAP_US:
+            return None
+        return int(time_us[away[-1]])
 
     def still_moving(self, tolerance_counts: int) -> tuple[int, ...]:
         """Nodes that went on moving to the end of the recording, by their own words; silent ones are not known."""

@@ -38,6 +38,7 @@ class Verdict:
     latency_ms: float | None
     rest_ticks: int | None
     rest_ms: float | None
+    recovery_ms: float | None
     violations: tuple[str, ...]
     wall_s: float
 
@@ -64,6 +65,7 @@ class Verdict:
             "latency_ms": self.latency_ms,
             "rest_ticks": self.rest_ticks,
             "rest_ms": self.rest_ms,
+            "recovery_ms": self.recovery_ms,
             "violations": list(self.violations),
             "wall_s": round(self.wall_s, 3),
         }
@@ -85,6 +87,7 @@ def judge(record: Record) -> Verdict:
             f"node {node} still moves at the end of the recording"
             for node in evidence.still_moving(REST_TOLERANCE_COUNTS)
         ]
+        violations += _not_seen_at_rest(record, evidence, codes)
     violations += _unexpected(record, codes, latency, rest)
     violations += _not_recovered(record)
     return Verdict(
@@ -98,6 +101,7 @@ def judge(record: Record) -> Verdict:
         latency_ms=latency[1],
         rest_ticks=rest[0],
         rest_ms=rest[1],
+        recovery_ms=None if record.recovery_ms is None else round(record.recovery_ms, 3),
         violations=tuple(violations),
         wall_s=record.wall_s,
     )
@@ -117,7 +121,10 @@ def _reaction(record: Record, evidence: Evidence) -> tuple[list[int], Times, Tim
         return codes, (None, None), (None, None)
     fault_us = found[0].time_us
     latency = _between(evidence, record.began_us, fault_us)
-    rest_us = record.rest_us or evidence.last_motion_us(REST_TOLERANCE_COUNTS)
+    rest_us = record.rest_us
+    if rest_us is None:
+        seen = evidence.last_motions_us(REST_TOLERANCE_COUNTS).values()
+        rest_us = max((time_us for time_us in seen if time_us is not None), default=None)
     rest = (None, None) if rest_us is None else _between(evidence, record.began_us, rest_us)
     return codes, latency, rest
 
@@ -158,6 +165,18 @@ def _distance_mm(record: Record, points: np.ndarray[tuple[int, int], np.dtype[np
     return worst
 
 
+def _not_seen_at_rest(record: Record, evidence: Evidence, codes: list[int]) -> list[str]:
+    """A rest that nobody measured is none that was in time."""
+    expect = record.case.scenario.expect
+    if not codes or not expect.limits_rest or record.rest_us is not None:
+        return []
+    last = evidence.last_motions_us(REST_TOLERANCE_COUNTS)
+    unknown = [node for node, time_us in last.items() if time_us is None]
+    if expect.unseen and len(unknown) < len(last):
+        return []
+    return [f"nobody saw when node {node} came to rest" for node in unknown]
+
+
 def _unexpected(record: Record, codes: list[int], latency: Times, rest: Times) -> list[str]:
     expect, bad = record.case.scenario.expect, []
     if record.case.rules and not record.injections:
@@ -187,6 +206,10 @@ def _not_recovered(record: Record) -> list[str]:
     if again is None:
         return ["no clean run afterwards"] if not record.troubles else []
     bad = []
+    most_ms = record.case.scenario.expect.recover_ms
+    if record.recovery_ms is None or record.recovery_ms > most_ms:
+        took = "no known time" if record.recovery_ms is None else f"{record.recovery_ms:.0f} ms"
+        bad.append(f"reset after {took}, {most_ms} ms are allowed")
     if again.setpoints_sha256 != clean.setpoints_sha256:
         bad.append("the run afterwards has other setpoints")
     same = record.case.scenario.expect.same_encoders

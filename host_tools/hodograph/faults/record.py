@@ -54,6 +54,8 @@ class Record:
     """Codes that object 0x2003 showed."""
     rest_us: int | None = None
     """When the drives were at rest, asked one by one."""
+    recovery_ms: float | None = None
+    """From the first command to reset until the drives were found and configured; None: they never were."""
     troubles: list[str] = field(default_factory=list)
     """What went wrong on the way, each a violation."""
     again: Motion | None = None

@@ -24,7 +24,9 @@ def recover(record: Record, stand: Stand, controller: Controller) -> None:
         for drive in stand.drives:
             drive.end()
         stand.start_drives(faulty=False)
+    began_s = time.monotonic()
     _reset(controller)
+    record.recovery_ms = 1000 * (time.monotonic() - began_s)
     run = run_program(Station(controller, "fast", None), job.machine, job.image, "fixed")
     record.again = run.motion
 

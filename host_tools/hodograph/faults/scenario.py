@@ -17,6 +17,8 @@ within_ticks = 5                    # from the first injection to the fault
 within_ms = 300                     # the same in wall time, where ticks do not go on
 rest_ticks = 400                    # from the fault until the axes are at rest
 rest_ms = 400                       # the same in wall time
+unseen = true                       # a drive may be silent as its axis comes to rest: the others are judged
+recover_ms = 5000                   # from the reset until the drives are found and configured anew
 """
 
 from __future__ import annotations
@@ -41,8 +43,13 @@ ACTIONS = (
     "cut-upload",
     "kill-upload",
 )
-_NO_LIMIT = 10**9
-_EXPECT = ("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders")
+NO_LIMIT = 10**9
+RECOVER_MS, NOTHING_TO_RESET_MS = 5000, 1000
+"""How long the way out of a fault may last; of scenarios that give no code, whose machine goes on by itself."""
+_EXPECT = (
+    *("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders"),
+    *("unseen", "recover_ms"),
+)
 
 _OF_SCENARIOS = {"rules", "random", "host", "expect"}
 """Keys that path and machine files beside the scenarios do not have."""
@@ -61,6 +68,13 @@ class Expectation:
     rest_ticks: int
     rest_ms: int
     same_encoders: bool = True
+    unseen: bool = False
+    recover_ms: int = RECOVER_MS
+
+    @property
+    def limits_rest(self) -> bool:
+        """Whether the axes must be seen to come to rest in time."""
+        return min(self.rest_ticks, self.rest_ms) < NO_LIMIT
 
 
 @dataclass(frozen=True)
@@ -156,7 +170,7 @@ def _expectation(table: Table, raw: Mapping[str, Any]) -> Expectation:
         raise table.error("codes", "must be a list of numbers such as 0x8130")
 
     def limit(key: str) -> int:
-        return table.integer(key, _NO_LIMIT, low=0, high=_NO_LIMIT)
+        return table.integer(key, NO_LIMIT, low=0, high=NO_LIMIT)
 
     return Expectation(
         codes=tuple(codes),
@@ -166,6 +180,10 @@ def _expectation(table: Table, raw: Mapping[str, Any]) -> Expectation:
         rest_ticks=limit("rest_ticks"),
         rest_ms=limit("rest_ms"),
         same_encoders=table.flag("same_encoders", True),
+        unseen=table.flag("unseen", False),
+        recover_ms=table.integer(
+            "recover_ms", RECOVER_MS if codes else NOTHING_TO_RESET_MS, low=0, high=NO_LIMIT
+        ),
     )
 
 

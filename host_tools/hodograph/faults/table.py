@@ -17,6 +17,7 @@ HEADER = (
     "fault ms",
     "rest ticks",
     "rest ms",
+    "reset ms",
     "violations",
 )
 
@@ -40,6 +41,7 @@ def _row(name: str, verdicts: Sequence[Verdict]) -> tuple[str, ...]:
         _worst([verdict.latency_ms for verdict in verdicts]),
         _worst([verdict.rest_ticks for verdict in verdicts]),
         _worst([verdict.rest_ms for verdict in verdicts]),
+        _worst([verdict.recovery_ms for verdict in verdicts]),
         str(sum(len(verdict.violations) for verdict in verdicts)),
     )
 

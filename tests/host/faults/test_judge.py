@@ -72,6 +72,7 @@ def record(recorded: Frames, expect: Expectation = EXPECT, *, at: int = 50) -> R
     made.evidence = Evidence(recorded, recorded, (2, 3))
     made.began_us = BEGAN_US + 1000 * (5 + at)
     made.again = job().clean
+    made.recovery_ms = 900.0
     return made
 
 
@@ -170,6 +171,40 @@ def test_what_did_not_happen_or_not_recover() -> None:
         "the run afterwards has other setpoints",
         "the run afterwards has other encoder positions",
     ]
+
+
+def test_a_rest_that_nobody_saw_is_no_rest() -> None:
+    seen = recording(stopped(60), 62, 200)
+    silent = seen[
+        (seen["id"] != 0x183)
+        | (seen["time_us"] < BEGAN_US + 80_000)
+        | (seen["time_us"] > BEGAN_US + 400_000)
+    ]
+    assert "nobody saw when node 3 came to rest" in violations(record(silent))
+    never = seen[seen["id"] != 0x182]
+    assert "nobody saw when node 2 came to rest" in violations(record(never))
+    told = record(silent)
+    told.rest_us = BEGAN_US + 100_000  # somebody asked the drives
+    excused = record(silent, replace(EXPECT, unseen=True))
+    unlimited = record(silent, replace(EXPECT, rest_ticks=FOREVER))
+    for made in (record(seen), told, excused, unlimited):
+        assert not any(words.startswith("nobody saw") for words in violations(made))
+    nobody = seen[(seen["id"] != 0x182) & (seen["id"] != 0x183)]
+    assert len(violations(record(nobody, replace(EXPECT, unseen=True)))) >= 2
+
+
+def test_an_axis_that_never_moved_is_at_rest() -> None:
+    still = np.repeat(job().setpoints[:1], 300, axis=0)
+    verdict = judge(record(recording(still, 62, 200)))
+    assert (verdict.rest_ticks, verdict.rest_ms) == (0, 0.0)
+
+
+def test_a_reset_that_takes_too_long_or_that_nobody_measured() -> None:
+    made = record(recording(stopped(60), 62, 200))
+    made.recovery_ms = 5001.0
+    assert "reset after 5001 ms, 5000 ms are allowed" in violations(made)
+    made.recovery_ms = None
+    assert "reset after no known time, 5000 ms are allowed" in violations(made)
 
 
 def test_the_table_has_the_worst_of_each_scenario() -> None:
