@@ -8,8 +8,10 @@ path            the program's curve: to draw, and to measure the contour error f
 decimator       many rows to few groups that keep their peaks
 pump            all of these, some 25 times a second, in a thread of its own
 link            the controller's state and commands, by SDO, in another
+emergencies     EMCY frames as events, some of a storm
 hub             messages to the browsers; bounded for each
 security        who may see, who may command
+seats           how many there may be, and who makes room
 server          HTTP and WebSocket
 session         puts it together
 page            what the browser gets

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from ..bus.decode import SYNC_ID
-from ..bus.texts import drive_state, fault_words
+from ..bus.texts import drive_state
 from ..bustime import exact_bits
 from ..errors import BusError, InputError
 from .decoder import Decoder, Samples
 from .derived import Derivation
+from .emergencies import Emergencies
 from .messages import path_message, rows_message
 from .path import ProgramPath
 from .source import Source, Taken
@@ -25,7 +26,6 @@ from .source import Source, Taken
 LOOK_S = 0.04
 _STATE_S = 0.25
 _RETRY_S = 1.0
-_EMCY, _NODES = 0x080, 0x7F
 
 Publish = Callable[[dict[str, Any]], None]
 
@@ -62,6 +62,7 @@ class Pump:
         self._ending = threading.Event()
         self._again = threading.Event()
         self._tally = Tally()
+        self._emergencies = Emergencies()
         self._decoder = Decoder(layout.nodes)
         self._derivation = self._fresh_derivation()
         self._state_due_s = 0.0
@@ -127,6 +128,8 @@ class Pump:
             taken = source.take()
             if taken.frames.size:
                 self._pass_on(taken)
+            for event in self._emergencies.feed(taken.frames, time.monotonic()):
+                self._publish(event)
             self._tally.busy_s += time.thread_time() - begun_s
             self._tell(taken)
             if self._again.is_set():
@@ -140,7 +143,6 @@ class Pump:
         self._tally.frames += taken.frames.size
         samples = self._decoder.feed(taken.frames)
         rows = self._derivation.feed(samples, self._path)
-        self._emergencies(taken)
         if rows.count:
             age_ms = None if taken.newest_s is None else 1000 * (time.time() - taken.newest_s)
             self._publish(rows_message(rows, self._layout.period_us / 1e6, age_ms))
@@ -179,18 +181,6 @@ class Pump:
         bits = int(exact_bits(taken.frames[sync_at[0] : sync_at[-1]]).sum())
         window_s = (sync_at.size - 1) * self._layout.period_us / 1e6
         return round(100 * bits / (window_s * self._layout.bitrate), 1)
-
-    def _emergencies(self, taken: Taken) -> None:
-        identifiers = taken.frames["id"]
-        found = (identifiers > _EMCY) & (identifiers <= _EMCY + _NODES)
-        for frame in taken.frames[found][:50]:
-            code = int(frame["data"][0]) | int(frame["data"][1]) << 8
-            node = int(frame["id"]) - _EMCY
-            text = "no error any more"
-            if code != 0:
-                words = fault_words(code)
-                text = f"{words.text} (0x{code:04X}): {words.remedy}"
-            self._publish({"type": "event", "text": f"node {node}: {text}", "fault": code != 0})
 
     def _tell(self, taken: Taken) -> None:
         """How the pump does, every second."""

@@ -15,9 +15,9 @@ from aiohttp import WSMsgType, web
 from ..errors import HodographError, InputError
 from .hub import Client, Hub
 from .messages import encode
+from .seats import Seats
 from .security import HEADERS, Guard
 
-MOST_CLIENTS = 16
 _MOST_REQUEST = 4096
 _HELLO_S = 10.0
 _WRONG_TOKEN_S = 0.5
@@ -42,7 +42,8 @@ class Server:
     def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], obey: Obey) -> None:
         self._guard, self._hub, self._greeting, self._obey = guard, hub, greeting, obey
         self._pages = _load_pages()
-        self._sockets: set[web.WebSocketResponse] = set()
+        self._seats: Seats[web.WebSocketResponse] = Seats()
+        self._closing: set[asyncio.Task[None]] = set()
         self.app = web.Application(middlewares=[self._check], client_max_size=_MOST_REQUEST)
         self.app.router.add_get("/ws", self._socket)
         self.app.router.add_get("/{name:[a-z_.]*}", self._page)
@@ -79,20 +80,22 @@ class Server:
         if not socket.can_prepare(request).ok:
             return web.Response(status=426, headers=HEADERS, text="A WebSocket is wanted here.\n")
         await socket.prepare(request)
-        if len(self._sockets) >= MOST_CLIENTS:
-            await socket.close(code=_POLICY, message=b"too many browsers")
-            return socket
-        self._sockets.add(socket)
         try:
+            self._send_away(self._seats.enter(socket))
             await self._serve(socket)
         finally:
-            self._sockets.discard(socket)
+            self._seats.leave(socket)
         return socket
 
     async def _serve(self, socket: web.WebSocketResponse) -> None:
         may_command = await self._welcome(socket)
         if may_command is None:
             return
+        too_many = self._seats.seat(socket, may_command=may_command)
+        if too_many is socket:
+            await _close_full(socket)
+            return
+        self._send_away(too_many)
         await socket.send_str(
             encode({"type": "hello", "may_command": may_command, **self._greeting})
         )
@@ -107,6 +110,13 @@ class Server:
             sender.cancel()
             with suppress(asyncio.CancelledError, ConnectionError):
                 await sender
+
+    def _send_away(self, socket: web.WebSocketResponse | None) -> None:
+        """Without waiting for it: it may not answer."""
+        if socket is not None:
+            closing = asyncio.create_task(_close_full(socket))
+            self._closing.add(closing)
+            closing.add_done_callback(self._closing.discard)
 
     async def _welcome(self, socket: web.WebSocketResponse) -> bool | None:
         """Whether the browser that says hello may command; None when it may not even see."""
@@ -147,8 +157,13 @@ class Server:
             return answer | {"text": str(error)}
 
     async def _shut_down(self, _: web.Application) -> None:
-        for socket in list(self._sockets):
+        for socket in self._seats.everybody():
             await socket.close(code=1001, message=b"the monitor ends")
+
+
+async def _close_full(socket: web.WebSocketResponse) -> None:
+    with suppress(ConnectionError):
+        await socket.close(code=_POLICY, message=b"too many browsers")
 
 
 async def _send(socket: web.WebSocketResponse, client: Client) -> None:

@@ -16,8 +16,9 @@ from aiohttp.test_utils import TestClient, TestServer
 from hodograph.errors import InputError, RefusedError
 from hodograph.monitor.commands import read_command
 from hodograph.monitor.hub import Hub
+from hodograph.monitor.seats import MOST_CLIENTS, MOST_WAITING
 from hodograph.monitor.security import Guard
-from hodograph.monitor.server import MOST_CLIENTS, Server
+from hodograph.monitor.server import Server
 
 TOKEN = "a-token-for-these-tests"
 
@@ -183,6 +184,24 @@ def test_several_browsers_but_not_any_number() -> None:
         await sockets[0].close()
         await asyncio.sleep(0.1)
         assert (await answer(await hello(browser), "hello"))["mode"] == "live"
+
+    Case().run(scenario)
+
+
+def test_who_has_the_token_always_gets_in() -> None:
+    async def scenario(browser: Browser) -> None:
+        headers = {"Origin": origin(browser)}
+        idle = [await browser.ws_connect("/ws", headers=headers) for _ in range(MOST_WAITING)]
+        lookers = [await hello(browser) for _ in range(MOST_CLIENTS)]
+        for socket in lookers:
+            await answer(socket, "hello")
+        operators = [await hello(browser, token=TOKEN) for _ in range(MOST_CLIENTS + 1)]
+        for socket in operators[1:]:
+            assert (await answer(socket, "hello"))["may_command"] is True
+        await answer(operators[0], "hello")
+        await answer(operators[0], "history")
+        assert (await operators[0].receive(timeout=5)).type is WSMsgType.CLOSE
+        assert (await idle[0].receive(timeout=5)).type is WSMsgType.CLOSE
 
     Case().run(scenario)
 
