@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The load of a bus, measured by listening: bits of every frame, stuff bits computed, over wall time."""
+"""The load of a bus, measured by listening (docs/bus-time.md section 3): bits of every frame, stuff bits computed,
+over the time of the bus. `hodograph status` and the live page show this one.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +19,8 @@ from .frames import Frames
 from .recorder import Recorder
 
 LEAST_LISTEN_S = 0.25
+LONGEST_S = 1.0
+"""What a listener hears is kept so long when nobody asks."""
 
 _CLASSES = (
     ("NMT", 0x000, 0x000),
@@ -91,6 +95,37 @@ def _kinds(identifiers: NDArray[np.uint32]) -> NDArray[np.int64]:
 def _now_us() -> int:
     """By the clock that the kernel stamps frames with."""
     return time.time_ns() // 1000
+
+
+class Listener:
+    """For somebody who gets the frames anyway: the load since the last question."""
+
+    def __init__(self, bitrate: int) -> None:
+        self._bitrate = bitrate
+        self._heard: list[Frames] = []
+        self._since_s: float | None = None
+        self._last_s = 0.0
+
+    def feed(self, frames: Frames, last_s: float) -> None:
+        """All frames since the last call; the last one came at `last_s` by the clock of the bus."""
+        if self._since_s is None or last_s < self._last_s:
+            self._since_s = last_s
+            self._heard.clear()
+        else:
+            if last_s - self._since_s > LONGEST_S:
+                self._since_s = self._last_s
+                self._heard.clear()
+            self._heard.append(frames)
+        self._last_s = last_s
+
+    def measure(self) -> BusLoad | None:
+        """From the last frame of the last question to the last one heard; None: that is no time."""
+        if self._since_s is None or self._last_s <= self._since_s:
+            return None
+        load = bus_load(np.concatenate(self._heard), self._last_s - self._since_s, self._bitrate)
+        self._since_s = self._last_s
+        self._heard.clear()
+        return load
 
 
 class LoadMeter:

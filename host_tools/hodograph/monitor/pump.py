@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..bus.decode import SYNC_ID
+from ..bus.load import Listener
 from ..bus.texts import drive_state
-from ..bustime import exact_bits
 from ..errors import BusError, InputError
 from .decoder import Decoder, Samples
 from .derived import Derivation
@@ -63,6 +62,7 @@ class Pump:
         self._again = threading.Event()
         self._tally = Tally()
         self._emergencies = Emergencies()
+        self._load = Listener(layout.bitrate)
         self._decoder = Decoder(layout.nodes)
         self._derivation = self._fresh_derivation()
         self._state_due_s = 0.0
@@ -111,6 +111,7 @@ class Pump:
                 self._ending.wait(_RETRY_S)
                 continue
             self._publish({"type": "bus", "there": True, "note": ""})
+            self._load = Listener(self._layout.bitrate)
             self._decoder = Decoder(self._layout.nodes)
             self._derivation = self._fresh_derivation()
             try:
@@ -141,6 +142,8 @@ class Pump:
 
     def _pass_on(self, taken: Taken) -> None:
         self._tally.frames += taken.frames.size
+        if taken.bus_s is not None:
+            self._load.feed(taken.frames, taken.bus_s)
         samples = self._decoder.feed(taken.frames)
         rows = self._derivation.feed(samples, self._path)
         if rows.count:
@@ -148,9 +151,9 @@ class Pump:
             self._publish(rows_message(rows, self._layout.period_us / 1e6, age_ms))
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S
-            self._publish(self._drives(samples, taken))
+            self._publish(self._drives(samples))
 
-    def _drives(self, samples: Samples, taken: Taken) -> dict[str, Any]:
+    def _drives(self, samples: Samples) -> dict[str, Any]:
         """Positions and states of the drives by their own words, and the load of the bus."""
         layout = self._layout
         drives = []
@@ -166,21 +169,13 @@ class Pump:
                     "actual_mm": round(actual, 6) if np.isfinite(actual) else None,
                 }
             )
-        path = self._path
+        path, load = self._path, self._load.measure()
         return {
             "type": "drives",
             "drives": drives,
-            "load_percent": self._load_percent(taken),
+            "load_percent": None if load is None else round(load.percent, 1),
             "arc_length_mm": None if path is None else path.arc_length_mm,
         }
-
-    def _load_percent(self, taken: Taken) -> float | None:
-        sync_at = np.flatnonzero(taken.frames["id"] == SYNC_ID)
-        if sync_at.size < 2:
-            return None
-        bits = int(exact_bits(taken.frames[sync_at[0] : sync_at[-1]]).sum())
-        window_s = (sync_at.size - 1) * self._layout.period_us / 1e6
-        return round(100 * bits / (window_s * self._layout.bitrate), 1)
 
     def _tell(self, taken: Taken) -> None:
         """How the pump does, every second."""

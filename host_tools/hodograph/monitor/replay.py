@@ -35,7 +35,8 @@ class ReplaySource:
         counters = frames["data"][self._sync_at, 0].astype(np.int64)
         steps = (np.diff(counters, prepend=counters[0]) - 1) % SYNC_OVERFLOW + 1
         steps[0] = 0
-        self._time_s = np.cumsum(steps) * (period_us / 1e6 / speed)
+        self._bus_s = np.cumsum(steps) * (period_us / 1e6)
+        self._time_s = self._bus_s / speed
         self._begun_s = time.monotonic()
         self._given = 0
 
@@ -49,7 +50,8 @@ class ReplaySource:
             return Taken(NOTHING.frames, None, ended=ended)
         frames = self._frames[self._given : end]
         self._given = end
-        return Taken(frames, time.time(), ended=ended)
+        bus_s = float(self._bus_s[min(syncs, self._sync_at.size - 1)])
+        return Taken(frames, time.time(), bus_s, ended=ended)
 
     def close(self) -> None:
         """See Source."""

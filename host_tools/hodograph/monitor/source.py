@@ -28,6 +28,8 @@ class Taken:
 
     frames: Frames
     newest_s: float | None
+    bus_s: float | None = None
+    """When the last frame came by the clock of the bus: of a recording that of the machine, else time.time()."""
     dropped: int = 0
     """Frames lost since the start, for want of somebody to take them."""
     ended: bool = False
@@ -83,7 +85,8 @@ class SocketSource:
             raise BusError(
                 f"{self._address}: {error.strerror}: did the interface go down?"
             ) from error
-        return Taken(np.frombuffer(b"".join(chunks), dtype=FRAME_DTYPE), newest_s, self._dropped)
+        frames = np.frombuffer(b"".join(chunks), dtype=FRAME_DTYPE)
+        return Taken(frames, newest_s, newest_s, self._dropped)
 
     def close(self) -> None:
         """See Source."""
@@ -137,7 +140,8 @@ class PythonCanSource:
         frames = np.zeros(len(waiting), dtype=FRAME_DTYPE)
         for row, (identifier, data) in zip(frames, waiting, strict=True):
             _fill(row, identifier, data)
-        return Taken(frames, newest_s if waiting else None, dropped)
+        newest_s = newest_s if waiting else None
+        return Taken(frames, newest_s, newest_s, dropped)
 
     def close(self) -> None:
         """See Source."""
