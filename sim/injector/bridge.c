@@ -30,9 +30,25 @@ static enum fault_side other(enum fault_side side)
     return side == FAULT_SIDE_CONTROLLER ? FAULT_SIDE_DRIVES : FAULT_SIDE_CONTROLLER;
 }
 
-static void send(const struct bridge *bridge, enum fault_side to, const struct can_msg *frame)
+/* As the rules are at `bridge->now_ns`. */
+static bool is_off(struct bridge *bridge, enum fault_side side)
 {
-    bridge->port.send(bridge->port.context, to, frame);
+    for (uint32_t i = 0; i < bridge->count; i++) {
+        struct fault_watch *watch = &bridge->watches[i];
+        if (watch->rule->kind == FAULT_KIND_BUS_OFF && watch->rule->side == side &&
+            fault_watch_acts(watch, bridge->ticks.tick, bridge->now_ns)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* From one side to the other: nothing while one of them is off. */
+static void send(struct bridge *bridge, enum fault_side to, const struct can_msg *frame)
+{
+    if (!is_off(bridge, FAULT_SIDE_CONTROLLER) && !is_off(bridge, FAULT_SIDE_DRIVES)) {
+        bridge->port.send(bridge->port.context, to, frame);
+    }
 }
 
 /* The frame behind overtakes the one that waited for it. */
@@ -81,9 +97,9 @@ static void judge(struct bridge *bridge, enum fault_side from, struct verdict *v
         if (!fault_watch_acts(watch, bridge->ticks.tick, now_ns)) {
             continue;
         }
-        if (watch->rule->kind == FAULT_KIND_BUS_OFF) {
-            verdict->copies = 0;
-        } else if (watch->rule->kind != FAULT_KIND_FLOOD && fault_watch_takes(watch, &before)) {
+        const enum fault_kind kind = watch->rule->kind;
+        if (kind != FAULT_KIND_BUS_OFF && kind != FAULT_KIND_FLOOD &&
+            fault_watch_takes(watch, &before)) {
             apply(watch->rule, verdict);
             bridge->port.note(bridge->port.context, watch, from, &before, true);
         }
@@ -108,15 +124,20 @@ static void deliver(struct bridge *bridge, enum fault_side from, const struct ve
     }
 }
 
-/* Other traffic: eight bytes that tell the frames apart. */
+/* Other traffic: eight bytes that tell the frames apart. It is on the wire, so only who is off does not hear it. */
 static void flood(struct bridge *bridge, struct fault_watch *watch)
 {
+    const bool heard[2] = {!is_off(bridge, FAULT_SIDE_CONTROLLER),
+                           !is_off(bridge, FAULT_SIDE_DRIVES)};
     for (uint32_t i = 0; i < watch->rule->per_tick; i++) {
         struct can_msg frame = {.id = watch->rule->id, .len = 8};
         const uint32_t number = watch->used++;
         memcpy(frame.data, &number, sizeof number);
-        send(bridge, FAULT_SIDE_CONTROLLER, &frame);
-        send(bridge, FAULT_SIDE_DRIVES, &frame);
+        for (unsigned side = 0; side < 2u; side++) {
+            if (heard[side]) {
+                bridge->port.send(bridge->port.context, (enum fault_side)side, &frame);
+            }
+        }
     }
 }
 
@@ -144,6 +165,7 @@ void bridge_receive(struct bridge *bridge, enum fault_side from, const struct ca
                     uint64_t now_ns)
 {
     struct verdict verdict = {.frame = *frame, .copies = 1};
+    bridge->now_ns = now_ns;
     const bool tick_begins =
         from == FAULT_SIDE_CONTROLLER && tick_count_receive(&bridge->ticks, frame);
     judge(bridge, from, &verdict, now_ns);
@@ -171,6 +193,7 @@ uint64_t bridge_due_ns(const struct bridge *bridge)
 void bridge_process(struct bridge *bridge, uint64_t now_ns)
 {
     struct delayed_frame late;
+    bridge->now_ns = now_ns;
     while (delay_queue_take(&bridge->delayed, now_ns, &late)) {
         send(bridge, late.to, &late.frame);
     }

@@ -3,7 +3,8 @@
  * some what the fault rules say (docs/protocol.md section 4).
  *
  * Rules act on a frame in the order of the file. A frame that changes places with the next one of
- * its direction waits for it for 20 ms at most. Deterministic: the same frames give the same
+ * its direction waits for it for 20 ms at most. While a side is off the bus nothing passes, frames that were held or
+ * delayed are lost, and a flood reaches the other side only. Deterministic: the same frames give the same
  * faults, but for delays and durations in ms, which go by the wall clock.
  *
  * No I/O, no heap. All functions in one context.
@@ -38,6 +39,7 @@ struct bridge {
     bool acts[FAULT_RULES_MAX];                  /* flood, bus-off: as last noted */
     uint32_t count;
     struct tick_count ticks;
+    uint64_t now_ns; /* of the last call */
     struct delay_queue delayed;
     struct bridge_held held[2]; /* by the side it came from */
     struct bridge_port port;

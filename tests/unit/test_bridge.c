@@ -236,6 +236,34 @@ static void test_bus_off_for_a_time(void)
     expect(0, CONTROLLER, 0x182, 3);
 }
 
+static void test_bus_off_takes_what_was_held_or_delayed(void)
+{
+    begin("delay at=0 id=0x182 us=1000\nreorder at=0 id=0x183\nbus-off at=1 side=controller "
+          "for_ms=100");
+    frame_from(DRIVES, 0x182, 1);
+    frame_from(DRIVES, 0x183, 2);
+    sync(11);
+    bridge_process(&bridge, now_ns + 50000000u);
+    TEST_ASSERT_EQUAL_UINT(0, sent_count);
+    now_ns += 200000000u;
+    bridge_process(&bridge, now_ns);
+    TEST_ASSERT_TRUE(bridge_due_ns(&bridge) == UINT64_MAX);
+    frame_from(DRIVES, 0x283, 3);
+    TEST_ASSERT_EQUAL_UINT(1, sent_count);
+}
+
+static void test_a_flood_reaches_the_side_that_is_on(void)
+{
+    begin("flood at=1 id=0x7A0 per_tick=2\nbus-off at=1 side=drives");
+    sync(11);
+    TEST_ASSERT_EQUAL_UINT(2, sent_count);
+    expect(0, CONTROLLER, 0x7A0, 0);
+    begin("flood at=1 id=0x7A0 per_tick=2\nbus-off at=1 side=controller");
+    sync(11);
+    TEST_ASSERT_EQUAL_UINT(2, sent_count);
+    expect(0, DRIVES, 0x7A0, 0);
+}
+
 static enum injector_options_result options(int argc, char **argv, const char *part)
 {
     char reason[200] = "";
@@ -274,6 +302,8 @@ int main(void)
     RUN_TEST(test_reorder_does_not_wait_for_ever);
     RUN_TEST(test_flood_on_both_sides_in_its_ticks);
     RUN_TEST(test_bus_off_for_a_time);
+    RUN_TEST(test_bus_off_takes_what_was_held_or_delayed);
+    RUN_TEST(test_a_flood_reaches_the_side_that_is_on);
     RUN_TEST(test_options);
     return UNITY_END();
 }
