@@ -3,6 +3,7 @@
 
 #include "app/commands.h"
 #include "canopen/cob.h"
+#include "canopen/heartbeat.h"
 #include "canopen/sdo_abort.h"
 #include "port/port.h"
 
@@ -29,6 +30,13 @@ uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_
     }
     if (entry->index == 0x1003) {
         return number == 0u ? SDO_OK : SDO_ABORT_VALUE;
+    }
+    if (entry->index == 0x1016) {
+        const uint8_t count = controller->values.consumer_heartbeat_time_count;
+        return heartbeat_entry_taken(controller->values.consumer_heartbeat_time, count,
+                                     (uint8_t)(entry->sub - 1u), (uint32_t)number)
+                   ? SDO_ABORT_INCOMPATIBLE
+                   : SDO_OK;
     }
     if (config_contains(entry->index)) {
         uint8_t present[8] = {0};

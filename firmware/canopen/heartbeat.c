@@ -54,6 +54,22 @@ void heartbeat_consumer_init_entry(struct heartbeat_consumer *consumer, uint32_t
                             (uint16_t)(entry & 0xFFFFu));
 }
 
+static bool is_used(uint32_t entry)
+{
+    return ((entry >> 16) & 0xFFu) != 0u && (entry & 0xFFFFu) != 0u;
+}
+
+bool heartbeat_entry_taken(const uint32_t *entries, uint8_t count, uint8_t at, uint32_t entry)
+{
+    for (uint8_t i = 0; i < count; ++i) {
+        const bool same_node = ((entries[i] ^ entry) & 0xFF0000u) == 0u;
+        if (i != at && same_node && is_used(entries[i]) && is_used(entry)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 enum heartbeat_event heartbeat_consumer_receive(struct heartbeat_consumer *consumer,
                                                 const struct can_msg *in)
 {

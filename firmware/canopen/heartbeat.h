@@ -51,6 +51,9 @@ void heartbeat_consumer_init(struct heartbeat_consumer *consumer, uint8_t node, 
 /* Splits an entry of 0x1016 (CiA 301: bits 16 ... 23 node, 0 ... 15 time in ms). */
 void heartbeat_consumer_init_entry(struct heartbeat_consumer *consumer, uint32_t entry);
 
+/* Whether another of `count` entries watches the node of this one, which is to be entry `at`: CiA 301 allows only one. */
+bool heartbeat_entry_taken(const uint32_t *entries, uint8_t count, uint8_t at, uint32_t entry);
+
 /* Takes a frame; others than this node's heartbeat give HEARTBEAT_NOTHING. Same context as
  * _process. */
 enum heartbeat_event heartbeat_consumer_receive(struct heartbeat_consumer *consumer,

@@ -59,6 +59,7 @@ struct drive_node {
     struct axis_motion axis;
     struct equipment equipment;
     struct overload overload;
+    bool overloaded;
     struct home_seek homing;
     struct drive_node_port port;
     double load_per_volt;   /* motor load in units of the rated torque */

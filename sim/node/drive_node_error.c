@@ -42,7 +42,8 @@ void drive_node_fail(struct drive_node *node, uint16_t code)
     }
 }
 
-/* Without encoder or supply there is nothing to stop with: the brake has to do it. */
+/* Without encoder or supply there is nothing to stop with: the brake has to do it. In a fault already it is one more
+ * error, which the master shall know of too. */
 void drive_node_fail_powerless(struct drive_node *node, uint16_t code)
 {
     const int16_t reaction = node->device.options.fault_reaction;
@@ -50,7 +51,10 @@ void drive_node_fail_powerless(struct drive_node *node, uint16_t code)
     if (node->device.state == CIA402_FAULT_REACTION_ACTIVE) {
         (void)cia402_device_stopped(&node->device);
     }
-    drive_node_fail(node, code);
+    if (cia402_device_fault(&node->device)) {
+        drive_node_no_stop(node);
+    }
+    drive_node_tell(node, code, 0);
     node->device.options.fault_reaction = reaction;
 }
 

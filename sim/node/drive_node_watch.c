@@ -49,9 +49,11 @@ static void drive_node_watch_overload(struct drive_node *node)
     }
     overload_step(&node->overload, node->axis.drive.state.volts * node->load_per_volt,
                   (double)node->axis.config.period_us * 1e-6);
-    if (overload_above(&node->overload, 1.0)) {
+    const bool overloaded = overload_above(&node->overload, 1.0);
+    if (overloaded && !node->overloaded) {
         drive_node_fail_powerless(node, EMCY_OVERLOAD);
     }
+    node->overloaded = overloaded;
 }
 
 void drive_node_watch(struct drive_node *node)

@@ -87,13 +87,48 @@ static void test_what_does_not_come_in_time_is_missed(void)
     (void)sync(1);
     (void)sync(0);
     (void)sync(0);
-    TEST_ASSERT_EQUAL_UINT32(0, sync(2));
+    TEST_ASSERT_EQUAL_UINT32(0, sync(2)); /* that of the first */
+    TEST_ASSERT_EQUAL_UINT32(0, sync(1));
     TEST_ASSERT_EQUAL_UINT32(0, sync(1));
     TEST_ASSERT_EQUAL_UINT32(1, sync(1));
     for (unsigned i = 0; i < 20; ++i) {
         TEST_ASSERT_EQUAL_UINT32(0, sync(1));
     }
     TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+}
+
+/* One is missed for good; another, four SYNCs later, comes late. */
+static void test_each_absent_one_has_its_own_time(void)
+{
+    wait_us = 5000;
+    (void)sync(1);
+    (void)sync(0);
+    for (unsigned i = 0; i < 3; ++i) {
+        (void)sync(1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(1, sync(0));
+    (void)sync(2);
+    for (unsigned i = 0; i < 20; ++i) {
+        (void)sync(1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+}
+
+static void test_more_than_can_be_remembered_are_missed(void)
+{
+    wait_us = 100000;
+    missed_max = 100;
+    (void)sync(1);
+    for (unsigned i = 0; i < ANSWERS_UNSETTLED; ++i) {
+        TEST_ASSERT_EQUAL_UINT32(0, sync(0));
+    }
+    TEST_ASSERT_EQUAL_UINT32(1, sync(0));
+    TEST_ASSERT_EQUAL_UINT32(1, sync(0));
+    (void)sync(1u + ANSWERS_UNSETTLED);
+    for (unsigned i = 0; i < 200; ++i) {
+        (void)sync(1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(2, answers.missed);
 }
 
 static void test_lost_takes_the_patience_too(void)
@@ -145,6 +180,8 @@ int main(void)
     RUN_TEST(test_one_more_than_permitted_in_a_row_is_lost_until_the_next_answer);
     RUN_TEST(test_late_answers_are_not_counted);
     RUN_TEST(test_what_does_not_come_in_time_is_missed);
+    RUN_TEST(test_each_absent_one_has_its_own_time);
+    RUN_TEST(test_more_than_can_be_remembered_are_missed);
     RUN_TEST(test_lost_takes_the_patience_too);
     RUN_TEST(test_a_doubled_answer_is_one);
     RUN_TEST(test_restart_keeps_the_presence_only);

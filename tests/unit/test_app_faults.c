@@ -463,13 +463,29 @@ static void test_quick_stop_without_end_is_a_fault(void)
     run_some(250);
     drive(1)->quick_stop_syncs = 5000;
     command(COMMAND_QUICK_STOP);
-    app_bench_periods(&bench, MACHINE_QUICK_TICKS - 10u);
+    for (unsigned i = 0; i < MACHINE_QUICK_TICKS - 10u; ++i) {
+        drive(1)->position_counts += (int32_t)bench.controller.config.start_tolerance_counts;
+        app_bench_periods(&bench, 1);
+    }
     TEST_ASSERT_EQUAL_INT(MACHINE_QUICK_STOP, machine()->state);
     app_bench_periods(&bench, 20);
     expect_fault(FAULT_NOT_STOPPED, 3);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_OFF, machine()->fault_phase);
     expect_off();
     recover();
+}
+
+/* As a drive does that has no 0x605A, or one that is 5 ... 7. */
+static void test_a_drive_that_stays_in_quick_stop_has_stopped_when_it_stands(void)
+{
+    run_some(250);
+    drive(1)->state.options.quick_stop = 6;
+    command(COMMAND_QUICK_STOP);
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS - 10u);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, drive(1)->state.state);
+    (void)app_bench_until(&bench, MACHINE_OFF, 20);
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
+    expect_off();
 }
 
 static void test_quick_stop_has_nothing_to_stop(void)
@@ -685,6 +701,18 @@ static void test_each_fault_is_told(void)
 
 /* --- Heartbeats --- */
 
+static void test_a_node_has_one_entry_in_1016(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 4, 0x00090190u, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 4, 0x00090200u, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_INCOMPATIBLE,
+                            app_bench_write(&bench, 0x1016, 5, 0x00090190u, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 5, 0x00090000u, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 5, 0x00000190u, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 4, 0u, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 5, 0x00090190u, 4));
+}
+
 static void test_heartbeat_time_is_object_1016(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 4, 0x00030190u, 4));
@@ -727,6 +755,7 @@ int main(void)
     RUN_TEST(test_after_a_lost_drive_enabling_begins_where_it_is_then);
     RUN_TEST(test_quick_stop_while_running);
     RUN_TEST(test_quick_stop_without_end_is_a_fault);
+    RUN_TEST(test_a_drive_that_stays_in_quick_stop_has_stopped_when_it_stands);
     RUN_TEST(test_quick_stop_has_nothing_to_stop);
     RUN_TEST(test_quick_stop_ends_the_braking_of_a_fault);
     RUN_TEST(test_a_drive_that_faults_in_a_quick_stop);
@@ -739,6 +768,7 @@ int main(void)
     RUN_TEST(test_a_reset_without_the_drive_leaves_it_to_boot);
     RUN_TEST(test_a_reset_with_one_more_axis_leads_to_boot);
     RUN_TEST(test_each_fault_is_told);
+    RUN_TEST(test_a_node_has_one_entry_in_1016);
     RUN_TEST(test_heartbeat_time_is_object_1016);
     RUN_TEST(test_an_error_that_was_cleared_is_not_the_cause_of_a_later_fault);
     return UNITY_END();

@@ -62,6 +62,20 @@ static void test_code_is_a_fault(void)
     TEST_ASSERT_EQUAL_HEX16(0x4210, drive_bench_read(0x603F, 0));
 }
 
+static void test_a_second_error_in_a_fault_is_told_too(void)
+{
+    drive_bench_enable();
+    TEST_ASSERT_EQUAL_INT(0, drive_node_fault(&bench.node, NODE_FAULT_CODE, 0x4210, true));
+    drive_bench_expect_emcy(0x4210, EMCY_REGISTER_TEMPERATURE | EMCY_REGISTER_GENERIC);
+    TEST_ASSERT_EQUAL_INT(0, drive_node_fault(&bench.node, NODE_FAULT_ENCODER_FAULT, 0, true));
+    TEST_ASSERT_EQUAL_INT(CIA402_FAULT, bench.node.device.state);
+    drive_bench_run(2);
+    TEST_ASSERT_EQUAL_HEX16(0x7305, drive_bench_read(0x603F, 0));
+    TEST_ASSERT_EQUAL_INT(2, drive_bench_read(0x1003, 0));
+    TEST_ASSERT_EQUAL_HEX16(0x7305, drive_bench_read(0x1003, 1) & 0xFFFF);
+    TEST_ASSERT_EQUAL_HEX16(0x4210, drive_bench_read(0x1003, 2) & 0xFFFF);
+}
+
 static void test_saturate(void)
 {
     TEST_ASSERT_EQUAL_INT(NODE_FAULT_ERR_VALUE,
@@ -83,6 +97,7 @@ int main(void)
     RUN_TEST(test_restart_boots);
     RUN_TEST(test_heartbeat_stop);
     RUN_TEST(test_code_is_a_fault);
+    RUN_TEST(test_a_second_error_in_a_fault_is_told_too);
     RUN_TEST(test_saturate);
     return UNITY_END();
 }

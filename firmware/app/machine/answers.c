@@ -26,42 +26,55 @@ void answers_restart(struct answers *answers)
     answers->last_us = before.last_us;
 }
 
-static void note_absent(struct answers *answers, uint32_t sync_us)
+/* The oldest absent one turns out to be late, or missed. */
+static void settle(struct answers *answers)
 {
-    if (answers->unsettled == 0u) {
-        answers->unsettled_us = sync_us;
+    answers->first = (uint8_t)((answers->first + 1u) % ANSWERS_UNSETTLED);
+    answers->unsettled--;
+}
+
+static uint32_t note_absent(struct answers *answers, uint32_t sync_us)
+{
+    uint32_t missed = 0;
+    if (answers->unsettled == ANSWERS_UNSETTLED) {
+        settle(answers);
+        missed = 1;
     }
+    answers->absent_us[(answers->first + answers->unsettled) % ANSWERS_UNSETTLED] = sync_us;
     answers->unsettled++;
     if (answers->absent_in_row < UINT32_MAX) {
         answers->absent_in_row++;
     }
+    return missed;
 }
 
 static void note_present(struct answers *answers)
 {
-    const uint32_t late = answers->count - 1u;
-    answers->unsettled -= late < answers->unsettled ? late : answers->unsettled;
+    for (uint32_t late = answers->count - 1u; late > 0u && answers->unsettled > 0u; --late) {
+        settle(answers);
+    }
     answers->absent_in_row = 0;
 }
 
 uint32_t answers_close_sync(struct answers *answers, uint32_t now_us, uint32_t sync_us,
                             uint32_t wait_us, uint8_t missed_max)
 {
+    uint32_t missed = 0;
     if (!answers->present) {
         return 0;
     }
     if (answers->count == 0u) {
-        note_absent(answers, sync_us);
+        missed = note_absent(answers, sync_us);
     } else {
         note_present(answers);
     }
     answers->count = 0;
     answers->lost = answers->absent_in_row > missed_max && now_us - answers->last_us > wait_us;
-    if (now_us - answers->unsettled_us < wait_us) {
-        return 0;
+    while (answers->unsettled > 0u &&
+           (answers->lost || now_us - answers->absent_us[answers->first] >= wait_us)) {
+        settle(answers);
+        missed++;
     }
-    const uint32_t missed = answers->unsettled;
     answers->missed += missed;
-    answers->unsettled = 0;
     return missed;
 }

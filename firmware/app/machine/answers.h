@@ -4,7 +4,7 @@
  *
  * A TPDO1 does not say which SYNC it answers. One that is absent at the next SYNC is only late when two of them come
  * during a later SYNC, at most `wait_us` after the SYNC it belongs to; else it is missed. Only missed ones are counted,
- * late ones are not. (A drive that stays one SYNC behind for good has missed one, as far as can be seen.)
+ * late ones are not; of a drive that is lost all are. (A drive that stays one SYNC behind for good has missed one, as far as can be seen.)
  *
  * Guarded by the port's lock; times are port_time_us(), which wraps.
  */
@@ -14,15 +14,20 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* When more are absent at once the oldest counts as missed. */
+#define ANSWERS_UNSETTLED 8u
+
 struct answers {
     bool present;           /* has answered a SYNC since answers_init */
     bool lost;              /* more than the permitted number missed in a row */
     uint8_t count;          /* to the present SYNC; more than 1: late ones, or frames doubled */
     uint32_t last_us;       /* time of the last one */
     uint32_t absent_in_row; /* SYNCs in a row without one */
-    uint32_t unsettled;     /* absent, and not known yet whether late or missed */
-    uint32_t unsettled_us;  /* time of the first SYNC of these */
-    uint32_t missed;        /* all in all */
+    uint32_t absent_us
+        [ANSWERS_UNSETTLED]; /* a ring: SYNCs not answered, and not known yet whether late or missed */
+    uint8_t first;           /* the oldest of these */
+    uint8_t unsettled;       /* how many */
+    uint32_t missed;         /* all in all */
 };
 
 void answers_init(struct answers *answers);

@@ -44,6 +44,18 @@ static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
     }
 }
 
+static void count_rest(struct axis *axis, uint32_t tolerance_counts)
+{
+    const bool stays = cia402_decode(axis->statusword) == CIA402_QUICK_STOP_ACTIVE &&
+                       distance(axis->rest_counts, axis->position_counts) <= tolerance_counts;
+    if (!stays) {
+        axis->rest_syncs = 0;
+        axis->rest_counts = axis->position_counts;
+    } else if (axis->rest_syncs < AXIS_STANDSTILL_SYNCS) {
+        axis->rest_syncs++;
+    }
+}
+
 /* A statusword that once says "not enabled" must not move the target of a drive that may follow it still. */
 static void note_engaged(struct axis *axis)
 {
@@ -78,6 +90,7 @@ void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg 
     note_engaged(axis);
     follow_position(axis);
     count_standstill(axis, tolerance_counts);
+    count_rest(axis, tolerance_counts);
     const struct pdo_setpoint setpoint = {.controlword = axis->controlword,
                                           .target_counts = axis->target_counts};
     pdo_encode_setpoint(axis->node, &setpoint, out);
@@ -127,7 +140,7 @@ bool axis_left(const struct axis *axis)
     if (state == CIA402_NOT_READY && moves_in(cia402_decode(axis->statusword_before))) {
         return axis->answers.lost;
     }
-    return axis->answers.lost || !moves_in(state);
+    return axis->answers.lost || !moves_in(state) || axis->rest_syncs >= AXIS_STANDSTILL_SYNCS;
 }
 
 bool axis_reached(const struct axis *axis)

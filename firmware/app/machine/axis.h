@@ -44,6 +44,8 @@ struct axis {
     uint32_t digital_inputs;        /* 0x60FD */
     int32_t following_error_counts; /* 0x60F4, looked at a few times a second */
     bool homed;                     /* since it was found */
+    uint32_t rest_syncs;            /* in Quick stop active: for how long it has been at */
+    int32_t rest_counts;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
@@ -69,7 +71,10 @@ bool axis_in_fault(const struct axis *axis);              /* Fault, or on the wa
 bool axis_enabled(const struct axis *axis);               /* Operation enabled */
 bool axis_dropped_out(const struct axis *axis); /* was enabled, shall be, and is not any more */
 bool axis_obeys(const struct axis *axis);       /* enabled, answers, follows its target */
-bool axis_left(const struct axis *axis);    /* moves no more by its own power: off, or in Fault */
+
+/* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and has
+ * been in one place for AXIS_STANDSTILL_SYNCS. */
+bool axis_left(const struct axis *axis);
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
 
