@@ -15,6 +15,8 @@ from typing import Any
 
 import aiohttp
 
+from hodograph.bus.processes import guarded
+
 START_S = 60.0
 ANSWER_S = 60.0
 
@@ -41,7 +43,11 @@ class Browser:
         ]
         with (folder / "chromium.log").open("wb") as log:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+                guarded(command),
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
             )
         self._loop = asyncio.new_event_loop()
         self._session = self._loop.run_until_complete(_session())
