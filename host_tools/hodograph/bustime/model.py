@@ -12,10 +12,12 @@ from .traffic import CYCLIC, NEEDED, SDO, SPORADIC, Message, sync_bits
 
 DRIVE_REACTION_US = 200
 """Assumed of a drive: TPDO1 waits for the bus this long after the end of SYNC, at most."""
+COMPUTE_US = 55
+"""Assumed of the controller, from the request of SYNC to that of the last setpoint: the shortest SYNC at 1 Mbit/s."""
 
 _SCALE = 1_000_000
 _SENT_WITH_SYNC = ("setpoints", "offsets")
-"""By the controller, ready when SYNC has left."""
+"""By the controller, ready `compute_us` after the request of SYNC: while it is on the wire, as a rule."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class BusTime:
     bitrate: int
     period_us: int
     reaction_us: int = DRIVE_REACTION_US
+    compute_us: int = COMPUTE_US
 
     @property
     def load_percent(self) -> float:
@@ -94,16 +97,22 @@ class BusTime:
         sync = self.messages[0]
         return self._blocking(sync) + self._length(sync)
 
+    def _released(self, message: Message) -> int:
+        """When a setpoint can be on the bus but for those that win: behind SYNC, or later, behind any frame."""
+        return max(self._sync_end, self.compute_us * self.bitrate + self._blocking(message))
+
     def _response(self, message: Message) -> int | None:
         if message.kind == "SYNC":
             return self._sync_end
         ahead = self._ahead(message)
         if message.kind in NEEDED:
             of_tick = [m for m in ahead if m.kind in CYCLIC and m.kind != "SYNC"]
-            through = self._sync_end + sum(map(self._length, (*of_tick, message)))
+            through = sum(map(self._length, (*of_tick, message)))
             if message.kind in _SENT_WITH_SYNC:
-                return through
-            return through + self.reaction_us * self.bitrate + self._blocking(message)
+                return self._released(message) + through
+            return (
+                self._sync_end + through + self.reaction_us * self.bitrate + self._blocking(message)
+            )
         tasks = [self._task(m) for m in ahead]
         return response_time(self._task(message), tasks, self._blocking(message), _SCALE)
 
@@ -113,7 +122,7 @@ class BusTime:
     def _task(self, message: Message) -> Task:
         jitter = 0
         if message.kind in _SENT_WITH_SYNC:
-            jitter = self._sync_end
+            jitter = self._released(message)
         elif message.kind in CYCLIC and message.kind != "SYNC":
             jitter = self._sync_end + self.reaction_us * self.bitrate
         return Task(self._length(message), message.period_us * self.bitrate, jitter)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hodograph.bustime import BusTime, PdoChoice, bus_time, max_drives
-from hodograph.bustime.model import DRIVE_REACTION_US
+from hodograph.bustime.model import COMPUTE_US, DRIVE_REACTION_US
 from hodograph.bustime.response import Task, response_time
 from hodograph.bustime.traffic import SDO, Message, sync_bits
 
@@ -100,7 +101,7 @@ def unkind_releases(model: BusTime, draw: Any, ticks: int) -> Iterator[Release]:
 def run_ticks(model: BusTime, draw: Any, ticks: int) -> dict[str, int]:
     """Greatest time from a SYNC's request to the end of each message, on a bus of 1 Mbit/s (1 bit = 1 us).
 
-    SYNC lets setpoints go when it has left, and drives answer within their reaction time; so releases depend on
+    Setpoints are computed meanwhile, and drives answer within their reaction time; so releases depend on
     the bus, and the SYNC of each tick is found first.
     """
     others = list(unkind_releases(model, draw, ticks))
@@ -114,13 +115,12 @@ def run_ticks(model: BusTime, draw: Any, ticks: int) -> dict[str, int]:
         for message in model.messages:
             if message.kind in ("SYNC", "heartbeats", "inputs"):
                 continue
-            late = (
-                0
-                if message.kind in ("setpoints", "offsets")
-                else draw(st.integers(0, model.reaction_us))
-            )
+            if message.kind in ("setpoints", "offsets"):
+                when = max(sync_end, requested + draw(st.integers(0, model.compute_us)))
+            else:
+                when = sync_end + draw(st.integers(0, model.reaction_us))
             name = f"{message.kind} {message.identifier}"
-            releases.append((sync_end + late, message.identifier, message.worst_bits, name))
+            releases.append((when, message.identifier, message.worst_bits, name))
     ends = arbitrated(releases)
     by_name: dict[str, list[int]] = {}
     for (name, _), ended in sorted(ends.items(), key=lambda item: item[0][1]):
@@ -143,7 +143,8 @@ def test_no_tick_is_slower_than_the_model(
     data: st.DataObject, size: tuple[int, int], choice: PdoChoice
 ) -> None:
     drives, period_us = size
-    model = machine(drives, period_us, choice)
+    compute_us = data.draw(st.sampled_from([COMPUTE_US, 150]))
+    model = replace(machine(drives, period_us, choice), compute_us=compute_us)
     assume(model.fits)
     worst = run_ticks(model, data.draw, 3)
     for message, bound in zip(model.messages, model.responses_us, strict=True):
@@ -165,6 +166,12 @@ def test_the_bound_of_the_tick_is_reached() -> None:
             frames[-1] = (*frames[-1][:3], str(message.identifier))
     last = max(arbitrated(frames).values())
     assert abs(last - model.tick_us) <= 1
+
+
+def test_a_tick_that_computes_no_longer_than_sync_lasts_costs_nothing() -> None:
+    model = machine(3, 1000)
+    assert replace(model, compute_us=0).tick_us == model.tick_us
+    assert replace(model, compute_us=sync_bits()[1] + 100).tick_us == model.tick_us + 100
 
 
 def test_jitter_of_sync() -> None:
