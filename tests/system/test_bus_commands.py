@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -63,7 +64,12 @@ def test_refusals(controller: Controller, capsys: pytest.CaptureFixture[str]) ->
     status, line = status_line(capsys, "start")
     assert (status, "no program is loaded" in line) == (5, True), line
     assert main(["goto", str(ALPHA), "--to", "5", "5"]) == 0
-    assert main(["upload", str(ALPHA)]) == 0
+    capsys.readouterr()
+    assert main(["upload", str(ALPHA), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert main(["status", "--json"]) == 0
+    assert told["program"] == json.loads(capsys.readouterr().out)["program"]
+    assert (told["node"], told["bytes"]) == (1, told["program"]["size"])
     status, line = status_line(capsys, "start")
     assert (status, "away from the program's start: hodograph goto" in line) == (5, True), line
     status, line = status_line(capsys, "goto", str(ALPHA), "--to", "500", "0")

@@ -5,15 +5,18 @@ from __future__ import annotations
 
 import json
 import signal
+import socket
+import struct
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bench import EXAMPLES
+from bench import EXAMPLES, MakeBench
 from hodograph.bus.frames import RECORD_DTYPE
 from hodograph.bus.recordings import read_recording, write_recording
 from hodograph.cli.main import main
@@ -22,6 +25,7 @@ pytestmark = pytest.mark.bus
 
 ALPHA = str(EXAMPLES / "alpha.toml")
 MACHINE = str(EXAMPLES / "machines" / "paper_alpha.toml")
+FRAME = struct.Struct("=IB3x8s")
 NOT_RECORDED = {"bus", "deadline_misses", "pace"}
 
 
@@ -95,6 +99,7 @@ def test_a_recording_from_beside(capsys: pytest.CaptureFixture[str], tmp_path: P
     """`hodograph record` hears all that happens: going to the start as well as the run."""
     file = tmp_path / "beside.blf"
     words = [sys.executable, "-m", "hodograph", "record", str(file), "--json"]
+    words += ["--machine", MACHINE]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
         deadline = time.monotonic() + 60
         while not file.exists():
@@ -107,12 +112,69 @@ def test_a_recording_from_beside(capsys: pytest.CaptureFixture[str], tmp_path: P
         out, _ = child.communicate(timeout=120)
         assert child.returncode == 0
     told = json.loads(out)
+    assert told["jumps"] == []
     frames = read_recording(file)
     assert frames.dtype == RECORD_DTYPE
     assert told["frames"] == frames.size > live["frames"]
     again = result(capsys, "replay", str(file), heart, "--json")
     for key in ("ticks", "setpoints_sha256", "encoders_sha256", "max_contour_error_um"):
         assert again[key] == live[key], key
+
+
+def motion(jump_at: int) -> None:
+    """Two axes at 50 mm/s beyond SYNC 20; at `jump_at` the first one steps aside by 1 mm."""
+    time.sleep(0.3)
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as out:
+        out.bind(("vcan0",))
+        x, speed = 0, 0
+        for k in range(1300):
+            speed = min(50_000, speed + 4000) if k > 20 else 0
+            x += speed + (1_000_000 if k == jump_at else 0)
+            out.send(FRAME.pack(0x80, 1, bytes([k % 240 + 1])))
+            for node, counts in ((2, x), (3, 0)):
+                out.send(FRAME.pack(0x180 + node, 6, struct.pack("<Hi", 0x1237, counts)))
+                out.send(FRAME.pack(0x200 + node, 6, struct.pack("<Hi", 0x0F, counts)))
+            if k % 50 == 0:
+                time.sleep(0.01)
+
+
+@pytest.mark.parametrize("jump_at", [-1, 1100])
+def test_a_jump_on_the_bus_is_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, jump_at: int
+) -> None:
+    def record(*more: str) -> tuple[int, dict[str, Any], str]:
+        sender = threading.Thread(target=motion, args=(jump_at,))
+        sender.start()
+        capsys.readouterr()
+        status = main(["record", str(tmp_path / "jump.log"), "--seconds", "3", "--json", *more])
+        out, err = capsys.readouterr()
+        sender.join()
+        return status, json.loads(out), err
+
+    status, told, err = record("--machine", MACHINE)
+    assert told["frames"] == 1300 * 5
+    if jump_at < 0:
+        assert (status, told["jumps"], err) == (0, [], "")
+        return
+    assert status == 6
+    assert f"setpoint jump at SYNC {jump_at} of the recording, axis 1 and 2: speed" in err
+    assert "the file is complete" in err.splitlines()[-1]
+    assert len(told["jumps"]) == 2  # speed, acceleration
+    assert read_recording(tmp_path / "jump.log").size == 1300 * 5
+    status, told, err = record()
+    assert (status, told["jumps"]) == (0, None)
+    assert "setpoints were not checked" in err
+
+
+def test_without_a_machine_file_the_controller_is_asked(
+    make_bench: MakeBench, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    make_bench("fast")
+    words = [sys.executable, "-m", "hodograph", "goto", ALPHA, "--to", "3", "4"]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as child:
+        told = result(capsys, "record", str(tmp_path / "goto.log"), "--seconds", "4", "--json")
+        assert child.wait() == 0
+    assert told["jumps"] == []
 
 
 def test_for_some_seconds(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

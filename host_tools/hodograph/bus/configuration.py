@@ -12,6 +12,7 @@ from .objects import CONFIGURATION, Object
 
 if TYPE_CHECKING:
     from ..config import Axis, Machine
+    from .node import Node
 
 WINDOW_OFF = 2**32 - 1
 
@@ -37,6 +38,12 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
     for sub, axis in enumerate(machine.axes, start=1):
         wanted += [((index, sub), value) for index, value in _axis(axis, counts)]
     return wanted
+
+
+def configured_nodes(controller: Node) -> tuple[int, ...]:
+    """The nodes of the controller's axes. Raises BusError."""
+    count = controller.read(CONFIGURATION, 1)
+    return tuple(controller.read(objects.AXIS_NODE, sub) for sub in range(1, count + 1))
 
 
 def feedforward_bits(machine: Machine) -> int:

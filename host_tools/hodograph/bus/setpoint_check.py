@@ -33,11 +33,14 @@ from numpy.typing import NDArray
 
 from ..errors import RunError
 from .decode import RPDO1, SYNC_ID, TPDO1
+from .objects import CONFIGURATION, PERIOD
 from .recorder import Frames
 
 if TYPE_CHECKING:
     from ..config import Machine
+    from .node import Node
 
+SPEED, ACCELERATION, TURN = "speed", "acceleration", "turn"
 _PLANE = 2
 _ROUNDING_COUNTS = 2 * math.sqrt(2.0)
 _ENABLED, _HOMING = 0x0F, 0x10
@@ -55,6 +58,34 @@ class StepLimits:
     speed: float
     acceleration: float
     normal: float = math.inf
+
+    def of(self, rule: str) -> float:
+        """What a rule limits."""
+        if rule == TURN:
+            return math.hypot(self.acceleration, self.normal)
+        return self.speed if rule == SPEED else self.acceleration
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step by one rule: what was found, what of it is rounding and the bow of the path, periods that it is apart."""
+
+    sync: int
+    axes: tuple[int, ...]
+    rule: str
+    found_counts: float
+    aside_counts: float
+    apart: float
+
+    @property
+    def needed(self) -> float:
+        """The least limit that allows it."""
+        return (self.found_counts - self.aside_counts) / self.apart
+
+    def jump(self, limits: StepLimits) -> Jump:
+        """What is said of it where it breaks the limit."""
+        allowed = limits.of(self.rule) * self.apart + self.aside_counts
+        return Jump(self.sync, self.axes, self.rule, self.found_counts, allowed)
 
 
 @dataclass(frozen=True)
@@ -77,13 +108,35 @@ class Jump:
 
 def step_limits(machine: Machine, setpoints: NDArray[np.int32] | None = None) -> StepLimits:
     """The controller's limits; with a program's nominal setpoints also its normal acceleration at 100 % feed."""
-    period_s, counts_per_mm = machine.period_us * 1e-6, machine.counts_per_mm
-    speed = machine.feed_mm_s * period_s * counts_per_mm
-    acceleration = machine.acceleration_mm_s2 * period_s**2 * counts_per_mm
     normal = math.inf
     if setpoints is not None:
         second = np.diff(setpoints.astype(np.float64), n=2, axis=0)
         normal = float(np.hypot(*second.T).max(initial=0.0))
+    return _limits(
+        *(machine.feed_mm_s, machine.acceleration_mm_s2, machine.period_us, machine.counts_per_mm),
+        normal,
+    )
+
+
+def configured_limits(controller: Node) -> StepLimits:
+    """The limits that the controller has now. Raises BusError."""
+    feed_um_s, acceleration_um_s2, counts_per_mm = (
+        controller.read(CONFIGURATION, sub) for sub in (2, 3, 7)
+    )
+    period_us = controller.read(PERIOD)
+    return _limits(feed_um_s / 1000, acceleration_um_s2 / 1000, period_us, counts_per_mm)
+
+
+def _limits(
+    feed_mm_s: float,
+    acceleration_mm_s2: float,
+    period_us: int,
+    counts_per_mm: int,
+    normal: float = math.inf,
+) -> StepLimits:
+    period_s = period_us * 1e-6
+    speed = feed_mm_s * period_s * counts_per_mm
+    acceleration = acceleration_mm_s2 * period_s**2 * counts_per_mm
     return StepLimits(speed or math.inf, acceleration or math.inf, normal)
 
 
@@ -97,14 +150,18 @@ def require_no_jump(frames: Frames, nodes: Sequence[int], limits: StepLimits) ->
 
 def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list[Jump]:
     """All steps that break a limit, in the order of the recording."""
-    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
-    if sync_at.size < 2:
-        return []
-    steps = _steps(frames, sync_at, nodes)
-    groups = [tuple(range(min(_PLANE, len(nodes))))]
-    groups += [(axis,) for axis in range(_PLANE, len(nodes))]
-    jumps = [jump for group in groups for jump in _check(steps.of(group), group, limits)]
+    jumps = [
+        step.jump(limits)
+        for measured in _measured(frames, nodes)
+        for step in measured.beyond(limits.of(measured.rule))
+    ]
     return sorted(jumps, key=lambda jump: jump.sync)
+
+
+def worst_steps(frames: Frames, nodes: Sequence[int], syncs: range) -> list[Step]:
+    """Of each rule and each group of axes the step at one of these SYNCs that comes nearest to its limit."""
+    steps = (measured.worst(syncs) for measured in _measured(frames, nodes))
+    return [step for step in steps if step is not None]
 
 
 def find_rough_starts(frames: Frames, nodes: Sequence[int], tolerance_counts: int) -> list[str]:
@@ -195,13 +252,52 @@ def _enabled(frames: Frames, node: int, at: NDArray[np.intp]) -> Bool:
     return np.asarray((last >= 0) & enabled[last])
 
 
-def _check(steps: _Steps, axes: tuple[int, ...], limits: StepLimits) -> list[Jump]:
+@dataclass(frozen=True)
+class _Measured:
+    """One rule for one group of axes, by SYNC from the second on: what it limits, how much it leaves aside."""
+
+    rule: str
+    axes: tuple[int, ...]
+    value: Float
+    aside: Float
+    apart: Float
+    checked: Bool
+    followed: Bool
+
+    def step(self, row: int) -> Step:
+        names = tuple(axis + 1 for axis, f in zip(self.axes, self.followed[row], strict=True) if f)
+        of_row = float(self.value[row]), float(self.aside[row]), float(self.apart[row])
+        return Step(row + 1, names, self.rule, *of_row)
+
+    def beyond(self, limit: float) -> list[Step]:
+        over = self.checked & (self.value > limit * self.apart + self.aside)
+        return [self.step(int(row)) for row in np.flatnonzero(over)]
+
+    def worst(self, syncs: range) -> Step | None:
+        wanted = self.checked.copy()
+        wanted[: max(0, syncs.start - 1)] = False
+        wanted[max(0, syncs.stop - 1) :] = False
+        if not wanted.any():
+            return None
+        needed = np.where(wanted, (self.value - self.aside) / self.apart, -np.inf)
+        return self.step(int(np.argmax(needed)))
+
+
+def _measured(frames: Frames, nodes: Sequence[int]) -> list[_Measured]:
+    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+    if sync_at.size < 2:
+        return []
+    steps = _steps(frames, sync_at, nodes)
+    groups = [tuple(range(min(_PLANE, len(nodes))))]
+    groups += [(axis,) for axis in range(_PLANE, len(nodes))]
+    return [rule for group in groups if group for rule in _rules(steps.of(group), group)]
+
+
+def _rules(steps: _Steps, axes: tuple[int, ...]) -> list[_Measured]:
     # The step before the first followed one is no step: the axis stood.
     followed = steps.followed
-    now, before = (
-        steps.counts[1:],
-        np.where(followed[1:] & followed[:-1], steps.counts[:-1], 0.0),
-    )
+    both = followed[1:] & followed[:-1]
+    now, before = steps.counts[1:], np.where(both, steps.counts[:-1], 0.0)
     length, length_before = np.linalg.norm(now, axis=1), np.linalg.norm(before, axis=1)
     periods = np.max(steps.periods, axis=1)
     apart = (periods[1:] + periods[:-1]) / 2
@@ -210,24 +306,16 @@ def _check(steps: _Steps, axes: tuple[int, ...], limits: StepLimits) -> list[Jum
     turned = np.minimum(_turn(now, before, length, length_before), _LARGEST_TURN)
     bow = (length + length_before) * turned**2 / 24
     change = np.linalg.norm(now - before, axis=1)
-    everywhere = np.ones_like(whole)
-    turn = math.hypot(limits.acceleration, limits.normal) * apart + 2 * _ROUNDING_COUNTS
-    rules = (
-        ("speed", length, np.full(length.size, limits.speed + _ROUNDING_COUNTS), everywhere),
-        (
-            "acceleration",
-            np.abs(length - length_before),
-            limits.acceleration * apart + 2 * _ROUNDING_COUNTS + bow,
-            whole,
+    ones, some = np.ones_like(length), np.any(followed[1:], axis=1)
+    once, twice = _ROUNDING_COUNTS * ones, 2 * _ROUNDING_COUNTS * ones
+    return [
+        _Measured(SPEED, axes, length, once, ones, some, followed[1:]),
+        _Measured(
+            *(ACCELERATION, axes, np.abs(length - length_before), twice + bow, apart),
+            *(whole, followed[1:]),
         ),
-        ("turn", change, turn, everywhere),
-    )
-    found = []
-    for name, value, allowed, checked in rules:
-        for row in np.flatnonzero(checked & (value > allowed)):
-            names = tuple(axis + 1 for axis, f in zip(axes, followed[row + 1], strict=True) if f)
-            found.append(Jump(int(row) + 1, names, name, float(value[row]), float(allowed[row])))
-    return found
+        _Measured(TURN, axes, change, twice, apart, some, followed[1:]),
+    ]
 
 
 def _turn(now: Float, before: Float, length: Float, length_before: Float) -> Float:

@@ -168,7 +168,7 @@ def snapshot(controller: Controller) -> Status:
         fault=fault,
         boot_trouble=trouble,
         last_refusal=REFUSALS.get(refusal),
-        program=_program(controller),
+        program=loaded_program(controller),
         motion=PathPosition(motion[0] * _Q40, motion[1] / 1000, motion[2] * _Q32),
         override=Override(override[0], 100 * override[1] * _Q30, bool(override[2])),
         axes=axes,
@@ -194,7 +194,8 @@ def _boot_trouble(controller: Controller) -> BootTrouble | None:
     return boot_trouble(*(controller.read(BOOT_TROUBLE, sub) for sub in (1, 2, 3, 4)))
 
 
-def _program(controller: Controller) -> LoadedProgram:
+def loaded_program(controller: Controller) -> LoadedProgram:
+    """Object 0x2000 but the image. Raises BusError."""
     with controller.turn():
         numbers = controller.program_summary()
     code, index = numbers["refused_code"], numbers["refused_index"]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..bus.address import parse_address
 from ..bus.frames import Frames
+from ..bus.setpoint_check import step_limits
 from ..chain import load_chain
 from ..config import Machine, load_machine
 from ..errors import InputError
@@ -71,6 +72,7 @@ def machine_layout(machine: Machine) -> Layout:
         counts_per_mm=machine.counts_per_mm,
         period_us=machine.period_us,
         bitrate=machine.bitrate,
+        limits=step_limits(machine),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import zlib
 from argparse import Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..bus.follow import Follower
 from ..bus.goto import goto as goto_point
 from ..bus.recordings import check_suffix
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
+from ..bus.status import loaded_program
 from ..bustime import require_fit
 from ..chain import Chain, load_chain, program_limits
 from ..config import Machine, load_machine, read_toml
@@ -50,13 +52,14 @@ def upload(options: Namespace) -> None:
             controller.configure(machine, options.kernel or machine.kernel)
         with progress("upload", "B", len(image)) as bar:
             controller.upload(image, bar)
-        summary = controller.program_summary()
+        program = loaded_program(controller)
     if options.json:
-        print_json({"bus": str(address), "bytes": len(image)} | summary)
+        told = {"bus": str(address), "node": node, "bytes": len(image)}
+        print_json(told | {"program": asdict(program)})
     else:
         print(
-            f"{len(image)} bytes on node {node}: {summary['segments']} segments, {summary['pieces']} feed "
-            f"pieces, {summary['ticks']} ticks, CRC-32 {zlib.crc32(image[16:]):08x}"
+            f"{len(image)} bytes on node {node}: {program.segments} segments, {program.pieces} feed "
+            f"pieces, {program.ticks} ticks, CRC-32 {zlib.crc32(image[16:]):08x}"
         )
 
 

@@ -70,9 +70,9 @@ def _timeout(parser: argparse.ArgumentParser, usual: str) -> None:
     )
 
 
-def _node(parser: argparse.ArgumentParser) -> None:
+def _node(parser: argparse.ArgumentParser, why: str = "for node number and bit rate") -> None:
     parser.add_argument("--node", type=node_number, help="the controller's node number (default 1)")
-    parser.add_argument("--machine", type=Path, metavar="FILE", help="for node number and bit rate")
+    parser.add_argument("--machine", type=Path, metavar="FILE", help=why)
 
 
 def _file(parser: argparse.ArgumentParser, *, many: bool = False, what: str = "path file") -> None:
@@ -293,6 +293,7 @@ def make_parser() -> argparse.ArgumentParser:
     record.add_argument("file", metavar="RECORDING", type=Path, help=".log (candump), .asc or .blf")
     record.add_argument("--seconds", type=seconds, metavar="S", help="for so long only")
     _bus_name(record)
+    _node(record, "for nodes and limits of the setpoints (without: the controller's)")
     _json(record)
 
     replay = command("replay", "analyse the run that a recording holds")

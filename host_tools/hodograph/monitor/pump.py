@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..bus.load import Listener
+from ..bus.setpoint_check import StepLimits
+from ..bus.setpoint_watch import SetpointWatch, jumps
 from ..bus.texts import drive_state
 from ..errors import BusError, InputError
 from .decoder import Decoder, Samples
@@ -38,6 +40,8 @@ class Layout:
     counts_per_mm: int
     period_us: int
     bitrate: int
+    limits: StepLimits | None = None
+    """Of setpoints; None: nobody says what they are."""
 
 
 @dataclass
@@ -63,6 +67,7 @@ class Pump:
         self._tally = Tally()
         self._emergencies = Emergencies()
         self._load = Listener(layout.bitrate)
+        self._watch = SetpointWatch(layout.nodes)
         self._decoder = Decoder(layout.nodes)
         self._derivation = self._fresh_derivation()
         self._state_due_s = 0.0
@@ -112,6 +117,7 @@ class Pump:
                 continue
             self._publish({"type": "bus", "there": True, "note": ""})
             self._load = Listener(self._layout.bitrate)
+            self._watch = SetpointWatch(self._layout.nodes)
             self._decoder = Decoder(self._layout.nodes)
             self._derivation = self._fresh_derivation()
             try:
@@ -144,6 +150,7 @@ class Pump:
         self._tally.frames += taken.frames.size
         if taken.bus_s is not None:
             self._load.feed(taken.frames, taken.bus_s)
+        self._check_setpoints(taken)
         samples = self._decoder.feed(taken.frames)
         rows = self._derivation.feed(samples, self._path)
         if rows.count:
@@ -152,6 +159,16 @@ class Pump:
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S
             self._publish(self._drives(samples))
+
+    def _check_setpoints(self, taken: Taken) -> None:
+        """Once in half a thousand SYNCs the worst step by each rule, if it breaks its limit."""
+        if self._layout.limits is None:
+            return
+        steps = self._watch.feed(taken.frames)
+        if taken.ended:
+            steps += self._watch.close()
+        for jump in jumps(steps, self._layout.limits):
+            self._publish({"type": "event", "text": str(jump), "fault": True})
 
     def _drives(self, samples: Samples) -> dict[str, Any]:
         """Positions and states of the drives by their own words, and the load of the bus."""

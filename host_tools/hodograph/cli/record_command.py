@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""hodograph record: the bus into a file, and a look at every setpoint that is written."""
+
+from __future__ import annotations
+
+import time
+from argparse import Namespace
+from typing import TYPE_CHECKING
+
+from ..bus.address import BusAddress, check_socketcan, parse_address
+from ..bus.configuration import configured_nodes
+from ..bus.controller import connect
+from ..bus.frames import Frames
+from ..bus.recorder import Recorder
+from ..bus.recordings import RecordingWriter, check_suffix
+from ..bus.setpoint_check import Jump, Step, configured_limits, step_limits
+from ..bus.setpoint_watch import SetpointWatch, jumps
+from ..errors import BusError, HodographError, RunError
+from .output import note, print_json
+from .targets import DEFAULT_BITRATE
+
+if TYPE_CHECKING:
+    from ..config import Machine
+
+_WRITE_EVERY_S = 0.5
+_ANSWER_S = 1.0
+
+
+def record(options: Namespace) -> None:
+    """Records; raises RunError when frames are missing or a setpoint jumps."""
+    check_suffix(options.file)
+    address = parse_address(options.bus)
+    if not address.is_socketcan:
+        raise BusError(f"{address}: record takes SocketCAN: use socketcan:CHANNEL")
+    check_socketcan(address)
+    machine = _machine(options)
+    with _Recording(address, options, machine) as recording:
+        recording.go_on()
+    if recording.dropped:
+        raise RunError(
+            f"{options.file}: {recording.dropped} frames are missing, which the kernel dropped: record as root if "
+            "you can (larger receive buffer)"
+        )
+    found = _jumps(recording, address, options, machine)
+    _print(options, recording, found)
+    for jump in (found or [])[1:]:
+        note(str(jump))
+    if found:
+        raise RunError(f"{options.file}: {found[0]}; the file is complete")
+
+
+def _machine(options: Namespace) -> Machine | None:
+    if options.machine is None:
+        return None
+    from ..config import load_machine
+
+    return load_machine(options.machine)
+
+
+class _Recording:
+    """A file in the making; keeps the worst step by each rule."""
+
+    def __init__(self, address: BusAddress, options: Namespace, machine: Machine | None) -> None:
+        self._options = options
+        self._watch = SetpointWatch(None if machine is None else machine.nodes)
+        self._worst: dict[tuple[str, tuple[int, ...]], Step] = {}
+        self._writer = RecordingWriter(options.file, address.channel)
+        try:
+            self._recorder = Recorder(address)
+        except BaseException:
+            self._writer.close()
+            raise
+
+    def __enter__(self) -> _Recording:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._recorder.stop()
+        self._writer.close()
+
+    def go_on(self) -> None:
+        """Until the time is over or Ctrl-C, which is how it is meant to end."""
+        recorder, seconds = self._recorder, self._options.seconds
+        begun = recorder.started_s
+        try:
+            while seconds is None or time.monotonic() - begun < seconds:
+                left_s = _WRITE_EVERY_S
+                if seconds is not None:
+                    left_s = min(left_s, begun + seconds - time.monotonic())
+                time.sleep(max(0.0, left_s))
+                self._keep(recorder.take())
+        except KeyboardInterrupt as error:
+            if type(error) is not KeyboardInterrupt:  # SIGTERM ends it as well, with its own status
+                raise
+        finally:
+            recorder.stop()
+            self._keep(recorder.take())
+            self.seconds = time.monotonic() - begun
+        self._look(self._watch.close())
+
+    def _keep(self, frames: Frames) -> None:
+        self._writer.write(frames)
+        self._look(self._watch.feed(frames))
+
+    def _look(self, steps: list[Step]) -> None:
+        for step in steps:
+            known = self._worst.get((step.rule, step.axes))
+            if known is None or known.needed < step.needed:
+                self._worst[step.rule, step.axes] = step
+
+    @property
+    def frame_count(self) -> int:
+        return self._recorder.frame_count
+
+    @property
+    def dropped(self) -> int:
+        return self._recorder.dropped
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """That got setpoints."""
+        return self._watch.seen
+
+    @property
+    def steps(self) -> list[Step]:
+        """The worst ones, in their order."""
+        return sorted(self._worst.values(), key=lambda step: step.sync)
+
+
+def _jumps(
+    recording: _Recording, address: BusAddress, options: Namespace, machine: Machine | None
+) -> list[Jump] | None:
+    """Steps beyond the limits of the machine file, or else of the controller; None: nobody says what they are."""
+    if not recording.steps:
+        return []
+    if machine is not None:
+        return jumps(recording.steps, step_limits(machine))
+    try:
+        with connect(address, options.node or 1, DEFAULT_BITRATE) as controller:
+            controller.require(_ANSWER_S)
+            limits, nodes = configured_limits(controller), configured_nodes(controller)
+    except HodographError as error:
+        note(f"setpoints were not checked, --machine FILE says what is allowed: {error}")
+        return None
+    if tuple(node for node in nodes if node in recording.nodes) != recording.nodes:
+        note(
+            f"setpoints were not checked, --machine FILE says what is allowed: nodes {recording.nodes} got some, "
+            f"the controller's axes are now {nodes}"
+        )
+        return None
+    return jumps(recording.steps, limits)
+
+
+def _print(options: Namespace, recording: _Recording, found: list[Jump] | None) -> None:
+    frames, seconds = recording.frame_count, recording.seconds
+    if options.json:
+        told = None if found is None else [str(jump) for jump in found]
+        print_json({"file": str(options.file), "frames": frames, "seconds": seconds, "jumps": told})
+    else:
+        print(f"{options.file}: {frames} frames in {seconds:.1f} s")
+
+
+COMMANDS = {"record": record}
