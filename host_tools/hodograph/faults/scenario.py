@@ -18,7 +18,7 @@ within_ms = 300                     # the same in wall time, where ticks do not 
 rest_ticks = 400                    # from the fault until the axes are at rest
 rest_ms = 400                       # the same in wall time
 unseen = true                       # a drive may be silent as its axis comes to rest: the others are judged
-recover_ms = 5000                   # from the reset until the drives are found and configured anew
+recover_ms = 3000                   # from the reset until the drives are found and configured anew
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ ACTIONS = (
     "kill-upload",
 )
 NO_LIMIT = 10**9
-RECOVER_MS, NOTHING_TO_RESET_MS = 5000, 1000
+RECOVER_MS, NOTHING_TO_RESET_MS = 3000, 1000
 """How long the way out of a fault may last; of scenarios that give no code, whose machine goes on by itself."""
 _EXPECT = (
     *("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders"),
