@@ -11,7 +11,8 @@
 
 enum { SEND_TRIES = 200, BATCHES = 4 };
 
-/* A full queue of the interface empties within a few frame times: wait for it. */
+/* A full queue of the interface empties within a few frame times: wait for it. One that stays full is a bus that is off:
+ * the frame is lost. */
 static void drives_send(void *context, const struct can_msg *frame)
 {
     struct drives *drives = context;
@@ -23,7 +24,7 @@ static void drives_send(void *context, const struct can_msg *frame)
             (void)poll(&writable, 1, 1);
         }
     }
-    if (result != 0) {
+    if (result != 0 && result != -EAGAIN) {
         drives->failed = result;
     }
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* drives: the simulated drives of one process on one SocketCAN bus.
  *
- * All in one thread. Bus errors are kept in `failed`; the caller looks at it.
+ * All in one thread. Bus errors are kept in `failed`; the caller looks at it. Frames that the interface has no room for
+ * are lost.
  */
 #ifndef NODE_DRIVES_H
 #define NODE_DRIVES_H
