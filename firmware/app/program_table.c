@@ -13,7 +13,7 @@ struct place {
     uint32_t offset;
 };
 
-static int put(void *context, const uint8_t *bytes, uint32_t size)
+static int put_records(void *context, const uint8_t *bytes, uint32_t size)
 {
     struct place *place = context;
     const int result = port_store_write(place->bank, place->offset, bytes, size);
@@ -21,7 +21,7 @@ static int put(void *context, const uint8_t *bytes, uint32_t size)
     return result;
 }
 
-static int compare(void *context, const uint8_t *bytes, uint32_t size)
+static int compare_records(void *context, const uint8_t *bytes, uint32_t size)
 {
     struct place *place = context;
     const int result = memcmp(port_store_data(place->bank) + place->offset, bytes, size);
@@ -55,7 +55,7 @@ int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
     if (!fits(program, made_for)) {
         return PROGRAM_ERR_ROOM;
     }
-    if (prepared_make(program, made_for, put, &place) != 0) {
+    if (prepared_make(program, made_for, put_records, &place) != 0) {
         return PROGRAM_ERR_STORE;
     }
     attach(bank, program, made_for);
@@ -67,7 +67,7 @@ bool program_table_find(unsigned bank, struct program *program, uint32_t kernel)
     const struct kernel *made_for = kernel_find(kernel);
     struct place place = behind(bank, program);
     if (made_for == NULL || !fits(program, made_for) ||
-        prepared_make(program, made_for, compare, &place) != 0) {
+        prepared_make(program, made_for, compare_records, &place) != 0) {
         return false;
     }
     attach(bank, program, made_for);

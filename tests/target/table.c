@@ -60,7 +60,7 @@ static void put(uint32_t offset, const uint8_t *bytes, uint32_t size)
 
 #endif
 
-static int write(void *context, const uint8_t *bytes, uint32_t size)
+static int write_records(void *context, const uint8_t *bytes, uint32_t size)
 {
     uint32_t *offset = context;
     put(*offset, bytes, size);
@@ -76,7 +76,7 @@ int table_make(struct program *program, uint32_t kernel)
         return -1;
     }
     erase();
-    (void)prepared_make(program, made_for, write, &offset);
+    (void)prepared_make(program, made_for, write_records, &offset);
     prepared_attach(program, made_for, startup_store_base + TABLE_AT);
     return 0;
 }
