@@ -105,7 +105,7 @@ HOST_LIBS := $(LIBS:%=$(BUILD)/host/libhodograph_%.a)
 c: $(HOST_LIBS) $(BINS:%=$(BUILD)/bin/hodograph-%) ## the C archives and programs only
 
 # Property tests with so many cases that the sanitized build runs only a part of them: optimised, in full.
-PLAIN_BINS := $(BUILD)/host/tests/test_override
+PLAIN_BINS := $(BUILD)/host/tests/test_override $(BUILD)/host/tests/test_stm32g4_flash
 UNIT_BINS := $(UNIT_NAMES:%=$(BUILD)/asan/tests/%) $(PLAIN_BINS)
 test: build $(STAMPS)/packages-test $(UNIT_BINS) $(BINS:%=$(BUILD)/asan/bin/hodograph-%) ## every test, C and Python; ends with "N passed, N failed"
 	@$(PY) tools/run_tests.py --build $(BUILD)

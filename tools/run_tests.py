@@ -25,7 +25,10 @@ _UNIT_LIMIT_S = 300
 _RESULT = re.compile(
     r"^(?P<where>[^:\n]+:\d+):(?P<name>\w+):(?P<result>PASS|FAIL|IGNORE)(?P<why>.*)$"
 )
-_IN_FULL = ("test_override",)  # optimised too, with all cases: the PLAIN_BINS of the Makefile
+_IN_FULL = (
+    "test_override",
+    "test_stm32g4_flash",
+)  # optimised too, with all cases: the PLAIN_BINS of the Makefile
 _SUMMARY = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored", re.MULTILINE)
 
 

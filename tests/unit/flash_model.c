@@ -29,7 +29,7 @@ enum { ACR = 0x00, KEYR = 0x08, SR = 0x10, CR = 0x14, ECCR = 0x18, OPTR = 0x20 }
 #define ERRORS        0xC3FAu
 #define BUSY_LOOKS    4u
 
-static struct {
+static struct flash {
     uint8_t memory[FLASH_MODEL_BYTES];
     bool spoiled[FLASH_MODEL_BYTES / WORD];
     unsigned erased[PAGES];
@@ -52,7 +52,7 @@ static struct {
     uint32_t half;
     bool stale;
     bool refuse;
-} self;
+} self, saved;
 
 void flash_model_power_on(void)
 {
@@ -75,6 +75,16 @@ void flash_model_new(void)
     self.cut_at = UINT32_MAX;
     self.dual = true;
     flash_model_power_on();
+}
+
+void flash_model_save(void)
+{
+    saved = self;
+}
+
+void flash_model_restore(void)
+{
+    self = saved;
 }
 
 bool flash_model_covers(uint32_t address)

@@ -25,6 +25,10 @@ enum flash_model_remains {
 /* Erased, as delivered. */
 void flash_model_new(void);
 
+/* Memory and registers to come back to. */
+void flash_model_save(void);
+void flash_model_restore(void);
+
 /* Registers as after power-on; the memory as it is. */
 void flash_model_power_on(void);
 
