@@ -9,7 +9,7 @@
 #include "faults/fault_log.h"
 #include "port/linux/clock.h"
 
-enum { SEND_TRIES = 200, BATCHES = 4 };
+enum { SEND_TRIES = 200, BATCHES = 4, PILE_BYTES = 256 * 1024 };
 
 /* A full queue of the interface empties within a few frame times: wait for it. One that stays full is a bus that is off:
  * the frame is lost. */
@@ -128,6 +128,16 @@ bool drives_receive(struct drives *drives)
         }
     }
     return acyclic;
+}
+
+void drives_wake(struct drives *drives)
+{
+    struct can_msg unread[CAN_SOCKET_BATCH];
+    int more = can_socket_waiting_bytes(&drives->socket) > PILE_BYTES;
+    while (more != 0 && drives->failed == 0) {
+        const int count = can_socket_receive(&drives->socket, unread, &more);
+        drives->failed = count < 0 ? count : 0;
+    }
 }
 
 void drives_process(struct drives *drives, uint32_t elapsed_us)

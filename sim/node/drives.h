@@ -40,6 +40,10 @@ int drives_filter(struct drives *drives);
  * drives_process at once. */
 bool drives_receive(struct drives *drives);
 
+/* After a long sleep: when so much has piled up meanwhile that working it off would take as long again, all of it is
+ * forgotten, as a drive does that was not there. A stall of the whole machine leaves a few frames only, which stay. */
+void drives_wake(struct drives *drives);
+
 /* Lets wall time pass. */
 void drives_process(struct drives *drives, uint32_t elapsed_us);
 

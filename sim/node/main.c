@@ -20,7 +20,7 @@
 /* Below the controller's tick, above everything ordinary. */
 #define PRIORITY 20
 
-enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, WAKE_MS = 10 };
+enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, WAKE_MS = 10, ASLEEP_US = 1000000 };
 
 /* Looking at the clock costs a system call, as much as a frame: within a run every fourth wake is enough. */
 enum { WAKES_PER_LOOK = 4 };
@@ -35,6 +35,9 @@ static void process(struct drives *drives, uint64_t *last_ns)
 {
     const uint64_t us = (clock_ns() - *last_ns) / 1000u;
     *last_ns += us * 1000u;
+    if (us > ASLEEP_US) {
+        drives_wake(drives);
+    }
     drives_process(drives, us < 1000000u ? (uint32_t)us : 1000000u);
 }
 

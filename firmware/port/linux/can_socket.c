@@ -13,6 +13,7 @@
 
 #include <linux/can.h>
 #include <linux/can/raw.h>
+#include <linux/sock_diag.h>
 
 #define RECEIVE_BUFFER_BYTES (4 * 1024 * 1024)
 
@@ -231,4 +232,14 @@ int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SO
     }
     *more = got == (int)CAN_SOCKET_BATCH;
     return count;
+}
+
+uint32_t can_socket_waiting_bytes(const struct can_socket *socket)
+{
+    uint32_t memory[SK_MEMINFO_VARS];
+    socklen_t size = sizeof memory;
+    if (getsockopt(socket->fd, SOL_SOCKET, SO_MEMINFO, memory, &size) != 0) {
+        return 0;
+    }
+    return memory[SK_MEMINFO_RMEM_ALLOC];
 }

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A bus that takes no frames, as an adapter that is bus-off has it: the port refuses, and all goes on later."""
+"""A bus that takes no frames, as an adapter that is bus-off has it, and drives that slept: the way out of both."""
 
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import time
 from collections.abc import Iterator
@@ -60,3 +61,26 @@ def test_frames_that_the_port_refuses_are_a_fault(
     crc = controller.program_crc()
     assert main(["run", str(load_chain(slow).file.file), "--json"]) == 0
     assert controller.program_crc() == crc
+
+
+def test_drives_that_slept_are_back_at_once(
+    make_bench: MakeBench, alpha_at: MakeAlpha, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What piled up for them meanwhile is not worked off: SYNCs of seconds ago, each a period of servo loops."""
+    bench = make_bench("real-time")
+    controller = bench.controller
+    assert main(["goto", str(alpha_at(20))]) == 0
+    assert main(["start"]) == 0
+    drives = int(subprocess.check_output(["pidof", "hodograph-drive"]))
+    os.kill(drives, signal.SIGSTOP)
+    try:
+        time.sleep(6.0)
+        assert controller.state() == FAULT_STATE
+    finally:
+        os.kill(drives, signal.SIGCONT)
+    capsys.readouterr()
+    assert main(["reset", "--timeout", "20"]) == 0
+    assert controller.state() == OFF
+    told = controller.read(0x2024, 1)
+    time.sleep(1.0)
+    assert controller.read(0x2024, 1) - told < 5
