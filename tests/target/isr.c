@@ -16,6 +16,7 @@
 #include "core/program.h"
 #include "port/port.h"
 #include "port/semihost/semihost.h"
+#include "table.h"
 
 enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_STATE = 6 };
 enum { DRIVES = 2, FRAMES = 8, LONGEST_WAIT_TICKS = 1000 };
@@ -23,7 +24,7 @@ enum { DRIVES = 2, FRAMES = 8, LONGEST_WAIT_TICKS = 1000 };
 /* Statuswords with voltage, remote and, in Operation enabled, "follows" (CiA 402). */
 enum { SWITCH_ON_DISABLED = 0x250, READY = 0x231, SWITCHED_ON = 0x233, ENABLED = 0x1237 };
 
-#define STORE_SIZE    0x20000u
+#define STORE_SIZE    TABLE_AT
 #define COUNTS_PER_MM 1000000u
 
 extern const uint8_t startup_store_base[];
@@ -145,6 +146,9 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel)
     const int32_t anywhere[PLANE_AXES] = {0, 0};
     struct config config;
     if (program_open(&program, image, size) != 0) {
+        return STATUS_PROGRAM;
+    }
+    if (table_make(&program, kernel) != 0) {
         return STATUS_PROGRAM;
     }
     memset(&config, 0, sizeof config);

@@ -25,7 +25,7 @@ RULES = (
     (r"core/interp\.\w:evaluate_feed", "feed"),
     (r"core/kernel_\w+\.\w:(set_|\w+_set$)", "search"),
     (r"core/feed_piece\.\w:\w+_(set|make)$", "search"),
-    (r"core/ph_segment\.\w:", "search"),
+    (r"core/(ph_segment|prepared)\.\w:", "search"),
     (r"core/interp\.\w:(find|load)_", "search"),
     (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),
     (r"core/kernel_\w+\.\w:\w+_at$", "position"),
