@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hodograph.bus.frames import FRAME_DTYPE, Frames
+from hodograph.bus.listening.frames import FRAME_DTYPE, Frames
 from hodograph.chain import load_chain
 from hodograph.monitor.decoder import Decoder
 from hodograph.monitor.derived import Derivation

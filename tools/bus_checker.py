@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bus_streams import Stream
 from bus_tap import Stretch
-from hodograph.bus.frame_batch import Frames
+from hodograph.bus.listening.frame_batch import Frames
 from hodograph.config import Machine
 from hodograph.dbc import dbc_text
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hodograph.bus.address import BusAddress
-from hodograph.bus.frame_batch import BATCH, FRAME_DTYPE, FrameBatch, Frames, open_socket
+from hodograph.bus.listening.frame_batch import BATCH, FRAME_DTYPE, FrameBatch, Frames, open_socket
 
 _PAUSE_S = 0.002
 _AWAKE_S = 0.02

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hodograph.bus.frames import FRAME_DTYPE, RECORD_DTYPE, Frames
+from hodograph.bus.listening.frames import FRAME_DTYPE, RECORD_DTYPE, Frames
 from hodograph.chain import load_chain
 from hodograph.simulate import simulate
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hodograph.bus.address import parse_address
-from hodograph.bus.controller import Controller
 from hodograph.bus.processes import Rig
+from hodograph.bus.sdo.controller import Controller
 from hodograph.config import Machine
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

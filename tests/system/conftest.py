@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from bench import BUS, EXAMPLES, PAPER_ALPHA, Bench, MakeAlpha, MakeBench
-from hodograph.bus.controller import connect
 from hodograph.bus.processes import Rig
+from hodograph.bus.sdo.controller import connect
 from hodograph.config import load_machine
 
 ROOT = Path(__file__).resolve().parents[2]

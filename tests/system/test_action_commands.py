@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from bench import EXAMPLES, PAPER_ALPHA, Bench, MakeAlpha, MakeBench
-from hodograph.bus.controller import FAULT_STATE, HELD, OFF, READY, RUNNING, Controller
-from hodograph.bus.objects import ACTUAL, HOMED
+from hodograph.bus.sdo.controller import FAULT_STATE, HELD, OFF, READY, RUNNING, Controller
+from hodograph.bus.sdo.objects import ACTUAL, HOMED
 from hodograph.cli.main import main
 
 pytestmark = pytest.mark.bus

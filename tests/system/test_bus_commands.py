@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from bench import BUS, EXAMPLES, MakeAlpha, MakeBench
-from hodograph.bus.controller import BOOT, READY, RUNNING, Controller, connect
+from hodograph.bus.sdo.controller import BOOT, READY, RUNNING, Controller, connect
 from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.errors import BusError, RefusedError

@@ -10,7 +10,7 @@ import cantools
 import pytest
 
 from hodograph.bus.address import parse_address
-from hodograph.bus.recorder import Recorder
+from hodograph.bus.listening.recorder import Recorder
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.dbc import dbc_text

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from bench import MakeAlpha, MakeBench
-from hodograph.bus.controller import FAULT_STATE, OFF, RUNNING
+from hodograph.bus.sdo.controller import FAULT_STATE, OFF, RUNNING
 from hodograph.chain import load_chain
 from hodograph.cli.main import main
 

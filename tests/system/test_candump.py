@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from bench import MakeBench
-from hodograph.bus.controller import OFF
+from hodograph.bus.sdo.controller import OFF
 
 pytestmark = pytest.mark.bus
 

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from bench import BUS, EXAMPLES, MakeBench
-from hodograph.bus.controller import OFF, READY
-from hodograph.bus.network import open_network
-from hodograph.bus.objects import ACTUAL, TARGET
+from hodograph.bus.sdo.controller import OFF, READY
+from hodograph.bus.sdo.network import open_network
+from hodograph.bus.sdo.objects import ACTUAL, TARGET
 from hodograph.bustime import axis_choice, drive_pdos
 from hodograph.cli.main import main
 from hodograph.data import DRIVE_EDS

@@ -30,7 +30,7 @@ UPLOAD = """
 import sys
 from pathlib import Path
 from hodograph.bus.address import parse_address
-from hodograph.bus.controller import connect
+from hodograph.bus.sdo.controller import connect
 with connect(parse_address("socketcan:vcan0"), 1, 1000000) as controller:
     controller.require(60)
     controller.upload(Path(sys.argv[1]).read_bytes())

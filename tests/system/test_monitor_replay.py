@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from browser import Browser, Page
-from hodograph.bus.recordings import write_recording
+from hodograph.bus.listening.recordings import write_recording
 from traffic import alpha, recorded
 
 pytestmark = pytest.mark.serial

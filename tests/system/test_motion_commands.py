@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from bench import MakeAlpha, MakeBench
-from hodograph.bus.controller import HELD, READY, RUNNING, Controller
+from hodograph.bus.sdo.controller import HELD, READY, RUNNING, Controller
 from hodograph.cli.main import main
 
 pytestmark = pytest.mark.bus

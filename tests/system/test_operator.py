@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from bench import BUS, PAPER_ALPHA, MakeAlpha
-from hodograph.bus.controller import connect
 from hodograph.bus.processes import controller_command, drive_command
+from hodograph.bus.sdo.controller import connect
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.faults.stand import Process

@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 
 from bench import EXAMPLES, MakeBench
-from hodograph.bus.frames import RECORD_DTYPE
-from hodograph.bus.recordings import read_recording, write_recording
+from hodograph.bus.listening.frames import RECORD_DTYPE
+from hodograph.bus.listening.recordings import read_recording, write_recording
 from hodograph.cli.main import main
 
 pytestmark = pytest.mark.bus

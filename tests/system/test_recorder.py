@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from hodograph.bus.address import BusAddress
-from hodograph.bus.recorder import Recorder
-from hodograph.bus.recordings import read_recording, write_recording
+from hodograph.bus.listening.recorder import Recorder
+from hodograph.bus.listening.recordings import read_recording, write_recording
 
 pytestmark = pytest.mark.bus
 

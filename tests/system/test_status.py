@@ -20,9 +20,9 @@ from typing import Any
 import pytest
 
 from bench import BUS, PAPER_ALPHA, MakeBench
-from hodograph.bus.controller import Controller, connect
 from hodograph.bus.processes import controller_command
-from hodograph.bus.status import snapshot
+from hodograph.bus.sdo.controller import Controller, connect
+from hodograph.bus.sdo.status import snapshot
 from hodograph.bustime import machine_bus_time
 from hodograph.cli.main import main
 from hodograph.config import load_machine

@@ -12,7 +12,7 @@ import pytest
 
 from bus_checker import BusChecker
 from bus_tap import Stretch
-from hodograph.bus.frame_batch import FRAME_DTYPE
+from hodograph.bus.listening.frame_batch import FRAME_DTYPE
 from hodograph.config import load_machine
 
 MACHINE = Path(__file__).resolve().parents[2] / "examples" / "machines" / "paper_alpha.toml"

@@ -12,8 +12,8 @@ from ..errors import InputError, RefusedError
 from ..feed import FeedRequest, Limits, plan_feed
 from ..program import ProgramOptions, compile_path, encode
 from ..spline import line
-from .controller import Controller
-from .objects import OVERRIDE, READY
+from .sdo.controller import Controller
+from .sdo.objects import OVERRIDE, READY
 
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25

@@ -16,12 +16,12 @@ from ..native import NativeProgram
 from ..simulate import settling_ticks
 from .address import BusAddress, check_socketcan, is_virtual
 from .analysis import REACHED_AFTER, BusRun, analyse_recording, first_tick, measured_pace
-from .controller import DISABLE, READY, STATISTICS, Controller, connect
-from .follow import Follower
 from .goto import goto
+from .listening.recorder import Recorder
+from .listening.recordings import write_recording
 from .processes import Rig
-from .recorder import Recorder
-from .recordings import write_recording
+from .sdo.controller import DISABLE, READY, STATISTICS, Controller, connect
+from .sdo.follow import Follower
 from .signals import unbroken
 
 __all__ = [

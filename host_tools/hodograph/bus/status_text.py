@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .load import BusLoad
-from .status import AxisStatus, LoadedProgram, Override, Statistics, Status
+from .listening.load import BusLoad
+from .sdo.status import AxisStatus, LoadedProgram, Override, Statistics, Status
 
 Row = tuple[str, str]
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import math
 from argparse import Namespace
 
-from ..bus import actions
 from ..bus.address import parse_address
-from ..bus.objects import BOOT, OFF, READY
+from ..bus.sdo import actions
+from ..bus.sdo.objects import BOOT, OFF, READY
 from .bus_commands import reached, stopping
 from .output import note
 from .targets import target

@@ -8,9 +8,9 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from ..bus import actions
 from ..bus.address import BusAddress, parse_address
-from ..bus.controller import (
+from ..bus.sdo import actions
+from ..bus.sdo.controller import (
     BOOT,
     DISABLE,
     OFF,
@@ -20,7 +20,7 @@ from ..bus.controller import (
     Controller,
     connect,
 )
-from ..bus.follow import Follower
+from ..bus.sdo.follow import Follower
 from ..bus.signals import unbroken
 from ..errors import HodographError
 from .output import note

@@ -8,8 +8,8 @@ from argparse import Namespace
 from pathlib import Path
 
 from ..bus.address import parse_address
-from ..bus.frames import Frames
-from ..bus.setpoint_check import step_limits
+from ..bus.listening.frames import Frames
+from ..bus.listening.setpoint_check import step_limits
 from ..chain import load_chain
 from ..config import Machine, load_machine
 from ..errors import InputError

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from ..bus.address import BusAddress, parse_address
-from ..bus.follow import Follower
 from ..bus.goto import goto as goto_point
-from ..bus.recordings import check_suffix
+from ..bus.listening.recordings import check_suffix
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
-from ..bus.status import loaded_program
+from ..bus.sdo.follow import Follower
+from ..bus.sdo.status import loaded_program
 from ..bustime import require_fit
 from ..chain import Chain, load_chain, program_limits
 from ..config import Machine, load_machine, read_toml

@@ -8,13 +8,13 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from ..bus.address import BusAddress, check_socketcan, parse_address
-from ..bus.configuration import configured_nodes
-from ..bus.controller import connect
-from ..bus.frames import Frames
-from ..bus.recorder import Recorder
-from ..bus.recordings import RecordingWriter, check_suffix
-from ..bus.setpoint_check import Jump, Step, configured_limits, step_limits
-from ..bus.setpoint_watch import SetpointWatch, jumps
+from ..bus.listening.frames import Frames
+from ..bus.listening.recorder import Recorder
+from ..bus.listening.recordings import RecordingWriter, check_suffix
+from ..bus.listening.setpoint_check import Jump, Step, limits_at, step_limits
+from ..bus.listening.setpoint_watch import SetpointWatch, jumps
+from ..bus.sdo.configuration import configured_limits, configured_nodes
+from ..bus.sdo.controller import connect
 from ..errors import BusError, HodographError, RunError
 from .output import note, print_json
 from .targets import DEFAULT_BITRATE
@@ -138,7 +138,8 @@ def _jumps(
     try:
         with connect(address, options.node or 1, DEFAULT_BITRATE) as controller:
             controller.require(_ANSWER_S)
-            limits, nodes = configured_limits(controller), configured_nodes(controller)
+            limits = limits_at(*configured_limits(controller))
+            nodes = configured_nodes(controller)
     except HodographError as error:
         note(f"setpoints were not checked, --machine FILE says what is allowed: {error}")
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from ..bus.recordings import check_suffix, read_recording
+from ..bus.listening.recordings import check_suffix, read_recording
 from ..errors import InputError, RunError
 from .output import print_json
 

@@ -13,9 +13,9 @@ from datetime import datetime
 from typing import Any
 
 from ..bus.address import BusAddress, parse_address
-from ..bus.controller import Controller, connect
-from ..bus.load import LEAST_LISTEN_S, BusLoad, LoadMeter
-from ..bus.status import Status, snapshot
+from ..bus.listening.load import LEAST_LISTEN_S, BusLoad, LoadMeter
+from ..bus.sdo.controller import Controller, connect
+from ..bus.sdo.status import Status, snapshot
 from ..bus.status_text import Row, status_line, status_rows
 from ..errors import BusError
 from .output import aligned, print_json

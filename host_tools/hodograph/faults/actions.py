@@ -15,9 +15,9 @@ from typing import Any
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ..bus.address import BusAddress
-from ..bus.controller import Controller
-from ..bus.network import open_network
-from ..bus.objects import PROGRAM
+from ..bus.sdo.controller import Controller
+from ..bus.sdo.network import open_network
+from ..bus.sdo.objects import PROGRAM
 from ..data import DRIVE_EDS
 from ..errors import RunError
 

@@ -7,10 +7,10 @@ import subprocess
 import time
 import zlib
 
-from ..bus.controller import BOOT, FAULT_STATE, OFF, READY, Controller
-from ..bus.objects import ACTUAL, FAULT, MOVING, STATISTICS
-from ..bus.recorder import Recorder
-from ..bus.texts import STATES
+from ..bus.listening.recorder import Recorder
+from ..bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, Controller
+from ..bus.sdo.objects import ACTUAL, FAULT, MOVING, STATISTICS
+from ..bus.words.texts import STATES
 from ..errors import BusError, RunError
 from .actions import await_rest, drives_at, kill, spawn_command
 from .record import LIMIT_S, LOOK_S, REST_TOLERANCE_COUNTS, Record

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bus.decode import RPDO1, SYNC_ID, TPDO1
-from ..bus.frames import Frames
+from ..bus.listening.decode import RPDO1, SYNC_ID, TPDO1
+from ..bus.listening.frames import Frames
 
 _ENABLED = 0x0F
 _EMCY = 0x080

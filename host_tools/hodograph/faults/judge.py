@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bus.setpoint_check import find_jumps, find_rough_starts, step_limits
+from ..bus.listening.setpoint_check import find_jumps, find_rough_starts, step_limits
 from ..native import Contour, NativeProgram
 from .evidence import Evidence
 from .record import REST_TOLERANCE_COUNTS, Record

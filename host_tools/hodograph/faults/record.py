@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bus.frames import Frames
+from ..bus.listening.frames import Frames
 from ..chain import load_chain
 from ..config import Machine
 from ..native import NativeProgram

@@ -6,9 +6,9 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 
-from ..bus.controller import FAULT_STATE, OFF, READY, RESET, CommandRefusedError, Controller
 from ..bus.run import Station, run_program
-from ..bus.texts import STATES
+from ..bus.sdo.controller import FAULT_STATE, OFF, READY, RESET, CommandRefusedError, Controller
+from ..bus.words.texts import STATES
 from ..errors import RunError
 from .record import LIMIT_S, Record
 from .stand import Stand

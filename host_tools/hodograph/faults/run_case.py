@@ -6,8 +6,8 @@ from __future__ import annotations
 import time
 
 from ..bus.address import BusAddress
-from ..bus.controller import connect
-from ..bus.recorder import Recorder
+from ..bus.listening.recorder import Recorder
+from ..bus.sdo.controller import connect
 from ..errors import HodographError
 from .disturb import disturb
 from .evidence import Evidence

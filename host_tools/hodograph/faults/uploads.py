@@ -9,8 +9,8 @@ import zlib
 
 import numpy as np
 
-from ..bus.controller import FAULT_STATE, READY, Controller
-from ..bus.recorder import Recorder
+from ..bus.listening.recorder import Recorder
+from ..bus.sdo.controller import FAULT_STATE, READY, Controller
 from ..errors import BusError, RefusedError, RunError
 from .actions import cut_upload, kill, spawn_upload
 from .record import LIMIT_S, LOOK_S, Record, load_job

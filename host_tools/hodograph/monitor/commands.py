@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..bus.controller import Controller
-from ..bus.objects import DISABLE, ENABLE, HOLD, HOME, QUICK_STOP, RESET, RESUME, START, STOP
+from ..bus.sdo.controller import Controller
+from ..bus.sdo.objects import DISABLE, ENABLE, HOLD, HOME, QUICK_STOP, RESET, RESUME, START, STOP
 from ..errors import InputError
 from .link import Command
 

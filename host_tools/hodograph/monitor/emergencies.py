@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..bus.frames import Frames
-from ..bus.texts import fault_words
+from ..bus.listening.frames import Frames
+from ..bus.words.texts import fault_words
 
 WINDOW_S = 1.0
 MOST_TOLD = 10

@@ -19,11 +19,11 @@ from typing import Any
 from canopen.sdo.exceptions import SdoAbortedError, SdoError
 
 from ..bus.address import BusAddress
-from ..bus.controller import Controller
-from ..bus.network import open_network
-from ..bus.objects import MOTION, OVERRIDE, PROGRAM
-from ..bus.status import read_status
-from ..bus.texts import STATES
+from ..bus.sdo.controller import Controller
+from ..bus.sdo.network import open_network
+from ..bus.sdo.objects import MOTION, OVERRIDE, PROGRAM
+from ..bus.sdo.status import read_status
+from ..bus.words.texts import STATES
 from ..data import CONTROLLER_EDS
 from ..errors import BusError, HodographError, RefusedError
 from .pump import Publish

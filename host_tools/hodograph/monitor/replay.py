@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..bus.decode import SYNC_ID, SYNC_OVERFLOW
-from ..bus.frames import FRAME_DTYPE, Frames
-from ..bus.recordings import read_recording
+from ..bus.listening.decode import SYNC_ID, SYNC_OVERFLOW
+from ..bus.listening.frames import FRAME_DTYPE, Frames
+from ..bus.listening.recordings import read_recording
 from ..errors import InputError
 from .source import NOTHING, Taken
 

@@ -14,8 +14,8 @@ import can
 import numpy as np
 
 from ..bus.address import BusAddress, check_socketcan
-from ..bus.frame_batch import BATCH, FrameBatch, open_socket
-from ..bus.frames import FRAME_DTYPE, Frames
+from ..bus.listening.frame_batch import BATCH, FrameBatch, open_socket
+from ..bus.listening.frames import FRAME_DTYPE, Frames
 from ..errors import BusError, one_line
 
 MOST_FRAMES = 65536

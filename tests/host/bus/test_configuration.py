@@ -8,7 +8,7 @@ from pathlib import Path
 import canopen
 import pytest
 
-from hodograph.bus.configuration import configuration
+from hodograph.bus.sdo.configuration import configuration
 from hodograph.config import load_machine
 from hodograph.data import CONTROLLER_EDS
 

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hodograph.bus.address import BusAddress
-from hodograph.bus.controller import connect
 from hodograph.bus.goto import SHORTEST_MOVE_MM, goto, legs, line_image
+from hodograph.bus.sdo.controller import connect
 from hodograph.chain import program_limits
 from hodograph.config import load_machine
 from hodograph.data import CONTROLLER_EDS

@@ -10,7 +10,7 @@ import canopen
 import pytest
 
 from hodograph.bus.address import BusAddress
-from hodograph.bus.controller import Controller, connect
+from hodograph.bus.sdo.controller import Controller, connect
 from hodograph.data import CONTROLLER_EDS
 from hodograph.errors import BusError
 

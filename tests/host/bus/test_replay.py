@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hodograph.bus.analysis import complete_ticks, program_tick, replay, runs_of
-from hodograph.bus.frames import RECORD_DTYPE, Frames
-from hodograph.bus.recordings import read_recording, write_recording
+from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
+from hodograph.bus.listening.recordings import read_recording, write_recording
 from hodograph.chain import Chain, load_chain
 from hodograph.cli.main import main
 from hodograph.errors import RunError

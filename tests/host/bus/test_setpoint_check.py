@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hodograph.bus.recorder import FRAME_DTYPE, Frames
-from hodograph.bus.setpoint_check import (
+from hodograph.bus.listening.recorder import FRAME_DTYPE, Frames
+from hodograph.bus.listening.setpoint_check import (
     StepLimits,
     find_jumps,
     find_rough_starts,

@@ -9,10 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hodograph.bus.boot_texts import boot_trouble
-from hodograph.bus.fault_texts import fault_words
-from hodograph.bus.load import BusLoad, ClassLoad
-from hodograph.bus.status import (
+from hodograph.bus.listening.load import BusLoad, ClassLoad
+from hodograph.bus.sdo.status import (
     AxisStatus,
     Fault,
     LoadedProgram,
@@ -22,6 +20,8 @@ from hodograph.bus.status import (
     Status,
 )
 from hodograph.bus.status_text import status_line, status_rows
+from hodograph.bus.words.boot_texts import boot_trouble
+from hodograph.bus.words.fault_texts import fault_words
 
 ROOT = Path(__file__).resolve().parents[3]
 

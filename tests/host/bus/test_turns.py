@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 
 from hodograph.bus.address import BusAddress
-from hodograph.bus.controller import connect
-from hodograph.bus.turns import Turns
+from hodograph.bus.sdo.controller import connect
+from hodograph.bus.sdo.turns import Turns
 from hodograph.errors import BusError
 
 BUS = BusAddress("virtual", f"turns-{os.getpid()}")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hodograph.bus.frames import RECORD_DTYPE, Frames
+from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
 from hodograph.faults.evidence import Evidence
 from hodograph.faults.judge import Verdict, judge
 from hodograph.faults.record import Job, Record, load_job

@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-from hodograph.bus.frames import FRAME_DTYPE, Frames
+from hodograph.bus.listening.frames import FRAME_DTYPE, Frames
 from hodograph.monitor.emergencies import MOST_TOLD, Emergencies
 
 

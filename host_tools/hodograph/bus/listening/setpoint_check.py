@@ -31,14 +31,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RunError
+from ...errors import RunError
 from .decode import RPDO1, SYNC_ID, TPDO1
-from .objects import CONFIGURATION, PERIOD
 from .recorder import Frames
 
 if TYPE_CHECKING:
-    from ..config import Machine
-    from .node import Node
+    from ...config import Machine
 
 SPEED, ACCELERATION, TURN = "speed", "acceleration", "turn"
 _PLANE = 2
@@ -112,28 +110,20 @@ def step_limits(machine: Machine, setpoints: NDArray[np.int32] | None = None) ->
     if setpoints is not None:
         second = np.diff(setpoints.astype(np.float64), n=2, axis=0)
         normal = float(np.hypot(*second.T).max(initial=0.0))
-    return _limits(
+    return limits_at(
         *(machine.feed_mm_s, machine.acceleration_mm_s2, machine.period_us, machine.counts_per_mm),
         normal,
     )
 
 
-def configured_limits(controller: Node) -> StepLimits:
-    """The limits that the controller has now. Raises BusError."""
-    feed_um_s, acceleration_um_s2, counts_per_mm = (
-        controller.read(CONFIGURATION, sub) for sub in (2, 3, 7)
-    )
-    period_us = controller.read(PERIOD)
-    return _limits(feed_um_s / 1000, acceleration_um_s2 / 1000, period_us, counts_per_mm)
-
-
-def _limits(
+def limits_at(
     feed_mm_s: float,
     acceleration_mm_s2: float,
     period_us: int,
     counts_per_mm: int,
     normal: float = math.inf,
 ) -> StepLimits:
+    """Limits of speed and acceleration along the path, 0: none, in the units of steps."""
     period_s = period_us * 1e-6
     speed = feed_mm_s * period_s * counts_per_mm
     acceleration = acceleration_mm_s2 * period_s**2 * counts_per_mm

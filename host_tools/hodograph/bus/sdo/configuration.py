@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..names import KERNELS
+from ...names import KERNELS
 from . import objects
 from .objects import CONFIGURATION, Object
 
 if TYPE_CHECKING:
-    from ..config import Axis, Machine
+    from ...config import Axis, Machine
     from .node import Node
 
 WINDOW_OFF = 2**32 - 1
@@ -38,6 +38,12 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
     for sub, axis in enumerate(machine.axes, start=1):
         wanted += [((index, sub), value) for index, value in _axis(axis, counts)]
     return wanted
+
+
+def configured_limits(controller: Node) -> tuple[float, float, int, int]:
+    """Feed in mm/s, acceleration in mm/s^2, period in us, counts per mm, as they are now. Raises BusError."""
+    feed_um_s, acceleration_um_s2, counts = (controller.read(CONFIGURATION, n) for n in (2, 3, 7))
+    return feed_um_s / 1000, acceleration_um_s2 / 1000, controller.read(objects.PERIOD), counts
 
 
 def configured_nodes(controller: Node) -> tuple[int, ...]:

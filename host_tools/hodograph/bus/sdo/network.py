@@ -15,8 +15,8 @@ import can
 import canopen
 from can.interfaces.socketcan import SocketcanBus
 
-from ..errors import BusError, one_line
-from .address import BusAddress, check_socketcan
+from ...errors import BusError, one_line
+from ..address import BusAddress, check_socketcan
 
 SEND_TIMEOUT_S = 1.0
 _FRAME = struct.Struct("=IB3x8s")  # struct can_frame of linux/can.h

@@ -14,8 +14,8 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BusError
-from .address import BusAddress
+from ...errors import BusError
+from ..address import BusAddress
 from .frame_batch import BATCH, FrameBatch, open_socket
 from .frames import FRAME_DTYPE, RECORD_DTYPE, Frames
 

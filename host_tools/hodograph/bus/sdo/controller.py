@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from ..data import CONTROLLER_EDS
-from ..errors import BusError, RefusedError, RunError, one_line
-from .address import BusAddress
+from ...data import CONTROLLER_EDS
+from ...errors import BusError, RefusedError, RunError, one_line
+from ..address import BusAddress
+from ..words.texts import PROGRAM_STATES, REFUSALS, STATES, detail_text, fault_text, fault_words
 from .configuration import configuration
 from .network import open_network
 from .node import Node
@@ -54,11 +55,10 @@ from .objects import (
     STOP,
     TARGET,
 )
-from .texts import PROGRAM_STATES, REFUSALS, STATES, detail_text, fault_text, fault_words
 from .upload import Progress, upload
 
 if TYPE_CHECKING:
-    from ..config import Machine
+    from ...config import Machine
 
 __all__ = [
     "BOOT",

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from ..errors import BusError, RefusedError, one_line
+from ...errors import BusError, RefusedError, one_line
+from ..words.texts import STATES
 from .node import Node
 from .objects import PROGRAM, STATE
-from .texts import STATES
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
 
@@ -69,8 +69,8 @@ def _refusal(node: Node, error: SdoAbortedError) -> RefusedError | BusError:
 
 def program_fault_text(code: int, index: int) -> str:
     """A refusal code of program_check in words, with its place."""
-    from ..program.check import Fault
-    from ..program.codes import ProgramError
+    from ...program.check import Fault
+    from ...program.codes import ProgramError
 
     try:
         fault = Fault(ProgramError(code), index)

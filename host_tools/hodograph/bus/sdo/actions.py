@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable
 
-from ..errors import BusError, RunError
+from ...errors import BusError, RunError
 from .controller import POLL_S, CommandRefusedError, Controller
 from .objects import (
     AXIS_NODE,

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...errors import InputError
+from ....errors import InputError
 
 
 def chosen_channel(file: Path, names: Sequence[str], wanted: str | None) -> str:

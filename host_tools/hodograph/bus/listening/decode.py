@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RunError
+from ...errors import RunError
 from .recorder import Frames
 
 SYNC_ID, RPDO1, TPDO1, TPDO2 = 0x080, 0x200, 0x180, 0x280

@@ -17,8 +17,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import BusError
-from .address import BusAddress
+from ...errors import BusError
+from ..address import BusAddress
 
 TURN_WAIT_S = 30.0
 """Patience for a turn where nothing else is asked for: mid-way in a job, giving up would cost more than waiting."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
-from ...errors import InputError
+from ....errors import InputError
 from ..frames import Frames
 from .candump import candump_lines, read_candump
 

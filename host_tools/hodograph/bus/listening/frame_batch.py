@@ -17,8 +17,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BusError
-from .address import BusAddress
+from ...errors import BusError
+from ..address import BusAddress
 from .frames import FRAME_DTYPE, Frames
 
 __all__ = ["BATCH", "FRAME_BYTES", "FRAME_DTYPE", "FrameBatch", "Frames", "open_socket"]

@@ -10,9 +10,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from .boot_texts import BootTrouble, boot_trouble
+from ..words.boot_texts import BootTrouble, boot_trouble
+from ..words.drive_states import inputs_on, state_of_number
+from ..words.texts import REFUSALS, STATES, detail_text, fault_words
 from .controller import Controller
-from .drive_states import inputs_on, state_of_number
 from .objects import (
     ACTUAL,
     AXIS_NODE,
@@ -31,7 +32,6 @@ from .objects import (
     STATUSWORD,
     TARGET,
 )
-from .texts import REFUSALS, STATES, detail_text, fault_words
 from .upload import program_fault_text
 
 _Q40 = 2.0**-40

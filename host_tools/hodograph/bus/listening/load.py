@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bustime.frame_bits import ERROR, EXTENDED, exact_bits
-from .address import BusAddress
+from ...bustime.frame_bits import ERROR, EXTENDED, exact_bits
+from ..address import BusAddress
 from .frames import Frames
 from .recorder import Recorder
 

@@ -14,8 +14,8 @@ import numpy as np
 from can.io.asc import ASCReader, ASCWriter
 from can.io.blf import BLFParseError, BLFReader, BLFWriter
 
-from ...bustime.frame_bits import ERROR, EXTENDED, REMOTE
-from ...errors import InputError, one_line
+from ....bustime.frame_bits import ERROR, EXTENDED, REMOTE
+from ....errors import InputError, one_line
 from ..frames import RECORD_DTYPE, Frames
 from .channels import chosen_channel
 

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bustime.frame_bits import ERROR, EXTENDED, REMOTE
-from ...errors import InputError
+from ....bustime.frame_bits import ERROR, EXTENDED, REMOTE
+from ....errors import InputError
 from ..frames import RECORD_DTYPE, Frames
 from .channels import chosen_channel
 

@@ -15,8 +15,8 @@ import can
 import canopen
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from ..errors import BusError, RefusedError, one_line
-from .address import BusAddress
+from ...errors import BusError, RefusedError, one_line
+from ..address import BusAddress
 from .objects import STATE
 from .turns import TURN_WAIT_S, Turns
 

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""What is said to the controller by SDO: its objects, programs, commands, state."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""States, faults and refusals in words."""
