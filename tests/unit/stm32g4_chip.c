@@ -109,6 +109,10 @@ static uint32_t read_timer(const struct timer *timer, uint32_t offset)
         return timer->count;
     case SR:
         return timer->matched ? 2u : 0u;
+    case DIER:
+        return timer->interrupt_on ? 2u : 0u;
+    case CCR1:
+        return timer->compare;
     default:
         chip_forbids("this model of a timer does not know the register", offset);
         return 0;

@@ -191,6 +191,51 @@ static void test_the_tick_is_above_the_receiver_and_kept_out_of_the_application(
     TEST_ASSERT_FALSE(chip_tick_pending());
 }
 
+static void expect_on_the_bus(uint32_t id)
+{
+    struct fdcan_model_frame frame;
+    TEST_ASSERT_TRUE(fdcan_model_transmit(&frame));
+    TEST_ASSERT_EQUAL_HEX32(id, frame.id);
+    irq_can();
+}
+
+static void test_the_mainline_stays_back_before_a_tick(void)
+{
+    const struct can_msg answer = {.id = 0x581, .len = 8};
+    const struct can_msg sync = {.id = 0x080, .len = 1};
+    start(1000);
+    chip_advance_100ns(PERIOD - 1610u);
+    TEST_ASSERT_TRUE(fdcan_send(&can, &answer, FDCAN_ORDINARY));
+    expect_on_the_bus(0x581);
+    chip_advance_100ns(20);
+    TEST_ASSERT_TRUE(fdcan_send(&can, &answer, FDCAN_ORDINARY));
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fdcan_model_waiting(), "SYNC would wait for it");
+    chip_advance_100ns(1700); /* the tick is due, and held off */
+    TEST_ASSERT_TRUE(fdcan_send(&can, &answer, FDCAN_ORDINARY));
+    TEST_ASSERT_EQUAL_UINT(0, fdcan_model_waiting());
+    irq_tick();
+    TEST_ASSERT_TRUE(fdcan_send(&can, &sync, FDCAN_URGENT));
+    expect_on_the_bus(0x080);
+    expect_on_the_bus(0x581);
+    expect_on_the_bus(0x581);
+    irq_stop();
+    chip_advance_100ns(PERIOD - 100u);
+    TEST_ASSERT_TRUE(fdcan_send(&can, &answer, FDCAN_ORDINARY));
+    expect_on_the_bus(0x581);
+}
+
+/* A frame takes longer than a period there. */
+static void test_on_the_slowest_bus_the_mainline_has_its_turn(void)
+{
+    const struct can_msg answer = {.id = 0x581, .len = 8};
+    tick_timer_begin(170);
+    TEST_ASSERT_TRUE(fdcan_begin(&can, 125000));
+    irq_start(&can, &handlers, 1000);
+    chip_advance_100ns(7000);
+    TEST_ASSERT_TRUE(fdcan_send(&can, &answer, FDCAN_ORDINARY));
+    expect_on_the_bus(0x581);
+}
+
 /* 32 kHz / 64 / 2000 = 4 s */
 static void test_the_watchdog_is_fed_while_ticks_go_on(void)
 {
@@ -285,6 +330,8 @@ int main(void)
     RUN_TEST(test_the_counter_may_wrap);
     RUN_TEST(test_a_new_period_counts_from_the_next_tick);
     RUN_TEST(test_the_tick_is_above_the_receiver_and_kept_out_of_the_application);
+    RUN_TEST(test_the_mainline_stays_back_before_a_tick);
+    RUN_TEST(test_on_the_slowest_bus_the_mainline_has_its_turn);
     RUN_TEST(test_the_watchdog_is_fed_while_ticks_go_on);
     RUN_TEST(test_a_bite_is_told_once_and_forgotten);
     RUN_TEST(test_the_clock_tree);

@@ -6,9 +6,14 @@
 #include "port/stm32g4/cpu.h"
 #include "port/stm32g4/fdcan_timing.h"
 #include "port/stm32g4/reg_fdcan.h"
+#include "port/stm32g4/tick_timer.h"
 
 #define ALL_BUFFERS   ((1u << FDCAN_FIFO_ELEMENTS) - 1u)
 #define ALL_FLAGS     0xFFFFFFFFu
+#define FRAME_BITS    135u /* the longest: 8 bytes, all stuff bits, and the gap behind it */
+#define SPARE_BITS    25u
+#define COUNTS_PER_S  10000000u
+#define GUARD_MAX     2500u
 #define ANSWER_LOOKS  10000u /* at a bit that takes some cycles of the slower clock */
 #define INTERRUPTS_ON (FDCAN_IE_RF0NE | FDCAN_IE_RF0LE | FDCAN_IE_TCE | FDCAN_IE_EPE | FDCAN_IE_BOE)
 
@@ -56,6 +61,13 @@ static void reject_unless(size_t filters)
                          reg_field(FDCAN_RXGFC_LSS, (uint32_t)filters));
 }
 
+/* A quarter of the shortest period at most: on a slow bus SYNC has to wait rather than the mainline for ever. */
+static uint32_t guard(uint32_t bits_s)
+{
+    const uint32_t frame = (FRAME_BITS + SPARE_BITS) * (COUNTS_PER_S / bits_s);
+    return frame < GUARD_MAX ? frame : GUARD_MAX;
+}
+
 bool fdcan_begin(struct fdcan *can, uint32_t bits_s)
 {
     memset(can, 0, sizeof *can);
@@ -64,6 +76,7 @@ bool fdcan_begin(struct fdcan *can, uint32_t bits_s)
     if (timing == 0u || !open_configuration()) {
         return false;
     }
+    can->guard_100ns = guard(bits_s);
     clear_message_ram();
     put(FDCAN_NBTP, timing);
     reject_unless(0);
@@ -118,14 +131,16 @@ static void transmit(uint32_t status, const struct can_msg *message)
     put(FDCAN_TXBAR, 1u << index);
 }
 
-/* The queue whose turn it is, with `room` free elements in the chip. */
+/* The queue whose turn it is, with `room` free elements in the chip. What stays back before a tick has its turn when the
+ * tick's own frames have gone. */
 static struct fdcan_queue *next_queue(struct fdcan *can, uint32_t room)
 {
     if (fdcan_queue_front(&can->urgent) != NULL) {
         return room > 0u ? &can->urgent : NULL;
     }
     const bool waits = fdcan_queue_front(&can->ordinary) != NULL;
-    return waits && room == FDCAN_FIFO_ELEMENTS ? &can->ordinary : NULL;
+    const bool fits = room == FDCAN_FIFO_ELEMENTS && tick_timer_left() > can->guard_100ns;
+    return waits && fits ? &can->ordinary : NULL;
 }
 
 /* Held. */

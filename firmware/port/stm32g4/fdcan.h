@@ -2,10 +2,10 @@
 /*
  * fdcan: FDCAN1 for classic frames with 11-bit identifiers.
  *
- * Sending. Two queues, one for the interrupts (SYNC, setpoints) and one for the mainline (SDO, heartbeats), each in
- * order. The chip's own FIFO of three takes all that the interrupts send, but from the mainline only one frame, when it is
- * empty: so SYNC never waits for more than the frame that is on the wire and one of the mainline, however much
- * the mainline has to say.
+ * Sending. Two queues, one for the interrupts (SYNC, setpoints) and one for the mainline (SDO, heartbeats), each in order. The
+ * chip's own FIFO of three takes all that the interrupts send; from the mainline it gets one frame at a time, when it is
+ * empty and the next tick is further off than the longest frame takes. So SYNC does not queue behind what the mainline has
+ * to say: it waits, as on any bus, for the one frame that is on the wire.
  *
  * Receiving. The chip's FIFO of three, 141 us of the shortest frames at 1 Mbit/s: the receive interrupt must not be held
  * off longer. What matches no filter is rejected by the chip, as are remote and extended frames.
@@ -43,7 +43,8 @@ struct fdcan {
     struct fdcan_queue urgent;   /* of the interrupts */
     struct fdcan_queue ordinary; /* of the mainline */
     struct fdcan_events events;
-    bool off; /* not on the bus: not started, or bus-off */
+    uint32_t guard_100ns; /* before a tick, in which the mainline's frames stay back */
+    bool off;             /* not on the bus: not started, or bus-off */
 };
 
 enum fdcan_sender { FDCAN_URGENT, FDCAN_ORDINARY };

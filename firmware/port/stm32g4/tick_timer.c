@@ -33,6 +33,15 @@ uint32_t tick_timer_us(void)
     return reg_read(TIM5_BASE + TIM_CNT);
 }
 
+uint32_t tick_timer_left(void)
+{
+    if ((reg_read(TIM2_BASE + TIM_DIER) & TIM_DIER_CC1IE) == 0u) {
+        return UINT32_MAX;
+    }
+    const uint32_t left = reg_read(TIM2_BASE + TIM_CCR1) - now();
+    return left <= UINT32_MAX / 2u ? left : 0u;
+}
+
 static void acknowledge(void)
 {
     reg_write(TIM2_BASE + TIM_SR, ~TIM_SR_CC1IF);

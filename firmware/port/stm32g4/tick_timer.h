@@ -28,6 +28,9 @@ void tick_timer_begin(uint32_t input_mhz);
 uint32_t tick_timer_ns(void);
 uint32_t tick_timer_us(void);
 
+/* Until the next tick is due, in counts of TIM2; UINT32_MAX: there are no ticks. 0: it is due. Any context. */
+uint32_t tick_timer_left(void);
+
 /* The first tick comes one period later. Mainline. */
 void tick_timer_start(struct tick_timer *timer, uint32_t period_us);
 void tick_timer_stop(void);
