@@ -90,7 +90,9 @@ static void send_process_data(struct tick *tick)
         return;
     }
     send_setpoints(tick, offset);
-    send_velocities(tick, offset);
+    if (offset == found) {
+        send_velocities(tick, offset);
+    }
 }
 
 /* At lock step nothing but this time keeps the next SYNC from coming at once. */

@@ -122,6 +122,12 @@ bool axis_dropped_out(const struct axis *axis)
     return axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis_enabled(axis);
 }
 
+bool axis_well(const struct axis *axis)
+{
+    return axis_enabled(axis) && !axis->answers.lost &&
+           axis->watch.in_row <= STATUS_WATCH_TOLERATED;
+}
+
 bool axis_obeys(const struct axis *axis)
 {
     return axis_enabled(axis) && !axis->answers.lost && status_watch_obeys(&axis->watch);

@@ -70,7 +70,8 @@ bool axis_gone(const struct axis *axis, uint32_t now_us); /* lost for long */
 bool axis_in_fault(const struct axis *axis);              /* Fault, or on the way there */
 bool axis_enabled(const struct axis *axis);               /* Operation enabled */
 bool axis_dropped_out(const struct axis *axis); /* was enabled, shall be, and is not any more */
-bool axis_obeys(const struct axis *axis);       /* enabled, answers, follows its target */
+bool axis_well(const struct axis *axis);  /* enabled, answers, its statusword tells no trouble */
+bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its target */
 
 /* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and has
  * been in one place for AXIS_STANDSTILL_SYNCS. */

@@ -56,7 +56,10 @@ void machine_supervise(struct machine *machine, uint32_t now_us)
     close_sync(machine, now_us);
     machine->sync_us = now_us;
     for (uint8_t i = 0; i < machine->config.axis_count && machine->state != MACHINE_BOOT; ++i) {
-        supervise_axis(machine, &machine->axes[i], now_us);
+        const struct axis *axis = &machine->axes[i];
+        if (!axis_well(axis)) {
+            supervise_axis(machine, axis, now_us);
+        }
     }
 }
 
