@@ -25,10 +25,13 @@
 #endif
 typedef char node_is_a_can_open_one[BOARD_NODE >= 1 && BOARD_NODE <= 127 ? 1 : -1];
 
+#define TELL_US 1000000u
+
 static struct {
     struct fdcan can;
     volatile bool started;
     volatile bool awake;
+    uint32_t told_us;
     uint32_t spoiled_words; /* seen before the start */
 } self;
 
@@ -160,8 +163,13 @@ static void tell(const char *text, uint32_t count)
     }
 }
 
-static void tell_events(void)
+/* Once a second at most: a line takes some milliseconds. */
+static void tell_events(uint32_t now_us)
 {
+    if (now_us - self.told_us < TELL_US) {
+        return;
+    }
+    self.told_us = now_us;
     const struct fdcan_events events = fdcan_take_events(&self.can);
     tell("left the CAN bus after too many errors, times", events.bus_offs);
     tell("error passive on the CAN bus began or ended, times", events.error_passives);
@@ -172,7 +180,7 @@ void port_wait(uint32_t timeout_us)
 {
     const uint32_t began_us = port_time_us();
     watchdog_feed(irq_ticks());
-    tell_events();
+    tell_events(began_us);
     while (!self.awake && port_time_us() - began_us < timeout_us) {
         if (self.started) {
             cpu_sleep();
