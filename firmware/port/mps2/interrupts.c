@@ -11,7 +11,8 @@ static struct {
     const struct link *link;
     struct port_handlers handlers;
     struct link_wish wish;
-    uint32_t late_ns; /* of the next tick */
+    uint32_t late_ns;        /* of the next tick */
+    volatile uint32_t ticks; /* so far; wraps */
     volatile bool woken;
 } self;
 
@@ -69,6 +70,7 @@ __attribute__((noinline)) static void run_tick(void)
 void startup_systick(void)
 {
     clock_tick();
+    self.ticks++;
     self.wish = (struct link_wish){.awaiting = false};
     run_tick();
     self.late_ns = self.link->after_tick(&self.wish);
@@ -86,18 +88,30 @@ void port_unlock(void)
 }
 
 /* An interrupt that comes between the look and the sleep is pending then, and ends the sleep. */
+static void sleep_once(void)
+{
+    const uint32_t before = core_mask();
+    if (!self.woken) {
+        core_sleep();
+    }
+    core_unmask(before);
+}
+
+static void spin_once(void)
+{
+    const uint32_t ticks = self.ticks;
+    while (!self.woken && self.ticks == ticks) {
+    }
+}
+
 void port_wait(uint32_t timeout_us)
 {
     const uint32_t began_us = clock_us();
-    while (clock_us() - began_us < timeout_us) {
-        const uint32_t before = core_mask();
-        const bool woken = self.woken || self.link->stop_requested();
-        if (!woken) {
-            core_sleep();
-        }
-        core_unmask(before);
-        if (woken) {
-            break;
+    while (!self.woken && !self.link->stop_requested() && clock_us() - began_us < timeout_us) {
+        if (self.link->sleeps) {
+            sleep_once();
+        } else {
+            spin_once();
         }
     }
     self.woken = false;

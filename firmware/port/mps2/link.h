@@ -23,6 +23,10 @@ struct link_wish {
 };
 
 struct link {
+    /* Whether the mainline sleeps (WFI) while it has nothing to do. Where the guest's clock counts instructions that only costs the emulator
+     * changes of its threads, so it spins there. */
+    bool sleeps;
+
     /* Mainline, in this order. 0 or PORT_ERR_SYSTEM. */
     int (*begin)(const struct command_line *line);
     int (*accept)(const struct port_filter *filters, size_t count);

@@ -135,6 +135,7 @@ static bool failed(void)
 }
 
 const struct link link_fifo = {
+    .sleeps = false,
     .begin = begin,
     .accept = accept,
     .send = send,

@@ -78,6 +78,7 @@ static bool never(void)
 }
 
 const struct link link_slcan = {
+    .sleeps = true,
     .begin = begin,
     .accept = accept,
     .send = send,
