@@ -132,9 +132,9 @@ class Board:
     def stop(self) -> None:
         """Asks the controller to end; by the FIFOs, as a board has no signals."""
         self._stopping_since = self._stopping_since or time.monotonic()
-        if self.bridge is not None and self._options.link == "fifo":
+        if self.bridge is not None:
             self.bridge.terminate()
-        else:
+        if self._options.link == "slcan":
             self.qemu.terminate()
 
     def wait(self) -> int:

@@ -41,9 +41,12 @@ def test_the_m4f_runs_alpha_and_heart(capsys: pytest.CaptureFixture[str]) -> Non
         assert run["deadline_misses"] == 0
 
 
-@pytest.mark.parametrize("target", ["an385", "an500", "an505"])
-def test_the_other_boards_answer_and_end(target: str) -> None:
-    words = [sys.executable, str(EMULATE), target, "--bus", "vcan0", "--node", "9"]
+@pytest.mark.parametrize(
+    ("target", "link"),
+    [("an385", "fifo"), ("an500", "slcan"), ("an505", "fifo"), ("an505", "slcan")],
+)
+def test_the_other_boards_answer_and_end(target: str, link: str) -> None:
+    words = [sys.executable, str(EMULATE), target, "--bus", "vcan0", "--node", "9", "--link", link]
     board = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     filters = [{"can_id": each["can_id"] + 8, "can_mask": 0x7FF} for each in FILTERS]
     network = canopen.Network()

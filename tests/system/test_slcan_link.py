@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""An emulated board in real time, with SLCAN on its UART: no frame is lost in 10 000 ticks, either way."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EMULATE = ROOT / "tools/emulate.py"
+TICKS = 10_000
+COUNTER_OVERFLOW = 240
+OBJECTS = (b"\x00\x10\x00", b"\x18\x10\x01", b"\x18\x10\x02", b"\x06\x10\x00")
+"""Index and subindex, little-endian, of objects that can be read in one frame."""
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def address() -> Iterator[tuple[str, int]]:
+    """Where a board serves its UART; all are on one core, as waking across cores is slow."""
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    port = free_port()
+    words = [sys.executable, str(EMULATE), "an386", "--serve", f"127.0.0.1:{port}"]
+    board = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    try:
+        yield "127.0.0.1", port
+        board.send_signal(signal.SIGTERM)
+        assert board.wait(20) == 0, board.communicate()[1]
+    finally:
+        board.kill()
+        board.communicate()
+        os.sched_setaffinity(0, before)
+
+
+def connected(address: tuple[str, int]) -> socket.socket:
+    deadline = time.monotonic() + 20
+    while True:
+        try:
+            return socket.create_connection(address, timeout=20)
+        except ConnectionRefusedError:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+
+class Peer:
+    """Asks for an object at every SYNC before which the last one was answered."""
+
+    def __init__(self, stream: socket.socket) -> None:
+        self.stream = stream
+        self.syncs = 0
+        self.last_counter = 0
+        self.asked: bytes | None = None
+        self.answers = 0
+        self.rest = b""
+
+    def on_sync(self, counter: int) -> bytes:
+        assert counter == self.last_counter % COUNTER_OVERFLOW + 1, f"SYNC {self.syncs}"
+        self.last_counter = counter
+        self.syncs += 1
+        if self.asked is not None or self.syncs > TICKS:
+            return b""
+        self.asked = OBJECTS[self.syncs % len(OBJECTS)]
+        return b"t601840" + self.asked.hex().encode() + b"00000000\r"
+
+    def on_answer(self, data: bytes) -> None:
+        assert data[0] & 0xE3 == 0x43, f"answer {self.answers}: {data.hex()}"
+        assert data[1:4] == self.asked, f"answer {self.answers}"
+        self.asked = None
+        self.answers += 1
+
+    def take(self) -> None:
+        """What has come, and what belongs behind it."""
+        text = self.stream.recv(65536)
+        assert text, "the board is gone"
+        *lines, self.rest = (self.rest + text).split(b"\r")
+        out = b""
+        for line in lines:
+            if line.startswith(b"t0801"):
+                out += self.on_sync(int(line[5:7], 16))
+            elif line.startswith(b"t5818"):
+                self.on_answer(bytes.fromhex(line[5:].decode()))
+        if out:
+            self.stream.sendall(out)
+
+
+@pytest.mark.serial
+def test_no_frame_is_lost(address: tuple[str, int]) -> None:
+    with connected(address) as stream:
+        stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        peer = Peer(stream)
+        began_s = time.monotonic()
+        while peer.syncs < TICKS or peer.asked is not None:
+            peer.take()
+        wall_s = time.monotonic() - began_s
+    print(f"{peer.syncs} ticks, {peer.answers} answers, {peer.syncs / wall_s:.1f} ticks/s")
+    assert peer.answers > TICKS / 100
