@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""Commands that need no bus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from . import options
+from .options import Command
+
+
+def _spline(command: Command) -> None:
+    spline = command("spline", "compute the PH spline of a path")
+    options.file(spline)
+    options.json(spline)
+    options.at(spline, "arc lengths in mm at which to give point, tangent and curvature")
+
+
+def _feed(command: Command) -> None:
+    feed = command("feed", "plan the feed along a path")
+    options.file(feed)
+    options.machine(feed)
+    options.json(feed)
+    options.at(feed, "times in s at which to give arc length and feed")
+
+
+def _compile(command: Command) -> None:
+    compile_ = command("compile", "make the program image that the controller runs")
+    options.file(compile_)
+    options.machine(compile_)
+    options.json(compile_)
+    compile_.add_argument(
+        "-o", "--output", type=Path, metavar="IMAGE", help="default: FILE with .hdgp, here"
+    )
+
+
+def _inspect(command: Command) -> None:
+    inspect = command("inspect", "print what a program image holds")
+    inspect.add_argument("file", metavar="FILE", type=Path, help="program image, or a path file")
+    options.machine(inspect)
+    options.json(inspect)
+    inspect.add_argument("--full", action="store_true", help="print every segment and piece")
+
+
+def _simulate(command: Command) -> None:
+    simulate = command("simulate", "run a path without a bus, as fast as it goes")
+    options.file(simulate)
+    options.machine(simulate)
+    options.kernel(simulate)
+    options.json(simulate)
+    simulate.add_argument("--trace", type=Path, metavar="CSV", help="write one row a tick")
+
+
+def _report(command: Command) -> None:
+    report = command("report", "simulate paths and write a report with figures")
+    options.file(report, many=True)
+    options.machine(report)
+    options.kernel(report)
+    report.add_argument(
+        "-o", "--output", type=Path, default=Path("report"), metavar="DIR", help="default: report"
+    )
+
+
+def _paper(command: Command) -> None:
+    paper = command("paper", "print the paper's numbers beside ours")
+    options.json(paper)
+
+
+def _dbc(command: Command) -> None:
+    dbc = command("dbc", "write the bus of a machine as a DBC file for other CAN tools")
+    dbc.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
+    dbc.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="default: MACHINE with .dbc, here"
+    )
+    dbc.add_argument(
+        "--eds", type=Path, metavar="EDS", help="of the drives (default: the simulated drive's)"
+    )
+
+
+ALL = (_spline, _feed, _compile, _inspect, _simulate, _report, _paper, _dbc)
