@@ -49,6 +49,8 @@ static struct {
     uint32_t tenths; /* of TIM5's next microsecond */
     uint8_t held;
     bool in_handler;
+    void (*sleep_hook)(void);
+    unsigned resets;
     bool on[LINES_MAX];
     uint8_t priority[LINES_MAX];
 } self;
@@ -215,6 +217,28 @@ bool chip_interrupt_is_on(uint32_t number, uint8_t *priority)
 {
     *priority = self.priority[number];
     return self.on[number];
+}
+
+void chip_on_sleep(void (*hook)(void))
+{
+    self.sleep_hook = hook;
+}
+
+unsigned chip_resets(void)
+{
+    return self.resets;
+}
+
+void cpu_sleep(void)
+{
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, self.held, "sleeps with interrupts held off");
+    TEST_ASSERT_NOT_NULL_MESSAGE(self.sleep_hook, "sleeps for ever");
+    self.sleep_hook();
+}
+
+void cpu_reset(void)
+{
+    self.resets++;
 }
 
 uint8_t cpu_hold(uint8_t priority)

@@ -32,6 +32,10 @@ uint8_t chip_held(void);
 void chip_in_handler(bool in_handler);
 bool chip_interrupt_is_on(uint32_t number, uint8_t *priority);
 
+/* What happens while the core sleeps; and how often it was asked to start anew. */
+void chip_on_sleep(void (*hook)(void));
+unsigned chip_resets(void);
+
 /* The counters of TIM2 (100 ns) and TIM5 (1 us), once they run. True when the compare interrupt of TIM2 is pending. */
 void chip_advance_100ns(uint32_t counts);
 bool chip_tick_pending(void);
