@@ -45,11 +45,6 @@ bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
     return in->id == COB_SDO_ASK + server->node && in->len == SDO_BYTES;
 }
 
-bool sdo_server_busy(const struct sdo_server *server)
-{
-    return server->state != SDO_SERVER_IDLE;
-}
-
 void sdo_server_frame(const struct sdo_server *s, uint8_t command, struct can_msg *out)
 {
     cob_frame(out, COB_SDO_ANSWER + s->node, SDO_BYTES);

@@ -91,7 +91,4 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
  * takes frames. */
 int sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out);
 
-/* True while a transfer is under way. */
-bool sdo_server_busy(const struct sdo_server *server);
-
 #endif

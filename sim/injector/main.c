@@ -14,6 +14,7 @@
 #include "faults/fault_log.h"
 #include "injector/bridge.h"
 #include "injector/injector_options.h"
+#include "injector/outbox.h"
 #include "port/linux/can_socket.h"
 #include "port/linux/clock.h"
 
@@ -21,12 +22,7 @@
  * ordinary. */
 #define PRIORITY 10
 
-enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, SEND_TRIES = 200 };
-
-struct outbox {
-    struct can_msg frames[CAN_SOCKET_BATCH];
-    size_t count;
-};
+enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4 };
 
 struct injector {
     struct can_socket sockets[2]; /* by enum fault_side */
@@ -44,46 +40,18 @@ static int complain(int status, const char *reason)
     return status;
 }
 
-/* A full queue of the interface empties within a few frame times: wait for it. One that stays full is a bus that is off:
- * the frames are lost. */
-static void flush(struct injector *injector, enum fault_side to)
-{
-    struct outbox *box = &injector->outboxes[to];
-    struct can_socket *socket = &injector->sockets[to];
-    size_t done = 0;
-    for (int tries = 0; done < box->count && tries < SEND_TRIES;) {
-        const int sent = can_socket_send_many(socket, box->frames + done, box->count - done);
-        if (sent > 0) {
-            done += (size_t)sent;
-        } else if (sent == -EAGAIN) {
-            struct pollfd writable = {.fd = socket->fd, .events = POLLOUT};
-            (void)poll(&writable, 1, 1);
-            tries++;
-        } else {
-            injector->failed = sent;
-            break;
-        }
-    }
-    box->count = 0;
-}
-
-/* Frames go out together: a call of the system for each costs more than all the rest. */
 static void send_frame(void *context, enum fault_side to, const struct can_msg *frame)
 {
     struct injector *injector = context;
-    struct outbox *box = &injector->outboxes[to];
-    box->frames[box->count++] = *frame;
-    if (box->count == CAN_SOCKET_BATCH) {
-        flush(injector, to);
-    }
+    const int error = outbox_put(&injector->outboxes[to], &injector->sockets[to], frame);
+    injector->failed = error != 0 ? error : injector->failed;
 }
 
 static void flush_both(struct injector *injector)
 {
     for (unsigned side = 0; side < 2u; side++) {
-        if (injector->outboxes[side].count > 0) {
-            flush(injector, (enum fault_side)side);
-        }
+        const int error = outbox_flush(&injector->outboxes[side], &injector->sockets[side]);
+        injector->failed = error != 0 ? error : injector->failed;
     }
 }
 

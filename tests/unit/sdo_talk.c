@@ -49,6 +49,11 @@ bool sdo_talk_segment(struct sdo_talk *talk, uint8_t first, const uint8_t *data,
     return sdo_talk_send(talk, request);
 }
 
+bool sdo_talk_busy(const struct sdo_talk *talk)
+{
+    return talk->server.state != SDO_SERVER_IDLE;
+}
+
 uint32_t sdo_talk_abort_code(const struct sdo_talk *talk)
 {
     return talk->answer.data[0] == 0x80 ? (uint32_t)cob_get(talk->answer.data + 4, 4) : 0;

@@ -32,6 +32,9 @@ bool sdo_talk_ask(struct sdo_talk *talk, uint8_t command, uint16_t index, uint8_
 /* A segment (segmented or block): first byte and up to seven bytes. */
 bool sdo_talk_segment(struct sdo_talk *talk, uint8_t first, const uint8_t *data, uint32_t size);
 
+/* Whether a transfer is under way. */
+bool sdo_talk_busy(const struct sdo_talk *talk);
+
 /* The abort code of the last answer, 0 when it is not an abort. */
 uint32_t sdo_talk_abort_code(const struct sdo_talk *talk);
 

@@ -109,7 +109,7 @@ static void download(uint32_t size, bool (*lost)(uint32_t))
     }
     finish(size, crc16_update(0, image, size));
     TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     TEST_ASSERT_EQUAL_UINT32(size, talk.small.domain_size);
     TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, size);
     TEST_ASSERT_EQUAL_INT(0, talk.small.aborted);
@@ -180,7 +180,7 @@ static void test_download_of_a_value(void)
 static void expect_abort(uint32_t code)
 {
     TEST_ASSERT_EQUAL_HEX32(code, sdo_talk_abort_code(&talk));
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     TEST_ASSERT_FALSE(talk.small.open);
 }
 
@@ -407,7 +407,7 @@ static void upload(uint32_t size, uint8_t segments, bool (*lost)(uint32_t))
     TEST_ASSERT_EQUAL_UINT32(size, at - ((talk.answer.data[0] >> 2) & 7u));
     TEST_ASSERT_EQUAL_HEX16(crc16_update(0, image, size), cob_get(talk.answer.data + 1, 2));
     TEST_ASSERT_FALSE(sdo_talk_send(&talk, finished));
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     if (size > 0) {
         TEST_ASSERT_EQUAL_MEMORY(image, got, size);
     }

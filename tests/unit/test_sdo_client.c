@@ -107,7 +107,7 @@ static void test_a_value_that_does_not_fit_is_given_up(void)
     run(sdo_client_read(&client, TALK_NODE, 0x2006, 0, room, sizeof room, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_MEMORY, client.abort_code);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
 }
 
 static void test_timeout(void)

@@ -101,7 +101,7 @@ static void random_request(uint8_t request[8])
     } else if (kind < 14) {
         memset(request, 0, 8);
         request[0] = 0x80;
-    } else if (kind < 25 || !sdo_server_busy(&talk.server)) {
+    } else if (kind < 25 || !sdo_talk_busy(&talk)) {
         random_initiate(request);
     } else {
         random_continuation(request);
@@ -122,7 +122,7 @@ static void check_that_an_honest_client_is_served(void)
     const uint8_t constant[8] = {0x43, 0x00, 0x10, 0x00, 0x78, 0x56, 0x34, 0x12};
 
     sdo_talk_ask(&talk, 0x80, 0, 0, SDO_ABORT_GENERAL);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     TEST_ASSERT_FALSE(talk.small.open);
     TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x40, 0x1000, 0, 0));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(constant, talk.answer.data, 8);
@@ -148,7 +148,7 @@ static void test_random_frames(void)
                 random_time();
             }
             TEST_ASSERT_TRUE(talk.small.open == talk.server.domain_open);
-            TEST_ASSERT_TRUE(sdo_server_busy(&talk.server) || !talk.small.open);
+            TEST_ASSERT_TRUE(sdo_talk_busy(&talk) || !talk.small.open);
         }
         finished += talk.small.ended;
         stored += talk.small.written;

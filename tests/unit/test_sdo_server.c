@@ -24,7 +24,7 @@ static void expect_abort(uint32_t code)
 {
     TEST_ASSERT_EQUAL_HEX8(0x80, talk.answer.data[0]);
     TEST_ASSERT_EQUAL_HEX32(code, sdo_talk_abort_code(&talk));
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     TEST_ASSERT_FALSE(talk.small.open);
 }
 
@@ -42,7 +42,7 @@ static void test_expedited_upload(void)
     expect_frame(expected);
     TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x40, 0x2001, 0, 0));
     expect_frame(two_bytes);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
 }
 
 static void test_expedited_download(void)
@@ -160,7 +160,7 @@ static void test_segmented_upload_of_a_string(void)
     sdo_talk_ask(&talk, 0x70, 0, 0, 0);
     TEST_ASSERT_EQUAL_HEX8(0x15, talk.answer.data[0]); /* toggle, 2 unused, last */
     TEST_ASSERT_EQUAL_MEMORY("world\0\0", talk.answer.data + 1, 7);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
 }
 
 static void test_segmented_upload_of_an_empty_string(void)
@@ -172,7 +172,7 @@ static void test_segmented_upload_of_an_empty_string(void)
     expect_frame(initiate);
     sdo_talk_ask(&talk, 0x60, 0, 0, 0);
     TEST_ASSERT_EQUAL_HEX8(0x0F, talk.answer.data[0]);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
 }
 
 static void test_segmented_upload_of_a_wide_number(void)
@@ -212,7 +212,7 @@ static void test_segmented_download_of_strings(void)
     download_string("exactly twenty bytes", 20);
     TEST_ASSERT_EQUAL_STRING("exactly twenty bytes", talk.small.values.text);
     TEST_ASSERT_EQUAL_HEX8(0x20, talk.answer.data[0]); /* third segment: toggle 0 again */
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     TEST_ASSERT_EQUAL_INT(3, talk.small.written);
 }
 
@@ -289,7 +289,7 @@ static void test_an_abort_midway_is_told_to_the_domain(void)
     sdo_talk_segment(&talk, 0x00, data, 7);
     TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2005, 0, SDO_ABORT_GENERAL));
     TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     sdo_talk_segment(&talk, 0x10, data, 7);
     expect_abort(SDO_ABORT_COMMAND);
 }
@@ -326,7 +326,7 @@ static void test_each_frame_restarts_the_timeout(void)
     sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer);
     sdo_talk_segment(&talk, 0x00, data, 7);
     TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
-    TEST_ASSERT_TRUE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_TRUE(sdo_talk_busy(&talk));
 }
 
 static void test_reset_is_silent(void)
@@ -334,7 +334,7 @@ static void test_reset_is_silent(void)
     sdo_talk_ask(&talk, 0x21, 0x2005, 0, 21);
     sdo_server_reset(&talk.server);
     TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
-    TEST_ASSERT_FALSE(sdo_server_busy(&talk.server));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
 }
 
 static void test_abort_texts(void)

@@ -3,131 +3,13 @@
 #include "port/linux/can_socket.h"
 
 #include <errno.h>
-#include <net/if.h>
-#include <net/if_arp.h>
-#include <stdio.h>
 #include <string.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <linux/can.h>
 #include <linux/can/raw.h>
 #include <linux/sock_diag.h>
-
-#define RECEIVE_BUFFER_BYTES (4 * 1024 * 1024)
-
-static int fail(char *reason, size_t size, int error, const char *text, const char *interface)
-{
-    (void)snprintf(reason, size, text, interface);
-    return -error;
-}
-
-/* Where nothing better is known than what the system says. */
-static int fail_plainly(char *reason, size_t size, int error, const char *interface)
-{
-    (void)snprintf(reason, size, "cannot use %s: %s", interface, strerror(error));
-    return -error;
-}
-
-static int interface_request(int fd, const char *interface, unsigned long request,
-                             struct ifreq *answer)
-{
-    memset(answer, 0, sizeof *answer);
-    memcpy(answer->ifr_name, interface, strlen(interface) + 1u);
-    return ioctl(fd, request, answer) == 0 ? 0 : errno;
-}
-
-/* Asks in the order in which a user would put things right. */
-static int check_interface(int fd, const char *interface, char *reason, size_t size)
-{
-    struct ifreq answer;
-    if (strlen(interface) == 0 || strlen(interface) >= IFNAMSIZ) {
-        return fail(reason, size, EINVAL, "'%s' is not the name of a network interface", interface);
-    }
-    int error = interface_request(fd, interface, SIOCGIFHWADDR, &answer);
-    if (error == ENODEV) {
-        return fail(reason, size, error,
-                    "no interface %s: create it (ip link add dev NAME type vcan) or run under "
-                    "tools/with-vcan",
-                    interface);
-    }
-    if (error != 0) {
-        return fail_plainly(reason, size, error, interface);
-    }
-    if (answer.ifr_hwaddr.sa_family != ARPHRD_CAN) {
-        return fail(reason, size, EINVAL, "%s is not a CAN interface: name one like vcan0 or can0",
-                    interface);
-    }
-    error = interface_request(fd, interface, SIOCGIFFLAGS, &answer);
-    if (error == 0 && (answer.ifr_flags & IFF_UP) == 0) {
-        return fail(reason, size, ENETDOWN,
-                    "interface %s is down: bring it up (ip link set up dev NAME)", interface);
-    }
-    return error == 0 ? 0 : fail_plainly(reason, size, error, interface);
-}
-
-static int bind_interface(int fd, const char *interface, char *reason, size_t size)
-{
-    struct sockaddr_can address;
-    memset(&address, 0, sizeof address);
-    address.can_family = AF_CAN;
-    address.can_ifindex = (int)if_nametoindex(interface);
-    if (bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
-        return fail_plainly(reason, size, errno, interface);
-    }
-    return 0;
-}
-
-/* A simulated bus has no bit times: whoever sleeps for some milliseconds must find everything that
- * was sent. */
-static void enlarge_buffers(int fd)
-{
-    const int bytes = RECEIVE_BUFFER_BYTES;
-    if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0) {
-        (void)setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
-    }
-    if (setsockopt(fd, SOL_SOCKET, SO_SNDBUFFORCE, &bytes, sizeof bytes) != 0) {
-        (void)setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
-    }
-}
-
-static int open_raw(const char *interface, char *reason, size_t size)
-{
-    const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
-    if (fd >= 0) {
-        return fd;
-    }
-    if (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT) {
-        return fail(reason, size, errno,
-                    "no CAN in this kernel, so no %s: run under tools/with-vcan", interface);
-    }
-    if (errno == EPERM || errno == EACCES) {
-        return fail(reason, size, errno,
-                    "no permission to open a CAN socket on %s: run as root or grant it", interface);
-    }
-    return fail_plainly(reason, size, errno, interface);
-}
-
-int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size)
-{
-    socket->fd = -1;
-    const int fd = open_raw(interface, reason, size);
-    if (fd < 0) {
-        return fd;
-    }
-    int error = check_interface(fd, interface, reason, size);
-    if (error == 0) {
-        enlarge_buffers(fd);
-        error = bind_interface(fd, interface, reason, size);
-    }
-    if (error != 0) {
-        (void)close(fd);
-        return error;
-    }
-    socket->fd = fd;
-    return 0;
-}
 
 void can_socket_close(struct can_socket *socket)
 {
