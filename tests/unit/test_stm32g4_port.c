@@ -153,6 +153,26 @@ static void test_waiting_ends_with_its_time_or_a_wake(void)
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(3, slept, "woken once, not twice");
 }
 
+static void test_the_context_decides_whose_turn_it_is(void)
+{
+    const struct can_msg message = {.id = 0x581, .len = 8};
+    struct fdcan_model_frame frame;
+    start();
+    for (unsigned i = 0; i < 3u; ++i) {
+        TEST_ASSERT_EQUAL_INT(0, port_can_send(&message));
+    }
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, fdcan_model_waiting(), "the mainline's go one at a time");
+    chip_in_handler(true);
+    for (unsigned i = 0; i < 2u; ++i) {
+        TEST_ASSERT_EQUAL_INT(0, port_can_send(&message));
+    }
+    chip_in_handler(false);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(3, fdcan_model_waiting(), "the tick's all at once");
+    while (fdcan_model_transmit(&frame)) {
+        irq_can();
+    }
+}
+
 static void test_the_lock_holds_off_both(void)
 {
     uint8_t priority = 0;
@@ -233,6 +253,8 @@ static void test_trouble_on_the_bus_is_told_once_a_second(void)
     port_wait(1000);
     const unsigned once = said();
     TEST_ASSERT_GREATER_THAN_UINT(40, once);
+    fdcan_model_fail(32);
+    sleep_a_little();
     port_wait(1000);
     TEST_ASSERT_EQUAL_UINT(once, said());
 }
@@ -243,6 +265,7 @@ int main(void)
     RUN_TEST(test_a_board_that_is_well_begins_in_silence);
     RUN_TEST(test_what_is_wrong_is_said_and_returned);
     RUN_TEST(test_waiting_ends_with_its_time_or_a_wake);
+    RUN_TEST(test_the_context_decides_whose_turn_it_is);
     RUN_TEST(test_the_lock_holds_off_both);
     RUN_TEST(test_the_watchdog_lives_on_ticks_and_mainline);
     RUN_TEST(test_spoiled_words_are_taken_before_the_start_only);
