@@ -46,14 +46,13 @@ def everything(build: Path) -> dict[str, Any]:
     return campaign.Campaign(build).run() | {"taylor": taylor.compare(build)}
 
 
-def write_document(figures: dict[str, Any]) -> None:
-    """Puts the blocks between their marks."""
-    text = DOCUMENT.read_text(encoding="utf-8")
+def document(figures: dict[str, Any], text: str) -> str:
+    """The document with the blocks between their marks."""
     for name, block in blocks(figures).items():
         begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->\n"
         before, rest = text.split(begin)
         text = before + begin + block + end + rest.split(end)[1]
-    DOCUMENT.write_text(text, encoding="utf-8")
+    return text
 
 
 def differences(figures: dict[str, Any], committed: dict[str, Any]) -> list[str]:
@@ -99,7 +98,7 @@ def main() -> int:
     if not options.update:
         return judge(figures)
     COMMITTED.write_text(tables.stored(figures), encoding="utf-8")
-    write_document(figures)
+    DOCUMENT.write_text(document(figures, DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
     print(f"count: written to {COMMITTED.relative_to(ROOT)} and {DOCUMENT.relative_to(ROOT)}")
     return 0
 

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""The counter of instructions agrees with the clock of the core that is counted."""
+"""The counter of instructions agrees with the clock of the core that is counted; the counts are the committed ones."""
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hodograph.chain import load_chain
+from hodograph.program import decode
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
+import count  # noqa: E402
 from target import adversary  # noqa: E402
+from target.campaign import EXAMPLES  # noqa: E402
 from target.counting import Counter  # noqa: E402
 from target.emulator import TARGETS, Target  # noqa: E402
 
@@ -53,3 +59,29 @@ def test_interrupts_inside_do_not_count(tmp_path: Path) -> None:
 
     assert len(counted()) > 1
     assert len(counted("startup_systick")) == 1
+
+
+def test_the_counts_are_the_committed_ones() -> None:
+    """Changed on purpose: `make count UPDATE=1`, and commit what it writes."""
+    counted = count.everything(BUILD)
+    committed = json.loads(count.COMMITTED.read_text(encoding="utf-8"))
+    reason = count.incomparable(counted, committed)
+    if reason is not None:
+        pytest.skip(reason)
+    assert count.differences(counted, committed) == []
+
+
+def test_the_document_shows_the_committed_counts() -> None:
+    committed = json.loads(count.COMMITTED.read_text(encoding="utf-8"))
+    text = count.DOCUMENT.read_text(encoding="utf-8")
+    assert count.document(committed, text) == text
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_images_that_are_counted_are_those_of_the_examples(name: str) -> None:
+    compiled = load_chain(ROOT / f"examples/{name}.toml").program
+    counted = decode(EXAMPLES[name].read_bytes())
+    assert counted.ticks == compiled.ticks
+    assert counted.segment_count == compiled.segment_count
+    assert counted.piece_count == compiled.piece_count
+    assert np.abs(counted.x_q40 - compiled.x_q40).max() < 2**10

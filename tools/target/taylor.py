@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hodograph.chain import load_chain
-from target.campaign import figures
+from hodograph.config import load_path_file
+from target.campaign import EXAMPLES, figures
 from target.counting import Counter
 from target.emulator import TARGETS
 
@@ -37,15 +37,16 @@ def stored(points_mm: npt.NDArray[np.complex128]) -> bytes:
 
 
 def ripple(setpoints: Setpoints) -> float:
-    """Greatest |chord feed - feed| / feed."""
+    """Greatest |chord feed - feed| / feed, three digits of it."""
     chords_mm = np.hypot(*np.diff(setpoints.astype(float), axis=0).T) * 1e-6
-    return float(np.abs(chords_mm / (FEED_MM_S * PERIOD_S) - 1.0).max())
+    most = np.abs(chords_mm / (FEED_MM_S * PERIOD_S) - 1.0).max()
+    return float(f"{most:.3g}")
 
 
 def compare(build: Path) -> dict[str, Any]:
     """For each core: figures of the other's tick and of ours, and both ripples."""
-    chain = load_chain(ALPHA)
-    polygon = stored(chain.file.path.points)
+    polygon = stored(load_path_file(ALPHA).path.points)
+    program = EXAMPLES["alpha"].read_bytes()
     out: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         setpoints = Path(name) / "setpoints"
@@ -55,7 +56,7 @@ def compare(build: Path) -> dict[str, Any]:
             # the last step ends at the end of the curve, and is shorter
             theirs["ripple"] = ripple(_read(setpoints)[:-1])
             counter = Counter(build, TARGETS[core])
-            counts = counter.count(kernel, chain.image, setpoints=setpoints)
+            counts = counter.count(kernel, program, setpoints=setpoints)
             first = round(RAMP_S / PERIOD_S) + 1
             ours = figures(counts[first:-first])
             ours["ripple"] = ripple(_read(setpoints)[first:-first])
