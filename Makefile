@@ -266,6 +266,7 @@ $(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph
 
 -include $(foreach v,$(VARIANTS),$(patsubst %.o,%.d,$(call object_of,$(v),$(OWN_C) $(OD_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))))
 
+include tests/proofs/proofs.mk
 include firmware/targets/targets.mk
 include tools/target/count.mk
 include tests/target/target.mk

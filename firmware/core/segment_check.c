@@ -109,19 +109,25 @@ static int same_direction(const struct program_segment *a, const struct program_
     return qwide_compare(qwide_abs(cross), qwide_shift_down(qwide_abs(dot), DIRECTION_BITS)) <= 0;
 }
 
-/* End of segment a against a point; end_q48 is relative to the start of a. */
-static int meets(int64_t start_q40, int64_t end_q48, int64_t target_q40, int64_t tolerance_q48)
+/* The end of a segment against where it should be, both relative to its start; |target| < 2^54. */
+static int meets(int64_t end_q48, int64_t target_q40, int64_t tolerance_q48)
 {
-    int64_t apart = (start_q40 - target_q40) * 256 + end_q48;
+    int64_t apart = end_q48 - target_q40 * 256;
     return apart <= tolerance_q48 && apart >= -tolerance_q48;
 }
 
-/* |a| is below 2^52 or the difference is clearly too large: no overflow in meets. */
+/* A way that no segment has is refused first: no overflow in meets. */
 static int meets_arc(int64_t start_q40, int64_t end_q48, int64_t target_q40)
 {
-    int64_t apart_q40 = target_q40 - start_q40;
-    return apart_q40 > 0 && apart_q40 < ((int64_t)1 << 50) &&
-           meets(start_q40, end_q48, target_q40, JOIN_Q48);
+    int64_t way_q40 = target_q40 - start_q40;
+    return way_q40 > 0 && way_q40 < ((int64_t)1 << 50) && meets(end_q48, way_q40, JOIN_Q48);
+}
+
+static int meets_point(const struct program_segment *a, const int64_t end_q48[3],
+                       const struct program_segment *b, int64_t tolerance_q48)
+{
+    return meets(end_q48[PH_X], b->x_q40_mm - a->x_q40_mm, tolerance_q48) &&
+           meets(end_q48[PH_Y], b->y_q40_mm - a->y_q40_mm, tolerance_q48);
 }
 
 static int check_join(const struct program_segment *a, const struct program_segment *b)
@@ -130,8 +136,7 @@ static int check_join(const struct program_segment *a, const struct program_segm
     int64_t end_q48[3];
     ph_segment_expand(&ph, a);
     ph_segment_end(&ph, end_q48);
-    if (!meets(a->x_q40_mm, end_q48[PH_X], b->x_q40_mm, JOIN_Q48) ||
-        !meets(a->y_q40_mm, end_q48[PH_Y], b->y_q40_mm, JOIN_Q48)) {
+    if (!meets_point(a, end_q48, b, JOIN_Q48)) {
         return PROGRAM_ERR_JOIN_POINT;
     }
     if (!meets_arc(a->start_q40_mm, end_q48[PH_S], b->start_q40_mm)) {
@@ -140,20 +145,18 @@ static int check_join(const struct program_segment *a, const struct program_segm
     return same_direction(a, b) ? 0 : PROGRAM_ERR_JOIN_DIRECTION;
 }
 
-static int check_end(const struct program *p, const struct program_segment *last)
+static int check_end(const struct program *p, const struct program_segment *first,
+                     const struct program_segment *last)
 {
     struct ph_segment ph;
-    struct program_segment first;
     int64_t end_q48[3];
     ph_segment_expand(&ph, last);
     ph_segment_end(&ph, end_q48);
     if (!meets_arc(last->start_q40_mm, end_q48[PH_S], p->header.length_q40_mm)) {
         return PROGRAM_ERR_SEGMENT_END;
     }
-    program_segment_get(p, 0, &first);
     if ((p->header.flags & PROGRAM_FLAG_CLOSED) != 0 &&
-        (!meets(last->x_q40_mm, end_q48[PH_X], first.x_q40_mm, CLOSED_Q48) ||
-         !meets(last->y_q40_mm, end_q48[PH_Y], first.y_q40_mm, CLOSED_Q48))) {
+        !meets_point(last, end_q48, first, CLOSED_Q48)) {
         return PROGRAM_ERR_NOT_CLOSED;
     }
     return 0;
@@ -168,14 +171,15 @@ static int check_one(const struct program_segment *g, const struct program_limit
 
 int segment_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
 {
-    struct program_segment before;
+    struct program_segment first = {0};
+    struct program_segment before = {0};
     struct program_segment g;
-    program_segment_get(p, 0, &before);
     for (*index = 0; *index < p->header.segment_count; (*index)++) {
         program_segment_get(p, *index, &g);
         int code = check_one(&g, limits);
         if (code == 0 && *index == 0) {
             code = g.start_q40_mm == 0 ? 0 : PROGRAM_ERR_SEGMENT_FIRST;
+            first = g;
         } else if (code == 0) {
             code = check_join(&before, &g);
         }
@@ -185,5 +189,5 @@ int segment_check_all(const struct program *p, const struct program_limits *limi
         before = g;
     }
     *index = p->header.segment_count - 1u;
-    return check_end(p, &before);
+    return check_end(p, &first, &before);
 }

@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * program_open for every image of any size: it reads inside the image only, and accepts none whose sizes and counts do
+ * not fit. Whether the CRC is right is left open.
+ *
+ * prover: cbmc
+ * options: --unwind 40
+ * replaces: read_u16:some_u16 read_u32:some_u32 read_u64:some_u64
+ * mutant: core/program.c: h->image_size > size || =>
+ * mutant: core/program.c: NULL || size < PROGRAM_HEADER_SIZE => NULL || size < 64
+ * mutant: core/program.c: (uint64_t)h->segment_count * PROGRAM_SEGMENT_SIZE => h->segment_count * PROGRAM_SEGMENT_SIZE
+ */
+#include <stdlib.h>
+
+#include "proof.h"
+
+int nondet_int(void);
+
+int memcmp(const void *a, const void *b, size_t size)
+{
+    prove(__CPROVER_r_ok(a, size) && __CPROVER_r_ok(b, size));
+    return nondet_int();
+}
+
+void *memcpy(void *to, const void *from, size_t size)
+{
+    prove(__CPROVER_w_ok(to, size) && __CPROVER_r_ok(from, size));
+    return to;
+}
+
+uint32_t some_u16(const uint8_t *b)
+{
+    prove(__CPROVER_r_ok(b, 2));
+    return nondet_uint32() & 0xFFFFu;
+}
+
+uint32_t some_u32(const uint8_t *b)
+{
+    prove(__CPROVER_r_ok(b, 4));
+    return nondet_uint32();
+}
+
+uint64_t some_u64(const uint8_t *b)
+{
+    prove(__CPROVER_r_ok(b, 8));
+    return nondet_uint64();
+}
+
+uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
+{
+    prove(__CPROVER_r_ok(bytes, size));
+    return crc ^ nondet_uint32();
+}
+
+#include "core/program.c"
+
+void harness(void)
+{
+    uint32_t size = nondet_uint32();
+    uint8_t *image = malloc(size);
+    struct program p;
+    if (program_open(&p, image, size) == 0) {
+        const struct program_header *h = &p.header;
+        prove(h->segment_count > 0 && h->piece_count > 0);
+        prove(p.size == h->image_size && p.size <= size);
+        prove(p.size == 128 + 72 * (uint64_t)h->segment_count + 88 * (uint64_t)h->piece_count);
+        reached();
+    }
+}

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What the checks of a feed piece need of feed_bounds, and what they get: eva_bounds.c proves it, eva_piece.c and
+ * eva_crossing.c rely on it.
+ */
+#ifndef HODOGRAPH_PIECE_BOUNDS_H
+#define HODOGRAPH_PIECE_BOUNDS_H
+
+#include "core/feed_bounds.h"
+#include "core/program.h"
+
+/* clang-format off */
+/*@ predicate in_range(struct program_piece *c) =
+      1 <= c->duration_q32_s <= (1 << 54) &&
+      -(1 << 54) <= c->c_q40_mm[0] <= (1 << 54) &&
+      -(1 << 54) <= c->c_q40_mm[1] <= (1 << 54) &&
+      -(1 << 54) <= c->c_q40_mm[2] <= (1 << 54) &&
+      -(1 << 54) <= c->c_q40_mm[3] <= (1 << 54) &&
+      -(1 << 54) <= c->c_q40_mm[4] <= (1 << 54) &&
+      -(1 << 54) <= c->c_q40_mm[5] <= (1 << 54) &&
+      -(1 << 54) <= c->c_q40_mm[6] <= (1 << 54);
+    predicate fits(integer a) = -(1 << 62) < a < (1 << 62);
+*/
+/* clang-format on */
+
+/*@ assigns *out \from *piece;
+    ensures \initialized(out) && out->arc_length_q44_mm == 0;
+    ensures fits(out->feed_q24_mm_s) && fits(out->acceleration_q16_mm_s2); */
+void feed_bounds_start(const struct program_piece *piece, struct feed_state *out);
+
+/*@ requires in_range(piece);
+    assigns *out \from *piece;
+    ensures \initialized(out) && fits(out->arc_length_q44_mm);
+    ensures fits(out->feed_q24_mm_s) && fits(out->acceleration_q16_mm_s2); */
+void feed_bounds_end(const struct program_piece *piece, struct feed_state *out);
+
+/*@ requires in_range(piece);
+    assigns \result \from *piece;
+    ensures \result == 0 || \result == 1; */
+int feed_bounds_contained(const struct program_piece *piece);
+
+/*@ requires in_range(piece) && 1 <= derivative <= 3;
+    assigns \result \from *piece, derivative, low_q24, high_q24;
+    ensures \result == 0 || \result == 1; */
+int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
+                       int64_t low_q24, int64_t high_q24);
+
+#endif

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: MIT
+# The proofs of tests/proofs by Frama-C and CBMC; included by the Makefile. PROOFS="eva_piece ..." runs these only.
+PROVERS := $(BUILD)/provers/.ready
+
+.PHONY: proofs
+PROOFS ?=
+proofs: $(PROVERS) ## no overflow, no bad shift, index or division: shown by Frama-C and CBMC (PROOFS=...)
+	@$(PYTHON) tools/proofs/prove.py --build $(BUILD) --jobs $(shell nproc) $(PROOFS)
+
+$(PROVERS): tools/proofs/provers.lock tools/proofs/fetch_provers.sh | $(STAMPS)/packages
+	$(call say,fetch,Frama-C and CBMC)
+	@bash tools/proofs/fetch_provers.sh tools/proofs/provers.lock $(@D)
+	@touch $@

@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""prove.py [--build DIR] [--jobs N] [--no-mutants] [NAME...]: runs the proofs of tests/proofs and prints what came out.
+
+A proof is a C file with a first comment that says, line by line, `prover: eva` or `prover: cbmc`, the functions whose
+contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), more `options:`, what is `scaled:` down for it, and
+its `mutant:`s, each `FILE: OLD => NEW`. It counts as proven when the prover has no doubt left, and has come to the
+proof's end, reached(); then in each mutant, a copy of the firmware with that mistake, the prover must find something:
+so no proof holds of nothing. Exit status 1 unless all is as it should be.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PROOFS = ROOT / "tests" / "proofs"
+LIMIT_S = 400  # of wall time, for one run of a prover
+EVA = (
+    *(
+        "-machdep",
+        "gcc_x86_64",
+        "-eva",
+        "-eva-no-results",
+        "-eva-msg-key=-initial-state,-final-states",
+    ),
+    *("-eva-slevel", "200", "-eva-split-limit", "200", "-eva-auto-loop-unroll", "20"),
+    *("-eva-equality-through-calls", "all", "-eva-split-return", "full"),
+)
+
+
+class BadProof(Exception):
+    """A proof's first comment says something else than what prove.py knows."""
+
+
+@dataclass
+class Proof:
+    """What the first comment of a proof says."""
+
+    name: str
+    prover: str = ""
+    assumes: list[str] = field(default_factory=list)
+    replaces: list[str] = field(default_factory=list)
+    options: list[str] = field(default_factory=list)
+    mutants: list[tuple[str, str, str]] = field(default_factory=list)
+    scaled: list[tuple[str, str, str]] = field(default_factory=list)
+
+
+@dataclass
+class Verdict:
+    """How one run of a prover ended."""
+
+    proven: bool
+    doubt: bool  # the prover found something it cannot exclude; neither: it could not do its work
+    why: str
+    seconds: float
+
+
+def read_proof(path: Path) -> Proof:
+    """Reads the first comment but one (the first names the licence)."""
+    proof = Proof(path.stem)
+    for key, value in re.findall(r"^ \* (\w+): (.+)$", path.read_text(), re.MULTILINE):
+        if key == "prover":
+            proof.prover = value
+        elif key in ("mutant", "scaled"):
+            found = re.fullmatch(r"([\w/.]+): (.+?) =>(?: (.*))?", value)
+            if found is None:
+                raise BadProof(f"{path}: {key} is not FILE: OLD => NEW: {value}")
+            list_ = proof.mutants if key == "mutant" else proof.scaled
+            list_.append((found[1], found[2], found[3] or ""))
+        elif key in ("assumes", "replaces", "options"):
+            getattr(proof, key).extend(value.split())
+    if proof.prover not in ("eva", "cbmc") or not proof.mutants:
+        raise BadProof(f"{path}: needs a prover, eva or cbmc, and at least one mutant")
+    return proof
+
+
+def _call(command: list[str]) -> tuple[int, str]:
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=LIMIT_S, check=False, cwd=ROOT
+        )
+    except subprocess.TimeoutExpired:
+        return -1, f"prove.py: no answer within {LIMIT_S} s"
+    return done.returncode, done.stdout + done.stderr
+
+
+class CannotTell(Exception):
+    """A prover gave up, or never came to the end of a proof."""
+
+
+def _eva(proof: Proof, firmware: Path, bin_: Path, _work: Path) -> str:
+    specified = ["-eva-use-spec", ",".join(proof.assumes)] if proof.assumes else []
+    source = PROOFS / f"{proof.name}.c"
+    status, out = _call(
+        [
+            *(str(bin_ / "frama-c"), f"-cpp-extra-args=-I{firmware} -I{PROOFS}", str(source)),
+            *(*EVA, *specified, *proof.options),
+        ]
+    )
+    doubts = re.findall(r"^\[eva:alarm\] (.+?)\s*$\n(?:  )?(.*)$", out, re.MULTILINE)
+    if doubts:
+        return f"{len(doubts)} alarms, the first: {doubts[0][0]} {doubts[0][1]}"
+    if status != 0 or "  0 alarms generated" not in out:
+        raise CannotTell(out[-1500:])
+    if re.search(r"[1-9]\d* (unknown|invalid)", out):
+        return "a contract was not proven: " + out[-900:]
+    if "Frama_C_show_each_reached" not in out:
+        raise CannotTell("its end was not reached")
+    return ""
+
+
+def _cbmc(proof: Proof, firmware: Path, bin_: Path, work: Path) -> str:
+    whole, replaced = work / "whole.gb", work / "replaced.gb"
+    source = PROOFS / f"{proof.name}.c"
+    steps = [
+        [
+            *(str(bin_ / "goto-cc"), "-o", str(whole), "--function", "harness"),
+            *(f"-I{firmware}", f"-I{PROOFS}", str(source)),
+        ]
+    ]
+    calls = [word for pair in proof.replaces for word in ("--replace-calls", pair)]
+    steps.append([str(bin_ / "goto-instrument"), *calls, str(whole), str(replaced)])
+    for step in steps:
+        status, out = _call(step)
+        if status != 0:
+            raise CannotTell(out[-1500:])
+    _, out = _call([str(bin_ / "cbmc"), str(replaced), "--slice-formula", *proof.options])
+    failed = re.findall(r"^\[.*\] (.*): FAILURE$", out, re.MULTILINE)
+    others = [line for line in failed if not line.endswith(" reached")]
+    if others:
+        return f"{len(others)} failed, the first: {others[0]}"
+    if not failed:
+        raise CannotTell("its end was not reached: " + out[-1500:])
+    return ""
+
+
+def run(proof: Proof, firmware: Path, bin_: Path, work: Path) -> Verdict:
+    """Runs the prover on one proof, with the firmware from a folder."""
+    work.mkdir(parents=True, exist_ok=True)
+    start = time.monotonic()
+    try:
+        why = (_eva if proof.prover == "eva" else _cbmc)(proof, firmware, bin_, work)
+        proven, doubt = why == "", why != ""
+    except CannotTell as error:
+        proven, doubt, why = False, False, str(error)
+    return Verdict(proven, doubt, why, time.monotonic() - start)
+
+
+def make_copy(changes: list[tuple[str, str, str]], work: Path) -> Path:
+    """A copy of firmware/core with these changes; returns the folder to include from."""
+    firmware = work / "firmware"
+    shutil.rmtree(firmware, ignore_errors=True)
+    shutil.copytree(ROOT / "firmware" / "core", firmware / "core")
+    for file, old, new in changes:
+        text = (firmware / file).read_text()
+        if old not in text:
+            raise BadProof(f"{work}: {file} has no `{old}` to change")
+        (firmware / file).write_text(text.replace(old, new, 1))
+    return firmware
+
+
+def _report(proof: Proof, what: str, good: bool, verdict: Verdict, said: str) -> dict[str, object]:
+    print(
+        f"  {said:9} {verdict.seconds:6.1f} s  {proof.prover:4}  {proof.name}  {what}", flush=True
+    )
+    if not good:
+        print(f"    {verdict.why}", flush=True)
+    return {"proof": proof.name, "what": what, "good": good, "seconds": round(verdict.seconds, 1)}
+
+
+def check(proof: Proof, build: Path, *, mutants: bool) -> list[dict[str, object]]:
+    """The proof and its mutants; each as an entry of the JSON."""
+    bin_, work = build / "provers" / "bin", build / "proofs" / proof.name
+    verdict = run(proof, make_copy(proof.scaled, work), bin_, work)
+    good = verdict.proven
+    entries = [_report(proof, "", good, verdict, "proven" if good else "NOT")]
+    for i, mutant in enumerate(proof.mutants if mutants else []):
+        own = work / str(i)
+        verdict = run(proof, make_copy([*proof.scaled, mutant], own), bin_, own)
+        good = verdict.doubt
+        what = f"mutant: {mutant[1]} => {mutant[2]}"
+        entries.append(_report(proof, what, good, verdict, "found" if good else "MISSED"))
+    return entries
+
+
+def main() -> int:
+    """Command line; see above."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="only these proofs")
+    parser.add_argument("--build", type=Path, default=ROOT / "build")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--no-mutants", action="store_true", help="only the proofs themselves")
+    options = parser.parse_args()
+    build = options.build.resolve()
+    try:
+        paths = [PROOFS / f"{name}.c" for name in options.names] or sorted(PROOFS.glob("*.c"))
+        proofs = [read_proof(path) for path in paths]
+        with ThreadPoolExecutor(options.jobs) as pool:
+            found = pool.map(lambda p: check(p, build, mutants=not options.no_mutants), proofs)
+            entries = [entry for list_ in found for entry in list_]
+    except BadProof as error:
+        print(f"prove.py: {error}", file=sys.stderr)
+        return 1
+    (build / "proofs.json").write_text(json.dumps(entries, indent=1) + "\n")
+    bad = sum(not entry["good"] for entry in entries)
+    cpu = resource.getrusage(resource.RUSAGE_CHILDREN)
+    print(
+        f"proofs: {len(entries) - bad} good, {bad} bad, {cpu.ru_utime + cpu.ru_stime:.0f} s of processor"
+    )
+    return 1 if bad or not entries else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
