@@ -153,10 +153,12 @@ class Board:
             self.qemu.kill()
             return _BUS_STATUS
         qemu = _end(self.qemu)
-        if self.bridge is not None and _end(self.bridge) == _BUS_STATUS:
+        bridge = 0 if self.bridge is None else _end(self.bridge)
+        if bridge == _BUS_STATUS:
             return _BUS_STATUS
-        if self._stopping_since is not None and self._options.link == "slcan":
-            return 0
+        asked = self._stopping_since is not None
+        if asked and (self._options.link == "slcan" or (qemu < 0 and bridge == 0)):
+            return 0  # it has no way to end by itself, or had not begun
         return qemu if qemu >= 0 else _MACHINE_STATUS
 
 

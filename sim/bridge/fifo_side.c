@@ -35,7 +35,7 @@ static int open_fifo(const char *path, int flags)
         return -1;
     }
     const int fd = open(path, flags | O_CLOEXEC);
-    if (fd < 0) {
+    if (fd < 0 && bus_signals() == 0u) {
         (void)bus_complain(BRIDGE_GONE, path, strerror(errno));
     }
     return fd;
@@ -169,12 +169,14 @@ int fifo_side_run(struct can_socket *socket, const char *out, const char *in)
     memset(&self, 0, sizeof self);
     self.socket = socket;
     self.out = open_fifo(out, O_RDONLY);
-    if (self.out < 0) {
-        return BRIDGE_GONE;
+    self.in = self.out < 0 ? -1 : open_fifo(in, O_WRONLY);
+    int status = bus_signals() > 0u ? BRIDGE_OK : BRIDGE_GONE;
+    if (self.in >= 0) {
+        status = run();
+        (void)close(self.in);
     }
-    self.in = open_fifo(in, O_WRONLY);
-    const int status = self.in < 0 ? BRIDGE_GONE : run();
-    (void)close(self.in);
-    (void)close(self.out);
+    if (self.out >= 0) {
+        (void)close(self.out);
+    }
     return status;
 }

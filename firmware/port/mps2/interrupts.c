@@ -79,12 +79,12 @@ void startup_systick(void)
 /* The mask does not nest with itself here: port.h has it so. */
 void port_lock(void)
 {
-    __asm__ volatile("cpsid i" ::: "memory");
+    (void)core_mask();
 }
 
 void port_unlock(void)
 {
-    __asm__ volatile("cpsie i\n\tisb" ::: "memory");
+    core_unmask(0);
 }
 
 /* An interrupt that comes between the look and the sleep is pending then, and ends the sleep. */

@@ -121,7 +121,7 @@ static const char *number(int32_t value, char text[NUMBER_SIZE])
 
 void port_log(enum port_level level, const char *text, int32_t value)
 {
-    char digits[NUMBER_SIZE];
+    char digits[NUMBER_SIZE] = {0};
     if (level == PORT_WARNING || self.line.verbose) {
         say(text, number(value, digits));
     }

@@ -160,11 +160,11 @@ class Rig:
                 )
 
     def end(self) -> None:
-        """Ends all children: SIGTERM, and SIGKILL after two seconds."""
+        """Ends all children: SIGTERM, and SIGKILL after five seconds."""
         for child, _ in reversed(self._children):
             if child.poll() is None:
                 child.terminate()
-        deadline = time.monotonic() + 2.0
+        deadline = time.monotonic() + 5.0
         for child, output in self._children:
             try:
                 child.wait(max(0.0, deadline - time.monotonic()))
