@@ -68,6 +68,9 @@ UNIT_NAMES    := $(UNIT_SRC:tests/unit/%.c=%)
 OWN_C    := $(wildcard firmware/targets/*.c) $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
 OWN_H    := $(wildcard firmware/*/*.h firmware/app/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
 FUZZ_SRC := $(wildcard tests/fuzz/*.c)
+TARGET_TEST_SRC := $(wildcard tests/target/*.c)
+# What only a microcontroller's compiler understands: linted by its flags (firmware/targets/targets.mk).
+BARE_C   := $(filter-out $(OWN_C),$(wildcard firmware/port/*/*.c firmware/targets/*.c))
 
 ## ---- flags -----------------------------------------------------------------------------------
 
@@ -96,7 +99,7 @@ VARIANTS := host asan clang
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1\t\2/p' $(firstword $(MAKEFILE_LIST)) | awk -F'\t' '{printf "  %-10s %s\n", $$1, $$2}'
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1\t\2/p' $(filter %Makefile %.mk,$(MAKEFILE_LIST)) | awk -F'\t' '{printf "  %-10s %s\n", $$1, $$2}'
 
 build: c $(VENV)/.editable $(if $(wildcard host_tools/hodograph/native/build_native.py),native) ## prepare everything: packages, .venv, C programs, Python module
 	@true
@@ -254,8 +257,8 @@ $(call LINK,$(1))
 endef
 $(foreach v,$(VARIANTS),$(eval $(call VARIANT_RULES,$(v))))
 # Objects of tests and the marks of lint are made by chains of patterns; make would delete them.
-.SECONDARY: $(foreach v,$(VARIANTS),$(call object_of,$(v),$(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))) \
-            $(patsubst %,$(BUILD)/clang/obj/%.tidy-deps,$(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))
+.SECONDARY: $(foreach v,$(VARIANTS),$(call object_of,$(v),$(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC))) \
+            $(patsubst %,$(BUILD)/clang/obj/%.tidy-deps,$(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC))
 
 define BIN_RULE # variant, program, file
 $(3): $(call object_of,$(1),$($(2)_MAIN)) $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a)
@@ -273,11 +276,11 @@ include tests/target/target.mk
 
 ## ---- lint ------------------------------------------------------------------------------------------
 
-C_FILES    := $(OWN_C) $(OWN_H) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(wildcard tests/fuzz/*.h)
+C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h)
 PY_TREES   := $(wildcard host_tools tools tests benchmarks)
 JS_FILES   := $(wildcard host_tools/hodograph/monitor/page/*.js)
 SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)
-LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC)
+LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC)
 # Every C file under the warning flags of gcc and of clang; the fuzz drivers too, though not linked.
 LINT_OBJ   := $(foreach v,host clang,$(call object_of,$(v),$(LINTED_C) $(OD_C)))
 LINT_PARTS := warnings tidy cppcheck clang-format ruff mypy shellcheck js directions eds
@@ -287,7 +290,7 @@ lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, forma
 	@echo "lint: all is well"
 
 lint-warnings: $(LINT_OBJ)
-lint-tidy: $(LINTED_C:%=$(BUILD)/lint/%.tidy)
+lint-tidy: $(LINTED_C:%=$(BUILD)/lint/%.tidy) $(BARE_C:%=$(BUILD)/lint/%.tidy)
 $(BUILD)/lint/%.tidy: % $(BUILD)/clang/obj/%.tidy-deps .clang-tidy
 	@mkdir -p $(@D)
 	$(call say,tidy,$<)
@@ -300,7 +303,7 @@ lint-cppcheck: $(STAMPS)/packages-lint $(OD_H)
 	$(call say,cppcheck,firmware sim)
 	@mkdir -p $(BUILD)/lint/cppcheck
 	$(Q)cppcheck --quiet --std=c99 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
-	    --suppress=missingIncludeSystem --suppress=shiftTooManyBitsSigned --cppcheck-build-dir=$(BUILD)/lint/cppcheck $(INCLUDES) $(OWN_C)
+	    --suppress=missingIncludeSystem --suppress=shiftTooManyBitsSigned --cppcheck-build-dir=$(BUILD)/lint/cppcheck $(INCLUDES) $(OWN_C) $(BARE_C) $(TARGET_TEST_SRC)
 lint-clang-format: $(VENV)/.ready
 	$(call say,format,C)
 	$(Q)$(VENV)/bin/clang-format --dry-run -Werror $(C_FILES)

@@ -32,10 +32,14 @@ static struct {
     float u;
 } curve;
 
-static void prepare(const struct path *path)
+/* 0, or -1 when there are too few or too many points. */
+static int prepare(const struct path *path)
 {
     curve.path = path;
     curve.count = (int)path->count;
+    if (curve.count <= DEGREE || curve.count > MOST_POINTS) {
+        return -1;
+    }
     const int last = curve.count - DEGREE;
     for (int i = 0; i < curve.count + DEGREE + 1; i++) {
         const int knot = i < DEGREE ? 0 : i - DEGREE > last ? last : i - DEGREE;
@@ -49,6 +53,7 @@ static void prepare(const struct path *path)
     }
     curve.span = DEGREE;
     curve.u = 0.0f;
+    return 0;
 }
 
 /* r, r' and r'' of both coordinates: a triangle of means whose last but one and last but two rows give the derivatives. */
@@ -118,7 +123,9 @@ int main(void)
     if (file < 0) {
         return STATUS_FILE;
     }
-    prepare((const struct path *)(const void *)startup_store_base);
+    if (prepare((const struct path *)(const void *)startup_store_base) != 0) {
+        return STATUS_USAGE;
+    }
     int over = 0;
     for (int k = 0; k < MOST_TICKS && over == 0; k++) {
         over = tick(target_nm);

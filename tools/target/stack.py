@@ -144,7 +144,7 @@ class Stack:
         symbols = self.image.symbols
         if "startup_vectors_end" not in symbols:
             return []
-        begin, end = symbols["startup_vectors"], symbols["startup_vectors_end"]
+        begin, end = symbols["startup_vectors_begin"], symbols["startup_vectors_end"]
         words = {self.image.word(address) & ~1 for address in range(begin + 8, end, 4)} - {0}
         return [self.image.function_at(word) for word in sorted(words)]
 

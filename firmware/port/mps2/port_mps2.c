@@ -104,19 +104,20 @@ uint32_t port_time_us(void)
     return clock_us();
 }
 
+/* Digits from the end of `text`. */
 static const char *number(int32_t value, char text[NUMBER_SIZE])
 {
     uint32_t rest = value < 0 ? 0u - (uint32_t)value : (uint32_t)value;
-    char *at = text + NUMBER_SIZE - 1;
-    *at = '\0';
+    uint32_t at = NUMBER_SIZE - 1;
+    text[at] = '\0';
     do {
-        *--at = (char)('0' + rest % 10u);
+        text[--at] = (char)('0' + rest % 10u);
         rest /= 10u;
     } while (rest != 0u);
     if (value < 0) {
-        *--at = '-';
+        text[--at] = '-';
     }
-    return at;
+    return &text[at];
 }
 
 void port_log(enum port_level level, const char *text, int32_t value)

@@ -1,16 +1,18 @@
 /* SPDX-License-Identifier: MIT */
+#include "port/rv32/startup.h"
+
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
 #include "port/semihost/semihost.h"
 
+enum { STATUS_TRAP = 3 };
+
 /* From the linker script. */
 extern uint32_t startup_data_load[], startup_data_begin[], startup_data_end[];
 extern uint32_t startup_bss_begin[], startup_bss_end[];
 
-void startup_memory(void);
-void startup_trap(void);
 int main(int argc, char **argv);
 
 /* Stack, global pointer, traps; then what can be said in C. */
@@ -40,8 +42,9 @@ void startup_memory(void)
     semihost_exit(main(0, NULL));
 }
 
+/* mtvec holds addresses of words. */
 __attribute__((aligned(4))) void startup_trap(void)
 {
     semihost_print("trap\n");
-    semihost_exit(3);
+    semihost_exit(STATUS_TRAP);
 }

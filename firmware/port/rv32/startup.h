@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What a RISC-V hart does between reset and main(): stack, global pointer, traps, memory. For QEMU's virt machine and
+ * the images of tests/target, which have no interrupts: machine mode, one hart, exit by semihosting.
+ *
+ * A trap of any kind ends the emulator with status 3.
+ */
+#ifndef PORT_RV32_STARTUP_H
+#define PORT_RV32_STARTUP_H
+
+/* The entry; assembler, since there is no stack yet. */
+void startup_reset(void);
+
+/* The rest of it, in C; calls main(). Does not return. */
+void startup_memory(void);
+
+/* Every trap; does not return, so nothing is saved. */
+void startup_trap(void);
+
+#endif
