@@ -276,7 +276,7 @@ include tests/target/target.mk
 
 ## ---- lint ------------------------------------------------------------------------------------------
 
-C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h)
+C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/target/*.c)
 PY_TREES   := $(wildcard host_tools tools tests benchmarks)
 JS_FILES   := $(wildcard host_tools/hodograph/monitor/page/*.js)
 SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)

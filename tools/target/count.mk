@@ -9,11 +9,11 @@ $(COUNT_PLUGIN): tools/target/count_plugin.c
 	$(Q)$(CC) -std=c99 $(WARN) -O2 -shared -fPIC -fvisibility=hidden -o $@ $<
 
 .PHONY: counter
-counter: firmware $(COUNT_PLUGIN) ## what tools/count_tick.py needs
+counter: firmware $(COUNT_PLUGIN)
 
 test pytest bench: counter
 
 UPDATE ?=
 .PHONY: count
-count: counter $(VENV)/.editable native ## instructions of the tick on all cores; differs from tests/data/counts.json: fails (UPDATE=1: written there)
+count: counter $(VENV)/.editable native ## instructions of the tick on all cores, compared with tests/data/counts.json (UPDATE=1 rewrites it)
 	@$(PY) tools/count.py --build $(BUILD) $(if $(UPDATE),--update)
