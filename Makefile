@@ -269,6 +269,7 @@ $(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph
 
 -include $(foreach v,$(VARIANTS),$(patsubst %.o,%.d,$(call object_of,$(v),$(OWN_C) $(OD_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC))))
 
+include tools/misra/misra.mk
 include tests/proofs/proofs.mk
 include firmware/targets/targets.mk
 include tools/target/count.mk
@@ -283,10 +284,10 @@ SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)
 LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC)
 # Every C file under the warning flags of gcc and of clang; the fuzz drivers too, though not linked.
 LINT_OBJ   := $(foreach v,host clang,$(call object_of,$(v),$(LINTED_C) $(OD_C)))
-LINT_PARTS := warnings tidy cppcheck clang-format ruff mypy shellcheck js directions eds
+LINT_PARTS := warnings tidy cppcheck misra clang-format ruff mypy shellcheck js directions eds
 .PHONY: $(LINT_PARTS:%=lint-%)
 
-lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, formats, ruff, mypy, directions, EDS files
+lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, MISRA C, formats, ruff, mypy, directions, EDS files
 	@echo "lint: all is well"
 
 lint-warnings: $(LINT_OBJ)

@@ -19,7 +19,9 @@ static void add_product(const struct program_segment *g, int i, int j, int64_t w
 void ph_segment_hodograph(const struct program_segment *segment, int64_t e_q50[5][3])
 {
     for (int k = 0; k < 5; k++) {
-        e_q50[k][PH_X] = e_q50[k][PH_Y] = e_q50[k][PH_S] = 0;
+        e_q50[k][PH_X] = 0;
+        e_q50[k][PH_Y] = 0;
+        e_q50[k][PH_S] = 0;
     }
     add_product(segment, 0, 0, 1, e_q50[0]);
     add_product(segment, 0, 1, 1, e_q50[1]);
@@ -71,7 +73,8 @@ static void make_straight(struct ph_segment *ph)
     }
     for (int k = 0; k < 3; k++) {
         ph->sigma_q50_mm[k] = sigma_q48 * 4;
-        ph->u_q44[k] = ph->v_q44[k] = 0;
+        ph->u_q44[k] = 0;
+        ph->v_q44[k] = 0;
     }
     ph->exponent = PH_LEAST_EXPONENT;
 }

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Deviations from MISRA C: what they cover, and that they go when nothing needs them."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "misra"))
+
+import check_misra
+
+OUTPUT = """\
+firmware/core/a.c:7: misra-c2012-15.5
+firmware/port/linux/b.c:9: misra-c2012-21.6
+build/generated/od.h:3: misra-c2012-2.5
+firmware/core/a.c:9: variableScope
+"""
+
+
+def _judge(deviations: str) -> list[str]:
+    return check_misra.judge(OUTPUT, check_misra.read_deviations(deviations))
+
+
+def test_a_rule_broken_without_a_deviation_is_named_with_its_place() -> None:
+    assert _judge("15.5 * early returns\n") == ["firmware/port/linux/b.c:9: MISRA C:2012 rule 21.6"]
+
+
+def test_a_deviation_holds_in_its_place_only() -> None:
+    assert _judge("15.5 * early\n21.6 firmware/port/* messages\n") == []
+    assert len(_judge("15.5 * early\n21.6 firmware/core/* messages\n")) == 2
+
+
+def test_a_deviation_that_nothing_needs_is_complained_of() -> None:
+    (complaint,) = _judge("# why\n15.5 * early\n21.6 * messages\n2.5 * of generated files\n")
+    assert "nothing deviates from rule 2.5" in complaint
+
+
+def test_a_deviation_without_a_reason_is_refused() -> None:
+    with pytest.raises(ValueError, match="no reason"):
+        check_misra.read_deviations("15.5 *\n")
