@@ -3,6 +3,28 @@
 
 #include "core/qmath.h"
 
+static int64_t magnitude(int64_t a)
+{
+    return a < 0 ? -a : a;
+}
+
+/* The derivative, as large as 32 bits hold all partial sums. */
+static void set_slope(struct feed_piece *f)
+{
+    int64_t sum = 1;
+    for (int k = 0; k < 7; k++) {
+        sum += (k + 1) * magnitude(f->c_q44_mm[k]);
+    }
+    int bits = 64 - qmath_clz64((uint64_t)sum);
+    f->slope_shift = bits > 32 ? bits - 31 : 1; /* at most 32: |c| <= 2^14 mm */
+    for (int k = 0; k < 7; k++) {
+        f->slope[k] = (int32_t)(((k + 1) * f->c_q44_mm[k]) >> f->slope_shift);
+    }
+    f->feed_shift = f->slope_shift - 12 - f->exponent;
+    f->feed_factor = (int32_t)1 << (f->feed_shift > 0 && f->feed_shift < 31 ? f->feed_shift : 0);
+    f->feed_drop = f->feed_shift >= 0 ? 0 : f->feed_shift < -31 ? 31 : -f->feed_shift;
+}
+
 void feed_piece_set(struct feed_piece *f, const struct program_piece *piece)
 {
     f->start_q40_mm = piece->start_q40_mm;
@@ -10,6 +32,7 @@ void feed_piece_set(struct feed_piece *f, const struct program_piece *piece)
         f->c_q44_mm[k] = piece->c_q40_mm[k] * 16;
     }
     f->exponent = program_piece_exponent(piece->duration_q32_s);
+    set_slope(f);
 }
 
 /* tau in q64, below 1. Its upper word drives the Horner steps; what is left is below 2^-32, where
@@ -24,15 +47,19 @@ void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_poi
 {
     uint64_t tau_q64 = scaled_time(t_q42_s, f->exponent);
     uint32_t tau = (uint32_t)(tau_q64 >> 32);
+    int32_t tau_q31 = (int32_t)(tau >> 1);
+    int32_t low_q63 = (int32_t)((uint32_t)tau_q64 >> 1);
     int64_t arc = f->c_q44_mm[6];
-    int64_t slope = arc;
+    int32_t slope = f->slope[6];
     for (int k = 5; k >= 0; k--) {
         arc = qmath_mul_unsigned(arc, tau) + f->c_q44_mm[k];
-        slope = qmath_mul_unsigned(slope, tau) + arc;
+        slope = 2 * qmath_mul_hi(slope, tau_q31) + f->slope[k];
     }
-    arc = qmath_mul_unsigned(arc, tau) + (qmath_mul_unsigned(slope, (uint32_t)tau_q64) >> 32);
+    arc =
+        qmath_mul_unsigned(arc, tau) + (2 * qmath_mul_hi(slope, low_q63) >> (32 - f->slope_shift));
     out->arc_length_q40_mm = f->start_q40_mm + qmath_round(arc, 4);
-    out->feed_q32_mm_s = qmath_shift_clamp(slope, -12 - f->exponent);
+    out->feed_q32_mm_s = f->feed_shift < 31 ? qmath_product(slope >> f->feed_drop, f->feed_factor)
+                                            : qmath_shift_clamp(slope, f->feed_shift);
 }
 
 void feed_piece_make(void *piece, const struct program_piece *from)

@@ -13,7 +13,12 @@
 struct feed_piece {
     int64_t start_q40_mm;
     int64_t c_q44_mm[7];
-    int exponent; /* tau = t / 2^exponent */
+    int32_t slope[7];    /* coefficients of the derivative in tau, */
+    int32_t slope_shift; /* 2^slope_shift times these in q44 */
+    int32_t feed_shift;  /* 2^feed_shift times these in 2^-32 mm/s */
+    int32_t feed_factor; /* that power, 2^0 ... 2^30, */
+    int32_t feed_drop;   /* or, where it is negative, so many bits */
+    int32_t exponent;    /* tau = t / 2^exponent */
 };
 
 struct feed_point {
@@ -24,8 +29,8 @@ struct feed_point {
 void feed_piece_set(struct feed_piece *f, const struct program_piece *piece);
 
 /* At local time t, 0 <= t < duration. Arc length within 2^-40.4 mm of the polynomial (half a unit
- * and the Horner steps), feed within 2^-40 mm / 2^exponent s + 2^-32 mm/s. Fourteen wide products,
- * no division. */
+ * and the Horner steps), feed within 14 units of `slope`, 2^-30 of the sum of its
+ * coefficients. Seven wide products and eight narrow ones, no division. */
 void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_point *out);
 
 /* The same two for struct kernel: `piece` is a struct feed_piece. */

@@ -95,7 +95,7 @@ static int32_t newton_step(const struct kernel_fixed_segment *k, int32_t s_q30, 
         value = qmath_mul_hi(value, z) + k->s_q30[i];
     }
     value = qmath_mul_hi(value, z) - s_q30;
-    return qmath_clamp32(z - (((int64_t)value * reciprocal_q15) >> 14));
+    return qmath_clamp32(z - (qmath_product(value, reciprocal_q15) >> 14));
 }
 
 static int64_t horner(const int64_t c_q48[6], int32_t z)
@@ -123,7 +123,7 @@ static void tangent(const struct kernel_fixed_segment *k, int32_t z, int32_t rec
     int32_t inverse_q27 = reciprocal_q15 * (1 << 11);
     for (int i = 0; i < 2; i++) {
         int32_t error_q25 = (1 << 25) - qmath_mul_hi(uu + vv, inverse_q27);
-        inverse_q27 += (int32_t)(((int64_t)inverse_q27 * error_q25) >> 25);
+        inverse_q27 += (int32_t)(qmath_product(inverse_q27, error_q25) >> 25);
     }
     tangent_q25[PH_X] = qmath_mul_hi(uu - vv, inverse_q27);
     tangent_q25[PH_Y] = qmath_mul_hi(2 * qmath_mul_hi(u, v), inverse_q27);
@@ -145,7 +145,7 @@ void kernel_fixed_segment_at(const struct kernel_fixed_segment *k, int64_t arc_l
     tangent(k, z, reciprocal, tangent_q25);
     int32_t rest_q44 = qmath_clamp32((s_q48 - horner(k->c_q48_mm[PH_S], z)) >> 4);
     for (int axis = PH_X; axis <= PH_Y; axis++) {
-        int64_t along = ((int64_t)rest_q44 * tangent_q25[axis]) >> 21;
+        int64_t along = qmath_product(rest_q44, tangent_q25[axis]) >> 21;
         int64_t local = horner(k->c_q48_mm[axis], z) + along;
         point_q40_mm[axis] = k->origin_q40_mm[axis] + qmath_round(local, 8);
     }

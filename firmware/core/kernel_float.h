@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The float kernel: single precision where it pays, integers for arc length, origins and the two
- * lowest powers of z. No double, no 64-bit conversion: int32 to float and back only. Derivation and
+ * The float kernel: the inverse of arc length and the tangent in single precision, everything else in 32-bit integers with
+ * a scale of the segment's own. No double, no 64-bit conversion: int32 to float and back only. Derivation and
  * error bound: docs/numerics.md section 10. Feed pieces are core/feed_piece.h. Only + - * / : with
  * -ffp-contract=off the same bits on every target with IEEE single. Pure, tick context.
  */
@@ -10,21 +10,38 @@
 
 #include "core/ph_segment.h"
 
-/* "Normalised" as in core/kernel_fixed.h. */
+#define KERNEL_FLOAT_PARTS 4 /* of a segment, of equal length in z, each with its own first guess */
+
+/* A coordinate: middle + linear z 2^-31 (q48) + (c1 z + ... + c5 z^5) times the segment's scale. */
+struct kernel_float_polynomial {
+    int32_t linear_q17_mm;
+    int32_t c[5]; /* of z ... z^5; the first is what is left of the linear one */
+};
+
+/* z = z0 + t (g1 + t (g2 + t g3)), t = (s - s0) scale from 0 to 1. */
+struct kernel_float_inverse {
+    float s0; /* normalised arc length from the middle, as in core/kernel_fixed.h */
+    float scale;
+    float z0;
+    float g[3];
+};
+
 struct kernel_float_segment {
-    int64_t origin_q40_mm[3];
-    int64_t c_q48_mm[3][4]; /* powers 0 ... 3 of z, power k times 2^k */
-    float high[3][2];       /* powers 4 and 5, normalised */
-    float s[6];             /* normalised arc length from the middle */
-    float u[3];             /* normalised w */
+    int64_t middle_q48_mm[2];  /* the point at z = 0 */
+    int64_t middle_arc_q40_mm; /* arc length there, rounded down, */
+    int32_t middle_rest_q48;   /* and what that leaves */
+    int32_t scale;             /* 2^(48 - q of the polynomials) */
+    int32_t shift;             /* arc length in q48 by this to q30 normalised */
+    struct kernel_float_polynomial p[3];
+    float s[6]; /* normalised arc length from the middle */
+    float u[3]; /* normalised w */
     float v[3];
-    float inverse[2][4]; /* first guess, before and behind the middle: scale, then cubic */
-    int exponent;
+    struct kernel_float_inverse inverse[KERNEL_FLOAT_PARTS];
 };
 
 void kernel_float_segment_set(struct kernel_float_segment *k, const struct ph_segment *ph);
 
-/* As kernel_fixed_segment_at; within 10 nm. Two Newton steps, three divisions, 9 wide products. */
+/* As kernel_fixed_segment_at; within 10 nm. One Newton step, two divisions, six wide products and fifteen narrow ones. */
 void kernel_float_segment_at(const struct kernel_float_segment *k, int64_t arc_length_q40_mm,
                              int64_t point_q40_mm[2]);
 

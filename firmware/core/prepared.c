@@ -5,16 +5,6 @@
 
 #include "core/ph_segment.h"
 
-uint32_t prepared_piece_size(const struct kernel *kernel)
-{
-    return (uint32_t)(offsetof(struct prepared_piece, feed) + kernel->piece_size);
-}
-
-uint32_t prepared_segment_size(const struct kernel *kernel)
-{
-    return (uint32_t)(offsetof(struct prepared_segment, path) + kernel->segment_size);
-}
-
 static uint64_t pieces_size(const struct program *p, const struct kernel *kernel)
 {
     return (uint64_t)p->header.piece_count * prepared_piece_size(kernel);

@@ -10,6 +10,7 @@
 #ifndef HODOGRAPH_CORE_PREPARED_H
 #define HODOGRAPH_CORE_PREPARED_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "core/feed_piece.h"
@@ -54,8 +55,15 @@ struct prepared_segment {
 };
 
 /* Bytes of a record. */
-uint32_t prepared_piece_size(const struct kernel *kernel);
-uint32_t prepared_segment_size(const struct kernel *kernel);
+static inline uint32_t prepared_piece_size(const struct kernel *kernel)
+{
+    return (uint32_t)(offsetof(struct prepared_piece, feed) + kernel->piece_size);
+}
+
+static inline uint32_t prepared_segment_size(const struct kernel *kernel)
+{
+    return (uint32_t)(offsetof(struct prepared_segment, path) + kernel->segment_size);
+}
 
 /* Bytes of all records of a program; may be above 2^32. */
 uint64_t prepared_size(const struct program *p, const struct kernel *kernel);

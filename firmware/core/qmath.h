@@ -37,10 +37,70 @@ static inline int qmath_clz64(uint64_t a)
     return high != 0 ? qmath_clz32(high) : 32 + qmath_clz32((uint32_t)a);
 }
 
+/* Cores with a multiplication of 32 x 32 bits to 32 only (ARMv6-M): four of 16 x 16 instead of a call. */
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
+#define QMATH_NARROW 1
+#else
+#define QMATH_NARROW 0
+#endif
+
+/* a b from halves of 16 bits. Knuth, TAOCP 2, 4.3.1, algorithm M: no sum passes 2^32. */
+static inline uint64_t qmath_narrow_unsigned(uint32_t a, uint32_t b)
+{
+    uint32_t a0 = a & 0xFFFFu;
+    uint32_t a1 = a >> 16;
+    uint32_t b0 = b & 0xFFFFu;
+    uint32_t b1 = b >> 16;
+    uint32_t middle = a1 * b0 + ((a0 * b0) >> 16);
+    uint32_t other = a0 * b1 + (middle & 0xFFFFu);
+    uint32_t high = a1 * b1 + (middle >> 16) + (other >> 16);
+    return (uint64_t)high << 32 | (uint32_t)(a * b);
+}
+
+/* The upper word of a b; the upper halves have the signs. */
+static inline int32_t qmath_narrow_high(int32_t a, int32_t b)
+{
+    int32_t a0 = (int32_t)((uint32_t)a & 0xFFFFu);
+    int32_t a1 = a >> 16;
+    int32_t b0 = (int32_t)((uint32_t)b & 0xFFFFu);
+    int32_t b1 = b >> 16;
+    int32_t middle = a1 * b0 + (int32_t)(((uint32_t)a0 * (uint32_t)b0) >> 16);
+    int32_t other = a0 * b1 + (int32_t)((uint32_t)middle & 0xFFFFu);
+    return a1 * b1 + (middle >> 16) + (other >> 16);
+}
+
+static inline int64_t qmath_narrow_signed(int32_t a, int32_t b)
+{
+    uint32_t high = (uint32_t)qmath_narrow_high(a, b);
+    return (int64_t)((uint64_t)high << 32 | (uint32_t)((uint32_t)a * (uint32_t)b));
+}
+
+/* The same number, of which the compiler does not know that: else gcc extends a factor that is used often to 64 bits
+ * beforehand and multiplies with four instructions instead of one. */
+static inline int32_t qmath_plain(int32_t a)
+{
+#if defined(__GNUC__) && defined(__arm__)
+    __asm__("" : "+r"(a));
+#endif
+    return a;
+}
+
+/* a b, exact. */
+static inline int64_t qmath_product(int32_t a, int32_t b)
+{
+    return QMATH_NARROW ? qmath_narrow_signed(a, b) : (int64_t)qmath_plain(a) * qmath_plain(b);
+}
+
+static inline uint64_t qmath_product_unsigned(uint32_t a, uint32_t b)
+{
+    return QMATH_NARROW ? qmath_narrow_unsigned(a, b) : (uint64_t)a * b;
+}
+
 /* floor(a b / 2^32) of 32-bit numbers: one SMULL, or SMMUL where there is one. */
 static inline int32_t qmath_mul_hi(int32_t a, int32_t b)
 {
-    return (int32_t)(((int64_t)a * b) >> 32);
+    return QMATH_NARROW ? qmath_narrow_high(a, b)
+                        : (int32_t)(((int64_t)qmath_plain(a) * qmath_plain(b)) >> 32);
 }
 
 /* a b / 2^32 of a 64-bit and a 32-bit number, within 1.5 units. Two SMULL: the lowest bit of a is
@@ -49,14 +109,16 @@ static inline int64_t qmath_mul_wide(int64_t a, int32_t b)
 {
     int32_t high = (int32_t)(a >> 32);
     int32_t low = (int32_t)((uint32_t)a >> 1);
-    return (int64_t)high * b + (((int64_t)low * b) >> 31);
+    return qmath_product(high, b) + (qmath_product(low, b) >> 31);
 }
 
 /* floor(a b / 2^32) of a signed 64-bit and an unsigned 32-bit number. Any a and b. */
 static inline int64_t qmath_mul_unsigned(int64_t a, uint32_t b)
 {
-    int64_t high = (a >> 32) * (int64_t)b;
-    return high + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32);
+    uint32_t high = (uint32_t)((uint64_t)a >> 32);
+    uint64_t product =
+        qmath_product_unsigned(high, b) + (qmath_product_unsigned((uint32_t)a, b) >> 32);
+    return (int64_t)(product - ((uint64_t)(a < 0 ? b : 0u) << 32));
 }
 
 /* floor(a b / 2^38), exact, for |a|, |b| < 2^50: q44 times q44 is q50. Limbs of 25 bits keep every

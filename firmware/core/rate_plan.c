@@ -147,12 +147,28 @@ static int64_t wanted_rate(const struct timebase *tb)
     return tb->state == TIMEBASE_RUNNING ? tb->override_q57 : 0;
 }
 
+int rate_plan_steady(const struct timebase *tb)
+{
+    int64_t wanted = wanted_rate(tb);
+    return wanted <= tb->least.most_q57 && tb->now.slope_q56 == 0 && tb->now.rate_q57 == wanted;
+}
+
+/* Of the present piece; most ticks need none. */
+static void renew_bounds(struct timebase *tb)
+{
+    if (tb->bounds_piece != tb->piece) {
+        rate_window_piece(&tb->scale, tb->program, tb->piece, &tb->bounds);
+        tb->bounds_piece = tb->piece;
+    }
+}
+
 int64_t rate_plan_slope(struct timebase *tb)
 {
     int64_t wanted = wanted_rate(tb);
     int64_t slope = 0;
     tb->saturated = tb->saturated != 0 && wanted > tb->least.most_q57;
     if (wanted > tb->least.most_q57) {
+        renew_bounds(tb);
         if (tb->piece >= tb->climb_piece && climb(tb, &slope) != 0) {
             return slope;
         }
@@ -163,6 +179,7 @@ int64_t rate_plan_slope(struct timebase *tb)
         tb->now.rate_q57 = wanted;
         return 0;
     }
+    renew_bounds(tb);
     plan(tb, wanted);
     return rate_next_slope(&tb->now, tb->plan_target_q57, &tb->plan);
 }

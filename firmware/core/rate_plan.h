@@ -11,4 +11,7 @@
 /* Slope at the end of the next tick; keeps the plan of *tb up to date and its `saturated`. */
 int64_t rate_plan_slope(struct timebase *tb);
 
+/* 1 when the rate is where it is wanted and may stay there whatever the pieces are: the next tick is like this one. */
+int rate_plan_steady(const struct timebase *tb);
+
 #endif

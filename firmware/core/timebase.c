@@ -34,7 +34,7 @@ static void set_least(struct timebase *tb)
 /* Makes the piece of the present time the current one. */
 static void find_piece(struct timebase *tb, uint32_t most)
 {
-    uint64_t time_q32_s = tb->time_q42_s >> 10;
+    const uint64_t time_q32_s = tb->time_q42_s >> 10;
     uint32_t i = tb->piece;
     while (time_q32_s >= tb->piece_end_q32_s && i + 1u < tb->program->header.piece_count &&
            most > 0) {
@@ -45,7 +45,6 @@ static void find_piece(struct timebase *tb, uint32_t most)
     if (i != tb->piece) {
         tb->piece = i;
         tb->climb_end_q32_s = 0;
-        rate_window_piece(&tb->scale, tb->program, i, &tb->bounds);
     }
 }
 
@@ -64,7 +63,8 @@ void timebase_begin_at(struct timebase *tb, const struct program *p, uint32_t pe
     tb->piece = 0;
     tb->piece_end_q32_s = program_piece_duration(p, 0);
     tb->climb_end_q32_s = 0;
-    rate_window_piece(&tb->scale, p, 0, &tb->bounds);
+    tb->bounds_piece = UINT32_MAX;
+    tb->steady = 0;
     find_piece(tb, UINT32_MAX);
     tb->now.rate_q57 = 0;
     tb->now.slope_q56 = 0;
@@ -84,6 +84,7 @@ void timebase_begin(struct timebase *tb, const struct program *p, uint32_t perio
 static void set_state(struct timebase *tb, enum timebase_state state)
 {
     tb->state = state;
+    tb->steady = 0;
     tb->climb_end_q32_s = 0;
     tb->climb_piece = 0;
 }
@@ -106,6 +107,7 @@ void timebase_override(struct timebase *tb, uint32_t percent)
 {
     uint32_t used = percent < TIMEBASE_MOST_PERCENT ? percent : TIMEBASE_MOST_PERCENT;
     tb->override_q57 = (int64_t)qmath_div_u64(((uint64_t)RATE_ONE >> 2) * used, 25u);
+    tb->steady = 0;
     tb->climb_end_q32_s = 0;
     tb->climb_piece = 0;
 }
@@ -126,27 +128,47 @@ static void step_first(struct timebase *tb)
     if (tb->time_q42_s == 0 && tb->state == TIMEBASE_RUNNING) {
         tb->now.rate_q57 = tb->override_q57 < RATE_ONE ? tb->override_q57 : RATE_ONE;
         tb->plan_target_q57 = tb->now.rate_q57;
+        tb->steady = tb->now.rate_q57 == RATE_ONE && rate_plan_steady(tb) != 0 ? 1u : 0u;
     }
 }
 
-/* Integral of the rate over the tick: 6 times its mean is 3 rate + 2 slope + next slope. */
-static void advance(struct timebase *tb, int64_t slope_q56)
+/* A tick at rate 1, exact. */
+static void advance_period(struct timebase *tb)
 {
-    if (tb->now.rate_q57 == RATE_ONE && tb->now.slope_q56 == 0 && slope_q56 == 0) {
-        tb->time_q42_s += tb->period_q42_s;
-        tb->rest += tb->period_rest;
-        if (tb->rest >= REST_UNIT) {
-            tb->rest -= REST_UNIT;
-            tb->time_q42_s++;
-        }
-        return;
+    tb->time_q42_s += tb->period_q42_s;
+    tb->rest += tb->period_rest;
+    if (tb->rest >= REST_UNIT) {
+        tb->rest -= REST_UNIT;
+        tb->time_q42_s++;
     }
-    int64_t six_q56 = 3 * tb->now.rate_q57 + 2 * tb->now.slope_q56 + slope_q56;
-    int64_t way_q62 = qmath_mul_unsigned(six_q56, (uint32_t)(tb->sixth_q70_s >> 32)) +
-                      (qmath_mul_unsigned(six_q56, (uint32_t)tb->sixth_q70_s) >> 32);
-    uint64_t sum = tb->fine + (uint64_t)(way_q62 > 0 ? way_q62 : 0);
+}
+
+static void advance_q62(struct timebase *tb, uint64_t way_q62_s)
+{
+    uint64_t sum = tb->fine + way_q62_s;
     tb->time_q42_s += sum >> FINE_BITS;
     tb->fine = (uint32_t)sum & ((1u << FINE_BITS) - 1u);
+}
+
+/* Integral of the rate over the tick: 6 times its mean is 3 rate + 2 slope + next slope. */
+static uint64_t way_q62_s(const struct timebase *tb, int64_t slope_q56)
+{
+    int64_t six_q56 = 3 * tb->now.rate_q57 + 2 * tb->now.slope_q56 + slope_q56;
+    int64_t way = qmath_mul_unsigned(six_q56, (uint32_t)(tb->sixth_q70_s >> 32)) +
+                  (qmath_mul_unsigned(six_q56, (uint32_t)tb->sixth_q70_s) >> 32);
+    return (uint64_t)(way > 0 ? way : 0);
+}
+
+static void advance(struct timebase *tb, int64_t slope_q56)
+{
+    int even = tb->now.slope_q56 == 0 && slope_q56 == 0;
+    if (even && tb->now.rate_q57 == RATE_ONE) {
+        advance_period(tb);
+    } else {
+        tb->steady_q62_s = way_q62_s(tb, slope_q56);
+        advance_q62(tb, tb->steady_q62_s);
+    }
+    tb->steady = even && rate_plan_steady(tb) != 0 ? 1u : 0u;
 }
 
 static void settle(struct timebase *tb)
@@ -156,6 +178,7 @@ static void settle(struct timebase *tb)
         tb->rest = 0;
         tb->fine = 0;
         tb->state = TIMEBASE_ENDED;
+        tb->steady = 0;
     } else if (tb->now.rate_q57 == 0 && tb->now.slope_q56 == 0) {
         tb->state = tb->state == TIMEBASE_STOPPING  ? TIMEBASE_STOPPED
                     : tb->state == TIMEBASE_HOLDING ? TIMEBASE_HELD
@@ -163,7 +186,23 @@ static void settle(struct timebase *tb)
     }
 }
 
-uint64_t timebase_step(struct timebase *tb)
+/* Nothing is on its way: the same again. */
+static void step_steady(struct timebase *tb)
+{
+    if (tb->now.rate_q57 == RATE_ONE) {
+        advance_period(tb);
+    } else {
+        advance_q62(tb, tb->steady_q62_s);
+    }
+    if (tb->time_q42_s >> 10 >= tb->piece_end_q32_s) {
+        find_piece(tb, MOST_ENDS);
+    }
+    if (tb->time_q42_s >= tb->duration_q42_s) {
+        settle(tb);
+    }
+}
+
+static void step(struct timebase *tb)
 {
     if (tb->started == 0) {
         step_first(tb);
@@ -177,11 +216,28 @@ uint64_t timebase_step(struct timebase *tb)
         find_piece(tb, MOST_ENDS);
     }
     settle(tb);
-    return (timebase_time_q42(tb) + 512u) >> 10;
+}
+
+uint64_t timebase_step_q42(struct timebase *tb)
+{
+    if (tb->steady != 0) {
+        step_steady(tb);
+    } else {
+        step(tb);
+    }
+    return timebase_time_q42(tb);
+}
+
+uint64_t timebase_step(struct timebase *tb)
+{
+    return (timebase_step_q42(tb) + 512u) >> 10;
 }
 
 uint64_t timebase_time_q42(const struct timebase *tb)
 {
+    if (tb->fine == 0) {
+        return tb->time_q42_s + (2u * tb->rest > REST_UNIT ? 1u : 0u);
+    }
     uint64_t rest = ((uint64_t)tb->rest << FINE_BITS) + (uint64_t)tb->fine * REST_UNIT;
     uint64_t half = (uint64_t)REST_UNIT << (FINE_BITS - 1);
     return tb->time_q42_s + (rest > half ? 1u : 0u) + (rest > 3u * half ? 1u : 0u);

@@ -42,13 +42,16 @@ struct timebase {
     uint32_t fine;         /* and in 2^-62 s, by all others; each below 2^-42 s */
     uint64_t period_q42_s; /* rounded down */
     uint32_t period_rest;
-    uint32_t period_q32_s;     /* rounded up, for look-ahead */
-    uint64_t sixth_q70_s;      /* a sixth of the period */
-    uint32_t started;          /* 0 until the first step */
-    uint32_t state;            /* enum timebase_state */
-    uint32_t piece;            /* of the last step, */
-    uint64_t piece_end_q32_s;  /* its end, */
-    struct rate_bounds bounds; /* and its bounds */
+    uint32_t period_q32_s;    /* rounded up, for look-ahead */
+    uint64_t sixth_q70_s;     /* a sixth of the period */
+    uint32_t started;         /* 0 until the first step */
+    uint32_t state;           /* enum timebase_state */
+    uint32_t piece;           /* of the last step, */
+    uint64_t piece_end_q32_s; /* and its end */
+    uint32_t bounds_piece;    /* the piece of the bounds; UINT32_MAX: none */
+    struct rate_bounds bounds;
+    uint32_t steady; /* 1: at the rate wanted, in which nothing but a command changes anything; */
+    uint64_t steady_q62_s; /* then, at a rate other than 1, program time of a tick */
     struct rate_scale scale;
     struct rate_bounds least; /* of all pieces */
     struct rate now;
@@ -96,6 +99,9 @@ void timebase_stop(struct timebase *tb);
  * call after begin gives the time begun at. After the end it stays at the duration, after a stop
  * where the stop ended. Bounded time, tick context. */
 uint64_t timebase_step(struct timebase *tb);
+
+/* The same, and gives timebase_time_q42: what a tick needs. */
+uint64_t timebase_step_q42(struct timebase *tb);
 
 /* Program time of the last step in 2^-42 s, rounded to nearest: for interp_at_q42. */
 uint64_t timebase_time_q42(const struct timebase *tb);

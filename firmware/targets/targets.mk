@@ -63,6 +63,10 @@ controller_TARGETS := an385 an386 an500 an505 $(BOARDS)
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -fstack-usage -DNDEBUG $(INCLUDES)
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
 
+# What the tick runs: loops of fixed length unrolled. Measured: a quarter fewer instructions.
+TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interp.c timebase.c rate.c rate_plan.c rate_window.c) \
+            firmware/app/machine/motion.c
+
 target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
 
 define TARGET_RULES # target
@@ -70,11 +74,12 @@ $(call NOTE,$(BUILD)/firmware/$(1)/obj/flags,$($(1)_CROSS) $($(1)_CPU) $(TARGET_
 $(BUILD)/firmware/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages-firmware
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)
-	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) -MMD -MP -c -o $$@ $$<
+	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) $$(TICK_CFLAGS) -MMD -MP -c -o $$@ $$<
 $(BUILD)/firmware/$(1)/obj/%.o: %.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages-firmware
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)
-	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) -MMD -MP -c -o $$@ $$<
+	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) $$(TICK_CFLAGS) -MMD -MP -c -o $$@ $$<
+$(call target_object,$(1),$(TICK_SRC) $(if $(findstring float,$($(1)_KERNELS)),firmware/core/kernel_float.c)): TICK_CFLAGS := -O3
 $(BUILD)/firmware/$(1)/libhodograph.a: $(call target_object,$(1),$(TARGET_SRC)) $(BUILD)/firmware/$(1)/obj/list
 	@rm -f $$@
 	@$($(1)_CROSS)ar rcs $$@ $$(filter %.o,$$^)

@@ -41,13 +41,12 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
 {
-    const uint64_t time_q32_s = timebase_step(&motion->timebase);
-    const int result =
-        interp_at_q42(&motion->interp, timebase_time_q42(&motion->timebase), &motion->point);
+    const uint64_t time_q42_s = timebase_step_q42(&motion->timebase);
+    const int result = interp_at_q42(&motion->interp, time_q42_s, &motion->point);
     if (result < 0) {
         return result;
     }
-    motion->time_q32_s = time_q32_s;
+    motion->time_q32_s = (time_q42_s + 512u) >> 10;
     motion->setpoints++;
     to_counts(motion, &motion->point, target_counts);
     return 0;
