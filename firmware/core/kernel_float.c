@@ -98,7 +98,8 @@ void kernel_float_segment_set(struct kernel_float_segment *k, const struct ph_se
         k->v[i] = 4.0f * from_q30(qmath_shift(ph->v_q44[i], -18 - n / 2));
     }
     if (ph->exponent == PH_LEAST_EXPONENT) {
-        k->u[0] += 1.0f; /* of a segment below all resolution w may be 0: what is left to move is too */
+        k->u[0] +=
+            1.0f; /* of a segment below all resolution w may be 0: what is left to move is too */
     }
     set_inverses(k);
 }
