@@ -13,6 +13,7 @@ import argparse
 import json
 import subprocess
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from target.image import Image
@@ -56,9 +57,12 @@ def measure(image: Image, rules: Rules) -> Row:
 def measure_all(build: Path) -> Table:
     """All images that are built."""
     rules = Rules.read(RULES)
+    files = sorted((build / "firmware").glob("*/*.elf"))
+    with ThreadPoolExecutor(2) as pool:
+        rows = pool.map(lambda file: measure(Image(file), rules), files)
     table: Table = {}
-    for file in sorted((build / "firmware").glob("*/*.elf")):
-        table.setdefault(file.parent.name, {})[file.stem] = measure(Image(file), rules)
+    for file, row in zip(files, rows, strict=True):
+        table.setdefault(file.parent.name, {})[file.stem] = row
     return table
 
 
