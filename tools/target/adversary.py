@@ -40,7 +40,7 @@ class Adversary:
 
     name: str
     bounds: Callable[[random.Random, int], Bounds]
-    pieces: int = 90
+    pieces: int = 70
     short_s: float = 2e-5
     short_mm: float = 2e-3
 
