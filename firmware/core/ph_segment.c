@@ -60,7 +60,8 @@ static int even_exponent(int64_t e_q50[5][3])
         sigma = k == 2 ? qmath_third(sigma) : sigma;
         greatest = sigma > greatest ? sigma : greatest;
     }
-    int bits = 64 - qmath_clz64((uint64_t)greatest + 2u) - 50;
+    uint64_t above = (uint64_t)greatest + ((uint64_t)greatest >> PH_MARGIN_BITS) + 2u;
+    int bits = 64 - qmath_clz64(above) - 50;
     return bits + (bits & 1);
 }
 

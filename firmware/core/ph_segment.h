@@ -23,6 +23,10 @@ enum ph_axis { PH_X = 0, PH_Y = 1, PH_S = 2 };
  * within 2^-34 mm. */
 #define PH_LEAST_EXPONENT (-34)
 
+/* By how much, relative, 2^exponent is above sigma: |w| in 2^(exponent/2) stays below 1 - 2^-25, so that it is below 1 in
+ * the kernels' words after any rounding. */
+#define PH_MARGIN_BITS 24
+
 /* Needs a segment that keeps the rules of protocol.md 1.2. */
 struct ph_segment {
     int64_t origin_q40_mm[3]; /* x, y and s at its start, as in the image */
@@ -34,7 +38,7 @@ struct ph_segment {
      */
     int64_t u_q44[3];
     int64_t v_q44[3];
-    /* even; 2^exponent is above every Bernstein coefficient of sigma, 2^(exponent-2) is not */
+    /* even; 2^exponent is above every Bernstein coefficient of sigma (by PH_MARGIN_BITS), 2^(exponent-2) is not */
     int exponent;
 };
 

@@ -5,6 +5,7 @@
  * in the same state.
  *
  * prover: eva
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * options: -eva-domains equality,symbolic-locations
  * assumes: check_speed qmath_clz64
  * mutant: core/segment_check.c: target_q40 * 256 => target_q40 * 1024

@@ -3,10 +3,10 @@
 """prove.py [--build DIR] [--jobs N] [--no-mutants] [NAME...]: runs the proofs of tests/proofs and prints what came out.
 
 A proof is a C file with a first comment that says, line by line, `prover: eva` or `prover: cbmc`, the functions whose
-contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), more `options:`, what is `scaled:` down for it, and
-its `mutant:`s, each `FILE: OLD => NEW`. It counts as proven when the prover has no doubt left, and has come to the
-proof's end, reached(); then in each mutant, a copy of the firmware with that mistake, the prover must find something:
-so no proof holds of nothing. Exit status 1 unless all is as it should be.
+contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), more `options:`, what stands `instead:` of something
+equal that the prover cannot follow, and its `mutant:`s, both `FILE: OLD => NEW`. It counts as proven when the prover
+has no doubt left and has come to the proof's end, reached(); then in each mutant, a copy of the firmware with that
+mistake, the prover must find something: so no proof holds of nothing. Exit status 1 unless all is as it should be.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Proof:
     replaces: list[str] = field(default_factory=list)
     options: list[str] = field(default_factory=list)
     mutants: list[tuple[str, str, str]] = field(default_factory=list)
-    scaled: list[tuple[str, str, str]] = field(default_factory=list)
+    instead: list[tuple[str, str, str]] = field(default_factory=list)
 
 
 @dataclass
@@ -72,11 +72,11 @@ def read_proof(path: Path) -> Proof:
     for key, value in re.findall(r"^ \* (\w+): (.+)$", path.read_text(), re.MULTILINE):
         if key == "prover":
             proof.prover = value
-        elif key in ("mutant", "scaled"):
+        elif key in ("mutant", "instead"):
             found = re.fullmatch(r"([\w/.]+): (.+?) =>(?: (.*))?", value)
             if found is None:
                 raise BadProof(f"{path}: {key} is not FILE: OLD => NEW: {value}")
-            list_ = proof.mutants if key == "mutant" else proof.scaled
+            list_ = proof.mutants if key == "mutant" else proof.instead
             list_.append((found[1], found[2], found[3] or ""))
         elif key in ("assumes", "replaces", "options"):
             getattr(proof, key).extend(value.split())
@@ -182,12 +182,12 @@ def _report(proof: Proof, what: str, good: bool, verdict: Verdict, said: str) ->
 def check(proof: Proof, build: Path, *, mutants: bool) -> list[dict[str, object]]:
     """The proof and its mutants; each as an entry of the JSON."""
     bin_, work = build / "provers" / "bin", build / "proofs" / proof.name
-    verdict = run(proof, make_copy(proof.scaled, work), bin_, work)
+    verdict = run(proof, make_copy(proof.instead, work), bin_, work)
     good = verdict.proven
     entries = [_report(proof, "", good, verdict, "proven" if good else "NOT")]
     for i, mutant in enumerate(proof.mutants if mutants else []):
         own = work / str(i)
-        verdict = run(proof, make_copy([*proof.scaled, mutant], own), bin_, own)
+        verdict = run(proof, make_copy([*proof.instead, mutant], own), bin_, own)
         good = verdict.doubt
         what = f"mutant: {mutant[1]} => {mutant[2]}"
         entries.append(_report(proof, what, good, verdict, "found" if good else "MISSED"))
