@@ -22,7 +22,8 @@ AFTER = {
     RESET_COMMUNICATION: _PRE,
 }
 """NMT commands, and the state that each leads to."""
-_LATEST_S = 0.25
+_LATEST_S = 1.0
+"""The shortest time after which one of those who listen would notice: the controller's, where 0x1016 has no entry."""
 
 
 class Beats:

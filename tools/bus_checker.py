@@ -35,6 +35,8 @@ _MAY_REFUSE = {
     (0x100D, 0x06020000),
 }
 """What a simulated drive has not, and the controller asks every drive for at its configuration."""
+_NOT_YET = (0x2001, 0x08000022)
+"""`start` while the axes settle; a refusal that the host does not expect ends its run."""
 _KEPT_FINDINGS = 50
 _SAMPLE = 499
 """cantools itself decodes each frame whose number this divides; the rest is decoded by numpy."""
@@ -217,6 +219,9 @@ class BusChecker:
             drive = self._drives.get(int(frame["id"]) - _SDO_ANSWER)
             if drive is not None and not drive.operational and (index, code) in _MAY_REFUSE:
                 self.kinds["SDO refused by a drive while it was configured"] += 1
+                continue
+            if frame["id"] == _SDO_ANSWER + self.machine.node and (index, code) == _NOT_YET:
+                self.kinds["command refused for now: the host asks again"] += 1
                 continue
             name = self._names.get(int(frame["id"]), "SDO")
             self.found(f"{name}: abort 0x{code:08X} of 0x{index:04X} sub {int(frame['data'][3])}")

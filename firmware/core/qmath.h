@@ -54,7 +54,7 @@ static inline uint64_t qmath_narrow_unsigned(uint32_t a, uint32_t b)
     uint32_t middle = a1 * b0 + ((a0 * b0) >> 16);
     uint32_t other = a0 * b1 + (middle & 0xFFFFu);
     uint32_t high = a1 * b1 + (middle >> 16) + (other >> 16);
-    return (uint64_t)high << 32 | (uint32_t)(a * b);
+    return (uint64_t)high << 32 | a * b;
 }
 
 /* The upper word of a b; the upper halves have the signs. */
@@ -72,7 +72,7 @@ static inline int32_t qmath_narrow_high(int32_t a, int32_t b)
 static inline int64_t qmath_narrow_signed(int32_t a, int32_t b)
 {
     uint32_t high = (uint32_t)qmath_narrow_high(a, b);
-    return (int64_t)((uint64_t)high << 32 | (uint32_t)((uint32_t)a * (uint32_t)b));
+    return (int64_t)((uint64_t)high << 32 | (uint32_t)a * (uint32_t)b);
 }
 
 /* The same number, of which the compiler does not know that: else gcc extends a factor that is used often to 64 bits
