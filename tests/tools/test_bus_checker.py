@@ -135,15 +135,24 @@ def test_a_heartbeat_that_is_late_or_stays_away() -> None:
     times = [0.0] * len(frames)
     beats = [i for i, frame in enumerate(frames) if frame == (0x703, b"\x05")]
     for i in range(len(frames)):
-        times[i] = 0.1 * sum(beat < i for beat in beats) + (0.4 if i >= beats[3] else 0.0)
+        times[i] = 0.1 * sum(beat < i for beat in beats) + (1.0 if i >= beats[3] else 0.0)
     found = seen(frames, times).findings
     assert any("heartbeat of node 3 after" in finding for finding in found), found
 
 
 def test_a_heartbeat_that_never_comes_again() -> None:
     frames = [frame for frame in good() if frame != (0x703, b"\x05")]
-    found = seen(frames).findings
+    found = seen(frames, [0.005 * i for i in range(len(frames))]).findings
     assert any("no heartbeat of node 3 for" in finding for finding in found), found
+
+
+def test_a_start_that_is_refused_for_now_is_no_fault() -> None:
+    refused = (0x581, struct.pack("<BHBI", 0x80, 0x2001, 0, 0x08000022))
+    other = (0x581, struct.pack("<BHBI", 0x80, 0x2000, 1, 0x08000022))
+    assert seen([*good(), refused]).findings == []
+    assert any(
+        "abort 0x08000022 of 0x2000" in finding for finding in seen([*good(), other]).findings
+    )
 
 
 def test_a_reset_that_was_asked_for_is_no_fault() -> None:
