@@ -21,12 +21,23 @@
 #include "core/program.h"
 
 #define PREPARED_ALIGNMENT 8u /* of the first record */
+#define PREPARED_SPANS     5  /* 1, 2, 4, 8, 16 pieces */
+
+/* Override bounds as in struct program_piece. */
+struct prepared_bounds {
+    uint32_t factor_q24;
+    uint32_t rate_q16_per_s;
+    uint32_t second_q8_per_s2;
+};
 
 /* A record ends behind the kernel's own part. */
 struct prepared_piece {
     uint64_t start_q32_s;
     uint64_t
         end_q32_s; /* UINT64_MAX for the last piece: nothing is evaluated beyond the duration */
+    struct prepared_bounds
+        ahead[PREPARED_SPANS]; /* least of this one and those behind it, 2^k pieces in all */
+    uint32_t reserved;
     union {
         struct feed_piece integers;
         struct kernel_double_piece doubles;

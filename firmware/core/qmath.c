@@ -38,6 +38,9 @@ static uint64_t divide_by_word(uint64_t a, uint32_t b)
 
 uint64_t qmath_div_u64(uint64_t a, uint64_t b)
 {
+    if (a < b) {
+        return 0;
+    }
     if (b >> 32 == 0) {
         return divide_by_word(a, (uint32_t)b);
     }
@@ -83,16 +86,35 @@ int64_t qmath_fifth(int64_t a)
     return mul_reciprocal(a, 0x33333333u);
 }
 
-uint64_t qmath_root(uint64_t a)
+/* Of a >= 2^30, by pairs of bits; what is left goes to rest. */
+static uint32_t root_of_word(uint32_t a, uint32_t *rest)
 {
-    uint64_t root = 0;
-    for (uint64_t bit = (uint64_t)1 << 62; bit != 0; bit >>= 2) {
-        uint64_t next = root + bit;
+    uint32_t root = 0;
+    for (uint32_t bit = (uint32_t)1 << 30; bit != 0; bit >>= 2) {
+        uint32_t next = root + bit;
         root >>= 1;
         if (a >= next) {
             a -= next;
             root += bit;
         }
     }
+    *rest = a;
     return root;
+}
+
+/* The upper 16 bits by pairs, the lower by a division: at most one too large (Zimmermann, "Karatsuba square root",
+ * 1999). */
+uint64_t qmath_root(uint64_t a)
+{
+    if (a == 0) {
+        return 0;
+    }
+    int shift = qmath_clz64(a) & ~1;
+    uint64_t n = a << shift;
+    uint32_t rest = 0;
+    uint32_t upper = root_of_word((uint32_t)(n >> 32), &rest);
+    uint32_t lower = (rest << 15 | (uint32_t)n >> 17) / upper;
+    uint32_t root = (upper << 16) + (lower < 0xFFFFu ? lower : 0xFFFFu);
+    root -= (uint64_t)root * root > n ? 1u : 0u;
+    return root >> (shift / 2);
 }

@@ -158,7 +158,7 @@ static inline int32_t qmath_clamp32(int64_t a)
 /* floor(a / b), b not 0: for targets without a 64-bit division. At most four 32-bit divisions, no loop. */
 uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 
-/* floor of the square root; 32 rounds of additions. */
+/* floor of the square root: 16 rounds of additions and a 32-bit division. */
 uint64_t qmath_root(uint64_t a);
 
 /* a / 3 and a / 5 for |a| < 2^62, by the reciprocal: at most 2 units below the exact value. */

@@ -60,31 +60,26 @@ static int64_t quotient(int64_t a, int64_t b)
     return (int64_t)qmath_div_u64((uint64_t)a, (uint64_t)b);
 }
 
-/* ceil(|slope| / second) */
-static int64_t rest_ticks(int64_t slope, int64_t second)
+struct rate_stop rate_stop(const struct rate *rate, int64_t second_q56)
 {
-    return slope == 0 ? 0 : quotient(magnitude(slope) - 1, second) + 1;
-}
-
-int64_t rate_rest(const struct rate *rate, int64_t second_q56)
-{
-    int64_t ticks = rest_ticks(rate->slope_q56, second_q56);
-    int64_t slope = rate->slope_q56;
-    if (slope == 0) {
-        return rate->rate_q57;
+    struct rate_stop stop = {.ticks = 0, .rest_q57 = rate->rate_q57};
+    const int64_t slope = magnitude(rate->slope_q56);
+    if (slope != 0) {
+        stop.ticks = quotient(slope - 1, second_q56) + 1;
+        int bits = 128 - qmath_clz64((uint64_t)stop.ticks) - qmath_clz64((uint64_t)slope);
+        int64_t way = bits > 60 ? (int64_t)1 << 60 : stop.ticks * slope;
+        stop.rest_q57 += rate->slope_q56 < 0 ? -way : way;
     }
-    int bits = 128 - qmath_clz64((uint64_t)ticks) - qmath_clz64((uint64_t)magnitude(slope));
-    int64_t way = bits > 60 ? (int64_t)1 << 60 : ticks * magnitude(slope);
-    return slope < 0 ? rate->rate_q57 - way : rate->rate_q57 + way;
+    return stop;
 }
 
 /* Ticks from rest to rest over a way in rate units, at most (section 12, "How long it takes"). */
 static int64_t way_ticks(int64_t way_q57, const struct rate_bounds *bounds)
 {
-    int64_t corner = (int64_t)qmath_root((uint64_t)quotient(way_q57 / 2, bounds->second_q56)) + 1;
     if (way_q57 == 0) {
         return 0;
     }
+    int64_t corner = (int64_t)qmath_root((uint64_t)quotient(way_q57 / 2, bounds->second_q56)) + 1;
     if (corner * bounds->second_q56 <= bounds->slope_q56) {
         return 2 * corner + 2;
     }
@@ -92,12 +87,12 @@ static int64_t way_ticks(int64_t way_q57, const struct rate_bounds *bounds)
            quotient(bounds->slope_q56, bounds->second_q56) + 5;
 }
 
-int64_t rate_span_q12(const struct rate *rate, int64_t target_q57, const struct rate_bounds *bounds)
+int64_t rate_span_q12(const struct rate *rate, const struct rate_stop *stop, int64_t target_q57,
+                      const struct rate_bounds *bounds)
 {
-    int64_t rest = clamp(rate_rest(rate, bounds->second_q56), -RATE_ONE, 2 * RATE_MOST);
+    int64_t rest = clamp(stop->rest_q57, -RATE_ONE, 2 * RATE_MOST);
     int64_t away = magnitude(rest - rate->rate_q57);
-    int64_t ticks = rest_ticks(rate->slope_q56, bounds->second_q56) +
-                    way_ticks(magnitude(target_q57 - rate->rate_q57) + away, bounds);
+    int64_t ticks = stop->ticks + way_ticks(magnitude(target_q57 - rate->rate_q57) + away, bounds);
     if (ticks >= RATE_SPAN_TICKS) {
         return INT64_MAX;
     }

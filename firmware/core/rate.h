@@ -35,7 +35,7 @@ struct rate_bounds rate_bounds_least(const struct rate_bounds *a, const struct r
 
 /* Slope at the end of the next tick on the fastest way to the target: the greatest from which the
  * rate can still come to rest there. Changes by at most `second`, stays within `slope` once it is.
- * Where rate_rest does not lie beyond the target, the rate never passes it and, after finitely many
+ * Where rate_stop does not lie beyond the target, the rate never passes it and, after finitely many
  * ticks, is there with slope 0. */
 int64_t rate_next_slope(const struct rate *rate, int64_t target_q57,
                         const struct rate_bounds *bounds);
@@ -43,13 +43,17 @@ int64_t rate_next_slope(const struct rate *rate, int64_t target_q57,
 /* One tick that ends with this slope. */
 void rate_move(struct rate *rate, int64_t slope_q56);
 
-/* The rate when the slope is taken to 0 as fast as `second` lets it in whole ticks; far outside 0
- * ... RATE_MOST where it is beyond +-8. */
-int64_t rate_rest(const struct rate *rate, int64_t second_q56);
+/* What comes of taking the slope to 0 as fast as `second` lets it in whole ticks. */
+struct rate_stop {
+    int64_t ticks;
+    int64_t rest_q57; /* the rate then; far outside 0 ... RATE_MOST where it is beyond +-8 */
+};
+
+struct rate_stop rate_stop(const struct rate *rate, int64_t second_q56);
 
 /* Upper bound of the program time, in ticks at rate 1, 2^-12 of one, until rate_next_slope has
- * reached the target; INT64_MAX when that may take more than RATE_SPAN_TICKS. */
-int64_t rate_span_q12(const struct rate *rate, int64_t target_q57,
+ * reached the target; INT64_MAX when that may take more than RATE_SPAN_TICKS. `stop` is rate_stop with the same bounds. */
+int64_t rate_span_q12(const struct rate *rate, const struct rate_stop *stop, int64_t target_q57,
                       const struct rate_bounds *bounds);
 
 #endif

@@ -1,22 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/rate_plan.h"
 
-#define MOST_ROUNDS 6 /* a window that has still not been found is given up */
+#define HIGHEST (RATE_WINDOW_LEVELS - 1u)
 
 static int64_t greater(int64_t a, int64_t b)
 {
     return a > b ? a : b;
 }
 
-static void open_window(const struct timebase *tb, struct rate_window *w)
+static void get_window(const struct timebase *tb, uint32_t level, struct rate_window *w)
 {
-    rate_window_open(w, tb->program, &tb->scale, tb->piece, tb->piece_end_q32_s, &tb->bounds);
-}
-
-static int same(const struct rate_bounds *a, const struct rate_bounds *b)
-{
-    return a->most_q57 == b->most_q57 && a->slope_q56 == b->slope_q56 &&
-           a->second_q56 == b->second_q56;
+    rate_window_get(w, &tb->scale, tb->program, tb->piece, tb->piece_end_q32_s, level);
 }
 
 /* Program time reached after so many ticks at rate 1, at most. */
@@ -29,33 +23,36 @@ static uint64_t reached_q32(const struct timebase *tb, int64_t ticks_q12)
 }
 
 /* Whether the way to a target keeps all three bounds in pieces that have these. */
-static int keeps(const struct rate *now, int64_t target_q57, const struct rate_bounds *bounds)
+static int keeps(const struct rate *now, const struct rate_stop *stop, int64_t target_q57,
+                 const struct rate_bounds *bounds)
 {
-    int64_t rest = rate_rest(now, bounds->second_q56);
-    int64_t high = greater(greater(now->rate_q57, rest), target_q57);
-    return rest >= 0 && high <= bounds->most_q57 && now->slope_q56 <= bounds->slope_q56 &&
+    int64_t high = greater(greater(now->rate_q57, stop->rest_q57), target_q57);
+    return stop->rest_q57 >= 0 && high <= bounds->most_q57 && now->slope_q56 <= bounds->slope_q56 &&
            now->slope_q56 >= -bounds->slope_q56;
 }
 
-/* Bounds with which the target can be reached from here inside all pieces on the way. */
-static int find_bounds(const struct timebase *tb, int64_t target_q57, struct rate_bounds *out)
+enum found { FOUND, NONE, NOT_YET };
+
+/* Bounds with which the target can be reached from here inside all pieces on the way. One window a tick; a wider one in
+ * the next. */
+static enum found find_bounds(struct timebase *tb, int64_t target_q57, struct rate_bounds *out)
 {
     struct rate_window w;
-    open_window(tb, &w);
-    for (int round = 0; round < MOST_ROUNDS && keeps(&tb->now, target_q57, &w.bounds); round++) {
+    get_window(tb, tb->plan_level, &w);
+    struct rate_stop stop = rate_stop(&tb->now, w.bounds.second_q56);
+    if (keeps(&tb->now, &stop, target_q57, &w.bounds)) {
         *out = w.bounds;
-        uint64_t reached = reached_q32(tb, rate_span_q12(&tb->now, target_q57, out));
-        while (reached > w.end_q32_s && rate_window_extend(&w) != 0) {
+        if (reached_q32(tb, rate_span_q12(&tb->now, &stop, target_q57, out)) <= w.end_q32_s) {
+            return FOUND;
         }
-        if (same(out, &w.bounds)) {
-            if (reached <= w.end_q32_s) {
-                return 1;
-            }
-            break;
+        if (tb->plan_level < HIGHEST) {
+            tb->plan_level++;
+            return NOT_YET;
         }
     }
     *out = tb->least;
-    return keeps(&tb->now, target_q57, out);
+    stop = rate_stop(&tb->now, out->second_q56);
+    return keeps(&tb->now, &stop, target_q57, out) ? FOUND : NONE;
 }
 
 static void plan(struct timebase *tb, int64_t target_q57)
@@ -65,8 +62,17 @@ static void plan(struct timebase *tb, int64_t target_q57)
     if (renewed && tb->plan_piece == tb->piece) {
         return;
     }
+    if (tb->plan_next_q57 != target_q57) {
+        tb->plan_next_q57 = target_q57;
+        tb->plan_level = 0;
+    }
+    enum found found = find_bounds(tb, target_q57, &bounds);
+    if (found == NOT_YET) {
+        return;
+    }
+    tb->plan_level = 0;
     tb->plan_piece = tb->piece;
-    if (find_bounds(tb, target_q57, &bounds) == 0) {
+    if (found == NONE) {
         return;
     }
     if (!renewed ||
@@ -80,6 +86,7 @@ static void plan(struct timebase *tb, int64_t target_q57)
  * of the program allow: the plan from then on. */
 struct attempt {
     struct rate after;
+    struct rate_stop stop; /* from there */
     int64_t target_q57;
     int64_t back_q57;
 };
@@ -92,11 +99,11 @@ static int try_tick(const struct timebase *tb, const struct rate_bounds *bounds,
     int64_t slope = rate_next_slope(now, a->target_q57, bounds);
     a->after = *now;
     rate_move(&a->after, slope);
-    int64_t rest = rate_rest(&a->after, bounds->second_q56);
-    a->back_q57 = rest < tb->least.most_q57 ? rest : tb->least.most_q57;
+    a->stop = rate_stop(&a->after, bounds->second_q56);
+    a->back_q57 = a->stop.rest_q57 < tb->least.most_q57 ? a->stop.rest_q57 : tb->least.most_q57;
     int64_t inside = now->rate_q57 + greater(now->slope_q56, 0);
     return inside <= bounds->most_q57 && now->slope_q56 <= bounds->slope_q56 &&
-           now->slope_q56 >= -bounds->slope_q56 && keeps(&a->after, a->back_q57, bounds);
+           now->slope_q56 >= -bounds->slope_q56 && keeps(&a->after, &a->stop, a->back_q57, bounds);
 }
 
 /* Slopes move the rate by even steps near the target: the last unit may be left over. */
@@ -105,41 +112,70 @@ static int arrived(int64_t rate_q57, int64_t target_q57)
     return rate_q57 - target_q57 <= 1 && target_q57 - rate_q57 <= 1;
 }
 
-static int climb(struct timebase *tb, int64_t *slope_q56)
+/* A tick that has been shown to be safe becomes the plan. */
+static void take(struct timebase *tb, const struct attempt *a, const struct rate_window *w,
+                 uint64_t reached_q32_s)
+{
+    int still = a->after.slope_q56 == 0 && arrived(a->after.rate_q57, a->target_q57) &&
+                tb->now.slope_q56 == 0;
+    uint64_t way = reached_q32_s - (tb->time_q42_s >> 10);
+    tb->climb_end_q32_s = still && w->end_q32_s > way ? w->end_q32_s - way : 0;
+    tb->plan = w->bounds;
+    tb->plan_target_q57 = a->back_q57;
+    tb->plan_piece = tb->piece;
+    tb->saturated = a->target_q57 < tb->override_q57;
+}
+
+/* A narrower window next time, if it would do with room for some ticks. */
+static void narrow(struct timebase *tb, uint64_t reached_q32_s, uint64_t margin)
+{
+    struct rate_window w;
+    if (tb->climb_level > 0) {
+        get_window(tb, tb->climb_level - 1u, &w);
+        tb->climb_level -= reached_q32_s + 2u * margin <= w.end_q32_s ? 1u : 0u;
+    }
+}
+
+static int64_t follow(const struct timebase *tb)
+{
+    return rate_next_slope(&tb->now, tb->plan_target_q57, &tb->plan);
+}
+
+/* No attempt before the first piece that may be the one in the way. */
+static void give_up(struct timebase *tb)
+{
+    tb->climb_piece = tb->piece + (tb->climb_level > 1u ? 1u << (tb->climb_level - 1u) : 1u);
+    tb->climb_end_q32_s = 0;
+    tb->climb_level = 0;
+}
+
+/* A tick above the least factor, or along the plan when its window shows no way back. */
+static int64_t climb(struct timebase *tb)
 {
     struct rate_window w;
     struct attempt a;
     uint64_t margin = 4u * (uint64_t)tb->period_q32_s;
+    uint64_t reached = UINT64_MAX;
     if ((tb->time_q42_s >> 10) + margin <= tb->climb_end_q32_s) {
-        *slope_q56 = 0;
-        return 1;
+        return 0;
     }
-    open_window(tb, &w);
-    for (int round = 0; round < MOST_ROUNDS && try_tick(tb, &w.bounds, &a); round++) {
-        struct rate_bounds bounds = w.bounds;
-        uint64_t reached = reached_q32(tb, rate_span_q12(&a.after, a.back_q57, &bounds)) + margin;
-        while (reached > w.end_q32_s && w.bounds.most_q57 == bounds.most_q57 &&
-               rate_window_extend(&w) != 0) {
-        }
-        if (reached <= w.end_q32_s && same(&bounds, &w.bounds)) {
-            int still = a.after.slope_q56 == 0 && arrived(a.after.rate_q57, a.target_q57) &&
-                        tb->now.slope_q56 == 0;
-            uint64_t way = reached - (tb->time_q42_s >> 10);
-            tb->climb_end_q32_s = still && w.end_q32_s > way ? w.end_q32_s - way : 0;
-            tb->plan = bounds;
-            tb->plan_target_q57 = a.back_q57;
-            tb->plan_piece = tb->piece;
-            tb->saturated = a.target_q57 < tb->override_q57;
-            *slope_q56 = a.after.slope_q56;
-            return 1;
-        }
-        if (same(&bounds, &w.bounds)) {
-            break;
-        }
+    get_window(tb, tb->climb_level, &w);
+    int possible = try_tick(tb, &w.bounds, &a);
+    if (possible != 0) {
+        reached = reached_q32(tb, rate_span_q12(&a.after, &a.stop, a.back_q57, &w.bounds)) + margin;
     }
-    tb->climb_piece = w.next - 1u > tb->piece ? w.next - 1u : tb->piece + 1u;
-    tb->climb_end_q32_s = 0;
-    return 0;
+    if (possible != 0 && reached <= w.end_q32_s) {
+        take(tb, &a, &w, reached);
+        narrow(tb, reached, margin);
+        return a.after.slope_q56;
+    }
+    if (possible != 0 && tb->climb_level < HIGHEST) {
+        tb->climb_level++;
+    } else {
+        give_up(tb);
+    }
+    tb->saturated = 1;
+    return follow(tb);
 }
 
 static int64_t wanted_rate(const struct timebase *tb)
@@ -153,24 +189,13 @@ int rate_plan_steady(const struct timebase *tb)
     return wanted <= tb->least.most_q57 && tb->now.slope_q56 == 0 && tb->now.rate_q57 == wanted;
 }
 
-/* Of the present piece; most ticks need none. */
-static void renew_bounds(struct timebase *tb)
-{
-    if (tb->bounds_piece != tb->piece) {
-        rate_window_piece(&tb->scale, tb->program, tb->piece, &tb->bounds);
-        tb->bounds_piece = tb->piece;
-    }
-}
-
 int64_t rate_plan_slope(struct timebase *tb)
 {
     int64_t wanted = wanted_rate(tb);
-    int64_t slope = 0;
     tb->saturated = tb->saturated != 0 && wanted > tb->least.most_q57;
     if (wanted > tb->least.most_q57) {
-        renew_bounds(tb);
-        if (tb->piece >= tb->climb_piece && climb(tb, &slope) != 0) {
-            return slope;
+        if (tb->piece >= tb->climb_piece) {
+            return climb(tb);
         }
         tb->saturated = 1;
         wanted = tb->least.most_q57;
@@ -179,7 +204,6 @@ int64_t rate_plan_slope(struct timebase *tb)
         tb->now.rate_q57 = wanted;
         return 0;
     }
-    renew_bounds(tb);
     plan(tb, wanted);
-    return rate_next_slope(&tb->now, tb->plan_target_q57, &tb->plan);
+    return follow(tb);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/rate_window.h"
 
+#include "core/prepared.h"
 #include "core/qmath.h"
 
 /* slope: rate_q16 h 2^40, second: second_q8 h^2 2^48. With the clamp products stay at 2^56. */
@@ -19,46 +20,48 @@ static int64_t scaled(uint32_t bound, uint32_t most, uint64_t scale)
     return a > RATE_SLOPE_MOST ? RATE_SLOPE_MOST : a;
 }
 
+static void set_bounds(struct rate_bounds *out, const struct rate_scale *scale,
+                       const struct prepared_bounds *own)
+{
+    out->most_q57 = (int64_t)own->factor_q24 << 33;
+    out->slope_q56 = scaled(own->rate_q16_per_s, scale->most_rate_q16, scale->slope);
+    out->second_q56 = scaled(own->second_q8_per_s2, scale->most_second_q8, scale->second);
+}
+
 void rate_window_piece(const struct rate_scale *scale, const struct program *p, uint32_t i,
                        struct rate_bounds *out)
 {
-    uint32_t factor_q24;
-    uint32_t rate_q16;
-    uint32_t second_q8;
-    program_piece_override(p, i, &factor_q24, &rate_q16, &second_q8);
-    out->most_q57 = (int64_t)factor_q24 << 33;
-    out->slope_q56 = scaled(rate_q16, scale->most_rate_q16, scale->slope);
-    out->second_q56 = scaled(second_q8, scale->most_second_q8, scale->second);
+    struct prepared_bounds own;
+    program_piece_override(p, i, &own.factor_q24, &own.rate_q16_per_s, &own.second_q8_per_s2);
+    set_bounds(out, scale, &own);
 }
 
-static void set_end(struct rate_window *w, uint64_t end_q32_s)
-{
-    w->end_q32_s = w->next == w->program->header.piece_count ? UINT64_MAX : end_q32_s;
-}
-
-void rate_window_open(struct rate_window *w, const struct program *p,
-                      const struct rate_scale *scale, uint32_t piece, uint64_t end_q32_s,
-                      const struct rate_bounds *bounds)
-{
-    w->program = p;
-    w->scale = scale;
-    w->bounds = *bounds;
-    w->next = piece + 1u;
-    w->pieces = 1;
-    set_end(w, end_q32_s);
-}
-
-int rate_window_extend(struct rate_window *w)
+static void look(struct rate_window *w, const struct rate_scale *scale, const struct program *p,
+                 uint32_t i, uint32_t last)
 {
     struct rate_bounds bounds;
-    if (w->pieces == RATE_WINDOW_PIECES || w->next == w->program->header.piece_count) {
-        return 0;
+    rate_window_piece(scale, p, i, &w->bounds);
+    for (uint32_t k = i + 1u; k <= last; k++) {
+        rate_window_piece(scale, p, k, &bounds);
+        w->bounds = rate_bounds_least(&w->bounds, &bounds);
+        w->end_q32_s += program_piece_duration(p, k);
     }
-    rate_window_piece(w->scale, w->program, w->next, &bounds);
-    w->bounds = rate_bounds_least(&w->bounds, &bounds);
-    uint64_t duration = program_piece_duration(w->program, w->next);
-    w->next++;
-    w->pieces++;
-    set_end(w, w->end_q32_s + duration);
-    return 1;
+}
+
+void rate_window_get(struct rate_window *w, const struct rate_scale *scale, const struct program *p,
+                     uint32_t i, uint64_t end_q32_s, uint32_t level)
+{
+    const uint32_t behind = (1u << level) - 1u;
+    const uint32_t left = p->header.piece_count - 1u - i;
+    const uint32_t last = i + (behind < left ? behind : left);
+    w->end_q32_s = end_q32_s;
+    if (p->prepared_for != NULL) {
+        set_bounds(&w->bounds, scale, &prepared_piece_at(p, p->prepared_for, i)->ahead[level]);
+        w->end_q32_s = prepared_piece_at(p, p->prepared_for, last)->end_q32_s;
+    } else {
+        look(w, scale, p, i, last);
+    }
+    if (behind >= left) {
+        w->end_q32_s = UINT64_MAX;
+    }
 }

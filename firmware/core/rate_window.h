@@ -11,7 +11,7 @@
 #include "core/program.h"
 #include "core/rate.h"
 
-#define RATE_WINDOW_PIECES 16u /* looked at, at most */
+#define RATE_WINDOW_LEVELS 5u /* windows of 1, 2, 4, 8, 16 pieces */
 
 /* From a physical bound of a piece to one per tick; from rate_scale_set. */
 struct rate_scale {
@@ -21,13 +21,10 @@ struct rate_scale {
     uint32_t most_second_q8;
 };
 
+/* The pieces from one on, 2^level of them or to the end of the program. */
 struct rate_window {
-    const struct program *program;
-    const struct rate_scale *scale;
-    struct rate_bounds bounds; /* of all pieces in it; never looser than the pieces' own */
+    struct rate_bounds bounds; /* of all pieces in it */
     uint64_t end_q32_s;        /* UINT64_MAX with the last piece */
-    uint32_t next;             /* the first piece beyond */
-    uint32_t pieces;
 };
 
 /* period_us: 1000, 2000, 4000 or 8000. */
@@ -37,12 +34,9 @@ void rate_scale_set(struct rate_scale *scale, uint32_t period_us);
 void rate_window_piece(const struct rate_scale *scale, const struct program *p, uint32_t i,
                        struct rate_bounds *out);
 
-/* A window of the one piece that ends at end_q32_s and has these bounds. */
-void rate_window_open(struct rate_window *w, const struct program *p,
-                      const struct rate_scale *scale, uint32_t piece, uint64_t end_q32_s,
-                      const struct rate_bounds *bounds);
-
-/* Takes one more piece in. 1; 0 when RATE_WINDOW_PIECES are in. */
-int rate_window_extend(struct rate_window *w);
+/* The window from piece i, which ends at end_q32_s. Constant time with prepared records (core/prepared.h), else it looks
+ * at each piece. */
+void rate_window_get(struct rate_window *w, const struct rate_scale *scale, const struct program *p,
+                     uint32_t i, uint64_t end_q32_s, uint32_t level);
 
 #endif

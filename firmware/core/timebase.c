@@ -63,7 +63,9 @@ void timebase_begin_at(struct timebase *tb, const struct program *p, uint32_t pe
     tb->piece = 0;
     tb->piece_end_q32_s = program_piece_duration(p, 0);
     tb->climb_end_q32_s = 0;
-    tb->bounds_piece = UINT32_MAX;
+    tb->plan_level = 0;
+    tb->plan_next_q57 = 0;
+    tb->climb_level = 0;
     tb->steady = 0;
     find_piece(tb, UINT32_MAX);
     tb->now.rate_q57 = 0;

@@ -48,8 +48,6 @@ struct timebase {
     uint32_t state;           /* enum timebase_state */
     uint32_t piece;           /* of the last step, */
     uint64_t piece_end_q32_s; /* and its end */
-    uint32_t bounds_piece;    /* the piece of the bounds; UINT32_MAX: none */
-    struct rate_bounds bounds;
     uint32_t steady; /* 1: at the rate wanted, in which nothing but a command changes anything; */
     uint64_t steady_q62_s; /* then, at a rate other than 1, program time of a tick */
     struct rate_scale scale;
@@ -61,8 +59,11 @@ struct timebase {
     struct rate_bounds plan;
     int64_t plan_target_q57; /* at most least.most_q57 */
     uint32_t plan_piece;     /* looked for a better one last in this piece */
+    uint32_t plan_level;     /* of the window that is tried next */
+    int64_t plan_next_q57;   /* for this target */
     /* Above the least factor of the program */
     uint32_t climb_piece;     /* no attempt before this piece */
+    uint32_t climb_level;     /* of the window that is tried next */
     uint64_t climb_end_q32_s; /* at the present rate the way back is known until then */
     uint32_t saturated;
 };

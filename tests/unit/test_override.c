@@ -289,7 +289,8 @@ static void finish(void)
 {
     const struct rate_bounds *least = &now.tb.least;
     struct rate from = {RATE_MOST, 0};
-    int64_t ticks = 4 * (rate_span_q12(&from, 0, least) >> 12) + 100;
+    const struct rate_stop stop = rate_stop(&from, least->second_q56);
+    int64_t ticks = 4 * (rate_span_q12(&from, &stop, 0, least) >> 12) + 100;
     int64_t wanted = RATE_ONE / 100 * now.percent;
     wanted = wanted < least->most_q57 ? wanted : least->most_q57;
     for (int64_t i = 0; i < ticks && !over(); i++) {

@@ -104,6 +104,29 @@ static void test_same_bits_as_expanded(void)
     }
 }
 
+static void test_spans_hold_the_least_of_their_pieces(void)
+{
+    const struct kernel *fixed = kernel_find(INTERP_FIXED);
+    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    for (uint32_t i = 0; i < plain.header.piece_count; i++) {
+        const struct prepared_piece *piece = prepared_piece_at(&ready, fixed, i);
+        for (uint32_t k = 0; k < PREPARED_SPANS; k++) {
+            uint32_t least[3] = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
+            for (uint32_t j = i; j < i + (1u << k) && j < plain.header.piece_count; j++) {
+                uint32_t own[3];
+                program_piece_override(&plain, j, &own[0], &own[1], &own[2]);
+                for (int n = 0; n < 3; n++) {
+                    least[n] = own[n] < least[n] ? own[n] : least[n];
+                }
+            }
+            TEST_ASSERT_EQUAL_UINT32(least[0], piece->ahead[k].factor_q24);
+            TEST_ASSERT_EQUAL_UINT32(least[1], piece->ahead[k].rate_q16_per_s);
+            TEST_ASSERT_EQUAL_UINT32(least[2], piece->ahead[k].second_q8_per_s2);
+        }
+    }
+    end();
+}
+
 static void test_an_error_of_the_sink_is_passed_on(void)
 {
     begin("alpha_offset.hdgp", INTERP_FIXED);
@@ -118,6 +141,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_same_bits_as_expanded);
+    RUN_TEST(test_spans_hold_the_least_of_their_pieces);
     RUN_TEST(test_an_error_of_the_sink_is_passed_on);
     return UNITY_END();
 }

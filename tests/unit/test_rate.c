@@ -34,8 +34,9 @@ static struct rate_bounds random_bounds(void)
 static void check_way(const struct rate *from, int64_t target, const struct rate_bounds *b)
 {
     struct rate rate = *from;
-    int64_t span = rate_span_q12(&rate, target, b);
-    int64_t rest = rate_rest(&rate, b->second_q56);
+    const struct rate_stop stop = rate_stop(&rate, b->second_q56);
+    int64_t span = rate_span_q12(&rate, &stop, target, b);
+    int64_t rest = stop.rest_q57;
     int rising = target >= rate.rate_q57;
     int beyond = rising ? rest > target : rest < target;
     double time_q12 = 0;
@@ -64,7 +65,7 @@ static void test_reaches_the_target(void)
         struct rate_bounds b = random_bounds();
         struct rate from = {below(RATE_MOST + 1), 0};
         from.slope_q56 = below(2 * b.slope_q56 + 1) - b.slope_q56;
-        int64_t rest = rate_rest(&from, b.second_q56);
+        int64_t rest = rate_stop(&from, b.second_q56).rest_q57;
         from.slope_q56 = rest < 0 || rest > RATE_MOST || i % 3 == 0 ? 0 : from.slope_q56;
         int64_t target = i % 4 == 0 ? 0 : i % 4 == 1 ? RATE_ONE : below(RATE_MOST + 1);
         check_way(&from, target, &b);
@@ -93,11 +94,11 @@ static void test_is_as_fast_as_can_be(void)
 static void test_rest_far_away_is_held(void)
 {
     struct rate rate = {RATE_ONE, RATE_SLOPE_MOST};
-    TEST_ASSERT_TRUE(rate_rest(&rate, 1) > 4 * RATE_MOST);
+    TEST_ASSERT_TRUE(rate_stop(&rate, 1).rest_q57 > 4 * RATE_MOST);
     rate.slope_q56 = -RATE_SLOPE_MOST;
-    TEST_ASSERT_TRUE(rate_rest(&rate, 1) < -RATE_MOST);
+    TEST_ASSERT_TRUE(rate_stop(&rate, 1).rest_q57 < -RATE_MOST);
     rate.slope_q56 = 0;
-    TEST_ASSERT_TRUE(rate_rest(&rate, 1) == RATE_ONE);
+    TEST_ASSERT_TRUE(rate_stop(&rate, 1).rest_q57 == RATE_ONE);
 }
 
 static void test_root(void)
