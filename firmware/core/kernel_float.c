@@ -6,7 +6,7 @@
 
 #define Q30  1073741824.0f
 #define Q24  16777216.0f
-#define HALF (KERNEL_FLOAT_PARTS / 2)
+#define HALF 2 /* parts on each side of the middle */
 
 static float from_q30(int64_t a)
 {

@@ -136,7 +136,7 @@ static void test_corners_do_not_overflow(void)
         draw(u, v);
         int n = 6 - 2 * (int)(golden_random(&seed) % 21u);
         double little = littles[golden_random(&seed) % (sizeof littles / sizeof littles[0])];
-        double turn = acos(-1.0) / (TURNS / 2) * (double)(golden_random(&seed) % TURNS);
+        double turn = acos(-1.0) / (0.5 * TURNS) * (double)(golden_random(&seed) % TURNS);
         /* above 2^6 mm no segment is accepted */
         at_power(u, v, n, n == 6 ? -fabs(little) : little, turn);
     }
