@@ -52,7 +52,6 @@ void prepared_piece_make(struct prepared_piece *out, const struct program *p,
     out->start_q32_s = start_q32_s;
     out->end_q32_s =
         i + 1u == p->header.piece_count ? UINT64_MAX : start_q32_s + piece.duration_q32_s;
-    look_ahead(out->ahead, p, i);
     out->reserved = 0;
     kernel->piece_set(&out->feed, &piece);
 }
@@ -83,6 +82,7 @@ int prepared_make(const struct program *p, const struct kernel *kernel, prepared
     memset(&record, 0, sizeof record);
     for (uint32_t i = 0; error == 0 && i < p->header.piece_count; i++) {
         prepared_piece_make(&record.piece, p, kernel, i, start_q32_s);
+        look_ahead(record.piece.ahead, p, i);
         start_q32_s = record.piece.end_q32_s;
         error = sink(context, record.bytes, prepared_piece_size(kernel));
     }

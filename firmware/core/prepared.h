@@ -68,7 +68,7 @@ static inline uint32_t prepared_segment_size(const struct kernel *kernel)
 /* Bytes of all records of a program; may be above 2^32. */
 uint64_t prepared_size(const struct program *p, const struct kernel *kernel);
 
-/* One record. The piece begins at start_q32_s. Main loop, or a tick without prepared records. */
+/* One record; a piece without `ahead`. The piece begins at start_q32_s. Main loop, or a tick without prepared records. */
 void prepared_piece_make(struct prepared_piece *out, const struct program *p,
                          const struct kernel *kernel, uint32_t i, uint64_t start_q32_s);
 void prepared_segment_make(struct prepared_segment *out, const struct program *p,
