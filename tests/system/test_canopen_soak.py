@@ -30,5 +30,5 @@ def test_a_minute_of_bus_time(root: Path, tmp_path: Path) -> None:
     for found in periods:
         assert found["unexpected"] == 0
         assert found["bus_s"] >= SECONDS / len(periods)
-        assert found["programs"] >= 3
+        assert found["programs"] >= 2  # at 8 ms they take longer
         assert found["frames"] > 6 * found["syncs"]

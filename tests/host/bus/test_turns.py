@@ -2,14 +2,18 @@
 """Turns at a controller's SDO channel: a lock that is waited for, but not for ever."""
 
 import os
+import queue
+import struct
 import threading
 import time
+import types
 from collections.abc import Iterator
 
 import pytest
 
 from hodograph.bus.address import BusAddress
 from hodograph.bus.sdo.controller import connect
+from hodograph.bus.sdo.node import Node
 from hodograph.bus.sdo.turns import Turns
 from hodograph.errors import BusError
 
@@ -93,3 +97,45 @@ def test_a_controller_that_another_command_uses(other: Turns) -> None:
         pytest.raises(BusError, match="another hodograph command is using node 1"),
     ):
         controller.require(0.1)
+
+
+class _LateSdo:
+    """An SDO channel whose answers come when the test says so."""
+
+    RESPONSE_TIMEOUT = 0.05
+
+    def __init__(self) -> None:
+        self.responses: queue.Queue[bytes] = queue.Queue()
+        self.asked: list[bytes] = []
+
+    def send_request(self, request: bytearray) -> None:
+        self.asked.append(bytes(request))
+
+    def answer(self, request: bytes) -> None:
+        self.responses.put(b"\x80" + request[1:4] + struct.pack("<L", 0x06020000))
+
+
+def test_an_answer_to_nobody_that_is_late_is_not_taken_for_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("hodograph.bus.sdo.node.LET_PASS_S", 0.05)
+    signs = iter([True, False, False, False])  # another process had the channel before, once
+    monkeypatch.setattr("hodograph.bus.sdo.turns._sign", lambda _: next(signs))
+    sdo = _LateSdo()
+    node = Node(BUS, 1, types.SimpleNamespace(sdo=sdo))
+    with pytest.raises(BusError, match="stopped answering"), node.turn():
+        pass
+    assert len(sdo.asked) == 1
+    with pytest.raises(BusError, match="stopped answering"), node.turn():
+        pass  # the first answer has still not come: nothing else may be asked
+    assert sdo.asked[0] != sdo.asked[1]
+    sdo.answer(sdo.asked[0])
+    sdo.answer(sdo.asked[1])
+    answered = threading.Timer(0.02, lambda: sdo.answer(sdo.asked[-1]))
+    answered.start()
+    with node.turn():
+        assert sdo.responses.empty(), "whatever came before the newest answer is gone"
+    answered.join()
+    with node.turn():
+        assert len(sdo.asked) == 3, "and the channel is ours until somebody else has it"
+    node.close()

@@ -28,6 +28,10 @@ NOWHERE = 0x5000
 LET_PASS_S = 1.0
 
 
+class _SilentError(BusError):
+    """No answer to the question that lets answers to others pass."""
+
+
 class Node:
     """A node with an SDO server, as its EDS describes it."""
 
@@ -35,6 +39,8 @@ class Node:
         self.address = address
         self.node_id = node_id
         self._turns = Turns(address, node_id)
+        self._others_under_way = False
+        self._asked_nowhere = 0
         self._identified = False
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
@@ -47,11 +53,13 @@ class Node:
     def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[None]:
         """The node's SDO channel is ours inside, and what was sent to another process is thrown away.
 
-        Raises BusError when there is no turn in `wait_s`, or when what is inside can't send.
+        Raises BusError when there is no turn in `wait_s`, when the node does not answer, or when what is inside can't
+        send.
         """
         try:
             with self._turns.turn(wait_s) as handed_over:
-                if handed_over:
+                self._others_under_way |= handed_over
+                if self._others_under_way:
                     self._let_pass()
                 yield
         except (can.CanError, OSError) as error:
@@ -60,16 +68,20 @@ class Node:
     def _let_pass(self) -> None:
         """Throws away answers to another process: all that come before the answer to a question only we ask.
 
-        The question is for an object that does not exist, so the answer is an abort that names it.
+        The question is for an object that does not exist, another one each time, so the answer is an abort that names
+        it. Until it has come nothing else may be asked: it would be taken for the answer to that.
         """
-        index = NOWHERE | (os.getpid() & 0xFFF)
+        self._asked_nowhere += 1
+        index = NOWHERE | ((os.getpid() + self._asked_nowhere) & 0xFFF)
         self.sdo.send_request(bytearray(struct.pack("<BHBL", 0x40, index, 0, 0)))
-        deadline = time.monotonic() + LET_PASS_S
+        deadline = time.monotonic() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
         with suppress(queue.Empty):
             while (left := deadline - time.monotonic()) > 0:
                 answer = self.sdo.responses.get(timeout=left)
                 if struct.unpack_from("<H", answer, 1)[0] == index:
+                    self._others_under_way = False
                     return
+        raise _SilentError(f"{self.who()} stopped answering: is its process or its power gone?")
 
     def read(self, index: int, sub: int | None = None) -> int:
         """An integer object."""
@@ -126,7 +138,7 @@ class Node:
                     raise BusError(
                         f"{self.who()} is not a Hodograph controller: {error}"
                     ) from error
-                except SdoCommunicationError:
+                except (SdoCommunicationError, _SilentError):
                     if time.monotonic() >= deadline:
                         return False
         finally:
