@@ -22,6 +22,7 @@ from bus_drives import Drive, field_of
 from bus_streams import Stream
 from bus_tap import Stretch
 from hodograph.bus.listening.frame_batch import Frames
+from hodograph.bus.sdo.node import NOWHERE
 from hodograph.config import Machine
 from hodograph.dbc import dbc_text
 
@@ -37,6 +38,7 @@ _MAY_REFUSE = {
 """What a simulated drive has not, and the controller asks every drive for at its configuration."""
 _NOT_YET = (0x2001, 0x08000022)
 """`start` while the axes settle; a refusal that the host does not expect ends its run."""
+_NO_OBJECT = 0x06020000
 _KEPT_FINDINGS = 50
 _SAMPLE = 499
 """cantools itself decodes each frame whose number this divides; the rest is decoded by numpy."""
@@ -220,8 +222,12 @@ class BusChecker:
             if drive is not None and not drive.operational and (index, code) in _MAY_REFUSE:
                 self.kinds["SDO refused by a drive while it was configured"] += 1
                 continue
-            if frame["id"] == _SDO_ANSWER + self.machine.node and (index, code) == _NOT_YET:
-                self.kinds["command refused for now: the host asks again"] += 1
-                continue
+            if frame["id"] == _SDO_ANSWER + self.machine.node:
+                if (index, code) == _NOT_YET:
+                    self.kinds["command refused for now: the host asks again"] += 1
+                    continue
+                if index & 0xF000 == NOWHERE and code == _NO_OBJECT:
+                    self.kinds["SDO channel handed over to another process"] += 1
+                    continue
             name = self._names.get(int(frame["id"]), "SDO")
             self.found(f"{name}: abort 0x{code:08X} of 0x{index:04X} sub {int(frame['data'][3])}")

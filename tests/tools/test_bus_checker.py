@@ -155,6 +155,13 @@ def test_a_start_that_is_refused_for_now_is_no_fault() -> None:
     )
 
 
+def test_a_channel_that_is_handed_over_is_no_fault() -> None:
+    nowhere = (0x581, struct.pack("<BHBI", 0x80, 0x5123, 0, 0x06020000))
+    missing = (0x581, struct.pack("<BHBI", 0x80, 0x2123, 0, 0x06020000))
+    assert seen([*good(), nowhere]).findings == []
+    assert any("of 0x2123" in finding for finding in seen([*good(), missing]).findings)
+
+
 def test_a_reset_that_was_asked_for_is_no_fault() -> None:
     frames = good()
     frames += [(0x000, b"\x81\x02"), (0x702, b"\0"), (0x000, b"\x01\x02")]
