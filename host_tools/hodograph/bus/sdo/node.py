@@ -25,6 +25,7 @@ IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))
 """Sub-index, name, low bits that may differ (the minor revision)."""
 
 NOWHERE = 0x5000
+_NO_OBJECT = 0x06020000
 LET_PASS_S = 1.0
 
 
@@ -85,7 +86,18 @@ class Node:
 
     def read(self, index: int, sub: int | None = None) -> int:
         """An integer object."""
-        return int(self._guarded(lambda: self._variable(index, sub).raw, index, sub))
+
+        def action() -> int:
+            try:
+                return int(self._variable(index, sub).raw)
+            except SdoAbortedError as error:
+                if error.code != _NO_OBJECT:
+                    raise
+                # The EDS has it, so this answered somebody's question for what is nowhere, late.
+                self._let_pass()
+                return int(self._variable(index, sub).raw)
+
+        return int(self._guarded(action, index, sub))
 
     def write(self, index: int, sub: int | None, value: int) -> None:
         """Writes an integer object. A refusal is an SdoAbortedError's text in a RefusedError."""
