@@ -10,6 +10,7 @@ import types
 from collections.abc import Iterator
 
 import pytest
+from canopen.sdo.exceptions import SdoCommunicationError
 
 from hodograph.bus.address import BusAddress
 from hodograph.bus.sdo.controller import connect
@@ -116,13 +117,13 @@ class _LateSdo:
 
 
 def test_an_answer_to_nobody_that_is_late_is_not_taken_for_another(
-    monkeypatch: pytest.MonkeyPatch,
+    other: Turns, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("hodograph.bus.sdo.node.LET_PASS_S", 0.05)
-    signs = iter([True, False, False, False])  # another process had the channel before, once
-    monkeypatch.setattr("hodograph.bus.sdo.turns._sign", lambda _: next(signs))
     sdo = _LateSdo()
     node = Node(BUS, 1, types.SimpleNamespace(sdo=sdo))
+    with other.turn():
+        pass
     with pytest.raises(BusError, match="stopped answering"), node.turn():
         pass
     assert len(sdo.asked) == 1
@@ -139,3 +140,31 @@ def test_an_answer_to_nobody_that_is_late_is_not_taken_for_another(
     with node.turn():
         assert len(sdo.asked) == 3, "and the channel is ours until somebody else has it"
     node.close()
+
+
+def test_an_answer_that_comes_too_late_is_not_taken_for_the_next() -> None:
+    sdo = _LateSdo()
+    node = Node(BUS, 4, types.SimpleNamespace(sdo=sdo))
+    with node.turn():
+        pass
+    assert not sdo.asked, "nobody had the channel before"
+    with pytest.raises(SdoCommunicationError), node.turn():
+        raise SdoCommunicationError("No SDO response received")
+    sdo.responses.put(bytes.fromhex("4f02200003000000"))
+    answered = threading.Timer(0.02, lambda: sdo.answer(sdo.asked[-1]))
+    answered.start()
+    with node.turn():
+        assert sdo.responses.empty()
+    answered.join()
+    node.close()
+
+
+def test_connections_of_one_process_are_told_of_each_other() -> None:
+    mine, yours = Turns(BUS, 3), Turns(BUS, 3)
+    had = []
+    for turns in (mine, mine, yours, mine):
+        with turns.turn() as handed_over:
+            had.append(handed_over)
+    mine.close()
+    yours.close()
+    assert had[1:] == [False, True, True]

@@ -9,7 +9,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TypeVar
 
 import can
 import canopen
@@ -25,12 +25,13 @@ IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))
 """Sub-index, name, low bits that may differ (the minor revision)."""
 
 NOWHERE = 0x5000
-_NO_OBJECT = 0x06020000
+"""The first of the 4096 indices that no EDS uses."""
 LET_PASS_S = 1.0
+_T = TypeVar("_T")
 
 
 class _SilentError(BusError):
-    """No answer to the question that lets answers to others pass."""
+    """No answer to the question that lets other answers pass."""
 
 
 class Node:
@@ -40,8 +41,7 @@ class Node:
         self.address = address
         self.node_id = node_id
         self._turns = Turns(address, node_id)
-        self._others_under_way = False
-        self._asked_nowhere = 0
+        self._under_way = False
         self._identified = False
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
@@ -52,35 +52,37 @@ class Node:
 
     @contextmanager
     def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[None]:
-        """The node's SDO channel is ours inside, and what was sent to another process is thrown away.
+        """The node's SDO channel is ours inside; what was sent to others, or came too late to us, is thrown away.
 
         Raises BusError when there is no turn in `wait_s`, when the node does not answer, or when what is inside can't
         send.
         """
         try:
             with self._turns.turn(wait_s) as handed_over:
-                self._others_under_way |= handed_over
-                if self._others_under_way:
+                self._under_way |= handed_over
+                if self._under_way:
                     self._let_pass()
                 yield
+        except SdoCommunicationError:
+            self._under_way = True
+            raise
         except (can.CanError, OSError) as error:
             raise BusError(f"{self.address}: cannot send: {one_line(error)}") from error
 
     def _let_pass(self) -> None:
-        """Throws away answers to another process: all that come before the answer to a question only we ask.
+        """Throws away answers that nobody waits for: all that come before the answer to a question only we ask.
 
-        The question is for an object that does not exist, another one each time, so the answer is an abort that names
-        it. Until it has come nothing else may be asked: it would be taken for the answer to that.
+        The question is for an object that does not exist, another one for everybody and each time, so the answer is an
+        abort that names it. Until it has come nothing else may be asked: it would be taken for the answer to that.
         """
-        self._asked_nowhere += 1
-        index = NOWHERE | ((os.getpid() + self._asked_nowhere) & 0xFFF)
-        self.sdo.send_request(bytearray(struct.pack("<BHBL", 0x40, index, 0, 0)))
+        nowhere = _nowhere()
+        self.sdo.send_request(bytearray(b"\x40" + nowhere + bytes(4)))
         deadline = time.monotonic() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
         with suppress(queue.Empty):
             while (left := deadline - time.monotonic()) > 0:
                 answer = self.sdo.responses.get(timeout=left)
-                if struct.unpack_from("<H", answer, 1)[0] == index:
-                    self._others_under_way = False
+                if answer[1:4] == nowhere:
+                    self._under_way = False
                     return
         raise _SilentError(f"{self.who()} stopped answering: is its process or its power gone?")
 
@@ -88,16 +90,9 @@ class Node:
         """An integer object."""
 
         def action() -> int:
-            try:
-                return int(self._variable(index, sub).raw)
-            except SdoAbortedError as error:
-                if error.code != _NO_OBJECT:
-                    raise
-                # The EDS has it, so this answered somebody's question for what is nowhere, late.
-                self._let_pass()
-                return int(self._variable(index, sub).raw)
+            return int(self._variable(index, sub).raw)
 
-        return int(self._guarded(action, index, sub))
+        return self._guarded(action, index, sub)
 
     def write(self, index: int, sub: int | None, value: int) -> None:
         """Writes an integer object. A refusal is an SdoAbortedError's text in a RefusedError."""
@@ -110,7 +105,7 @@ class Node:
     def _variable(self, index: int, sub: int | None) -> Any:
         return self.sdo[index] if sub is None else self.sdo[index][sub]
 
-    def _guarded(self, action: Callable[[], Any], index: int, sub: int | None) -> Any:
+    def _guarded(self, action: Callable[[], _T], index: int, sub: int | None) -> _T:
         try:
             with self.turn():
                 return action()
@@ -180,6 +175,12 @@ class Node:
                 f"no answer from {self.who()} in {wait_s:g} s: start the controller "
                 f"(hodograph rig --bus {self.address} brings up a simulated machine)"
             )
+
+
+def _nowhere() -> bytes:
+    """One of a million objects that no EDS has, as three bytes of an SDO: index and sub-index."""
+    number = int.from_bytes(os.urandom(3), "little")
+    return struct.pack("<HB", NOWHERE | (number & 0xFFF), number >> 16)
 
 
 def _name(index: int, sub: int | None) -> str:

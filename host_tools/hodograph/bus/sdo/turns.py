@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Taking turns at the one SDO channel of a controller, among the processes of one computer.
+"""Taking turns at the one SDO channel of a controller, among the connections of one computer.
 
 CANopen gives a server one default channel and assumes one client. `hodograph status` beside `hodograph run` is two; a
-lock file per bus and node lets them alternate, transfer by transfer. Whoever gets the turn from another process is
-told so, to let pass what was still on its way to the other.
+lock file per bus and node lets them alternate, transfer by transfer. Whoever gets the turn from another is told so,
+to let pass what was still on its way to the other: two connections of one process are strangers to each other too.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ..address import BusAddress
 TURN_WAIT_S = 30.0
 """Patience for a turn where nothing else is asked for: mid-way in a job, giving up would cost more than waiting."""
 _LOOK_S = 0.002
+_SIGN_BYTES = 8
 LOCK_FOLDER = Path("/run/lock")
 
 
@@ -36,6 +37,7 @@ class Turns:
     def __init__(self, address: BusAddress, node: int) -> None:
         self._who = f"node {node} on {address}"
         self._depth = 0
+        self._sign = os.urandom(_SIGN_BYTES)
         name = re.sub(r"[^A-Za-z0-9]+", "-", f"hodograph-{address}-{node}")
         self._files: list[int] = []
         with suppress(OSError):
@@ -49,7 +51,7 @@ class Turns:
 
     @contextmanager
     def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[bool]:
-        """The channel is ours inside; true when another process had it before. Turns may be nested.
+        """The channel is ours inside; true when another had it before. Turns may be nested.
 
         Raises BusError when others keep the channel for longer than `wait_s`.
         """
@@ -59,7 +61,7 @@ class Turns:
         self._take(wait_s)
         self._depth += 1
         try:
-            yield _sign(self._files[1])
+            yield _put_down(self._sign, self._files[1])
         finally:
             self._depth -= 1
             fcntl.flock(self._files[1], fcntl.LOCK_UN)
@@ -103,11 +105,10 @@ def _lock(file: int, deadline: float) -> bool:
         time.sleep(_LOOK_S)
 
 
-def _sign(file: int) -> bool:
-    """Puts our name down; true when another's stood there."""
-    me = str(os.getpid()).encode()
-    last = os.pread(file, 32, 0)
-    if last != me:
+def _put_down(sign: bytes, file: int) -> bool:
+    """Leaves our sign; true when another's stood there."""
+    last = os.pread(file, 2 * _SIGN_BYTES, 0)
+    if last != sign:
         os.ftruncate(file, 0)
-        os.pwrite(file, me, 0)
-    return bool(last) and last != me
+        os.pwrite(file, sign, 0)
+    return bool(last) and last != sign
