@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed import FeedRequest, Limits
+from ..feed import AxisLimits, FeedCap, FeedRequest, Limits
+from ..feed.limits import POLICIES
 from ..feed.request import (
     GREATEST_DEGREE,
     GREATEST_FEED_MM_S,
@@ -19,7 +21,7 @@ from ..feed.request import (
     LEAST_DEGREE,
     LEAST_FEED_MM_S,
     LEAST_RAMP_S,
-    POLICIES,
+    OPTIMAL,
     PROFILES,
 )
 from ..spline import END_NAMES
@@ -57,19 +59,42 @@ class PathFile:
 _SECTIONS = ("path", "feed", "limits", "machine")
 _PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent")
 _FEED = ("profile", "nominal_mm_s", "ramp_time_s", "n_c", "degree")
-_LIMITS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "policy")
+_LIMITS = (
+    "feed_mm_s",
+    "acceleration_mm_s2",
+    "jerk_mm_s3",
+    "centripetal_mm_s2",
+    "volts",
+    "policy",
+    "axis",
+    "cap",
+)
+_AXIS_LIMITS = ("velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+_CAP = ("from_mm", "to_mm", "feed_mm_s")
+_FEEDS, _ACCELERATIONS, _JERKS = (
+    {"low": 0.001, "high": 1e5},
+    {"low": 0.01, "high": 1e9},
+    {"low": 0.1, "high": 1e12},
+)
 
 
 def load_path_file(file: Path) -> PathFile:
     """The path file `file`; raises InputError. The machine file is named, not looked for."""
     root = Table(file, "", read_toml(file), _SECTIONS)
     machine = root.table("machine", ("file",), required=False)
+    path = _path(root.table("path", _PATH))
+    feed = _feed(root.table("feed", _FEED)) if root.has("feed") else None
+    limits = _limits(root.table("limits", _LIMITS, required=False))
+    if feed is not None and feed.optimal and not limits.bind:
+        raise root.error(
+            "feed", f'profile "{feed.profile}" has no limit to obey: add one to [limits] at least'
+        )
     return PathFile(
         file=file,
         name=file.stem,
-        path=_path(root.table("path", _PATH)),
-        feed=_feed(root.table("feed", _FEED)) if root.has("feed") else None,
-        limits=_limits(root.table("limits", _LIMITS, required=False)),
+        path=path,
+        feed=feed,
+        limits=limits,
         machine_file=machine.path("file") if machine.has("file") else None,
     )
 
@@ -130,9 +155,13 @@ def _tangent(table: Table, key: str) -> complex | None:
 
 def _feed(table: Table) -> FeedRequest:
     profile = table.choice("profile", PROFILES, "exponential")
+    feeds = {"low": LEAST_FEED_MM_S, "high": GREATEST_FEED_MM_S}
+    if profile == OPTIMAL:
+        nominal_mm_s = table.optional_number("nominal_mm_s", **feeds)
+        return FeedRequest(profile, inf if nominal_mm_s is None else nominal_mm_s)
     return FeedRequest(
         profile=profile,
-        nominal_mm_s=table.number("nominal_mm_s", low=LEAST_FEED_MM_S, high=GREATEST_FEED_MM_S),
+        nominal_mm_s=table.number("nominal_mm_s", **feeds),
         ramp_time_s=table.number("ramp_time_s", low=LEAST_RAMP_S, high=GREATEST_RAMP_S),
         n_c=_n_c(table),
         degree=table.integer("degree", 5, low=LEAST_DEGREE, high=GREATEST_DEGREE),
@@ -148,8 +177,27 @@ def _n_c(table: Table) -> float | Literal["optimise"]:
 
 def _limits(table: Table) -> Limits:
     return Limits(
-        feed_mm_s=table.optional_number("feed_mm_s", low=0.001, high=1e5),
-        acceleration_mm_s2=table.optional_number("acceleration_mm_s2", low=0.01, high=1e9),
-        jerk_mm_s3=table.optional_number("jerk_mm_s3", low=0.1, high=1e12),
+        feed_mm_s=table.optional_number("feed_mm_s", **_FEEDS),
+        acceleration_mm_s2=table.optional_number("acceleration_mm_s2", **_ACCELERATIONS),
+        jerk_mm_s3=table.optional_number("jerk_mm_s3", **_JERKS),
         policy=table.choice("policy", POLICIES, "respect"),
+        centripetal_mm_s2=table.optional_number("centripetal_mm_s2", **_ACCELERATIONS),
+        volts=table.optional_number("volts", low=1e-3, high=1e3),
+        axis=_axis_limits(table.table("axis", _AXIS_LIMITS, required=False)),
+        caps=tuple(_cap(one) for one in table.tables("cap", _CAP, required=False)),
     )
+
+
+def _axis_limits(table: Table) -> AxisLimits:
+    return AxisLimits(
+        velocity_mm_s=table.optional_per_axis("velocity_mm_s", **_FEEDS),
+        acceleration_mm_s2=table.optional_per_axis("acceleration_mm_s2", **_ACCELERATIONS),
+        jerk_mm_s3=table.optional_per_axis("jerk_mm_s3", **_JERKS),
+    )
+
+
+def _cap(table: Table) -> FeedCap:
+    from_mm, to_mm = (table.number(key, low=0.0, high=1e7) for key in ("from_mm", "to_mm"))
+    if not from_mm < to_mm:
+        raise table.error("from_mm", f"is {from_mm:g}: must be below to_mm = {to_mm:g}")
+    return FeedCap(from_mm, to_mm, table.number("feed_mm_s", **_FEEDS))

@@ -103,6 +103,15 @@ class Table:
         """As `number`; None when the file does not give the key."""
         return self.number(key, low=low, high=high) if self.has(key) else None
 
+    def optional_per_axis(self, key: str, *, low: float, high: float) -> tuple[float, float] | None:
+        """A number for x and y alike, or two [x, y]; None when the file does not give the key."""
+        if not self.has(key):
+            return None
+        if isinstance(self._data[key], (list, tuple)):
+            return self.pair(key, low=low, high=high)
+        both = self.number(key, low=low, high=high)
+        return both, both
+
     def integer(self, key: str, default: int = _MISSING, *, low: int, high: int) -> int:
         """A whole number from `low` to `high`, both included."""
         value = self._get(key, default, "a whole number")
@@ -179,12 +188,15 @@ class Table:
         section = f"{self.section}.{key}" if self.section else key
         return Table(self.file, section, value, known)
 
-    def tables(self, key: str, known: Collection[str]) -> list[Table]:
-        """The array of tables [[key]]; at least one."""
+    def tables(self, key: str, known: Collection[str], *, required: bool = True) -> list[Table]:
+        """The array of tables [[key]]; at least one where it is required."""
+        if not required and not self.has(key):
+            return []
         value = self._data.get(key, [])
+        name = f"{self.section}.{key}" if self.section else key
         if not isinstance(value, list) or not value or not all(isinstance(v, dict) for v in value):
-            raise InputError(f"{self.file}: needs one section [[{key}]] or more")
-        return [Table(self.file, f"{key} {i + 1}", v, known) for i, v in enumerate(value)]
+            raise InputError(f"{self.file}: needs one section [[{name}]] or more")
+        return [Table(self.file, f"{name} {i + 1}", v, known) for i, v in enumerate(value)]
 
     def path(self, key: str) -> Path:
         """A file name, relative to the directory of this file; the file need not be there."""

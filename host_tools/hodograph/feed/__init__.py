@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Feed along a path: profiles, plans inside limits, and the feed pieces of a program."""
 
+from .limits import AxisLimits, ControllerLimits, FeedCap, Limits
 from .pattern_search import SearchStep
 from .pieces import FeedPiece, FeedPieces
 from .plan import Excess, FeedPlan
 from .planning import plan_again, plan_feed
-from .request import ControllerLimits, FeedRequest, Limits
+from .request import FeedRequest
 
 __all__ = [
+    "AxisLimits",
     "ControllerLimits",
     "Excess",
+    "FeedCap",
     "FeedPiece",
     "FeedPieces",
     "FeedPlan",

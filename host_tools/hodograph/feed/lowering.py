@@ -10,9 +10,10 @@ from functools import partial
 from math import exp, log
 
 from ..errors import PlanError
+from .limits import ControllerLimits, Limits
 from .quantise import LONGEST_PIECE_MM
 from .ramp import ACCELERATION, JERK
-from .request import ControllerLimits, FeedRequest, Limits
+from .request import FeedRequest
 from .shapes import Shape, make_shape
 
 _HAIR = 1e-9

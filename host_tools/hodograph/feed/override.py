@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .request import ControllerLimits, Limits
+from .limits import ControllerLimits, Limits
 
 Real = NDArray[np.float64]
 Unsigned = NDArray[np.uint32]

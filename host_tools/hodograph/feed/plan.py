@@ -10,12 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .limits import ControllerLimits, Limits
 from .override import override_bounds
 from .pattern_search import SearchStep
 from .pieces import FeedPieces, derivative_peaks
 from .quantise import RawPieces, quantise
 from .ramp import ACCELERATION, JERK
-from .request import ControllerLimits, FeedRequest, Limits
+from .request import FeedRequest
 from .timeline import Timeline, timeline
 
 Real = NDArray[np.float64]

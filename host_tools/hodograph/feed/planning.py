@@ -8,12 +8,13 @@ from fractions import Fraction
 from math import isfinite
 
 from ..errors import InputError, PlanError
+from .limits import ControllerLimits, Limits
 from .lowering import Cap, choose
 from .pieces import derivative_peaks
 from .plan import Excess, FeedPlan
 from .quantise import RawPieces
 from .ramp import ACCELERATION, JERK, Ramp
-from .request import ControllerLimits, FeedRequest, Limits, check_period
+from .request import FeedRequest, check_period
 from .timeline import timeline
 
 SHORTEST_MM, LONGEST_MM = 2.0**-10, 2.0**22 - 1.0
@@ -36,6 +37,10 @@ def plan_feed(
     of range and PlanError where no feed will do.
     """
     check_period(period_us)
+    if request.optimal:
+        raise PlanError(
+            f'feed: profile "{request.profile}" needs the path itself, not only its length'
+        )
     if not (isfinite(length_mm) and SHORTEST_MM <= length_mm <= LONGEST_MM):
         raise InputError(
             f"path: its length {length_mm:g} mm must be from {SHORTEST_MM:.3g} to {LONGEST_MM:.7g} mm: "

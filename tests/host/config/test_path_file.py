@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from hodograph.config import load_path_file
 from hodograph.errors import InputError
+from hodograph.feed import AxisLimits, FeedCap
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -50,6 +52,48 @@ def test_good_file(tmp_path: Path) -> None:
     assert (found.limits.jerk_mm_s3, found.limits.acceleration_mm_s2) == (5e4, None)
     assert found.limits.policy == "report"
     assert found.machine_file is None
+
+
+FULL = (
+    GOOD
+    + """
+centripetal_mm_s2 = 1500
+volts = 4.5
+[limits.axis]
+velocity_mm_s = 200
+jerk_mm_s3 = [5e4, 4e4]
+[[limits.cap]]
+from_mm = 0
+to_mm = 12.5
+feed_mm_s = 40
+[[limits.cap]]
+from_mm = 10
+to_mm = 20
+feed_mm_s = 50
+"""
+)
+
+
+def test_every_limit(tmp_path: Path) -> None:
+    limits = load_path_file(write(tmp_path, FULL)).limits
+    assert (limits.centripetal_mm_s2, limits.volts) == (1500.0, 4.5)
+    assert limits.axis == AxisLimits((200.0, 200.0), None, (5e4, 4e4))
+    assert limits.caps == (FeedCap(0.0, 12.5, 40.0), FeedCap(10.0, 20.0, 50.0))
+
+
+OPTIMAL = "[path]\nclosed = true\nthrough = [[0,0],[1,0],[1,1]]\n[feed]\nprofile = 'optimal'\n"
+
+
+def test_optimal_needs_limits_and_nothing_else(tmp_path: Path) -> None:
+    found = load_path_file(write(tmp_path, OPTIMAL + "[limits]\nvolts = 4\n"))
+    assert found.feed.optimal
+    assert found.feed.nominal_mm_s == inf
+    capped = OPTIMAL + "nominal_mm_s = 30\n[limits.axis]\njerk_mm_s3 = 1e4\n"
+    assert load_path_file(write(tmp_path, capped)).feed.nominal_mm_s == 30.0
+    cap = "[[limits.cap]]\nfrom_mm = 0\nto_mm = 1\nfeed_mm_s = 9\n"
+    for text in (OPTIMAL, OPTIMAL + cap):
+        with pytest.raises(InputError, match=r'\[feed\] profile "optimal" has no limit to obey'):
+            load_path_file(write(tmp_path, text))
 
 
 def test_defaults(tmp_path: Path) -> None:
@@ -104,7 +148,11 @@ MISTAKES = [
         r"ends applies to open paths with through",
     ),
     ('"exponential"', '"exponentail"', r'profile.*did you mean "exponential"\?'),
-    ('"exponential"', "3", r"profile cannot be 3; use one of: quintic, exponential, minimax"),
+    (
+        '"exponential"',
+        "3",
+        r"profile cannot be 3; use one of: quintic, exponential, minimax, optimal",
+    ),
     ("nominal_mm_s = 100", "nominal_mms = 100", r'did you mean "nominal_mm_s"\?'),
     (
         "nominal_mm_s = 100",
@@ -142,6 +190,39 @@ def test_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert re.search(message, text), text
     assert text.startswith(f"{file}: ")
     assert "\n" not in text
+
+
+MORE_MISTAKES = [
+    ("volts = 4.5", "volts = 0", r"\[limits\] volts must be from 0\.001"),
+    ("volts = 4.5", "volt = 4.5", r'\[limits\] volt: unknown key; did you mean "volts"\?'),
+    ("[5e4, 4e4]", "[5e4]", r"\[limits\.axis\] jerk_mm_s3 must be two numbers \[a, b\]"),
+    ("[5e4, 4e4]", "[5e4, 0]", r"\[limits\.axis\] jerk_mm_s3 must be from 0\.1"),
+    ("[5e4, 4e4]", "'5e4'", r"\[limits\.axis\] jerk_mm_s3 must be a number"),
+    ("to_mm = 12.5\n", "", r"\[limits\.cap 1\] to_mm is missing"),
+    ("to_mm = 20", "to_mm = 10", r"\[limits\.cap 2\] from_mm is 10: must be below to_mm = 10"),
+    ("from_mm = 10", "from_mm = -1", r"\[limits\.cap 2\] from_mm must be from 0"),
+    (
+        "feed_mm_s = 50",
+        "feed = 50",
+        r'\[limits\.cap 2\] feed: unknown key; did you mean "feed_mm_s"',
+    ),
+    ("volts = 4.5", "cap = 4.5", r"not valid TOML"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MORE_MISTAKES)
+def test_mistakes_in_limits(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in FULL
+    file = write(tmp_path, FULL.replace(old, new, 1))
+    with pytest.raises(InputError, match=message) as caught:
+        load_path_file(file)
+    assert str(caught.value).startswith(f"{file}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_cap_that_is_no_section(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"needs one section \[\[limits\.cap\]\] or more"):
+        load_path_file(write(tmp_path, GOOD + "cap = 3\n"))
 
 
 def test_sections_that_are_no_sections(tmp_path: Path) -> None:

@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hodograph.errors import InputError, PlanError
-from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
+from hodograph.feed import (
+    AxisLimits,
+    ControllerLimits,
+    FeedCap,
+    FeedRequest,
+    Limits,
+    plan_feed,
+)
 from hodograph.feed.pattern_search import pattern_search
 from hodograph.feed.ramp import JERK, exponential_ramp, quintic_ramp
 
@@ -153,10 +160,35 @@ def test_absurd_lengths_are_refused(length: float) -> None:
         plan_feed(length, PAPER)
 
 
+def test_what_bounds_a_motion() -> None:
+    assert not Limits().bind
+    assert not Limits(caps=(FeedCap(0.0, 1.0, 5.0),)).bind
+    assert Limits(volts=1.0).bind
+    assert Limits(axis=AxisLimits(velocity_mm_s=(1.0, 2.0))).bind
+
+
+def test_optimal_needs_no_feed_but_the_path() -> None:
+    assert FeedRequest("optimal").optimal
+    with pytest.raises(InputError):
+        FeedRequest("optimal", 0.0)
+    with pytest.raises(InputError):
+        FeedRequest("quintic")
+    with pytest.raises(PlanError, match="needs the path itself"):
+        plan_feed(10.0, FeedRequest("optimal"), Limits(1.0))
+
+
 def test_absurd_limits_are_refused() -> None:
     for kwargs in ({"feed_mm_s": 0.0}, {"jerk_mm_s3": float("nan")}, {"policy": "ignore"}):
         with pytest.raises(InputError):
             Limits(**kwargs)
+    for kwargs in ({"volts": -1.0}, {"centripetal_mm_s2": float("inf")}):
+        with pytest.raises(InputError, match="must be above 0 and finite"):
+            Limits(**kwargs)
+    with pytest.raises(InputError, match=r"limits.axis: jerk_mm_s3 0 must be above 0"):
+        AxisLimits(jerk_mm_s3=(1.0, 0.0))
+    for ends in ((1.0, 1.0), (-1.0, 1.0), (0.0, float("inf")), (float("nan"), 1.0)):
+        with pytest.raises(InputError, match=r"limits.cap: from_mm"):
+            FeedCap(*ends, 10.0)
     with pytest.raises(InputError):
         ControllerLimits(1.0, 1.0, 1.0, 1.5)
     with pytest.raises(InputError):

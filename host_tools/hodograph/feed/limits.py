@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""The limits that a feed has to keep: those of the path file, and those of the controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from math import isfinite
+
+from ..errors import InputError
+
+POLICIES = ("respect", "report")
+LEAST_RESERVE = 2e-3
+
+PerAxis = tuple[float, float]
+"""One value for x, one for y."""
+
+
+@dataclass(frozen=True)
+class AxisLimits:
+    """Limits of the motion of each axis, `[limits.axis]`; None: no limit. Raises InputError."""
+
+    velocity_mm_s: PerAxis | None = None
+    acceleration_mm_s2: PerAxis | None = None
+    jerk_mm_s3: PerAxis | None = None
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            for value in getattr(self, one.name) or ():
+                _above_zero(f"limits.axis: {one.name}", value)
+
+    @property
+    def any(self) -> bool:
+        """Whether one of them is given."""
+        return any(getattr(self, one.name) is not None for one in fields(self))
+
+
+@dataclass(frozen=True)
+class FeedCap:
+    """A greatest feed on the stretch of path from one arc length to another. Raises InputError."""
+
+    from_mm: float
+    to_mm: float
+    feed_mm_s: float
+
+    def __post_init__(self) -> None:
+        _above_zero("limits.cap: feed_mm_s", self.feed_mm_s)
+        if not (isfinite(self.to_mm) and 0.0 <= self.from_mm < self.to_mm):
+            raise InputError(
+                f"limits.cap: from_mm {self.from_mm:g} must be at least 0 and below to_mm {self.to_mm:g}"
+            )
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the path file; None: no limit.
+
+    feed_mm_s, acceleration_mm_s2, jerk_mm_s3   of the motion along the path (F', F'', F''')
+    centripetal_mm_s2   feed^2 times curvature
+    volts               of each axis by the plant of its drive file (docs/numerics.md 13), along the path;
+                        the drive's own volts_limit where that is less
+    axis                of the motion of x and y
+    caps                of the feed on stretches of the path; where several meet, the least
+
+    policy "respect": the feed is lowered until the profile obeys; "report": it runs as asked and what
+    exceeds is listed. Profile "optimal" always obeys. Raises InputError.
+    """
+
+    feed_mm_s: float | None = None
+    acceleration_mm_s2: float | None = None
+    jerk_mm_s3: float | None = None
+    policy: str = "respect"
+    centripetal_mm_s2: float | None = None
+    volts: float | None = None
+    axis: AxisLimits = field(default_factory=AxisLimits)
+    caps: tuple[FeedCap, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in _SCALARS:
+            value = getattr(self, name)
+            if value is not None:
+                _above_zero(f"limits: {name}", value)
+        if self.policy not in POLICIES:
+            raise InputError(f"limits: policy {self.policy!r} is not one of {', '.join(POLICIES)}")
+
+    @property
+    def bind(self) -> bool:
+        """Whether one of them bounds the motion everywhere; caps alone do not."""
+        return self.axis.any or any(getattr(self, name) is not None for name in _SCALARS)
+
+
+_SCALARS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "centripetal_mm_s2", "volts")
+
+
+@dataclass(frozen=True)
+class ControllerLimits:
+    """Limits of the controller (machine file): they always bind.
+
+    A plan keeps `reserve` (a fraction) of each free for hold and override, and at least LEAST_RESERVE, which
+    the pieces need; docs/numerics.md 5.5 and section 7. Raises InputError.
+    """
+
+    feed_mm_s: float
+    acceleration_mm_s2: float
+    jerk_mm_s3: float
+    reserve: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3"):
+            _above_zero(f"controller: {name}", getattr(self, name))
+        if not 0.0 <= self.reserve <= 0.9:
+            raise InputError(f"controller: reserve {self.reserve:g} is not in 0 … 0.9")
+
+    @property
+    def kept_free(self) -> float:
+        """The fraction of each limit that a plan really keeps free."""
+        return max(self.reserve, LEAST_RESERVE)
+
+
+def _above_zero(name: str, value: float) -> None:
+    if not (isfinite(value) and value > 0.0):
+        raise InputError(f"{name} {value:g} must be above 0 and finite")
