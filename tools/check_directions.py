@@ -61,6 +61,7 @@ C_RULES: dict[str, set[str]] = {
         "firmware/canopen",
         "firmware/port/linux/can_socket.h",  # a Linux program: socket and clock are those of the port
         "firmware/port/linux/clock.h",
+        "firmware/port/linux/end_signals.h",
         "sim/plant",
         "sim/faults",
         "generated",
@@ -70,6 +71,7 @@ C_RULES: dict[str, set[str]] = {
         "firmware/can",
         "firmware/port/linux/can_socket.h",
         "firmware/port/linux/clock.h",
+        "firmware/port/linux/end_signals.h",
         "sim/faults",
     },
     "sim/bridge": {

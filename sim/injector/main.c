@@ -5,10 +5,8 @@
 #include <errno.h>
 #include <poll.h>
 #include <sched.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/signalfd.h>
 
 #include "faults/fault_file.h"
 #include "faults/fault_log.h"
@@ -17,6 +15,7 @@
 #include "injector/outbox.h"
 #include "port/linux/can_socket.h"
 #include "port/linux/clock.h"
+#include "port/linux/end_signals.h"
 
 /* Below the drives and the controller's tick, so that they finish what they send together; above everything
  * ordinary. */
@@ -133,22 +132,11 @@ static int run(struct injector *injector, int signals)
     return EXIT_BUS;
 }
 
-/* Ends come as readable bytes, so that no handler runs in the middle of anything. */
-static int open_signals(void)
-{
-    sigset_t set;
-    (void)sigemptyset(&set);
-    (void)sigaddset(&set, SIGTERM);
-    (void)sigaddset(&set, SIGINT);
-    (void)sigprocmask(SIG_BLOCK, &set, NULL);
-    return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-}
-
 static int start(struct injector *injector, const struct injector_options *options)
 {
     char reason[512];
     const struct sched_param priority = {.sched_priority = PRIORITY};
-    const int signals = open_signals();
+    const int signals = end_signals_open();
     if (options->rules != NULL &&
         fault_file_read(&injector->rules, options->rules, reason, sizeof reason) != 0) {
         return complain(EXIT_USAGE, reason);

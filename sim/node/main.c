@@ -5,17 +5,16 @@
 #include <errno.h>
 #include <poll.h>
 #include <sched.h>
-#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include "faults/fault_file.h"
 #include "node/drives.h"
 #include "node/node_options.h"
 #include "port/linux/clock.h"
+#include "port/linux/end_signals.h"
 
 /* Below the controller's tick, above everything ordinary. */
 #define PRIORITY 20
@@ -67,17 +66,6 @@ static bool run(struct drives *drives, int signals)
     return false;
 }
 
-/* Ends come as readable bytes, so that no handler runs in the middle of anything. */
-static int open_signals(void)
-{
-    sigset_t set;
-    (void)sigemptyset(&set);
-    (void)sigaddset(&set, SIGTERM);
-    (void)sigaddset(&set, SIGINT);
-    (void)sigprocmask(SIG_BLOCK, &set, NULL);
-    return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-}
-
 /* Real drives answer within a fraction of the period; where that is not permitted, the host's scheduler decides. */
 static void ask_for_priority(void)
 {
@@ -89,7 +77,7 @@ static int start(struct drives *drives, const struct node_options *options)
 {
     char reason[512];
     uint8_t node = 0;
-    const int signals = open_signals();
+    const int signals = end_signals_open();
     if (options->faults != NULL &&
         fault_file_read(&drives->rules, options->faults, reason, sizeof reason) != 0) {
         return complain(EXIT_USAGE, reason);
