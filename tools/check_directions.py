@@ -98,6 +98,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "native": {"errors", "names", "config"},
     "program": {"errors", "spline", "feed", "native"},
     "simulate": {"errors", "config", "native", "program"},
+    "verify": {"errors", "names", "config", "feed", "native", "program"},
     "bustime": {"errors", "data", "config"},
     "dbc": {"data", "config", "bustime"},
     "bus.address": {"errors"},

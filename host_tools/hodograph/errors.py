@@ -42,6 +42,12 @@ class RunError(HodographError):
     exit_status = 6
 
 
+class LimitError(HodographError):
+    """A program goes beyond the limits that it was looked at with."""
+
+    exit_status = 7
+
+
 INTERRUPTED_EXIT_STATUS = 130
 """Exit status after Ctrl-C (128 + SIGINT), as shells have it."""
 

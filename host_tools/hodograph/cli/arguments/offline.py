@@ -42,6 +42,16 @@ def _inspect(command: Command) -> None:
     inspect.add_argument("--full", action="store_true", help="print every segment and piece")
 
 
+def _verify(command: Command) -> None:
+    verify = command("verify", "look whether a program keeps the limits of its path file")
+    options.file(verify)
+    options.machine(verify)
+    options.json(verify)
+    verify.add_argument(
+        "--program", type=Path, metavar="IMAGE", help="look at this image, not at FILE planned anew"
+    )
+
+
 def _simulate(command: Command) -> None:
     simulate = command("simulate", "run a path without a bus, as fast as it goes")
     options.file(simulate)
@@ -77,4 +87,4 @@ def _dbc(command: Command) -> None:
     )
 
 
-ALL = (_spline, _feed, _compile, _inspect, _simulate, _report, _paper, _dbc)
+ALL = (_spline, _feed, _compile, _inspect, _verify, _simulate, _report, _paper, _dbc)

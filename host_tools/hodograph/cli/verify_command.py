@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""hodograph verify: a program beside the limits of its path file."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from dataclasses import asdict
+from pathlib import Path
+
+from ..chain import Chain, load_chain
+from ..config import PLANE_AXES, Drive, Machine
+from ..errors import InputError, LimitError
+from ..native.program import NativeProgram
+from ..program import compile_program, encode
+from ..program.compiler import ProgramOptions
+from ..verify import (
+    TOLERANCE,
+    BusNoise,
+    Peak,
+    Sampled,
+    Verification,
+    bus_noise,
+    sampled,
+    verify_program,
+)
+from .output import number, print_json
+from .path_commands import decode_file, print_notes, read_image
+
+COUNTS_PER_MM = 1_000_000
+"""Where no machine says anything else."""
+
+_MOST_LINES = 20
+
+
+def verify(options: Namespace) -> None:
+    """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
+    chain = load_chain(options.file, options.machine)
+    machine = chain.machine_or_none
+    image = _planned(chain) if options.program is None else _given(options.program)
+    program = decode_file(options.program or options.file, image)
+    NativeProgram(image).require()
+    found = verify_program(program, chain.file.limits, _drives(machine))
+    drives_see = sampled(image)
+    counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
+    noise = bus_noise(counts_per_mm, program.period_us)
+    if options.json:
+        print_json(_document(found, drives_see, noise))
+    else:
+        print(_text(found, drives_see, noise))
+    if not found.kept:
+        beyond = [peak.quantity for peak in found.peaks if not peak.kept]
+        raise LimitError(
+            f"{options.file}: beyond its limits by more than {100 * TOLERANCE:g} %: {', '.join(beyond)}"
+        )
+
+
+def _planned(chain: Chain) -> bytes:
+    print_notes(chain, chain.plan)
+    if chain.machine_or_none is not None:
+        return chain.image
+    options = ProgramOptions(chain.file.name)
+    return encode(compile_program(chain.spline_result.spline, chain.plan, options))
+
+
+def _given(file: Path) -> bytes:
+    image = read_image(file)
+    if image is None:
+        raise InputError(f"{file}: is not a program image: make one with hodograph compile")
+    return image
+
+
+def _drives(machine: Machine | None) -> tuple[Drive, ...]:
+    """Those of x and y, none when one of them is not known."""
+    if machine is None or len(machine.axes) < PLANE_AXES:
+        return ()
+    known = [axis.drive for axis in machine.plane if axis.drive is not None]
+    return tuple(known) if len(known) == PLANE_AXES else ()
+
+
+def _document(
+    found: Verification, drives_see: tuple[Sampled, ...], noise: BusNoise
+) -> dict[str, object]:
+    return {
+        "kept": found.kept,
+        "duration_s": found.duration_s,
+        "length_mm": found.length_mm,
+        "samples": found.samples,
+        "peak": {peak.quantity: _entry(peak) for peak in found.peaks},
+        "excesses": [{"quantity": peak.quantity} | _entry(peak) for peak in found.excesses],
+        "setpoints": {
+            one.kernel: {k: v for k, v in asdict(one).items() if k != "kernel"}
+            for one in drives_see
+        },
+        "bus_noise": asdict(noise),
+    }
+
+
+def _entry(peak: Peak) -> dict[str, object]:
+    return {
+        "value": peak.value,
+        "at_most": peak.at_most,
+        "limit": peak.limit,
+        "ratio": peak.ratio,
+        "s_mm": peak.s_mm,
+        "t_s": peak.t_s,
+    }
+
+
+def _text(found: Verification, drives_see: tuple[Sampled, ...], noise: BusNoise) -> str:
+    lines = [
+        f"{'quantity':<24} {'peak':>12} {'at most':>12} {'limit':>10} {'ratio':>8} {'s mm':>10} {'t s':>9}",
+        *(_row(peak) for peak in found.peaks),
+        "",
+    ]
+    if found.excesses:
+        lines.append(f"beyond a limit, worst place of each stretch ({len(found.excesses)}):")
+        lines += [_row(peak) for peak in found.excesses[:_MOST_LINES]]
+        if len(found.excesses) > _MOST_LINES:
+            lines.append(f"  ... {len(found.excesses) - _MOST_LINES} more (--json lists them)")
+    else:
+        lines.append("nothing beyond a limit")
+    lines += [
+        "",
+        f"{'setpoints of kernel':<24} {'x mm/s^2':>12} {'y mm/s^2':>12} {'x mm/s^3':>12} {'y mm/s^3':>12} "
+        f"{'noise':>10}",
+    ]
+    lines += [
+        f"{one.kernel:<24} {number(one.acceleration_mm_s2[0]):>12} {number(one.acceleration_mm_s2[1]):>12} "
+        f"{number(one.jerk_mm_s3[0]):>12} {number(one.jerk_mm_s3[1]):>12} {number(one.noise_mm_s3):>10}"
+        for one in drives_see
+    ]
+    lines.append(
+        f"rounding to counts adds up to {number(noise.acceleration_mm_s2)} mm/s^2 and "
+        f"{number(noise.jerk_mm_s3)} mm/s^3 on the bus"
+    )
+    return "\n".join(lines)
+
+
+def _row(peak: Peak) -> str:
+    limit = "-" if peak.limit is None else number(peak.limit)
+    ratio = "-" if peak.ratio is None else f"{peak.ratio:.5f}"
+    return (
+        f"{peak.quantity:<24} {number(peak.value):>12} {number(peak.at_most):>12} {limit:>10} {ratio:>8} "
+        f"{peak.s_mm:>10.4f} {peak.t_s:>9.4f}"
+    )
+
+
+COMMANDS = {"verify": verify}

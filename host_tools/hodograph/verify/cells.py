@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""The motion of a program cut into cells: stretches of time within one feed piece and one segment.
+
+Within a cell everything is smooth: arc length is one polynomial in time, the curve one polynomial in its parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..program import Program
+from .polynomials import shifted, values
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Int = NDArray[np.int64]
+
+_BISECTIONS = 56
+_NEWTON_STEPS = 6
+_BRIEF_S = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """C cells in the order of time.
+
+    segment, start_s, duration_s   (C,) index; program time of its start; its length in time
+    way      (C, 8) arc length within the segment, mm, in powers of u = (t - start_s) / duration_s
+    xi       (C, 2) the curve's parameter at both ends
+    """
+
+    program: Program
+    curve: Curve
+    segment: Int
+    start_s: Real
+    duration_s: Real
+    way: Real
+    xi: Real
+
+    def __len__(self) -> int:
+        return int(self.segment.size)
+
+    def arc_length_mm(self, cell: Int, u: Real) -> Real:
+        """Arc length on the path."""
+        return self.curve.start_mm[self.segment[cell]] + values(self.way[cell], u)
+
+    def time_s(self, cell: Int, u: Real) -> Real:
+        """Program time."""
+        return np.asarray(self.start_s[cell] + u * self.duration_s[cell])
+
+    def taken(self, which: Int | NDArray[np.bool_]) -> Cells:
+        """Some of them."""
+        return replace(
+            self,
+            segment=self.segment[which],
+            start_s=self.start_s[which],
+            duration_s=self.duration_s[which],
+            way=self.way[which],
+            xi=self.xi[which],
+        )
+
+    def divided(self, parts: Int) -> Cells:
+        """Each cut evenly into `parts` (C,)."""
+        cell = np.repeat(np.arange(len(self)), parts)
+        width = 1.0 / parts[cell]
+        first = np.arange(cell.size) - np.repeat(np.cumsum(parts) - parts, parts)
+        part = replace(
+            self.taken(cell),
+            start_s=self.start_s[cell] + first * width * self.duration_s[cell],
+            duration_s=width * self.duration_s[cell],
+            way=shifted(self.way[cell], first * width, width),
+        )
+        return replace(part, xi=part.curve.ends(part.segment, part.way))
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The segments of a program in powers of xi: w (N, 3) and the arc length within the segment (N, 6), mm."""
+
+    start_mm: Real
+    w: Complex
+    arc: Real
+
+    def parameter(self, segment: Int, arc_mm: Real) -> Real:
+        """xi at an arc length within the segment, both (K,). Newton; docs/numerics.md 12 says why it converges."""
+        arc = self.arc[segment]
+        xi = arc_mm / arc.sum(axis=1)
+        for _ in range(_NEWTON_STEPS):
+            xi = xi - (values(arc, xi) - arc_mm) / values(arc, xi, 1)
+        return np.asarray(xi)
+
+    def ends(self, segment: Int, way: Real) -> Real:
+        """xi at u = 0 and 1 of cells, (C, 2)."""
+        first, last = (self.parameter(segment, end) for end in (way[:, 0], way.sum(axis=1)))
+        return np.stack((first, last), axis=1)
+
+
+def curve_of(program: Program) -> Curve:
+    """The exact geometry of a program, in doubles."""
+    bernstein = 2.0**-44 * (program.u_q44 + 1j * program.v_q44)
+    b0, b1, b2 = bernstein.T
+    w: Complex = np.stack((b0, 2.0 * (b1 - b0), b0 - 2.0 * b1 + b2), axis=1)
+    sigma = np.stack([speed_power(w, k) for k in range(5)], axis=1)
+    arc: Real = np.concatenate((np.zeros((len(w), 1)), sigma / np.arange(1.0, 6.0)), axis=1)
+    return Curve(np.ldexp(program.start_q40.astype(np.float64), -40), w, arc)
+
+
+def speed_power(w: Complex, power: int) -> Real:
+    """Coefficient of xi^power of sigma = |w|^2, (N,)."""
+    pairs = [(j, power - j) for j in range(3) if 0 <= power - j <= 2]
+    return np.asarray(sum((w[:, j] * np.conj(w[:, k])).real for j, k in pairs))
+
+
+def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
+    """The cells of a program; cut at the arc lengths `more_mm` besides."""
+    pieces = program.pieces
+    exponent = np.array([piece.exponent for piece in pieces], dtype=np.float64)
+    duration = pieces.duration_q32_s * 2.0**-32
+    scale = np.concatenate((np.zeros((len(pieces), 1)), pieces.c_q40 * 2.0**-40), axis=1)
+    way = scale * (duration * 2.0**-exponent)[:, None] ** np.arange(8.0)
+    piece, u = _joints(program, way, more_mm)
+    cell_piece, low, high = _stretches(len(pieces), piece, u)
+    brief = (high - low) * duration[cell_piece] < _BRIEF_S
+    cell_piece, low, high = cell_piece[~brief], low[~brief], high[~brief]
+    middle = values(way[cell_piece], 0.5 * (low + high))
+    start = pieces.start_q40[cell_piece]
+    at_q40 = start + np.rint(middle * 2.0**40).astype(np.int64)
+    segment = np.searchsorted(program.start_q40, at_q40, side="right") - 1
+    segment = np.clip(segment, 0, program.segment_count - 1)
+    own = shifted(way[cell_piece], low, high - low)
+    own[:, 0] += (start - program.start_q40[segment]) * 2.0**-40
+    curve = curve_of(program)
+    begun = np.concatenate(([0.0], np.cumsum(duration)[:-1]))
+    return Cells(
+        program,
+        curve,
+        segment,
+        begun[cell_piece] + low * duration[cell_piece],
+        (high - low) * duration[cell_piece],
+        own,
+        curve.ends(segment, own),
+    )
+
+
+def _joints(program: Program, way: Real, more_mm: Sequence[float]) -> tuple[Int, Real]:
+    """Piece and u where the motion passes a joint of segments, or one of `more_mm`."""
+    more = np.rint(np.asarray(more_mm, dtype=np.float64) * 2.0**40).astype(np.int64)
+    joints = np.unique(np.concatenate((program.start_q40[1:], more)))
+    joints = joints[(joints > 0) & (joints < program.length_q40)]
+    starts = program.pieces.start_q40
+    piece = np.clip(np.searchsorted(starts, joints, side="right") - 1, 0, None)
+    target = (joints - starts[piece]) * 2.0**-40
+    low, high = np.zeros(joints.size), np.ones(joints.size)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = values(way[piece], middle) < target
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return piece, 0.5 * (low + high)
+
+
+def _stretches(count: int, piece: Int, u: Real) -> tuple[Int, Real, Real]:
+    """Piece, begin and end of what lies between neighbouring cuts; ends of pieces are cuts too."""
+    whole = np.arange(count)
+    pieces = np.concatenate((whole, piece))
+    lows = np.concatenate((np.zeros(count), u))
+    order = np.lexsort((lows, pieces))
+    pieces, lows = pieces[order], lows[order]
+    highs = np.append(lows[1:], 1.0)
+    highs[np.append(pieces[1:] != pieces[:-1], True)] = 1.0
+    return pieces, lows, highs

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""Greatest magnitudes of all quantities, by samples close enough for a certain bound; docs/numerics.md 16."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bounds import bends
+from .cells import Cells
+from .motion import Motion, motion_at
+from .quantities import Quantity
+
+Real = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+GAP = 1e-4
+"""How far a quantity may rise between samples, over its least limit or its peak, whichever is greater."""
+
+_MOST_INTERVALS = 48
+_ROUNDS = 8
+_CHUNK = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class CellPeaks:
+    """By quantity and cell, (Q, C): the greatest magnitude among samples, where (u), and what it can be at most."""
+
+    found: Real
+    at: Real
+    at_most: Real
+    samples: int
+
+
+def scales(cells: Cells, rows: Sequence[Quantity]) -> Real:
+    """Of each quantity, (Q,): its least limit, or its magnitude at ends and middles of cells where that is more."""
+    top = np.full(len(rows), 1e-12)
+    for k, row in enumerate(rows):
+        if row.limit is not None and np.isfinite(row.limit).any():
+            top[k] = row.limit.min()
+    for u in (0.0, 0.5, 1.0):
+        for first in range(0, len(cells), _CHUNK):
+            cell = np.arange(first, min(first + _CHUNK, len(cells)))
+            motion = motion_at(cells, cell, np.full(cell.size, u))
+            top = np.maximum(top, [np.abs(row.of(motion)).max() for row in rows])
+    return top
+
+
+def refine(cells: Cells, rows: Sequence[Quantity], scale: Real) -> tuple[Cells, Motion]:
+    """Cells cut further until their bounds ask for few samples each, and these bounds."""
+    for _ in range(_ROUNDS):
+        bend = bends(cells)
+        need = intervals(cells, bend, rows, scale)
+        parts = np.where(need > _MOST_INTERVALS, np.minimum(need // 16, 16), 1)
+        if not np.any(parts > 1):
+            break
+        cells = cells.divided(parts)
+    return cells, bends(cells)
+
+
+def intervals(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real) -> Int:
+    """How many (C,) keep every quantity within GAP of its scale between their ends."""
+    worst = np.zeros(len(cells))
+    for row, one in zip(rows, scale, strict=True):
+        worst = np.maximum(worst, row.of(bend) / one)
+    return np.ceil(cells.duration_s * np.sqrt(worst / (8.0 * GAP)) + 1e-3).astype(np.int64)
+
+
+def cell_peaks(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real) -> CellPeaks:
+    """Samples each cell at the ends of its intervals."""
+    need = intervals(cells, bend, rows, scale)
+    found, at = np.zeros((len(rows), len(cells))), np.zeros((len(rows), len(cells)))
+    for first, last in _spans(need + 1):
+        count = need[first:last] + 1
+        begin = np.cumsum(count) - count
+        cell = np.repeat(np.arange(first, last), count)
+        u = (np.arange(cell.size) - np.repeat(begin, count)) / need[cell]
+        motion = motion_at(cells, cell, u)
+        for k, row in enumerate(rows):
+            size = np.abs(row.of(motion))
+            top = np.maximum.reduceat(size, begin)
+            found[k, first:last] = top
+            where = np.where(size == np.repeat(top, count), u, np.inf)
+            at[k, first:last] = np.minimum.reduceat(where, begin)
+    rise = np.stack([row.of(bend) for row in rows]) * (cells.duration_s / need) ** 2 / 8.0
+    return CellPeaks(found, at, found + rise, int((need + 1).sum()))
+
+
+def _spans(count: Int) -> Iterator[tuple[int, int]]:
+    """Neighbouring cells whose samples together are about _CHUNK."""
+    total = np.cumsum(count)
+    first = 0
+    while first < count.size:
+        before = total[first - 1] if first else 0
+        last = max(first + 1, int(np.searchsorted(total, before + _CHUNK, side="right")))
+        yield first, last
+        first = last

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""Differences of setpoints: by hand, in stretches, and beside the true derivatives."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.chain import load_chain
+from hodograph.feed import Limits
+from hodograph.native.program import NativeProgram
+from hodograph.verify import bus_noise, sampled, verify_program
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+
+
+@pytest.mark.parametrize("name", ["alpha", "heart"])
+def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str) -> None:
+    chain = load_chain(EXAMPLES / f"{name}.toml")
+    found = {one.kernel: one for one in sampled(chain.image)}
+    program = NativeProgram(chain.image)
+    points = program.points("fixed", program.tick_times_q42_s())
+    for axis, key in enumerate(("x_q40_mm", "y_q40_mm")):
+        x = points[key].astype(np.float64) * 2.0**-40
+        x = np.concatenate((np.full(3, x[0]), x, np.full(3, x[-1])))
+        acceleration = np.abs(np.diff(x, 2)).max() / 1e-6
+        jerk = np.abs(np.diff(x, 3)).max() / 1e-9
+        assert found["fixed"].acceleration_mm_s2[axis] == pytest.approx(acceleration, abs=1e-3)
+        assert found["fixed"].jerk_mm_s3[axis] == pytest.approx(jerk, abs=1.0)
+    peaks = {peak.quantity: peak for peak in verify_program(chain.program, Limits()).peaks}
+    for one in found.values():
+        # A difference is a mean of the derivative, plus what the kernel's rounding adds.
+        for axis, name_ in enumerate("xy"):
+            jerk = peaks[f"{name_}_jerk_mm_s3"].at_most
+            assert one.jerk_mm_s3[axis] <= jerk + one.noise_mm_s3 + 0.01
+            assert one.jerk_mm_s3[axis] >= 0.98 * jerk - one.noise_mm_s3
+    assert found["double"].noise_mm_s3 == 0.0
+    assert found["fixed"].noise_mm_s3 < 0.01 < found["float"].noise_mm_s3 < 200.0
+
+
+def test_long_programs_are_read_in_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+    image = load_chain(EXAMPLES / "alpha.toml").image
+    whole = sampled(image)
+    monkeypatch.setattr("hodograph.verify.setpoints._CHUNK", 37)
+    assert sampled(image) == whole
+
+
+def test_rounding_to_counts() -> None:
+    """The worst case exists: roundings of alternating sign."""
+    noise = bus_noise(1_000_000, 1000)
+    assert (noise.acceleration_mm_s2, noise.jerk_mm_s3) == pytest.approx((2.0, 4000.0))
+    worst = 0.5e-6 * (-1.0) ** np.arange(9)
+    assert np.abs(np.diff(worst, 3)).max() / 1e-9 == pytest.approx(noise.jerk_mm_s3)
+    assert np.abs(np.diff(worst, 2)).max() / 1e-6 == pytest.approx(noise.acceleration_mm_s2)
