@@ -58,12 +58,14 @@ class Chain:
     """A path file and everything computed from it. Errors come when a step is first asked for."""
 
     file: PathFile
-    given_machine: Path | None = None
-    """A machine file that replaces the one the path file names."""
+    given_machine: Path | Machine | None = None
+    """A machine, or its file, that replaces the one the path file names."""
 
     @cached_property
     def machine_or_none(self) -> Machine | None:
         """The machine, None when none is named."""
+        if isinstance(self.given_machine, Machine):
+            return self.given_machine
         if self.given_machine is not None:
             return load_machine(self.given_machine)
         name = self.file.machine_file

@@ -45,6 +45,9 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
     rig->counts_per_mm = drives[0].counts_per_mm;
     rig->tick = 0;
     rig->influenced = false;
+    rig->faults = NULL;
+    rig->fault_count = 0;
+    rig->fault_tick = -1;
     rig->program_ticks = program_ticks(program);
     if (interp_begin(&rig->interp, program, kernel) != 0) {
         return RIG_ERR_KERNEL;
@@ -55,6 +58,7 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
     }
     for (int axis = 0; axis < 2; axis++) {
         drive_place(&rig->drives[axis], start[axis]);
+        rig->latched_counts[axis] = start[axis];
         rig->configs[axis] = drives[axis];
         rig->gains[axis] = without;
         rig->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
@@ -80,6 +84,19 @@ void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double frictio
     rig->rated_torque_nm[axis] = rated_torque_nm;
     rig->influences[axis].friction_volts = friction_volts;
     rig->influenced = rig->influenced || friction_volts > 0.0;
+}
+
+int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        if (!rig_fault_ok(&faults[i])) {
+            return RIG_ERR_FAULT;
+        }
+    }
+    rig->faults = faults;
+    rig->fault_count = count;
+    rig->influenced = rig->influenced || count > 0;
+    return 0;
 }
 
 static int rig_command(struct rig *rig, struct rig_row *row)
@@ -112,8 +129,39 @@ static struct feedforward_offset rig_offset(struct rig *rig, const struct rig_ro
                : none;
 }
 
+static bool rig_arrives(const struct rig *rig, uint32_t axis)
+{
+    for (uint32_t i = 0; i < rig->fault_count; i++) {
+        if (rig->faults[i].axis == axis && rig_fault_loses(&rig->faults[i], rig->fault_tick)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Begins and ends faults, and latches what arrives. */
+static void rig_latch(struct rig *rig, const struct rig_row *row)
+{
+    const bool moves = row->set_counts[0] != rig->latched_counts[0] ||
+                       row->set_counts[1] != rig->latched_counts[1];
+    if (rig->fault_tick >= 0 || moves) {
+        rig->fault_tick++;
+    }
+    for (uint32_t i = 0; i < rig->fault_count; i++) {
+        const uint32_t axis = rig->faults[i].axis;
+        rig_fault_tick(&rig->faults[i], rig->fault_tick, &rig->influences[axis],
+                       &rig->drives[axis]);
+    }
+    for (uint32_t axis = 0; axis < 2; axis++) {
+        if (rig_arrives(rig, axis)) {
+            rig->latched_counts[axis] = row->set_counts[axis];
+        }
+    }
+}
+
 static void rig_move_forward(struct rig *rig, const struct rig_row *row)
 {
+    rig_latch(rig, row);
     for (int axis = 0; axis < 2; axis++) {
         struct influence *influence = &rig->influences[axis];
         const struct feedforward_offset offset = rig_offset(rig, row, axis);
@@ -121,9 +169,9 @@ static void rig_move_forward(struct rig *rig, const struct rig_row *row)
                           offset.velocity_counts_s, offset.torque_permille,
                           rig->rated_torque_nm[axis]);
         if (influence_acts(influence, &rig->drives[axis])) {
-            influence_period(influence, &rig->drives[axis], row->set_counts[axis]);
+            influence_period(influence, &rig->drives[axis], rig->latched_counts[axis]);
         } else {
-            drive_period(&rig->drives[axis], row->set_counts[axis]);
+            drive_period(&rig->drives[axis], rig->latched_counts[axis]);
         }
     }
 }

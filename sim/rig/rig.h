@@ -24,6 +24,7 @@
 #include "plant/drive.h"
 #include "plant/influence.h"
 #include "rig/contour.h"
+#include "rig/rig_fault.h"
 
 /* One tick; 64 bytes without holes. Python maps it as a numpy record. */
 struct rig_row {
@@ -41,6 +42,7 @@ enum rig_error {
     RIG_ERR_KERNEL = -100, /* no such kernel */
     RIG_ERR_PERIOD = -101, /* a drive's period is not the program's */
     RIG_ERR_COUNTS = -102, /* the drives' counts per mm differ */
+    RIG_ERR_FAULT = -103,  /* a fault that cannot be carried out */
     RIG_ERR_DRIVE = -200,  /* minus 10 * axis, plus the enum drive_error of that axis */
     RIG_ERR_INTERP = -300, /* the interpolator failed: the program was not checked */
 };
@@ -56,7 +58,11 @@ struct rig {
     struct feedforward feedforwards[2];
     struct feedforward_gains gains[2];
     double rated_torque_nm[2];
-    bool influenced; /* by feedforward or friction */
+    bool influenced;                /* by feedforward, friction or faults */
+    const struct rig_fault *faults; /* borrowed */
+    uint32_t fault_count;
+    int64_t fault_tick;        /* of the faults; negative before the first motion */
+    int32_t latched_counts[2]; /* the last setpoint that arrived */
     uint32_t program_ticks;
     uint32_t counts_per_mm;
     uint32_t tick;
@@ -74,6 +80,11 @@ void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
 /* Rated torque of an axis (0, 1; more than 0; drive_config_rated_torque_nm if this is not called), and
  * Coulomb friction as volts (0 or more; none); right after rig_begin. */
 void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts);
+
+/* Faults of this run, right after rig_begin; they must outlive the rig. Positions and contour error stay
+ * those of the axis itself, whatever its encoder says. Of faults of one kind and axis one acts at a time.
+ * Returns 0 or RIG_ERR_FAULT. */
+int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count);
 
 /* The next n ticks. Returns 0 or RIG_ERR_INTERP. */
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);

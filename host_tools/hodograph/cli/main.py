@@ -29,6 +29,7 @@ _MODULES = {
     "record": "record_command",
     "replay": "replay_command",
     **dict.fromkeys(("home", "quick-stop", "reset"), "action_commands"),
+    "campaign": "campaign_command",
     "dbc": "dbc_command",
     "faults": "faults_command",
     "monitor": "monitor_command",

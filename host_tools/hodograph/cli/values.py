@@ -41,6 +41,13 @@ def count(text: str) -> int:
     return int(text)
 
 
+def at_least_one(text: str) -> int:
+    """A number of things of which there must be one."""
+    if not text.isdigit() or not 1 <= int(text) <= 1000:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 1 to 1000')
+    return int(text)
+
+
 def part(text: str) -> tuple[int, int]:
     """One of several equal parts."""
     match = re.fullmatch(r"(\d{1,3})/(\d{1,3})", text)

@@ -78,6 +78,10 @@ class Table:
         """Whether the file gives this key, and as a text."""
         return isinstance(self._data.get(key), str)
 
+    def is_list(self, key: str) -> bool:
+        """Whether the file gives this key, and as a list."""
+        return isinstance(self._data.get(key), list)
+
     def _get(self, key: str, default: Any, what: str) -> Any:
         if key in self._data:
             return self._data[key]
@@ -155,6 +159,17 @@ class Table:
         one = Table(self.file, self.section, {key: value[0]}, (key,))
         two = Table(self.file, self.section, {key: value[1]}, (key,))
         return one.number(key, low=low, high=high), two.number(key, low=low, high=high)
+
+    def numbers(self, key: str, *, low: float = -1e9, high: float = 1e9) -> tuple[float, ...]:
+        """A list of one or more finite numbers from `low` to `high`, each another."""
+        value = self._get(key, _MISSING, "[a, b, ...]")
+        if not isinstance(value, list) or not value:
+            raise self.error(key, f"must be a list of numbers, but is {_show(value)}")
+        each = [Table(self.file, self.section, {key: item}, (key,)) for item in value]
+        found = tuple(one.number(key, low=low, high=high) for one in each)
+        if len(set(found)) < len(found):
+            raise self.error(key, f"holds a number twice: {_show(value)}")
+        return found
 
     def points(self, key: str, *, limit: float) -> NDArray[np.complex128]:
         """A list of [x, y] as complex numbers x + iy, each component within ±`limit`."""

@@ -137,15 +137,41 @@ def load_scenario(file: Path) -> Scenario:
         text=root.text("text"),
         path=root.path("path"),
         rules=_texts(root, raw, "rules"),
-        ranges={name: _range(root, name, value) for name, value in raw.get("random", {}).items()},
+        ranges=_ranges(root, raw),
         action=host.choice("action", ACTIONS, "none"),
         expect=_expectation(expect, raw.get("expect", {})),
     )
+    _try(scenario, root)
+    return scenario
+
+
+def inline_scenario(table: Table, raw: Mapping[str, Any], name: str) -> Scenario:
+    """Rules within another file: the keys `rules` and `random` of one of its tables. Raises InputError."""
+    scenario = Scenario(
+        name=name,
+        text=name,
+        path=table.file,
+        rules=_texts(table, raw, "rules"),
+        ranges=_ranges(table, raw),
+        action="none",
+        expect=_expectation(table, {}),
+    )
+    _try(scenario, table)
+    return scenario
+
+
+def _ranges(root: Table, raw: Mapping[str, Any]) -> dict[str, tuple[Drawn, ...]]:
+    random_ = raw.get("random", {})
+    if not isinstance(random_, dict):
+        raise root.error("random", "must be a section")
+    return {name: _range(root, name, value) for name, value in random_.items()}
+
+
+def _try(scenario: Scenario, root: Table) -> None:
     try:
         draw(scenario, 0).rules  # noqa: B018
     except (KeyError, IndexError, ValueError) as error:
         raise root.error("rules", f"name what [random] does not give: {error}") from None
-    return scenario
 
 
 def _texts(table: Table, raw: Mapping[str, Any], key: str) -> tuple[str, ...]:

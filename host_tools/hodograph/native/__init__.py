@@ -8,7 +8,7 @@ says so. Arrays go in and out without copies; the interpreter lock is released d
 from ..names import KERNELS
 from .contour import Contour
 from .drive import DriveModel
-from .library import library
+from .library import library, native_file
 from .program import (
     POINT,
     NativeFault,
@@ -17,9 +17,11 @@ from .program import (
     counts_from_q40_mm,
     kernel_code,
 )
-from .rig import ROW, Rig
+from .rig import FAULT_KINDS, FOR_EVER, ROW, Rig, RigFault
 
 __all__ = [
+    "FAULT_KINDS",
+    "FOR_EVER",
     "KERNELS",
     "POINT",
     "ROW",
@@ -29,7 +31,9 @@ __all__ = [
     "NativeLimits",
     "NativeProgram",
     "Rig",
+    "RigFault",
     "counts_from_q40_mm",
     "kernel_code",
     "library",
+    "native_file",
 ]

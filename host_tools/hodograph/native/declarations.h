@@ -76,6 +76,21 @@ double contour_distance_mm(struct contour *contour, double arc_length_mm, const 
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
                        const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um);
 
+/* rig/rig_fault.h */
+enum rig_fault_kind {
+    RIG_FAULT_ENCODER_FREEZE,
+    RIG_FAULT_ENCODER_JUMP,
+    RIG_FAULT_SATURATE,
+    RIG_FAULT_LOAD,
+    RIG_FAULT_SETPOINT_LOST,
+    ...
+};
+struct rig_fault {
+    enum rig_fault_kind kind;
+    uint32_t axis, at, ticks;
+    double value;
+};
+
 /* rig/rig.h */
 struct rig_row {
     int64_t arc_length_q40_mm;
@@ -98,9 +113,10 @@ struct feedforward_gains {
 };
 void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
 void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts);
+int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count);
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
 int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
 void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
-enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };
+enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_FAULT, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };

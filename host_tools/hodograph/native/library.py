@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from ..errors import HodographError
@@ -26,6 +27,12 @@ def library() -> tuple[Any, Any]:
             "run `make clean` and `make build`"
         ) from None
     return module.ffi, module.lib
+
+
+def native_file() -> Path:
+    """The file of the compiled module. Raises HodographError as `library` does."""
+    library()
+    return Path(import_module("hodograph.native._native").__file__ or "")
 
 
 def text(pointer: Any) -> str:

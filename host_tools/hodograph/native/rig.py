@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +34,27 @@ ROW = np.dtype(
 """One tick, struct rig_row of sim/rig/rig.h: setpoint k beside the drives' report for SYNC k+2."""
 
 
+FAULT_KINDS = ("encoder-freeze", "encoder-jump", "saturate", "load", "setpoint-lost")
+"""What a `RigFault` can be, in the order of enum rig_fault_kind."""
+
+FOR_EVER = 2**32 - 1
+"""`ticks` of a fault that does not end."""
+
+
+@dataclass(frozen=True)
+class RigFault:
+    """What happens to an axis (0, 1) for `ticks` ticks from tick `at` on (sim/rig/rig_fault.h).
+
+    `value`: bus counts of a jump, volts of a voltage limit or load. Ticks count as in docs/protocol.md section 4.
+    """
+
+    kind: str
+    axis: int
+    at: int
+    ticks: int
+    value: float = 0.0
+
+
 class Rig:
     """Interpolator, two drives and contour error; begins with the drives parked at the start point."""
 
@@ -42,8 +65,9 @@ class Rig:
         drives: tuple[Drive, Drive],
         counts_per_mm: int,
         feedforward: tuple[Feedforward, Feedforward] | None = None,
+        faults: Sequence[RigFault] = (),
     ) -> None:
-        """Set up, with the controller's feedforward (None: none).
+        """Set up, with the controller's feedforward (None: none) and faults.
 
         Raises InputError: unknown kernel, figures out of range, program not acceptable.
         """
@@ -73,6 +97,13 @@ class Rig:
                 ffi.new("struct feedforward_gains[2]", [_gains(axis) for axis in feedforward]),
             )
 
+        self._faults = ffi.new("struct rig_fault[]", [_fault(fault) for fault in faults])
+        if lib.rig_faults(self._rig, self._faults, len(faults)) != 0:
+            raise InputError(
+                f"simulation: cannot carry out the faults {list(faults)}: "
+                "axis 0 or 1, ticks from 1 on, volts of a limit above 0"
+            )
+
     def run(self, rows: NDArray[np.void]) -> None:
         """Fill `rows` (contiguous, of ROW) with the next ticks."""
         ffi, lib = library()
@@ -94,6 +125,13 @@ def _gains(feedforward: Feedforward) -> dict[str, int]:
         "torque_per_acceleration_q16": feedforward.torque_per_acceleration_q16,
         "torque_per_velocity_q16": feedforward.torque_per_velocity_q16,
     }
+
+
+def _fault(fault: RigFault) -> tuple[object, ...]:
+    """As cffi takes a struct rig_fault."""
+    if fault.kind not in FAULT_KINDS:
+        raise InputError(f'simulation: there is no fault "{fault.kind}"; {", ".join(FAULT_KINDS)}')
+    return (FAULT_KINDS.index(fault.kind), *astuple(fault)[1:])
 
 
 def _begin_error(code: int) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +39,7 @@ class Motion:
     setpoints_sha256: str
     encoders_sha256: str
     max_contour_error_um: float
+    rms_contour_error_um: float
     max_following_error_um: float
     max_volts: float
 
@@ -115,6 +117,8 @@ class Tally:
         self._setpoints = hashlib.sha256()
         self._encoders = hashlib.sha256()
         self._contour_um = 0.0
+        self._contour_um2 = 0.0
+        self._rows = 0
         self._following_counts = 0
         self._volts_mv = 0
 
@@ -128,7 +132,10 @@ class Tally:
             return
         behind = np.abs(rows["set_counts"].astype(np.int64) - rows["act_counts"])
         self._following_counts = max(self._following_counts, int(behind.max()))
-        self._contour_um = max(self._contour_um, float(rows["contour_error_um"].max()))
+        contour_um = rows["contour_error_um"]
+        self._contour_um = max(self._contour_um, float(contour_um.max()))
+        self._contour_um2 += math.fsum(contour_um * contour_um)
+        self._rows += rows.size
         self._volts_mv = max(self._volts_mv, int(np.abs(rows["volts_mv"].astype(np.int32)).max()))
 
     def motion(
@@ -144,6 +151,7 @@ class Tally:
             setpoints_sha256=self._setpoints.hexdigest(),
             encoders_sha256=self._encoders.hexdigest(),
             max_contour_error_um=self._contour_um,
+            rms_contour_error_um=math.sqrt(self._contour_um2 / max(self._rows, 1)),
             max_following_error_um=self._following_counts * self._um_per_count,
             max_volts=self._volts_mv / 1000.0,
         )

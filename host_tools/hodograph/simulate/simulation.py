@@ -10,7 +10,7 @@ import numpy as np
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import InputError
-from ..native import ROW, NativeProgram, Rig
+from ..native import ROW, NativeProgram, Rig, RigFault
 from .motion import Motion, Tally, settling_ticks
 
 CHUNK_TICKS = 16384
@@ -18,12 +18,13 @@ CHUNK_TICKS = 16384
 
 
 def simulate(
-    image: bytes,
+    image: bytes | NativeProgram,
     drives: Sequence[Drive],
     *,
     kernel: str = "fixed",
     counts_per_mm: int = 1_000_000,
     feedforward: tuple[Feedforward, Feedforward] | None = None,
+    faults: Sequence[RigFault] = (),
     keep_rows: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Motion:
@@ -31,12 +32,13 @@ def simulate(
 
     Gives the same setpoints and encoder positions as a run on the bus, bit for bit. `keep_rows=False`
     bounds the memory of very long runs: hashes and maxima only. `progress(done, all)` is called
-    after each chunk. Raises InputError: image, kernel or drive figures not acceptable.
+    after each chunk. An image that is run often may be given opened. `faults` act on the axes; nobody supervises them.
+    Raises InputError: image, kernel or drive figures not acceptable.
     """
     if len(drives) != 2:
         raise InputError(f"simulate: needs the drives of 2 axes, not {len(drives)}")
-    program = NativeProgram(image)
-    rig = Rig(program, kernel, (drives[0], drives[1]), counts_per_mm, feedforward)
+    program = image if isinstance(image, NativeProgram) else NativeProgram(image)
+    rig = Rig(program, kernel, (drives[0], drives[1]), counts_per_mm, feedforward, faults)
     total = program.ticks + settling_ticks(program.period_us)
     tally = Tally(program.ticks, counts_per_mm)
     rows = np.empty(total if keep_rows else min(total, CHUNK_TICKS), dtype=ROW)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..values import at_least_one
 from . import options
 from .options import Command
 
@@ -71,6 +72,24 @@ def _report(command: Command) -> None:
     )
 
 
+def _campaign(command: Command) -> None:
+    campaign = command("campaign", "make many simulated runs on all cores, or on a cluster")
+    options.file(campaign, what="campaign file")
+    campaign.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="default: FILE without .toml, here"
+    )
+    campaign.add_argument(
+        "--workers", type=at_least_one, metavar="N", help="processes (default: one for each core)"
+    )
+    campaign.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, as tcp://host:8786"
+    )
+    campaign.add_argument(
+        "--fresh", action="store_true", help="begin anew, whatever DIR holds already"
+    )
+    options.json(campaign)
+
+
 def _paper(command: Command) -> None:
     paper = command("paper", "print the paper's numbers beside ours")
     options.json(paper)
@@ -87,4 +106,4 @@ def _dbc(command: Command) -> None:
     )
 
 
-ALL = (_spline, _feed, _compile, _inspect, _verify, _simulate, _report, _paper, _dbc)
+ALL = (_spline, _feed, _compile, _inspect, _verify, _simulate, _report, _campaign, _paper, _dbc)

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""What workers do: compile a program, make a batch of runs. Nothing here knows which engine calls it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..errors import HodographError, one_line
+from ..native import NativeProgram
+from ..simulate import simulate
+from .definition import Source
+from .design import Design, Run
+
+QUANTITIES = (
+    "max_contour_error_um",
+    "rms_contour_error_um",
+    "max_following_error_um",
+    "max_volts",
+)
+"""The figures of a run that are kept."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """What became of a program: its image and ticks, or why there is none."""
+
+    number: int
+    image: bytes = b""
+    ticks: int = 0
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a run: its figures in the order of QUANTITIES and the hash of its encoders, or an error."""
+
+    number: int
+    values: tuple[float, ...] = ()
+    encoders_sha256: str = ""
+    error: str = ""
+
+
+def build(source: Source, profile: str | None, feed_mm_s: float | None, number: int) -> Built:
+    """Plans and compiles one program."""
+    try:
+        chain = source.chain(profile, feed_mm_s)
+        return Built(number, chain.image, chain.program.ticks)
+    except Exception as error:  # a program that cannot be is a result, whatever the reason
+        return Built(number, error=_told(error))
+
+
+def make_runs(design: Design, built: Built, numbers: Sequence[int]) -> list[Outcome]:
+    """Simulates runs of one program, in their order."""
+    program = NativeProgram(built.image)
+    return [_outcome(design, program, number) for number in numbers]
+
+
+def _outcome(design: Design, program: NativeProgram, number: int) -> Outcome:
+    try:
+        return _simulated(design.run(number), program)
+    except Exception as error:  # a run that fails is a row of the table
+        return Outcome(number, error=_told(error))
+
+
+def _simulated(run: Run, program: NativeProgram) -> Outcome:
+    plant = run.plant
+    forward = any(f.velocity or f.has_torque for f in plant.feedforward)
+    motion = simulate(
+        program,
+        plant.drives,
+        kernel=plant.kernel,
+        counts_per_mm=plant.counts_per_mm,
+        feedforward=plant.feedforward if forward else None,
+        faults=run.faults,
+        keep_rows=False,
+    )
+    values = tuple(float(getattr(motion, name)) for name in QUANTITIES)
+    return Outcome(run.number, values, motion.encoders_sha256)
+
+
+def _told(error: Exception) -> str:
+    """Errors of ours as they are, others with their kind: those are bugs."""
+    text = one_line(error)
+    return text if isinstance(error, HodographError) else f"{type(error).__name__}: {text}"

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Faults of a campaign: the rules of docs/protocol.md section 4 that act on one axis alone.
+
+What needs frames, a bus or somebody who supervises is the business of `hodograph faults`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..errors import InputError
+from ..faults.scenario import Scenario, draw
+from ..native import FOR_EVER, RigFault
+
+_VALUES = {
+    "encoder-freeze": None,
+    "encoder-jump": "counts",
+    "saturate": "volts",
+    "load": "volts",
+    "drop": None,
+}
+_RPDO1 = 0x200
+LONGEST_TICKS = 4_000_000
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault that runs may have; `scenario` None: no fault."""
+
+    name: str
+    scenario: Scenario | None = None
+
+    def rules(
+        self, seed: int, sample: int, nodes: tuple[int, int], period_us: int
+    ) -> list[RigFault]:
+        """The faults of one sample. Raises InputError: a rule that a run without a bus cannot have."""
+        if self.scenario is None:
+            return []
+        text = draw(self.scenario, seed + sample).rules
+        return [rig_fault(line, nodes, period_us) for line in text.splitlines() if line.strip()]
+
+
+def rig_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault:
+    """A line of rules, for the drives with these node numbers. Raises InputError."""
+    kind, *words = rule.split()
+    if kind not in _VALUES:
+        raise InputError(
+            f'rule "{rule}": {kind} needs a bus: use `hodograph faults`, or one of {", ".join(_VALUES)}'
+        )
+    value_key = _VALUES[kind]
+    known = {"at", "for", "for_ms", "id" if kind == "drop" else "node", value_key or "at"}
+    given = dict(_pair(rule, word, known) for word in words)
+    node = int(_required(rule, given, "id")) - _RPDO1 if kind == "drop" else given.get("node")
+    if node not in nodes:
+        what = "setpoints (0x200 + node) of" if kind == "drop" else "the node of"
+        raise InputError(f'rule "{rule}": is not about {what} an axis of the path ({nodes})')
+    return RigFault(
+        "setpoint-lost" if kind == "drop" else kind,
+        nodes.index(int(node)),
+        int(_required(rule, given, "at")),
+        _ticks(kind, given, period_us),
+        0.0 if value_key is None else _required(rule, given, value_key),
+    )
+
+
+def _pair(rule: str, word: str, known: set[str]) -> tuple[str, float]:
+    key, _, text = word.partition("=")
+    if key not in known:
+        raise InputError(f'rule "{rule}": {key} has no place here; {", ".join(sorted(known))}')
+    try:
+        value = float(text) if key == "volts" else float(int(text, 0))
+    except ValueError:
+        raise InputError(f'rule "{rule}": {word} is not a number') from None
+    least = 0 if key == "at" else 1
+    if key in ("at", "for", "for_ms") and not least <= value <= LONGEST_TICKS:
+        raise InputError(f'rule "{rule}": {word} is out of range')
+    return key, value
+
+
+def _required(rule: str, given: dict[str, float], key: str) -> float:
+    if key not in given:
+        raise InputError(f'rule "{rule}": {key} is missing: add {key}=...')
+    return given[key]
+
+
+def _ticks(kind: str, given: dict[str, float], period_us: int) -> int:
+    if "for_ms" in given:
+        return max(1, math.ceil(given["for_ms"] * 1000 / period_us))
+    return int(given.get("for", FOR_EVER if kind == "encoder-jump" else 1))

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""What a campaign says in short: each group of runs (all but grid and sample the same) in a line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .design import Design
+from .execute import QUANTITIES
+from .results import Results
+from .table import case_texts
+
+SHARES = (50.0, 95.0, 100.0)
+"""Percentiles that are told of the greatest contour error."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """One line: what the runs have in common, how many there are, and their figures (NaN: none succeeded)."""
+
+    case: tuple[str, ...]
+    runs: int
+    failed: int
+    contour_um: tuple[float, ...]
+    rms_um: float
+    following_um: float
+    volts: float
+
+    @property
+    def label(self) -> str:
+        """For people: what is not as the files have it."""
+        return ", ".join(text for text in self.case if text not in ("own", "none"))
+
+    def as_dict(self) -> dict[str, object]:
+        """For tools; None where no run succeeded."""
+        p50, p95, greatest = (_finite(value) for value in self.contour_um)
+        names = ("path", "profile", "feed_mm_s", "gains", "fault")
+        return {
+            **dict(zip(names, self.case, strict=True)),
+            "runs": self.runs,
+            "failed": self.failed,
+            "contour_error_um": {"median": p50, "p95": p95, "max": greatest},
+            "rms_contour_error_um": _finite(self.rms_um),
+            "max_following_error_um": _finite(self.following_um),
+            "max_volts": _finite(self.volts),
+        }
+
+
+def groups(design: Design, results: Results) -> list[Group]:
+    """All groups, in the order of the table."""
+    size = design.group_size
+    return [
+        _group(
+            tuple(case_texts(design, design.case(place))),
+            results.values[place * size : (place + 1) * size],
+        )
+        for place in range(design.total // size)
+    ]
+
+
+def _group(case: tuple[str, ...], values: NDArray[np.float64]) -> Group:
+    good = values[~np.isnan(values[:, 0])]
+    column = dict(zip(QUANTITIES, good.T, strict=True))
+    contour = column["max_contour_error_um"]
+    return Group(
+        case=case,
+        runs=len(values),
+        failed=len(values) - len(good),
+        contour_um=tuple(
+            float(np.percentile(contour, share)) if contour.size else np.nan for share in SHARES
+        ),
+        rms_um=_greatest(column["rms_contour_error_um"]),
+        following_um=_greatest(column["max_following_error_um"]),
+        volts=_greatest(column["max_volts"]),
+    )
+
+
+def _greatest(values: NDArray[np.float64]) -> float:
+    return float(values.max()) if values.size else float("nan")
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+HEADER = ("", "runs", "failed", "contour um: median", "p95", "max", "rms", "following um", "volts")
+
+
+def text(found: list[Group]) -> str:
+    """The lines of a table for people."""
+    lines = [HEADER, *(cells(group) for group in found)]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(HEADER))]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if i == 0 else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in lines
+    )
+
+
+def cells(group: Group) -> tuple[str, ...]:
+    """A group as a line of that table."""
+    numbers = (*group.contour_um, group.rms_um, group.following_um, group.volts)
+    shown = ["–" if np.isnan(value) else f"{value:.3f}" for value in numbers]
+    return (group.label, str(group.runs), str(group.failed), *shown)

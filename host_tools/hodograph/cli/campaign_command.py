@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""hodograph campaign: many simulated runs, one table."""
+
+from __future__ import annotations
+
+import io
+from argparse import Namespace
+from pathlib import Path
+
+from ..campaign.conduct import conduct, default_folder
+from ..campaign.definition import Campaign, load_campaign
+from ..campaign.engine import available_cores, engine
+from ..campaign.journal import journal
+from ..campaign.results import Results
+from ..campaign.summary import groups, text
+from ..campaign.table import write_csv
+from ..errors import InputError, RunError
+from .output import note, print_json, progress, write_file
+
+
+def campaign(options: Namespace) -> None:
+    """Makes the runs that are missing, writes table and report; raises RunError when none succeeds."""
+    workers = options.workers or available_cores()
+    if options.scheduler is not None and options.workers is not None:
+        raise InputError(
+            "--workers is about this machine, --scheduler about a cluster: give one of them"
+        )
+    asked = load_campaign(options.file)
+    folder: Path = options.output or default_folder(asked.file)
+    total = asked.design.total
+    with journal(folder, asked.fingerprint, total, fresh=options.fresh) as made:
+        before = made.results.count
+        if before:
+            note(f"{folder}: {before} of {total} runs are done: going on")
+        if before < total:
+            with (
+                engine(workers, options.scheduler) as somewhere,
+                progress("campaign", "run", total) as bar,
+            ):
+                conduct(asked, made, somewhere, bar)
+        _write(asked, made.results, folder)
+    _tell(asked, made.results, folder, json=options.json)
+
+
+def _write(asked: Campaign, results: Results, folder: Path) -> None:
+    from ..campaign.report import write_report
+
+    stream = io.StringIO()
+    write_csv(asked.design, results, stream)
+    write_file(folder / "runs.csv", stream.getvalue().encode())
+    write_report(asked, results, folder)
+
+
+def _tell(asked: Campaign, results: Results, folder: Path, *, json: bool) -> None:
+    found = groups(asked.design, results)
+    if json:
+        print_json(
+            {
+                "folder": str(folder),
+                "runs": asked.design.total,
+                "failed": len(results.errors),
+                "groups": [group.as_dict() for group in found],
+            }
+        )
+    else:
+        print(text(found))
+        print(
+            f"{folder / 'runs.csv'}: {asked.design.total} runs; figures: {folder / 'report.html'}"
+        )
+    if results.errors:
+        number, error = min(results.errors.items())
+        told = f"{len(results.errors)} of {asked.design.total} runs failed, the first is run {number}: {error}"
+        if len(results.errors) == asked.design.total:
+            raise RunError(told)
+        note(told)
+
+
+COMMANDS = {"campaign": campaign}
