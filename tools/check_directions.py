@@ -93,7 +93,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "names": {"errors"},
     "data": set(),
     "spline": {"errors"},
-    "feed": {"errors"},
+    "feed": {"errors", "spline"},
     "config": {"errors", "names", "feed", "spline"},
     "native": {"errors", "names", "config"},
     "program": {"errors", "spline", "feed", "native"},

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from .config import Machine, PathFile, load_machine, load_path_file
+from .config import Drive, Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
-from .feed import ControllerLimits, FeedPlan, FeedRequest, plan_feed
+from .feed import ControllerLimits, FeedPlan, FeedRequest, Limits, Plant, plan_path
 from .program import (
     Compilation,
     Program,
@@ -32,6 +32,35 @@ def controller_limits(machine: Machine) -> ControllerLimits:
         jerk_mm_s3=machine.jerk_mm_s3,
         reserve=machine.reserve,
     )
+
+
+def plants(machine: Machine | None, limits: Limits) -> tuple[Plant, Plant] | None:
+    """The plants of x and y with the volts that `limits` gives them, None when it gives none.
+
+    Raises InputError: volts are limited, and an axis has no drive file, or its friction takes them all.
+    """
+    if limits.volts is None:
+        return None
+    if machine is None:
+        raise InputError(
+            '[limits] volts needs a machine: add [machine] file = "..." or use --machine FILE'
+        )
+    x, y = (_plant(drive, limits.volts) for drive in machine.models(machine.plane))
+    return x, y
+
+
+def _plant(drive: Drive, volts: float) -> Plant:
+    plant = Plant(
+        drive.gain_rad_s_v * drive.screw_mm_rad,
+        drive.time_constant_s,
+        min(volts, drive.volts_limit),
+        drive.equipment.friction_volts or 0.0,
+    )
+    if not plant.reach_mm_s > 0.0:
+        raise InputError(
+            f"[limits] volts {volts:g}: friction alone takes {plant.friction_volts:g} V of a drive"
+        )
+    return plant
 
 
 def program_limits(machine: Machine) -> ProgramLimits:
@@ -117,11 +146,12 @@ class Chain:
         feed, machine = self.feed, self.machine_or_none
         spline = self.spline_result.spline
         with _told_by(f"{self.file.file}:"):
-            plan = plan_feed(
-                spline.length_mm,
+            plan = plan_path(
+                spline,
                 feed,
                 self.file.limits,
                 controller_limits(machine) if machine is not None else None,
+                plants(machine, self.file.limits),
                 period_us=machine.period_us if machine is not None else 1000,
             )
             return fit_plan(spline, plan)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..feed import AxisLimits, FeedCap, FeedRequest, Limits
-from ..feed.limits import POLICIES
+from ..feed.limits import GREATEST_RESERVE, LEAST_RESERVE, POLICIES
 from ..feed.request import (
     GREATEST_DEGREE,
     GREATEST_FEED_MM_S,
@@ -66,6 +66,7 @@ _LIMITS = (
     "centripetal_mm_s2",
     "volts",
     "policy",
+    "reserve",
     "axis",
     "cap",
 )
@@ -184,6 +185,7 @@ def _limits(table: Table) -> Limits:
         centripetal_mm_s2=table.optional_number("centripetal_mm_s2", **_ACCELERATIONS),
         volts=table.optional_number("volts", low=1e-3, high=1e3),
         axis=_axis_limits(table.table("axis", _AXIS_LIMITS, required=False)),
+        reserve=table.number("reserve", Limits.reserve, low=LEAST_RESERVE, high=GREATEST_RESERVE),
         caps=tuple(_cap(one) for one in table.tables("cap", _CAP, required=False)),
     )
 

@@ -2,10 +2,12 @@
 """Feed along a path: profiles, plans inside limits, and the feed pieces of a program."""
 
 from .limits import AxisLimits, ControllerLimits, FeedCap, Limits
+from .path_planning import plan_path
 from .pattern_search import SearchStep
 from .pieces import FeedPiece, FeedPieces
 from .plan import Excess, FeedPlan
 from .planning import plan_again, plan_feed
+from .plant import Plant
 from .request import FeedRequest
 
 __all__ = [
@@ -18,7 +20,9 @@ __all__ = [
     "FeedPlan",
     "FeedRequest",
     "Limits",
+    "Plant",
     "SearchStep",
     "plan_again",
     "plan_feed",
+    "plan_path",
 ]

@@ -9,7 +9,7 @@ from math import isfinite
 from ..errors import InputError
 
 POLICIES = ("respect", "report")
-LEAST_RESERVE = 2e-3
+LEAST_RESERVE, GREATEST_RESERVE = 2e-3, 0.9
 
 PerAxis = tuple[float, float]
 """One value for x, one for y."""
@@ -60,6 +60,8 @@ class Limits:
                         the drive's own volts_limit where that is less
     axis                of the motion of x and y
     caps                of the feed on stretches of the path; where several meet, the least
+    reserve             share of the axes' accelerations, jerks and volts that plans leave free, so that hold, resume
+                        and override keep these limits too (docs/numerics.md section 7)
 
     policy "respect": the feed is lowered until the profile obeys; "report": it runs as asked and what
     exceeds is listed. Profile "optimal" always obeys. Raises InputError.
@@ -73,6 +75,7 @@ class Limits:
     volts: float | None = None
     axis: AxisLimits = field(default_factory=AxisLimits)
     caps: tuple[FeedCap, ...] = ()
+    reserve: float = 0.02
 
     def __post_init__(self) -> None:
         for name in _SCALARS:
@@ -81,6 +84,10 @@ class Limits:
                 _above_zero(f"limits: {name}", value)
         if self.policy not in POLICIES:
             raise InputError(f"limits: policy {self.policy!r} is not one of {', '.join(POLICIES)}")
+        if not LEAST_RESERVE <= self.reserve <= GREATEST_RESERVE:
+            raise InputError(
+                f"limits: reserve {self.reserve:g} is not in {LEAST_RESERVE:g} … {GREATEST_RESERVE:g}"
+            )
 
     @property
     def bind(self) -> bool:
@@ -107,8 +114,10 @@ class ControllerLimits:
     def __post_init__(self) -> None:
         for name in ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3"):
             _above_zero(f"controller: {name}", getattr(self, name))
-        if not 0.0 <= self.reserve <= 0.9:
-            raise InputError(f"controller: reserve {self.reserve:g} is not in 0 … 0.9")
+        if not 0.0 <= self.reserve <= GREATEST_RESERVE:
+            raise InputError(
+                f"controller: reserve {self.reserve:g} is not in 0 … {GREATEST_RESERVE:g}"
+            )
 
     @property
     def kept_free(self) -> float:

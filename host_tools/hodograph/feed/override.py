@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .limits import ControllerLimits, Limits
+from .room import FACTOR_SHARE, Room
 
 Real = NDArray[np.float64]
 Unsigned = NDArray[np.uint32]
 
 GREATEST_FACTOR = 2.0
-FACTOR_SHARE = 0.5
-"""Part of the room under each limit that a factor above 1 may use up."""
 
 _HAIR = 1.0 - 1e-9
 _U32_MAX = 2.0**32 - 1.0
@@ -37,10 +36,12 @@ def override_bounds(
     jerk_mm_s3: Real,
     controller: ControllerLimits,
     program: Limits,
+    room: Room | None = None,
 ) -> OverrideBounds:
     """Bounds from the peaks of each piece (M,), such that for every |lambda| <= factor,
     |lambda'| <= rate, |lambda''| <= second rate the controller's limits hold, and at constant
-    lambda <= factor the program's too.
+    lambda <= factor the program's too. `room`, if given, is that along the path; if the plan obeys
+    its limits, they hold for every motion of lambda as the controller's do.
     """
     v, a, j = (np.maximum(p, _TINY) for p in (feed_mm_s, acceleration_mm_s2, jerk_mm_s3))
     factor = np.minimum.reduce(
@@ -53,14 +54,21 @@ def override_bounds(
             np.cbrt(_ratio(program.jerk_mm_s3, j)),
         )
     )
+    if room is not None:
+        factor = np.minimum(factor, room.factor())
     # Rounded first: the rates then use the room that the stored factor really leaves.
     factor_q24 = np.floor(np.clip(factor * _HAIR, 1.0, GREATEST_FACTOR) * 2.0**24)
     factor = factor_q24 / 2.0**24
     room_a = controller.acceleration_mm_s2 - factor**2 * a
     room_j = controller.jerk_mm_s3 - factor**3 * j
     rate = np.minimum(room_a / v, 0.5 * room_j / (3.0 * factor * a))
+    binding = room if room is not None and room.bounds.obeyed else None
+    if binding is not None:
+        rate = np.minimum(rate, binding.rate(factor))
     rate_q16 = np.floor(np.clip(rate * _HAIR * 2.0**16, 0.0, _U32_MAX))
     second = (room_j - 3.0 * factor * (rate_q16 / 2.0**16) * a) / v
+    if binding is not None:
+        second = np.minimum(second, binding.second(factor, rate_q16 / 2.0**16))
     second_q8 = np.floor(np.clip(second * _HAIR * 2.0**8, 0.0, _U32_MAX))
     return OverrideBounds(
         factor_q24.astype(np.uint32), rate_q16.astype(np.uint32), second_q8.astype(np.uint32)

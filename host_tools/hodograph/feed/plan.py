@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .along import PathBounds, Pieces
 from .limits import ControllerLimits, Limits
 from .override import override_bounds
 from .pattern_search import SearchStep
@@ -17,6 +18,7 @@ from .pieces import FeedPieces, derivative_peaks
 from .quantise import RawPieces, quantise
 from .ramp import ACCELERATION, JERK
 from .request import FeedRequest
+from .room import Room
 from .timeline import Timeline, timeline
 
 Real = NDArray[np.float64]
@@ -42,6 +44,7 @@ class FeedPlan:
     history   steps of the pattern search for the feed really used; empty without a search
     notes     one line for each thing the user should know (what lowered the feed, and so on)
     excesses  limits broken under policy "report"
+    path      the path, where limits depend on it
     """
 
     request: FeedRequest
@@ -52,6 +55,7 @@ class FeedPlan:
     history: tuple[SearchStep, ...]
     notes: tuple[str, ...]
     excesses: tuple[Excess, ...]
+    path: PathBounds | None = None
 
     @property
     def profile(self) -> str:
@@ -122,7 +126,7 @@ class FeedPlan:
     @cached_property
     def pieces(self) -> FeedPieces:
         """`raw` with the override bounds of each piece."""
-        return _with_override(self.raw, self.controller, self.limits)
+        return with_override(self.raw, self.controller, self.limits, self.path)
 
     def pieces_over(self, length_q40: int) -> FeedPieces:
         """The plan in integers over exactly `length_q40`, which may differ a little (rounding)."""
@@ -133,16 +137,20 @@ class FeedPlan:
         if not self.line.constant_s:
             ramp = replace(ramp, feed_mm_s=float(length / Fraction(ramp.time_s)))
         raw = quantise(timeline(ramp, length), length_q40, self.period_us)
-        return _with_override(raw, self.controller, self.limits)
+        return with_override(raw, self.controller, self.limits, self.path)
 
     @property
     def _length_q40(self) -> int:
         return round(self.line.length_mm * 2**40)
 
 
-def _with_override(raw: RawPieces, controller: ControllerLimits, limits: Limits) -> FeedPieces:
+def with_override(
+    raw: Pieces, controller: ControllerLimits, limits: Limits, path: PathBounds | None = None
+) -> FeedPieces:
+    """Pieces with bounds of the override: of the controller's limits, and of those along a path."""
     peaks = derivative_peaks(raw.duration_q32_s, raw.c_q40)
-    override = override_bounds(*peaks, controller, limits)
+    room = Room(path, raw) if path is not None and path.bind else None
+    override = override_bounds(*peaks, controller, limits, room)
     return FeedPieces(
         raw.duration_q32_s,
         raw.start_q40,

@@ -51,7 +51,7 @@ def plan_feed(
 
 def plan_again(plan: FeedPlan, feed_mm_s: float, reason: str) -> FeedPlan:
     """The same request planned with the feed at most `feed_mm_s`; `reason` goes to the notes."""
-    return _plan(
+    again = _plan(
         plan.line.length_mm,
         plan.request,
         plan.limits,
@@ -59,6 +59,7 @@ def plan_again(plan: FeedPlan, feed_mm_s: float, reason: str) -> FeedPlan:
         plan.period_us,
         (Cap(feed_mm_s, reason),),
     )
+    return replace(again, path=plan.path)
 
 
 def _plan(

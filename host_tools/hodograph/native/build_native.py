@@ -16,7 +16,14 @@ from cffi import FFI
 
 PACKAGE = Path(__file__).resolve().parent
 ROOT = PACKAGE.parents[2]
-HEADERS = ("core/program_check.h", "core/interp.h", "plant/drive.h", "rig/contour.h", "rig/rig.h")
+HEADERS = (
+    "core/program_check.h",
+    "core/interp.h",
+    "core/timebase.h",
+    "plant/drive.h",
+    "rig/contour.h",
+    "rig/rig.h",
+)
 LIBRARIES = ("sim", "core")
 
 

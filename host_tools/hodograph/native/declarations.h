@@ -40,6 +40,22 @@ struct interp {
 };
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
 
+/* core/rate.h, core/timebase.h */
+struct rate {
+    int64_t rate_q57, slope_q56;
+};
+struct timebase {
+    struct rate now;
+    ...;
+};
+void timebase_begin(struct timebase *tb, const struct program *p, uint32_t period_us);
+void timebase_hold(struct timebase *tb);
+void timebase_resume(struct timebase *tb);
+void timebase_override(struct timebase *tb, uint32_t percent);
+void timebase_stop(struct timebase *tb);
+uint64_t timebase_step_q42(struct timebase *tb);
+int timebase_state(const struct timebase *tb);
+
 /* plant/drive.h */
 struct drive_plant {
     double gain_rad_s_v, time_constant_s, screw_mm_rad, torque_to_volts, volts_limit;

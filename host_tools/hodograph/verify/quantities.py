@@ -63,7 +63,7 @@ def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Qu
             )
         ]
     for k, (axis, drive) in enumerate(zip(AXES, drives, strict=False)):
-        volts = None if limits.volts is None else min(limits.volts, drive.volts_limit)
+        volts = None if limits.volts is None else _volts_left(drive, limits.volts)
         out.append(row(f"{axis}_volts", "V", volts, _volts(drive, k)))
     if limits.caps:
         out.append(Quantity("cap_mm_s", "mm/s", lambda m: m.feed, _caps(cells, limits.caps)))
@@ -81,6 +81,11 @@ def _volts(drive: Drive, axis: int) -> Callable[[Motion], Real]:
     return lambda m: (
         per_speed * m.axis_velocity[axis] + per_acceleration * m.axis_acceleration[axis]
     )
+
+
+def _volts_left(drive: Drive, volts: float) -> float:
+    """What motion may take of the volts: friction takes the rest, in whatever direction."""
+    return max(min(volts, drive.volts_limit) - (drive.equipment.friction_volts or 0.0), 1e-9)
 
 
 def _caps(cells: Cells, caps: Sequence[FeedCap]) -> Real:

@@ -207,6 +207,7 @@ MORE_MISTAKES = [
         r'\[limits\.cap 2\] feed: unknown key; did you mean "feed_mm_s"',
     ),
     ("volts = 4.5", "cap = 4.5", r"not valid TOML"),
+    ("volts = 4.5", "reserve = 0", r"\[limits\] reserve must be from 0\.002 to 0\.9"),
 ]
 
 

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""Feed pieces along a path: what they ask of the axes, beside limits of axes, curvature, volts and stretches.
+
+Samples within cells (one piece on one segment of the path); how far a quantity may rise between them is taken
+from its second differences. docs/numerics.md section 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..spline import PHSpline
+from .limits import Limits
+from .pieces import exponents
+from .plant import Plants
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Int = NDArray[np.int64]
+
+INTERVALS = 12
+_BISECTIONS = 50
+_BESIDE = 1e-6
+_BRIEF = 1e-9
+
+
+class Pieces(Protocol):
+    """Feed pieces, with or without their override bounds."""
+
+    @property
+    def duration_q32_s(self) -> Int:
+        """As `FeedPieces`."""
+
+    @property
+    def start_q40(self) -> Int:
+        """As `FeedPieces`."""
+
+    @property
+    def c_q40(self) -> Int:
+        """As `FeedPieces`."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathBounds:
+    """A path, and the limits of its file that depend on where on the path the motion is.
+
+    `obeyed`: the plan keeps them; else they only keep factors above 1 from breaking more of them.
+    """
+
+    spline: PHSpline
+    limits: Limits
+    plants: Plants | None = None
+    obeyed: bool = True
+
+    @property
+    def bind(self) -> bool:
+        """Whether there are any."""
+        limits = self.limits
+        some = limits.centripetal_mm_s2 is not None or bool(limits.caps)
+        return some or limits.axis.any or self.plants is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """C cells, K samples each: `piece` (C,); the others (C, K), those of the point as x + iy; mm, s."""
+
+    piece: Int
+    arc_mm: Real
+    feed: Real
+    centripetal: Real
+    velocity: Complex
+    acceleration: Complex
+    jerk: Complex
+
+
+def sample(bounds: PathBounds, pieces: Pieces) -> Samples:
+    """The motion of `pieces` along the path."""
+    spline = bounds.spline
+    seconds = np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
+    start = np.ldexp(pieces.start_q40.astype(np.float64), -40)
+    stretch = np.ldexp(seconds, -exponents(pieces.duration_q32_s))
+    way = np.zeros((seconds.size, 8))
+    way[:, 1:] = np.ldexp(pieces.c_q40.astype(np.float64), -40)
+    way[:, 1:] *= stretch[:, None] ** np.arange(1, 8)
+    ends = [end for cap in bounds.limits.caps for end in (cap.from_mm, cap.to_mm)]
+    cuts = np.unique(np.concatenate((spline.segment_starts_mm[1:-1], ends)))
+    piece, low, high = _cells(start, way, cuts)
+    share = np.linspace(_BESIDE, 1.0 - _BESIDE, INTERVALS + 1)
+    u = low[:, None] + (high - low)[:, None] * share
+    s = np.clip(start[piece, None] + _value(way[piece], u, 0), 0.0, spline.length_mm)
+    per_s = 1.0 / seconds[piece, None]
+    f1, f2, f3 = (_value(way[piece], u, n) * per_s**n for n in (1, 2, 3))
+    tangent, kappa, slope = _frames(spline, s)
+    normal = kappa * f1 * f1
+    across = 3.0 * kappa * f1 * f2 + slope * f1**3
+    return Samples(
+        piece,
+        s,
+        f1,
+        normal,
+        f1 * tangent,
+        (f2 + 1j * normal) * tangent,
+        (f3 - kappa * normal * f1 + 1j * across) * tangent,
+    )
+
+
+def raised(values: Real) -> Real:
+    """Magnitudes of samples (C, K), raised by what second differences say they may rise in between."""
+    bend = np.abs(np.diff(values, 2, axis=1))
+    bend = np.concatenate((bend[:, :1], bend, bend[:, -1:]), axis=1) / 8.0
+    return np.asarray(np.abs(values) + bend)
+
+
+def _cells(start: Real, way: Real, cuts: Real) -> tuple[Int, Real, Real]:
+    """Piece, begin and end (u) of each cell."""
+    at = np.clip(np.searchsorted(start, cuts, side="right") - 1, 0, None)
+    low, high = np.zeros(cuts.size), np.ones(cuts.size)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = start[at] + _value(way[at], middle[:, None], 0)[:, 0] < cuts
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    piece = np.concatenate((np.arange(start.size), at))
+    begin = np.concatenate((np.zeros(start.size), high))
+    order = np.lexsort((begin, piece))
+    piece, begin = piece[order], begin[order]
+    end = np.append(begin[1:], 1.0)
+    end[np.append(piece[1:] != piece[:-1], True)] = 1.0
+    keep = end - begin > _BRIEF
+    return piece[keep], begin[keep], end[keep]
+
+
+def _value(way: Real, u: Real, order: int) -> Real:
+    """Derivative `order` of rows of powers (C, 8) at u (C, K)."""
+    out = np.zeros_like(u)
+    for power in range(7, order - 1, -1):
+        factor = float(np.prod(np.arange(power - order + 1, power + 1)))
+        out = out * u + factor * way[:, power, None]
+    return out
+
+
+def _frames(spline: PHSpline, s: Real) -> tuple[Complex, Real, Real]:
+    """Unit tangent, curvature and its slope along the arc at arc lengths of any shape."""
+    segment, xi = spline.locate(s)
+    w0, w1, w2 = np.moveaxis(spline.w[segment], -1, 0)
+    w = w0 * (1.0 - xi) ** 2 + 2.0 * w1 * xi * (1.0 - xi) + w2 * xi * xi
+    first = 2.0 * ((w1 - w0) * (1.0 - xi) + (w2 - w1) * xi)
+    second = 2.0 * (w2 - 2.0 * w1 + w0)
+    sigma = w.real * w.real + w.imag * w.imag
+    turn = np.conj(w) * first
+    kappa = 2.0 * turn.imag / sigma**2
+    slope = (2.0 * (np.conj(w) * second).imag - 8.0 * turn.imag * turn.real / sigma) / sigma**3
+    return w * w / sigma, kappa, slope
+
+
+def per_axis(values: Complex) -> Iterator[Real]:
+    """x, then y."""
+    yield values.real
+    yield values.imag
+
+
+def least_of_pieces(samples: Samples, values: Real, count: int) -> Real:
+    """The least value (M,) over all samples of each piece."""
+    out = np.full(count, np.inf)
+    np.minimum.at(out, samples.piece, values.min(axis=1))
+    return out

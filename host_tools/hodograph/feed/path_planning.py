@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""Planning a feed for a path, inside the limits that depend on where on it the motion is; docs/numerics.md 5.5."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp, log
+
+from ..errors import PlanError
+from ..spline import PHSpline
+from .along import PathBounds
+from .limits import ControllerLimits, Limits
+from .obeying import Strain, strains
+from .plan import Excess, FeedPlan
+from .planning import plan_again, plan_feed
+from .plant import Plants
+from .request import FeedRequest
+
+_CLOSE = 1e-4
+_HAIR = 1e-6
+_MOST_TRIALS = 30
+
+
+def plan_path(
+    spline: PHSpline,
+    request: FeedRequest,
+    limits: Limits,
+    controller: ControllerLimits | None = None,
+    plants: Plants | None = None,
+    *,
+    period_us: int = 1000,
+) -> FeedPlan:
+    """As `plan_feed`, and under policy "respect" with a feed at which the motion along `spline` keeps the limits of
+    axes, curvature, volts (`plants`) and stretches too. Under "report" these are listed where they are broken.
+    """
+    plan = plan_feed(spline.length_mm, request, limits, controller, period_us=period_us)
+    respect = limits.policy == "respect"
+    bounds = PathBounds(spline, limits, plants, obeyed=respect)
+    if not bounds.bind:
+        return plan
+    if respect:
+        return replace(_lowered(plan, bounds), path=bounds)
+    broken = (
+        Excess(one.name, one.limit, one.peak)
+        for one in strains(bounds, plan.raw)
+        if one.peak > one.limit * (1.0 + _HAIR)
+    )
+    return replace(plan, path=bounds, excesses=(*plan.excesses, *broken))
+
+
+def _lowered(plan: FeedPlan, bounds: PathBounds) -> FeedPlan:
+    """The plan at the highest feed that the bounds allow: secant of log excess over log feed."""
+    high, worst = log(plan.feed_mm_s), _worst(plan, bounds)
+    high_excess = log(worst.ratio)
+    if high_excess <= 0.0:
+        return plan
+    low = low_excess = 0.0
+    best: FeedPlan | None = None
+    for _ in range(_MOST_TRIALS):
+        if best is None:
+            trial = high - high_excess - _HAIR
+        else:
+            share = -low_excess / (high_excess - low_excess)
+            trial = low + (high - low) * max(0.05, min(0.95, share))
+        tried = plan_again(plan, exp(trial), worst.reason)
+        found = _worst(tried, bounds)
+        if found.ratio > 1.0:
+            high, high_excess, worst = trial, log(found.ratio), found
+            continue
+        best, low, low_excess = tried, trial, log(found.ratio)
+        if low_excess > -_CLOSE or high - low < _CLOSE:
+            break
+    if best is None:
+        raise PlanError(f"feed: no feed obeys {worst.reason}: raise it")
+    return best
+
+
+def _worst(plan: FeedPlan, bounds: PathBounds) -> Strain:
+    return max(strains(bounds, plan.raw), key=lambda one: one.ratio)

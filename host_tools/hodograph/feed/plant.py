@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""An axis as far as its volts go; docs/numerics.md 13."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Plant:
+    """volts * gain = velocity + time constant * acceleration.
+
+    gain_mm_s_v     steady speed for one volt
+    volts           greatest voltage that may be used, of which friction takes `friction_volts`
+    """
+
+    gain_mm_s_v: float
+    time_constant_s: float
+    volts: float
+    friction_volts: float = 0.0
+
+    @property
+    def reach_mm_s(self) -> float:
+        """Bound of |velocity + time constant * acceleration|."""
+        return self.gain_mm_s_v * (self.volts - self.friction_volts)
+
+
+Plants = tuple[Plant, Plant]
+"""Of x and y."""

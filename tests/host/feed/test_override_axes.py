@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: MIT
+"""Limits along a path: kept by every profile, and by the controller's own program time under any commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hodograph.errors import InputError
+from hodograph.feed import AxisLimits, FeedCap, FeedRequest, Limits, Plant, plan_feed, plan_path
+from hodograph.native.program import NativeProgram
+from hodograph.native.timebase import State, Timebase
+from hodograph.program import Program, compile_program, encode
+from hodograph.spline import PHSpline, from_control_polygon
+from hodograph.verify.cells import cut
+from hodograph.verify.motion import motion_at
+
+PLANTS = (Plant(132.0, 0.19936, 2.5), Plant(80.3, 0.15641, 3.5, 0.2))
+COUNT_S, MOST_TICKS = 5, 6000
+
+
+def wavy(seed: int) -> PHSpline:
+    """A smooth random path, open or closed."""
+    rng = np.random.default_rng([seed, 7])
+    count = int(rng.integers(5, 12))
+    if rng.integers(2):
+        angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        return from_control_polygon(
+            (30.0 + rng.uniform(-9, 9, count)) * np.exp(1j * angle), True
+        ).spline
+    turn = np.cumsum(rng.uniform(-0.8, 0.8, count))
+    return from_control_polygon(
+        np.cumsum(rng.uniform(4, 20, count) * np.exp(1j * turn)), False
+    ).spline
+
+
+def random_limits(rng: np.random.Generator, length_mm: float) -> Limits:
+    """Some of them, tight enough to bind now and then."""
+
+    def maybe(value):
+        return value if rng.uniform() < 0.6 else None
+
+    def pair(low: float, high: float) -> tuple[float, float]:
+        x, y = np.exp(rng.uniform(np.log(low), np.log(high), 2))
+        return float(x), float(y)
+
+    start = float(rng.uniform(0.0, 0.8 * length_mm))
+    cap = FeedCap(start, start + 0.1 * length_mm, float(rng.uniform(20.0, 200.0)))
+    return Limits(
+        centripetal_mm_s2=maybe(float(rng.uniform(300.0, 3000.0))),
+        axis=AxisLimits(maybe(pair(30, 200)), maybe(pair(300, 3000)), maybe(pair(1e4, 1e5))),
+        caps=(cap,) if rng.uniform() < 0.4 else (),
+        reserve=float(np.exp(rng.uniform(np.log(0.005), np.log(0.3)))),
+    )
+
+
+@dataclass
+class Case:
+    program: Program
+    limits: Limits
+    plants: tuple[Plant, Plant] | None
+
+
+def random_case(seed: int) -> Case:
+    """A program planned under policy "respect"."""
+    rng = np.random.default_rng([seed, 17])
+    spline = wavy(seed)
+    limits = random_limits(rng, spline.length_mm)
+    plants = PLANTS if rng.uniform() < 0.4 else None
+    request = FeedRequest(
+        ("quintic", "minimax", "exponential")[seed % 3],
+        float(rng.uniform(30.0, 250.0)),
+        float(rng.uniform(0.05, 0.3)),
+    )
+    plan = plan_path(spline, request, limits, None, plants)
+    return Case(compile_program(spline, plan), limits, plants)
+
+
+def worst_ratio(case: Case, t_s, rate, slope, second) -> dict[str, float]:
+    """Greatest value over limit of each quantity with program time at t_s moving at `rate`; docs/numerics.md 7."""
+    cells = cut(case.program)
+    cell = np.clip(np.searchsorted(cells.start_s, t_s, side="right") - 1, 0, None)
+    u = np.clip((t_s - cells.start_s[cell]) / cells.duration_s[cell], 0.0, 1.0)
+    m = motion_at(cells, cell, u)
+    out = {}
+    limits = case.limits
+    if limits.centripetal_mm_s2 is not None:
+        out["centripetal"] = np.abs(rate**2 * m.centripetal).max() / limits.centripetal_mm_s2
+    s = cells.arc_length_mm(cell, u)
+    for cap in limits.caps:
+        inside = (s > cap.from_mm + 1e-6) & (s < cap.to_mm - 1e-6)
+        out["cap"] = np.abs(rate * m.feed)[inside].max(initial=0.0) / cap.feed_mm_s
+    for k in range(2):
+        v, a, j = m.axis_velocity[k], m.axis_acceleration[k], m.axis_jerk[k]
+        velocity = rate * v
+        acceleration = slope * v + rate**2 * a
+        jerk = second * v + 3.0 * rate * slope * a + rate**3 * j
+        for name, value, limit in (
+            ("velocity", velocity, limits.axis.velocity_mm_s),
+            ("acceleration", acceleration, limits.axis.acceleration_mm_s2),
+            ("jerk", jerk, limits.axis.jerk_mm_s3),
+        ):
+            if limit is not None:
+                out[f"{name} {k}"] = np.abs(value).max() / limit[k]
+        if case.plants is not None:
+            plant = case.plants[k]
+            pull = velocity + plant.time_constant_s * acceleration
+            out[f"volts {k}"] = np.abs(pull).max() / plant.reach_mm_s
+    return {name: float(value) for name, value in out.items()}
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_profile_keeps_the_limits_with_their_reserve(seed: int) -> None:
+    case = random_case(seed)
+    t = np.linspace(0.0, case.program.duration_s, 50_001)
+    ratio = worst_ratio(case, t, np.ones(t.size), np.zeros(t.size), np.zeros(t.size))
+    kept = 1.0 - case.limits.reserve
+    for name, value in ratio.items():
+        share = kept if name.split()[0] in ("acceleration", "jerk", "volts") else 1.0
+        assert value <= share * (1.0 + 1e-6), name
+
+
+def run(case: Case, seed: int) -> tuple[dict[str, float], set[State]]:
+    """The controller's program time under random commands, looked at five times a tick."""
+    rng = np.random.default_rng([seed, 23])
+    timebase = Timebase(NativeProgram(encode(case.program)))
+    period = 1e-6 * case.program.period_us
+    busy = float(rng.choice((0.002, 0.01, 0.05)))
+    instants: list[tuple[float, float, float, float]] = []
+    states = set()
+    before = timebase.step()
+    for _ in range(MOST_TICKS):
+        if rng.uniform() < busy:
+            command = rng.integers(5)
+            if command == 0:
+                timebase.hold()
+            elif command in (1, 2):
+                timebase.resume()
+            else:
+                timebase.override(int(rng.choice((20, 50, 80, 100, 120, 200))))
+        after = timebase.step()
+        states.add(timebase.state)
+        if timebase.state == State.ENDED:
+            break
+        second = (after.slope_per_s - before.slope_per_s) / period
+        for part in np.linspace(0.0, 1.0, COUNT_S):
+            h = part * period
+            way = before.rate * h + before.slope_per_s * h**2 / 2.0 + second * h**3 / 6.0
+            rate = before.rate + before.slope_per_s * h + second * h**2 / 2.0
+            instants.append((before.time_s + way, rate, before.slope_per_s + second * h, second))
+        before = after
+    t, rate, slope, second = np.array(instants).T
+    return worst_ratio(case, t, rate, slope, second), states
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(st.integers(0, 2**20))
+def test_no_command_breaks_a_limit_of_the_axes(seed: int) -> None:
+    ratio, _ = run(random_case(seed), seed)
+    for name, value in ratio.items():
+        assert value <= 1.0 + 1e-6, name
+
+
+def test_commands_use_the_reserve_and_come_to_rest() -> None:
+    """The property is not empty: something comes near its limit, and holds end."""
+    found, states = [], set()
+    for seed in range(12):
+        ratio, seen = run(random_case(seed), seed)
+        found += list(ratio.values())
+        states |= seen
+    assert max(found) > 0.97
+    assert State.HELD in states
+    assert State.ENDED in states
+
+
+def test_without_such_limits_nothing_changes() -> None:
+    spline = wavy(3)
+    request = FeedRequest("minimax", 100.0, 0.1)
+    plain = plan_feed(spline.length_mm, request, Limits(None, 2000.0))
+    along = plan_path(spline, request, Limits(None, 2000.0))
+    for name in ("duration_q32_s", "c_q40", "override_rate_q16_per_s", "override_factor_q24"):
+        np.testing.assert_array_equal(getattr(plain.pieces, name), getattr(along.pieces, name))
+
+
+def test_report_lists_what_is_broken_along_the_path() -> None:
+    spline = wavy(3)
+    limits = Limits(
+        policy="report",
+        centripetal_mm_s2=50.0,
+        axis=AxisLimits(jerk_mm_s3=(1e9, 2e4)),
+        caps=(FeedCap(0.0, 5.0, 10.0),),
+    )
+    plan = plan_path(spline, FeedRequest("minimax", 100.0, 0.1), limits)
+    assert plan.feed_mm_s == 100.0
+    names = {excess.quantity for excess in plan.excesses}
+    assert "centripetal_mm_s2" in names
+    assert "axis y jerk_mm_s3" in names
+    assert not any("axis x" in name for name in names)
+    assert plan.pieces.override_factor_q24.min() == 1 << 24
+
+
+def test_the_note_names_the_limit() -> None:
+    plan = plan_path(
+        wavy(3), FeedRequest("minimax", 100.0, 0.1), Limits(axis=AxisLimits(jerk_mm_s3=(2e4, 2e4)))
+    )
+    assert plan.feed_mm_s < 100.0
+    assert "less its reserve" in plan.notes[0]
+    assert "jerk_mm_s3 = 20000" in plan.notes[0]
+
+
+def test_absurd_reserves() -> None:
+    for reserve in (0.0, -1.0, 1.0, float("nan")):
+        with pytest.raises(InputError, match="limits: reserve"):
+            Limits(reserve=reserve)
