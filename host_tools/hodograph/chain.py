@@ -8,10 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from time import perf_counter
 
 from .config import Drive, Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
-from .feed import ControllerLimits, FeedPlan, FeedRequest, Limits, Plant, plan_path
+from .feed import ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
+from .feed.optimal import plan_optimal
 from .program import (
     Compilation,
     Program,
@@ -140,21 +142,36 @@ class Chain:
             )
         return self.file.feed
 
-    @cached_property
-    def plan(self) -> FeedPlan:
+    @property
+    def plan(self) -> Plan:
         """The feed over the spline, as the program has it."""
-        feed, machine = self.feed, self.machine_or_none
+        return self._timed_plan[0]
+
+    @property
+    def planning_s(self) -> float:
+        """Wall time that planning took."""
+        return self._timed_plan[1]
+
+    @cached_property
+    def _timed_plan(self) -> tuple[Plan, float]:
+        feed, limits, machine = self.feed, self.file.limits, self.machine_or_none
         spline = self.spline_result.spline
+        controller = controller_limits(machine) if machine is not None else None
+        period_us = machine.period_us if machine is not None else 1000
+        begin = perf_counter()
         with _told_by(f"{self.file.file}:"):
-            plan = plan_path(
+            plan: Plan
+            make = plan_optimal if feed.optimal else plan_path
+            plan = make(
                 spline,
                 feed,
-                self.file.limits,
-                controller_limits(machine) if machine is not None else None,
-                plants(machine, self.file.limits),
-                period_us=machine.period_us if machine is not None else 1000,
+                limits,
+                controller,
+                plants(machine, limits),
+                period_us=period_us,
             )
-            return fit_plan(spline, plan)
+            plan = fit_plan(spline, plan)
+        return plan, perf_counter() - begin
 
     @cached_property
     def compilation(self) -> Compilation:
@@ -179,7 +196,7 @@ class Chain:
         """The program's bytes."""
         return encode(self.program)
 
-    def notes(self, plan: FeedPlan) -> tuple[str, ...]:
+    def notes(self, plan: Plan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""
         excesses = tuple(f"feed: {excess}" for excess in plan.excesses)
         return (*self.spline_result.notes, *plan.notes, *excesses)

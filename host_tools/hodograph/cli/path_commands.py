@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from ..bustime import require_fit
 from ..chain import Chain, load_chain
 from ..errors import InputError
-from ..feed import FeedPlan
+from ..feed import Plan
+from ..feed.optimal import OptimalPlan, Peak
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.image import MAGIC
 from ..simulate import Motion, simulate, write_trace
@@ -69,7 +71,7 @@ def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray
     return np.minimum(array, end)
 
 
-def print_notes(chain: Chain, plan: FeedPlan) -> None:
+def print_notes(chain: Chain, plan: Plan) -> None:
     """The notes of a path, each with the file's name."""
     for line in chain.notes(plan):
         note(f"{chain.file.file.name}: {line}")
@@ -86,6 +88,8 @@ def feed(options: Namespace) -> None:
         "evaluations": plan.evaluations,
         "ramp_time_s": plan.ramp_time_s,
         "duration_s": plan.duration_s,
+        "planning_s": chain.planning_s,
+        "peak": {name: asdict(peak) for name, peak in _peaks(plan).items()},
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
     }
@@ -97,20 +101,33 @@ def feed(options: Namespace) -> None:
         print_json(result)
         return
     slope = "" if plan.n_c is None else f", n_c {plan.n_c:.6g} ({plan.evaluations} evaluations)"
+    ramps = [] if plan.ramp_time_s is None else [("ramps", f"{number(plan.ramp_time_s)} s")]
     print_rows(
         [
             ("profile", plan.profile + slope),
             ("feed", f"{number(plan.feed_mm_s)} mm/s"),
-            ("ramps", f"{number(plan.ramp_time_s)} s"),
+            *ramps,
             ("duration", f"{number(plan.duration_s)} s"),
+            ("planned in", f"{chain.planning_s:.3g} s"),
             ("peak acceleration", f"{number(plan.peak_acceleration_mm_s2)} mm/s^2"),
             ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
         ]
     )
+    if peaks := _peaks(plan):
+        print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
+        for name, peak in peaks.items():
+            print(
+                f"{name:28} {peak.value:12.6g} {peak.limit:12.6g} {100.0 * peak.share:8.2f} {peak.s_mm:12.6g}"
+            )
     if options.at is not None:
         print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
         for at, s, v in zip(options.at, plan.arc_length(t), plan.feed(t), strict=True):
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
+
+
+def _peaks(plan: Plan) -> dict[str, Peak]:
+    """Limited quantities of a plan over the whole path."""
+    return plan.peaks if isinstance(plan, OptimalPlan) else {}
 
 
 def compile_(options: Namespace) -> None:

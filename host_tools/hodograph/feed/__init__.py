@@ -5,8 +5,8 @@ from .limits import AxisLimits, ControllerLimits, FeedCap, Limits
 from .path_planning import plan_path
 from .pattern_search import SearchStep
 from .pieces import FeedPiece, FeedPieces
-from .plan import Excess, FeedPlan
-from .planning import plan_again, plan_feed
+from .plan import Excess, FeedPlan, Plan
+from .planning import plan_feed
 from .plant import Plant
 from .request import FeedRequest
 
@@ -20,9 +20,9 @@ __all__ = [
     "FeedPlan",
     "FeedRequest",
     "Limits",
+    "Plan",
     "Plant",
     "SearchStep",
-    "plan_again",
     "plan_feed",
     "plan_path",
 ]

@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .along import PathBounds, Pieces
-from .limits import ControllerLimits, Limits
+from .limits import ControllerLimits, FeedCap, Limits
 from .override import override_bounds
 from .pattern_search import SearchStep
 from .pieces import FeedPieces, derivative_peaks
@@ -35,6 +37,122 @@ class Excess:
     def __str__(self) -> str:
         over = 100.0 * (self.value / self.limit - 1.0)
         return f"{self.quantity} {self.value:.6g} is above its limit {self.limit:g} by {over:.1f} %"
+
+
+class Plan(Protocol):
+    """What every planned feed can say, whatever its profile.
+
+    notes, excesses   as in FeedPlan; `n_c` and `ramp_time_s` are None, and `history` empty, where a profile has none
+    """
+
+    @property
+    def request(self) -> FeedRequest:
+        """What was asked."""
+        ...
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of the path file."""
+        ...
+
+    @property
+    def controller(self) -> ControllerLimits:
+        """Limits of the controller."""
+        ...
+
+    @property
+    def period_us(self) -> int:
+        """Of the program."""
+        ...
+
+    @property
+    def history(self) -> tuple[SearchStep, ...]:
+        """Steps of a pattern search."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """One line for each thing the user should know."""
+        ...
+
+    @property
+    def excesses(self) -> tuple[Excess, ...]:
+        """Limits broken under policy "report"."""
+        ...
+
+    @property
+    def profile(self) -> str:
+        """Name of the profile."""
+        ...
+
+    @property
+    def n_c(self) -> float | None:
+        """Slope coefficient."""
+        ...
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the peak jerk that a search took."""
+        ...
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the path."""
+        ...
+
+    @property
+    def feed_mm_s(self) -> float:
+        """Peak feed."""
+        ...
+
+    @property
+    def ramp_time_s(self) -> float | None:
+        """Time of each ramp."""
+        ...
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the whole."""
+        ...
+
+    @property
+    def peak_acceleration_mm_s2(self) -> float:
+        """Greatest |F''|."""
+        ...
+
+    @property
+    def peak_jerk_mm_s3(self) -> float:
+        """Greatest |F'''|."""
+        ...
+
+    def arc_length(self, t_s: ArrayLike) -> Real:
+        """F at times; mm."""
+        ...
+
+    def feed(self, t_s: ArrayLike) -> Real:
+        """F'; mm/s."""
+        ...
+
+    def acceleration(self, t_s: ArrayLike) -> Real:
+        """F''; mm/s^2."""
+        ...
+
+    def jerk(self, t_s: ArrayLike) -> Real:
+        """F'''; mm/s^3."""
+        ...
+
+    @property
+    def pieces(self) -> FeedPieces:
+        """The plan in integers."""
+        ...
+
+    def pieces_over(self, length_q40: int) -> FeedPieces:
+        """The same over exactly this length, which may differ a little (rounding)."""
+        ...
+
+    def slowed(self, caps: Sequence[FeedCap], reason: str) -> Plan:
+        """Planned again with the feed capped on stretches of the path; `reason` goes to the notes."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +256,12 @@ class FeedPlan:
             ramp = replace(ramp, feed_mm_s=float(length / Fraction(ramp.time_s)))
         raw = quantise(timeline(ramp, length), length_q40, self.period_us)
         return with_override(raw, self.controller, self.limits, self.path)
+
+    def slowed(self, caps: Sequence[FeedCap], reason: str) -> FeedPlan:
+        """Planned again with the feed nowhere above the least of the caps; `reason` goes to the notes."""
+        from .planning import plan_again  # which makes plans, and so knows this module
+
+        return plan_again(self, min(cap.feed_mm_s for cap in caps), reason)
 
     @property
     def _length_q40(self) -> int:

@@ -41,12 +41,17 @@ def plan_feed(
         raise PlanError(
             f'feed: profile "{request.profile}" needs the path itself, not only its length'
         )
+    check_length(length_mm)
+    return _plan(Fraction(length_mm), request, limits or Limits(), controller, period_us, ())
+
+
+def check_length(length_mm: float) -> None:
+    """Raises InputError for a length that the program format does not know."""
     if not (isfinite(length_mm) and SHORTEST_MM <= length_mm <= LONGEST_MM):
         raise InputError(
             f"path: its length {length_mm:g} mm must be from {SHORTEST_MM:.3g} to {LONGEST_MM:.7g} mm: "
             "scale its points (they are in mm)"
         )
-    return _plan(Fraction(length_mm), request, limits or Limits(), controller, period_us, ())
 
 
 def plan_again(plan: FeedPlan, feed_mm_s: float, reason: str) -> FeedPlan:

@@ -65,7 +65,7 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
     middle_starts = _constant_starts(line, middle)
     straight = np.zeros((middle.size - 1, 8))
     straight[:, 1] = np.diff(middle_starts) * 2.0**-40
-    inner = _round_pieces(middle, middle_starts, straight)
+    inner = round_pieces(middle, middle_starts, straight)
     for cuts in _cut_counts(line, up_end, period_us):
         up_cuts = _ramp_cuts(line, up_end, cuts)
         # The way down is the way up run backwards from the exact end, a rounding off the last tick.
@@ -81,9 +81,9 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
             np.concatenate((up_starts[:-1], middle_starts[:-1], down_starts[:-1])),
             np.concatenate(
                 (
-                    _round_pieces(up_cuts, up_starts, up.shape),
+                    round_pieces(up_cuts, up_starts, up.shape),
                     inner,
-                    _round_pieces(down_cuts, down_starts, down.shape),
+                    round_pieces(down_cuts, down_starts, down.shape),
                 )
             ),
             max(up.jerk_error, down.jerk_error),
@@ -191,8 +191,11 @@ def _constant_starts(line: Timeline, cuts: Int) -> Int:
     )
 
 
-def _round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
-    """Coefficients c1 … c7 in tau; c1 such that each end is the next start to the last bit."""
+def round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
+    """Coefficients c1 … c7 in tau; c1 such that each end is the next start to the last bit.
+
+    times (n + 1,) in 2^-32 s, starts (n + 1,) in 2^-40 mm; shapes (n, 8): powers of u = 0 … 1 over a piece, mm
+    """
     duration = np.diff(times)
     e = exponents(duration)
     stretch = np.ldexp(1.0, e + 32) / duration

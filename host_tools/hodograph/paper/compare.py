@@ -72,7 +72,7 @@ def plain_plan(chain: Chain) -> FeedPlan:
 def _feed_rows(chain: Chain, row: Any) -> None:
     plan, plain = chain.plan, plain_plan(chain)
     jerk, plain_jerk = plan.peak_jerk_mm_s3, plain.peak_jerk_mm_s3
-    at_paper_n_c = exponential_ramp(plan.feed_mm_s, plan.ramp_time_s, PAPER_N_C).peak(JERK)
+    at_paper_n_c = exponential_ramp(plan.feed_mm_s, chain.feed.ramp_time_s, PAPER_N_C).peak(JERK)
     row("n_c", "", N_C, plan.n_c)
     row("search_iterations", "", ITERATIONS, len(plan.history) - 1)
     row("search_evaluations", "", EVALUATIONS, plan.evaluations)

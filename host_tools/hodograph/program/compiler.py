@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
-from ..feed import FeedPlan, plan_again
+from ..feed import FeedCap, Plan
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
 from .check import Fault, check
@@ -37,7 +37,7 @@ class Compilation:
     """
 
     program: Program
-    plan: FeedPlan
+    plan: Plan
     notes: tuple[str, ...]
     drift_mm: float
 
@@ -59,12 +59,12 @@ class ProgramOptions:
 _USUAL = ProgramOptions()
 
 
-def compile_program(spline: PHSpline, plan: FeedPlan, options: ProgramOptions = _USUAL) -> Program:
+def compile_program(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL) -> Program:
     """The program of `compile_path`, for callers that need nothing else."""
     return compile_path(spline, plan, options).program
 
 
-def compile_path(spline: PHSpline, plan: FeedPlan, options: ProgramOptions = _USUAL) -> Compilation:
+def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL) -> Compilation:
     """Compiles `plan` along `spline`, shifted by the work offset into machine coordinates.
 
     Under policy "respect" the feed is lowered where two neighbouring segments would pass within one tick at
@@ -109,7 +109,7 @@ def compile_path(spline: PHSpline, plan: FeedPlan, options: ProgramOptions = _US
     return Compilation(program, plan, plan.notes, geometry.drift_mm)
 
 
-def fit_plan(spline: PHSpline, plan: FeedPlan) -> FeedPlan:
+def fit_plan(spline: PHSpline, plan: Plan) -> Plan:
     """The plan that `compile_path` makes a program of: its feed lowered where short segments ask for it.
 
     Raises PlanError as `compile_path` does for them, and InputError for a path beyond the format.
@@ -118,7 +118,7 @@ def fit_plan(spline: PHSpline, plan: FeedPlan) -> FeedPlan:
     return _fit_feed(plan, geometry.start_q40, spline)[0]
 
 
-def _fit_feed(plan: FeedPlan, joints_q40: Int, spline: PHSpline) -> tuple[FeedPlan, FeedPieces]:
+def _fit_feed(plan: Plan, joints_q40: Int, spline: PHSpline) -> tuple[Plan, FeedPieces]:
     """The plan with its feed low enough for the segments, and its pieces over their exact length."""
     length_q40 = int(joints_q40[-1])
     for _ in range(_MOST_ROUNDS):
@@ -127,7 +127,8 @@ def _fit_feed(plan: FeedPlan, joints_q40: Int, spline: PHSpline) -> tuple[FeedPl
         if not pairs.size:
             return plan, pieces
         worst = int(allowed_mm_s.argmin())
-        feed = float(allowed_mm_s[worst]) * (1.0 - 1e-6) - _FEED_MARGIN_MM_S
+        feeds = allowed_mm_s * (1.0 - 1e-6) - _FEED_MARGIN_MM_S
+        feed = float(feeds[worst])
         span, place_mm = _span(spline, joints_q40, int(pairs[worst]))
         where = (
             f"the path has {way_mm[worst]:.4g} mm in two neighbouring segments at arc length "
@@ -141,7 +142,9 @@ def _fit_feed(plan: FeedPlan, joints_q40: Int, spline: PHSpline) -> tuple[FeedPl
                 f"{where}: {feed * (1.0 - 5e-4):.4g} mm/s would do; "
                 'lower nominal_mm_s or set policy "respect"'
             )
-        plan = plan_again(plan, feed, where)
+        low, high = joints_q40[pairs] * 2.0**-40, joints_q40[pairs + 2] * 2.0**-40
+        caps = zip(low.tolist(), high.tolist(), feeds.tolist(), strict=True)
+        plan = plan.slowed([FeedCap(*cap) for cap in caps], where)
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
 
 

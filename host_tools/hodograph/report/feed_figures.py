@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
 from ..chain import Chain
-from ..feed import FeedPlan
+from ..feed import Plan
 from ..feed.ramp import JERK, exponential_ramp
 from ..feed.shapes import N_C_HIGH, N_C_LOW
 from ..paper import plain_plan
@@ -18,15 +18,22 @@ from .style import BLUE, GREEN, GREY, ORANGE, RED, png
 _SAMPLES = 1600
 
 
-def feed_figure(chain: Chain, plan: FeedPlan) -> bytes:
-    """Feed, acceleration and jerk of the profile used and of the plain quintic; whole run and first ramp."""
-    plain = plain_plan(chain)
+def feed_figure(chain: Chain, plan: Plan) -> bytes:
+    """Feed, acceleration and jerk of the profile used; whole run and first ramp, with the plain quintic beside it.
+
+    Of profile `optimal`, which has no ramps: whole run and first quarter.
+    """
+    ramps = plan.ramp_time_s is not None
+    plain: Plan = plain_plan(chain) if ramps else plan
     figure, grid = pyplot.subplots(3, 2, figsize=(9.6, 7.2), width_ratios=(1.5, 1), sharey="row")
     name = plan.profile if plan.n_c is None else f"{plan.profile}, n_c {plan.n_c:.3f}"
-    ramp_end_s = 1.15 * max(plan.ramp_time_s, plain.ramp_time_s)
+    ramp_end_s = 0.25 * plan.duration_s
+    if plan.ramp_time_s is not None:
+        ramp_end_s = 1.15 * max(plan.ramp_time_s, plain.ramp_time_s or 0.0)
+    curves = [(plain, ORANGE, "plain quintic"), (plan, BLUE, name)][0 if ramps else 1 :]
     for column, end_s in enumerate((max(plan.duration_s, plain.duration_s), ramp_end_s)):
         t_s = np.linspace(0.0, end_s, _SAMPLES)
-        for shown, color, label in ((plain, ORANGE, "plain quintic"), (plan, BLUE, name)):
+        for shown, color, label in curves:
             inside = np.unique(np.minimum(t_s, shown.duration_s))
             for axes, value in zip(
                 grid[:, column],
@@ -44,7 +51,7 @@ def feed_figure(chain: Chain, plan: FeedPlan) -> bytes:
     ):
         axes.set_ylabel(label)
     grid[0, 0].set_title(f"{chain.file.name}: feed along the path")
-    grid[0, 1].set_title("first ramp")
+    grid[0, 1].set_title("first ramp" if ramps else "first quarter")
     grid[0, 1].legend(loc="lower right")
     return png(figure)
 
@@ -57,14 +64,14 @@ def _limits(row: np.ndarray, limit: float | None) -> None:
             axes.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
 
 
-def search_figure(plan: FeedPlan) -> bytes | None:
+def search_figure(plan: Plan) -> bytes | None:
     """Progress of the pattern search for n_c, beside the function it minimises; None without a search."""
     if not plan.history:
         return None
     figure, (progress, function) = pyplot.subplots(1, 2, figsize=(9.6, 3.8))
     _progress(progress, plan)
     n_c = np.linspace(N_C_LOW, N_C_HIGH, 161)
-    jerk = [exponential_ramp(plan.feed_mm_s, plan.ramp_time_s, v).peak(JERK) for v in n_c]
+    jerk = [exponential_ramp(plan.feed_mm_s, plan.ramp_time_s or 0.0, v).peak(JERK) for v in n_c]
     best = plan.history[-1]
     function.plot(n_c, jerk, color=BLUE, label="peak jerk")
     function.plot(
@@ -87,7 +94,7 @@ def search_figure(plan: FeedPlan) -> bytes | None:
     return png(figure)
 
 
-def _progress(axes: Axes, plan: FeedPlan) -> None:
+def _progress(axes: Axes, plan: Plan) -> None:
     iterations = [step.iteration for step in plan.history]
     axes.step(iterations, [step.value for step in plan.history], where="post", color=BLUE)
     axes.set_xlabel(f"iteration ({plan.evaluations} evaluations in all)")

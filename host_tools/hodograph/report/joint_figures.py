@@ -6,12 +6,12 @@ from __future__ import annotations
 from matplotlib import pyplot
 
 from ..chain import Chain
-from ..feed import FeedPlan
+from ..feed import Plan
 from ..paper import chord_acceleration_mm_s2, joint_disturbance
 from .style import BLUE, GREY, ORANGE, png
 
 
-def joint_figure(chain: Chain, plan: FeedPlan) -> bytes:
+def joint_figure(chain: Chain, plan: Plan) -> bytes:
     """First and second differences of chord speed along the whole path, joints marked."""
     spline = chain.spline_result.spline
     period_s = plan.period_us / 1e6

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: MIT
+"""Profile `optimal`: the fastest feed along a whole path inside limits of path, axes and drives.
+
+A plan begins with `plan_optimal`. In order: bounds (all limits), feasible (whether they leave any feed), curve (exact
+derivatives by arc length), knots (where to cut), grid (the unknown feed^2 as a piecewise cubic), motion (limited
+quantities), rows and solver (linear programs), window (their sequence), windows (any length), track (polynomials
+in time), peaks (what came of it). docs/numerics.md 5.6.
+"""
+
+from .peaks import Peak
+from .planner import OptimalPlan, plan_optimal
+
+__all__ = ["OptimalPlan", "Peak", "plan_optimal"]

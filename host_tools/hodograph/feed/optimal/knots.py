@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""A first idea of the feed, good enough to say where knots should be; docs/numerics.md 5.6."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...spline import PHSpline
+from .bounds import Bounds
+from .curve import LEFT, RIGHT, frames
+
+Real = NDArray[np.float64]
+
+_SHARE = 0.6
+"""Of acceleration limits, which the jerk does not let a feed use all the time."""
+
+_SAMPLES = 16
+_END_SAMPLES = 24
+_PER_SEGMENT = 4
+_PER_RAMP = 0.4
+_LEAST_PERIODS = 1.7
+_FLAT_STRETCH = 8.0
+_LEAST_Q = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """q (n,) at arc lengths s (n,), rising; t (n,) when; `step_s` (n,) how long intervals may last."""
+
+    s: Real
+    q: Real
+    t: Real
+    step_s: Real
+
+    def squared_feed(self, s: Real) -> Real:
+        """q between."""
+        return np.asarray(np.interp(s, self.s, self.q))
+
+
+def steady_caps(spline: PHSpline, bounds: Bounds, s: Real) -> Real:
+    """The greatest q at which a constant feed keeps every limit."""
+    q = np.full(s.size, inf)
+    for side in (LEFT, RIGHT):
+        f = frames(spline, s, np.full(s.size, side, dtype=np.int8))
+        with np.errstate(divide="ignore"):
+            q = np.minimum(q, bounds.feed_mm_s**2)
+            q = np.minimum(q, bounds.centripetal_mm_s2 / np.abs(f.curvature))
+            for part, velocity, acceleration, jerk in zip(
+                (np.real, np.imag), bounds.velocity, bounds.acceleration, bounds.jerk, strict=True
+            ):
+                q = np.minimum(q, (velocity / np.abs(part(f.r1))) ** 2)
+                q = np.minimum(q, acceleration / np.abs(part(f.r2)))
+                q = np.minimum(q, (jerk / np.abs(part(f.r3))) ** (2.0 / 3.0))
+    for plant in bounds.plants or ():
+        q = np.minimum(q, plant.reach_mm_s**2)
+    for low, high, feed in bounds.caps:
+        q[(s >= low) & (s <= high)] = np.minimum(q[(s >= low) & (s <= high)], feed**2)
+    return q
+
+
+def sketch(
+    spline: PHSpline,
+    bounds: Bounds,
+    low: float,
+    high: float,
+    q_start: float | None,
+    period_s: float,
+) -> Sketch:
+    """From `low`, at rest (q_start None) or moving, to rest at `high`."""
+    s = _samples(spline, bounds, low, high)
+    cap = np.maximum(steady_caps(spline, bounds, s), _LEAST_Q)
+    jerk = bounds.least_jerk
+    reach = (jerk * (high - low) ** 2) ** (1.0 / 3.0)
+    slowness = 1.0 / np.minimum(np.sqrt(cap), reach)
+    typical = (high - low) / float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(s)))
+    pull = min(_SHARE * bounds.least_acceleration, (jerk * typical) ** 0.5)
+    q = cap.copy()
+    q = np.minimum(q, _from_rest(high - s, jerk))
+    if q_start is None:
+        q = np.minimum(q, _from_rest(s - low, jerk))
+    else:
+        q[0] = min(q[0], q_start)
+    rise = 2.0 * pull * (s - low)
+    q = np.minimum.accumulate(q - rise) + rise
+    fall = 2.0 * pull * (high - s)
+    q = (np.minimum.accumulate((q - fall)[::-1]))[::-1] + fall
+    q = np.maximum(q, _LEAST_Q)
+    feed = np.sqrt(q)
+    time = 2.0 * np.diff(s) / (feed[1:] + feed[:-1])
+    if q_start is None:
+        time[0] = np.cbrt(6.0 * (s[1] - s[0]) / jerk)
+    time[-1] = np.cbrt(6.0 * (s[-1] - s[-2]) / jerk)
+    t = np.concatenate((np.zeros(1), np.cumsum(time)))
+    return Sketch(s, q, t, _steps(spline, bounds, s, q, t, pull, jerk, period_s))
+
+
+def _from_rest(way: Real, jerk: float) -> Real:
+    """q after a way from rest at constant jerk."""
+    return np.asarray(0.25 * jerk**2 * (6.0 * np.maximum(way, 0.0) / jerk) ** (4.0 / 3.0))
+
+
+def _samples(spline: PHSpline, bounds: Bounds, low: float, high: float) -> Real:
+    joints = spline.segment_starts_mm
+    first = int(np.searchsorted(joints, low, side="right"))
+    last = int(np.searchsorted(joints, high, side="left"))
+    edges = np.unique(
+        np.concatenate(([low], joints[first:last], stretch_ends(bounds, low, high), [high]))
+    )
+    fine = np.linspace(0.0, 1.0, _SAMPLES + 1)[1:]
+    count = max(1, min(16, 96 // max(1, edges.size)))
+    fine = np.linspace(0.0, 1.0, _SAMPLES * count + 1)[1:]
+    s = np.concatenate((edges[:1], (edges[:-1, None] + np.diff(edges)[:, None] * fine).ravel()))
+    end = (np.arange(1, _END_SAMPLES) / _END_SAMPLES) ** 3
+    s = np.concatenate((s, s[0] + (s[1] - s[0]) * end, s[-1] - (s[-1] - s[-2]) * end, edges))
+    s = np.unique(s)
+    return np.asarray(s[np.append(True, np.diff(s) > 1e-12 * (high - low))])
+
+
+def stretch_ends(bounds: Bounds, low: float, high: float) -> Real:
+    """Where stretches with caps begin and end, between two arc lengths."""
+    ends = bounds.caps[:, :2].ravel()
+    return np.asarray(ends[(ends > low) & (ends < high)])
+
+
+def _steps(
+    spline: PHSpline,
+    bounds: Bounds,
+    s: Real,
+    q: Real,
+    t: Real,
+    pull: float,
+    jerk: float,
+    period_s: float,
+) -> Real:
+    """How long an interval may last: a share of the time that full acceleration takes to build up."""
+    ramp = pull / _SHARE / jerk
+    step = _PER_RAMP * min(ramp, t[-1] / 6.0)
+    steps = np.full(s.size, step)
+    # A quarter of the segment at most, where the feed changes.
+    joints = np.searchsorted(spline.segment_starts_mm, s, side="right")
+    joint_t = np.interp(spline.segment_starts_mm, s, t)
+    spans = np.maximum(np.diff(joint_t), 1e-9)[np.clip(joints - 1, 0, spline.segment_count - 1)]
+    bent = np.abs(np.diff(q, append=q[-1])) > 1e-6 * q
+    near = _near(t, bent, 2.0 * ramp)
+    steps = np.where(near, np.minimum(steps, spans / _PER_SEGMENT), steps * _FLAT_STRETCH)
+    return np.asarray(np.maximum(steps, _LEAST_PERIODS * period_s))
+
+
+def _near(t: Real, marked: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
+    places = t[marked]
+    if places.size == 0:
+        return np.zeros(t.size, dtype=np.bool_)
+    after = places[np.clip(np.searchsorted(places, t), 0, places.size - 1)]
+    before = places[np.clip(np.searchsorted(places, t, side="right") - 1, 0, places.size - 1)]
+    return np.asarray(np.minimum(np.abs(after - t), np.abs(t - before)) <= reach)
+
+
+def choose_knots(
+    spline: PHSpline, bounds: Bounds, s: Real, t: Real, step_s: Real, period_s: float
+) -> Real:
+    """Knots in arc length: at joints and ends of stretches where these are far enough apart in time, evenly between."""
+    low, high = float(s[0]), float(s[-1])
+    density = 1.0 / step_s
+    count = np.concatenate(
+        (np.zeros(1), np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(t)))
+    )
+    least = min(12.0, max(3.0, t[-1] / (1.7 * period_s)))
+    if count[-1] < least:
+        count *= least / count[-1]
+    joints = spline.segment_starts_mm
+    joints = joints[(joints > low) & (joints < high)]
+    marks = np.unique(np.concatenate((joints, stretch_ends(bounds, low, high))))
+    at = np.interp(marks, s, count)
+    kept, places, last = [low], [0.0], 0.0
+    for mark, place in zip(marks.tolist(), at.tolist(), strict=True):
+        if place - last >= 0.62 and count[-1] - place >= 0.62:
+            kept.append(mark)
+            places.append(place)
+            last = place
+    kept.append(high)
+    places.append(float(count[-1]))
+    parts = np.maximum(1, np.ceil(np.diff(places) - 0.3)).astype(np.int64)
+    first = np.repeat(np.array(places[:-1]), parts)
+    width = np.repeat(np.diff(places) / parts, parts)
+    inner = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    knots = np.interp(first + inner * width, count, s)
+    knots[np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(parts)[:-1]))] = kept[:-1]
+    return np.append(knots, high)

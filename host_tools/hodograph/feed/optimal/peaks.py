@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""The greatest value of every limited quantity of a track, on the pieces themselves; docs/numerics.md 5.6."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...spline import PHSpline
+from .bounds import Bounds
+from .curve import LEFT, RIGHT, frames
+from .motion import AXES
+from .track import Track, powers
+
+Real = NDArray[np.float64]
+
+_US = np.array([0.0, 0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375, 1.0])
+_CHUNK = 50_000
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Where a quantity comes nearest to its limit."""
+
+    value: float
+    limit: float
+    s_mm: float
+
+    @property
+    def share(self) -> float:
+        """Of the limit."""
+        return self.value / self.limit
+
+
+def find_peaks(spline: PHSpline, bounds: Bounds, track: Track) -> dict[str, Peak]:
+    """By name, at ten places of each piece and on both sides of its ends."""
+    out: dict[str, Peak] = {}
+    for first in range(0, track.shape.shape[0], _CHUNK):
+        part = slice(first, first + _CHUNK)
+        for name, (value, limit, s) in _values(spline, bounds, track, part).items():
+            share = value / limit
+            worst = int(np.argmax(share))
+            peak = Peak(
+                float(value[worst]),
+                float(np.broadcast_to(limit, share.shape)[worst]),
+                float(s[worst]),
+            )
+            if name not in out or peak.share > out[name].share:
+                out[name] = peak
+    return out
+
+
+def _values(
+    spline: PHSpline, bounds: Bounds, track: Track, part: slice
+) -> dict[str, tuple[Real, Real | float, Real]]:
+    shape, h = track.shape[part, None, :], track.seconds[part, None]
+    way, v, a, j = ((powers(shape, k, _US) / h**k).ravel() for k in range(4))
+    starts = track.s[:-1][part]
+    s = (starts[:, None] + way.reshape(-1, _US.size)).ravel()
+    side = np.tile(np.where(_US == 0.0, RIGHT, np.where(_US == 1.0, LEFT, 0)), starts.size)
+    ends = track.s[1:][part]
+    s = np.where(
+        side == RIGHT,
+        np.repeat(starts, _US.size),
+        np.where(side == LEFT, np.repeat(ends, _US.size), s),
+    )
+    f = frames(spline, s, side.astype(np.int8))
+    velocity, acceleration = f.r1 * v, f.r1 * a + f.r2 * v * v
+    jerk = f.r1 * j + 3.0 * f.r2 * v * a + f.r3 * v**3
+    out: dict[str, tuple[Real, Real | float, Real]] = {
+        "feed_mm_s": (np.abs(v), bounds.feed_mm_s, s)
+    }
+    if bounds.acceleration_mm_s2 < inf:
+        out["acceleration_mm_s2"] = np.abs(a), bounds.acceleration_mm_s2, s
+    if bounds.jerk_mm_s3 < inf:
+        out["jerk_mm_s3"] = np.abs(j), bounds.jerk_mm_s3, s
+    if bounds.centripetal_mm_s2 < inf:
+        out["centripetal_mm_s2"] = np.abs(f.curvature) * v * v, bounds.centripetal_mm_s2, s
+    for k, (axis, of) in enumerate(zip(AXES, (np.real, np.imag), strict=True)):
+        for name, limits, vector in (
+            ("velocity_mm_s", bounds.velocity, velocity),
+            ("acceleration_mm_s2", bounds.acceleration, acceleration),
+            ("jerk_mm_s3", bounds.jerk, jerk),
+        ):
+            if limits[k] < inf:
+                out[f"axis.{name}.{axis}"] = np.abs(of(vector)), limits[k], s
+        if bounds.plants is not None:
+            plant = bounds.plants[k]
+            drive = of(velocity) + plant.time_constant_s * of(acceleration)
+            friction = np.sign(of(velocity)) * plant.friction_volts
+            out[f"volts.{axis}"] = np.abs(drive / plant.gain_mm_s_v + friction), plant.volts, s
+    if bounds.caps.size:
+        caps = np.full(s.size, inf)
+        for low, high, feed in bounds.caps:
+            within = (s >= low) & (s <= high)
+            caps[within] = np.minimum(caps[within], feed)
+        if np.isfinite(caps).any():
+            out["cap_mm_s"] = np.abs(v), caps, s
+    return out

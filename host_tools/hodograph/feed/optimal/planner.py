@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: MIT
+"""The profile `optimal`: least time along a path inside all its limits; docs/numerics.md 5.6."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import InputError, PlanError
+from ...spline import PHSpline
+from ..along import PathBounds
+from ..limits import ControllerLimits, FeedCap, Limits
+from ..pattern_search import SearchStep
+from ..pieces import FeedPieces, derivative_peaks
+from ..plan import Excess, with_override
+from ..planning import LONGEST_S, check_length
+from ..plant import Plants
+from ..quantise import RawPieces, round_pieces
+from ..request import FeedRequest, check_period
+from .bounds import Bounds, gather
+from .feasible import check_feasible
+from .peaks import Peak, find_peaks
+from .track import Track, joined, make_track
+from .windows import plan_windows
+
+Real = NDArray[np.float64]
+
+_ABOVE = 3e-4
+"""A plan may be above a limit by this share; what is more is taken out by running it slower."""
+
+_POWER = {"acceleration": 2, "jerk": 3, "centripetal": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class OptimalPlan:
+    """A feed over the whole path; like FeedPlan, but its pieces are the plan.
+
+    bounds  all that was obeyed; `stretch` what the plan was slowed by in the end, 1.0003 being 0.03 %
+    """
+
+    request: FeedRequest
+    limits: Limits
+    controller: ControllerLimits
+    period_us: int
+    spline: PHSpline
+    given_controller: ControllerLimits | None
+    plants: Plants | None
+    bounds: Bounds
+    track: Track
+    stretch: float
+    notes: tuple[str, ...]
+
+    history: tuple[SearchStep, ...] = ()
+    excesses: tuple[Excess, ...] = ()
+    n_c: float | None = None
+    evaluations: int = 0
+    ramp_time_s: float | None = None
+
+    @property
+    def profile(self) -> str:
+        """Name of the profile."""
+        return self.request.profile
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the path."""
+        return self.spline.length_mm
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the whole."""
+        return self.track.duration_s
+
+    @cached_property
+    def _derivative_peaks(self) -> tuple[float, float, float]:
+        v, a, j = (
+            float(p.max()) for p in derivative_peaks(self.raw.duration_q32_s, self.raw.c_q40)
+        )
+        return v, a, j
+
+    @property
+    def feed_mm_s(self) -> float:
+        """Peak feed."""
+        return self._derivative_peaks[0]
+
+    @property
+    def peak_acceleration_mm_s2(self) -> float:
+        """Greatest |F''|."""
+        return self._derivative_peaks[1]
+
+    @property
+    def peak_jerk_mm_s3(self) -> float:
+        """Greatest |F'''|."""
+        return self._derivative_peaks[2]
+
+    @cached_property
+    def peaks(self) -> dict[str, Peak]:
+        """Where every limited quantity comes nearest to its limit."""
+        return {
+            name: self._in_full(name, peak)
+            for name, peak in find_peaks(self.spline, self.bounds, self.track).items()
+        }
+
+    def _in_full(self, name: str, peak: Peak) -> Peak:
+        """Beside the limit as it was given, its reserve included."""
+        if name.startswith(("axis.acceleration", "axis.jerk", "volts")):
+            return replace(peak, limit=peak.limit / self.bounds.axis_share)
+        return peak
+
+    def arc_length(self, t_s: ArrayLike) -> Real:
+        """F at times 0 … duration_s (clipped); mm."""
+        return self.track.value(0, t_s)
+
+    def feed(self, t_s: ArrayLike) -> Real:
+        """F'; mm/s."""
+        return self.track.value(1, t_s)
+
+    def acceleration(self, t_s: ArrayLike) -> Real:
+        """F''; mm/s^2."""
+        return self.track.value(2, t_s)
+
+    def jerk(self, t_s: ArrayLike) -> Real:
+        """F'''; mm/s^3."""
+        return self.track.value(3, t_s)
+
+    @cached_property
+    def raw(self) -> RawPieces:
+        """The curve in integers, over the length rounded to 2^-40 mm."""
+        return _raw(self.track, round(self.length_mm * 2**40))
+
+    @property
+    def pieces(self) -> FeedPieces:
+        """`raw` with the override bounds of each piece."""
+        return with_override(self.raw, self.controller, self.limits, self._path)
+
+    def pieces_over(self, length_q40: int) -> FeedPieces:
+        """The plan in integers over exactly `length_q40`, which may differ a little (rounding)."""
+        raw = _raw(self.track, length_q40)
+        return with_override(raw, self.controller, self.limits, self._path)
+
+    @cached_property
+    def _path(self) -> PathBounds:
+        return PathBounds(self.spline, self.limits, self.plants)
+
+    def slowed(self, caps: Sequence[FeedCap], reason: str) -> OptimalPlan:
+        """Planned again with further caps; `reason` goes to the notes."""
+        limits = replace(self.limits, caps=(*self.limits.caps, *caps))
+        again = plan_optimal(
+            self.spline,
+            self.request,
+            limits,
+            self.given_controller,
+            self.plants,
+            period_us=self.period_us,
+        )
+        return replace(again, limits=limits, notes=(*again.notes, f"feed capped: {reason}"))
+
+
+def plan_optimal(
+    spline: PHSpline,
+    request: FeedRequest,
+    limits: Limits,
+    controller: ControllerLimits | None = None,
+    plants: Plants | None = None,
+    *,
+    period_us: int = 1000,
+) -> OptimalPlan:
+    """The fastest feed along `spline` from rest to rest.
+
+    plants  of the axes, where `limits.volts` is given
+    Raises InputError (length, period) and PlanError: limits that no useful feed obeys (which, where, and what
+    would do).
+    """
+    check_period(period_us)
+    check_length(spline.length_mm)
+    if not limits.bind:
+        raise InputError(
+            'feed: profile "optimal" has no limit to obey: add one to [limits] at least'
+        )
+    bounds = gather(request, limits, controller, plants, period_us)
+    check_feasible(spline, bounds)
+    ends = joined(list(plan_windows(spline, bounds, 1e-6 * period_us)))
+    track = make_track(ends, 1.0)
+    stretch = _needed_stretch(find_peaks(spline, bounds, track))
+    if stretch > 1.0:
+        track = make_track(ends, stretch)
+    if track.duration_s >= LONGEST_S:
+        raise PlanError(
+            f"feed: the path takes {track.duration_s:.4g} s inside its limits, longer than {LONGEST_S:.7g} s"
+        )
+    return OptimalPlan(
+        request,
+        limits,
+        controller or _assumed(track),
+        period_us,
+        spline,
+        controller,
+        plants,
+        bounds,
+        track,
+        stretch,
+        bounds.notes,
+    )
+
+
+def _needed_stretch(peaks: dict[str, Peak]) -> float:
+    """By how much to slow down so that no limit is exceeded by more than is allowed."""
+    stretch = 1.0
+    for name, peak in peaks.items():
+        power = next((n for word, n in _POWER.items() if word in name), 1)
+        stretch = max(stretch, (peak.share / (1.0 + _ABOVE)) ** (1.0 / power))
+    return stretch
+
+
+def _raw(track: Track, length_q40: int) -> RawPieces:
+    starts = np.rint(track.s * 2.0**40).astype(np.int64)
+    starts[-1] = length_q40
+    c = round_pieces(track.t_q32, starts, track.shape)
+    return RawPieces(np.diff(track.t_q32), starts[:-1], c, 0.0, 0.0)
+
+
+def _assumed(track: Track) -> ControllerLimits:
+    """Limits of a controller that nobody named: roomy ones, so that they never bind."""
+    raw = _raw(track, round(float(track.s[-1]) * 2**40))
+    v, a, j = (float(p.max()) for p in derivative_peaks(raw.duration_q32_s, raw.c_q40))
+    return ControllerLimits(2.0 * v, 8.0 * a + 10.0 * v, 16.0 * j + 100.0 * v)

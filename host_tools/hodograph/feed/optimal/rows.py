@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Limits as linear inequalities about a feed near the last one; docs/numerics.md 5.6.
+
+A jerk is sqrt(p) times a linear function of the unknowns: |linear| <= limit / sqrt(p). The right side is
+convex in p, so its tangent at the last p is below it: what keeps the tangent keeps the limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .motion import Line, Points, acceleration, jerk_by_root
+
+Real = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+_NEAR = 0.55
+_LEAST_P = 0.05
+_FALLEN = 0.11
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """low <= coefficients (m, 4) on the unknowns of `interval` <= high."""
+
+    coefficients: Real
+    interval: Index
+    low: Real
+    high: Real
+
+
+@dataclass(frozen=True, eq=False)
+class About:
+    """The last feed at the points: p, and its derivatives where they are known (not from a sketch)."""
+
+    p: Real
+    derivatives: tuple[Real, Real] | None = None
+
+
+@dataclass(eq=False)
+class Selection:
+    """Which points make rows: those of `basic` near their limit, others once they were above it; for good.
+
+    The sketch has rows at all basic points. So most limits at most points never become rows.
+    """
+
+    basic: Mask
+    kept: dict[str, Mask] = field(default_factory=dict)
+    last: Real | None = None
+    low: Mask | None = None
+
+    def choose(self, name: str, used: Real | None, among: Mask | None = None) -> Index:
+        """Points for the rows of a quantity, of which the last feed used these shares."""
+        wanted = self.basic if among is None else self.basic & among
+        if used is None:
+            return np.flatnonzero(wanted)
+        active = (wanted & (used > _NEAR)) | (used > 1.0)
+        if name in self.kept:
+            active |= self.kept[name]
+        self.kept[name] = active
+        return np.flatnonzero(active)
+
+    def choose_low(self, p: Real) -> Index:
+        """Points where p fell much since the last time."""
+        if self.last is not None:
+            self.low = (p < _FALLEN * self.last) | (self.low if self.low is not None else False)
+        self.last = p
+        return np.flatnonzero(np.zeros(p.size, dtype=np.bool_) if self.low is None else self.low)
+
+
+def make_rows(points: Points, about: About, select: Selection, once: Mask) -> Rows:
+    """All rows about a feed. `once` (m,): points where accelerations count, not twice at knots."""
+    flat: list[Rows] = []
+    for line in points.jerks:
+        flat += _jerk_rows(points, line, about, select)
+    flat += [_acceleration_rows(points, line, about, select, once) for line in points.accelerations]
+    flat += [_volts_rows(points, line, about, select, once) for line in points.volts]
+    flat += _speed_rows(points, about, select)
+    return Rows(
+        np.concatenate([row.coefficients for row in flat]),
+        np.concatenate([row.interval for row in flat]),
+        np.concatenate([row.low for row in flat]),
+        np.concatenate([row.high for row in flat]),
+    )
+
+
+def _jerk_rows(points: Points, line: Line, about: About, select: Selection) -> Iterator[Rows]:
+    used = None
+    if about.derivatives is not None:
+        used = jerk_by_root(line, about.p, *about.derivatives) * np.sqrt(about.p) / line.limit
+    for sign in (1.0, -1.0):
+        at = select.choose(f"{line.name}{sign:+g}", None if used is None else sign * used)
+        p, d, dd = (b[at] for b in points.basis)
+        by = sign * np.sqrt(about.p[at]) / line.limit
+        coefficients = (
+            (line.c3[at] * by + 0.5 / about.p[at])[:, None] * p
+            + (1.5 * line.c2[at] * by)[:, None] * d
+            + (0.5 * line.c1[at] * by)[:, None] * dd
+        )
+        one = np.ones(at.size)
+        yield Rows(coefficients, points.interval[at], -np.inf * one, 1.5 * one)
+
+
+def _acceleration_rows(
+    points: Points, line: Line, about: About, select: Selection, once: Mask
+) -> Rows:
+    used = None
+    if about.derivatives is not None:
+        used = np.abs(acceleration(line, about.p, about.derivatives[0])) / line.limit
+    at = select.choose(line.name, used, once)
+    one = np.ones(at.size)
+    return Rows(_acceleration(points, line, at) / line.limit, points.interval[at], -one, one)
+
+
+def _acceleration(points: Points, line: Line, at: Index) -> Real:
+    p, d, _ = points.basis
+    return np.asarray(line.c2[at, None] * p[at] + 0.5 * line.c1[at, None] * d[at])
+
+
+def _volts_rows(points: Points, line: Line, about: About, select: Selection, once: Mask) -> Rows:
+    """c1 sqrt(p) + lag (acceleration): sqrt by its tangent, which is above it."""
+    used = None
+    if about.derivatives is not None:
+        pull = line.lag_s * acceleration(line, about.p, about.derivatives[0])
+        used = np.abs(line.c1 * np.sqrt(about.p) + pull) / line.limit
+    at = select.choose(line.name, used, once)
+    half = 0.5 * line.c1[at] * np.sqrt(about.p[at])
+    coefficients = (half / about.p[at])[:, None] * points.basis[0][at]
+    coefficients = coefficients + line.lag_s * _acceleration(points, line, at)
+    one = np.ones(at.size)
+    offset = half / line.limit
+    return Rows(coefficients / line.limit, points.interval[at], -one - offset, one - offset)
+
+
+def _speed_rows(points: Points, about: About, select: Selection) -> list[Rows]:
+    """Bounds of p where it comes near them, and p above 0 where it does not stay so by itself."""
+    high = select.choose("feed", about.p / points.most_p)
+    one = np.ones(high.size)
+    rows = [
+        Rows(
+            points.basis[0][high] / points.most_p[high, None],
+            points.interval[high],
+            -np.inf * one,
+            one,
+        )
+    ]
+    if about.derivatives is not None:
+        low = select.choose_low(about.p)
+        one = np.ones(low.size)
+        rows.append(
+            Rows(
+                points.basis[0][low] / about.p[low, None],
+                points.interval[low],
+                _LEAST_P * one,
+                np.inf * one,
+            )
+        )
+    return rows

@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: MIT
+"""The fastest feed over one window of a path, from a given state to rest; docs/numerics.md 5.6."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...spline import PHSpline
+from .bounds import Bounds
+from .grid import GAUSS_W, GAUSS_X, Grid, corners, make_grid, squared_feed
+from .knots import Sketch, choose_knots, sketch
+from .motion import Points, make_points
+from .rows import About, Rows, Selection, make_rows
+from .solver import Problem, solve
+
+Real = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+US = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+BASIC_US = (0.0, 0.5, 1.0)
+ALLOWED = 5e-4
+"""Excess that a plan may have, as a share of a limit."""
+
+_MOST_ROUNDS = 9
+_GAIN = 1e-4
+_BESIDE = 1e-7
+_LEAST_Q = 1e-12
+_LEAST_FALL = 0.1
+
+Feed = Callable[[Real], Real]
+"""q at arc lengths."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A moving start: q = feed^2 and its derivative by arc length."""
+
+    q: float
+    slope: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A feed over a grid; excess: greatest share by which it is above a limit; rounds: linear programs solved."""
+
+    grid: Grid
+    q: Real
+    slope: Real
+    times: Real
+    excess: float
+    rounds: int
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the window."""
+        return float(self.times.sum())
+
+    def squared_feed(self, s: Real) -> Real:
+        """q at arc lengths, above 0 at least by a hair."""
+        return np.maximum(squared_feed(self.grid, self.q, self.slope, s), _LEAST_Q)
+
+
+@dataclass(frozen=True, eq=False)
+class _Setting:
+    """What stays through the rounds on one grid."""
+
+    bounds: Bounds
+    grid: Grid
+    start: State | None
+    points: Points
+    basic: NDArray[np.bool_]
+    once: NDArray[np.bool_]
+    most_q: Real  # (n + 1,)
+    gauss: tuple[
+        Index, Real, Real
+    ]  # interval, arc length and basis of p at the points of quadrature
+
+
+def plan_window(
+    spline: PHSpline,
+    bounds: Bounds,
+    low: float,
+    high: float,
+    start: State | None,
+    period_s: float,
+    known: Solution | None = None,
+    known_to: float = 0.0,
+) -> Solution | None:
+    """From `low` to rest at `high`; None where the linear programs have no solution (a moving start only).
+
+    known  an earlier solution that is good up to arc length known_to
+    """
+    guess = sketch(spline, bounds, low, high, None if start is None else start.q, period_s)
+    s, t, step = guess.s, guess.t, guess.step_s
+    best: Solution | None = None
+    about: Feed = guess.squared_feed
+    if known is not None:
+        about = _blend(known, known_to, guess)
+    for _ in range(3):
+        knots = choose_knots(spline, bounds, s, t, step, period_s)
+        setting = _setting(spline, bounds, knots, start)
+        best = _rounds(setting, about)
+        if best is None:
+            return None
+        uneven = _uneven(best, step, s, period_s)
+        if not uneven:
+            break
+        about = best.squared_feed
+        s, t, step = _retimed(best, guess, period_s)
+    return best
+
+
+def _blend(known: Solution, known_to: float, guess: Sketch) -> Feed:
+    """A known feed up to a place, a sketched one after it."""
+
+    def feed(s: Real) -> Real:
+        old = known.squared_feed(np.minimum(s, known_to))
+        return np.asarray(np.where(s < known_to, old, guess.squared_feed(s)))
+
+    return feed
+
+
+def _uneven(found: Solution, step: Real, s: Real, period_s: float) -> bool:
+    """Whether the times of the intervals are far from what was wanted: then the knots have to move."""
+    wanted = np.interp(0.5 * (found.grid.s[1:] + found.grid.s[:-1]), s, step)
+    inner = found.times[1:-1]
+    brief = inner.size > 1 and bool((inner[1:] + inner[:-1]).min() < 2.05 * period_s)
+    return brief or bool((found.times > 2.2 * wanted).any())
+
+
+def _retimed(found: Solution, guess: Sketch, period_s: float) -> tuple[Real, Real, Real]:
+    grid = found.grid
+    u = np.linspace(0.0, 1.0, 9)[1:]
+    interval = np.repeat(np.arange(grid.size), u.size)
+    s = grid.sigma(interval, np.tile(u, grid.size))[0]
+    s = np.concatenate((grid.s[:1], s))
+    s[-1] = grid.s[-1]
+    q = np.maximum(found.squared_feed(s), 1e-12)
+    feed = np.sqrt(q)
+    part = 2.0 * np.diff(s) / (feed[1:] + feed[:-1])
+    part = part.reshape(grid.size, u.size)
+    part *= (found.times / part.sum(axis=1))[:, None]
+    t = np.concatenate((np.zeros(1), np.cumsum(part.ravel())))
+    step = np.interp(s, guess.s, guess.step_s)
+    return s, t, np.maximum(step, 1.7 * period_s)
+
+
+def _setting(spline: PHSpline, bounds: Bounds, knots: Real, start: State | None) -> _Setting:
+    grid = make_grid(knots, start is None)
+    caps = _interval_caps(bounds, knots)
+    joints = spline.segment_starts_mm
+    joints = joints[(joints > knots[0]) & (joints < knots[-1])]
+    crossing, u = _inside(grid, joints)
+    interval = np.concatenate((np.repeat(np.arange(grid.size), len(US)), np.repeat(crossing, 2)))
+    sides = np.column_stack((u - _BESIDE, u + _BESIDE)).ravel()
+    us = np.concatenate((np.tile(np.array(US), grid.size), sides))
+    points = make_points(spline, bounds, grid, interval, us, caps)
+    basic = np.isin(us, BASIC_US) | (np.arange(us.size) >= grid.size * len(US))
+    basic |= grid.grade[interval] != 0
+    most = np.full(knots.size, np.inf)
+    at_start, at_end = points.interval[us == 0.0], points.interval[us == 1.0] + 1
+    moving = points.sigma[0] > 0.0
+    limit = np.where(moving, points.most_p, np.inf) * np.where(moving, points.sigma[0], 1.0) ** 2
+    np.minimum.at(most, at_start, limit[us == 0.0])
+    np.minimum.at(most, at_end, limit[us == 1.0])
+    return _Setting(bounds, grid, start, points, basic, us < 1.0, most, _gauss(grid))
+
+
+def _gauss(grid: Grid) -> tuple[Index, Real, Real]:
+    interval = np.repeat(np.arange(grid.size), GAUSS_X.size)
+    u = np.tile(GAUSS_X, grid.size)
+    return interval, grid.sigma(interval, u)[0], grid.basis(interval, u)[0]
+
+
+def _inside(grid: Grid, joints: Real) -> tuple[Index, Real]:
+    """Joints that are no knots: interval and u."""
+    interval = np.clip(np.searchsorted(grid.s, joints, side="right") - 1, 0, grid.size - 1)
+    near = np.minimum(joints - grid.s[interval], grid.s[interval + 1] - joints)
+    keep = near > 1e-9 * (grid.s[interval + 1] - grid.s[interval])
+    interval, joints = interval[keep], joints[keep]
+    grade = grid.grade[interval]
+    x = np.where(
+        grade > 0,
+        np.cbrt(joints - grid.s[0]),
+        np.where(grade < 0, -np.cbrt(grid.s[-1] - joints), joints),
+    )
+    return interval, (x - grid.x0[interval]) / grid.h[interval]
+
+
+def _interval_caps(bounds: Bounds, knots: Real) -> Real:
+    caps = np.full(knots.size - 1, np.inf)
+    slack = 1e-9 * (knots[-1] - knots[0])
+    for low, high, feed in bounds.caps:
+        first = int(np.searchsorted(knots, low + slack, side="right")) - 1
+        last = int(np.searchsorted(knots, high - slack, side="left"))
+        if last > 0 and first < caps.size:
+            part = slice(max(first, 0), last)
+            caps[part] = np.minimum(caps[part], feed)
+    return caps
+
+
+def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
+    """Linear programs about the last feed, with further rows where it was above a limit between the others."""
+    grid = setting.grid
+    select = Selection(setting.basic)
+    about = About(_p_of(sketched, setting.points.interval, setting.points.s, setting))
+    inner = About(_p_of(sketched, setting.gauss[0], setting.gauss[1], setting))
+    typical = sketched(grid.s)
+    best: Solution | None = None
+    for rounds in range(1, _MOST_ROUNDS + 1):
+        problem = _problem(
+            setting, make_rows(setting.points, about, select, setting.once), inner.p, typical
+        )
+        found = solve(problem)
+        if found is None:
+            return best
+        q, slope = found[0::2], found[1::2]
+        p, d, dd = setting.points.cubic(grid, q, slope)
+        excess = _excess(setting, p, d, dd)
+        about = About(np.maximum(p, _LEAST_FALL * about.p), (d, dd))
+        p = np.sum(setting.gauss[2] * corners(grid, setting.gauss[0], q, slope), axis=-1)
+        inner = About(np.maximum(p, _LEAST_FALL * inner.p))
+        times = _times(setting, inner.p)
+        typical = q
+        gain = np.inf if best is None else best.duration_s - times.sum()
+        best = Solution(grid, q, slope, times, excess, rounds)
+        if rounds > 1 and excess <= ALLOWED and abs(gain) < _GAIN * times.sum():
+            break
+    return best
+
+
+def _p_of(feed: Feed, interval: Index, s: Real, setting: _Setting) -> Real:
+    """p of a feed given as q; at rest that of the middle of the interval."""
+    grid = setting.grid
+    middle, slope, _, _ = grid.sigma(interval, np.full(interval.size, 0.5))
+    x = np.where(grid.grade[interval] > 0, np.cbrt(s - grid.s[0]), np.cbrt(grid.s[-1] - s))
+    s1 = np.where(grid.grade[interval] == 0, 1.0, 3.0 * x * x)
+    at_rest = s1 <= 0.0
+    return np.asarray(feed(np.where(at_rest, middle, s)) / np.where(at_rest, slope, s1) ** 2)
+
+
+def _times(setting: _Setting, p: Real) -> Real:
+    """Time (n,) of each interval from p at the Gauss points."""
+    parts = (1.0 / np.sqrt(p)).reshape(-1, GAUSS_W.size) @ GAUSS_W
+    return np.asarray(parts * setting.grid.h)
+
+
+def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real) -> Problem:
+    """The linear program: least time to first order about a feed, p at the Gauss points, q at the knots."""
+    grid = setting.grid
+    typical = np.maximum(typical, 1e-6 * np.max(typical))
+    scale = np.empty(2 * grid.size + 2)
+    scale[0::2] = typical
+    width = np.diff(grid.s)
+    scale[1::2] = typical / np.minimum(np.append(width, width[-1]), np.append(width[0], width))
+    low, high = np.full(scale.size, -np.inf), np.full(scale.size, np.inf)
+    low[0::2], high[0::2] = 1e-6 * scale[0::2], setting.most_q
+    if setting.start is None:
+        scale[0], scale[1] = _rest_scale(grid, 0, typical[1])
+        low[0] = 1e-6 * scale[0]
+    else:
+        low[0] = high[0] = setting.start.q
+        low[1] = high[1] = setting.start.slope
+    scale[-2], scale[-1] = _rest_scale(grid, grid.size - 1, typical[-2])
+    low[-2] = 1e-6 * scale[-2]
+    bounded = np.isfinite(high)
+    high[bounded] = np.maximum(high[bounded], low[bounded])
+    if setting.start is not None:
+        # The state that the window before ends with may be above its limits by what is allowed.
+        rows.high[rows.interval < 2] += 2.0 * ALLOWED
+        rows.low[rows.interval < 2] -= 2.0 * ALLOWED
+    return Problem(_gradient(setting, p), scale, low, high, rows)
+
+
+def _rest_scale(grid: Grid, interval: int, q: float) -> tuple[float, float]:
+    """Scales of p and dp/dx at rest, from q at the other end of the interval."""
+    far = grid.sigma(np.array([interval]), np.array([1.0 if interval == 0 else 0.0]))[1][0]
+    p = q / far**2
+    return p, p / grid.h[interval]
+
+
+def _gradient(setting: _Setting, p: Real) -> Real:
+    """Of the time, by the unknowns."""
+    grid = setting.grid
+    weights = np.tile(GAUSS_W, grid.size) * np.repeat(grid.h, GAUSS_W.size)
+    pull = (
+        ((-0.5 * weights * p**-1.5)[:, None] * setting.gauss[2])
+        .reshape(grid.size, -1, 4)
+        .sum(axis=1)
+    )
+    gradient = np.zeros(2 * grid.size + 2)
+    for k in range(4):
+        gradient[k : k + 2 * grid.size : 2] += pull[:, k]
+    return gradient
+
+
+def _excess(setting: _Setting, p: Real, d: Real, dd: Real) -> float:
+    """Greatest share by which a feed is above a limit."""
+    if p.min() <= 0.0:
+        return 1.0
+    worst = 0.0
+    inherited = (setting.points.interval < 2) & (setting.start is not None)
+    for value, limit in setting.points.values(p, d, dd).values():
+        ratio = value / limit - 2.0 * ALLOWED * inherited
+        worst = max(worst, float(ratio.max()) - 1.0)
+    return worst
