@@ -13,7 +13,7 @@ from time import perf_counter
 from .config import Drive, Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
 from .feed import ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
-from .feed.optimal import plan_optimal
+from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
 from .program import (
     Compilation,
     Program,
@@ -151,6 +151,15 @@ class Chain:
     def planning_s(self) -> float:
         """Wall time that planning took."""
         return self._timed_plan[1]
+
+    @cached_property
+    def peaks(self) -> dict[str, Peak]:
+        """Where every limited quantity of the plan comes nearest to its limit."""
+        plan, machine, limits = self.plan, self.machine_or_none, self.file.limits
+        controller = controller_limits(machine) if machine is not None else None
+        bounds = gather(self.feed, limits, controller, plants(machine, limits), plan.period_us)
+        spline = self.spline_result.spline
+        return find_peaks(spline, bounds, track_of(plan.raw, spline.length_mm))
 
     @cached_property
     def _timed_plan(self) -> tuple[Plan, float]:

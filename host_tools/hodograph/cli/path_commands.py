@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from ..bustime import require_fit
 from ..chain import Chain, load_chain
 from ..errors import InputError
 from ..feed import Plan
-from ..feed.optimal import OptimalPlan, Peak
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.image import MAGIC
 from ..simulate import Motion, simulate, write_trace
@@ -89,7 +87,10 @@ def feed(options: Namespace) -> None:
         "ramp_time_s": plan.ramp_time_s,
         "duration_s": plan.duration_s,
         "planning_s": chain.planning_s,
-        "peak": {name: asdict(peak) for name, peak in _peaks(plan).items()},
+        "peak": {
+            name: {"value": peak.value, "limit": peak.limit, "at_mm": peak.s_mm}
+            for name, peak in chain.peaks.items()
+        },
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
     }
@@ -113,21 +114,15 @@ def feed(options: Namespace) -> None:
             ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
         ]
     )
-    if peaks := _peaks(plan):
-        print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
-        for name, peak in peaks.items():
-            print(
-                f"{name:28} {peak.value:12.6g} {peak.limit:12.6g} {100.0 * peak.share:8.2f} {peak.s_mm:12.6g}"
-            )
+    print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
+    for name, peak in chain.peaks.items():
+        print(
+            f"{name:28} {peak.value:12.6g} {peak.limit:12.6g} {100.0 * peak.share:8.2f} {peak.s_mm:12.6g}"
+        )
     if options.at is not None:
         print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
         for at, s, v in zip(options.at, plan.arc_length(t), plan.feed(t), strict=True):
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
-
-
-def _peaks(plan: Plan) -> dict[str, Peak]:
-    """Limited quantities of a plan over the whole path."""
-    return plan.peaks if isinstance(plan, OptimalPlan) else {}
 
 
 def compile_(options: Namespace) -> None:

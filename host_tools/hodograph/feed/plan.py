@@ -142,6 +142,11 @@ class Plan(Protocol):
         ...
 
     @property
+    def raw(self) -> RawPieces:
+        """The plan in integers, without bounds for the override."""
+        ...
+
+    @property
     def pieces(self) -> FeedPieces:
         """The plan in integers."""
         ...

@@ -23,7 +23,7 @@ SPLINE_KEYS = {
 }  # fmt: skip
 FEED_KEYS = {
     "profile", "n_c", "evaluations", "ramp_time_s", "duration_s", "peak_acceleration_mm_s2",
-    "peak_jerk_mm_s3",
+    "peak_jerk_mm_s3", "planning_s", "peak",
 }  # fmt: skip
 SIMULATE_KEYS = {
     "ticks", "setpoints_sha256", "encoders_sha256", "max_contour_error_um", "max_following_error_um",
@@ -70,6 +70,9 @@ def test_feed(capsys: pytest.CaptureFixture[str], name: str) -> None:
     found = result(capsys, "feed", file, "--json")
     assert set(found) == FEED_KEYS
     assert (found["n_c"] is None) == (name == "star")
+    assert found["planning_s"] > 0
+    for peak in found["peak"].values():
+        assert set(peak) == {"value", "limit", "at_mm"}
     length = result(capsys, "spline", file, "--json")["length_mm"]
     at = result(capsys, "feed", file, "--json", "--at", "0", repr(found["duration_s"]))
     assert set(at) == FEED_KEYS | {"arc_length_mm", "feed_mm_s"}

@@ -7,7 +7,9 @@ quantities), rows and solver (linear programs), window (their sequence), windows
 in time), peaks (what came of it). docs/numerics.md 5.6.
 """
 
-from .peaks import Peak
+from .bounds import gather
+from .peaks import Peak, find_peaks
 from .planner import OptimalPlan, plan_optimal
+from .track import track_of
 
-__all__ = ["OptimalPlan", "Peak", "plan_optimal"]
+__all__ = ["OptimalPlan", "Peak", "find_peaks", "gather", "plan_optimal", "track_of"]

@@ -19,35 +19,40 @@ Real = NDArray[np.float64]
 
 _US = np.array([0.0, 0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375, 1.0])
 _CHUNK = 50_000
+_WITH_RESERVE = ("axis.acceleration", "axis.jerk", "volts")
 
 
 @dataclass(frozen=True)
 class Peak:
-    """Where a quantity comes nearest to its limit."""
+    """Where a quantity comes nearest to its limit, as given; a plan means to use the share `kept` of it only."""
 
     value: float
     limit: float
     s_mm: float
+    kept: float = 1.0
 
     @property
     def share(self) -> float:
         """Of the limit."""
         return self.value / self.limit
 
+    @property
+    def strain(self) -> float:
+        """Of what is meant to be used of the limit."""
+        return self.share / self.kept
+
 
 def find_peaks(spline: PHSpline, bounds: Bounds, track: Track) -> dict[str, Peak]:
-    """By name, at ten places of each piece and on both sides of its ends."""
+    """By name, at ten places of each piece and on both sides of its ends; volts are those beside friction."""
     out: dict[str, Peak] = {}
     for first in range(0, track.shape.shape[0], _CHUNK):
         part = slice(first, first + _CHUNK)
         for name, (value, limit, s) in _values(spline, bounds, track, part).items():
             share = value / limit
             worst = int(np.argmax(share))
-            peak = Peak(
-                float(value[worst]),
-                float(np.broadcast_to(limit, share.shape)[worst]),
-                float(s[worst]),
-            )
+            kept = bounds.axis_share if name.startswith(_WITH_RESERVE) else 1.0
+            bound = float(np.broadcast_to(limit, share.shape)[worst])
+            peak = Peak(float(value[worst]), bound / kept, float(s[worst]), kept)
             if name not in out or peak.share > out[name].share:
                 out[name] = peak
     return out
@@ -90,8 +95,8 @@ def _values(
         if bounds.plants is not None:
             plant = bounds.plants[k]
             drive = of(velocity) + plant.time_constant_s * of(acceleration)
-            friction = np.sign(of(velocity)) * plant.friction_volts
-            out[f"volts.{axis}"] = np.abs(drive / plant.gain_mm_s_v + friction), plant.volts, s
+            reach = plant.reach_mm_s / plant.gain_mm_s_v
+            out[f"volts.{axis}"] = np.abs(drive / plant.gain_mm_s_v), reach, s
     if bounds.caps.size:
         caps = np.full(s.size, inf)
         for low, high, feed in bounds.caps:

@@ -100,16 +100,7 @@ class OptimalPlan:
     @cached_property
     def peaks(self) -> dict[str, Peak]:
         """Where every limited quantity comes nearest to its limit."""
-        return {
-            name: self._in_full(name, peak)
-            for name, peak in find_peaks(self.spline, self.bounds, self.track).items()
-        }
-
-    def _in_full(self, name: str, peak: Peak) -> Peak:
-        """Beside the limit as it was given, its reserve included."""
-        if name.startswith(("axis.acceleration", "axis.jerk", "volts")):
-            return replace(peak, limit=peak.limit / self.bounds.axis_share)
-        return peak
+        return find_peaks(self.spline, self.bounds, self.track)
 
     def arc_length(self, t_s: ArrayLike) -> Real:
         """F at times 0 … duration_s (clipped); mm."""
@@ -212,7 +203,7 @@ def _needed_stretch(peaks: dict[str, Peak]) -> float:
     stretch = 1.0
     for name, peak in peaks.items():
         power = next((n for word, n in _POWER.items() if word in name), 1)
-        stretch = max(stretch, (peak.share / (1.0 + _ABOVE)) ** (1.0 / power))
+        stretch = max(stretch, (peak.strain / (1.0 + _ABOVE)) ** (1.0 / power))
     return stretch
 
 

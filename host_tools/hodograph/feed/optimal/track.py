@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..pieces import exponents
+from ..quantise import RawPieces
 from .window import Solution
 
 Real = NDArray[np.float64]
@@ -113,6 +115,15 @@ def powers(shape: Real, order: int, u: Real) -> Real:
         factor = float(np.prod(np.arange(k - order + 1, k + 1)))
         out = out * u + factor * shape[..., k]
     return out
+
+
+def track_of(raw: RawPieces, length_mm: float) -> Track:
+    """Pieces of any plan."""
+    t_q32 = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(raw.duration_q32_s)))
+    unit = np.ldexp(raw.duration_q32_s.astype(np.float64), -32 - exponents(raw.duration_q32_s))
+    shape = np.zeros((unit.size, 8))
+    shape[:, 1:] = raw.c_q40 * 2.0**-40 * unit[:, None] ** np.arange(1, 8)
+    return Track(t_q32, np.append(raw.start_q40 * 2.0**-40, length_mm), shape)
 
 
 def make_track(ends: Ends, stretch: float) -> Track:
