@@ -145,7 +145,9 @@ PYTHON_RULES: dict[str, set[str]] = {
         "bus",
         "bustime",
         "paper",
+        "tune",
     },
+    "tune": {"errors", "config", "native", "simulate", "chain"},
     "monitor": {"errors", "data", "config", "native", "bus", "bustime", "__init__"},
     "faults.scenario": {"errors", "config"},
     "faults": {

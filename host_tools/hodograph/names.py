@@ -4,5 +4,8 @@
 KERNELS = ("fixed", "float", "double")
 """Number kernels, in the order of their codes in object 0x2004 sub 5."""
 
+INTERPOLATIONS = ("linear", "cubic")
+"""How a simulated drive goes from setpoint to setpoint, in the order of enum drive_interpolation."""
+
 PACES = ("real-time", "fast")
 """How a controller process of a simulated machine may tick."""

@@ -32,6 +32,7 @@ static const struct key keys[] = {
     {"encoder_counts_per_rev", AT(config.encoder_counts_per_rev), KEY_U32, false},
     {"loop_rate_hz", AT(config.loop_rate_hz), KEY_U32, false},
     {"counts_per_mm", AT(config.counts_per_mm), KEY_U32, false},
+    {"interpolation", AT(config.interpolation), KEY_U32, false},
     {"position_mm", AT(position_mm), KEY_NUMBER, false},
     {"limit_negative_mm", AT(equipment.limit_negative_mm), KEY_NUMBER, false},
     {"limit_positive_mm", AT(equipment.limit_positive_mm), KEY_NUMBER, false},

@@ -31,6 +31,7 @@ int drive_init(struct drive *d, const struct drive_config *c)
     d->samples = drive_config_samples(c);
     d->sample_fraction = 1.0 / (double)d->samples;
     d->samples_per_s = (double)c->loop_rate_hz;
+    d->cubic = c->interpolation == DRIVE_CUBIC;
     drive_place(d, 0);
     return 0;
 }
@@ -40,6 +41,8 @@ static void drive_rest(struct drive *d)
     d->state.motor.speed_rad_s = 0.0;
     d->state.integral_rad = 0.0;
     d->state.volts = 0.0;
+    d->way_counts = 0.0;
+    d->end_way_counts = 0.0;
 }
 
 void drive_place(struct drive *d, int32_t target_counts)
@@ -83,16 +86,33 @@ bool drive_stays_parked(struct drive *d, int32_t target_counts, bool may_park)
     return d->parked;
 }
 
+/* Cubic from the speed at the end of the last period to that at the end of this one, which is the slope
+ * there of the parabola through the last three setpoints. */
+static void drive_cubic(struct drive *d, struct drive_command *c, double counts)
+{
+    const double start = d->end_way_counts;
+    const double end = 1.5 * counts - 0.5 * d->way_counts;
+    c->per_s = d->samples_per_s * d->sample_fraction;
+    c->way_mm[0] = start * d->mm_per_count;
+    c->way_mm[1] = (3.0 * counts - 2.0 * start - end) * d->mm_per_count;
+    c->way_mm[2] = (start + end - 2.0 * counts) * d->mm_per_count;
+    d->way_counts = counts;
+    d->end_way_counts = end;
+}
+
 /* The step is one multiplication of the exact difference in counts: a difference of two rounded
  * positions in mm would put noise on the speed feedforward. */
 struct drive_command drive_command(struct drive *d, int32_t target_counts)
 {
-    struct drive_command c;
+    struct drive_command c = {.cubic = d->cubic, .fraction = d->sample_fraction};
     const double counts = (double)target_counts - (double)d->target_counts;
     c.start_mm = (double)d->target_counts * d->mm_per_count;
     c.step_mm = counts * d->mm_per_count * d->sample_fraction;
     c.speed_mm_s = c.step_mm * d->samples_per_s;
     d->target_counts = target_counts;
+    if (c.cubic) {
+        drive_cubic(d, &c, counts);
+    }
     return c;
 }
 
@@ -120,6 +140,31 @@ static void drive_run(struct drive *d, int32_t target_counts)
     d->state = state;
 }
 
+static void drive_run_cubic(struct drive *d, int32_t target_counts)
+{
+    const struct drive_command c = drive_command(d, target_counts);
+    struct drive_state state = d->state;
+    for (uint32_t i = 0; i < d->samples; i++) {
+        struct pdff_input in = {
+            .position_mm = encoder_read_mm(&d->encoder, state.motor.position_mm),
+            .speed_rad_s = state.motor.speed_rad_s,
+        };
+        drive_command_at(&c, i, &in);
+        state.volts = pdff_step(&d->pdff, &state.integral_rad, &in);
+        motor_step(&d->motor, &state.motor, state.volts);
+    }
+    d->state = state;
+}
+
+static void drive_run_one(struct drive *d, int32_t target_counts)
+{
+    if (d->cubic) {
+        drive_run_cubic(d, target_counts);
+    } else {
+        drive_run(d, target_counts);
+    }
+}
+
 static void drive_run_pair(struct drive *first, struct drive *second,
                            const int32_t target_counts[2])
 {
@@ -138,7 +183,7 @@ static void drive_run_pair(struct drive *first, struct drive *second,
 void drive_period(struct drive *d, int32_t target_counts)
 {
     if (!drive_stays_parked(d, target_counts, true)) {
-        drive_run(d, target_counts);
+        drive_run_one(d, target_counts);
     }
 }
 
@@ -146,15 +191,16 @@ void drive_period_pair(struct drive *first, struct drive *second, const int32_t 
 {
     const bool first_parked = drive_stays_parked(first, target_counts[0], true);
     const bool second_parked = drive_stays_parked(second, target_counts[1], true);
-    if (!first_parked && !second_parked && first->samples == second->samples) {
+    const bool alike = first->samples == second->samples && !first->cubic && !second->cubic;
+    if (!first_parked && !second_parked && alike) {
         drive_run_pair(first, second, target_counts);
         return;
     }
     if (!first_parked) {
-        drive_run(first, target_counts[0]);
+        drive_run_one(first, target_counts[0]);
     }
     if (!second_parked) {
-        drive_run(second, target_counts[1]);
+        drive_run_one(second, target_counts[1]);
     }
 }
 

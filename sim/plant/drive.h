@@ -6,7 +6,7 @@
  * Use: drive_init, then drive_place (or drive_hold), then for every SYNC j: report
  * drive_position_counts and drive_volts_mv (they are those of the instant of SYNC j), latch the
  * setpoint received since SYNC j-1 and call drive_period with it; the axis is commanded to be there
- * at SYNC j+1, in a straight line from the setpoint before.
+ * at SYNC j+1, in a straight line from the setpoint before, or along a cubic whose speed has no jumps.
  *
  * Parking (docs/protocol.md section 3): an axis that has had one target for DRIVE_PARK_PERIODS
  * periods and reads within DRIVE_PARK_INCREMENTS encoder increments of it is put exactly at rest at
@@ -49,6 +49,10 @@ struct drive {
     double samples_per_s;
     uint32_t samples;
     struct drive_state state;
+    bool cubic; /* interpolation */
+    double
+        way_counts; /* of the last period, and what the command does in a period at the speed it */
+    double end_way_counts; /* had at the end of that; both for cubic interpolation */
     int32_t target_counts;
     uint32_t same_target_periods; /* up to DRIVE_PARK_PERIODS */
     bool parked;
@@ -69,7 +73,8 @@ void drive_hold(struct drive *drive);
 void drive_period(struct drive *drive, int32_t target_counts);
 
 /* The same for two axes at once: the same bits as two calls, but their chains of arithmetic overlap
- * in the processor (when both have the same number of servo samples per period). */
+ * in the processor (when both have the same number of servo samples per period and interpolate
+ * linearly). */
 void drive_period_pair(struct drive *first, struct drive *second, const int32_t target_counts[2]);
 
 /* Encoder position in bus counts, rounded to nearest and saturated. */

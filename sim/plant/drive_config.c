@@ -68,6 +68,9 @@ int drive_config_check(const struct drive_config *c)
     if (c->plant.time_constant_s * (double)c->loop_rate_hz < 1.0) {
         return DRIVE_ERR_STEP;
     }
+    if (c->interpolation > DRIVE_CUBIC) {
+        return DRIVE_ERR_INTERPOLATION;
+    }
     return 0;
 }
 
@@ -87,6 +90,8 @@ const char *drive_error_text(int code)
                "times period)";
     case DRIVE_ERR_STEP:
         return "the plant's time constant is shorter than one servo sample";
+    case DRIVE_ERR_INTERPOLATION:
+        return "interpolation must be 0 (linear) or 1 (cubic)";
     default:
         return "unknown error";
     }

@@ -21,6 +21,9 @@ struct drive_pdff {
     double k_vf;
 };
 
+/* How the drive goes from one setpoint to the next (docs/numerics.md section 13). */
+enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1 };
+
 struct drive_config {
     struct drive_plant plant;
     struct drive_pdff pdff;
@@ -28,6 +31,7 @@ struct drive_config {
     uint32_t loop_rate_hz;           /* servo samples a second; a whole number of them per period */
     uint32_t counts_per_mm;          /* of the bus, 1 ... 10^9 */
     uint32_t period_us;              /* 1 ... 10^6 */
+    uint32_t interpolation;          /* enum drive_interpolation */
 };
 
 enum drive_error {
@@ -36,6 +40,7 @@ enum drive_error {
     DRIVE_ERR_ENCODER = -3, /* encoder_counts_per_rev or counts_per_mm out of range */
     DRIVE_ERR_RATE = -4, /* no whole number of servo samples per period, or too many (over 65536) */
     DRIVE_ERR_STEP = -5, /* the time constant is shorter than one servo sample */
+    DRIVE_ERR_INTERPOLATION = -6, /* no enum drive_interpolation */
 };
 
 /* 0, or the first enum drive_error that applies. */

@@ -86,12 +86,11 @@ void influence_period(const struct influence *in, struct drive *d, int32_t targe
     }
     const struct drive_command c = drive_command(d, target_counts);
     for (uint32_t i = 0; i < d->samples; i++) {
-        const struct pdff_input input = {
-            .command_mm = c.start_mm + (double)i * c.step_mm,
-            .command_mm_s = c.speed_mm_s,
+        struct pdff_input input = {
             .position_mm = influence_read_mm(in, d),
             .speed_rad_s = d->state.motor.speed_rad_s,
         };
+        drive_command_at(&c, i, &input);
         d->state.volts = pdff_step_offset(&pdff, &d->state.integral_rad, &input,
                                           in->speed_offset_rad_s, in->volts_offset);
         influence_push(in, &d->motor, &d->state.motor, d->state.volts, in->friction_volts);

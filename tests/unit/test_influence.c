@@ -34,7 +34,7 @@ static bool same_state(const struct drive_state *a, const struct drive_state *b)
            a->volts == b->volts;
 }
 
-static void test_nothing_has_the_bits_of_the_plain_drive(void)
+static void nothing_has_the_bits_of_the_plain_drive(void)
 {
     TEST_ASSERT_FALSE(influence_acts(&influence, &plain));
     for (int k = 0; k < 3000; k++) {
@@ -45,6 +45,20 @@ static void test_nothing_has_the_bits_of_the_plain_drive(void)
         TEST_ASSERT_EQUAL_INT(drive_parked(&plain), drive_parked(&other));
     }
     TEST_ASSERT_TRUE(drive_parked(&other));
+}
+
+static void test_nothing_has_the_bits_of_the_plain_drive(void)
+{
+    nothing_has_the_bits_of_the_plain_drive();
+}
+
+static void test_nor_has_it_others_when_setpoints_are_joined_by_cubics(void)
+{
+    struct drive_config config = drive_bench_config;
+    config.interpolation = DRIVE_CUBIC;
+    TEST_ASSERT_EQUAL_INT(0, drive_init(&plain, &config));
+    TEST_ASSERT_EQUAL_INT(0, drive_init(&other, &config));
+    nothing_has_the_bits_of_the_plain_drive();
 }
 
 static void test_each_figure_acts(void)
@@ -195,6 +209,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_nothing_has_the_bits_of_the_plain_drive);
+    RUN_TEST(test_nor_has_it_others_when_setpoints_are_joined_by_cubics);
     RUN_TEST(test_each_figure_acts);
     RUN_TEST(test_a_load_is_held_by_the_integral);
     RUN_TEST(test_velocity_offset_takes_the_lag_away);

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import BusError
+from ..names import INTERPOLATIONS
 from .address import BusAddress
 
 if TYPE_CHECKING:
@@ -87,6 +88,7 @@ def _axis_text(node: int, drive: Drive, machine: Machine) -> str:
         "loop_rate_hz": drive.loop_rate_hz,
         "counts_per_mm": machine.counts_per_mm,
         "position_mm": 0,
+        "interpolation": INTERPOLATIONS.index(drive.interpolation),
         **drive.equipment.given(),
     }
     return ",".join(f"{key}={value:.17g}" for key, value in values.items())

@@ -31,6 +31,7 @@ _MODULES = {
     **dict.fromkeys(("home", "quick-stop", "reset"), "action_commands"),
     "campaign": "campaign_command",
     "dbc": "dbc_command",
+    "tune": "tune_command",
     "faults": "faults_command",
     "monitor": "monitor_command",
     **dict.fromkeys(("report", "paper"), "report_commands"),

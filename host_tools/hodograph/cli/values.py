@@ -27,6 +27,14 @@ def seconds(text: str) -> float:
     return value
 
 
+def positive(text: str) -> float:
+    """A number above zero."""
+    value = finite(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a number above 0')
+    return value
+
+
 def percentage(text: str) -> int:
     """A feed override."""
     if not text.isdigit() or int(text) > 200:

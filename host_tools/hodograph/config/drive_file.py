@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+from ..names import INTERPOLATIONS
 from .table import Table, read_toml
 
 
@@ -48,6 +49,8 @@ class Drive:
     k_vf: float
     encoder_counts_per_rev: int
     loop_rate_hz: int
+    interpolation: str = "linear"
+    """How it goes from setpoint to setpoint: "linear" or "cubic" (docs/numerics.md section 13)."""
     equipment: Equipment = Equipment()
 
     @property
@@ -69,7 +72,7 @@ def load_drive(file: Path) -> Drive:
     plant = root.table("plant", _PLANT)
     pdff = root.table("pdff", _PDFF)
     encoder = root.table("encoder", ("counts_per_rev",), required=False)
-    servo = root.table("servo", ("loop_rate_hz",), required=False)
+    servo = root.table("servo", ("loop_rate_hz", "interpolation"), required=False)
     return Drive(
         gain_rad_s_v=plant.number("gain_rad_s_v", low=1e-3, high=1e6),
         time_constant_s=plant.number("time_constant_s", low=1e-5, high=1e3),
@@ -83,6 +86,7 @@ def load_drive(file: Path) -> Drive:
         k_vf=pdff.number("k_vf", low=0, high=1e3),
         encoder_counts_per_rev=encoder.integer("counts_per_rev", 2**20, low=16, high=2**26),
         loop_rate_hz=_loop_rate(servo),
+        interpolation=servo.choice("interpolation", INTERPOLATIONS, "linear"),
         equipment=_equipment(root),
     )
 

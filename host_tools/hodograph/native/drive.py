@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..names import INTERPOLATIONS
 from .library import library, text
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def drive_config(drive: Drive, counts_per_mm: int, period_us: int) -> dict[str, 
         "loop_rate_hz": drive.loop_rate_hz,
         "counts_per_mm": counts_per_mm,
         "period_us": period_us,
+        "interpolation": INTERPOLATIONS.index(drive.interpolation),
     }
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..values import at_least_one
+from ...names import INTERPOLATIONS
+from ..values import at_least_one, finite, positive
 from . import options
 from .options import Command
 
@@ -106,4 +107,60 @@ def _dbc(command: Command) -> None:
     )
 
 
-ALL = (_spline, _feed, _compile, _inspect, _verify, _simulate, _report, _campaign, _paper, _dbc)
+def _tune(command: Command) -> None:
+    tune = command("tune", "compute servo gains and feedforward of a machine from its plant model")
+    tune.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
+    tune.add_argument(
+        "--path",
+        type=Path,
+        action="append",
+        metavar="FILE",
+        help="path for the table of contour errors, and, without --bandwidth, to be best for (may be repeated)",
+    )
+    tune.add_argument(
+        "--bandwidth", type=positive, metavar="HZ", help="natural frequency of the closed loop"
+    )
+    tune.add_argument("--damping", type=positive, metavar="Z", help="of it (default 1)")
+    tune.add_argument(
+        "--stiffness",
+        type=positive,
+        metavar="N/UM",
+        help="least force that moves the table by 1 um",
+    )
+    tune.add_argument(
+        "--interpolation",
+        choices=INTERPOLATIONS,
+        help="of setpoints in the drives (default: as they have it)",
+    )
+    tune.add_argument(
+        "--velocity",
+        choices=("drive", "bus"),
+        default="drive",
+        help="velocity feedforward by the drive's k_pf (default) or by 0x60B1 over the bus",
+    )
+    tune.add_argument(
+        "--margin",
+        type=positive,
+        default=0.5,
+        metavar="M",
+        help="least modulus margin (default 0.5)",
+    )
+    tune.add_argument(
+        "--delay-us",
+        type=finite,
+        default=125.0,
+        metavar="US",
+        help="dead time that the margins must stand, beyond the model's (default 125)",
+    )
+    tune.add_argument("--report", type=Path, metavar="DIR", help="write a report with figures")
+    tune.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write a machine file and its drive files"
+    )
+    tune.add_argument("--force", action="store_true", help="replace files that are there")
+    options.json(tune)
+
+
+ALL = (
+    *(_spline, _feed, _compile, _inspect, _verify, _simulate, _report),
+    *(_campaign, _tune, _paper, _dbc),
+)

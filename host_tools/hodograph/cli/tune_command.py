@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""Commands about servo loops: tune."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from dataclasses import replace
+from pathlib import Path
+
+from ..bustime import require_fit
+from ..chain import load_chain
+from ..config import Machine, load_machine
+from ..config.axis_table import Feedforward
+from ..errors import InputError
+from .output import note, print_json, progress, write_file
+
+
+def tune(options: Namespace) -> None:
+    """hodograph tune."""
+    from ..tune import Asked, Wanted, refuse_existing, tuned_files, tuning_json, tuning_text
+    from ..tune import tune as tune_machine
+
+    _check(options)
+    machine = load_machine(options.file)
+    chains = [load_chain(file, options.file) for file in options.path or ()]
+    asked = Asked(
+        bandwidth_hz=options.bandwidth,
+        damping=options.damping if options.damping is not None else 1.0,
+        stiffness_n_um=options.stiffness,
+        interpolation=options.interpolation,
+        velocity=options.velocity,
+        wanted=Wanted(modulus=options.margin, delay_s=options.delay_us * 1e-6),
+    )
+    with progress("search", "loop") as advance:
+        found = tune_machine(machine, chains, asked, advance)
+    for axis in found.axes:
+        if options.bandwidth is not None and axis.tuned.margins.modulus < options.margin:
+            note(
+                f"axis {axis.name}: the modulus margin is {axis.tuned.margins.modulus:.3f}, below {options.margin:g}"
+            )
+    require_fit(_with_feedforward(machine, found.feedforward))
+    files: dict[Path, str] = {}
+    if options.output is not None:
+        files = tuned_files(machine, found.drives, found.feedforward, options.output)
+        refuse_existing(files, options.force)
+        for file, text in files.items():
+            write_file(file, text.encode())
+    if options.report is not None:
+        from ..report.tune_report import write_tune_report
+
+        files[write_tune_report(found, chains, options.report)] = ""
+    if options.json:
+        print_json(tuning_json(found) | {"files": [str(file) for file in files]})
+        return
+    print(tuning_text(found))
+    for file in files:
+        print(file)
+
+
+def _with_feedforward(machine: Machine, forward: tuple[Feedforward, Feedforward]) -> Machine:
+    """The machine as it is to be: offsets take room on the bus."""
+    plane = zip(machine.plane, forward, strict=True)
+    told = tuple(replace(axis, feedforward=own) for axis, own in plane)
+    return replace(machine, axes=(*told, *machine.axes[len(told) :]))
+
+
+def _check(options: Namespace) -> None:
+    if options.delay_us < 0:
+        raise InputError(f"--delay-us {options.delay_us:g}: a dead time is not negative")
+    if options.bandwidth is None:
+        if not options.path:
+            raise InputError(
+                "tune: say what for: --bandwidth HZ, or --path FILE for the least contour error on it"
+            )
+        for name in ("damping", "stiffness"):
+            if getattr(options, name) is not None:
+                raise InputError(f"tune: --{name} goes with --bandwidth HZ")
+
+
+COMMANDS = {"tune": tune}

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: MIT
+"""Servo loops by design: PDFF gains and feedforward from the plant model, margins, and what a wrong model costs.
+
+The method is docs/numerics.md section 18, the use docs/tuning.md.
+"""
+
+from .design import VELOCITIES
+from .files import refuse_existing, tuned_files
+from .result import Tuning
+from .search import Wanted
+from .text import tuning_json, tuning_text
+from .tuning import Asked, tune
+
+__all__ = [
+    "VELOCITIES",
+    "Asked",
+    "Tuning",
+    "Wanted",
+    "refuse_existing",
+    "tune",
+    "tuned_files",
+    "tuning_json",
+    "tuning_text",
+]

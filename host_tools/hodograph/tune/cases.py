@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""Contour error where the plant is not what the gains and the feedforward were made for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..config.axis_table import Feedforward
+from ..config.drive_file import Drive
+from ..native import FOR_EVER, RigFault
+from ..simulate import simulate
+
+Drives = tuple[Drive, Drive]
+Forward = tuple[Feedforward, Feedforward] | None
+Pair = tuple[float, float]
+_MV = 1e-3
+
+COULOMB, LOAD = 0.05, 0.10
+"""Of the voltage limit: friction that a motion has to overcome, and a load that comes on at the start."""
+VISCOUS = 0.2
+"""Viscous friction besides, as part of the motor's own damping: it lowers gain and time constant alike."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A plant: gain and time constant of both axes over the nominal ones, friction and load over the voltage limit."""
+
+    name: str
+    gain: Pair = (1.0, 1.0)
+    time: Pair = (1.0, 1.0)
+    coulomb: float = 0.0
+    load: float = 0.0
+
+    def drives(self, drives: Drives) -> Drives:
+        """The drives with this plant; their gains stay."""
+        return self._drive(drives[0], 0), self._drive(drives[1], 1)
+
+    def _drive(self, drive: Drive, axis: int) -> Drive:
+        own = drive.equipment.friction_volts or 0.0
+        friction = own + self.coulomb * drive.volts_limit
+        return replace(
+            drive,
+            gain_rad_s_v=drive.gain_rad_s_v * self.gain[axis],
+            time_constant_s=drive.time_constant_s * self.time[axis],
+            equipment=replace(drive.equipment, friction_volts=friction or None),
+        )
+
+    def faults(self, drives: Drives) -> tuple[RigFault, ...]:
+        """The load on both axes."""
+        if self.load == 0:
+            return ()
+        return tuple(
+            RigFault("load", axis, 0, FOR_EVER, self.load * drive.volts_limit)
+            for axis, drive in enumerate(drives)
+        )
+
+
+def _viscous(name: str, more: float, coulomb: float = 0.0, load: float = 0.0) -> Case:
+    both = (1 / (1 + more), 1 / (1 + more))
+    return Case(name, both, both, coulomb, load)
+
+
+NOMINAL = Case("as modelled")
+CASES = (
+    NOMINAL,
+    Case("gain -20 %", gain=(0.8, 0.8)),
+    Case("gain +20 %", gain=(1.2, 1.2)),
+    Case("time constant -20 %", time=(0.8, 0.8)),
+    Case("time constant +20 %", time=(1.2, 1.2)),
+    Case("gain -20 %, time constant +20 %", (0.8, 0.8), (1.2, 1.2)),
+    Case("gain +20 %, time constant -20 %", (1.2, 1.2), (0.8, 0.8)),
+    Case("gain of x -20 %, of y +20 %", gain=(0.8, 1.2)),
+    Case("gain of x +20 %, of y -20 %", gain=(1.2, 0.8)),
+    Case(f"Coulomb friction, {100 * COULOMB:.0f} % of the limit", coulomb=COULOMB),
+    _viscous(f"viscous friction, {100 * VISCOUS:.0f} % more", VISCOUS),
+    Case(f"load torque, {100 * LOAD:.0f} % of the limit, from the start on", load=LOAD),
+    _viscous("both frictions and the load", VISCOUS, COULOMB, LOAD),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one run: the greatest contour error, the greatest voltage seen at a SYNC, and whether it met the limit."""
+
+    contour_error_um: float
+    volts: float
+    saturated: bool
+
+
+def outcome(
+    image: bytes, counts_per_mm: int, drives: Drives, forward: Forward, case: Case
+) -> Outcome:
+    """A run of a program with this plant."""
+    motion = simulate(
+        image,
+        case.drives(drives),
+        kernel="double",
+        counts_per_mm=counts_per_mm,
+        feedforward=forward,
+        faults=case.faults(drives),
+        keep_rows=False,
+    )
+    limit = min(drive.volts_limit for drive in drives)
+    return Outcome(motion.max_contour_error_um, motion.max_volts, motion.max_volts > limit - _MV)
+
+
+def outcomes(
+    image: bytes,
+    counts_per_mm: int,
+    drives: Drives,
+    forward: Forward,
+    cases: Sequence[Case] = CASES,
+) -> list[Outcome]:
+    """Of all cases."""
+    return [outcome(image, counts_per_mm, drives, forward, case) for case in cases]

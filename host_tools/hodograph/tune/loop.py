@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""The servo loop of one axis as a linear sampled system: docs/numerics.md section 18.
+
+Exact for the simulated drive (sim/plant) but for what is not linear: encoder increments, voltage limit, friction.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config.axis_table import Feedforward
+from ..config.drive_file import Drive
+
+Float = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+GRID_POINTS = 6000
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Coefficients of one servo sample: plant from volts, loop to volts (sim/plant/motor.h, pdff.h)."""
+
+    step_s: float
+    speed_from_speed: float
+    speed_from_volts: float
+    position_from_speed: float
+    position_from_volts: float
+    k_pp_rad_s_mm: float
+    k_pf_rad_mm: float
+    volts_per_ref: float
+    volts_per_integral: float
+    volts_per_speed: float
+    newton_per_volt: float
+    """Force at the table for a volt of load."""
+
+    @property
+    def nyquist_rad_s(self) -> float:
+        """Half of the servo's sampling frequency."""
+        return math.pi / self.step_s
+
+    def grid(self) -> Float:
+        """Frequencies for plots and margins, rad/s, ascending, in equal ratios up to Nyquist."""
+        top = self.nyquist_rad_s * (1 - 1e-9)
+        return np.geomspace(top * 1e-6, top, GRID_POINTS)
+
+    def _plant(self, z: Complex) -> tuple[Complex, Complex]:
+        """Speed and position for a volt."""
+        speed = self.speed_from_volts / (z - self.speed_from_speed)
+        position = (self.position_from_speed * speed + self.position_from_volts) / (z - 1)
+        return speed, position
+
+    def _by_ref(self, z: Complex) -> Complex:
+        """Volts for a rad/s of reference."""
+        return self.volts_per_ref + self.volts_per_integral * self.step_s / (z - 1)
+
+    def open(self, rad_s: Float, delay_s: float = 0.0) -> Complex:
+        """The loop opened at the volts, at these frequencies: what comes back for a volt, sign turned.
+
+        `delay_s` is a dead time that the model does not have.
+        """
+        z = np.exp(1j * rad_s * self.step_s)
+        speed, position = self._plant(z)
+        back = self._by_ref(z) * self.k_pp_rad_s_mm * position
+        back += self.volts_per_integral * self.step_s / (z - 1) * speed
+        back += self.volts_per_speed * speed
+        return np.asarray(back * np.exp(-1j * rad_s * delay_s))
+
+    def closed(self, rad_s: Float, volts_s_mm: float = 0.0, volts_s2_mm: float = 0.0) -> Complex:
+        """Position for a command; the last two are the torque offset, as volts, for speed and acceleration.
+
+        Speed and acceleration of the command are taken as the drive would have them without setpoints' periods.
+        """
+        z = np.exp(1j * rad_s * self.step_s)
+        s = 1j * rad_s
+        _, position = self._plant(z)
+        volts = self._by_ref(z) * (self.k_pp_rad_s_mm + self.k_pf_rad_mm * s)
+        volts += volts_s_mm * s + volts_s2_mm * s * s
+        return np.asarray(position * volts / (1 + self.open(rad_s)))
+
+    def compliance(self, rad_s: Float) -> Float:
+        """Amount by which a load moves the table, um/N."""
+        _, position = self._plant(np.exp(1j * rad_s * self.step_s))
+        mm_per_volt = np.abs(position / (1 + self.open(rad_s)))
+        return np.asarray(1000.0 * mm_per_volt / self.newton_per_volt)
+
+    def poles(self) -> Complex:
+        """The closed loop's three, as continuous ones, rad/s, slowest first."""
+        values = np.linalg.eigvals(self._transition()[0])
+        found = np.log(values.astype(np.complex128)) / self.step_s
+        return np.asarray(found[np.argsort(np.abs(found))])
+
+    @property
+    def stable(self) -> bool:
+        """Whether all poles die away."""
+        return bool(np.max(self.poles().real) < 0)
+
+    def _transition(self) -> tuple[Float, Float, Float]:
+        """State (position, speed, integral) of the next sample from this one, by state, command and load (volts)."""
+        a: Float = np.zeros((3, 3))
+        a[0, :2] = 1, self.position_from_speed
+        a[1, 1] = self.speed_from_speed
+        a[2] = -self.step_s * self.k_pp_rad_s_mm, -self.step_s, 1
+        b: Float = np.array([self.position_from_volts, self.speed_from_volts, 0.0])
+        back: Float = np.array(
+            [
+                -self.volts_per_ref * self.k_pp_rad_s_mm,
+                -self.volts_per_speed,
+                self.volts_per_integral,
+            ]
+        )
+        command = b * self.volts_per_ref * self.k_pp_rad_s_mm
+        command[2] = self.step_s * self.k_pp_rad_s_mm
+        both: Float = a + b[:, np.newaxis] * back
+        return both, command, -b
+
+    def steps(self, duration_s: float) -> tuple[Float, Float, Float]:
+        """Times; position after a step of the command (of 1); movement after a step of load, um/N."""
+        a, command, load = self._transition()
+        count = max(2, math.ceil(duration_s / self.step_s))
+        states, both = np.zeros((count, 3, 2)), np.stack([command, load], axis=1)
+        for i in range(1, count):
+            states[i] = a @ states[i - 1] + both
+        per_newton = 1000.0 / self.newton_per_volt
+        t_s: Float = np.arange(count, dtype=np.float64) * self.step_s
+        return t_s, states[:, 0, 0], -states[:, 0, 1] * per_newton
+
+
+def loop_of(drive: Drive) -> Loop:
+    """The loop of a drive file."""
+    h, t, g = 1.0 / drive.loop_rate_hz, drive.time_constant_s, drive.screw_mm_rad
+    decay = math.exp(-h / t)
+    lost = -math.expm1(-h / t)
+    volts = drive.torque_to_volts * drive.k_pv_nm_s_rad
+    return Loop(
+        step_s=h,
+        speed_from_speed=decay,
+        speed_from_volts=drive.gain_rad_s_v * lost,
+        position_from_speed=g * t * lost,
+        position_from_volts=g * drive.gain_rad_s_v * (h - t * lost),
+        k_pp_rad_s_mm=drive.k_pp_rad_s_mm,
+        k_pf_rad_mm=drive.k_pf_rad_mm,
+        volts_per_ref=volts * (drive.k_vf + drive.k_iv_per_s * h),
+        volts_per_integral=volts * drive.k_iv_per_s,
+        volts_per_speed=volts * (1 + drive.k_iv_per_s * h),
+        newton_per_volt=1000.0 / (drive.torque_to_volts * g),
+    )
+
+
+def offset_volts(drive: Drive, feedforward: Feedforward) -> tuple[float, float]:
+    """What the torque offset comes to, V for a mm/s and V for a mm/s^2."""
+    volts = drive.rated_torque_nm * drive.torque_to_volts * 1e-6
+    return feedforward.torque_permille_s_m * volts, feedforward.torque_permille_s2_m * volts

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""From a machine and what is asked for to gains, feedforward and what they do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from ..chain import Chain
+from ..config import Machine
+from ..config.axis_table import Feedforward
+from ..config.drive_file import Drive
+from ..errors import PlanError
+from .cases import CASES, Drives, Forward, Outcome, outcomes
+from .design import Poles, feedforward_of, pole_for_stiffness, stiffness_n_um, with_poles
+from .loop import loop_of
+from .margins import margins
+from .result import AxisResult, CaseResult, PathResult, Side, Tuning
+from .search import Wanted, best_poles
+
+DIGITS = 6
+"""Significant ones of the gains: what is judged is what is written."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the loops are to be. Without `bandwidth_hz` the least contour error on the paths is the goal.
+
+    `interpolation` None keeps that of the drive files.
+    """
+
+    bandwidth_hz: float | None = None
+    damping: float = 1.0
+    stiffness_n_um: float | None = None
+    interpolation: str | None = None
+    velocity: str = "drive"
+    wanted: Wanted = field(default_factory=Wanted)
+
+
+def tune(
+    machine: Machine,
+    chains: Sequence[Chain],
+    asked: Asked,
+    progress: Callable[[int], None] = lambda done: None,
+) -> Tuning:
+    """Gains for both axes of the plane, the same poles for both, so that they lag alike.
+
+    Raises PlanError: not possible; InputError: no model, or a path that is wrong.
+    """
+    x, y = machine.models(machine.plane)
+    given: Drives = (x, y)
+    drives = (_interpolated(x, asked), _interpolated(y, asked))
+    programs = [(chain.image, machine.counts_per_mm) for chain in chains]
+    tried = 0
+    if asked.bandwidth_hz is None:
+        poles, all_tried = best_poles(drives, programs, asked.wanted, asked.velocity, progress)
+        tried = len(all_tried)
+    else:
+        natural = 2 * math.pi * asked.bandwidth_hz
+        real = pole_for_stiffness(drives, natural, asked.damping, asked.stiffness_n_um)
+        poles = Poles(natural, asked.damping, real)
+    sides = [_side(*_tuned(drive, poles, asked.velocity)) for drive in drives]
+    before = [_side(axis.drive, axis.feedforward) for axis in machine.plane if axis.drive]
+    axes = [
+        AxisResult(axis.name, old, new)
+        for axis, old, new in zip(machine.plane, before, sides, strict=True)
+    ]
+    result = Tuning(machine, poles, (axes[0], axes[1]), (), tried)
+    return replace(result, paths=tuple(_path(chain, result, given) for chain in chains))
+
+
+def _interpolated(drive: Drive, asked: Asked) -> Drive:
+    return replace(drive, interpolation=asked.interpolation or drive.interpolation)
+
+
+def _tuned(drive: Drive, poles: Poles, velocity: str) -> tuple[Drive, Feedforward]:
+    found, forward = feedforward_of(with_poles(drive, poles), velocity)
+    found = replace(
+        found,
+        k_pp_rad_s_mm=_rounded(found.k_pp_rad_s_mm),
+        k_pv_nm_s_rad=_rounded(found.k_pv_nm_s_rad),
+        k_iv_per_s=_rounded(found.k_iv_per_s),
+        k_pf_rad_mm=_rounded(found.k_pf_rad_mm),
+    )
+    return found, replace(
+        forward,
+        torque_permille_s2_m=_rounded(forward.torque_permille_s2_m),
+        torque_permille_s_m=_rounded(forward.torque_permille_s_m),
+    )
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _side(drive: Drive, forward: Feedforward) -> Side:
+    loop = loop_of(drive)
+    if not loop.stable:
+        raise PlanError(
+            f"k_pp {drive.k_pp_rad_s_mm:g}, k_pv {drive.k_pv_nm_s_rad:g}, k_iv {drive.k_iv_per_s:g}: the loop is not "
+            f"stable at {drive.loop_rate_hz} samples a second: ask for less bandwidth"
+        )
+    return Side(drive, forward, margins(loop), stiffness_n_um(drive))
+
+
+def _path(chain: Chain, tuning: Tuning, given: Drives) -> PathResult:
+    machine, image = tuning.machine, chain.image
+
+    def runs(drives: Drives, forward: Forward) -> list[Outcome]:
+        return outcomes(image, machine.counts_per_mm, drives, forward)
+
+    columns = zip(
+        CASES,
+        runs(given, machine.plane_feedforward),
+        runs(tuning.drives, None),
+        runs(tuning.drives, tuning.feedforward),
+        strict=True,
+    )
+    return PathResult(chain.file.name, image, tuple(CaseResult(*row) for row in columns))

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hodograph.config import Drive, Machine, load_machine
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+
+
+@pytest.fixture(scope="session")
+def machine() -> Machine:
+    return load_machine(EXAMPLES / "machines" / "paper_alpha.toml")
+
+
+@pytest.fixture(scope="session")
+def drives(machine: Machine) -> tuple[Drive, Drive]:
+    x, y = machine.models(machine.plane)
+    return x, y

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: MIT
+"""`hodograph tune`: goals met, what is asked for, files that lose nothing, refusals."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hodograph.chain import load_chain
+from hodograph.cli.main import main
+from hodograph.config import Drive, Machine, load_machine
+from hodograph.errors import PlanError
+from hodograph.simulate import simulate
+from hodograph.tune import Asked, Wanted, search, tune
+from hodograph.tune.cases import CASES, NOMINAL, outcome
+from hodograph.tune.search import greatest_bandwidth
+
+from .conftest import EXAMPLES
+
+MACHINES = EXAMPLES / "machines"
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.mark.parametrize(("name", "paper_um"), [("alpha", 21.353), ("heart", 28.098)])
+def test_the_example_machine_has_a_contour_error_below_a_micrometre(
+    name: str, paper_um: float
+) -> None:
+    plain = load_chain(EXAMPLES / f"{name}.toml")
+    tuned = load_chain(EXAMPLES / f"{name}.toml", MACHINES / "tuned.toml")
+    assert plain.image == tuned.image
+    errors = []
+    for chain in (plain, tuned):
+        machine = chain.machine
+        drives = machine.models(machine.plane)
+        motion = simulate(chain.image, drives, feedforward=machine.plane_feedforward)
+        assert motion.max_volts < 5.0
+        errors.append(motion.max_contour_error_um)
+    assert errors[0] == pytest.approx(paper_um, abs=0.001)
+    assert 0.002 < errors[1] < 0.05
+
+
+def test_the_example_machine_is_what_tune_finds(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The search's last step again: the greatest bandwidth of the damping that was best."""
+    monkeypatch.setattr(search, "DAMPINGS", (1.2,))
+    monkeypatch.setattr(search, "BANDWIDTHS", 1)
+    monkeypatch.setattr(search, "SPAN", 1.0)
+    chain = load_chain(EXAMPLES / "alpha.toml", machine.file)
+    found = tune(machine, [chain], Asked(interpolation="cubic"))
+    example = load_machine(MACHINES / "tuned.toml")
+    assert found.drives == example.models(example.plane)
+    assert found.feedforward == example.plane_feedforward
+    assert found.tried == 1
+    nominal = found.paths[0].cases[0]
+    assert nominal.given.contour_error_um == pytest.approx(21.353, abs=0.001)
+    assert nominal.tuned.contour_error_um < nominal.plain.contour_error_um < 0.1
+
+
+def test_every_case_differs_from_the_model(drives: tuple[Drive, Drive]) -> None:
+    image = load_chain(EXAMPLES / "alpha.toml").image
+    nominal = outcome(image, 1_000_000, drives, None, NOMINAL)
+    for case in CASES[1:]:
+        found = outcome(image, 1_000_000, drives, None, case)
+        assert found != nominal, case.name
+        assert 15 < found.contour_error_um < 30, case.name
+        assert not found.saturated
+
+
+def test_saturation_is_seen(drives: tuple[Drive, Drive]) -> None:
+    chain = load_chain(EXAMPLES / "heart.toml")
+    weak = next(c for c in CASES if c.name == "gain -20 %, time constant +20 %")
+    assert outcome(chain.image, 1_000_000, drives, None, weak).saturated
+    assert not outcome(chain.image, 1_000_000, drives, None, NOMINAL).saturated
+
+
+def test_bandwidth_damping_and_stiffness_asked_for(machine: Machine) -> None:
+    found = tune(machine, [], Asked(bandwidth_hz=80.0, damping=0.8, stiffness_n_um=190.0))
+    assert min(axis.tuned.stiffness_n_um for axis in found.axes) == pytest.approx(190, rel=1e-3)
+    assert found.poles.natural_rad_s == pytest.approx(2 * 3.14159265 * 80)
+    stiffest = tune(machine, [], Asked(bandwidth_hz=80.0, damping=0.8))
+    assert min(axis.tuned.stiffness_n_um for axis in stiffest.axes) > 191
+    with pytest.raises(PlanError, match=r"stiffness 1e\+06 N/um: .* at most"):
+        tune(machine, [], Asked(bandwidth_hz=80.0, stiffness_n_um=1e6))
+    with pytest.raises(PlanError, match="quicker without feedback"):
+        tune(machine, [], Asked(bandwidth_hz=0.3))
+    with pytest.raises(PlanError, match="not stable at 16000 samples"):
+        tune(machine, [], Asked(bandwidth_hz=4000.0))
+
+
+def test_more_margin_is_less_bandwidth(drives: tuple[Drive, Drive]) -> None:
+    usual = greatest_bandwidth(drives, 1.0, Wanted())
+    careful = greatest_bandwidth(drives, 1.0, Wanted(modulus=0.7, delay_s=500e-6))
+    assert usual is not None
+    assert careful is not None
+    assert 0.1 * usual < careful < 0.5 * usual
+    assert greatest_bandwidth(drives, 1.0, Wanted(modulus=1.5)) is None
+
+
+def test_velocity_over_the_bus(machine: Machine) -> None:
+    found = tune(machine, [], Asked(bandwidth_hz=80.0, velocity="bus"))
+    assert [drive.k_pf_rad_mm for drive in found.drives] == [0.0, 0.0]
+    assert [forward.velocity for forward in found.feedforward] == [1.0, 1.0]
+
+
+def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    shutil.copytree(EXAMPLES / "drives", tmp_path / "drives")
+    machines = tmp_path / "machines"
+    machines.mkdir()
+    text = (
+        (MACHINES / "paper_alpha.toml")
+        .read_text()
+        .replace("period_us = 1000 ", "period_us = 2000 ")
+    )
+    third = '\n[[axis]]\nname = "z"\nnode = 4\ntravel_mm = [0, 9]\ndrive = "../drives/alpha_x.toml" # z\n'
+    (machines / "given.toml").write_text(text + third)
+    output = tmp_path / "tuned.toml"
+    arguments = ("tune", str(machines / "given.toml"), "--bandwidth", "60", "-o", str(output))
+    status, out, err = run(capsys, *arguments, "--json")
+    assert status == 0, err
+    written = [output, tmp_path / "tuned_x.toml", tmp_path / "tuned_y.toml"]
+    result = json.loads(out)
+    assert result["files"] == [str(file) for file in written]
+    before, after = tomllib.loads(text + third), tomllib.loads(output.read_text())
+    for axis in after["axis"][:2]:
+        assert axis.pop("feedforward")["torque_permille_s2_m"] > 100
+    assert [axis.pop("drive") for axis in after["axis"]] == [
+        "tuned_x.toml",
+        "tuned_y.toml",
+        "drives/alpha_x.toml",
+    ]
+    for axis in before["axis"]:
+        del axis["drive"]
+    assert after == before
+    for line in (line for line in text.splitlines() if "#" in line):
+        assert line in output.read_text()
+    drive = tomllib.loads(written[1].read_text())
+    given = tomllib.loads((tmp_path / "drives" / "alpha_x.toml").read_text())
+    gains = drive.pop("pdff")
+    assert gains.keys() == given.pop("pdff").keys()
+    assert drive == given
+    side: dict[str, Any] = result["axes"][0]["tuned"]
+    assert gains == {name: side[name] for name in gains}
+    assert len(load_machine(output).axes) == 3
+
+    status, _, err = run(capsys, *arguments)
+    assert status == 2
+    assert "there already: name another --output, or add --force" in err
+    written[2].write_text("other")
+    assert run(capsys, *arguments, "--force")[0] == 0
+    assert "other" not in written[2].read_text()
+
+
+def test_nothing_is_written_when_one_file_is_there(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "tuned_y.toml").write_text("mine")
+    arguments = ("--bandwidth", "60", "-o", str(tmp_path / "tuned.toml"))
+    status, _, err = run(capsys, "tune", str(MACHINES / "paper_alpha.toml"), *arguments)
+    assert status == 2
+    assert "tuned_y.toml: there already" in err
+    assert [file.name for file in tmp_path.iterdir()] == ["tuned_y.toml"]
+    assert (tmp_path / "tuned_y.toml").read_text() == "mine"
+
+
+def test_report_and_text(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = str(EXAMPLES / "alpha.toml")
+    status, out, err = run(
+        capsys,
+        *("tune", str(MACHINES / "paper_alpha.toml"), "--bandwidth", "90", "--path", path),
+        *("--interpolation", "cubic", "--report", str(tmp_path / "report")),
+    )
+    assert status == 0, err
+    assert "k_pp" in out
+    assert "as modelled" in out
+    assert "21.353" in out
+    files = {file.name for file in (tmp_path / "report").iterdir()}
+    figures = {f"{kind}_{axis}.png" for kind in ("frequency", "step") for axis in "xy"}
+    assert files == {"tune.html", "contour_alpha.png", *figures}
+    html = (tmp_path / "report" / "tune.html").read_text()
+    assert html.count("data:image/png;base64,") == 5
+    assert "Coulomb friction" in html
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        ((), 2, "--bandwidth HZ, or --path FILE"),
+        (("--stiffness", "3"), 2, "--bandwidth HZ, or --path FILE"),
+        (("--path", "alpha.toml", "--damping", "1"), 2, "--damping goes with --bandwidth"),
+        (("--bandwidth", "0"), 2, '"0" is not a number above 0'),
+        (("--bandwidth", "60", "--delay-us", "-1"), 2, "--delay-us"),
+        (("--path", "alpha.toml", "--margin", "1.2"), 3, "no gains leave a modulus margin of 1.2"),
+        (("--bandwidth", "60", "--velocity", "bus", "-o", "OUT"), 2, "at most 1 drive"),
+    ],
+)
+def test_what_cannot_be(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    arguments: tuple[str, ...],
+    status: int,
+    message: str,
+) -> None:
+    monkeypatch.chdir(EXAMPLES)
+    given = [word.replace("OUT", str(tmp_path / "out.toml")) for word in arguments]
+    found, _, err = run(capsys, "tune", str(MACHINES / "paper_alpha.toml"), *given)
+    assert found == status
+    assert message in err
+    assert len(err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
