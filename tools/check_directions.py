@@ -148,6 +148,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "tune",
     },
     "tune": {"errors", "config", "native", "simulate", "chain"},
+    "identify": {"errors", "config", "native", "bus"},
     "monitor": {"errors", "data", "config", "native", "bus", "bustime", "__init__"},
     "faults.scenario": {"errors", "config"},
     "faults": {

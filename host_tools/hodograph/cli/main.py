@@ -32,6 +32,7 @@ _MODULES = {
     "campaign": "campaign_command",
     "dbc": "dbc_command",
     "tune": "tune_command",
+    "identify": "identify_command",
     "faults": "faults_command",
     "monitor": "monitor_command",
     **dict.fromkeys(("report", "paper"), "report_commands"),

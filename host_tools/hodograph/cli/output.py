@@ -7,7 +7,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -97,3 +97,14 @@ def write_file(file: Path, data: bytes) -> None:
     except OSError as error:
         fresh.unlink(missing_ok=True) if fresh.parent.is_dir() else None
         raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def write_files(files: Mapping[Path, str], *, force: bool) -> None:
+    """Writes texts by path; none when one is there already and may not be replaced. Raises InputError."""
+    there = [str(file) for file in files if file.exists()]
+    if there and not force:
+        raise InputError(
+            f"{', '.join(there)}: there already: name another --output, or add --force"
+        )
+    for file, text in files.items():
+        write_file(file, text.encode())

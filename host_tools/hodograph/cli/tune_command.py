@@ -11,13 +11,14 @@ from ..bustime import require_fit
 from ..chain import load_chain
 from ..config import Machine, load_machine
 from ..config.axis_table import Feedforward
+from ..config.rewrite import rewritten
 from ..errors import InputError
-from .output import note, print_json, progress, write_file
+from .output import note, print_json, progress, write_files
 
 
 def tune(options: Namespace) -> None:
     """hodograph tune."""
-    from ..tune import Asked, Wanted, refuse_existing, tuned_files, tuning_json, tuning_text
+    from ..tune import Asked, Wanted, tuning_json, tuning_text
     from ..tune import tune as tune_machine
 
     _check(options)
@@ -41,10 +42,9 @@ def tune(options: Namespace) -> None:
     require_fit(_with_feedforward(machine, found.feedforward))
     files: dict[Path, str] = {}
     if options.output is not None:
-        files = tuned_files(machine, found.drives, found.feedforward, options.output)
-        refuse_existing(files, options.force)
-        for file, text in files.items():
-            write_file(file, text.encode())
+        drives, forward = dict(enumerate(found.drives)), dict(enumerate(found.feedforward))
+        files = rewritten(machine, drives, forward, options.output, "tune")
+        write_files(files, force=options.force)
     if options.report is not None:
         from ..report.tune_report import write_tune_report
 

@@ -6,6 +6,7 @@ says so. Arrays go in and out without copies; the interpreter lock is released d
 """
 
 from ..names import KERNELS
+from .axis_run import AxisInputs, run_axis
 from .contour import Contour
 from .drive import DriveModel
 from .library import library, native_file
@@ -25,6 +26,7 @@ __all__ = [
     "KERNELS",
     "POINT",
     "ROW",
+    "AxisInputs",
     "Contour",
     "DriveModel",
     "NativeFault",
@@ -36,4 +38,5 @@ __all__ = [
     "kernel_code",
     "library",
     "native_file",
+    "run_axis",
 ]

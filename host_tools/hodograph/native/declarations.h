@@ -136,3 +136,14 @@ int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
 void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
 enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_FAULT, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };
+
+/* rig/axis_run.h */
+struct axis_run {
+    double rated_torque_nm, friction_volts;
+    int32_t start_counts;
+    uint32_t count;
+    const int32_t *target_counts, *speed_counts_s;
+    const int16_t *torque_permille;
+};
+int axis_run(const struct drive_config *config, const struct axis_run *run, double *position_mm,
+             double *volts);

@@ -5,7 +5,6 @@ The method is docs/numerics.md section 18, the use docs/tuning.md.
 """
 
 from .design import VELOCITIES
-from .files import refuse_existing, tuned_files
 from .result import Tuning
 from .search import Wanted
 from .text import tuning_json, tuning_text
@@ -16,9 +15,7 @@ __all__ = [
     "Asked",
     "Tuning",
     "Wanted",
-    "refuse_existing",
     "tune",
-    "tuned_files",
     "tuning_json",
     "tuning_text",
 ]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...errors import RunError
 from .recorder import Frames
 
-SYNC_ID, RPDO1, TPDO1, TPDO2 = 0x080, 0x200, 0x180, 0x280
+SYNC_ID, RPDO1, RPDO2, TPDO1, TPDO2 = 0x080, 0x200, 0x300, 0x180, 0x280
 SYNC_OVERFLOW = 240
 _LONGEST_LAG = 250
 """SYNCs by which an answer may be late: a slow host delays drives, but frames keep their order."""
@@ -70,6 +70,20 @@ def decode_ticks(frames: Frames, nodes: Sequence[int]) -> Ticks:
         if with_volts
         else None,
     )
+
+
+def decode_offsets(frames: Frames, node: int, count: int) -> tuple[Int32, NDArray[np.int16]]:
+    """Velocity offsets (counts/s) and torque offsets (per mille) sent after each of `count` SYNCs; 0: none."""
+    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+    velocity, torque = np.zeros(count, dtype=np.int32), np.zeros(count, dtype=np.int16)
+    with_torque = (frames["id"] == RPDO1 + node) & (frames["length"] == 8)
+    if np.any(with_torque):
+        data = _by_sync(frames, sync_at, RPDO1 + node, f"setpoints of node {node}")[:count]
+        torque[: len(data)] = _integers(data, 6, "<i2")
+    if np.any(frames["id"] == RPDO2 + node):
+        data = _by_sync(frames, sync_at, RPDO2 + node, f"velocity offsets of node {node}")[:count]
+        velocity[: len(data)] = _integers(data, 0, "<i4")
+    return velocity, torque
 
 
 def _check_counters(counters: NDArray[np.int64]) -> None:

@@ -160,7 +160,27 @@ def _tune(command: Command) -> None:
     options.json(tune)
 
 
+def _identify(command: Command) -> None:
+    identify = command("identify", "fit the plant of each axis to a recorded run")
+    identify.add_argument(
+        "recording", metavar="RECORDING", type=Path, help="recorded run (.log, .asc, .blf)"
+    )
+    identify.add_argument(
+        "--machine",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="machine file it was made with: nodes, and drive files with the loops",
+    )
+    identify.add_argument("--channel", metavar="NAME", help="of a recording with several")
+    identify.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write a machine file and its drive files"
+    )
+    identify.add_argument("--force", action="store_true", help="replace files that are there")
+    options.json(identify)
+
+
 ALL = (
     *(_spline, _feed, _compile, _inspect, _verify, _simulate, _report),
-    *(_campaign, _tune, _paper, _dbc),
+    *(_campaign, _identify, _tune, _paper, _dbc),
 )

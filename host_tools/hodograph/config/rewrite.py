@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Machine and drive files with other figures: everything else in them stays, comments and order too."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from .axis_table import Feedforward
+from .drive_file import Drive
+from .machine_file import Machine
+
+_KEYS = {
+    "plant": ("gain_rad_s_v", "time_constant_s", "screw_mm_rad", "torque_to_volts", "volts_limit"),
+    "pdff": ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s", "k_pf_rad_mm", "k_vf"),
+    "servo": ("interpolation",),
+}
+_FORWARD = ("velocity", "torque_permille_s2_m", "torque_permille_s_m")
+
+
+def rewritten(
+    machine: Machine,
+    drives: Mapping[int, Drive],
+    feedforward: Mapping[int, Feedforward],
+    output: Path,
+    by: str,
+) -> dict[Path, str]:
+    """The texts of the machine file `output` and of drive files beside it, by path; nothing is written.
+
+    `drives` and `feedforward` are by axis; the other axes keep theirs. `by` says in the drive files who changed them.
+    """
+    document = _parsed(machine.file)
+    tables: Any = document["axis"]
+    texts: dict[Path, str] = {}
+    for index, axis in enumerate(machine.axes):
+        table = tables[index]
+        if index in feedforward:
+            _feedforward(table, feedforward[index])
+        if axis.drive is None:
+            continue
+        source = machine.file.parent / Path(str(table["drive"])).expanduser()
+        if index not in drives:
+            table["drive"] = os.path.relpath(source, output.parent)
+            continue
+        name = f"{output.stem}_{re.sub(r'[^A-Za-z0-9_-]+', '-', axis.name)}.toml"
+        head = f"# Changed by `hodograph {by}`; it was {source.name}.\n"
+        texts[output.with_name(name)] = head + drive_text(source, axis.drive, drives[index])
+        table["drive"] = name
+    return {output: tomlkit.dumps(document).rstrip("\n") + "\n", **texts}
+
+
+def drive_text(source: Path, given: Drive, wanted: Drive) -> str:
+    """A drive file with the figures of `wanted` where they are not those that it gives."""
+    document = _parsed(source)
+    for section, keys in _KEYS.items():
+        for key in keys:
+            if getattr(wanted, key) != getattr(given, key):
+                _section(document, section)[key] = getattr(wanted, key)
+    friction = wanted.equipment.friction_volts
+    if friction != given.equipment.friction_volts:
+        _section(document, "equipment")["friction_volts"] = friction or 0.0
+    return tomlkit.dumps(document)
+
+
+def _parsed(file: Path) -> tomlkit.TOMLDocument:
+    return tomlkit.parse(file.read_text(encoding="utf-8"))
+
+
+def _section(document: tomlkit.TOMLDocument, name: str) -> Any:
+    if name not in document:
+        document.add(tomlkit.nl())
+        document.add(name, tomlkit.table())
+    return document[name]
+
+
+def _feedforward(axis: Any, forward: Feedforward) -> None:
+    table = axis.get("feedforward")
+    fresh = table is None
+    if fresh:
+        table = tomlkit.table()
+    for name in _FORWARD:
+        table[name] = getattr(forward, name)
+    if fresh:
+        table.add(tomlkit.nl())
+        axis["feedforward"] = table

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: MIT
+"""The plant of each axis from a recorded run, with confidence intervals: docs/tuning.md, numerics.md section 19."""
+
+from .fit import Estimate, Plant, identify_axis
+from .stretches import Stretch, stretches
+from .text import plant_json, plant_text
+
+__all__ = [
+    "Estimate",
+    "Plant",
+    "Stretch",
+    "identify_axis",
+    "plant_json",
+    "plant_text",
+    "stretches",
+]

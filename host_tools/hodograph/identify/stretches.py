@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""The motions in a recording: what an axis was told, and what its drive reported."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bus.analysis import REACHED_AFTER, complete_ticks, runs_of
+from ..bus.listening.decode import (
+    RPDO1,
+    SYNC_ID,
+    TPDO1,
+    TPDO2,
+    Ticks,
+    decode_offsets,
+    decode_ticks,
+)
+from ..bus.listening.frames import Frames
+from ..errors import RunError
+from ..native import AxisInputs
+
+PARK_PERIODS = 250
+"""After so many periods with one target a simulated drive stands exactly there (docs/protocol.md section 3)."""
+
+_FOLLOWS = 0x1027
+_FOLLOWS_MASK = 0x106F
+_REST = PARK_PERIODS + REACHED_AFTER
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One motion, from rest to its last setpoint: inputs; position and volts as reported at the end of each period."""
+
+    inputs: AxisInputs
+    position_counts: NDArray[np.int32]
+    volts_mv: NDArray[np.int16]
+
+
+def stretches(frames: Frames, node: int) -> list[Stretch]:
+    """All motions of a drive in cyclic synchronous position mode, in order.
+
+    Raises RunError: the drive does not report volts, or never moves.
+    """
+    if not np.any(frames["id"] == TPDO2 + node):
+        raise RunError(
+            f"node {node} sends no volts (TPDO2): only simulated drives do, and where the controller has set them up"
+        )
+    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+    sent = [complete_ticks(frames, sync_at, function + node) for function in (RPDO1, TPDO1, TPDO2)]
+    found = []
+    for begin, end in runs_of(np.logical_and.reduce(sent)):
+        part = frames[sync_at[begin] : sync_at[end]]
+        if end - begin > _REST:
+            ticks = decode_ticks(part, (node,))
+            found += _motions(ticks, *decode_offsets(part, node, ticks.count))
+    if not found:
+        raise RunError(
+            f"node {node} follows no motion in it that begins at rest: record a run from before its start"
+        )
+    return found
+
+
+def _motions(ticks: Ticks, speeds: NDArray[np.int32], torques: NDArray[np.int16]) -> list[Stretch]:
+    """Period i goes to the target sent after SYNC i, from SYNC i+1 to SYNC i+2."""
+    assert ticks.volts_mv is not None
+    follows = (ticks.statuswords[:, 0] & _FOLLOWS_MASK) == _FOLLOWS
+    targets = ticks.targets[:, 0]
+    found = []
+    for first, last in runs_of(follows[1:-1] & follows[2:]):
+        changes = first + 1 + np.flatnonzero(np.diff(targets[first:last]))
+        for begin, end in _groups(changes):
+            start = begin - _REST
+            if start < first:
+                continue
+            stop = min(end + 1, last)
+            span, reached = slice(begin - 1, stop), slice(begin + 1, stop + REACHED_AFTER)
+            inputs = AxisInputs(int(targets[begin - 1]), targets[span], speeds[span], torques[span])
+            found.append(Stretch(inputs, ticks.actual[reached, 0], ticks.volts_mv[reached, 0]))
+    return found
+
+
+def _groups(changes: NDArray[np.intp]) -> list[tuple[int, int]]:
+    """Changes of the target that belong together, without a rest between: first and last of each group."""
+    if not changes.size:
+        return []
+    cuts = np.flatnonzero(np.diff(changes) > _REST)
+    firsts = np.concatenate([[0], cuts + 1])
+    lasts = np.concatenate([cuts, [changes.size - 1]])
+    return [(int(changes[a]), int(changes[b])) for a, b in zip(firsts, lasts, strict=True)]

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/* One axis under given setpoints and offsets, for fits of its plant: what the motor does in the
+ * model, before encoder and bus round it. The drive computes as it always does, with its encoder.
+ */
+#ifndef HODOGRAPH_RIG_AXIS_RUN_H
+#define HODOGRAPH_RIG_AXIS_RUN_H
+
+#include <stdint.h>
+
+#include "plant/drive_config.h"
+
+struct axis_run {
+    double rated_torque_nm; /* of torque offsets, more than 0 */
+    double friction_volts;  /* Coulomb, 0 or more */
+    int32_t start_counts;   /* at rest here */
+    uint32_t count;
+    /* By bus period, `count` each. */
+    const int32_t *target_counts;
+    const int32_t *speed_counts_s;  /* 0x60B1 */
+    const int16_t *torque_permille; /* 0x60B2 */
+};
+
+/* The whole run; position and volts (of the last servo sample) at the end of each period. Returns 0 or a
+ * negative enum drive_error. */
+int axis_run(const struct drive_config *config, const struct axis_run *run, double *position_mm,
+             double *volts);
+
+#endif
