@@ -63,21 +63,27 @@ static void take_inputs(struct machine *machine, int node, uint32_t inputs)
     }
 }
 
+static void receive_other(struct controller *controller, const struct can_msg *message)
+{
+    uint32_t inputs;
+    const int node = pdo_decode_inputs(message, &inputs);
+    if (node != 0) {
+        take_inputs(&controller->machine, node, inputs);
+    } else if (frame_queue_put(&controller->queue, message)) {
+        port_wake();
+    }
+}
+
 /* Receive: process data at once, the rest waits for the mainline. */
 static void on_receive(void *self, const struct can_msg *message, uint32_t now_us)
 {
     struct controller *controller = self;
-    struct pdo_actual unused;
-    uint32_t inputs;
-    const int inputs_node = pdo_decode_inputs(message, &inputs);
-    if (pdo_decode_actual(message, &unused) != 0) {
-        if (machine_receive(&controller->machine, message, now_us)) {
-            port_tick_ready();
-        }
-    } else if (inputs_node != 0) {
-        take_inputs(&controller->machine, inputs_node, inputs);
-    } else if (frame_queue_put(&controller->queue, message)) {
-        port_wake();
+    struct pdo_actual actual;
+    const int node = pdo_decode_actual(message, &actual);
+    if (node == 0) {
+        receive_other(controller, message);
+    } else if (node > 0 && machine_receive(&controller->machine, (uint8_t)node, &actual, now_us)) {
+        port_tick_ready();
     }
 }
 

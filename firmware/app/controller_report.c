@@ -101,7 +101,7 @@ static void note_drives(struct controller *controller)
     for (uint8_t i = 0; i < controller->config.axis_count; ++i) {
         port_lock();
         const struct axis *axis = &controller->machine.axes[i];
-        const enum cia402_state state = cia402_decode(axis->statusword);
+        const enum cia402_state state = axis->state;
         const uint8_t node = axis->node;
         port_unlock();
         if (state != controller->noted_drive[i]) {

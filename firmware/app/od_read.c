@@ -138,7 +138,7 @@ static uint64_t boot_number(const struct drive_boot *boot, uint8_t sub)
 
 static uint64_t drive_state(const struct axis *axis)
 {
-    return axis->answers.present ? (uint64_t)cia402_decode(axis->statusword) + 1u : 0u;
+    return axis->answers.present ? (uint64_t)axis->state + 1u : 0u;
 }
 
 static uint64_t axis_number(const struct axis *axis, uint16_t index)

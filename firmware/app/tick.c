@@ -15,25 +15,28 @@ void tick_init(struct tick *tick, struct machine *machine)
     sync_producer_init(&tick->sync, SYNC_COUNTER_OVERFLOW);
 }
 
-static bool send(struct tick *tick, const struct can_msg *message)
+static void note_refused(struct tick *tick)
 {
-    if (port_can_send(message) == 0) {
-        return true;
-    }
     tick->refused = true;
     if (machine_on_path(tick->machine)) {
         tick->machine->statistics.frames_not_sent++;
     }
-    return false;
+}
+
+static bool send(struct tick *tick, const struct can_msg *message)
+{
+    const bool sent = port_can_send(message) == 0;
+    if (!sent) {
+        note_refused(tick);
+    }
+    return sent;
 }
 
 /* First of all, so that the work of the tick does not move it about. */
 static bool send_sync(struct tick *tick)
 {
-    struct can_msg sync;
-    sync_producer_next(&tick->sync, &sync);
     tick->machine->statistics.syncs++;
-    return send(tick, &sync);
+    return send(tick, sync_producer_next(&tick->sync));
 }
 
 /* Axes that hold have none. */
@@ -54,14 +57,13 @@ static const struct feedforward_offset *find_offsets(struct tick *tick,
 static void send_setpoints(struct tick *tick, const struct feedforward_offset *offset)
 {
     struct machine *machine = tick->machine;
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+    for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
-        struct can_msg setpoint;
-        axis_setpoint(axis, machine->config.start_tolerance_counts, &setpoint);
+        axis_setpoint(axis, machine->config.start_tolerance_counts);
         if (axis->torque_mapped) {
-            pdo_add_torque(&setpoint, offset[i].torque_permille);
+            pdo_add_torque(&axis->setpoint, offset[i].torque_permille);
         }
-        if (send(tick, &setpoint)) {
+        if (send(tick, &axis->setpoint)) {
             axis_sent(axis);
         }
     }

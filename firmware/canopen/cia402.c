@@ -8,7 +8,7 @@ struct coding {
     uint16_t bits;
 };
 
-static const struct coding codings[] = {
+static const struct coding codings[CIA402_STATES] = {
     [CIA402_NOT_READY] = {"Not ready to switch on", 0x00},
     [CIA402_SWITCH_ON_DISABLED] = {"Switch on disabled", 0x40},
     [CIA402_READY_TO_SWITCH_ON] = {"Ready to switch on", 0x21},
@@ -18,8 +18,6 @@ static const struct coding codings[] = {
     [CIA402_FAULT_REACTION_ACTIVE] = {"Fault reaction active", 0x0F},
     [CIA402_FAULT] = {"Fault", 0x08},
 };
-
-#define STATES (sizeof codings / sizeof codings[0])
 
 /* Bit 5 means nothing in four of them. Others are CIA402_NOT_READY, which is 0. */
 const uint8_t cia402_states[CIA402_CODES] = {
@@ -42,5 +40,5 @@ uint16_t cia402_status_bits(enum cia402_state state)
 
 const char *cia402_state_name(enum cia402_state state)
 {
-    return (size_t)state < STATES ? codings[state].name : "unknown";
+    return (size_t)state < CIA402_STATES ? codings[state].name : "unknown";
 }

@@ -20,6 +20,7 @@ enum cia402_state {
     CIA402_FAULT_REACTION_ACTIVE,
     CIA402_FAULT
 };
+#define CIA402_STATES 8
 
 /* Modes of operation, 0x6060 and 0x6061. */
 #define CIA402_MODE_NONE   0

@@ -2,7 +2,7 @@
 /* cia402_master: the controller's side of the CiA 402 state machine: which controlword brings a
  * drive nearer to a goal.
  *
- * Called each tick with the latest statusword; the answer is the controlword to send. No memory but
+ * Called each tick with the latest state; the answer is the controlword to send. No memory but
  * the controlword sent before (for the rising edge of the fault reset). Pure functions, any
  * context.
  */
@@ -24,9 +24,19 @@ enum cia402_goal {
                                the statusword says: nobody brakes by what may be wrong or old */
     CIA402_GOAL_RESET /* out of Fault, to Switch on disabled */
 };
+#define CIA402_GOALS 6
 
-/* The controlword to send after `statusword` came and `previous` was sent last. */
-uint16_t cia402_master_controlword(enum cia402_goal goal, uint16_t statusword, uint16_t previous);
+/* Commands by goal and state. */
+extern const uint8_t cia402_master_commands[CIA402_GOALS][CIA402_STATES];
+
+/* The controlword to send to a drive in `state` after `previous` was sent: a fault reset is an edge, so it falls again. */
+static inline uint16_t cia402_master_controlword(enum cia402_goal goal, enum cia402_state state,
+                                                 uint16_t previous)
+{
+    const uint16_t command = cia402_master_commands[goal][state];
+    return (command & previous & CIA402_CONTROL_FAULT_RESET) != 0u ? CIA402_DISABLE_VOLTAGE
+                                                                   : command;
+}
 
 /* Whether the drive has arrived. */
 bool cia402_master_reached(enum cia402_goal goal, uint16_t statusword);

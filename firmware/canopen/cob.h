@@ -39,7 +39,8 @@ uint64_t cob_get(const uint8_t *from, uint32_t size);
 /* Stores the low `size` (0 ... 8) bytes of `value` at `to`, least significant first. */
 void cob_put(uint8_t *to, uint64_t value, uint32_t size);
 
-/* The same for what process data are made of, in the tick. */
+/* The same for what process data are made of, in the tick: written out, so that compilers make one load or store of it
+ * where the core has unaligned ones. */
 static inline uint16_t cob_get16(const uint8_t *from)
 {
     return (uint16_t)(from[0] | (uint32_t)from[1] << 8);
@@ -47,7 +48,7 @@ static inline uint16_t cob_get16(const uint8_t *from)
 
 static inline uint32_t cob_get32(const uint8_t *from)
 {
-    return cob_get16(from) | (uint32_t)cob_get16(from + 2) << 16;
+    return from[0] | (uint32_t)from[1] << 8 | (uint32_t)from[2] << 16 | (uint32_t)from[3] << 24;
 }
 
 static inline void cob_put16(uint8_t *to, uint16_t value)
@@ -58,8 +59,10 @@ static inline void cob_put16(uint8_t *to, uint16_t value)
 
 static inline void cob_put32(uint8_t *to, uint32_t value)
 {
-    cob_put16(to, (uint16_t)value);
-    cob_put16(to + 2, (uint16_t)(value >> 16));
+    to[0] = (uint8_t)value;
+    to[1] = (uint8_t)(value >> 8);
+    to[2] = (uint8_t)(value >> 16);
+    to[3] = (uint8_t)(value >> 24);
 }
 
 /* Two's complement reading of the low `size` (1 ... 8) bytes of `value`. */

@@ -9,14 +9,6 @@
 #define VELOCITY_BYTES          4u
 #define INPUTS_BYTES            4u
 
-static void put_word_and_position(struct can_msg *out, uint32_t cob, uint8_t drive, uint16_t word,
-                                  int32_t position)
-{
-    cob_frame(out, cob + drive, WORD_AND_POSITION_BYTES);
-    cob_put16(out->data, word);
-    cob_put32(out->data + 2, (uint32_t)position);
-}
-
 /* Node id, 0 or PDO_ERR_SHORT, as pdo.h has it. */
 static int node_of(const struct can_msg *in, uint32_t cob, uint8_t bytes)
 {
@@ -31,9 +23,16 @@ static int32_t get_position(const struct can_msg *in)
     return (int32_t)cob_get32(in->data + 2);
 }
 
+void pdo_begin_setpoint(uint8_t drive, struct can_msg *out)
+{
+    cob_frame(out, COB_RPDO1 + drive, WORD_AND_POSITION_BYTES);
+}
+
 void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out)
 {
-    put_word_and_position(out, COB_RPDO1, drive, setpoint->controlword, setpoint->target_counts);
+    pdo_begin_setpoint(drive, out);
+    pdo_put_controlword(out, setpoint->controlword);
+    pdo_put_target(out, setpoint->target_counts);
 }
 
 int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint)
@@ -97,7 +96,9 @@ int pdo_decode_inputs(const struct can_msg *in, uint32_t *inputs)
 
 void pdo_encode_actual(uint8_t drive, const struct pdo_actual *actual, struct can_msg *out)
 {
-    put_word_and_position(out, COB_TPDO1, drive, actual->statusword, actual->position_counts);
+    cob_frame(out, COB_TPDO1 + drive, WORD_AND_POSITION_BYTES);
+    cob_put16(out->data, actual->statusword);
+    cob_put32(out->data + 2, (uint32_t)actual->position_counts);
 }
 
 int pdo_decode_actual(const struct can_msg *in, struct pdo_actual *actual)

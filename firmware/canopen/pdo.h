@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 #include "can/can_frame.h"
+#include "canopen/cob.h"
 
 #define PDO_ERR_SHORT (-1)
 
@@ -31,8 +32,20 @@ struct pdo_actual {
 void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out);
 int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint);
 
+/* The same in steps, for a frame that is kept from tick to tick: identifier and length (with zeros) once; what has
+ * changed of it. */
+void pdo_begin_setpoint(uint8_t drive, struct can_msg *out);
+static inline void pdo_put_controlword(struct can_msg *out, uint16_t controlword)
+{
+    cob_put16(out->data, controlword);
+}
+static inline void pdo_put_target(struct can_msg *out, int32_t target_counts)
+{
+    cob_put32(out->data + 2, (uint32_t)target_counts);
+}
+
 /* RPDO1 with a third object, 0x60B2: the torque offset, per mille of the rated torque; added to the
- * frame of pdo_encode_setpoint. pdo_decode_setpoint takes both lengths. */
+ * frame of pdo_begin_setpoint or pdo_encode_setpoint. pdo_decode_setpoint takes both lengths. */
 void pdo_add_torque(struct can_msg *out, int16_t torque_permille);
 int pdo_decode_torque(const struct can_msg *in, int16_t *torque_permille);
 

@@ -6,19 +6,17 @@
 void sync_producer_init(struct sync_producer *producer, uint8_t overflow)
 {
     producer->overflow = overflow;
-    producer->counter = 0;
+    cob_frame(&producer->frame, COB_SYNC, overflow == 0 ? 0 : 1);
 }
 
-void sync_producer_next(struct sync_producer *producer, struct can_msg *out)
+const struct can_msg *sync_producer_next(struct sync_producer *producer)
 {
-    if (producer->overflow == 0) {
-        cob_frame(out, COB_SYNC, 0);
-        return;
+    const uint8_t counter = producer->frame.data[0];
+
+    if (producer->overflow != 0) {
+        producer->frame.data[0] = counter >= producer->overflow ? 1u : (uint8_t)(counter + 1u);
     }
-    producer->counter =
-        producer->counter >= producer->overflow ? 1u : (uint8_t)(producer->counter + 1u);
-    cob_frame(out, COB_SYNC, 1);
-    out->data[0] = producer->counter;
+    return &producer->frame;
 }
 
 void sync_consumer_init(struct sync_consumer *consumer, uint8_t overflow)

@@ -12,15 +12,15 @@
 #define SYNC_OVERFLOW_MAX 240u
 
 struct sync_producer {
+    struct can_msg frame; /* the last SYNC; its counter is 0 before the first */
     uint8_t overflow;
-    uint8_t counter; /* of the last SYNC sent; 0 before the first */
 };
 
 /* Timer (or before it starts). `overflow` is 0x1019. */
 void sync_producer_init(struct sync_producer *producer, uint8_t overflow);
 
-/* The next SYNC: 1 ... overflow, then 1 again. Timer. */
-void sync_producer_next(struct sync_producer *producer, struct can_msg *out);
+/* The next SYNC: 1 ... overflow, then 1 again. It is the producer's until the next call. Timer. */
+const struct can_msg *sync_producer_next(struct sync_producer *producer);
 
 struct sync_consumer {
     uint8_t overflow;

@@ -71,7 +71,11 @@ __attribute__((noinline)) static void isr(uint32_t now_us)
 /* The other counted part: what its receive interrupt calls. */
 __attribute__((noinline)) static void receive(const struct can_msg *answer, uint32_t now_us)
 {
-    (void)machine_receive(&machine, answer, now_us);
+    struct pdo_actual actual;
+    const int node = pdo_decode_actual(answer, &actual);
+    if (node > 0) {
+        (void)machine_receive(&machine, (uint8_t)node, &actual, now_us);
+    }
 }
 
 static uint16_t obey(uint16_t controlword)

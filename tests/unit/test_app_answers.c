@@ -33,6 +33,27 @@ static uint32_t sync(unsigned count)
     return answers_close_sync(&answers, now_us, sync_us, wait_us, missed_max);
 }
 
+/* What the tick uses has to do exactly what answers_close_sync does, wherever it says that it has done it. */
+static void test_the_quick_end_of_a_sync_is_the_same_as_the_thorough_one(void)
+{
+    static const uint8_t counts[] = {1, 1, 0, 1, 2, 1, 0, 0, 3, 1, 1, 0, 0, 0, 1, 1, 2, 0, 1, 5, 1};
+    uint32_t quick_ones = 0;
+    wait_us = 2u * PERIOD_US;
+    for (uint32_t i = 0; i < sizeof counts; ++i) {
+        struct answers quick = answers;
+        for (unsigned k = 0; k < counts[i]; ++k) {
+            answers_take(&quick, now_us + 300u);
+        }
+        const struct answers before = quick;
+        const bool done = answers_close_answered(&quick);
+        const uint32_t missed = sync(counts[i]);
+        TEST_ASSERT_EQUAL_MEMORY(done ? &answers : &before, &quick, sizeof quick);
+        TEST_ASSERT_TRUE(!done || missed == 0u);
+        quick_ones += done ? 1u : 0u;
+    }
+    TEST_ASSERT_TRUE(quick_ones > 5u && quick_ones < sizeof counts - 5u); /* both have been tried */
+}
+
 static void test_nothing_is_missed_before_the_first_answer(void)
 {
     for (unsigned i = 0; i < 20; ++i) {
@@ -175,6 +196,7 @@ static void test_restart_keeps_the_presence_only(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_the_quick_end_of_a_sync_is_the_same_as_the_thorough_one);
     RUN_TEST(test_nothing_is_missed_before_the_first_answer);
     RUN_TEST(test_without_patience_absent_is_missed);
     RUN_TEST(test_one_more_than_permitted_in_a_row_is_lost_until_the_next_answer);

@@ -6,7 +6,6 @@
 #define TOLERANCE 100u
 
 static struct axis axis;
-static struct can_msg frame;
 
 void setUp(void)
 {
@@ -27,9 +26,9 @@ static void answer(enum cia402_state state, int32_t position_counts, uint32_t no
 static struct pdo_setpoint sent(void)
 {
     struct pdo_setpoint setpoint;
-    axis_setpoint(&axis, TOLERANCE, &frame);
+    axis_setpoint(&axis, TOLERANCE);
     axis_sent(&axis);
-    TEST_ASSERT_EQUAL_INT(5, pdo_decode_setpoint(&frame, &setpoint));
+    TEST_ASSERT_EQUAL_INT(5, pdo_decode_setpoint(&axis.setpoint, &setpoint));
     return setpoint;
 }
 
@@ -58,7 +57,7 @@ static void test_a_quick_stop_takes_the_target_that_was_sent(void)
     axis.target_counts = 60;
     (void)sent();
     axis.target_counts = 70;
-    axis_setpoint(&axis, TOLERANCE, &frame);
+    axis_setpoint(&axis, TOLERANCE);
     axis_command(&axis, CIA402_GOAL_QUICK_STOP);
     TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
 }
@@ -187,6 +186,50 @@ static void test_a_drive_that_is_off_does_not_stand_still(void)
     TEST_ASSERT_FALSE(axis_still(&axis));
 }
 
+/* The frame is kept and only what changes is written: it must be the one that would be made anew. */
+static void test_the_kept_frame_is_the_whole_setpoint(void)
+{
+    static const int32_t targets[] = {0, 70000, -1, -1, INT32_MIN, 255, 256};
+    axis.goal = CIA402_GOAL_ENABLED;
+    for (uint32_t k = 0; k < sizeof targets / sizeof targets[0]; ++k) {
+        struct can_msg whole;
+        answer(k == 3 ? CIA402_SWITCHED_ON : CIA402_OPERATION_ENABLED, 5, 0);
+        axis.target_counts = targets[k];
+        axis.goal = k == 5 ? CIA402_GOAL_QUICK_STOP : CIA402_GOAL_ENABLED;
+        (void)sent();
+        const struct pdo_setpoint setpoint = {.controlword = axis.controlword,
+                                              .target_counts = axis.target_counts};
+        pdo_encode_setpoint(5, &setpoint, &whole);
+        TEST_ASSERT_EQUAL_HEX32(whole.id, axis.setpoint.id);
+        TEST_ASSERT_EQUAL_UINT8(whole.len, axis.setpoint.len);
+        TEST_ASSERT_EQUAL_HEX8_ARRAY(whole.data, axis.setpoint.data, CAN_DATA_MAX);
+    }
+}
+
+/* Well is noted with each answer; a restart and a loss end it at once. */
+static void test_well_ends_with_a_restart_with_a_loss_and_with_trouble_that_stays(void)
+{
+    axis.goal = CIA402_GOAL_ENABLED;
+    const struct pdo_actual good = {.statusword = 0x1237};
+    const struct pdo_actual unfed = {.statusword = 0x1227};
+    axis_receive(&axis, &good, 0);
+    TEST_ASSERT_TRUE(axis_well(&axis));
+    axis.answers.lost = true;
+    TEST_ASSERT_FALSE(axis_well(&axis));
+    for (uint32_t k = 0; k < STATUS_WATCH_TOLERATED; ++k) {
+        axis_receive(&axis, &unfed, 0);
+        TEST_ASSERT_TRUE(axis_well(&axis));
+    }
+    axis_receive(&axis, &unfed, 0);
+    TEST_ASSERT_FALSE(axis_well(&axis));
+    axis_receive(&axis, &good, 0);
+    TEST_ASSERT_TRUE(axis_well(&axis));
+    axis_restarted(&axis);
+    TEST_ASSERT_FALSE(axis_well(&axis));
+    TEST_ASSERT_FALSE(axis_enabled(&axis));
+    TEST_ASSERT_TRUE(axis_dropped_out(&axis) || !axis.engaged);
+}
+
 /* The clock wraps in between. */
 static void test_gone_is_lost_for_long(void)
 {
@@ -223,6 +266,8 @@ int main(void)
     RUN_TEST(test_switching_off_lets_the_target_follow_again);
     RUN_TEST(test_standstill_needs_250_syncs_at_the_target);
     RUN_TEST(test_a_drive_that_is_off_does_not_stand_still);
+    RUN_TEST(test_the_kept_frame_is_the_whole_setpoint);
+    RUN_TEST(test_well_ends_with_a_restart_with_a_loss_and_with_trouble_that_stays);
     RUN_TEST(test_gone_is_lost_for_long);
     RUN_TEST(test_distance_is_that_of_the_farther_one_without_overflow);
     return UNITY_END();

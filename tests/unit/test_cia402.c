@@ -275,7 +275,8 @@ static int periods_to(enum cia402_goal goal, unsigned lag)
         if (cia402_master_reached(goal, cia402_device_statusword(&device))) {
             return period;
         }
-        control = cia402_master_controlword(goal, words[((unsigned)period + 4 - lag) % 4], control);
+        control = cia402_master_controlword(
+            goal, cia402_decode(words[((unsigned)period + 4 - lag) % 4]), control);
         cia402_device_control(&device, control);
     }
     return -1;
@@ -309,8 +310,7 @@ static void test_master_stays_at_its_goal(void)
             (enum cia402_goal)(CIA402_GOAL_READY + state - CIA402_READY_TO_SWITCH_ON);
         put_in((enum cia402_state)state);
         TEST_ASSERT_EQUAL_INT(0, periods_to(goal, 0));
-        cia402_device_control(
-            &device, cia402_master_controlword(goal, cia402_device_statusword(&device), 0));
+        cia402_device_control(&device, cia402_master_controlword(goal, device.state, 0));
         TEST_ASSERT_EQUAL_INT(state, device.state);
     }
 }
@@ -328,17 +328,38 @@ static void test_master_leaves_a_fault_only_when_told(void)
     }
 }
 
+/* Transitions of CiA 402-2 by goal, one letter a state: 6, 7, F are the commands, 0 and Q off and quick stop, R reset. */
+static void test_master_commands_are_those_of_the_standard(void)
+{
+    static const char *const letters[CIA402_GOALS] = {"00000000", "06666000", "06777000",
+                                                      "067FF000", "QQQQQQQQ", "0000000R"};
+    for (int goal = 0; goal < CIA402_GOALS; goal++) {
+        for (int state = 0; state < CIA402_STATES; state++) {
+            const char letter = letters[goal][state];
+            const uint16_t expected = letter == '0'   ? CIA402_DISABLE_VOLTAGE
+                                      : letter == '6' ? CIA402_SHUTDOWN
+                                      : letter == '7' ? CIA402_SWITCH_ON
+                                      : letter == 'F' ? CIA402_ENABLE_OPERATION
+                                      : letter == 'Q' ? CIA402_QUICK_STOP
+                                                      : CIA402_FAULT_RESET;
+            TEST_ASSERT_EQUAL_HEX16(
+                expected,
+                cia402_master_controlword((enum cia402_goal)goal, (enum cia402_state)state, 0));
+        }
+    }
+    TEST_ASSERT_EQUAL_HEX16(
+        0, cia402_master_controlword(CIA402_GOAL_RESET, CIA402_FAULT, CIA402_FAULT_RESET));
+}
+
 static void test_master_quick_stop(void)
 {
     put_in(CIA402_OPERATION_ENABLED);
     TEST_ASSERT_EQUAL_INT(1, periods_to(CIA402_GOAL_QUICK_STOP, 0));
-    TEST_ASSERT_EQUAL_HEX16(
-        CIA402_QUICK_STOP,
-        cia402_master_controlword(CIA402_GOAL_QUICK_STOP, cia402_device_statusword(&device), 0));
+    TEST_ASSERT_EQUAL_HEX16(CIA402_QUICK_STOP,
+                            cia402_master_controlword(CIA402_GOAL_QUICK_STOP, device.state, 0));
     put_in(CIA402_SWITCHED_ON);
-    TEST_ASSERT_EQUAL_HEX16(
-        CIA402_QUICK_STOP,
-        cia402_master_controlword(CIA402_GOAL_QUICK_STOP, cia402_device_statusword(&device), 0));
+    TEST_ASSERT_EQUAL_HEX16(CIA402_QUICK_STOP,
+                            cia402_master_controlword(CIA402_GOAL_QUICK_STOP, device.state, 0));
     (void)periods_to(CIA402_GOAL_QUICK_STOP, 0);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, device.state);
 }
@@ -371,6 +392,7 @@ int main(void)
     RUN_TEST(test_master_enables_in_three_steps);
     RUN_TEST(test_master_stays_at_its_goal);
     RUN_TEST(test_master_leaves_a_fault_only_when_told);
+    RUN_TEST(test_master_commands_are_those_of_the_standard);
     RUN_TEST(test_master_quick_stop);
     RUN_TEST(test_modes);
     return UNITY_END();

@@ -28,27 +28,24 @@ static int hear(uint8_t counter)
 
 static void test_counts_from_1_to_240_and_again(void)
 {
-    struct can_msg out;
-
     for (uint32_t i = 0; i < 1000; i++) {
-        sync_producer_next(&producer, &out);
-        TEST_ASSERT_EQUAL_HEX32(0x80, out.id);
-        TEST_ASSERT_EQUAL_UINT8(1, out.len);
-        TEST_ASSERT_EQUAL_UINT8(i % 240 + 1, out.data[0]);
-        TEST_ASSERT_EQUAL_INT(1, sync_consumer_receive(&consumer, &out));
+        const struct can_msg *out = sync_producer_next(&producer);
+        TEST_ASSERT_EQUAL_HEX32(0x80, out->id);
+        TEST_ASSERT_EQUAL_UINT8(1, out->len);
+        TEST_ASSERT_EQUAL_UINT8(i % 240 + 1, out->data[0]);
+        TEST_ASSERT_EQUAL_INT(1, sync_consumer_receive(&consumer, out));
     }
 }
 
 static void test_without_counter(void)
 {
-    struct can_msg out;
-
     sync_producer_init(&producer, 0);
     sync_consumer_init(&consumer, 0);
-    sync_producer_next(&producer, &out);
-    TEST_ASSERT_EQUAL_UINT8(0, out.len);
-    TEST_ASSERT_EQUAL_INT(1, sync_consumer_receive(&consumer, &out));
-    TEST_ASSERT_EQUAL_INT(1, sync_consumer_receive(&consumer, &out));
+    const struct can_msg *out = sync_producer_next(&producer);
+    TEST_ASSERT_EQUAL_UINT8(0, out->len);
+    TEST_ASSERT_EQUAL_UINT8(0, out->data[0]);
+    TEST_ASSERT_EQUAL_INT(1, sync_consumer_receive(&consumer, out));
+    TEST_ASSERT_EQUAL_INT(1, sync_consumer_receive(&consumer, out));
     TEST_ASSERT_EQUAL_INT(SYNC_ERR_LENGTH, hear(1));
 }
 

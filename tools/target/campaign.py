@@ -84,13 +84,21 @@ class Campaign:
         runs = [counter.count(kernel, programs, _commands(name)) for name in scenario.commands]
         return np.concatenate(runs)
 
+    def interrupts(self, counter: Counter, kernel: str) -> dict[str, Any]:
+        """Figures of the interrupts that give setpoints of a program, and of those in which it settles at its end."""
+        counts = {s.name: self.scenario(counter, kernel, s) for s in SCENARIOS}
+        given = PARTS.index("feed")
+        moving = {name: figures(c[c[:, given] > 0]) for name, c in counts.items()}
+        plain = counts[SCENARIOS[0].name]
+        return moving | {"settling": figures(plain[plain[:, given] == 0])}
+
     def pair(self, target: Target, kernel: str) -> dict[str, Any]:
         """The figures of one kernel on one core: of the motion part, of the whole interrupts."""
         motion, tick = Counter(self.build, target), Counter(self.build, target, "isr", "isr")
         receive = Counter(self.build, target, "isr", "receive")
         return {
             "motion": {s.name: figures(self.scenario(motion, kernel, s)) for s in SCENARIOS},
-            "isr": {s.name: figures(self.scenario(tick, kernel, s)) for s in SCENARIOS},
+            "isr": self.interrupts(tick, kernel),
             "receive": {"plain": figures(self.scenario(receive, kernel, SCENARIOS[0]))},
         }
 

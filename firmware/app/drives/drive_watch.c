@@ -40,12 +40,11 @@ static void gone(struct machine *machine, uint16_t code, uint8_t node)
     }
 }
 
-/* What it said last is no longer true: it is not even ready to switch on. */
 static void restarted(struct machine *machine, uint8_t node)
 {
     struct axis *axis = machine_axis(machine, node);
     if (axis != NULL) {
-        axis->statusword = cia402_status_bits(CIA402_NOT_READY);
+        axis_restarted(axis);
     }
     if (machine->state == MACHINE_BOOT) { /* it has lost what was configured so far */
         machine_enter_boot(machine);

@@ -38,6 +38,18 @@ void answers_take(struct answers *answers, uint32_t now_us);
 /* Counts anew from here on; a drive that is present stays so. Under the lock. */
 void answers_restart(struct answers *answers);
 
+/* The usual end of a SYNC: true when it was answered and none is unsettled; then nothing is missed. False, and nothing has
+ * changed: answers_close_sync has to look. Timer. */
+static inline bool answers_close_answered(struct answers *answers)
+{
+    if (answers->count == 0u || answers->unsettled != 0u) {
+        return false;
+    }
+    answers->count = 0;
+    answers->absent_in_row = 0;
+    return true;
+}
+
 /* The SYNC that was sent at sync_us is over. Up to missed_max SYNCs in a row may pass without an answer; one more, and
  * more than wait_us since the last answer, and the drive is lost, until it answers again. Returns how many answers are
  * now known to be missed. Timer. */

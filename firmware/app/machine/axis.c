@@ -13,6 +13,7 @@ void axis_init(struct axis *axis, uint8_t node)
     memset(axis, 0, sizeof *axis);
     axis->node = node;
     axis->goal = CIA402_GOAL_OFF;
+    pdo_begin_setpoint(node, &axis->setpoint);
 }
 
 void axis_command(struct axis *axis, enum cia402_goal goal)
@@ -22,20 +23,34 @@ void axis_command(struct axis *axis, enum cia402_goal goal)
     axis->by_itself = false;
 }
 
-void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us)
+static void take_status(struct axis *axis, uint16_t statusword)
 {
     axis->statusword_before = axis->statusword;
-    axis->statusword = actual->statusword;
+    axis->statusword = statusword;
+    axis->state = cia402_decode(statusword);
+}
+
+void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us)
+{
+    take_status(axis, actual->statusword);
     axis->position_counts = actual->position_counts;
     answers_take(&axis->answers, now_us);
     if (axis_enabled(axis) && axis->goal == CIA402_GOAL_ENABLED) {
         status_watch_take(&axis->watch, axis->statusword, !axis->by_itself);
     }
+    axis->fit = axis_enabled(axis) && axis->watch.in_row <= STATUS_WATCH_TOLERATED;
+}
+
+void axis_restarted(struct axis *axis)
+{
+    axis->statusword = cia402_status_bits(CIA402_NOT_READY);
+    axis->state = CIA402_NOT_READY;
+    axis->fit = false;
 }
 
 static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
 {
-    const bool still = axis_enabled(axis) && axis->target_counts == axis->target_sent_counts &&
+    const bool still = axis->target_counts == axis->target_sent_counts && axis_enabled(axis) &&
                        distance(axis->target_counts, axis->position_counts) <= tolerance_counts;
     if (!still) {
         axis->still_syncs = 0;
@@ -46,7 +61,7 @@ static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
 
 static void count_rest(struct axis *axis, uint32_t tolerance_counts)
 {
-    const bool stays = cia402_decode(axis->statusword) == CIA402_QUICK_STOP_ACTIVE &&
+    const bool stays = axis->state == CIA402_QUICK_STOP_ACTIVE &&
                        distance(axis->rest_counts, axis->position_counts) <= tolerance_counts;
     if (!stays) {
         axis->rest_syncs = 0;
@@ -60,7 +75,9 @@ static void count_rest(struct axis *axis, uint32_t tolerance_counts)
 static void note_engaged(struct axis *axis)
 {
     if (axis->goal == CIA402_GOAL_ENABLED) {
-        axis->engaged = axis->engaged || axis_enabled(axis);
+        if (axis_enabled(axis)) {
+            axis->engaged = true;
+        }
     } else if (axis->goal != CIA402_GOAL_QUICK_STOP && !axis_enabled(axis)) {
         axis->engaged = false;
         status_watch_init(&axis->watch);
@@ -76,29 +93,26 @@ static void follow_position(struct axis *axis)
     }
 }
 
-static uint16_t next_controlword(const struct axis *axis)
+/* In the frame only when it changes. */
+static void set_controlword(struct axis *axis)
 {
-    const uint16_t word =
-        cia402_master_controlword(axis->goal, axis->statusword, axis->controlword);
-    const uint16_t extra = word == CIA402_ENABLE_OPERATION ? axis->control_extra : 0u;
-    return (uint16_t)(word | extra);
+    const uint16_t command = cia402_master_controlword(axis->goal, axis->state, axis->controlword);
+    const uint16_t extra = command == CIA402_ENABLE_OPERATION ? axis->control_extra : 0u;
+    const uint16_t word = (uint16_t)(command | extra);
+    if (word != axis->controlword) {
+        axis->controlword = word;
+        pdo_put_controlword(&axis->setpoint, word);
+    }
 }
 
-void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg *out)
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts)
 {
-    axis->controlword = next_controlword(axis);
+    set_controlword(axis);
     note_engaged(axis);
     follow_position(axis);
+    pdo_put_target(&axis->setpoint, axis->target_counts);
     count_standstill(axis, tolerance_counts);
     count_rest(axis, tolerance_counts);
-    const struct pdo_setpoint setpoint = {.controlword = axis->controlword,
-                                          .target_counts = axis->target_counts};
-    pdo_encode_setpoint(axis->node, &setpoint, out);
-}
-
-void axis_sent(struct axis *axis)
-{
-    axis->target_sent_counts = axis->target_counts;
 }
 
 bool axis_gone(const struct axis *axis, uint32_t now_us)
@@ -108,24 +122,12 @@ bool axis_gone(const struct axis *axis, uint32_t now_us)
 
 bool axis_in_fault(const struct axis *axis)
 {
-    const enum cia402_state state = cia402_decode(axis->statusword);
-    return state == CIA402_FAULT || state == CIA402_FAULT_REACTION_ACTIVE;
-}
-
-bool axis_enabled(const struct axis *axis)
-{
-    return cia402_decode(axis->statusword) == CIA402_OPERATION_ENABLED;
+    return axis->state == CIA402_FAULT || axis->state == CIA402_FAULT_REACTION_ACTIVE;
 }
 
 bool axis_dropped_out(const struct axis *axis)
 {
     return axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis_enabled(axis);
-}
-
-bool axis_well(const struct axis *axis)
-{
-    return axis_enabled(axis) && !axis->answers.lost &&
-           axis->watch.in_row <= STATUS_WATCH_TOLERATED;
 }
 
 bool axis_obeys(const struct axis *axis)
@@ -142,11 +144,11 @@ static bool moves_in(enum cia402_state state)
 /* A statusword that means nothing, once, does not make a moving drive a stopped one. */
 bool axis_left(const struct axis *axis)
 {
-    const enum cia402_state state = cia402_decode(axis->statusword);
-    if (state == CIA402_NOT_READY && moves_in(cia402_decode(axis->statusword_before))) {
+    if (axis->state == CIA402_NOT_READY && moves_in(cia402_decode(axis->statusword_before))) {
         return axis->answers.lost;
     }
-    return axis->answers.lost || !moves_in(state) || axis->rest_syncs >= AXIS_STANDSTILL_SYNCS;
+    return axis->answers.lost || !moves_in(axis->state) ||
+           axis->rest_syncs >= AXIS_STANDSTILL_SYNCS;
 }
 
 bool axis_reached(const struct axis *axis)

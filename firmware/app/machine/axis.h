@@ -24,6 +24,8 @@
 
 struct axis {
     uint8_t node;
+    enum cia402_state state; /* that the statusword tells */
+    bool fit; /* as of the last answer: Operation enabled, and the statusword tells no trouble */
     struct answers answers;
     struct status_watch watch;
     uint16_t statusword;
@@ -35,6 +37,8 @@ struct axis {
     int32_t position_counts;
     int32_t target_counts;      /* to be sent in this tick */
     int32_t target_sent_counts; /* sent in the last one */
+    struct can_msg
+        setpoint; /* RPDO1 as axis_setpoint made it last: kept, so that only changes are written */
     enum cia402_goal goal;
     bool
         engaged; /* seen in Operation enabled since it was told to go there: its target is its own */
@@ -57,20 +61,33 @@ void axis_command(struct axis *axis, enum cia402_goal goal);
 /* Takes the drive's TPDO1. Receive. */
 void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t now_us);
 
-/* Makes the setpoint frame of this tick. Until the drive has been seen in Operation enabled its target follows its
+/* The drive has restarted: what it said last is no longer true, it is not even ready to switch on. Under the lock. */
+void axis_restarted(struct axis *axis);
+
+/* Makes the setpoint frame of this tick, `setpoint`. Until the drive has been seen in Operation enabled its target follows its
  * position, so that switching on moves nothing; from then on it stays where it is put, in a quick stop too. Once the
  * drive is off it follows again. Timer. */
-void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, struct can_msg *out);
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts);
 
 /* The port has taken that frame. Timer. */
-void axis_sent(struct axis *axis);
+static inline void axis_sent(struct axis *axis)
+{
+    axis->target_sent_counts = axis->target_counts;
+}
 
 /* All pure, under the lock. */
 bool axis_gone(const struct axis *axis, uint32_t now_us); /* lost for long */
 bool axis_in_fault(const struct axis *axis);              /* Fault, or on the way there */
-bool axis_enabled(const struct axis *axis);               /* Operation enabled */
 bool axis_dropped_out(const struct axis *axis); /* was enabled, shall be, and is not any more */
-bool axis_well(const struct axis *axis);  /* enabled, answers, its statusword tells no trouble */
+static inline bool axis_enabled(const struct axis *axis) /* Operation enabled */
+{
+    return axis->state == CIA402_OPERATION_ENABLED;
+}
+/* Enabled, answers, its statusword tells no trouble. */
+static inline bool axis_well(const struct axis *axis)
+{
+    return axis->fit && !axis->answers.lost;
+}
 bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its target */
 
 /* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and has

@@ -89,11 +89,6 @@ bool machine_drives_answer(const struct machine *machine)
     return true;
 }
 
-bool machine_drives_operational(const struct machine *machine)
-{
-    return machine->state != MACHINE_BOOT;
-}
-
 bool machine_busy(const struct machine *machine)
 {
     if (machine->state != MACHINE_READY && machine->state != MACHINE_HELD) {
@@ -149,14 +144,13 @@ static bool all_answered(const struct machine *machine)
     return true;
 }
 
-bool machine_receive(struct machine *machine, const struct can_msg *in, uint32_t now_us)
+bool machine_receive(struct machine *machine, uint8_t node, const struct pdo_actual *actual,
+                     uint32_t now_us)
 {
-    struct pdo_actual actual;
-    const int node = pdo_decode_actual(in, &actual);
-    struct axis *axis = node > 0 ? machine_axis(machine, (uint8_t)node) : NULL;
+    struct axis *axis = machine_axis(machine, node);
     if (axis == NULL || (machine->state == MACHINE_BOOT && !machine->configured)) {
         return false;
     }
-    axis_receive(axis, &actual, now_us);
+    axis_receive(axis, actual, now_us);
     return all_answered(machine);
 }

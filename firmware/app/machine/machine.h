@@ -168,7 +168,10 @@ uint32_t machine_answer_wait_us(const struct machine *machine);
 /* Whether every drive has answered a SYNC since BOOT began. */
 bool machine_drives_answer(const struct machine *machine);
 /* Whether setpoints are to be sent in this state. */
-bool machine_drives_operational(const struct machine *machine);
+static inline bool machine_drives_operational(const struct machine *machine)
+{
+    return machine->state != MACHINE_BOOT;
+}
 /* Whether the next tick should wait for the drives' answers: they are simulated and not all lost. */
 bool machine_awaits_drives(const struct machine *machine);
 /* Whether at lock step the next tick should come as soon as the drives have answered: something
@@ -177,8 +180,9 @@ bool machine_busy(const struct machine *machine);
 
 /* --- Receive --- */
 
-/* Takes a TPDO1; true when all drives have now answered the present SYNC. */
-bool machine_receive(struct machine *machine, const struct can_msg *in, uint32_t now_us);
+/* Takes what the TPDO1 of a node says; true when all drives have now answered the present SYNC. */
+bool machine_receive(struct machine *machine, uint8_t node, const struct pdo_actual *actual,
+                     uint32_t now_us);
 
 /* The axis of a node, or NULL. Pure. */
 struct axis *machine_axis(struct machine *machine, uint8_t node);

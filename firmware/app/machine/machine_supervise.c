@@ -33,28 +33,41 @@ static void supervise_axis(struct machine *machine, const struct axis *axis, uin
 }
 
 /* Where the SYNC itself did not leave, no answer is missing. */
-static void close_sync(struct machine *machine, uint32_t now_us)
+static void close_unanswered(struct machine *machine, struct answers *answers, uint32_t now_us)
 {
-    const uint32_t wait_us = machine_answer_wait_us(machine);
-    uint32_t missed = 0;
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        struct answers *answers = &machine->axes[i].answers;
-        if (machine->sync_sent) {
-            missed += answers_close_sync(answers, now_us, machine->sync_us, wait_us,
-                                         machine->config.missed_max);
-        } else {
-            answers->count = 0;
-        }
+    if (!machine->sync_sent) {
+        answers->count = 0;
+        return;
     }
+    const uint32_t missed =
+        answers_close_sync(answers, now_us, machine->sync_us, machine_answer_wait_us(machine),
+                           machine->config.missed_max);
     if (missed != 0u && machine_on_path(machine)) {
         machine->statistics.missed_tpdos += missed;
     }
 }
 
+/* True when every drive is well. */
+static bool close_sync(struct machine *machine, uint32_t now_us)
+{
+    const bool sent = machine->sync_sent;
+    bool well = true;
+    for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
+        struct axis *axis = &machine->axes[i];
+        if (!sent || !answers_close_answered(&axis->answers)) {
+            close_unanswered(machine, &axis->answers, now_us);
+        }
+        well = well && axis_well(axis);
+    }
+    machine->sync_us = now_us;
+    return well;
+}
+
 void machine_supervise(struct machine *machine, uint32_t now_us)
 {
-    close_sync(machine, now_us);
-    machine->sync_us = now_us;
+    if (close_sync(machine, now_us)) {
+        return;
+    }
     for (uint8_t i = 0; i < machine->config.axis_count && machine->state != MACHINE_BOOT; ++i) {
         const struct axis *axis = &machine->axes[i];
         if (!axis_well(axis)) {
