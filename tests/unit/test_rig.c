@@ -194,6 +194,103 @@ static void test_feedforward(void)
     TEST_ASSERT_TRUE(plain > 10000 && better < plain / 4 && better > -plain / 4);
 }
 
+/* Runs with these faults into `faulty`; `rows` has the run without. */
+static struct rig_row faulty[ROWS];
+
+static void run_with(const struct rig_fault *faults, uint32_t count)
+{
+    TEST_ASSERT_EQUAL_INT(0, begin());
+    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, begin());
+    TEST_ASSERT_EQUAL_INT(0, rig_faults(&rig, faults, count));
+    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, faulty, ROWS));
+}
+
+/* The first row that differs in position or volts, ROWS if none does. */
+static int first_difference(void)
+{
+    int k = 0;
+    while (k < ROWS && memcmp(rows[k].act_counts, faulty[k].act_counts, 8) == 0 &&
+           memcmp(rows[k].volts_mv, faulty[k].volts_mv, 4) == 0) {
+        k++;
+    }
+    return k;
+}
+
+/* Of this program setpoint 3 is the first that differs from the start point by a count: tick 0 is
+ * the SYNC at which it is latched, and what happens from there on is in row 3. */
+enum { TICK_0 = 3 };
+
+static void test_faults_begin_in_their_tick(void)
+{
+    const struct rig_fault never = {RIG_FAULT_LOAD, 0, ROWS, 1, 2.0};
+    struct rig_fault fault = {RIG_FAULT_LOAD, 1, 100, 50, 2.0};
+    run_with(&never, 1);
+    TEST_ASSERT_EQUAL_INT(ROWS, first_difference());
+    run_with(&fault, 1);
+    TEST_ASSERT_EQUAL_INT(TICK_0 + 100, first_difference());
+    TEST_ASSERT_TRUE(faulty[TICK_0 + 100].act_counts[1] <
+                     -1000000); /* a positive load pushes back */
+    fault.kind = RIG_FAULT_ENCODER_FREEZE;
+    fault.axis = 0;
+    run_with(&fault, 1);
+    TEST_ASSERT_EQUAL_INT(TICK_0 + 100, first_difference());
+    fault.kind = RIG_FAULT_ENCODER_JUMP;
+    fault.value = 10000.0;
+    run_with(&fault, 1);
+    TEST_ASSERT_EQUAL_INT(TICK_0 + 100, first_difference());
+    fault.at = 0;
+    fault.kind = RIG_FAULT_SATURATE;
+    fault.value = 0.05;
+    run_with(&fault, 1);
+    TEST_ASSERT_TRUE(first_difference() >= TICK_0);
+    for (int k = TICK_0; k < TICK_0 + 50; k++) {
+        TEST_ASSERT_TRUE(faulty[k].volts_mv[0] <= 50);
+    }
+}
+
+/* While an encoder reads 10 um too much the axis is 10 um short; afterwards it is where it was. */
+static void test_faults_end(void)
+{
+    const struct rig_fault jump = {RIG_FAULT_ENCODER_JUMP, 1, 100, 600, 10000.0};
+    run_with(&jump, 1);
+    TEST_ASSERT_INT32_WITHIN(20, -1010000, faulty[TICK_0 + 699].act_counts[1]);
+    TEST_ASSERT_INT32_WITHIN(20, -1000000, faulty[ROWS - 1].act_counts[1]);
+}
+
+/* What is sent in tick 100 would be latched in tick 101: the drive stays with what it had. */
+static void test_setpoints_are_lost(void)
+{
+    const struct rig_fault lost = {RIG_FAULT_SETPOINT_LOST, 0, 100, 2, 0.0};
+    struct drive alone;
+    run_with(&lost, 1);
+    TEST_ASSERT_EQUAL_INT(0, drive_init(&alone, &configs[0]));
+    drive_place(&alone, 10000000);
+    for (int k = 0; k < ROWS; k++) {
+        const bool missing = k == TICK_0 + 101 || k == TICK_0 + 102;
+        drive_period(&alone, rows[missing ? TICK_0 + 100 : k].set_counts[0]);
+        TEST_ASSERT_EQUAL_INT32(drive_position_counts(&alone), faulty[k].act_counts[0]);
+        TEST_ASSERT_EQUAL_INT32(rows[k].set_counts[0], faulty[k].set_counts[0]);
+    }
+    TEST_ASSERT_EQUAL_INT(TICK_0 + 101, first_difference());
+}
+
+static void test_faults_that_cannot_be(void)
+{
+    const struct rig_fault good = {RIG_FAULT_SATURATE, 0, 0, 1, 1.0};
+    struct rig_fault bad[] = {good, good, good, good, good};
+    bad[0].axis = 2;
+    bad[1].ticks = 0;
+    bad[2].value = 0.0;
+    bad[3].value = NAN;
+    bad[4].kind = RIG_FAULT_KINDS;
+    TEST_ASSERT_EQUAL_INT(0, begin());
+    TEST_ASSERT_EQUAL_INT(0, rig_faults(&rig, &good, 1));
+    for (int i = 0; i < 5; i++) {
+        TEST_ASSERT_EQUAL_INT(RIG_ERR_FAULT, rig_faults(&rig, &bad[i], 1));
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -203,5 +300,9 @@ int main(void)
     RUN_TEST(test_times_and_points);
     RUN_TEST(test_times_do_not_drift_in_long_programs);
     RUN_TEST(test_feedforward);
+    RUN_TEST(test_faults_begin_in_their_tick);
+    RUN_TEST(test_faults_end);
+    RUN_TEST(test_setpoints_are_lost);
+    RUN_TEST(test_faults_that_cannot_be);
     return UNITY_END();
 }

@@ -56,16 +56,8 @@ class Campaign:
     text: str
     sources: tuple[Source, ...]
     design: Design
-
-    @property
-    def fingerprint(self) -> str:
-        """Of all that the results depend on: the design, the paths, and Hodograph itself."""
-        told = hashlib.sha256(f"{__version__} {self.design!r}".encode())
-        told.update(native_file().read_bytes())
-        for source in self.sources:
-            told.update(source.path.file.read_bytes())
-            told.update(repr(replace(source.machine, file=Path())).encode())
-        return told.hexdigest()
+    fingerprint: str
+    """Of all that the results depend on: the design, the paths and machines, and Hodograph itself."""
 
 
 def load_campaign(file: Path) -> Campaign:
@@ -91,7 +83,17 @@ def load_campaign(file: Path) -> Campaign:
             f"{file}: makes {design.total} runs, more than {GREATEST_RUNS}: split it, or take fewer samples"
         )
     _check_samples(root, design)
-    return Campaign(file, root.text("text", file.stem), sources, design)
+    told = _fingerprint(design, sources)
+    return Campaign(file, root.text("text", file.stem), sources, design, told)
+
+
+def _fingerprint(design: Design, sources: Sequence[Source]) -> str:
+    told = hashlib.sha256(f"{__version__} {design!r}".encode())
+    told.update(native_file().read_bytes())
+    for source in sources:
+        told.update(source.path.file.read_bytes())
+        told.update(repr(replace(source.machine, file=Path())).encode())
+    return told.hexdigest()
 
 
 def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:

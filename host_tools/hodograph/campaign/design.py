@@ -129,6 +129,11 @@ class Design:
         plant = _with_gains(self.plants[case.path], self.gains[case.gains])
         return sample, self._vary(plant, grid, sample)[1]
 
+    def rules(self, number: int) -> str:
+        """The fault rules of a run, as text."""
+        case, _, sample = self._parts(number)
+        return "; ".join(self.faults[case.fault].lines(self.seed, sample))
+
     def _parts(self, number: int) -> tuple[Case, dict[Variation, int], int]:
         group, within = divmod(number, self.group_size)
         *grid, sample = _places(within, [*(len(v.numbers) for v in self.grids), self.samples])

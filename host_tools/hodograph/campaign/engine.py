@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from multiprocessing.resource_tracker import ensure_running
 from typing import Any, Protocol, TypeVar
 
 from .. import __version__
@@ -113,16 +115,30 @@ def _dask() -> Any:
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
     dask = _dask()
-    with (
-        dask.LocalCluster(
+    with _deaf_children():
+        cluster = dask.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
-        ) as cluster,
-        dask.Client(cluster) as client,
-    ):
+        )
+    with cluster, dask.Client(cluster) as client:
         yield client
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes begun inside take no notice of Ctrl-C, which terminals send to all: we end them ourselves.
+
+    The signal is blocked for all threads and processes begun meanwhile; the resource tracker has to be there before,
+    because starting it unblocks the signal.
+    """
+    ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

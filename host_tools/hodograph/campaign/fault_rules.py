@@ -35,10 +35,13 @@ class Fault:
         self, seed: int, sample: int, nodes: tuple[int, int], period_us: int
     ) -> list[RigFault]:
         """The faults of one sample. Raises InputError: a rule that a run without a bus cannot have."""
+        return [rig_fault(line, nodes, period_us) for line in self.lines(seed, sample)]
+
+    def lines(self, seed: int, sample: int) -> list[str]:
+        """The rules of one sample as text: what `hodograph faults --seed` would draw for seed + sample."""
         if self.scenario is None:
             return []
-        text = draw(self.scenario, seed + sample).rules
-        return [rig_fault(line, nodes, period_us) for line in text.splitlines() if line.strip()]
+        return [line for line in draw(self.scenario, seed + sample).rules.splitlines() if line]
 
 
 def rig_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault:
@@ -49,7 +52,8 @@ def rig_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault:
             f'rule "{rule}": {kind} needs a bus: use `hodograph faults`, or one of {", ".join(_VALUES)}'
         )
     value_key = _VALUES[kind]
-    known = {"at", "for", "for_ms", "id" if kind == "drop" else "node", value_key or "at"}
+    known = {"at", "for", "for_ms", *({"id", "count"} if kind == "drop" else {"node"})}
+    known |= {value_key} if value_key else set()
     given = dict(_pair(rule, word, known) for word in words)
     node = int(_required(rule, given, "id")) - _RPDO1 if kind == "drop" else given.get("node")
     if node not in nodes:
@@ -73,7 +77,7 @@ def _pair(rule: str, word: str, known: set[str]) -> tuple[str, float]:
     except ValueError:
         raise InputError(f'rule "{rule}": {word} is not a number') from None
     least = 0 if key == "at" else 1
-    if key in ("at", "for", "for_ms") and not least <= value <= LONGEST_TICKS:
+    if key in ("at", "for", "for_ms", "count") and not least <= value <= LONGEST_TICKS:
         raise InputError(f'rule "{rule}": {word} is out of range')
     return key, value
 
@@ -86,5 +90,7 @@ def _required(rule: str, given: dict[str, float], key: str) -> float:
 
 def _ticks(kind: str, given: dict[str, float], period_us: int) -> int:
     if "for_ms" in given:
-        return max(1, math.ceil(given["for_ms"] * 1000 / period_us))
-    return int(given.get("for", FOR_EVER if kind == "encoder-jump" else 1))
+        ticks = math.ceil(given["for_ms"] * 1000 / period_us)
+    else:
+        ticks = int(given.get("for", FOR_EVER if kind == "encoder-jump" else 1))
+    return min(ticks, int(given.get("count", FOR_EVER)))  # a drive gets one setpoint a tick

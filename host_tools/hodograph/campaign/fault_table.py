@@ -48,6 +48,5 @@ def _try(table: Table, fault: Fault, plants: Sequence[Plant]) -> None:
         try:
             fault.rules(0, 0, plant.nodes, plant.period_us)
         except InputError as error:
-            raise table.error(
-                "scenario" if table.has("scenario") else "rules", f"{error}"
-            ) from None
+            key = "scenario" if table.has("scenario") else "rules"
+            raise table.error(key, str(error).removeprefix("rule ")) from None

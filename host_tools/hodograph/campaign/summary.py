@@ -28,11 +28,15 @@ class Group:
     rms_um: float
     following_um: float
     volts: float
+    duration_s: float
 
     @property
     def label(self) -> str:
         """For people: what is not as the files have it."""
-        return ", ".join(text for text in self.case if text not in ("own", "none"))
+        path, profile, feed_mm_s, gains, fault = self.case
+        feed = "own" if feed_mm_s == "own" else f"{float(feed_mm_s):g} mm/s"
+        said = (path, profile, feed, gains, fault)
+        return ", ".join(text for text in said if text not in ("own", "none"))
 
     def as_dict(self) -> dict[str, object]:
         """For tools; None where no run succeeded."""
@@ -46,6 +50,7 @@ class Group:
             "rms_contour_error_um": _finite(self.rms_um),
             "max_following_error_um": _finite(self.following_um),
             "max_volts": _finite(self.volts),
+            "duration_s": _finite(self.duration_s),
         }
 
 
@@ -75,6 +80,7 @@ def _group(case: tuple[str, ...], values: NDArray[np.float64]) -> Group:
         rms_um=_greatest(column["rms_contour_error_um"]),
         following_um=_greatest(column["max_following_error_um"]),
         volts=_greatest(column["max_volts"]),
+        duration_s=_greatest(column["duration_s"]),
     )
 
 
@@ -86,7 +92,18 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-HEADER = ("", "runs", "failed", "contour um: median", "p95", "max", "rms", "following um", "volts")
+HEADER = (
+    "",
+    "runs",
+    "failed",
+    "contour um: median",
+    "p95",
+    "max",
+    "rms",
+    "following um",
+    "volts",
+    "s",
+)
 
 
 def text(found: list[Group]) -> str:
@@ -104,6 +121,6 @@ def text(found: list[Group]) -> str:
 
 def cells(group: Group) -> tuple[str, ...]:
     """A group as a line of that table."""
-    numbers = (*group.contour_um, group.rms_um, group.following_um, group.volts)
+    numbers = (*group.contour_um, group.rms_um, group.following_um, group.volts, group.duration_s)
     shown = ["–" if np.isnan(value) else f"{value:.3f}" for value in numbers]
     return (group.label, str(group.runs), str(group.failed), *shown)

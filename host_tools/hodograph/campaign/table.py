@@ -14,12 +14,13 @@ from .design import Case, Design
 from .execute import QUANTITIES
 from .results import Results
 
-_CASE = ("path", "profile", "feed_mm_s", "gains", "fault", "sample")
+_CASE = ("path", "profile", "feed_mm_s", "gains", "fault")
 
 
 def header(design: Design) -> list[str]:
     """Names of the columns."""
-    return ["run", *_CASE, *design.varied_columns, *QUANTITIES, "encoders_sha256", "error"]
+    varied = ("sample", *design.varied_columns, "rules")
+    return ["run", *_CASE, *varied, *QUANTITIES, "encoders_sha256", "error"]
 
 
 def rows(design: Design, results: Results) -> Iterator[list[str]]:
@@ -45,7 +46,7 @@ def case_texts(design: Design, case: Case) -> list[str]:
 
 def _run(design: Design, number: int) -> list[str]:
     sample, varied = design.varied(number)
-    return [str(sample), *(repr(value) for _, value in varied)]
+    return [str(sample), *(repr(value) for _, value in varied), design.rules(number)]
 
 
 def _result(results: Results, number: int) -> list[str]:

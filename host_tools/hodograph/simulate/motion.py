@@ -56,6 +56,11 @@ class Motion:
         }
 
     @property
+    def duration_s(self) -> float:
+        """Time from the first setpoint of the program to its last, s."""
+        return (self.ticks - 1) * self.period_us / 1e6
+
+    @property
     def program_rows(self) -> NDArray[np.void]:
         """The rows of the program's ticks, without the settling time."""
         return self.rows[: self.ticks]
@@ -134,7 +139,9 @@ class Tally:
         self._following_counts = max(self._following_counts, int(behind.max()))
         contour_um = rows["contour_error_um"]
         self._contour_um = max(self._contour_um, float(contour_um.max()))
-        self._contour_um2 += math.fsum(contour_um * contour_um)
+        self._contour_um2 += math.fsum(
+            (contour_um * contour_um).tolist()
+        )  # the same on every processor
         self._rows += rows.size
         self._volts_mv = max(self._volts_mv, int(np.abs(rows["volts_mv"].astype(np.int32)).max()))
 

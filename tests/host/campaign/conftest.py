@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""Campaign files in a temporary folder, over a short path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from campaign_files import EXAMPLES, PATH, Write
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Writes path.toml and a campaign file with this text, which may use {path} and {examples}."""
+
+    def made(text: str, name: str = "campaign.toml", path: str = PATH) -> Path:
+        (tmp_path / "path.toml").write_text(path)
+        file = tmp_path / name
+        file.write_text(text.replace("{examples}", str(EXAMPLES)))
+        return file
+
+    return made

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""By Dask: on this machine's cores, killed and gone on with, and on a cluster over loopback: always the same table."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from campaign_files import Write
+
+from hodograph.campaign import engine
+from hodograph.cli.main import main
+
+TEXT = """
+paths = ["{examples}/heart.toml"]
+profiles = ["quintic"]
+samples = 300
+[vary.time_constant_s]
+factor_uniform = [0.8, 1.2]
+[vary.gain_rad_s_v]
+values = [60, -1]
+"""
+WAIT_S = 60
+COMMAND = [sys.executable, "-m", "hodograph", "campaign"]
+DASK = [sys.executable, "-m", "dask"]
+
+
+def campaign(file: Path, folder: Path, *more: str) -> bytes:
+    """Runs a campaign in this process; returns its table."""
+    assert main(["campaign", str(file), "-o", str(folder), *more]) == 0
+    return (folder / "runs.csv").read_bytes()
+
+
+@contextmanager
+def under_way(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that makes the campaign on two cores, as soon as its first batch is done."""
+    child = subprocess.Popen(
+        [*COMMAND, str(file), "-o", str(folder), "--workers", "2"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    journal, limit = folder / "runs.journal", time.monotonic() + WAIT_S
+    while child.poll() is None and time.monotonic() < limit:
+        if journal.exists() and b'{"runs"' in journal.read_bytes():
+            break
+        time.sleep(0.01)
+    yield child
+    child.kill()
+
+
+def test_killed_and_gone_on_with_on_two_cores(write: Write, tmp_path: Path) -> None:
+    file, folder = write(TEXT), tmp_path / "two"
+    with under_way(file, folder) as child:
+        child.kill()
+        _, told = child.communicate()
+    assert child.returncode == -signal.SIGKILL, told.decode()
+    assert not (folder / "runs.csv").exists()
+    assert campaign(file, folder, "--workers", "1") == campaign(
+        file, tmp_path / "one", "--workers", "1"
+    )
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[str]:
+    """A scheduler and two workers on loopback, as one would start them on machines of their own."""
+    at = folder / "scheduler.json"
+    hosts = ["--host", "127.0.0.1", "--no-dashboard"]
+    options = {"cwd": folder, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = [*DASK, "scheduler", "--scheduler-file", str(at), "--port", "0", *hosts]
+    worker = [*DASK, "worker", "--scheduler-file", str(at), "--nthreads", "1", "--no-nanny", *hosts]
+    worker += ["--local-directory", str(folder)]
+    children = [subprocess.Popen(command, **options) for command in (scheduler, worker, worker)]  # type: ignore[call-overload]
+    try:
+        limit = time.monotonic() + WAIT_S
+        while not at.exists() and time.monotonic() < limit:
+            time.sleep(0.05)
+        yield json.loads(at.read_text())["address"]
+    finally:
+        for child in children:
+            child.kill()
+            child.wait()
+
+
+def test_a_cluster_gives_the_same_table(
+    write: Write, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = write(TEXT)
+    with cluster(tmp_path) as address:
+        far = campaign(file, tmp_path / "far", "--scheduler", address)
+    assert far == campaign(file, tmp_path / "near", "--workers", "1")
+    assert far.count(b"plant figures must be positive") == 300
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_ctrl_c_is_one_line(write: Write, tmp_path: Path) -> None:
+    """A terminal sends it to all processes; the next start goes on."""
+    with under_way(write(TEXT), tmp_path / "out") as child:
+        os.killpg(child.pid, signal.SIGINT)
+        _, told = child.communicate(timeout=WAIT_S)
+    assert child.returncode == 130
+    assert all(line.startswith("hodograph: ") for line in told.decode().splitlines()), told.decode()
+
+
+def test_no_scheduler(
+    write: Write,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(engine, "ANSWER_S", 1)
+    file = write(TEXT)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        assert main(["campaign", str(file), "-o", str(tmp_path), "--scheduler", address]) == 2
+        told = capsys.readouterr().err
+        assert f"--scheduler {address}: no Dask scheduler answers" in told
+        assert "Traceback" not in told
