@@ -24,11 +24,13 @@ C_RULES: dict[str, set[str]] = {
     "firmware/targets": {"firmware/core"},
     "firmware/canopen": {"firmware/can"},
     "firmware/port/port.h": {"firmware/can"},
+    "firmware/port/common": {"firmware/port/port.h"},
     "firmware/port/semihost": set(),
     "firmware/port/cortex_m": set(),
     "firmware/port/*": {  # each board; not one another
         "firmware/can",
         "firmware/port/port.h",
+        "firmware/port/common",
         "firmware/port/cortex_m",
         "firmware/port/semihost",
     },

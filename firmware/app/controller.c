@@ -95,7 +95,7 @@ static void on_tick(void *self, uint32_t now_us, uint32_t late_ns)
 
 int controller_start(struct controller *controller)
 {
-    const struct port_filter filters[] = {
+    const struct can_match filters[] = {
         {COB_NMT, CAN_ID_MAX},    {COB_EMCY, 0x780u},
         {COB_TPDO1, 0x780u},      {COB_TPDO3, 0x780u},
         {COB_SDO_ANSWER, 0x780u}, {(uint16_t)(COB_SDO_ASK + controller->node), CAN_ID_MAX},

@@ -3,7 +3,7 @@
  * port.h: everything that the controller needs of a machine, on one page.
  *
  * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It
- * includes nothing above this file but can/can_frame.h. The Linux port is in port/linux.
+ * includes nothing above this file but the headers of can/. docs/port-to-your-board.md makes one.
  *
  * Three contexts (drawn in docs/architecture.md):
  *   receive   the CAN receive interrupt: calls port_handlers.receive for every accepted frame
@@ -24,6 +24,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "can/can_match.h"
 #include "can/can_frame.h"
 
 enum port_error {
@@ -53,15 +54,10 @@ uint8_t port_node_id(void);
 
 /* --- CAN, classic frames --- */
 
-struct port_filter {
-    uint16_t id;   /* a frame passes when (frame.id & mask) == (id & mask) for one of the filters */
-    uint16_t mask; /* 11-bit identifiers */
-};
-
-/* Lets only matching frames through to the receive handler. At most PORT_FILTERS of them. Mainline,
+/* Lets only frames that pass one of them through to the receive handler. At most PORT_FILTERS of them. Mainline,
  * before port_start(). */
 #define PORT_FILTERS 16
-int port_can_accept(const struct port_filter *filters, size_t count);
+int port_can_accept(const struct can_match *filters, size_t count);
 
 /* Queues one frame for sending, in call order per context. 0 or PORT_ERR_FULL. */
 int port_can_send(const struct can_msg *message);

@@ -57,7 +57,7 @@ taylor_TARGETS := an385 an386
 taylor_CHECK   := --soft-float
 
 controller_MAIN    := firmware/app/main.c
-controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/can/*.c)
+controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/port/common/*.c firmware/can/*.c)
 controller_TARGETS := an385 an386 an500 an505 $(BOARDS)
 
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -fstack-usage -DNDEBUG $(INCLUDES)

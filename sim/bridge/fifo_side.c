@@ -72,7 +72,7 @@ static bool write_reply(void)
 
 static int set_filters(void)
 {
-    struct can_socket_filter filters[CAN_SOCKET_FILTERS];
+    struct can_match filters[CAN_SOCKET_FILTERS];
     const size_t count = self.request.header.count;
     if (count > CAN_SOCKET_FILTERS) {
         return -EINVAL;

@@ -59,18 +59,18 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
 
 int drives_filter(struct drives *drives)
 {
-    struct can_socket_filter filters[4 + (1 + DRIVE_NODE_PDOS) * NODE_OPTIONS_AXES] = {
+    struct can_match filters[4 + (1 + DRIVE_NODE_PDOS) * NODE_OPTIONS_AXES] = {
         {COB_NMT, CAN_ID_MAX}, {COB_SYNC, CAN_ID_MAX}, {COB_HEARTBEAT, 0x780}};
     size_t n = 3;
     if (drives->rules.count > 0) {
-        filters[n++] = (struct can_socket_filter){COB_RPDO1, 0x780}; /* ticks are those of all */
+        filters[n++] = (struct can_match){COB_RPDO1, 0x780}; /* ticks are those of all */
     }
     for (size_t i = 0; i < drives->count; i++) {
         struct drive_node *node = &drives->nodes[i];
-        filters[n++] = (struct can_socket_filter){(uint16_t)(COB_SDO_ASK + node->id), CAN_ID_MAX};
+        filters[n++] = (struct can_match){(uint16_t)(COB_SDO_ASK + node->id), CAN_ID_MAX};
         for (int k = 0; k < DRIVE_NODE_PDOS; k++) {
             if (node->rpdos[k].valid) {
-                filters[n++] = (struct can_socket_filter){node->rpdos[k].cob_id, CAN_ID_MAX};
+                filters[n++] = (struct can_match){node->rpdos[k].cob_id, CAN_ID_MAX};
             }
         }
         node->pdos_moved = false;

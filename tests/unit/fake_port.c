@@ -143,7 +143,7 @@ uint8_t port_node_id(void)
     return 1;
 }
 
-int port_can_accept(const struct port_filter *filters, size_t count)
+int port_can_accept(const struct can_match *filters, size_t count)
 {
     (void)filters;
     return count <= PORT_FILTERS ? 0 : PORT_ERR_SYSTEM;

@@ -67,7 +67,7 @@ void tearDown(void)
 
 static void start(uint32_t period_us)
 {
-    static const struct fdcan_filter all = {.id = 0, .mask = 0};
+    static const struct can_match all = {.id = 0, .mask = 0};
     tick_timer_begin(170);
     TEST_ASSERT_TRUE(fdcan_begin(&can, 1000000));
     TEST_ASSERT_TRUE(fdcan_accept(&all, 1));

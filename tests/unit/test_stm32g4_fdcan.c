@@ -16,7 +16,7 @@ static struct fdcan can;
 static struct can_msg got[GOT_MAX];
 static unsigned got_count;
 
-static const struct fdcan_filter everything = {.id = 0, .mask = 0};
+static const struct can_match everything = {.id = 0, .mask = 0};
 
 void setUp(void)
 {
@@ -129,7 +129,7 @@ static void test_a_second_begin_reaches_a_chip_that_runs(void)
 
 static void test_filters_let_through_what_they_say(void)
 {
-    static const struct fdcan_filter filters[] = {
+    static const struct can_match filters[] = {
         {0x000, 0x7FF}, {0x080, 0x780}, {0x180, 0x780}, {0x601, 0x7FF}, {0x701, 0x70F}};
     TEST_ASSERT_TRUE(fdcan_begin(&can, MBIT));
     TEST_ASSERT_TRUE(fdcan_accept(filters, 5));
@@ -162,7 +162,7 @@ static void test_only_data_frames_with_short_identifiers(void)
 
 static void test_no_filter_and_too_many(void)
 {
-    static const struct fdcan_filter many[29];
+    static const struct can_match many[29];
     TEST_ASSERT_TRUE(fdcan_begin(&can, MBIT));
     TEST_ASSERT_FALSE(fdcan_accept(many, 29));
     fdcan_start(&can);

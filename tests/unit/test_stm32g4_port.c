@@ -96,7 +96,7 @@ void tearDown(void)
 
 static void start(void)
 {
-    static const struct port_filter filters[] = {{0x180, 0x780}, {0x601, 0x7FF}};
+    static const struct can_match filters[] = {{0x180, 0x780}, {0x601, 0x7FF}};
     TEST_ASSERT_EQUAL_INT(0, port_begin(0, NULL));
     TEST_ASSERT_EQUAL_INT(0, port_can_accept(filters, 2));
     TEST_ASSERT_EQUAL_INT(0, port_start(&handlers, 1000));

@@ -19,7 +19,7 @@ void can_socket_close(struct can_socket *socket)
     }
 }
 
-int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters,
+int can_socket_filter(struct can_socket *socket, const struct can_match *filters,
                       size_t count)
 {
     struct can_filter raw[CAN_SOCKET_FILTERS];

@@ -12,15 +12,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "can/can_match.h"
 #include "can/can_frame.h"
 
 struct can_socket {
     int fd; /* for poll(); -1 when closed */
-};
-
-struct can_socket_filter {
-    uint16_t id;
-    uint16_t mask; /* a frame passes when (id ^ filter id) & mask is 0 */
 };
 
 #define CAN_SOCKET_FILTERS 40u
@@ -32,7 +28,7 @@ int can_socket_open(struct can_socket *socket, const char *interface, char *reas
 void can_socket_close(struct can_socket *socket);
 
 /* Lets only these frames through (none: all). At most CAN_SOCKET_FILTERS. 0 or negative errno. */
-int can_socket_filter(struct can_socket *socket, const struct can_socket_filter *filters,
+int can_socket_filter(struct can_socket *socket, const struct can_match *filters,
                       size_t count);
 
 /* 0; -EAGAIN when the queue is full (the frame is not sent); else a negative errno (interface down,

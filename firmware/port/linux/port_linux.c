@@ -106,16 +106,9 @@ uint8_t port_node_id(void)
     return self.options.node;
 }
 
-int port_can_accept(const struct port_filter *filters, size_t count)
+int port_can_accept(const struct can_match *filters, size_t count)
 {
-    struct can_socket_filter copies[CAN_SOCKET_FILTERS];
-    if (count > CAN_SOCKET_FILTERS) {
-        return PORT_ERR_SYSTEM;
-    }
-    for (size_t i = 0; i < count; ++i) {
-        copies[i] = (struct can_socket_filter){.id = filters[i].id, .mask = filters[i].mask};
-    }
-    return can_socket_filter(&self.socket, copies, count) == 0 ? 0 : PORT_ERR_SYSTEM;
+    return can_socket_filter(&self.socket, filters, count) == 0 ? 0 : PORT_ERR_SYSTEM;
 }
 
 int port_can_send(const struct can_msg *message)

@@ -1,35 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The program store in memory: what a board keeps in two banks of flash. Lost when the process
- * ends. */
+/* The program store is memory of the process. */
+#include "port/common/ram_store.h"
 #include "port/port.h"
-
-#include <string.h>
 
 #define BANK_BYTES (64u * 1024u * 1024u)
 
 static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES] __attribute__((aligned(8)));
-
-uint32_t port_store_size(void)
-{
-    return BANK_BYTES;
-}
-
-/* Pages that were never written cost nothing, so erasing is left to the writes. */
-int port_store_erase(unsigned bank)
-{
-    return bank < PORT_STORE_BANKS ? 0 : PORT_ERR_STORE;
-}
-
-int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
-{
-    if (bank >= PORT_STORE_BANKS || offset > BANK_BYTES || size > BANK_BYTES - offset) {
-        return PORT_ERR_STORE;
-    }
-    memcpy(&banks[bank][offset], data, size);
-    return 0;
-}
-
-const uint8_t *port_store_data(unsigned bank)
-{
-    return banks[bank];
-}
+const struct ram_store ram_store = {.memory = banks[0], .bank_bytes = sizeof banks[0]};

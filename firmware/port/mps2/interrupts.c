@@ -5,7 +5,8 @@
 
 #include "port/cortex_m/core.h"
 #include "port/cortex_m/startup.h"
-#include "port/mps2/clock.h"
+#include "port/cortex_m/systick.h"
+#include "port/mps2/board.h"
 
 static struct {
     const struct link *link;
@@ -24,22 +25,21 @@ void interrupts_begin(const struct link *link)
 
 void interrupts_end(void)
 {
-    clock_end();
+    systick_end();
 }
 
 int port_start(const struct port_handlers *handlers, uint32_t period_us)
 {
     const uint32_t before = core_mask();
     self.handlers = *handlers;
-    CORE_SHPR3 &= ~CORE_SHPR3_SYST(0xFFu);
-    clock_begin(period_us);
+    systick_begin(period_us, BOARD_CLOCK_MHZ, 0);
     core_unmask(before);
     return 0;
 }
 
 void port_tick_period(uint32_t period_us)
 {
-    clock_period(period_us);
+    systick_period(period_us);
 }
 
 void port_tick_await(uint32_t guard_us, bool hurry)
@@ -56,7 +56,7 @@ void interrupts_receive(const struct can_msg *message)
 {
     const uint32_t before = core_mask();
     if (self.handlers.receive != NULL) {
-        self.handlers.receive(self.handlers.self, message, clock_us());
+        self.handlers.receive(self.handlers.self, message, systick_us());
     }
     core_unmask(before);
 }
@@ -64,12 +64,12 @@ void interrupts_receive(const struct can_msg *message)
 /* Apart from the link, so that its instructions can be counted by themselves. */
 __attribute__((noinline)) static void run_tick(void)
 {
-    self.handlers.tick(self.handlers.self, clock_us(), self.late_ns + clock_late_ns());
+    self.handlers.tick(self.handlers.self, systick_us(), self.late_ns + systick_late_ns());
 }
 
 void startup_systick(void)
 {
-    clock_tick();
+    systick_tick();
     self.ticks++;
     self.wish = (struct link_wish){.awaiting = false};
     run_tick();
@@ -106,8 +106,8 @@ static void spin_once(void)
 
 void port_wait(uint32_t timeout_us)
 {
-    const uint32_t began_us = clock_us();
-    while (!self.woken && !self.link->stop_requested() && clock_us() - began_us < timeout_us) {
+    const uint32_t began_us = systick_us();
+    while (!self.woken && !self.link->stop_requested() && systick_us() - began_us < timeout_us) {
         if (self.link->sleeps) {
             sleep_once();
         } else {

@@ -29,7 +29,7 @@ struct link {
 
     /* Mainline, in this order. 0 or PORT_ERR_SYSTEM. */
     int (*begin)(const struct command_line *line);
-    int (*accept)(const struct port_filter *filters, size_t count);
+    int (*accept)(const struct can_match *filters, size_t count);
 
     /* Any context. 0 or PORT_ERR_FULL. */
     int (*send)(const struct can_msg *message);

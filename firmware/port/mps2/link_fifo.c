@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right behind the tick. */
 #include "port/cortex_m/core.h"
-#include "port/mps2/clock.h"
+#include "port/cortex_m/systick.h"
 #include "port/mps2/exchange.h"
 #include "port/mps2/interrupts.h"
 #include "port/mps2/link.h"
@@ -57,7 +57,7 @@ static void receive_frames(void)
 static void exchange(uint16_t flags, uint32_t guard_us)
 {
     self.out.header.flags = flags;
-    self.out.header.period_us = clock_period_us();
+    self.out.header.period_us = systick_period_us();
     self.out.header.guard_us = guard_us;
     if (self.failed || semihost_write(self.out_handle, &self.out, exchange_size(&self.out)) != 0 ||
         !read_reply()) {
@@ -71,7 +71,7 @@ static void exchange(uint16_t flags, uint32_t guard_us)
     receive_frames();
 }
 
-static int accept(const struct port_filter *filters, size_t count)
+static int accept(const struct can_match *filters, size_t count)
 {
     for (size_t i = 0; i < count && i < EXCHANGE_FRAMES; ++i) {
         self.out.frames[i] = (struct exchange_frame){

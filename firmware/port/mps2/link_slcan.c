@@ -8,24 +8,15 @@
 
 static struct {
     struct slcan_decoder decoder;
-    struct port_filter filters[PORT_FILTERS];
+    struct can_match filters[PORT_FILTERS];
     size_t filter_count;
 } self;
-
-static bool passes(const struct can_msg *message)
-{
-    for (size_t i = 0; i < self.filter_count; ++i) {
-        if (((message->id ^ self.filters[i].id) & self.filters[i].mask) == 0u) {
-            return true;
-        }
-    }
-    return false;
-}
 
 static void take(char character)
 {
     struct can_msg message;
-    if (slcan_decode(&self.decoder, character, &message) && passes(&message)) {
+    if (slcan_decode(&self.decoder, character, &message) &&
+        can_match_any(self.filters, self.filter_count, &message)) {
         interrupts_receive(&message);
     }
 }
@@ -40,7 +31,7 @@ static int begin(const struct command_line *line)
     return 0;
 }
 
-static int accept(const struct port_filter *filters, size_t count)
+static int accept(const struct can_match *filters, size_t count)
 {
     const uint32_t before = core_mask();
     for (size_t i = 0; i < count; ++i) {

@@ -4,8 +4,9 @@
 
 #include <string.h>
 
+#include "port/common/decimal.h"
 #include "port/cortex_m/startup.h"
-#include "port/mps2/clock.h"
+#include "port/cortex_m/systick.h"
 #include "port/mps2/command_line.h"
 #include "port/mps2/interrupts.h"
 #include "port/mps2/link.h"
@@ -13,8 +14,7 @@
 
 enum exit_status { EXIT_USAGE = 2, EXIT_BUS = 4 };
 
-#define LINE_SIZE   192u
-#define NUMBER_SIZE 12u
+#define LINE_SIZE 192u
 
 static struct {
     char text[LINE_SIZE];
@@ -84,7 +84,7 @@ uint8_t port_node_id(void)
     return self.line.node;
 }
 
-int port_can_accept(const struct port_filter *filters, size_t count)
+int port_can_accept(const struct can_match *filters, size_t count)
 {
     return count <= PORT_FILTERS ? self.link->accept(filters, count) : PORT_ERR_SYSTEM;
 }
@@ -96,35 +96,19 @@ int port_can_send(const struct can_msg *message)
 
 uint32_t port_time_ns(void)
 {
-    return clock_ns();
+    return systick_ns();
 }
 
 uint32_t port_time_us(void)
 {
-    return clock_us();
-}
-
-/* Digits from the end of `text`. */
-static const char *number(int32_t value, char text[NUMBER_SIZE])
-{
-    uint32_t rest = value < 0 ? 0u - (uint32_t)value : (uint32_t)value;
-    uint32_t at = NUMBER_SIZE - 1;
-    text[at] = '\0';
-    do {
-        text[--at] = (char)('0' + rest % 10u);
-        rest /= 10u;
-    } while (rest != 0u);
-    if (value < 0) {
-        text[--at] = '-';
-    }
-    return &text[at];
+    return systick_us();
 }
 
 void port_log(enum port_level level, const char *text, int32_t value)
 {
-    char digits[NUMBER_SIZE] = {0};
+    char digits[DECIMAL_SIZE];
     if (level == PORT_WARNING || self.line.verbose) {
-        say(text, number(value, digits));
+        say(text, decimal(value, digits));
     }
 }
 

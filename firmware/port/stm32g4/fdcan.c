@@ -89,7 +89,7 @@ bool fdcan_begin(struct fdcan *can, uint32_t bits_s)
     return true;
 }
 
-bool fdcan_accept(const struct fdcan_filter *filters, size_t count)
+bool fdcan_accept(const struct can_match *filters, size_t count)
 {
     if (count > FDCAN_FILTERS) {
         return false;

@@ -24,13 +24,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "can/can_match.h"
 #include "can/can_frame.h"
 #include "port/stm32g4/fdcan_queue.h"
-
-struct fdcan_filter {
-    uint16_t id;
-    uint16_t mask; /* a frame passes when (frame.id & mask) == (id & mask) */
-};
 
 /* Since they were last taken. */
 struct fdcan_events {
@@ -53,7 +49,7 @@ enum fdcan_sender { FDCAN_URGENT, FDCAN_ORDINARY };
 bool fdcan_begin(struct fdcan *can, uint32_t bits_s);
 
 /* Between begin and start. False: more filters than the chip has (28). No filter: nothing passes. */
-bool fdcan_accept(const struct fdcan_filter *filters, size_t count);
+bool fdcan_accept(const struct can_match *filters, size_t count);
 
 /* Enters the bus (after 11 recessive bits), leaves it. Mainline. */
 void fdcan_start(struct fdcan *can);

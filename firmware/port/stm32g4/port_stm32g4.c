@@ -92,16 +92,9 @@ uint8_t port_node_id(void)
     return BOARD_NODE;
 }
 
-int port_can_accept(const struct port_filter *filters, size_t count)
+int port_can_accept(const struct can_match *filters, size_t count)
 {
-    struct fdcan_filter copies[PORT_FILTERS];
-    if (count > PORT_FILTERS) {
-        return PORT_ERR_SYSTEM;
-    }
-    for (size_t i = 0; i < count; ++i) {
-        copies[i] = (struct fdcan_filter){.id = filters[i].id, .mask = filters[i].mask};
-    }
-    return fdcan_accept(copies, count) ? 0 : PORT_ERR_SYSTEM;
+    return fdcan_accept(filters, count) ? 0 : PORT_ERR_SYSTEM;
 }
 
 int port_can_send(const struct can_msg *message)

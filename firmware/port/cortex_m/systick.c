@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-#include "port/mps2/clock.h"
-
-#include <stdbool.h>
+#include "port/cortex_m/systick.h"
 
 #include "port/cortex_m/core.h"
-#include "port/mps2/board.h"
 
 static struct {
+    uint32_t core_mhz;
     uint32_t base_ns; /* when the present period began */
     uint32_t base_us;
     uint32_t running_us; /* the period that SysTick counts */
@@ -17,11 +15,13 @@ static struct {
 static void load(uint32_t period_us)
 {
     self.loaded_us = period_us;
-    CORE_SYST_RVR = period_us * BOARD_CLOCK_MHZ - 1u;
+    CORE_SYST_RVR = period_us * self.core_mhz - 1u;
 }
 
-void clock_begin(uint32_t period_us)
+void systick_begin(uint32_t period_us, uint32_t core_mhz, uint8_t priority)
 {
+    CORE_SHPR3 = (CORE_SHPR3 & ~CORE_SHPR3_SYST(0xFFu)) | CORE_SHPR3_SYST((uint32_t)priority);
+    self.core_mhz = core_mhz;
     self.running_us = period_us;
     self.wanted_us = period_us;
     load(period_us);
@@ -29,22 +29,22 @@ void clock_begin(uint32_t period_us)
     CORE_SYST_CSR = CORE_SYST_CSR_RUN;
 }
 
-void clock_end(void)
+void systick_end(void)
 {
     CORE_SYST_CSR = 0;
 }
 
-void clock_period(uint32_t period_us)
+void systick_period(uint32_t period_us)
 {
     self.wanted_us = period_us;
 }
 
-uint32_t clock_period_us(void)
+uint32_t systick_period_us(void)
 {
     return self.running_us;
 }
 
-void clock_tick(void)
+void systick_tick(void)
 {
     self.base_us += self.running_us;
     self.base_ns += self.running_us * 1000u;
@@ -56,27 +56,36 @@ void clock_tick(void)
 static uint32_t counts(uint32_t period_us)
 {
     const uint32_t current = CORE_SYST_CVR;
-    return current == 0u ? 0u : period_us * BOARD_CLOCK_MHZ - current;
+    return current == 0u ? 0u : period_us * self.core_mhz - current;
+}
+
+/* In two parts: counts times 1000 would not fit at a high clock. */
+static uint32_t ns_of(uint32_t count)
+{
+    return count / self.core_mhz * 1000u + count % self.core_mhz * 1000u / self.core_mhz;
 }
 
 /* Under the mask, where a period may be over whose interrupt is pending. */
 static uint32_t elapsed_ns(void)
 {
+    if (self.core_mhz == 0u) {
+        return 0; /* not begun */
+    }
     uint32_t passed = counts(self.running_us);
     uint32_t whole_us = 0;
     if ((CORE_ICSR & CORE_ICSR_PENDSTSET) != 0u) {
         passed = counts(self.loaded_us);
         whole_us = self.running_us;
     }
-    return whole_us * 1000u + passed * (1000u / BOARD_CLOCK_MHZ);
+    return whole_us * 1000u + ns_of(passed);
 }
 
-uint32_t clock_late_ns(void)
+uint32_t systick_late_ns(void)
 {
     return elapsed_ns();
 }
 
-uint32_t clock_ns(void)
+uint32_t systick_ns(void)
 {
     const uint32_t before = core_mask();
     const uint32_t now_ns = self.base_ns + elapsed_ns();
@@ -84,7 +93,7 @@ uint32_t clock_ns(void)
     return now_ns;
 }
 
-uint32_t clock_us(void)
+uint32_t systick_us(void)
 {
     const uint32_t before = core_mask();
     const uint32_t now_us = self.base_us + elapsed_ns() / 1000u;

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: MIT */
+/* decimal: numbers for the console of a board without printf. */
+#ifndef PORT_COMMON_DECIMAL_H
+#define PORT_COMMON_DECIMAL_H
+
+#include <stdint.h>
+
+#define DECIMAL_SIZE 12u /* sign, ten digits, end */
+
+/* The number as text; it begins somewhere in `text`. Any context. */
+const char *decimal(int32_t value, char text[DECIMAL_SIZE]);
+
+#endif
