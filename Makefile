@@ -38,7 +38,7 @@ OD_NAMES := $(if $(wildcard firmware/app/controller.eds),controller) $(if $(wild
 OD_C     := $(OD_NAMES:%=$(BUILD)/generated/od_%.c)
 OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
 
-LIBS        := app node injector bridge faults port mps2 stm32g4 canopen can sim core od
+LIBS        := app node injector bridge hub faults port mps2 stm32g4 canopen can sim core od
 core_SRC    := $(wildcard firmware/core/*.c)
 canopen_SRC := $(wildcard firmware/canopen/*.c)
 sim_SRC     := $(wildcard sim/plant/*.c sim/rig/*.c)
@@ -48,17 +48,19 @@ node_SRC    := $(filter-out %/main.c,$(wildcard sim/node/*.c))
 faults_SRC  := $(wildcard sim/faults/*.c)
 injector_SRC := $(filter-out %/main.c,$(wildcard sim/injector/*.c))
 bridge_SRC  := $(filter-out %/main.c,$(wildcard sim/bridge/*.c))
+hub_SRC     := $(filter-out %/main.c,$(wildcard sim/hub/*.c))
 can_SRC     := $(wildcard firmware/can/*.c)
 mps2_SRC    := $(wildcard firmware/port/mps2/command_line.c)
 # Without what is the core's own: tests stand in for that.
 stm32g4_SRC := $(filter-out %/cpu.c %/vectors.c %/port_stm32g4.c,$(wildcard firmware/port/stm32g4/*.c))
 od_SRC      := $(OD_C)
 
-BINS            := controller drive injector bridge
+BINS            := controller drive injector bridge hub
 controller_MAIN := $(wildcard firmware/app/main.c firmware/port/linux/main.c)
 drive_MAIN      := $(wildcard sim/node/main.c)
 injector_MAIN   := $(wildcard sim/injector/main.c)
 bridge_MAIN     := $(wildcard sim/bridge/main.c)
+hub_MAIN        := $(wildcard sim/hub/main.c)
 BINS            := $(foreach b,$(BINS),$(if $($(b)_MAIN),$(b)))
 
 UNIT_SRC      := $(wildcard tests/unit/test_*.c)
@@ -132,10 +134,11 @@ SOAK_S ?= 3600
 soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame looked at
 	@tools/with-vcan $(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
 
-# TARGET: one of an385 an386 an500 an505
+# TARGET: one of an385 an386 an500 an505; TIL=--local: a bus of its own instead of vcan0; TIL="--local --link slcan": real time
 TARGET ?= an386
+TIL    ?=
 til: build firmware ## target in the loop: the controller on an emulated board runs alpha and heart, the same bits as here
-	@tools/with-vcan $(PY) tools/til.py --target $(TARGET) examples/alpha.toml examples/heart.toml
+	@$(if $(findstring --local,$(TIL)),,tools/with-vcan) $(PY) tools/til.py --target $(TARGET) $(TIL) examples/alpha.toml examples/heart.toml
 
 SEEDS ?= 5
 SCENARIO ?=

@@ -76,6 +76,7 @@ C_RULES: dict[str, set[str]] = {
         "firmware/port/linux/end_signals.h",
         "sim/faults",
     },
+    "sim/hub": {"firmware/port/linux/end_signals.h"},
     "sim/bridge": {
         "firmware/can",
         "firmware/port/linux/can_socket.h",
@@ -105,8 +106,18 @@ PYTHON_RULES: dict[str, set[str]] = {
     "dbc": {"data", "config", "bustime"},
     "bus.address": {"errors"},
     "bus.words": set(),
-    "bus.listening": {"errors", "config", "bustime", "bus.address"},
-    "bus.sdo": {"errors", "names", "data", "config", "program", "bus.address", "bus.words"},
+    "bus.local_bus": set(),
+    "bus.listening": {"errors", "config", "bustime", "bus.address", "bus.local_bus"},
+    "bus.sdo": {
+        "errors",
+        "names",
+        "data",
+        "config",
+        "program",
+        "bus.address",
+        "bus.local_bus",
+        "bus.words",
+    },
     "bus": {
         "bus.address",
         "bus.words",

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""count_til.py [--target TARGET] FILE: instructions of the tick's interrupt in a run on the bus. To be run under
-tools/with-vcan.
+"""count_til.py [--target TARGET] FILE: instructions of the tick's interrupt in a run on a bus of its own.
 
 The whole controller on an emulated board, with simulated drives, uploads and runs a path at full pace; every tick while
 setpoints come from the program is counted, as tests/target/isr.c is without a bus.
@@ -40,7 +39,9 @@ def main(arguments: list[str]) -> int:
         (folder / "map").write_text(counter.map.text)
         out = folder / "out"
         plugin = counter.plugin_words(folder / "map", out)
-        til.run(load_chain(options.file), f"{til.EMULATE} {options.target} --plugin {plugin}")
+        board = f"{til.EMULATE} {options.target} --plugin {plugin}"
+        with til.local_bus() as bus:
+            til.run(load_chain(options.file), bus, "fast", board)
         counts = read(out, len(counter.names))
     show(counter.names, counts[counts[:, _FEED] > 0], options.worst)
     return 0

@@ -12,11 +12,12 @@ import argparse
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -24,6 +25,12 @@ TARGETS = ("an385", "an386", "an500", "an505")
 _BUS_STATUS, _MACHINE_STATUS, _USAGE_STATUS = 4, 1, 2
 _GRACE_S = 5.0
 """For the board to notice that its bridge is gone, and the other way round."""
+_PRIORITY = 15
+"""Of a board in real time, where permitted: below the simulated drives (20), above everything ordinary. One for all its
+threads and its bridge, which take turns: one above another would be woken by each character.
+"""
+_SO_RCVBUFFORCE = 33
+_BUFFER_BYTES = 4 * 2**20
 _STOP_S = 8.0
 """For the controller to stop the axes and switch them off: it takes 6 s at most."""
 
@@ -35,7 +42,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "target", choices=TARGETS, help="board: Cortex-M3, -M4F, -M7, -M33 in this order"
     )
-    parser.add_argument("--bus", help="CAN interface that the board is joined to, such as vcan0")
+    parser.add_argument(
+        "--bus",
+        help="what the board is joined to: a CAN interface such as vcan0, or the path of a hodograph-hub",
+    )
     parser.add_argument("--node", type=int, default=1, help="node number (default 1)")
     parser.add_argument("--pace", choices=("real-time", "fast"), default="real-time")
     parser.add_argument("--verbose", action="store_true", help="notes about states on stderr")
@@ -62,22 +72,32 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
-def qemu_command(options: argparse.Namespace, folder: Path) -> list[str]:
-    """What runs the board; FIFOs and sockets have their names relative to `folder`."""
+def qemu_command(options: argparse.Namespace, ports: tuple[int, int]) -> list[str]:
+    """What runs the board, in the folder of its FIFOs; `ports`: the bridge's and its own, of UDP."""
     words = [f"node={options.node}", f"link={options.link}", f"pace={options.pace}"]
     words += ["verbose"] if options.verbose else []
     command = ["qemu-system-arm", "-M", f"mps2-{options.target}", "-display", "none"]
     command += ["-monitor", "none", "-accel", "tcg,tb-size=32"]
     if options.link == "fifo":
         command += ["-serial", "none", "-icount", "shift=6,sleep=off"]
-    elif options.serve is not None:
-        command += ["-serial", f"tcp:{options.serve},server=on,wait=on,nodelay=on"]
     else:
-        command += ["-serial", f"unix:{folder / 'uart'},server=on,wait=on"]
+        command += ["-chardev", f"{_uart(options, ports)},id=uart,mux=on"]
+        command += ["-serial", "chardev:uart"]
     command += ["-plugin", options.plugin] if options.plugin else []
     command += ["-kernel", str(image(options))]
     semihosting = ["enable=on", "target=native", *(f"arg={word}" for word in words)]
     return [*command, "-semihosting-config", ",".join(semihosting)]
+
+
+def _uart(options: argparse.Namespace, ports: tuple[int, int]) -> str:
+    """What the UART is joined to. A multiplexed device (mux=on, with one user) has a buffer of 32 characters, which
+    goes on filling while the UART is full and gives the next one when the board has read the last. Datagrams are taken
+    from the socket as a whole, where a stream costs a turn of QEMU's main loop for each character (docs/target.md).
+    """
+    if options.serve is None:
+        return f"udp,host=127.0.0.1,port={ports[0]},localaddr=127.0.0.1,localport={ports[1]}"
+    host, _, port = options.serve.rpartition(":")
+    return f"socket,host={host},port={port},nodelay=on,server=on,wait=on"
 
 
 def image(options: argparse.Namespace) -> Path:
@@ -86,10 +106,10 @@ def image(options: argparse.Namespace) -> Path:
     return folder / "firmware" / target / "controller.elf"
 
 
-def bridge_command(options: argparse.Namespace, folder: Path) -> list[str]:
+def bridge_command(options: argparse.Namespace, folder: Path, uart: int) -> list[str]:
     command = [str(Path(options.build) / "bin/hodograph-bridge"), "--bus", options.bus]
     if options.link == "slcan":
-        return [*command, "--slcan", str(folder / "uart")]
+        return [*command, "--slcan", f"fd:{uart}"]
     return [*command, "--out", str(folder / "out"), "--in", str(folder / "in")]
 
 
@@ -102,11 +122,32 @@ def missing(options: argparse.Namespace) -> str | None:
     return None
 
 
-def spawn(command: list[str], folder: Path) -> subprocess.Popen[bytes]:
+def datagrams() -> tuple[socket.socket, tuple[int, int]]:
+    """The bridge's end of the UART, and the ports of both."""
+    ends = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
+    for end in ends:
+        end.bind(("127.0.0.1", 0))
+    ports = (int(ends[0].getsockname()[1]), int(ends[1].getsockname()[1]))
+    ends[0].connect(("127.0.0.1", ports[1]))
+    for option in (_SO_RCVBUFFORCE, socket.SO_RCVBUF):
+        with suppress(PermissionError):
+            ends[0].setsockopt(socket.SOL_SOCKET, option, _BUFFER_BYTES)
+            break
+    ends[1].close()  # QEMU binds it anew
+    return ends[0], ports
+
+
+def spawn(command: list[str], folder: Path, *descriptors: int) -> subprocess.Popen[bytes]:
     """A child that does not outlive us, and hears no Ctrl-C: we stop it in our way."""
     guard = shutil.which("setpriv")
     guarded = [guard, "--pdeathsig", "KILL", "--", *command] if guard else command
-    return subprocess.Popen(guarded, cwd=folder, stdin=subprocess.DEVNULL, start_new_session=True)
+    return subprocess.Popen(
+        guarded,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,
+        pass_fds=descriptors,
+    )
 
 
 class Board:
@@ -117,17 +158,13 @@ class Board:
             os.mkfifo(folder / name)
         self._stopping_since: float | None = None
         self._options = options
-        self.qemu = spawn(qemu_command(options, folder), folder)
+        uart, ports = datagrams()
+        self.qemu = spawn(qemu_command(options, ports), folder)
         self.bridge = None
         if options.bus is not None:
-            if options.link == "slcan":
-                self._await_socket(folder / "uart")
-            self.bridge = spawn(bridge_command(options, folder), folder)
-
-    def _await_socket(self, path: Path) -> None:
-        deadline = time.monotonic() + 5.0
-        while not path.exists() and self.qemu.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.01)
+            command = bridge_command(options, folder, uart.fileno())
+            self.bridge = spawn(command, folder, uart.fileno())
+        uart.close()
 
     def stop(self) -> None:
         """Asks the controller to end; by the FIFOs, as a board has no signals."""
@@ -152,6 +189,8 @@ class Board:
         if self.bridge is not None and self.bridge.poll() == _BUS_STATUS:
             self.qemu.kill()
             return _BUS_STATUS
+        if self.bridge is not None and self._options.link == "slcan":
+            self.bridge.terminate()  # datagrams do not tell that the other end has gone
         qemu = _end(self.qemu)
         bridge = 0 if self.bridge is None else _end(self.bridge)
         if bridge == _BUS_STATUS:
@@ -179,6 +218,9 @@ def main(arguments: list[str]) -> int:
         print(f"emulate.py: something is missing: {first}", file=sys.stderr)
         return _USAGE_STATUS
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})  # waking across cores costs too much
+    if options.link == "slcan":
+        with suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(_PRIORITY))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="hodograph-")))
         board = Board(options, folder)

@@ -17,7 +17,7 @@ struct can_match {
 
 /* True when the frame passes one of them. Any context. */
 static inline bool can_match_any(const struct can_match *filters, size_t count,
-                                   const struct can_msg *message)
+                                 const struct can_msg *message)
 {
     for (size_t i = 0; i < count; ++i) {
         if (((message->id ^ filters[i].id) & filters[i].mask) == 0u) {

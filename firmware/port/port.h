@@ -24,8 +24,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "can/can_match.h"
 #include "can/can_frame.h"
+#include "can/can_match.h"
 
 enum port_error {
     PORT_ERR_FULL = -1,   /* no room to send: the frame is not queued */

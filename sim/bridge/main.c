@@ -11,9 +11,13 @@
 #include "bridge/fifo_side.h"
 #include "bridge/slcan_side.h"
 
-/* A batch thread is woken once for all answers of the drives, not by the first of them. */
+/* A batch thread is woken once for all answers of the drives, not by the first of them; nor by each character of a UART.
+ * Whoever has given us a real-time priority means that. */
 static void be_patient(void)
 {
+    if (sched_getscheduler(0) != SCHED_OTHER) {
+        return;
+    }
     const struct sched_param none = {.sched_priority = 0};
     (void)sched_setscheduler(0, SCHED_BATCH, &none);
 }

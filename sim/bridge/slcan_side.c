@@ -3,6 +3,7 @@
 #include "bridge/slcan_side.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -71,11 +72,46 @@ static int connect_tcp(const char *address, const char *port)
     return fd;
 }
 
+/* A socket that the caller has opened. */
+static int inherited(const char *number)
+{
+    int fd = 0;
+    for (; *number >= '0' && *number <= '9' && fd < 10000; ++number) {
+        fd = 10 * fd + (*number - '0');
+    }
+    errno = *number == '\0' ? EBADF : EINVAL;
+    return *number == '\0' && fcntl(fd, F_GETFD) >= 0 ? fd : -1;
+}
+
 static int connect_stream(const char *address)
 {
+    if (strncmp(address, "fd:", 3) == 0) {
+        return inherited(address + 3);
+    }
     const char *port = strrchr(address, ':');
     return port != NULL && strchr(address, '/') == NULL ? connect_tcp(address, port)
                                                         : connect_unix(address);
+}
+
+/* Of datagrams: the board's emulator does not listen yet. */
+static bool passes_over(int error)
+{
+    return error == EINTR || error == EAGAIN || error == ECONNREFUSED;
+}
+
+/* What is there, which may be many messages of a character. -1: the stream has ended. */
+static ssize_t gather(int stream, char text[TEXT_SIZE])
+{
+    ssize_t size = 0;
+    while (size < (ssize_t)TEXT_SIZE) {
+        const ssize_t got = recv(stream, text + size, TEXT_SIZE - (size_t)size, MSG_DONTWAIT);
+        if (got <= 0) {
+            const bool over = got == 0 || !passes_over(errno);
+            return over && size == 0 ? -1 : size;
+        }
+        size += got;
+    }
+    return size;
 }
 
 /* Lines from the board, onto the bus. Returns a negative errno of the bus, 0, or 1 at the end of the stream. */
@@ -85,9 +121,9 @@ static int to_bus(struct can_socket *socket, int stream, struct slcan_decoder *d
     struct can_msg messages[TEXT_SIZE / 6u +
                             1u]; /* the shortest line has 6 characters; one may have begun before */
     size_t count = 0;
-    const ssize_t got = read(stream, text, sizeof text);
-    if (got <= 0) {
-        return got < 0 && errno == EINTR ? 0 : 1;
+    const ssize_t got = gather(stream, text);
+    if (got < 0) {
+        return 1;
     }
     for (ssize_t i = 0; i < got; ++i) {
         count += slcan_decode(decoder, text[i], &messages[count]) ? 1u : 0u;
@@ -99,8 +135,11 @@ static bool write_all(int stream, const char *text, size_t size)
 {
     while (size > 0u) {
         const ssize_t done = write(stream, text, size);
-        if (done < 0 && (errno != EINTR || bus_signals() > 0u)) {
+        if (done < 0 && (!passes_over(errno) || bus_signals() > 0u)) {
             return false;
+        }
+        if (done < 0 && errno == ECONNREFUSED) {
+            return true;
         }
         text += done > 0 ? done : 0;
         size -= done > 0 ? (size_t)done : 0u;

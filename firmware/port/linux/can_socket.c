@@ -19,12 +19,16 @@ void can_socket_close(struct can_socket *socket)
     }
 }
 
-int can_socket_filter(struct can_socket *socket, const struct can_match *filters,
-                      size_t count)
+int can_socket_filter(struct can_socket *socket, const struct can_match *filters, size_t count)
 {
     struct can_filter raw[CAN_SOCKET_FILTERS];
     if (count > CAN_SOCKET_FILTERS) {
         return -EINVAL;
+    }
+    if (socket->local) {
+        memcpy(socket->filters, filters, count * sizeof filters[0]);
+        socket->filter_count = count;
+        return 0;
     }
     for (size_t i = 0; i < count; ++i) {
         raw[i].can_id = filters[i].id;
@@ -80,12 +84,24 @@ static int plain_frame(const struct can_frame *frame)
            frame->can_dlc <= CAN_MAX_DLEN;
 }
 
+static int passes(const struct can_socket *socket, const struct can_msg *message)
+{
+    return socket->filter_count == 0u ||
+           can_match_any(socket->filters, socket->filter_count, message);
+}
+
 static void convert(struct can_msg *message, const struct can_frame *frame)
 {
     memset(message, 0, sizeof *message);
     message->id = frame->can_id & CAN_SFF_MASK;
     message->len = frame->can_dlc;
     memcpy(message->data, frame->data, frame->can_dlc);
+}
+
+/* An empty message is how a local bus ends. */
+static int at_end(const struct mmsghdr *headers, int got)
+{
+    return got > 0 && headers[got - 1].msg_len == 0u;
 }
 
 int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],
@@ -109,11 +125,12 @@ int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SO
     int count = 0;
     for (int i = 0; i < got; ++i) {
         if (headers[i].msg_len == sizeof frames[i] && plain_frame(&frames[i])) {
-            convert(&messages[count++], &frames[i]);
+            convert(&messages[count], &frames[i]);
+            count += passes(socket, &messages[count]) ? 1 : 0;
         }
     }
     *more = got == (int)CAN_SOCKET_BATCH;
-    return count;
+    return socket->local && at_end(headers, got) ? -ENETDOWN : count;
 }
 
 uint32_t can_socket_waiting_bytes(const struct can_socket *socket)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * can_socket: classic CAN frames through a raw SocketCAN socket. Used by the Linux port and by the
- * simulated drives.
+ * can_socket: classic CAN frames through a raw SocketCAN socket, or through a local bus without any CAN of the kernel. Used by
+ * the Linux port and by the simulated drives.
  *
  * The socket never blocks. Remote, extended and error frames are dropped on the way in. Frames that
  * this socket sends do not come back to it; other sockets of the same machine see them.
@@ -9,27 +9,31 @@
 #ifndef PORT_LINUX_CAN_SOCKET_H
 #define PORT_LINUX_CAN_SOCKET_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#include "can/can_match.h"
 #include "can/can_frame.h"
-
-struct can_socket {
-    int fd; /* for poll(); -1 when closed */
-};
+#include "can/can_match.h"
 
 #define CAN_SOCKET_FILTERS 40u
 #define CAN_SOCKET_BATCH   32u
 
-/* Opens and binds. Returns 0, or a negative errno with one line in `reason`: what is wrong and what
- * to do. */
+struct can_socket {
+    int fd; /* for poll(); -1 when closed */
+    /* On a local bus the kernel cannot look at frames: filters are applied here. */
+    struct can_match filters[CAN_SOCKET_FILTERS];
+    size_t filter_count;
+    bool local;
+};
+
+/* Opens and binds: a network interface, or with a '/' in its name the local bus of hodograph-hub (sim/hub) at this path.
+ * Returns 0, or a negative errno with one line in `reason`: what is wrong and what to do. */
 int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size);
 void can_socket_close(struct can_socket *socket);
 
 /* Lets only these frames through (none: all). At most CAN_SOCKET_FILTERS. 0 or negative errno. */
-int can_socket_filter(struct can_socket *socket, const struct can_match *filters,
-                      size_t count);
+int can_socket_filter(struct can_socket *socket, const struct can_match *filters, size_t count);
 
 /* 0; -EAGAIN when the queue is full (the frame is not sent); else a negative errno (interface down,
  * removed). */

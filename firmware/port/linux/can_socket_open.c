@@ -10,6 +10,7 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <linux/can.h>
@@ -92,6 +93,11 @@ static void enlarge_buffers(int fd)
     }
 }
 
+static int open_sequenced(void)
+{
+    return socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+}
+
 static int open_raw(const char *interface, char *reason, size_t size)
 {
     const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
@@ -109,9 +115,37 @@ static int open_raw(const char *interface, char *reason, size_t size)
     return fail_plainly(reason, size, errno, interface);
 }
 
+/* As if it were a raw socket: one frame of linux/can.h is one message. */
+static int open_local(struct can_socket *socket, const char *path, char *reason, size_t size)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (strlen(path) >= sizeof address.sun_path) {
+        return fail(reason, size, ENAMETOOLONG, "%s is too long for the path of a local bus", path);
+    }
+    memcpy(address.sun_path, path, strlen(path) + 1u);
+    const int fd = open_sequenced();
+    if (fd < 0) {
+        return fail_plainly(reason, size, errno, path);
+    }
+    if (connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        const int error = errno;
+        (void)close(fd);
+        return fail(reason, size, error, "no local bus at %s: start one there with hodograph-hub",
+                    path);
+    }
+    enlarge_buffers(fd);
+    socket->local = true;
+    socket->fd = fd;
+    return 0;
+}
+
 int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size)
 {
+    memset(socket, 0, sizeof *socket);
     socket->fd = -1;
+    if (strchr(interface, '/') != NULL) {
+        return open_local(socket, interface, reason, size);
+    }
     const int fd = open_raw(interface, reason, size);
     if (fd < 0) {
         return fd;

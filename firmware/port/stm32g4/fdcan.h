@@ -24,8 +24,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "can/can_match.h"
 #include "can/can_frame.h"
+#include "can/can_match.h"
 #include "port/stm32g4/fdcan_queue.h"
 
 /* Since they were last taken. */

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Names of buses, as python-can has them: `socketcan:vcan0`, `slcan:/dev/ttyACM0@115200`, `virtual:test`."""
+"""Names of buses, as python-can has them: `socketcan:vcan0`, `slcan:/dev/ttyACM0@115200`, `virtual:test`; and
+`local:/tmp/bus`, a bus that hodograph-hub serves at this path.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +29,16 @@ class BusAddress:
         return f"{self.interface}:{self.channel}"
 
     @property
+    def is_local(self) -> bool:
+        """Whether hodograph-hub serves it."""
+        return self.interface == "local"
+
+    @property
+    def is_raw(self) -> bool:
+        """Whether it gives every frame as it is, fast enough to record a full bus: SocketCAN or a local bus."""
+        return self.is_socketcan or self.is_local
+
+    @property
     def is_socketcan(self) -> bool:
         """Whether this is a network interface of the kernel."""
         return self.interface == "socketcan"
@@ -42,8 +54,20 @@ def parse_address(text: str) -> BusAddress:
     return BusAddress(interface, channel)
 
 
-def check_socketcan(address: BusAddress) -> None:
-    """Raises BusError with the remedy when this SocketCAN interface is not there or is down."""
+def check_raw(address: BusAddress) -> None:
+    """Raises BusError with the remedy when the interface is missing or down, or nobody serves the local bus."""
+    if address.is_local:
+        _check_local(address)
+    else:
+        _check_socketcan(address)
+
+
+def _check_local(address: BusAddress) -> None:
+    if not Path(address.channel).is_socket():
+        raise BusError(f"{address}: nobody serves it: start hodograph-hub {address.channel}")
+
+
+def _check_socketcan(address: BusAddress) -> None:
     name = address.channel
     try:
         probe = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -69,9 +93,9 @@ def check_socketcan(address: BusAddress) -> None:
 
 
 def is_virtual(address: BusAddress) -> bool:
-    """Whether no hardware is behind this SocketCAN interface, so that simulated nodes may be started."""
+    """Whether no hardware is behind this bus, so that simulated nodes may be started."""
     if not address.is_socketcan:
-        return False
+        return address.is_local
     device = Path("/sys/class/net") / address.channel
     if device.exists():
         return "/virtual/" in str(device.resolve())

@@ -14,7 +14,7 @@ from ..config import Machine
 from ..errors import BusError, HodographError, RunError
 from ..native import NativeProgram
 from ..simulate import settling_ticks
-from .address import BusAddress, check_socketcan, is_virtual
+from .address import BusAddress, check_raw, is_virtual
 from .analysis import REACHED_AFTER, BusRun, analyse_recording, first_tick, measured_pace
 from .goto import goto
 from .listening.recorder import Recorder
@@ -179,7 +179,7 @@ def rig_until_interrupted(
     controller_program: str | None = None,
 ) -> None:
     """Controller and drives on a virtual bus, configured, until Ctrl-C."""
-    check_socketcan(address)
+    check_raw(address)
     if not is_virtual(address):
         raise BusError(f"{address}: not a virtual CAN: a simulated machine stays off real buses")
     with connect(address, machine.node, machine.bitrate) as controller:

@@ -113,7 +113,7 @@ def machine_of(file: Path, given: Path | None) -> Machine:
 def run(options: Namespace) -> None:
     """hodograph run."""
     address = parse_address(options.bus)
-    if not address.is_socketcan:
+    if not address.is_raw:
         raise BusError(
             f"{address}: run records at full bus load, which takes SocketCAN: use socketcan:CHANNEL "
             "(slcand makes one of a serial adapter)"

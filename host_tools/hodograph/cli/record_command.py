@@ -7,7 +7,7 @@ import time
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from ..bus.address import BusAddress, check_socketcan, parse_address
+from ..bus.address import BusAddress, check_raw, parse_address
 from ..bus.listening.frames import Frames
 from ..bus.listening.recorder import Recorder
 from ..bus.listening.recordings import RecordingWriter, check_suffix
@@ -30,9 +30,9 @@ def record(options: Namespace) -> None:
     """Records; raises RunError when frames are missing or a setpoint jumps."""
     check_suffix(options.file)
     address = parse_address(options.bus)
-    if not address.is_socketcan:
+    if not address.is_raw:
         raise BusError(f"{address}: record takes SocketCAN: use socketcan:CHANNEL")
-    check_socketcan(address)
+    check_raw(address)
     machine = _machine(options)
     with _Recording(address, options, machine) as recording:
         recording.go_on()

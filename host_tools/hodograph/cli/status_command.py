@@ -43,7 +43,7 @@ def status(options: Namespace) -> None:
 
 def _meter(address: BusAddress, to: Target, stack: ExitStack) -> LoadMeter | None:
     """Only SocketCAN lets us listen beside what we ask."""
-    if not address.is_socketcan:
+    if not address.is_raw:
         return None
     return stack.enter_context(LoadMeter(address, to.bitrate))
 

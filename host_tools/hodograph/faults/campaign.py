@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from ..bus.address import BusAddress, check_socketcan, is_virtual
+from ..bus.address import BusAddress, check_raw, is_virtual
 from ..errors import BusError
 from .judge import Verdict, judge
 from .run_case import run_case
@@ -26,7 +26,7 @@ def run_campaign(
     Raises BusError when the buses are not two virtual ones.
     """
     for address in (bus, drives_bus):
-        check_socketcan(address)
+        check_raw(address)
         if not is_virtual(address):
             raise BusError(f"{address}: not a virtual CAN: faults are for simulated machines only")
     cases = [draw(scenario, seed) for scenario in scenarios for seed in seeds]

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import can
 import numpy as np
 
-from ..bus.address import BusAddress, check_socketcan
+from ..bus.address import BusAddress, check_raw
 from ..bus.listening.frame_batch import BATCH, FrameBatch, open_socket
 from ..bus.listening.frames import FRAME_DTYPE, Frames
 from ..errors import BusError, one_line
@@ -53,8 +53,8 @@ class Source(Protocol):
 
 def open_source(address: BusAddress, bitrate: int) -> Source:
     """Listens on a bus. Raises BusError with the remedy."""
-    if address.is_socketcan:
-        check_socketcan(address)
+    if address.is_raw:
+        check_raw(address)
         return SocketSource(address)
     return PythonCanSource(address, bitrate)
 

@@ -9,6 +9,7 @@ socket (SO_RXQ_OVFL) and when it got the frame (SO_TIMESTAMP).
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import socket
 import struct
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from ...errors import BusError
 from ..address import BusAddress
+from ..local_bus import connect_local
 from .frames import FRAME_DTYPE, Frames
 
 __all__ = ["BATCH", "FRAME_BYTES", "FRAME_DTYPE", "FrameBatch", "Frames", "open_socket"]
@@ -47,12 +49,16 @@ def open_socket(address: BusAddress, *, timestamps: bool = False) -> socket.sock
     """A socket that hears every frame, with a large buffer; frames queue up from here on. Raises BusError."""
     listener: socket.socket | None = None
     try:
-        listener = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        if address.is_local:
+            listener = connect_local(address.channel)
+        else:
+            listener = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         _enlarge(listener)
         listener.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
         if timestamps:
             listener.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMP, 1)
-        listener.bind((address.channel,))
+        if not address.is_local:
+            listener.bind((address.channel,))
     except OSError as error:
         if listener is not None:
             listener.close()
@@ -124,6 +130,8 @@ class FrameBatch:
             if error in (11, 4):
                 return 0
             raise OSError(error, os.strerror(error))
+        if count > 0 and self._messages[0].length == 0:  # how a local bus ends
+            raise OSError(errno.ENETDOWN, os.strerror(errno.ENETDOWN))
         return count
 
     def taken(self, count: int) -> bytes:

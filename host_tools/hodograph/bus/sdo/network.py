@@ -16,7 +16,8 @@ import canopen
 from can.interfaces.socketcan import SocketcanBus
 
 from ...errors import BusError, one_line
-from ..address import BusAddress, check_socketcan
+from ..address import BusAddress, check_raw
+from ..local_bus import LocalBus
 
 SEND_TIMEOUT_S = 1.0
 _FRAME = struct.Struct("=IB3x8s")  # struct can_frame of linux/can.h
@@ -47,7 +48,7 @@ class _Network(canopen.Network):
                 time.sleep(0.001)
 
     def _send_once(self, can_id: int, data: bytes, remote: bool) -> None:
-        if remote or not isinstance(self.bus, SocketcanBus):
+        if remote or not isinstance(self.bus, (SocketcanBus, LocalBus)):
             super().send_message(can_id, data, remote)
         else:
             self.bus.socket.send(_FRAME.pack(can_id, len(data), bytes(data)))
@@ -60,20 +61,26 @@ def _filters(node: int) -> list[dict[str, Any]]:
     ]
 
 
+def _open(address: BusAddress, node: int, bitrate: int) -> can.BusABC:
+    if address.is_local:
+        return LocalBus(address.channel, can_filters=_filters(node))
+    options: dict[str, Any] = {} if address.is_socketcan else {"bitrate": bitrate}
+    return can.Bus(
+        channel=address.channel,
+        interface=address.interface,
+        can_filters=_filters(node),
+        **options,
+    )
+
+
 @contextmanager
 def open_network(address: BusAddress, node: int, bitrate: int) -> Iterator[canopen.Network]:
     """A canopen network that hears what `node` says to us. Raises BusError when it can't be opened."""
-    if address.is_socketcan:
-        check_socketcan(address)
-    options: dict[str, Any] = {} if address.is_socketcan else {"bitrate": bitrate}
+    if address.is_raw:
+        check_raw(address)
     network = _Network()
     try:
-        bus = can.Bus(
-            channel=address.channel,
-            interface=address.interface,
-            can_filters=_filters(node),
-            **options,
-        )
+        bus = _open(address, node, bitrate)
     except Exception as error:
         raise BusError(f"{address}: cannot be opened: {one_line(error)}") from error
     network.bus = bus
