@@ -4,8 +4,8 @@ PROVERS := $(BUILD)/provers/.ready
 
 .PHONY: proofs
 PROOFS ?=
-proofs: $(PROVERS) ## no overflow, no bad shift, index or division: shown by Frama-C and CBMC (PROOFS=...)
-	@$(PYTHON) tools/proofs/prove.py --build $(BUILD) --jobs $(shell nproc) $(PROOFS)
+proofs: $(PROVERS) ## no overflow, no bad shift, index or division: shown by Frama-C and CBMC (PROOFS=...); ends with "N passed, N failed"
+	@nice $(PYTHON) tools/proofs/prove.py --build $(BUILD) --jobs $(shell nproc) $(PROOFS)
 
 $(PROVERS): tools/proofs/provers.lock tools/proofs/fetch_provers.sh | $(STAMPS)/packages
 	$(call say,fetch,Frama-C and CBMC)

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The square root: no division by 0, no shift out of range, no zero counted, for any number; the root of a word is exact,
+ * and no root is above 2^32 - 1.
+ *
+ * prover: cbmc
+ * options: --unwind 70 --unsigned-overflow-check
+ * mutant: core/qmath.c: qmath_clz64(a) & ~1 => 0
+ * mutant: core/qmath.c: bit = (uint32_t)1 << 30 => bit = (uint32_t)1 << 31
+ * mutant: core/qmath.c: bit >>= 2 => bit >>= 3
+ */
+#include "proof.h"
+
+int __builtin_clz(unsigned a)
+{
+    __CPROVER_assert(a != 0, "no zero is counted");
+    int n = (int)any_between(0, 31);
+    __CPROVER_assume(a >> (31 - n) == 1u);
+    return n;
+}
+
+#include "core/qmath.c"
+
+void harness(void)
+{
+    uint32_t word = nondet_uint32();
+    uint32_t rest = 0;
+    __CPROVER_assume(word >= 1u << 30);
+    uint32_t root = root_of_word(word, &rest);
+    prove(root >= 1u << 15 && root < 1u << 16 && rest <= 2u * root);
+    prove(qmath_root(nondet_uint64()) < (uint64_t)1 << 32);
+    reached();
+}

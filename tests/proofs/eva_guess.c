@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The first guess of z, as eva_fixed.c takes it: it has the sign of the arc length, is not 0 far outside, and nothing
+ * overflows, for any slopes of the cubic that a speed ratio of 2 leaves, in 6 x 6 ranges, and 16 of t.
+ *
+ * prover: eva
+ * options: -eva-slevel 10
+ * instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a < INT32_MIN ? INT32_MIN : a > INT32_MAX ? INT32_MAX : (int32_t)a; int32_t low = 0;
+ * instead: core/kernel_fixed.c: int32_t first = (int32_t)((half * (int64_t)reciprocal_q16(sigma_middle_q30)) >> 19); => int32_t first = first_q26; (void)half;
+ * instead: core/kernel_fixed.c: int32_t last = (int32_t)((half * (int64_t)reciprocal_q16(sigma_end_q30)) >> 19); => int32_t last = last_q26;
+ * mutant: core/kernel_fixed.c: t_q30 < 0x3FFFFFFF ? t_q30 : 0x3FFFFFFF => t_q30
+ * mutant: core/kernel_fixed.c: t_q25 < 0x1FFFFFF ? t_q25 * 64 => t_q25 < 0x2FFFFFF ? t_q25 * 64
+ * mutant: core/kernel_fixed.c: 3 * one_q26 - 2 * first - last => 2 * one_q26 - 2 * first - last
+ */
+#include "kernel_bounds.h"
+#include "proof.h"
+
+#include <stdint.h>
+
+static int32_t first_q26;
+static int32_t last_q26;
+
+#include "core/kernel_fixed.c"
+
+/* first_guess asks for t only: with this scale it is as wide as s_q30 / 2. */
+static void guess(struct kernel_fixed_segment *k, int64_t from, int64_t to)
+{
+    int32_t s_q30 = (int32_t)any_between(from, to);
+    k->inverse[1].scale_q26 = 1 << 30;
+    prove(first_guess(k, s_q30) >= 0);
+    k->inverse[0].scale_q26 = 1 << 30;
+    int32_t z = first_guess(k, -1 - s_q30);
+    prove(z <= 0 && z > INT32_MIN);
+}
+
+/* t is the greatest there is where s is beyond FAR_Q30, as no segment's scale is below 2. */
+static void guess_far(struct kernel_fixed_segment *k)
+{
+    int64_t s_q30 = any_between(FAR_Q30, INT32_MAX);
+    k->inverse[1].scale_q26 = (int32_t)any_between(POWER(27) - POWER(18), POWER(30));
+    prove(first_guess(k, (int32_t)s_q30) >= FAR_Z_Q31);
+    k->inverse[0].scale_q26 = k->inverse[1].scale_q26;
+    int32_t z = first_guess(k, (int32_t)(-1 - s_q30));
+    prove(z <= -FAR_Z_Q31 && z > INT32_MIN);
+}
+
+static void cubic(int64_t first, int64_t last, int64_t width)
+{
+    struct kernel_fixed_segment k;
+    first_q26 = (int32_t)any_between(first, first + width);
+    last_q26 = (int32_t)any_between(last, last + width);
+    set_inverse(&k.inverse[0], 1 << 29, 1 << 29, 1 << 29);
+    k.inverse[1] = k.inverse[0];
+    //@ loop unroll 40;
+    for (int64_t part = 0; part < 16; part++) {
+        guess(&k, part << 22, (part + 1) << 22);
+    }
+    guess(&k, POWER(26), INT32_MAX);
+    guess_far(&k);
+}
+
+int main(void)
+{
+    int64_t width = (START_MOST_Q26 - START_LEAST_Q26) / 6;
+    //@ loop unroll 40;
+    for (int64_t first = START_LEAST_Q26; first < START_MOST_Q26; first += width) {
+        //@ loop unroll 40;
+        for (int64_t last = START_LEAST_Q26; last < START_MOST_Q26; last += width) {
+            cubic(first, last, width);
+        }
+    }
+    reached();
+    return 0;
+}

@@ -1,0 +1,170 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The interpolator and the records of a prepared program, for any program of three segments and pieces that passed the
+ * checks, any kernel, wherever the cursor is, and any times: no segment, piece or record is asked for that there is not, nothing overflows.
+ *
+ * prover: eva
+ * options: -eva-slevel 60
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end
+ * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
+ * mutant: core/interp.c: while (i > 0 && => while (
+ * mutant: core/interp.c: end = i + 1u == it->program->header.piece_count => end = i == it->program->header.piece_count
+ * mutant: core/prepared.c: i + 1u == p->header.piece_count ? UINT64_MAX => i == p->header.piece_count ? UINT64_MAX
+ * mutant: core/prepared.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
+ * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
+ * mutant: core/prepared.c: && i + taken < p->header.piece_count => && i + taken <= p->header.piece_count
+ */
+#include "core/program.h"
+#include "core/ph_segment.h"
+#include "proof.h"
+
+/*@ requires i < p->header.segment_count;
+    assigns *out \from i;
+    ensures \initialized(out) && 0 <= out->start_q40_mm < (1 << 62);
+    ensures -(1 << 52) < out->x_q40_mm < (1 << 52) && -(1 << 52) < out->y_q40_mm < (1 << 52); */
+void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
+
+/*@ requires i < p->header.segment_count;
+    assigns \result \from i;
+    ensures 0 <= \result < (1 << 62); */
+int64_t program_segment_start(const struct program *p, uint32_t i);
+
+/*@ requires i < p->header.piece_count;
+    assigns *out \from i;
+    ensures \initialized(out) && 0 < out->duration_q32_s <= (1 << 54) && 0 <= out->start_q40_mm < (1 << 62); */
+void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out);
+
+/*@ requires i < p->header.piece_count;
+    assigns \result \from i;
+    ensures 0 < \result <= (1 << 54); */
+uint64_t program_piece_duration(const struct program *p, uint32_t i);
+
+/*@ requires i < p->header.piece_count;
+    assigns *factor_q24, *rate_q16_per_s, *second_q8_per_s2 \from i;
+    ensures \initialized(factor_q24) && \initialized(rate_q16_per_s) && \initialized(second_q8_per_s2); */
+void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
+                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2);
+
+/*@ requires \initialized(segment);
+    assigns *ph \from \nothing;
+    ensures \initialized(ph); */
+void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segment);
+
+/* A segment is 32 mm long at most. */
+/*@ requires \initialized(ph);
+    assigns end_q48_mm[0 .. 2] \from \nothing;
+    ensures \initialized(end_q48_mm + (0 .. 2));
+    ensures -(1 << 60) < end_q48_mm[0] < (1 << 60) && -(1 << 60) < end_q48_mm[1] < (1 << 60); */
+void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[3]);
+
+#include "core/interp.c"
+#include "core/kernel.c"
+#include "core/prepared.c"
+
+#define COUNT 3u
+
+static void piece_set(void *piece, const struct program_piece *from)
+{
+    struct feed_piece *f = piece;
+    f->start_q40_mm = from->start_q40_mm;
+}
+
+static void segment_set(void *segment, const struct ph_segment *from)
+{
+    struct kernel_fixed_segment *k = segment;
+    k->exponent = from->exponent;
+}
+
+static void piece_at(const void *piece, uint64_t t_q42_s, struct feed_point *out)
+{
+    const struct feed_piece *f = piece;
+    (void)t_q42_s;
+    prove(f->start_q40_mm >= 0);
+    out->arc_length_q40_mm = any_between(INT64_MIN, INT64_MAX);
+    out->feed_q32_mm_s = any_between(-POWER(62), POWER(62));
+}
+
+static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
+{
+    const struct kernel_fixed_segment *k = segment;
+    point_q40_mm[0] = k->exponent;
+    point_q40_mm[1] = arc_length_q40_mm;
+}
+
+static const struct kernel any_kernel = {
+    .piece_size = sizeof(struct feed_piece),
+    .segment_size = sizeof(struct kernel_fixed_segment),
+    .piece_set = piece_set,
+    .segment_set = segment_set,
+    .piece_at = piece_at,
+    .segment_at = segment_at,
+};
+
+const struct kernel *const kernels_linked[KERNELS] = {&any_kernel, NULL, NULL};
+
+static uint64_t records[COUNT * (sizeof(struct prepared_piece) + sizeof(struct prepared_segment)) / 8];
+static uint32_t filled;
+
+static int take(void *context, const uint8_t *bytes, uint32_t size)
+{
+    memcpy((uint8_t *)context + filled, bytes, size);
+    filled += size;
+    return 0;
+}
+
+static uint64_t any_time(void)
+{
+    return (uint64_t)any_between(INT64_MIN, INT64_MAX);
+}
+
+/* Wherever the cursor is: after begin, and after any call before. Pieces are looked for without regard to the segment, and
+ * segments to the piece. */
+static void place(struct interp *it, uint32_t i)
+{
+    if (it->piece == NULL) {
+        load_piece(it, i, (uint64_t)any_between(0, POWER(54)));
+        load_segment(it, i);
+    } else {
+        it->piece = prepared_piece_at(it->program, it->kernel, i);
+        it->segment = prepared_segment_at(it->program, it->kernel, i);
+    }
+}
+
+static void interpolate(const struct program *p)
+{
+    struct interp it;
+    struct interp_point point;
+    if (interp_begin(&it, p, INTERP_FIXED) != 0) {
+        return;
+    }
+    for (uint32_t i = 0; i < COUNT; i++) {
+        place(&it, i);
+        interp_at_q42(&it, any_time(), &point);
+        place(&it, i);
+        interp_seek(&it, any_time());
+    }
+    place(&it, 0);
+    interp_at(&it, any_time(), &point);
+}
+
+int main(void)
+{
+    static uint8_t image[1];
+    struct program p;
+    Frama_C_make_unknown((char *)&p.header, sizeof p.header);
+    p.image = image;
+    p.header.segment_count = COUNT;
+    p.header.piece_count = COUNT;
+    p.header.duration_q32_s = (uint64_t)any_between(1, POWER(54) - 1);
+    p.header.length_q40_mm = any_between(1, POWER(62) - 1);
+    p.prepared = NULL;
+    p.prepared_for = NULL;
+    interpolate(&p);
+    if (prepared_make(&p, &any_kernel, take, records) == 0) {
+        prove(filled == prepared_size(&p, &any_kernel) && filled <= sizeof records);
+        prepared_attach(&p, &any_kernel, (const uint8_t *)records);
+        interpolate(&p);
+        reached();
+    }
+    return 0;
+}
