@@ -8,7 +8,7 @@ from its second differences. docs/numerics.md section 7.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
@@ -27,6 +27,9 @@ INTERVALS = 12
 _BISECTIONS = 50
 _BESIDE = 1e-6
 _BRIEF = 1e-9
+_ROUGH = 0.1
+_PARTS = 4
+_ROUNDS = 3
 
 
 class Pieces(Protocol):
@@ -79,22 +82,60 @@ class Samples:
 
 
 def sample(bounds: PathBounds, pieces: Pieces) -> Samples:
-    """The motion of `pieces` along the path."""
-    spline = bounds.spline
+    """The motion of `pieces` along the path. Cells in which an axis' acceleration or jerk may rise between samples by
+    more than a share of its reserve are cut into parts.
+    """
+    track = _track(pieces)
+    ends = [end for cap in bounds.limits.caps for end in (cap.from_mm, cap.to_mm)]
+    cuts = np.unique(np.concatenate((bounds.spline.segment_starts_mm[1:-1], ends)))
+    cells = _cells(track, cuts)
+    found = []
+    for _ in range(_ROUNDS):
+        samples = _evaluate(bounds.spline, track, cells)
+        rough = _rough(bounds.limits, samples)
+        found.append(_taken(samples, ~rough))
+        cells = _divided(_Cells(cells.piece[rough], cells.low[rough], cells.high[rough]))
+        if not rough.any():
+            break
+    else:
+        found.append(_evaluate(bounds.spline, track, cells))
+    return Samples(*(np.concatenate(parts) for parts in zip(*map(_fields, found), strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """Arc length of M pieces: `start` mm, and powers (M, 8) of u = t / seconds."""
+
+    start: Real
+    way: Real
+    seconds: Real
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Piece, begin and end (u) of each."""
+
+    piece: Int
+    low: Real
+    high: Real
+
+
+def _track(pieces: Pieces) -> _Track:
     seconds = np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
-    start = np.ldexp(pieces.start_q40.astype(np.float64), -40)
     stretch = np.ldexp(seconds, -exponents(pieces.duration_q32_s))
     way = np.zeros((seconds.size, 8))
     way[:, 1:] = np.ldexp(pieces.c_q40.astype(np.float64), -40)
     way[:, 1:] *= stretch[:, None] ** np.arange(1, 8)
-    ends = [end for cap in bounds.limits.caps for end in (cap.from_mm, cap.to_mm)]
-    cuts = np.unique(np.concatenate((spline.segment_starts_mm[1:-1], ends)))
-    piece, low, high = _cells(start, way, cuts)
+    return _Track(np.ldexp(pieces.start_q40.astype(np.float64), -40), way, seconds)
+
+
+def _evaluate(spline: PHSpline, track: _Track, cells: _Cells) -> Samples:
+    piece = cells.piece
     share = np.linspace(_BESIDE, 1.0 - _BESIDE, INTERVALS + 1)
-    u = low[:, None] + (high - low)[:, None] * share
-    s = np.clip(start[piece, None] + _value(way[piece], u, 0), 0.0, spline.length_mm)
-    per_s = 1.0 / seconds[piece, None]
-    f1, f2, f3 = (_value(way[piece], u, n) * per_s**n for n in (1, 2, 3))
+    u = cells.low[:, None] + (cells.high - cells.low)[:, None] * share
+    s = np.clip(track.start[piece, None] + _value(track.way[piece], u, 0), 0.0, spline.length_mm)
+    per_s = 1.0 / track.seconds[piece, None]
+    f1, f2, f3 = (_value(track.way[piece], u, n) * per_s**n for n in (1, 2, 3))
     tangent, kappa, slope = _frames(spline, s)
     normal = kappa * f1 * f1
     across = 3.0 * kappa * f1 * f2 + slope * f1**3
@@ -109,6 +150,35 @@ def sample(bounds: PathBounds, pieces: Pieces) -> Samples:
     )
 
 
+def _rough(limits: Limits, samples: Samples) -> NDArray[np.bool_]:
+    """Cells that want to be cut."""
+    rough = np.zeros(samples.piece.size, dtype=np.bool_)
+    for values, both in (
+        (samples.acceleration, limits.axis.acceleration_mm_s2),
+        (samples.jerk, limits.axis.jerk_mm_s3),
+    ):
+        for one, limit in zip(per_axis(values), both or (), strict=False):
+            rise = np.abs(np.diff(one, 2, axis=1)).max(axis=1) / 8.0
+            near = np.abs(one).max(axis=1) + rise > (1.0 - 2.0 * limits.reserve) * limit
+            rough |= near & (rise > _ROUGH * limits.reserve * limit)
+    return rough
+
+
+def _divided(cells: _Cells) -> _Cells:
+    part = np.arange(_PARTS) / _PARTS
+    width = (cells.high - cells.low)[:, None]
+    low = cells.low[:, None] + width * part
+    return _Cells(np.repeat(cells.piece, _PARTS), low.ravel(), (low + width / _PARTS).ravel())
+
+
+def _fields(samples: Samples) -> tuple[NDArray[np.generic], ...]:
+    return tuple(getattr(samples, one.name) for one in fields(samples))
+
+
+def _taken(samples: Samples, which: NDArray[np.bool_]) -> Samples:
+    return Samples(*(values[which] for values in _fields(samples)))  # type: ignore[arg-type]
+
+
 def raised(values: Real) -> Real:
     """Magnitudes of samples (C, K), raised by what second differences say they may rise in between."""
     bend = np.abs(np.diff(values, 2, axis=1))
@@ -116,22 +186,22 @@ def raised(values: Real) -> Real:
     return np.asarray(np.abs(values) + bend)
 
 
-def _cells(start: Real, way: Real, cuts: Real) -> tuple[Int, Real, Real]:
-    """Piece, begin and end (u) of each cell."""
-    at = np.clip(np.searchsorted(start, cuts, side="right") - 1, 0, None)
+def _cells(track: _Track, cuts: Real) -> _Cells:
+    """Pieces, cut at arc lengths `cuts`."""
+    at = np.clip(np.searchsorted(track.start, cuts, side="right") - 1, 0, None)
     low, high = np.zeros(cuts.size), np.ones(cuts.size)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        below = start[at] + _value(way[at], middle[:, None], 0)[:, 0] < cuts
+        below = track.start[at] + _value(track.way[at], middle[:, None], 0)[:, 0] < cuts
         low, high = np.where(below, middle, low), np.where(below, high, middle)
-    piece = np.concatenate((np.arange(start.size), at))
-    begin = np.concatenate((np.zeros(start.size), high))
+    piece = np.concatenate((np.arange(track.start.size), at))
+    begin = np.concatenate((np.zeros(track.start.size), high))
     order = np.lexsort((begin, piece))
     piece, begin = piece[order], begin[order]
     end = np.append(begin[1:], 1.0)
     end[np.append(piece[1:] != piece[:-1], True)] = 1.0
     keep = end - begin > _BRIEF
-    return piece[keep], begin[keep], end[keep]
+    return _Cells(piece[keep], begin[keep], end[keep])
 
 
 def _value(way: Real, u: Real, order: int) -> Real:

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: MIT
+"""Profile `optimal` beside the best known optimum (collocation), a bound from below (TOPP-RA) and the best program of
+the paper's kind, all under the same limits, on the paper's curves and on random ones.
+
+    python benchmarks/optimal.py [--json OUT] [--only NAME…] [--intervals N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "benchmarks/support"), str(ROOT / "host_tools")]
+
+from collocation import Optimum, Task, solve  # noqa: E402
+from toppra_bound import bound  # noqa: E402
+
+from hodograph.chain import Chain, controller_limits, load_chain, plants  # noqa: E402
+from hodograph.errors import HodographError  # noqa: E402
+from hodograph.feed import Limits  # noqa: E402
+from hodograph.verify import sampled, verify_program  # noqa: E402
+
+PAPER = """feed_mm_s = 100
+acceleration_mm_s2 = 2000
+jerk_mm_s3 = 50000
+[limits.axis]
+acceleration_mm_s2 = 2000
+jerk_mm_s3 = 50000
+"""
+ALL = """feed_mm_s = 200
+acceleration_mm_s2 = 3000
+jerk_mm_s3 = 80000
+centripetal_mm_s2 = 1500
+volts = 4.5
+[limits.axis]
+velocity_mm_s = [180, 160]
+acceleration_mm_s2 = [2500, 1800]
+jerk_mm_s3 = [70000, 50000]
+"""
+SEEDS = range(101, 106)
+"""Of paths that nothing was ever tuned on."""
+
+RAMPS_S = (0.02, 0.03, 0.045, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6)
+COARSE = 8
+LEAST_RESERVE = 0.002
+
+
+@dataclass(frozen=True)
+class Case:
+    """A name, the section [path], [limits], and the machine file."""
+
+    name: str
+    path: str
+    limits: str
+    machine: Path
+
+
+def cases() -> Iterator[Case]:
+    """The paper's two curves under two sets of limits, and the random ones."""
+    machines = ROOT / "examples/machines"
+    for curve in ("alpha", "heart"):
+        text = (ROOT / f"examples/{curve}.toml").read_text(encoding="utf-8")
+        path = text[text.index("[path]") : text.index("[feed]")]
+        for label, limits in (("paper", PAPER), ("all", ALL)):
+            yield Case(f"{curve}, {label}", path, limits, machines / f"paper_{curve}.toml")
+    for seed in SEEDS:
+        yield Case(f"random {seed}", random_path(seed), ALL, machines / "paper_alpha.toml")
+
+
+def random_path(seed: int) -> str:
+    """Five to nine control points, open or closed, some 60 to 200 mm long."""
+    rng = np.random.default_rng([seed, 5])
+    count, closed = int(rng.integers(5, 10)), bool(rng.integers(2))
+    if closed:
+        angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        points = rng.uniform(15.0, 40.0, count) * np.exp(1j * angle)
+    else:
+        turn = np.cumsum(rng.uniform(-1.2, 1.2, count))
+        points = np.cumsum(rng.uniform(10.0, 30.0, count) * np.exp(1j * turn))
+    listed = [[round(float(p.real), 6), round(float(p.imag), 6)] for p in points]
+    return f"[path]\nclosed = {str(closed).lower()}\ncontrol_points = {listed}\n"
+
+
+def chain_of(case: Case, feed: str, reserve: float, folder: Path) -> Chain:
+    """A path file of the case with this section [feed]."""
+    text = f"{case.path}[feed]\n{feed}[limits]\nreserve = {reserve}\n{case.limits}"
+    file = folder / "case.toml"
+    file.write_text(text + f'[machine]\nfile = "{case.machine}"\n', encoding="utf-8")
+    return load_chain(file)
+
+
+def task_of(chain: Chain) -> Task:
+    """What the planner has to obey, its reserve aside: path file and controller."""
+    limits, own = chain.file.limits, controller_limits(chain.machine)
+    kept = 1.0 - own.kept_free
+
+    def least(name: str) -> float:
+        given = getattr(limits, name)
+        return min(given or np.inf, kept * getattr(own, name))
+
+    names = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+    bound_by: Limits = replace(limits, **{name: least(name) for name in names})
+    return Task(chain.spline_result.spline, bound_by, plants(chain.machine, limits))
+
+
+def optimum(task: Task, intervals: int) -> dict[str, Any]:
+    """Several starts on a coarse grid, then the best of them on grids twice and four times as fine."""
+    top = task.limits.feed_mm_s or 100.0
+    starts = [solve(task, COARSE, None, share * top) for share in (0.1, 0.3, 0.6)]
+    good = [one for one in starts if one is not None]
+    if not good:
+        return {"collocation_s": None}
+    best: Optimum = min(good, key=lambda one: one.duration_s)
+    spread = max(one.duration_s for one in good) / best.duration_s - 1.0
+    trail = [best.duration_s]
+    fine = max(2 * COARSE, round(intervals / task.spline.segment_count))
+    for per_span in (max(COARSE, fine // 2), fine):
+        finer = solve(task, per_span, (best.arc_mm, best.feed_mm_s), 0.3 * top)
+        if finer is not None:
+            best = finer
+            trail.append(finer.duration_s)
+    return {
+        "collocation_s": best.duration_s,
+        "collocation_last_change_percent": 100.0 * abs(trail[-1] / trail[-2] - 1.0)
+        if len(trail) > 1
+        else None,
+        "collocation_beyond_percent": 100.0 * best.beyond,
+        "collocation_starts": len(good),
+        "collocation_spread_percent": 100.0 * spread,
+        "collocation_intervals": best.intervals,
+    }
+
+
+def planned(case: Case, reserve: float, folder: Path) -> dict[str, Any] | None:
+    """The planner's own time, peaks and wall time; None where it cannot."""
+    chain = chain_of(case, 'profile = "optimal"\n', reserve, folder)
+    spline = chain.spline_result.spline  # not to be timed
+    begin = time.perf_counter()
+    try:
+        duration_s = chain.plan.duration_s
+    except HodographError as error:
+        print(f"  {case.name}: {error}", file=sys.stderr)
+        return None
+    planning_s = time.perf_counter() - begin
+    machine = chain.machine
+    found = verify_program(chain.program, chain.file.limits, machine.models(machine.plane))
+    jerks = next(one for one in sampled(chain.image) if one.kernel == "fixed").jerk_mm_s3
+    return {
+        "duration_s": duration_s,
+        "segments": spline.segment_count,
+        "planning_s": planning_s,
+        "kept": found.kept,
+        "worst_ratio": max(peak.ratio or 0.0 for peak in found.peaks),
+        "axis_jerk_mm_s3": max(jerks),
+    }
+
+
+def of_the_papers_kind(case: Case, folder: Path) -> dict[str, Any] | None:
+    """The least time of ramp, constant feed, ramp under the same limits, over ramp times and profiles."""
+    tried: dict[tuple[str, float], float] = {}
+
+    def duration(profile: str, ramp_s: float) -> float:
+        feed = f'profile = "{profile}"\nnominal_mm_s = 450\nramp_time_s = {ramp_s}\n'
+        try:
+            plan = chain_of(case, feed, LEAST_RESERVE, folder).plan
+        except HodographError:
+            return np.inf
+        return plan.duration_s
+
+    for ramp_s in RAMPS_S:
+        tried["minimax", ramp_s] = duration("minimax", ramp_s)
+    coarse = min(tried, key=tried.__getitem__)[1]
+    for share in (0.8, 0.9, 1.0, 1.1, 1.25):
+        for profile in ("minimax", "exponential"):
+            tried[profile, share * coarse] = duration(profile, share * coarse)
+    best = min(tried, key=tried.__getitem__)
+    if not np.isfinite(tried[best]):
+        return None
+    return {"duration_s": tried[best], "profile": best[0], "ramp_time_s": best[1]}
+
+
+def measure(case: Case, intervals: int, folder: Path) -> dict[str, Any]:
+    """All figures of one case."""
+    chain = chain_of(case, 'profile = "optimal"\n', LEAST_RESERVE, folder)
+    task = task_of(chain)
+    out = optimum(task, intervals)
+    lower = bound(task.spline, task.limits)
+    out |= {"toppra_s": lower.duration_s, "toppra_axis_jerk_mm_s3": lower.axis_jerk_mm_s3}
+    out["papers_kind"] = of_the_papers_kind(case, folder)
+    out["optimal"] = planned(case, Limits.reserve, folder)
+    out["optimal_least_reserve"] = planned(case, LEAST_RESERVE, folder)
+    return out
+
+
+HEADER = (
+    f"{'case':<16} {'best known':>10} {'change %':>8} {'optimal':>9} {'/ best':>8} {'least res.':>10} "
+    f"{'/ best':>8} {'TOPP-RA':>8} {'/ best':>7} {'its jerk':>9} {'our jerk':>9} {'paper kind':>10} {'saved %':>8}"
+)
+
+
+def row(name: str, found: dict[str, Any]) -> str:
+    """One line of the table."""
+
+    def over(value: float | None) -> str:
+        best = found["collocation_s"]
+        return "-" if value is None or best is None else f"{value / best:.4f}"
+
+    def seconds(value: float | None) -> str:
+        return "-" if value is None else f"{value:.4f}"
+
+    own, least, paper = found["optimal"], found["optimal_least_reserve"], found["papers_kind"]
+    own_s, least_s = own and own["duration_s"], least and least["duration_s"]
+    paper_s = paper and paper["duration_s"]
+    saved = "-" if own_s is None or paper_s is None else f"{100 * (1 - own_s / paper_s):.1f}"
+    change = found.get("collocation_last_change_percent")
+    jerk = "-" if own is None else f"{own['axis_jerk_mm_s3']:.3g}"
+    return (
+        f"{name:<16} {seconds(found['collocation_s']):>10} {'-' if change is None else f'{change:.3f}':>8} "
+        f"{seconds(own_s):>9} {over(own_s):>8} {seconds(least_s):>10} {over(least_s):>8} "
+        f"{seconds(found['toppra_s']):>8} {over(found['toppra_s']):>7} "
+        f"{found['toppra_axis_jerk_mm_s3']:>9.3g} {jerk:>9} {seconds(paper_s):>10} {saved:>8}"
+    )
+
+
+def main() -> int:
+    """Exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--only", nargs="*", help="cases whose names begin so")
+    parser.add_argument("--intervals", type=int, default=128, help="of the finest grid, in all")
+    options = parser.parse_args()
+    results = {}
+    print(HEADER)
+    with tempfile.TemporaryDirectory() as folder:
+        for case in cases():
+            if options.only and not any(case.name.startswith(start) for start in options.only):
+                continue
+            results[case.name] = measure(case, options.intervals, Path(folder))
+            print(row(case.name, results[case.name]), flush=True)
+    if options.json is not None:
+        options.json.write_text(json.dumps(results) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""Time-optimal feed without a limit of the jerk, by TOPP-RA: a bound from below for every planner that has one.
+
+The path has a third coordinate, arc length itself, so that feed and tangential acceleration are limits like those of
+axes. Volts are left out (they mix speed and acceleration), which only lowers the bound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+import toppra
+from numpy.typing import NDArray
+from toppra import algorithm, constraint
+from toppra.interpolator import AbstractGeometricPath
+
+from hodograph.feed import Limits
+from hodograph.spline import PHSpline
+
+Real = NDArray[np.float64]
+
+GRID = 4000
+_FREE = 1e7
+_PERIOD_S = 1e-3
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The time, and the greatest third difference of an axis at 1 kHz."""
+
+    duration_s: float
+    axis_jerk_mm_s3: float
+
+
+class _Path(AbstractGeometricPath):  # type: ignore[misc]
+    def __init__(self, spline: PHSpline) -> None:
+        self._spline = spline
+
+    @property
+    def dof(self) -> int:
+        return 3
+
+    @property
+    def path_interval(self) -> Real:
+        return np.array([0.0, self._spline.length_mm])
+
+    @property
+    def waypoints(self) -> None:
+        return None
+
+    def __call__(self, path_positions: Any, order: int = 0) -> Real:
+        s = np.asarray(path_positions, dtype=np.float64)
+        at = np.clip(np.atleast_1d(s), 0.0, self._spline.length_mm)
+        if order == 0:
+            z, along = self._spline.point(at), at
+        elif order == 1:
+            z, along = self._spline.tangent(at), np.ones(at.size)
+        else:
+            z = 1j * self._spline.curvature(at) * self._spline.tangent(at)
+            along = np.zeros(at.size)
+        out = np.stack((z.real, z.imag, along), axis=1)
+        return out[0] if s.ndim == 0 else out
+
+
+def bound(spline: PHSpline, limits: Limits) -> Bound:
+    """From rest to rest along the whole path. Raises RuntimeError: TOPP-RA finds none."""
+    toppra.setup_logging("ERROR")
+    path = _Path(spline)
+    axis = limits.axis
+    vx, vy = axis.velocity_mm_s or (_FREE, _FREE)
+    ax, ay = axis.acceleration_mm_s2 or (_FREE, _FREE)
+    feed, acceleration = limits.feed_mm_s or _FREE, limits.acceleration_mm_s2 or _FREE
+
+    def velocities(s: float) -> Real:
+        kappa = abs(float(spline.curvature(min(max(s, 0.0), spline.length_mm))))
+        curve = inf if limits.centripetal_mm_s2 is None else limits.centripetal_mm_s2
+        most = min(feed, (curve / max(kappa, 1e-12)) ** 0.5)
+        most = min([most, *(c.feed_mm_s for c in limits.caps if c.from_mm <= s <= c.to_mm)])
+        high = np.array([vx, vy, most])
+        return np.stack((-high, high), axis=1)
+
+    high = np.array([ax, ay, acceleration])
+    constraints = [
+        constraint.JointVelocityConstraintVarying(velocities),
+        constraint.JointAccelerationConstraint(np.stack((-high, high), axis=1)),
+    ]
+    grid = np.linspace(0.0, spline.length_mm, GRID + 1)
+    planner = algorithm.TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
+    _, speed, _ = planner.compute_parameterization(0.0, 0.0)
+    if speed is None or not np.all(np.isfinite(speed)):
+        raise RuntimeError("TOPP-RA found no feed")
+    pace = speed[1:] + speed[:-1]
+    t = np.concatenate((np.zeros(1), np.cumsum(2.0 * np.diff(grid) / pace)))
+    return Bound(float(t[-1]), _sampled_jerk(spline, grid, speed, t))
+
+
+def _sampled_jerk(spline: PHSpline, grid: Real, speed: Real, t: Real) -> float:
+    """Constant tangential acceleration within each interval, looked at every millisecond."""
+    at = np.arange(0.0, t[-1], _PERIOD_S)
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
+    u = at - t[k]
+    pull = (speed[k + 1] - speed[k]) / (t[k + 1] - t[k])
+    s = np.clip(grid[k] + speed[k] * u + 0.5 * pull * u * u, 0.0, spline.length_mm)
+    z = np.pad(spline.point(np.append(s, spline.length_mm)), 3, mode="edge")
+    third = np.diff(z, 3) / _PERIOD_S**3
+    return float(max(np.abs(third.real).max(), np.abs(third.imag).max()))
