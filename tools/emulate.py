@@ -60,6 +60,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="HOST:PORT",
         help="SLCAN on this TCP port instead of a bus, for python-can's slcan:socket://HOST:PORT",
     )
+    parser.add_argument("--image", type=Path, help="another image than that of make firmware")
     parser.add_argument("--plugin", help="a plugin for QEMU, with its words (tools/count_til.py)")
     parser.add_argument("--build", type=Path, default=ROOT / "build", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
@@ -101,6 +102,8 @@ def _uart(options: argparse.Namespace, ports: tuple[int, int]) -> str:
 
 
 def image(options: argparse.Namespace) -> Path:
+    if options.image is not None:
+        return Path(options.image).resolve()
     folder: Path = options.build
     target: str = options.target
     return folder / "firmware" / target / "controller.elf"

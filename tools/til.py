@@ -52,10 +52,12 @@ def run(chain: Chain, bus: str, pace: str, controller: str | None) -> BusRun:
         return run_program(at, chain.machine, chain.image, chain.machine.kernel)
 
 
-def compare(file: Path, target: str, link: str, bus: str) -> bool:
+def compare(file: Path, options: argparse.Namespace, bus: str) -> bool:
     """Whether both give the same bits."""
     chain = load_chain(file)
+    target, link = options.target, options.link
     board = f"{EMULATE} {target} --link {link}"
+    board += f" --image {options.image}" if options.image else ""
     runs = {
         "linux": run(chain, bus, "fast", None),
         target: run(chain, bus, "fast" if link == "fifo" else "real-time", board),
@@ -80,12 +82,13 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--link", choices=("fifo", "slcan"), default="fifo", help="slcan: real time, on its UART"
     )
+    parser.add_argument("--image", type=Path, help="another image than that of make firmware")
     parser.add_argument("--local", action="store_true", help="a bus of its own, not vcan0")
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
     options = parser.parse_args(arguments)
     try:
         with local_bus() if options.local else nullcontext(DEFAULT_BUS) as bus:
-            equal = [compare(file, options.target, options.link, bus) for file in options.files]
+            equal = [compare(file, options, bus) for file in options.files]
     except HodographError as error:
         print(f"til.py: {error}", file=sys.stderr)
         return 1

@@ -18,15 +18,13 @@ $(foreach t,an385 microbit rv32,$(eval $(t)_KERNELS := firmware/targets/kernels_
 # Debian's libraries have no build for rv32imc: those for rv32im are linked.
 rv32_LINK    := -march=rv32im -mabi=ilp32
 
-# Boards to hold in one's hands. They have a port of their own, and of the images the controller.
+# Boards to hold in one's hands. They have a port of their own, whose board.mk adds them here, and of the images the
+# controller (docs/port-to-your-board.md).
 #   make firmware NODE=2 CAN_BITS_S=500000
-BOARDS     := nucleo_g474re
+BOARDS     :=
 NODE       ?= 1
 CAN_BITS_S ?= 1000000
-nucleo_g474re_CPU     := $(an386_CPU) -DBOARD_NODE=$(NODE) -DBOARD_CAN_BITS_S=$(CAN_BITS_S)
-nucleo_g474re_KERNELS := firmware/targets/kernels_float.c
-nucleo_g474re_SRC     := $(wildcard firmware/port/stm32g4/*.c)
-nucleo_g474re_OPENOCD := board/st_nucleo_g4.cfg
+include $(wildcard firmware/port/*/board.mk)
 
 $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CROSS := $(if $(filter rv32,$(t)),riscv64-unknown-elf-,arm-none-eabi-)))
 $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv32,cortex_m)))
@@ -91,13 +89,15 @@ $(foreach t,$(TARGETS) $(BOARDS),$(eval $(call TARGET_RULES,$(t))))
 # What each image is asked after it is linked: no heap, no double, no soft float, no 64-bit division; a stack that fits.
 IMAGE_CHECK := tools/check_image.py firmware/targets/stack.toml $(addprefix tools/target/,effects.py forbidden.py image.py stack.py)
 
+# A board's linker script may lie in the folder of its port.
+target_ld = $(firstword $(wildcard firmware/port/*/$(1).ld) firmware/targets/$(1).ld)
 image_src = $($(2)_MAIN) $(or $($(1)_SRC),$($(2)_SRC)) $(or $($(2)_KERNELS),$($(1)_KERNELS)) $(wildcard firmware/port/$($(1)_CORE)/*.c)
 
 define IMAGE_RULE # target, image
-$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$(image_src)) $(BUILD)/firmware/$(1)/libhodograph.a firmware/targets/$(1).ld firmware/port/$($(1)_CORE)/sections.ld $(IMAGE_CHECK) $(BUILD)/firmware/$(1)/$(2).list
+$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$(image_src)) $(BUILD)/firmware/$(1)/libhodograph.a $(target_ld) firmware/port/$($(1)_CORE)/sections.ld $(IMAGE_CHECK) $(BUILD)/firmware/$(1)/$(2).list
 	$$(call say,link,$$@)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $(or $($(1)_LINK),$($(1)_CPU)) -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,-Map,$$(@:.elf=.map) \
-	    -Lfirmware/port/$($(1)_CORE) -Tfirmware/targets/$(1).ld -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
+	    -Lfirmware/port/$($(1)_CORE) -T$(target_ld) -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
 	$$(Q)$(PYTHON) tools/check_image.py $($(2)_CHECK) $$@
 $(call NOTE,$(BUILD)/firmware/$(1)/$(2).list,$(image_src) $($(2)_CHECK))
 -include $(patsubst %.o,%.d,$(call target_object,$(1),$(image_src)))
