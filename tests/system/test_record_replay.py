@@ -101,11 +101,7 @@ def test_a_recording_from_beside(capsys: pytest.CaptureFixture[str], tmp_path: P
     words = [sys.executable, "-m", "hodograph", "record", str(file), "--json"]
     words += ["--machine", MACHINE]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
-        deadline = time.monotonic() + 60
-        while not file.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        time.sleep(0.5)
+        until_there(file)
         heart = str(EXAMPLES / "heart.toml")
         live = result(capsys, "run", heart, "--json", "--pace", "fast")
         child.send_signal(signal.SIGINT)
@@ -121,9 +117,18 @@ def test_a_recording_from_beside(capsys: pytest.CaptureFixture[str], tmp_path: P
         assert again[key] == live[key], key
 
 
-def motion(jump_at: int) -> None:
+def until_there(file: Path) -> None:
+    """Waits for a recording to begin: its socket is opened right after its file."""
+    deadline = time.monotonic() + 60
+    while not file.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    time.sleep(0.5)
+
+
+def motion(jump_at: int, recording: Path) -> None:
     """Two axes at 50 mm/s beyond SYNC 20; at `jump_at` the first one steps aside by 1 mm."""
-    time.sleep(0.3)
+    until_there(recording)
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as out:
         out.bind(("vcan0",))
         x, speed = 0, 0
@@ -142,16 +147,17 @@ def motion(jump_at: int) -> None:
 def test_a_jump_on_the_bus_is_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, jump_at: int
 ) -> None:
-    def record(*more: str) -> tuple[int, dict[str, Any], str]:
-        sender = threading.Thread(target=motion, args=(jump_at,))
+    def record(name: str, *more: str) -> tuple[int, dict[str, Any], str]:
+        file = tmp_path / name
+        sender = threading.Thread(target=motion, args=(jump_at, file))
         sender.start()
         capsys.readouterr()
-        status = main(["record", str(tmp_path / "jump.log"), "--seconds", "3", "--json", *more])
+        status = main(["record", str(file), "--seconds", "4", "--json", *more])
         out, err = capsys.readouterr()
         sender.join()
         return status, json.loads(out), err
 
-    status, told, err = record("--machine", MACHINE)
+    status, told, err = record("jump.log", "--machine", MACHINE)
     assert told["frames"] == 1300 * 5
     if jump_at < 0:
         assert (status, told["jumps"], err) == (0, [], "")
@@ -161,7 +167,7 @@ def test_a_jump_on_the_bus_is_told(
     assert "the file is complete" in err.splitlines()[-1]
     assert len(told["jumps"]) == 2  # speed, acceleration
     assert read_recording(tmp_path / "jump.log").size == 1300 * 5
-    status, told, err = record()
+    status, told, err = record("unchecked.log")
     assert (status, told["jumps"]) == (0, None)
     assert "setpoints were not checked" in err
 
