@@ -130,6 +130,15 @@ static void place(struct interp *it, uint32_t i)
     }
 }
 
+/* Records of pieces and of segments stand behind one another: neither is taken for the other. */
+static void stays(const struct interp *it)
+{
+    if (it->piece != NULL) {
+        prove((const void *)it->piece < (const void *)prepared_segment_at(it->program, it->kernel, 0));
+        prove(it->segment >= prepared_segment_at(it->program, it->kernel, 0));
+    }
+}
+
 static void interpolate(const struct program *p)
 {
     struct interp it;
@@ -140,8 +149,10 @@ static void interpolate(const struct program *p)
     for (uint32_t i = 0; i < COUNT; i++) {
         place(&it, i);
         interp_at_q42(&it, any_time(), &point);
+        stays(&it);
         place(&it, i);
         interp_seek(&it, any_time());
+        stays(&it);
     }
     place(&it, 0);
     interp_at(&it, any_time(), &point);
