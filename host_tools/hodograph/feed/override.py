@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .limits import ControllerLimits, Limits
-from .room import FACTOR_SHARE, Room
+from .room import FACTOR_SHARE, RATE_SHARES, Room
 
 Real = NDArray[np.float64]
 Unsigned = NDArray[np.uint32]
@@ -61,18 +61,35 @@ def override_bounds(
     factor = factor_q24 / 2.0**24
     room_a = controller.acceleration_mm_s2 - factor**2 * a
     room_j = controller.jerk_mm_s3 - factor**3 * j
-    rate = np.minimum(room_a / v, 0.5 * room_j / (3.0 * factor * a))
+    own_rate = np.minimum(room_a / v, 0.5 * room_j / (3.0 * factor * a))
     binding = room if room is not None and room.bounds.obeyed else None
-    if binding is not None:
-        rate = np.minimum(rate, binding.rate(factor))
-    rate_q16 = np.floor(np.clip(rate * _HAIR * 2.0**16, 0.0, _U32_MAX))
-    second = (room_j - 3.0 * factor * (rate_q16 / 2.0**16) * a) / v
-    if binding is not None:
-        second = np.minimum(second, binding.second(factor, rate_q16 / 2.0**16))
-    second_q8 = np.floor(np.clip(second * _HAIR * 2.0**8, 0.0, _U32_MAX))
+
+    def rates(share: float) -> tuple[Real, Real]:
+        rate = own_rate
+        if binding is not None:
+            rate = np.minimum(rate, binding.rate(factor, share))
+        rate_q16 = np.floor(np.clip(rate * _HAIR * 2.0**16, 0.0, _U32_MAX))
+        second = (room_j - 3.0 * factor * (rate_q16 / 2.0**16) * a) / v
+        if binding is not None:
+            second = np.minimum(second, binding.second(factor, rate_q16 / 2.0**16))
+        return rate_q16, np.floor(np.clip(second * _HAIR * 2.0**8, 0.0, _U32_MAX))
+
+    rate_q16, second_q8 = rates(RATE_SHARES[0])
+    for share in RATE_SHARES[1:] if binding is not None else ():
+        other = rates(share)
+        better = _hold_s(*other) < _hold_s(rate_q16, second_q8)
+        rate_q16 = np.where(better, other[0], rate_q16)
+        second_q8 = np.where(better, other[1], second_q8)
     return OverrideBounds(
         factor_q24.astype(np.uint32), rate_q16.astype(np.uint32), second_q8.astype(np.uint32)
     )
+
+
+def _hold_s(rate_q16: Real, second_q8: Real) -> Real:
+    """Time from rate 1 to rest within these bounds."""
+    rate = np.maximum(rate_q16, 0.5) / 2.0**16
+    second = np.maximum(second_q8, 0.5) / 2.0**8
+    return np.asarray(np.where(second < rate**2, 2.0 / np.sqrt(second), 1.0 / rate + rate / second))
 
 
 def _shared(peak: Real, limit: float) -> Real:

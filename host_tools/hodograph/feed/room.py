@@ -28,8 +28,8 @@ Real = NDArray[np.float64]
 FACTOR_SHARE = 0.5
 """Part of the room under each limit that a factor above 1 may use up."""
 
-RATE_SHARE = 0.5
-"""Part of what is left of a jerk that lambda' may use; lambda'' has the rest."""
+RATE_SHARES = (0.5, 0.7, 0.85, 0.95)
+"""Parts of what is left of a jerk that lambda' may use; lambda'' has the rest. The best one depends on the piece."""
 
 _TINY = 1e-12
 
@@ -109,13 +109,13 @@ class Room:
                 f = np.minimum(f, _factor_of_volts(axis, axis.plant))
         return least_of_pieces(samples, f, self._count)
 
-    def rate(self, factor: Real) -> Real:
-        """R (M,) for factors (M,); below 0 where a limit leaves nothing."""
+    def rate(self, factor: Real, share: float) -> Real:
+        """R (M,) for factors (M,), with `share` of the jerks; below 0 where a limit leaves nothing."""
         f = factor[self._samples.piece, None]
         rate = np.full_like(self._samples.feed, np.inf)
         for axis in self.axes:
             rate = np.minimum(rate, (axis.acceleration - f**2 * axis.a) / axis.v)
-            left = RATE_SHARE * (axis.jerk - f**3 * axis.j)
+            left = share * (axis.jerk - f**3 * axis.j)
             rate = np.minimum(rate, left / (3.0 * f * axis.a))
             if axis.plant is not None:
                 left = axis.plant.reach_mm_s - _greatest_volts(axis, axis.plant, f)
