@@ -282,7 +282,7 @@ static void test_faults_that_cannot_be(void)
     bad[0].axis = 2;
     bad[1].ticks = 0;
     bad[2].value = 0.0;
-    bad[3].value = NAN;
+    bad[3].value = (double)NAN;
     bad[4].kind = RIG_FAULT_KINDS;
     TEST_ASSERT_EQUAL_INT(0, begin());
     TEST_ASSERT_EQUAL_INT(0, rig_faults(&rig, &good, 1));

@@ -39,12 +39,14 @@ class Plant:
 class Gains:
     """Gains and feedforward that replace those of the path's machine; what is not given stays.
 
-    `changes`: figure of a drive and its value for x and y; `feed`: the same for fields of Feedforward.
+    `changes`: figure of a drive and its value for x and y; `feed`: the same for fields of Feedforward;
+    `interpolation`: how the drives of x and y go from setpoint to setpoint.
     """
 
     name: str
     changes: tuple[tuple[str, tuple[float, float]], ...] = ()
     feed: tuple[tuple[str, tuple[float, float]], ...] = ()
+    interpolation: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -183,6 +185,8 @@ def _with_gains(plant: Plant, gains: Gains) -> Plant:
     for axis in (0, 1):
         for name, values in gains.changes:
             drives[axis] = with_figure(drives[axis], name, values[axis])
+        if gains.interpolation is not None:
+            drives[axis] = replace(drives[axis], interpolation=gains.interpolation[axis])
         for name, values in gains.feed:
             feed[axis] = replace(feed[axis], **{name: values[axis]})
     return replace(plant, drives=(drives[0], drives[1]), feedforward=(feed[0], feed[1]))

@@ -56,8 +56,8 @@ class OnDask:
         self._client = client
 
     def share(self, value: object) -> Any:
-        """A future, whose value workers get from one another."""
-        return self._client.scatter(value)
+        """A task that gives it: workers get it from one another, or again from the scheduler when one is lost."""
+        return self._client.submit(_same, value, pure=False)
 
     def results(self, function: Callable[..., T], tasks: Iterable[Task]) -> Iterator[T]:
         """As they are done, with few ahead. Raises RunError when workers are lost again and again."""
@@ -81,6 +81,10 @@ class OnDask:
             self._client.submit(function, *task, pure=False)
             for _, task in zip(range(most), tasks, strict=False)
         ]
+
+
+def _same(value: T) -> T:
+    return value
 
 
 def available_cores() -> int:

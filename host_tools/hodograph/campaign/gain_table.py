@@ -8,6 +8,7 @@ from dataclasses import fields
 from ..config import load_machine
 from ..config.axis_table import Feedforward
 from ..config.table import Table
+from ..names import INTERPOLATIONS
 from .design import Gains, gains_of
 
 _PDFF = ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s", "k_pf_rad_mm", "k_vf")
@@ -20,7 +21,7 @@ def read_gains(root: Table) -> tuple[Gains, ...]:
     """In the order of the file; raises InputError."""
     if not root.has("gains"):
         return (AS_GIVEN,)
-    tables = root.tables("gains", ("name", "machine", *_PDFF, "feedforward"))
+    tables = root.tables("gains", ("name", "machine", *_PDFF, "feedforward", "interpolation"))
     found: list[Gains] = []
     for table in tables:
         gains = _gains(table)
@@ -33,16 +34,20 @@ def read_gains(root: Table) -> tuple[Gains, ...]:
 def _gains(table: Table) -> Gains:
     changes: dict[str, tuple[float, float]] = {}
     feed: dict[str, tuple[float, float]] = {}
+    interpolation = None
     if table.has("machine"):
         machine = load_machine(table.present("machine"))
         drives = machine.models(machine.plane)
         changes |= gains_of((drives[0], drives[1]), _PDFF)
+        interpolation = drives[0].interpolation, drives[1].interpolation
         x, y = (axis.feedforward for axis in machine.plane)
         feed |= {name: (getattr(x, name), getattr(y, name)) for name in _FEED}
     changes |= {name: _both(table, name, 1e6) for name in _PDFF if table.has(name)}
     forward = table.table("feedforward", _FEED, required=False)
     feed |= {name: _both(forward, name, 32767) for name in _FEED if forward.has(name)}
-    return Gains(table.text("name"), tuple(changes.items()), tuple(feed.items()))
+    if table.has("interpolation"):
+        interpolation = (table.choice("interpolation", INTERPOLATIONS),) * 2
+    return Gains(table.text("name"), tuple(changes.items()), tuple(feed.items()), interpolation)
 
 
 def _both(table: Table, name: str, high: float) -> tuple[float, float]:

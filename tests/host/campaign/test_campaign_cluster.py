@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""By Dask: on this machine's cores, killed and gone on with, and on a cluster over loopback: always the same table."""
+"""By Dask: on this machine's cores, killed and gone on with, and on a cluster, which may lose workers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hodograph.cli.main import main
 TEXT = """
 paths = ["{examples}/heart.toml"]
 profiles = ["quintic"]
-samples = 300
+samples = 600
 [vary.time_constant_s]
 factor_uniform = [0.8, 1.2]
 [vary.gain_rad_s_v]
@@ -40,10 +40,10 @@ def campaign(file: Path, folder: Path, *more: str) -> bytes:
 
 
 @contextmanager
-def under_way(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that makes the campaign on two cores, as soon as its first batch is done."""
+def under_way(file: Path, folder: Path, *options: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that makes the campaign (on two cores), as soon as its first batch is done."""
     child = subprocess.Popen(
-        [*COMMAND, str(file), "-o", str(folder), "--workers", "2"],
+        [*COMMAND, str(file), "-o", str(folder), *(options or ("--workers", "2"))],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         start_new_session=True,
@@ -70,8 +70,8 @@ def test_killed_and_gone_on_with_on_two_cores(write: Write, tmp_path: Path) -> N
 
 
 @contextmanager
-def cluster(folder: Path) -> Iterator[str]:
-    """A scheduler and two workers on loopback, as one would start them on machines of their own."""
+def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A scheduler and two workers on loopback, as one would start them on machines of their own; one of the workers."""
     at = folder / "scheduler.json"
     hosts = ["--host", "127.0.0.1", "--no-dashboard"]
     options = {"cwd": folder, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -83,7 +83,7 @@ def cluster(folder: Path) -> Iterator[str]:
         limit = time.monotonic() + WAIT_S
         while not at.exists() and time.monotonic() < limit:
             time.sleep(0.05)
-        yield json.loads(at.read_text())["address"]
+        yield json.loads(at.read_text())["address"], children[-1]
     finally:
         for child in children:
             child.kill()
@@ -94,11 +94,16 @@ def test_a_cluster_gives_the_same_table(
     write: Write, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     file = write(TEXT)
-    with cluster(tmp_path) as address:
+    with cluster(tmp_path) as (address, worker):
         far = campaign(file, tmp_path / "far", "--scheduler", address)
+        with under_way(file, tmp_path / "lost", "--scheduler", address) as child:
+            worker.kill()
+            _, told = child.communicate(timeout=2 * WAIT_S)
+            assert child.returncode == 0, told.decode()
     assert far == campaign(file, tmp_path / "near", "--workers", "1")
-    assert far.count(b"plant figures must be positive") == 300
-    assert "Traceback" not in capfd.readouterr().err
+    assert (tmp_path / "lost" / "runs.csv").read_bytes() == far
+    assert far.count(b"plant figures must be positive") == 600
+    assert "Traceback" not in capfd.readouterr().err + told.decode()
 
 
 def test_ctrl_c_is_one_line(write: Write, tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ import fcntl
 import io
 import json
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -64,6 +66,7 @@ def test_rows_are_what_simulate_gives(write: Write, tmp_path: Path) -> None:
         assert float(row["rms_contour_error_um"]) == motion.rms_contour_error_um
         assert float(row["max_following_error_um"]) == motion.max_following_error_um
         assert float(row["max_volts"]) == motion.max_volts
+        assert float(row["duration_s"]) == 1.1
         assert row["error"] == ""
     assert rows[1]["rules"] == "encoder-jump at=50 node=3 counts=9000"
     assert rows[1]["encoders_sha256"] != rows[0]["encoders_sha256"]
@@ -228,3 +231,8 @@ def test_bad_options(
     given = [option.replace("{file}", str(file)) for option in options]
     assert main(["campaign", str(file), "-o", str(tmp_path / "out"), *given]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_dask_is_not_loaded_before_it_is_needed() -> None:
+    text = "import sys, hodograph.cli.campaign_command; sys.exit('distributed' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", text], check=False).returncode == 0
