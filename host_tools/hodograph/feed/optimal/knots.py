@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...spline import PHSpline
+from ..quantise import LONGEST_PIECE_MM
 from .bounds import Bounds
 from .curve import LEFT, RIGHT, frames
 
@@ -189,4 +190,14 @@ def choose_knots(
     inner = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     knots = np.interp(first + inner * width, count, s)
     knots[np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(parts)[:-1]))] = kept[:-1]
-    return np.append(knots, high)
+    return _short_enough(np.append(knots, high))
+
+
+def _short_enough(knots: Real) -> Real:
+    """Intervals longer than a piece may be are cut evenly."""
+    parts = np.ceil(np.diff(knots) / LONGEST_PIECE_MM).astype(np.int64)
+    if parts.max() == 1:
+        return knots
+    inner = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    cut = np.repeat(knots[:-1], parts) + inner * np.repeat(np.diff(knots) / parts, parts)
+    return np.append(cut, knots[-1])

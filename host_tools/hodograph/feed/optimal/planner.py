@@ -32,6 +32,8 @@ Real = NDArray[np.float64]
 _ABOVE = 3e-4
 """A plan may be above a limit by this share; what is more is taken out by running it slower."""
 
+_CAP_SHARE, _BESIDE_MM = 0.998, 2.0**-12
+
 _POWER = {"acceleration": 2, "jerk": 3, "centripetal": 2}
 
 
@@ -133,13 +135,24 @@ class OptimalPlan:
         raw = _raw(self.track, length_q40)
         return with_override(raw, self.controller, self.limits, self._path)
 
+    def _widened(self, cap: FeedCap) -> FeedCap:
+        s = self.track.s
+        first = int(np.searchsorted(s, cap.from_mm - _BESIDE_MM, side="right")) - 1
+        last = int(np.searchsorted(s, cap.to_mm + _BESIDE_MM, side="left"))
+        return FeedCap(
+            float(s[max(first, 0)]), float(s[min(last, s.size - 1)]), cap.feed_mm_s * _CAP_SHARE
+        )
+
     @cached_property
     def _path(self) -> PathBounds:
         return PathBounds(self.spline, self.limits, self.plants)
 
     def slowed(self, caps: Sequence[FeedCap], reason: str) -> OptimalPlan:
-        """Planned again with further caps; `reason` goes to the notes."""
-        limits = replace(self.limits, caps=(*self.limits.caps, *caps))
+        """Planned again with further caps; `reason` goes to the notes.
+
+        A cap counts for whole pieces: each is widened to those that it touches, and kept with room to spare.
+        """
+        limits = replace(self.limits, caps=(*self.limits.caps, *map(self._widened, caps)))
         again = plan_optimal(
             self.spline,
             self.request,
@@ -175,10 +188,10 @@ def plan_optimal(
     bounds = gather(request, limits, controller, plants, period_us)
     check_feasible(spline, bounds)
     ends = joined(list(plan_windows(spline, bounds, 1e-6 * period_us)))
-    track = make_track(ends, 1.0)
+    track = make_track(ends, 1.0, spline.segment_starts_mm)
     stretch = _needed_stretch(find_peaks(spline, bounds, track))
     if stretch > 1.0:
-        track = make_track(ends, stretch)
+        track = make_track(ends, stretch, spline.segment_starts_mm)
     if track.duration_s >= LONGEST_S:
         raise PlanError(
             f"feed: the path takes {track.duration_s:.4g} s inside its limits, longer than {LONGEST_S:.7g} s"

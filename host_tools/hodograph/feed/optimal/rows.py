@@ -46,17 +46,21 @@ class About:
 class Selection:
     """Which points make rows: those of `basic` near their limit, others once they were above it; for good.
 
+    With `everything` all points make rows: safe, and slow.
     The sketch has rows at all basic points. So most limits at most points never become rows.
     """
 
     basic: Mask
     kept: dict[str, Mask] = field(default_factory=dict)
     last: Real | None = None
+    everything: bool = False
     low: Mask | None = None
 
     def choose(self, name: str, used: Real | None, among: Mask | None = None) -> Index:
         """Points for the rows of a quantity, of which the last feed used these shares."""
         wanted = self.basic if among is None else self.basic & among
+        if self.everything:
+            return np.flatnonzero(np.ones_like(wanted) if among is None else among)
         if used is None:
             return np.flatnonzero(wanted)
         active = (wanted & (used > _NEAR)) | (used > 1.0)

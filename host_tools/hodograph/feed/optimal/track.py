@@ -126,14 +126,24 @@ def track_of(raw: RawPieces, length_mm: float) -> Track:
     return Track(t_q32, np.append(raw.start_q40 * 2.0**-40, length_mm), shape)
 
 
-def make_track(ends: Ends, stretch: float) -> Track:
-    """Pieces of the plan run slower by the factor `stretch` >= 1: all limits fall with it."""
+def make_track(ends: Ends, stretch: float, joints: Real) -> Track:
+    """Pieces of the plan run slower by the factor `stretch` >= 1: what it uses of all limits falls with it.
+
+    joints  arc lengths where knots have to stay exactly, since limited quantities jump there
+    """
     t = np.concatenate((np.zeros(1), np.cumsum(ends.times.astype(np.longdouble) * stretch)))
     t_q32 = np.rint(t * 2.0**32).astype(np.int64)
+    late = (t_q32 * np.longdouble(2.0**-32) - t).astype(np.float64)
     h = np.diff(t_q32) * 2.0**-32
-    feed, acceleration = ends.feed / stretch, ends.acceleration / stretch**2
     j0, j1 = (j / stretch**3 for j in ends.jerk)
-    return Track(t_q32, ends.s, _hermite(np.diff(ends.s), h, feed, acceleration, j0, j1))
+    # The states at the rounded times: a length that is off by feed * 2^-33 s would cost brief pieces much jerk.
+    late[np.isin(ends.s, joints)] = 0.0
+    feed, acceleration = ends.feed / stretch, ends.acceleration / stretch**2
+    s = ends.s + feed * late
+    feed = feed + acceleration * late
+    acceleration = acceleration + np.append(j0, 0.0) * late
+    feed[-1] = acceleration[-1] = 0.0
+    return Track(t_q32, s, _hermite(np.diff(s), h, feed, acceleration, j0, j1))
 
 
 def _hermite(way: Real, h: Real, feed: Real, acceleration: Real, j0: Real, j1: Real) -> Real:

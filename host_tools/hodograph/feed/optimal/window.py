@@ -21,6 +21,7 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 US = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+GRADED_US = (0.03125, 0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375, 0.96875)
 BASIC_US = (0.0, 0.5, 1.0)
 ALLOWED = 5e-4
 """Excess that a plan may have, as a share of a limit."""
@@ -30,6 +31,9 @@ _GAIN = 1e-4
 _BESIDE = 1e-7
 _LEAST_Q = 1e-12
 _LEAST_FALL = 0.1
+_PATIENCE = 6
+_TOLERABLE = 5e-3
+_LEAST_SKETCHED = 1e-3
 
 Feed = Callable[[Real], Real]
 """q at arc lengths."""
@@ -102,6 +106,8 @@ def plan_window(
         about = _blend(known, known_to, guess)
     for _ in range(3):
         knots = choose_knots(spline, bounds, s, t, step, period_s)
+        if known is not None:
+            knots = _same_knots(knots, known, known_to)
         setting = _setting(spline, bounds, knots, start)
         best = _rounds(setting, about)
         if best is None:
@@ -112,6 +118,13 @@ def plan_window(
         about = best.squared_feed
         s, t, step = _retimed(best, guess, period_s)
     return best
+
+
+def _same_knots(knots: Real, known: Solution, known_to: float) -> Real:
+    """Knots that are the known solution's as long as it is good: it is then one of this grid too, and keeps its limits."""
+    same = known.grid.s[(known.grid.s >= knots[0]) & (known.grid.s <= known_to)]
+    gap = 0.6 * (same[-1] - same[-2]) if same.size > 1 else 0.0
+    return np.concatenate((same, knots[knots > same[-1] + gap])) if same.size > 1 else knots
 
 
 def _blend(known: Solution, known_to: float, guess: Sketch) -> Feed:
@@ -155,12 +168,18 @@ def _setting(spline: PHSpline, bounds: Bounds, knots: Real, start: State | None)
     joints = spline.segment_starts_mm
     joints = joints[(joints > knots[0]) & (joints < knots[-1])]
     crossing, u = _inside(grid, joints)
-    interval = np.concatenate((np.repeat(np.arange(grid.size), len(US)), np.repeat(crossing, 2)))
+    graded = np.flatnonzero(grid.grade)
+    interval = np.concatenate(
+        (
+            np.repeat(np.arange(grid.size), len(US)),
+            np.repeat(crossing, 2),
+            np.repeat(graded, len(GRADED_US)),
+        )
+    )
     sides = np.column_stack((u - _BESIDE, u + _BESIDE)).ravel()
-    us = np.concatenate((np.tile(np.array(US), grid.size), sides))
+    us = np.concatenate((np.tile(US, grid.size), sides, np.tile(GRADED_US, graded.size)))
     points = make_points(spline, bounds, grid, interval, us, caps)
     basic = np.isin(us, BASIC_US) | (np.arange(us.size) >= grid.size * len(US))
-    basic |= grid.grade[interval] != 0
     most = np.full(knots.size, np.inf)
     at_start, at_end = points.interval[us == 0.0], points.interval[us == 1.0] + 1
     moving = points.sigma[0] > 0.0
@@ -213,11 +232,15 @@ def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
     best: Solution | None = None
     for rounds in range(1, _MOST_ROUNDS + 1):
         problem = _problem(
-            setting, make_rows(setting.points, about, select, setting.once), inner.p, typical
+            setting,
+            make_rows(setting.points, about, select, setting.once),
+            inner.p,
+            typical,
+            _LEAST_FALL if rounds > 1 else _LEAST_SKETCHED,
         )
         found = solve(problem)
         if found is None:
-            return best
+            return best if best is not None and best.excess < _TOLERABLE else None
         q, slope = found[0::2], found[1::2]
         p, d, dd = setting.points.cubic(grid, q, slope)
         excess = _excess(setting, p, d, dd)
@@ -228,6 +251,7 @@ def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
         typical = q
         gain = np.inf if best is None else best.duration_s - times.sum()
         best = Solution(grid, q, slope, times, excess, rounds)
+        select.everything = rounds >= _PATIENCE
         if rounds > 1 and excess <= ALLOWED and abs(gain) < _GAIN * times.sum():
             break
     return best
@@ -249,8 +273,8 @@ def _times(setting: _Setting, p: Real) -> Real:
     return np.asarray(parts * setting.grid.h)
 
 
-def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real) -> Problem:
-    """The linear program: least time to first order about a feed, p at the Gauss points, q at the knots."""
+def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real, least: float) -> Problem:
+    """The quadratic program: least time to second order about a feed, p at the Gauss points, q at the knots."""
     grid = setting.grid
     typical = np.maximum(typical, 1e-6 * np.max(typical))
     scale = np.empty(2 * grid.size + 2)
@@ -258,22 +282,22 @@ def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real) -> Problem:
     width = np.diff(grid.s)
     scale[1::2] = typical / np.minimum(np.append(width, width[-1]), np.append(width[0], width))
     low, high = np.full(scale.size, -np.inf), np.full(scale.size, np.inf)
-    low[0::2], high[0::2] = 1e-6 * scale[0::2], setting.most_q
+    low[0::2], high[0::2] = least * scale[0::2], setting.most_q
     if setting.start is None:
         scale[0], scale[1] = _rest_scale(grid, 0, typical[1])
-        low[0] = 1e-6 * scale[0]
+        low[0] = least * scale[0]
     else:
         low[0] = high[0] = setting.start.q
         low[1] = high[1] = setting.start.slope
     scale[-2], scale[-1] = _rest_scale(grid, grid.size - 1, typical[-2])
-    low[-2] = 1e-6 * scale[-2]
+    low[-2] = least * scale[-2]
     bounded = np.isfinite(high)
     high[bounded] = np.maximum(high[bounded], low[bounded])
     if setting.start is not None:
         # The state that the window before ends with may be above its limits by what is allowed.
         rows.high[rows.interval < 2] += 2.0 * ALLOWED
         rows.low[rows.interval < 2] -= 2.0 * ALLOWED
-    return Problem(_gradient(setting, p), scale, low, high, rows)
+    return Problem(*_cost(setting, p), scale, low, high, rows)
 
 
 def _rest_scale(grid: Grid, interval: int, q: float) -> tuple[float, float]:
@@ -283,19 +307,18 @@ def _rest_scale(grid: Grid, interval: int, q: float) -> tuple[float, float]:
     return p, p / grid.h[interval]
 
 
-def _gradient(setting: _Setting, p: Real) -> Real:
-    """Of the time, by the unknowns."""
+def _cost(setting: _Setting, p: Real) -> tuple[Real, Real]:
+    """Time to second order about p at the Gauss points: gradient by the unknowns, and Hessian (n, 4, 4) by interval."""
     grid = setting.grid
-    weights = np.tile(GAUSS_W, grid.size) * np.repeat(grid.h, GAUSS_W.size)
-    pull = (
-        ((-0.5 * weights * p**-1.5)[:, None] * setting.gauss[2])
-        .reshape(grid.size, -1, 4)
-        .sum(axis=1)
-    )
+    basis = setting.gauss[2].reshape(grid.size, -1, 4)
+    weights = (np.tile(GAUSS_W, grid.size) * np.repeat(grid.h, GAUSS_W.size)).reshape(grid.size, -1)
+    p = p.reshape(grid.size, -1)
+    bend = 0.75 * weights * p**-2.5
+    pull = np.einsum("ng,ngk->nk", -0.5 * weights * p**-1.5 - bend * p, basis)
     gradient = np.zeros(2 * grid.size + 2)
     for k in range(4):
         gradient[k : k + 2 * grid.size : 2] += pull[:, k]
-    return gradient
+    return gradient, np.einsum("ng,ngk,ngl->nkl", bend, basis, basis, optimize=True)
 
 
 def _excess(setting: _Setting, p: Real, d: Real, dd: Real) -> float:

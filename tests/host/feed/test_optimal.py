@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: MIT
+"""Profile `optimal`: inside all limits on any path, fast, in windows as in one, and clear where nothing will do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hodograph.errors import InputError, PlanError
+from hodograph.feed import AxisLimits, ControllerLimits, FeedCap, FeedRequest, Limits, Plant
+from hodograph.feed.optimal import OptimalPlan, plan_optimal
+from hodograph.feed.optimal.bounds import gather
+from hodograph.feed.optimal.track import joined
+from hodograph.feed.optimal.windows import plan_windows
+from hodograph.program import check, compile_path
+from hodograph.spline import PHSpline, from_control_polygon
+
+OPTIMAL = FeedRequest("optimal")
+AXES = Limits(axis=AxisLimits(None, (2000.0, 2000.0), (50000.0, 50000.0)))
+CONTROLLER = ControllerLimits(500.0, 5000.0, 200000.0, 0.1)
+
+
+def walk(points: int, seed: int, step_mm: float = 15.0) -> PHSpline:
+    """A smooth random path of points - 2 segments."""
+    random = np.random.default_rng(seed)
+    turns = np.cumsum(random.normal(0.0, 0.7, points))
+    steps = step_mm * random.uniform(0.5, 1.5, points) * np.exp(1j * turns)
+    return from_control_polygon(np.cumsum(steps), False).spline
+
+
+def ring(points: int, seed: int, radius_mm: float = 30.0) -> PHSpline:
+    """A closed random path."""
+    random = np.random.default_rng(seed)
+    radii = radius_mm * (1.0 + 0.3 * random.uniform(-1.0, 1.0, points))
+    angles = 2.0 * np.pi * np.arange(points) / points
+    return from_control_polygon(radii * np.exp(1j * angles), True).spline
+
+
+def straight(length_mm: float) -> PHSpline:
+    """One segment."""
+    return from_control_polygon(np.linspace(0.0, length_mm, 4) + 0j, False).spline
+
+
+def keeps(plan: OptimalPlan) -> bool:
+    """Every limit, to 0.1 %."""
+    return max(peak.strain for peak in plan.peaks.values()) < 1.001
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_paths_and_limits_are_kept_and_make_programs(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    scale = 10.0 ** random.uniform(-1.0, 1.0)
+    spline = ring(9, seed, 20.0 * scale) if seed % 3 == 0 else walk(6 + seed, seed, 8.0 * scale)
+    feed = 10.0 ** random.uniform(1.3, 2.6)
+    acceleration = feed / random.uniform(0.03, 0.3)
+    jerk = acceleration / random.uniform(0.02, 0.1)
+    pair = tuple((acceleration * random.uniform(0.5, 2.0, 2)).tolist())
+    limits = Limits(
+        feed_mm_s=feed if seed % 2 else None,
+        jerk_mm_s3=jerk,
+        centripetal_mm_s2=acceleration if seed % 4 == 1 else None,
+        volts=5.0 if seed % 5 == 2 else None,
+        axis=AxisLimits(None, (pair[0], pair[1]), (1.5 * jerk, jerk) if seed % 3 else None),
+        caps=(FeedCap(0.3 * spline.length_mm, 0.4 * spline.length_mm, 0.3 * feed),),
+    )
+    plants = (Plant(feed / 3.0, 0.15, 5.0, 0.1), Plant(feed / 4.0, 0.2, 5.0))
+    plan = plan_optimal(
+        spline, OPTIMAL, limits, None, plants if limits.volts else None, period_us=1000
+    )
+    assert keeps(plan)
+    assert plan.stretch < 1.01
+    assert check(compile_path(spline, plan).program) is None
+
+
+@pytest.mark.parametrize("length_mm", [2e-3, 0.1, 7.0, 300.0])
+def test_a_straight_line_takes_the_time_of_seven_phases(length_mm: float) -> None:
+    feed, acceleration, jerk = 100.0, 2000.0, 50000.0
+    plan = plan_optimal(straight(length_mm), OPTIMAL, Limits(feed, acceleration, jerk))
+    assert keeps(plan)
+    least = least_time(length_mm, feed, acceleration, jerk)
+    assert least * 0.9995 < plan.duration_s < least * 1.02 + 2e-3
+
+
+def least_time(length: float, feed: float, acceleration: float, jerk: float) -> float:
+    """From rest to rest, in closed form: the highest feed reached is the one that fits the length."""
+
+    def ramp_s(v: float) -> float:
+        if v < acceleration**2 / jerk:
+            return 2.0 * float(np.sqrt(v / jerk))
+        return v / acceleration + acceleration / jerk
+
+    low, high = 0.0, feed
+    if ramp_s(feed) * feed <= length:
+        return 2.0 * ramp_s(feed) + (length - ramp_s(feed) * feed) / feed
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if ramp_s(middle) * middle < length else (low, middle)
+    return 2.0 * ramp_s(low)
+
+
+def test_more_room_is_never_slower() -> None:
+    spline = walk(12, 4)
+    times = []
+    for scale in (0.5, 1.0, 2.0):
+        limits = replace(
+            AXES, axis=AxisLimits(None, (scale * 2000.0, 2000.0), (50000.0, scale * 50000.0))
+        )
+        times.append(plan_optimal(spline, OPTIMAL, limits, CONTROLLER).duration_s)
+    assert all(later < earlier * 1.0005 for earlier, later in pairwise(times))
+
+
+def test_uniformly_wider_limits_scale_time_exactly() -> None:
+    """Feed by k, accelerations by k^2, jerks by k^3: the same motion, k times as fast."""
+    spline, k = ring(10, 3), 1.3
+    base = Limits(150.0, 1500.0, 40000.0, axis=AxisLimits(None, (1200.0, 1800.0), None))
+    fast = Limits(
+        150.0 * k, 1500.0 * k**2, 40000.0 * k**3,
+        axis=AxisLimits(None, (1200.0 * k**2, 1800.0 * k**2), None),
+    )  # fmt: skip
+    slow_s, fast_s = (plan_optimal(spline, OPTIMAL, x).duration_s for x in (base, fast))
+    assert slow_s / fast_s == pytest.approx(k, rel=5e-3)
+
+
+def test_windows_agree_with_one_plan_and_join_smoothly() -> None:
+    spline = walk(40, 5)
+    bounds = gather(OPTIMAL, AXES, CONTROLLER, None, 1000)
+    whole = joined(list(plan_windows(spline, bounds, 1e-3, 10**6)))
+    parts = list(plan_windows(spline, bounds, 1e-3, 60))
+    assert len(parts) > 2
+    assert joined(parts).times.sum() == pytest.approx(whole.times.sum(), rel=1e-3)
+    for one, following in pairwise(parts):
+        assert one.s[-1] == following.s[0]
+        assert one.feed[-1] == pytest.approx(following.feed[0], rel=1e-6)
+        assert one.acceleration[-1] == pytest.approx(following.acceleration[0], abs=1e-3)
+
+
+def test_each_period_has_pieces_that_the_controller_takes() -> None:
+    spline = walk(12, 6)
+    for period_us in (1000, 8000):
+        plan = plan_optimal(spline, OPTIMAL, AXES, CONTROLLER, period_us=period_us)
+        seconds = plan.track.seconds[1:-1]
+        assert (seconds[1:] + seconds[:-1]).min() > 2e-6 * period_us
+        assert check(compile_path(spline, plan).program) is None
+
+
+def test_without_a_limit_of_jerk_one_is_taken_and_told() -> None:
+    plan = plan_optimal(walk(8, 7), OPTIMAL, Limits(feed_mm_s=80.0))
+    assert any("jerk" in note for note in plan.notes)
+    assert keeps(plan)
+
+
+@pytest.mark.parametrize(
+    ("limits", "name", "needed"),
+    [
+        (Limits(feed_mm_s=1e-4), "feed_mm_s", 1e-3),
+        (Limits(jerk_mm_s3=1.0, centripetal_mm_s2=1e-12), "centripetal_mm_s2", None),
+        (Limits(axis=AxisLimits(None, None, (1e-14, 1.0))), "axis.jerk_mm_s3 of x", None),
+    ],
+)
+def test_hopeless_limits_say_which_where_and_what_would_do(
+    limits: Limits, name: str, needed: float | None
+) -> None:
+    spline = walk(8, 8)
+    with pytest.raises(PlanError) as caught:
+        plan_optimal(spline, OPTIMAL, limits)
+    text = str(caught.value)
+    assert f"limits: {name} = " in text
+    assert "arc length" in text
+    value = float(text.split(": ")[-1].split()[0])
+    if needed is not None:
+        assert value == pytest.approx(needed, rel=0.02)
+
+
+def test_no_limits_at_all_are_refused() -> None:
+    with pytest.raises(InputError, match="no limit"):
+        plan_optimal(straight(10.0), OPTIMAL, Limits())
+
+
+def test_effort_grows_in_proportion_to_the_path() -> None:
+    """Intervals and pieces, which all effort is in proportion to: counted, since time is noisy."""
+    counts = [
+        plan_optimal(walk(n + 2, 1), OPTIMAL, AXES, CONTROLLER).track.s.size for n in (30, 120)
+    ]
+    assert 3.0 < counts[1] / counts[0] < 5.5
