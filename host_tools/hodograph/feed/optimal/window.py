@@ -121,7 +121,7 @@ def plan_window(
 
 
 def _same_knots(knots: Real, known: Solution, known_to: float) -> Real:
-    """Knots that are the known solution's as long as it is good: it is then one of this grid too, and keeps its limits."""
+    """Knots that are the known solution's as long as it is good: then it is one of this grid too."""
     same = known.grid.s[(known.grid.s >= knots[0]) & (known.grid.s <= known_to)]
     gap = 0.6 * (same[-1] - same[-2]) if same.size > 1 else 0.0
     return np.concatenate((same, knots[knots > same[-1] + gap])) if same.size > 1 else knots
