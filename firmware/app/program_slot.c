@@ -83,6 +83,23 @@ static void adopt(struct program_slot *slot, const struct program *program, unsi
     slot->present = true;
 }
 
+/* What makes the image in a bank the program: records for the kernel, and last the record of the bank. */
+static int seal(struct program_slot *slot, struct program *program, unsigned bank,
+                const struct config *config)
+{
+    const struct program_record record = {.sequence = slot->sequence + 1u,
+                                          .image_size = program->header.image_size};
+    const int result = program_table_write(bank, program, config->kernel);
+    if (result != 0) {
+        return result;
+    }
+    if (program_record_write(bank, &record) != 0) {
+        return PROGRAM_ERR_STORE;
+    }
+    adopt(slot, program, bank, record.sequence);
+    return 0;
+}
+
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config)
 {
     const unsigned bank = spare_bank(slot);
@@ -96,17 +113,12 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
         (void)check(&candidate, config, &slot->refused);
     }
     if (slot->refused.code == 0) {
-        slot->refused.code = program_table_write(bank, &candidate, config->kernel);
-    }
-    const struct program_record record = {.sequence = slot->sequence + 1u, .image_size = size};
-    if (slot->refused.code == 0 && program_record_write(bank, &record) != 0) {
-        slot->refused.code = PROGRAM_ERR_STORE;
+        slot->refused.code = seal(slot, &candidate, bank, config);
     }
     slot->receiving = false;
     if (slot->refused.code != 0) {
         return slot->refused.code;
     }
-    adopt(slot, &candidate, bank, record.sequence);
     slot->acceptable = true;
     slot->checked = true;
     find_ends(slot, config);
@@ -152,30 +164,19 @@ void program_slot_stale(struct program_slot *slot)
 static int move(struct program_slot *slot, const struct config *config)
 {
     const unsigned bank = spare_bank(slot);
-    const struct program_record record = {.sequence = slot->sequence + 1u,
-                                          .image_size = slot->program.header.image_size};
     struct program moved = slot->program;
     if (slot->receiving || port_store_erase(bank) != 0 ||
-        port_store_write(bank, 0, slot->program.image, record.image_size) != 0) {
+        port_store_write(bank, 0, moved.image, moved.header.image_size) != 0) {
         return PROGRAM_ERR_STORE;
     }
     moved.image = port_store_data(bank);
-    const int result = program_table_write(bank, &moved, config->kernel);
-    if (result != 0 || program_record_write(bank, &record) != 0) {
-        return result != 0 ? result : PROGRAM_ERR_STORE;
-    }
-    adopt(slot, &moved, bank, record.sequence);
-    return 0;
+    return seal(slot, &moved, bank, config);
 }
 
 static int prepare(struct program_slot *slot, const struct config *config)
 {
-    const struct kernel *kernel = kernel_find(config->kernel);
-    if ((kernel != NULL && slot->program.prepared_for == kernel) ||
-        program_table_find(slot->bank, &slot->program, config->kernel)) {
-        return 0;
-    }
-    return move(slot, config);
+    const bool found = program_table_find(slot->bank, &slot->program, config->kernel);
+    return found ? 0 : move(slot, config);
 }
 
 void program_slot_refresh(struct program_slot *slot, const struct config *config)

@@ -66,7 +66,13 @@ bool program_table_find(unsigned bank, struct program *program, uint32_t kernel)
 {
     const struct kernel *made_for = kernel_find(kernel);
     struct place place = behind(bank, program);
-    if (made_for == NULL || !fits(program, made_for) ||
+    if (made_for == NULL) {
+        return false;
+    }
+    if (program->prepared_for == made_for) {
+        return true;
+    }
+    if (!fits(program, made_for) ||
         prepared_make(program, made_for, compare_records, &place) != 0) {
         return false;
     }

@@ -17,7 +17,8 @@
  */
 int program_table_write(unsigned bank, struct program *program, uint32_t kernel);
 
-/* Gives the records that are there to the program, if every byte of them is right. */
+/* Gives the records that are there to the program, if it has not got them yet and every byte of them is right. True when
+ * it has them now. */
 bool program_table_find(unsigned bank, struct program *program, uint32_t kernel);
 
 #endif

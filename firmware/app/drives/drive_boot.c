@@ -3,17 +3,11 @@
 
 #include <string.h>
 
+#include "app/drives/drive_boot_private.h"
 #include "canopen/nmt.h"
 #include "canopen/sdo_abort.h"
 
 #define AXIS_NODE 0x2005u
-
-static void pause(struct drive_boot *boot, uint32_t pause_us)
-{
-    boot->phase = DRIVE_BOOT_PAUSE;
-    boot->pause_us = pause_us;
-    sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
-}
 
 void drive_boot_init(struct drive_boot *boot)
 {
@@ -25,23 +19,7 @@ void drive_boot_begin(struct drive_boot *boot, const struct config *config)
 {
     boot->config = *config;
     memset(&boot->trouble, 0, sizeof boot->trouble);
-    pause(boot, DRIVE_BOOT_PAUSE_US);
-}
-
-static uint8_t node_of(const struct drive_boot *boot)
-{
-    return boot->config.node[boot->axis];
-}
-
-static void give_up(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
-{
-    boot->trouble = (struct drive_trouble){
-        .node = node_of(boot),
-        .object = ((uint32_t)boot->op.index << 8) + boot->op.sub,
-        .abort_code = abort_code,
-        .value = value,
-    };
-    pause(boot, DRIVE_BOOT_RETRY_US);
+    drive_boot_pause(boot, DRIVE_BOOT_PAUSE_US);
 }
 
 static void begin_drive(struct drive_boot *boot)
@@ -64,79 +42,13 @@ static void finish_drive(struct drive_boot *boot)
     }
 }
 
-static void advance(struct drive_boot *boot)
-{
-    boot->client.status = SDO_CLIENT_IDLE;
-    boot->reading_back = false;
-    boot->reads = 0;
-    drive_plan_advance(&boot->plan);
-}
-
-static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
-{
-    boot->client.status = SDO_CLIENT_IDLE;
-    boot->reading_back = false;
-    if (!drive_plan_refused(&boot->plan, abort_code)) {
-        give_up(boot, abort_code, value);
-    }
-}
-
-static bool as_wanted(const struct drive_op *op, uint32_t value)
-{
-    return ((value ^ op->value) & op->mask) == 0u;
-}
-
-/* What a write should have made so, or what only the drive knows. */
-static void judge_read(struct drive_boot *boot)
-{
-    const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
-    if (as_wanted(&boot->op, value)) {
-        drive_facts_learn(boot->plan.facts, boot->op.fact, value);
-        advance(boot);
-    } else if (boot->reading_back) {
-        refused(boot, boot->refused_code, value);
-    } else if (++boot->reads < DRIVE_BOOT_READS) {
-        boot->client.status = SDO_CLIENT_IDLE;
-        boot->pause_us = DRIVE_BOOT_READ_AGAIN_US;
-    } else {
-        refused(boot, SDO_OK, value);
-    }
-}
-
-static void judge_refusal(struct drive_boot *boot, uint32_t abort_code)
-{
-    const bool missing = abort_code == SDO_ABORT_NO_OBJECT || abort_code == SDO_ABORT_NO_SUB;
-    if (boot->op.kind == DRIVE_OP_PREPARE || (boot->op.optional && missing)) {
-        advance(boot);
-    } else if (boot->op.kind == DRIVE_OP_WRITE && !missing && !boot->reading_back) {
-        boot->client.status = SDO_CLIENT_IDLE;
-        boot->reading_back = true;
-        boot->refused_code = abort_code;
-    } else {
-        refused(boot, boot->reading_back ? boot->refused_code : abort_code, 0);
-    }
-}
-
-static void judge(struct drive_boot *boot)
-{
-    if (boot->client.status == SDO_CLIENT_FAILED) {
-        give_up(boot, boot->client.abort_code, 0);
-    } else if (boot->client.status == SDO_CLIENT_REFUSED) {
-        judge_refusal(boot, boot->client.abort_code);
-    } else if (boot->op.kind == DRIVE_OP_READ || boot->reading_back) {
-        judge_read(boot);
-    } else {
-        advance(boot);
-    }
-}
-
 static int begin_op(struct drive_boot *boot, struct can_msg *out)
 {
     const struct drive_op *op = &boot->op;
-    const uint8_t node = node_of(boot);
+    const uint8_t node = drive_boot_node(boot);
     if (op->kind == DRIVE_OP_NMT_PRE_OPERATIONAL) {
         nmt_master_command(NMT_ENTER_PRE_OPERATIONAL, node, out);
-        advance(boot);
+        drive_boot_advance(boot);
         return 1;
     }
     const int sent = op->kind == DRIVE_OP_READ || boot->reading_back
@@ -158,7 +70,7 @@ static int configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_ms
         return sdo_client_process(&boot->client, elapsed_us, out);
     }
     if (boot->client.status != SDO_CLIENT_IDLE) {
-        judge(boot);
+        drive_boot_judge(boot);
     }
     if (boot->phase != DRIVE_BOOT_CONFIGURE || waits(boot, elapsed_us)) {
         return 0;
@@ -174,7 +86,7 @@ static int configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_ms
 
 static int start_next(struct drive_boot *boot, struct can_msg *out)
 {
-    nmt_master_command(NMT_START, node_of(boot), out);
+    nmt_master_command(NMT_START, drive_boot_node(boot), out);
     boot->axis++;
     if (boot->axis == boot->config.axis_count) {
         boot->phase = DRIVE_BOOT_DONE;
@@ -200,7 +112,7 @@ static bool nodes_clash(struct drive_boot *boot)
             boot->axis = i;
             boot->op.index = AXIS_NODE;
             boot->op.sub = (uint8_t)(i + 1u);
-            give_up(boot, SDO_ABORT_INCOMPATIBLE, node_of(boot));
+            drive_boot_give_up(boot, SDO_ABORT_INCOMPATIBLE, drive_boot_node(boot));
             return true;
         }
     }

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "app/drives/homing_private.h"
 #include "canopen/cia402.h"
 #include "port/port.h"
 
@@ -15,16 +16,6 @@ void homing_init(struct homing *homing)
 bool homing_busy(const struct homing *homing)
 {
     return homing->phase != HOMING_IDLE;
-}
-
-uint32_t homing_time_s(const struct config *config, uint8_t axis)
-{
-    const struct config_axis *settings = &config->axis[axis];
-    const uint32_t travel_counts =
-        (uint32_t)config->travel_max_counts[axis] - (uint32_t)config->travel_min_counts[axis];
-    const uint64_t time_s = (uint64_t)travel_counts / settings->homing_speed_towards_counts_s +
-                            travel_counts / settings->homing_speed_away_counts_s + HOMING_SPARE_S;
-    return time_s < HOMING_MAX_S ? (uint32_t)time_s : HOMING_MAX_S;
 }
 
 static bool wanted(const struct machine *machine, uint8_t axis)
@@ -52,13 +43,6 @@ static enum machine_refusal drives_refusal(const struct machine *machine,
                                                               : MACHINE_NOTHING_TO_HOME;
 }
 
-static void enter(struct homing *homing, const struct machine *machine, enum homing_phase phase)
-{
-    homing->phase = phase;
-    homing->began_syncs = machine->statistics.syncs;
-    homing_mode_begin(&homing->mode);
-}
-
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
                                   const struct drive_facts *facts)
 {
@@ -73,7 +57,7 @@ enum machine_refusal homing_begin(struct homing *homing, struct machine *machine
     if (refusal == MACHINE_ACCEPTED) {
         homing_init(homing);
         homing->axis = next_axis(machine, 0);
-        enter(homing, machine, HOMING_MODE);
+        homing_enter(homing, machine, HOMING_MODE);
     }
     port_unlock();
     return refusal;
@@ -87,67 +71,12 @@ static void fail(struct homing *homing, struct machine *machine, uint16_t code, 
     port_unlock();
 }
 
-/* True when the phase has lasted longer. Under the lock. */
-static bool over(const struct homing *homing, const struct machine *machine, uint64_t time_us)
-{
-    const uint32_t syncs = machine->statistics.syncs - homing->began_syncs;
-    return (uint64_t)syncs * machine->config.period_us > time_us;
-}
-
-/* CiA 402-2: bit 13 error, bits 12 and 10 together: attained. Returns a fault code or 0. */
-static uint16_t judge_move(struct homing *homing, struct machine *machine)
-{
-    struct axis *axis = &machine->axes[homing->axis];
-    const uint16_t attained = CIA402_STATUS_HOMING_ATTAINED | CIA402_STATUS_TARGET_REACHED;
-    const uint64_t time_us = UINT64_C(1000000) * homing_time_s(&machine->config, homing->axis);
-    if (machine->statistics.syncs - homing->began_syncs < HOMING_SYNCS_BEFORE_ANSWER) {
-        return 0;
-    }
-    if ((axis->statusword & CIA402_STATUS_HOMING_ERROR) != 0u) {
-        return FAULT_HOMING_FAILED;
-    }
-    if ((axis->statusword & attained) == attained) {
-        axis->homed = true;
-        axis->control_extra = 0;
-        axis->goal = CIA402_GOAL_OFF;
-        enter(homing, machine, HOMING_DISABLE);
-        return 0;
-    }
-    return over(homing, machine, time_us) ? FAULT_HOMING_LATE : 0u;
-}
-
-static uint16_t step_enable(struct homing *homing, struct machine *machine)
-{
-    struct axis *axis = &machine->axes[homing->axis];
-    axis->goal = CIA402_GOAL_ENABLED;
-    if (axis_enabled(axis)) {
-        axis->control_extra = CIA402_CONTROL_START_HOMING;
-        enter(homing, machine, HOMING_MOVE);
-    }
-    return over(homing, machine, HOMING_SWITCH_US) ? FAULT_NOT_ENABLED : 0u;
-}
-
-static uint16_t step_disable(struct homing *homing, struct machine *machine)
-{
-    if (cia402_master_reached(CIA402_GOAL_OFF, machine->axes[homing->axis].statusword)) {
-        enter(homing, machine, HOMING_MODE_BACK);
-    }
-    return over(homing, machine, HOMING_SWITCH_US) ? FAULT_HOMING_LATE : 0u;
-}
-
 /* What the process data of the drive decide. */
 static void step_drive(struct homing *homing, struct machine *machine)
 {
     port_lock();
     const uint16_t statusword = machine->axes[homing->axis].statusword;
-    uint16_t code = 0;
-    if (homing->phase == HOMING_ENABLE) {
-        code = step_enable(homing, machine);
-    } else if (homing->phase == HOMING_MOVE) {
-        code = judge_move(homing, machine);
-    } else {
-        code = step_disable(homing, machine);
-    }
+    const uint16_t code = homing_drive_step(homing, machine);
     port_unlock();
     if (code != 0u) {
         fail(homing, machine, code, statusword);
@@ -158,11 +87,11 @@ static void mode_done(struct homing *homing, struct machine *machine)
 {
     port_lock();
     if (homing->phase == HOMING_MODE) {
-        enter(homing, machine, HOMING_ENABLE);
+        homing_enter(homing, machine, HOMING_ENABLE);
     } else {
         homing->axis = next_axis(machine, (uint8_t)(homing->axis + 1u));
         if (homing->axis < machine->config.axis_count) {
-            enter(homing, machine, HOMING_MODE);
+            homing_enter(homing, machine, HOMING_MODE);
         } else {
             homing->phase = HOMING_IDLE;
             machine_end_homing(machine);

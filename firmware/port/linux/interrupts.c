@@ -5,15 +5,13 @@
 #include <errno.h>
 #include <poll.h>
 #include <pthread.h>
-#include <sched.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <time.h>
 
 #include "port/linux/clock.h"
+#include "port/linux/interrupts_thread.h"
 #include "port/linux/schedule.h"
 
-#define PRIORITY         60         /* above the kernel's threaded interrupts (50) */
 #define LONGEST_SLEEP_NS 100000000u /* how late a wish to end may be noticed */
 #define BATCHES_MAX      8u
 
@@ -171,43 +169,6 @@ int interrupts_begin(struct can_socket *socket, bool lock_step)
     return make_lock() == 0 ? 0 : PORT_ERR_SYSTEM;
 }
 
-static int create_thread(int policy, int priority)
-{
-    pthread_attr_t attributes;
-    const struct sched_param parameters = {.sched_priority = priority};
-    (void)pthread_attr_init(&attributes);
-    (void)pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-    (void)pthread_attr_setschedpolicy(&attributes, policy);
-    (void)pthread_attr_setschedparam(&attributes, &parameters);
-    const int error = pthread_create(&self.thread, &attributes, run, NULL);
-    (void)pthread_attr_destroy(&attributes);
-    return error;
-}
-
-static int create_real_time_thread(void)
-{
-    if (mlockall(MCL_CURRENT) != 0) {
-        port_log(PORT_NOTE, "memory is not locked, page faults can delay ticks: errno", errno);
-    }
-    const int error = create_thread(SCHED_FIFO, PRIORITY);
-    if (error != EPERM) {
-        return error;
-    }
-    port_log(PORT_NOTE, "no permission for SCHED_FIFO, ticks come as the scheduler likes: errno",
-             error);
-    return create_thread(SCHED_OTHER, 0);
-}
-
-/* A batch thread does not interrupt the simulated drives when the first of them has answered: it is
- * woken once for all answers. glibc refuses SCHED_BATCH as a thread attribute, so the thread sets
- * it itself. */
-static void *run_lock_step(void *unused)
-{
-    const struct sched_param none = {.sched_priority = 0};
-    (void)sched_setscheduler(0, SCHED_BATCH, &none);
-    return run(unused);
-}
-
 int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
 {
     self.handlers = *handlers;
@@ -216,8 +177,8 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
         return PORT_ERR_SYSTEM;
     }
     schedule_begin(&self.schedule, self.now_ns, (uint64_t)period_us * 1000u, self.lock_step);
-    const int error = self.lock_step ? pthread_create(&self.thread, NULL, run_lock_step, NULL)
-                                     : create_real_time_thread();
+    const int error = self.lock_step ? interrupts_thread_batch(&self.thread, run)
+                                     : interrupts_thread_real_time(&self.thread, run);
     self.started = error == 0;
     return error == 0 ? 0 : PORT_ERR_SYSTEM;
 }

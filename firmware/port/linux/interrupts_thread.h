@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+/* interrupts_thread: how the thread of the interrupts is made: as one that others wait for, or as one that waits for
+ * others. Mainline. */
+#ifndef PORT_LINUX_INTERRUPTS_THREAD_H
+#define PORT_LINUX_INTERRUPTS_THREAD_H
+
+#include <pthread.h>
+
+/* Starts `run` under SCHED_FIFO, with memory locked; where that is not permitted says so once and starts it as an
+ * ordinary thread. 0 or an errno. */
+int interrupts_thread_real_time(pthread_t *thread, void *(*run)(void *unused));
+
+/* Starts `run` under SCHED_BATCH: it does not interrupt the simulated drives when the first of them has answered, but is
+ * woken once for all answers. 0 or an errno. */
+int interrupts_thread_batch(pthread_t *thread, void *(*run)(void *unused));
+
+#endif
