@@ -1,63 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/od_read.h"
 
+#include "app/od_read_axis.h"
+#include "app/od_read_pdo.h"
+#include "app/od_read_program.h"
 #include "canopen/sdo_abort.h"
 #include "port/port.h"
 
-static uint64_t of_i32(int32_t value)
-{
-    return (uint64_t)(int64_t)value;
-}
-
-static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
-{
-    const struct program_header *header = &slot->program.header;
-    switch (sub) {
-    case 5:
-        return header->crc32;
-    case 6:
-        return header->image_size;
-    case 7:
-        return header->segment_count;
-    case 8:
-        return header->piece_count;
-    case 9:
-        return program_ticks(&slot->program);
-    case 10:
-        return header->duration_q32_s;
-    case 11:
-        return (uint64_t)header->length_q40_mm;
-    default:
-        return 0;
-    }
-}
-
-static uint64_t place_number(struct controller *controller, uint8_t sub)
-{
-    struct program_slot *slot = &controller->slot;
-    program_slot_refresh(slot, &controller->config);
-    const int32_t *counts = sub < 14u ? slot->start_counts : slot->end_counts;
-    return of_i32(counts[sub & 1u]);
-}
-
-static uint64_t program_number(struct controller *controller, uint8_t sub)
-{
-    const struct program_slot *slot = &controller->slot;
-    switch (sub) {
-    case 2:
-        return (uint64_t)program_slot_state(slot);
-    case 3:
-        return of_i32(slot->refused.code);
-    case 4:
-        return slot->refused.index;
-    default:
-        break;
-    }
-    if (!slot->present) {
-        return 0;
-    }
-    return sub < 12u ? header_number(slot, sub) : place_number(controller, sub);
-}
+#define FIRST_MANUFACTURER_OBJECT 0x2000u
 
 /* While the drives are being looked for, node and detail tell which one keeps the others waiting.
  */
@@ -103,7 +53,7 @@ static uint64_t motion_number(const struct motion *motion, uint8_t sub)
     case 1:
         return (uint64_t)motion->point.arc_length_q40_mm;
     case 2:
-        return of_i32(motion_feed_um_s(motion));
+        return (uint64_t)(int64_t)motion_feed_um_s(motion);
     default:
         return motion->time_q32_s;
     }
@@ -136,37 +86,6 @@ static uint64_t boot_number(const struct drive_boot *boot, uint8_t sub)
     }
 }
 
-static uint64_t drive_state(const struct axis *axis)
-{
-    return axis->answers.present ? (uint64_t)axis->state + 1u : 0u;
-}
-
-static uint64_t axis_number(const struct axis *axis, uint16_t index)
-{
-    switch (index) {
-    case 0x2017:
-        return axis->homed ? 1u : 0u;
-    case 0x201B:
-        return axis->digital_inputs;
-    case 0x201C:
-        return of_i32(axis->following_error_counts);
-    case 0x2024:
-        return axis->answers.missed;
-    case 0x2026:
-        return drive_state(axis);
-    case 0x200A:
-        return axis->statusword;
-    case 0x200B:
-        return of_i32(axis->position_counts);
-    case 0x200C:
-        return axis->error_code;
-    case 0x200D:
-        return of_i32(axis->target_sent_counts);
-    default:
-        return axis->controlword;
-    }
-}
-
 static uint64_t machine_number(const struct controller *controller, const struct od_entry *entry)
 {
     const struct machine *machine = &controller->machine;
@@ -189,7 +108,7 @@ static uint64_t machine_number(const struct controller *controller, const struct
     case 0x202A:
         return controller->boot.facts[entry->sub - 1u].value[entry->index - 0x2027u];
     default:
-        return axis_number(&machine->axes[entry->sub - 1u], entry->index);
+        return od_read_axis(&machine->axes[entry->sub - 1u], entry->index);
     }
 }
 
@@ -200,7 +119,7 @@ static bool is_mirror(const struct od_entry *entry)
     }
     static const uint16_t records[] = {0x2003, 0x2008, 0x2009, 0x200A, 0x200B, 0x200C, 0x200D,
                                        0x200E, 0x2010, 0x2017, 0x201B, 0x201C, 0x2024, 0x2025,
-                                       0x2026, 0x2027, 0x2028, 0x2029, 0x202A};
+                                       0x2026, 0x2027, 0x2028, 0x2029, 0x202A, 0x202B, 0x202C};
     for (size_t i = 0; i < sizeof records / sizeof records[0]; ++i) {
         if (records[i] == entry->index) {
             return entry->sub > 0u;
@@ -209,11 +128,24 @@ static bool is_mirror(const struct od_entry *entry)
     return false;
 }
 
+static void read_pdo(struct controller *controller, const struct od_entry *entry)
+{
+    uint64_t number;
+    port_lock();
+    const bool depends = od_read_pdo(&controller->machine, entry, &number);
+    port_unlock();
+    if (depends) {
+        od_set_number(&controller->od, entry, number);
+    }
+}
+
 uint32_t od_read_hook(void *context, const struct od_entry *entry)
 {
     struct controller *controller = context;
-    if (entry->index == 0x2000 && entry->sub > 1u) {
-        od_set_number(&controller->od, entry, program_number(controller, entry->sub));
+    if (entry->index < FIRST_MANUFACTURER_OBJECT) {
+        read_pdo(controller, entry);
+    } else if (entry->index == 0x2000 && entry->sub > 1u) {
+        od_set_number(&controller->od, entry, od_read_program(controller, entry->sub));
     } else if (is_mirror(entry)) {
         port_lock();
         const uint64_t number = machine_number(controller, entry);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* od_read: what the host reads: objects 0x2000 (but its image), 0x2002, 0x2003, 0x2008 ... 0x200E.
+/* od_read: what the host reads: objects 0x2000 (but its image), 0x2002 ... 0x202C, PDO parameters.
  * Mainline. */
 #ifndef APP_OD_READ_H
 #define APP_OD_READ_H

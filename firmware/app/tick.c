@@ -61,7 +61,8 @@ static void send_setpoints(struct tick *tick, const struct feedforward_offset *o
         struct axis *axis = &machine->axes[i];
         axis_setpoint(axis, machine->config.start_tolerance_counts);
         if (axis->torque_mapped) {
-            pdo_add_torque(&axis->setpoint, offset[i].torque_permille);
+            axis->torque_offset_permille = offset[i].torque_permille;
+            pdo_add_torque(&axis->setpoint, axis->torque_offset_permille);
         }
         if (send(tick, &axis->setpoint)) {
             axis_sent(axis);
@@ -71,14 +72,15 @@ static void send_setpoints(struct tick *tick, const struct feedforward_offset *o
 
 static void send_velocities(struct tick *tick, const struct feedforward_offset *offset)
 {
-    const struct machine *machine = tick->machine;
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+    struct machine *machine = tick->machine;
+    for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
+        struct axis *axis = &machine->axes[i];
         struct can_msg velocity;
-        if (!machine->axes[i].velocity_mapped) {
-            continue;
+        if (axis->velocity_mapped) {
+            axis->velocity_offset_counts_s = offset[i].velocity_counts_s;
+            pdo_encode_velocity(axis->node, axis->velocity_offset_counts_s, &velocity);
+            (void)send(tick, &velocity);
         }
-        pdo_encode_velocity(machine->axes[i].node, offset[i].velocity_counts_s, &velocity);
-        (void)send(tick, &velocity);
     }
 }
 

@@ -130,6 +130,44 @@ static void test_gains_change_without_a_new_boot(void)
     TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, bench.controller.machine.state);
 }
 
+static void expect_pdo(uint16_t index, uint8_t sub, uint32_t value)
+{
+    TEST_ASSERT_EQUAL_HEX32(value, (uint32_t)app_bench_read(&bench, index, sub));
+}
+
+static void test_the_dictionary_says_what_is_sent_without_offsets(void)
+{
+    prepare(0);
+    expect_pdo(0x1400, 1, 0x182);
+    expect_pdo(0x1800, 1, 0x202);
+    expect_pdo(0x1801, 1, 0x203);
+    expect_pdo(0x1402, 1, 0x80000184); /* no third axis */
+    expect_pdo(0x1802, 1, 0x80000204);
+    expect_pdo(0x1A00, 0, 2);
+    expect_pdo(0x1A00, 3, 0);
+    expect_pdo(0x1806, 1, 0x80000302);
+    expect_pdo(0x1A06, 0, 0);
+    expect_pdo(0x1A06, 1, 0);
+}
+
+static void test_the_dictionary_says_what_is_sent_with_offsets(void)
+{
+    prepare(3);
+    expect_pdo(0x1A00, 0, 3);
+    expect_pdo(0x1A00, 2, 0x200D0120);
+    expect_pdo(0x1A01, 3, 0x202B0210);
+    expect_pdo(0x1806, 1, 0x302);
+    expect_pdo(0x1808, 1, 0x80000304);
+    expect_pdo(0x1A07, 0, 1);
+    expect_pdo(0x1A07, 1, 0x202C0220);
+    start();
+    app_bench_periods(&bench, 250);
+    TEST_ASSERT_TRUE(x_drive()->torque_permille > 0);
+    expect_pdo(0x202B, 1, (uint32_t)x_drive()->torque_permille);
+    expect_pdo(0x202C, 1, (uint32_t)x_drive()->velocity_counts_s);
+    expect_pdo(0x202C, 2, 0);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -137,6 +175,8 @@ int main(void)
     RUN_TEST(test_both);
     RUN_TEST(test_velocity_belongs_to_the_way_of_its_setpoint);
     RUN_TEST(test_nothing_while_held_and_off);
+    RUN_TEST(test_the_dictionary_says_what_is_sent_without_offsets);
+    RUN_TEST(test_the_dictionary_says_what_is_sent_with_offsets);
     RUN_TEST(test_gains_change_without_a_new_boot);
     return UNITY_END();
 }

@@ -42,13 +42,15 @@ struct axis {
     enum cia402_goal goal;
     bool
         engaged; /* seen in Operation enabled since it was told to go there: its target is its own */
-    bool by_itself;       /* it homes: moves by its own motion, its target follows its position */
-    bool torque_mapped;   /* its RPDO1 takes a torque offset */
-    bool velocity_mapped; /* its RPDO2 takes a velocity offset */
-    uint32_t digital_inputs;        /* 0x60FD */
-    int32_t following_error_counts; /* 0x60F4, looked at a few times a second */
-    bool homed;                     /* since it was found */
-    uint32_t rest_syncs;            /* in Quick stop active: for how long it has been at */
+    bool by_itself; /* it homes: moves by its own motion, its target follows its position */
+    int32_t velocity_offset_counts_s; /* put into its RPDO2 last */
+    int16_t torque_offset_permille;   /* put into its RPDO1 last */
+    bool torque_mapped;               /* its RPDO1 takes a torque offset */
+    bool velocity_mapped;             /* its RPDO2 takes a velocity offset */
+    uint32_t digital_inputs;          /* 0x60FD */
+    int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
+    bool homed;                       /* since it was found */
+    uint32_t rest_syncs;              /* in Quick stop active: for how long it has been at */
     int32_t rest_counts;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
