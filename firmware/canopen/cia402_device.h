@@ -27,9 +27,9 @@ enum cia402_action {
 
 /* Option codes, from the object dictionary. */
 struct cia402_options {
-    int16_t quick_stop; /* 0x605A: 0 power off; 1, 2, 3 stop, then Switch on disabled; 5, 6, 7 stop
+    int16_t quick_stop; /* 0x605A: 0 power off; 1 ... 4 stop, then Switch on disabled; 5 ... 8 stop
                            and stay */
-    int16_t fault_reaction; /* 0x605E: 0 power off; 1, 2, 3 stop, then Fault */
+    int16_t fault_reaction; /* 0x605E: 0 power off; 1 ... 4 stop, then Fault */
     int16_t shutdown;       /* 0x605B: 0 power off; 1 stop, then Ready to switch on */
     int16_t disable;        /* 0x605C: 0 power off; 1 stop, then Switched on */
 };

@@ -104,6 +104,17 @@ bool axis_motion_hold(struct axis_motion *axis)
     return rests;
 }
 
+bool axis_motion_brake(struct axis_motion *axis, enum axis_motion_limit limit)
+{
+    const struct drive_plant *plant = &axis->config.plant;
+    const double volts = limit == AXIS_MOTION_CURRENT
+                             ? axis->rated_torque_nm * plant->torque_to_volts
+                             : plant->volts_limit;
+    const bool rests = influence_brake(&axis->influence, &axis->drive, volts);
+    axis_motion_rest(axis);
+    return rests;
+}
+
 /* Change of speed in one period, counts per period: at least one, so that every ramp ends. */
 static int64_t axis_motion_change(const struct axis_motion *axis, uint32_t acceleration_counts_s2)
 {

@@ -50,6 +50,11 @@ void axis_motion_follow(struct axis_motion *axis, int32_t target_counts);
 /* One period without power, on the brake. Returns true when the axis is at rest. */
 bool axis_motion_hold(struct axis_motion *axis);
 
+/* One period in which the motor brakes with all that its limit allows: of the current (rated torque) or of the voltage.
+ * Returns true when the axis is at rest; its target is then where it is. */
+enum axis_motion_limit { AXIS_MOTION_CURRENT, AXIS_MOTION_VOLTAGE };
+bool axis_motion_brake(struct axis_motion *axis, enum axis_motion_limit limit);
+
 /* One period in which the target's speed nears `speed` (counts a period) by at most the
  * acceleration (counts/s^2). Returns true when it has that speed. */
 bool axis_motion_ramp(struct axis_motion *axis, int64_t speed_counts_period,

@@ -3,9 +3,6 @@
 
 #define CONTROL_HOMING_START 0x0010u
 
-/* 0x605A and 0x605E: the slow down ramp 0x6084 instead of the quick stop ramp 0x6085. */
-enum { RAMP_SLOW = 1, RAMP_SLOW_AND_STAY = 5 };
-
 /* The beginning of Operation enabled. A drive that is switched on by hand, without a setpoint, stays
  * where it is. */
 static void drive_node_enabled(struct drive_node *node)
@@ -14,6 +11,7 @@ static void drive_node_enabled(struct drive_node *node)
     node->silence_us = 0;
     node->sync_lost = false;
     drive_node_forgive(node);
+    drive_node_no_stop(node);
     if (!node->setpoint_fresh) {
         node->values.target_position = node->axis.target_counts;
     }
@@ -68,13 +66,6 @@ static void drive_node_offsets(struct drive_node *node, bool on)
     node->offsets_act = act;
 }
 
-static uint32_t drive_node_quick_ramp(const struct drive_node *node, int16_t option)
-{
-    return option == RAMP_SLOW || option == RAMP_SLOW_AND_STAY
-               ? node->values.profile_deceleration
-               : node->values.quick_stop_deceleration;
-}
-
 /* Returns false when the setpoint leads further onto a limit switch: nothing has moved yet. */
 static bool drive_node_follow(struct drive_node *node)
 {
@@ -109,10 +100,10 @@ static void drive_node_move(struct drive_node *node)
         drive_node_stop(node, v->profile_deceleration);
         break;
     case CIA402_STOP_QUICKLY:
-        drive_node_stop(node, drive_node_quick_ramp(node, v->quick_stop_option_code));
+        drive_node_stop_as(node, v->quick_stop_option_code);
         break;
     case CIA402_STOP_FOR_FAULT:
-        drive_node_stop(node, drive_node_quick_ramp(node, v->fault_reaction_option_code));
+        drive_node_stop_as(node, v->fault_reaction_option_code);
         break;
     default:
         drive_node_no_stop(node);

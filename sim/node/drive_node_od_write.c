@@ -65,12 +65,6 @@ static uint32_t drive_node_counter_write(const struct drive_node *node, uint32_t
     return node->values.communication_cycle_period == 0 ? SDO_OK : SDO_ABORT_STATE;
 }
 
-/* 0x605A: 3, 4 (current or voltage limit) this drive does not have. */
-static uint32_t drive_node_quick_stop_write(uint32_t value)
-{
-    return value == 3 || value == 4 ? SDO_ABORT_VALUE : SDO_OK;
-}
-
 uint32_t drive_node_od_write(void *context, const struct od_entry *entry, const uint8_t *value,
                              uint32_t size)
 {
@@ -86,8 +80,6 @@ uint32_t drive_node_od_write(void *context, const struct od_entry *entry, const 
         return drive_node_counter_write(node, number);
     case OD_DRIVE_MODES_OF_OPERATION:
         return drive_node_mode_write(node, cob_signed(number, size));
-    case OD_DRIVE_QUICK_STOP_OPTION_CODE:
-        return drive_node_quick_stop_write(number);
     case OD_DRIVE_HOMING_METHOD:
         return home_seek_supports((int8_t)cob_signed(number, size)) ? SDO_OK : SDO_ABORT_VALUE;
     case OD_DRIVE_POSITION_ENCODER_RESOLUTION:

@@ -58,6 +58,9 @@ void drive_node_step(struct drive_node *node);
 /* drive_node_stop.c: one period of a stop, which ends with cia402_device_stopped when the motor is
  * at rest; and: no stop now. */
 void drive_node_stop(struct drive_node *node, uint32_t deceleration_counts_s2);
+
+/* One period of the stop that an option code (0x605A, 0x605E; not 0) asks for: by a ramp, or at the motor's limits. */
+void drive_node_stop_as(struct drive_node *node, int16_t option);
 void drive_node_no_stop(struct drive_node *node);
 bool drive_node_settled(const struct drive_node *node);
 

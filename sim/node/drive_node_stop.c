@@ -16,6 +16,7 @@ void drive_node_no_stop(struct drive_node *node)
 {
     node->settled_us = 0;
     node->stopping_us = 0;
+    node->braked = false;
 }
 
 /* The ramp is the reference's; the stop has ended when the motor, too, has stood in the position
@@ -33,4 +34,19 @@ void drive_node_stop(struct drive_node *node, uint32_t deceleration_counts_s2)
         node->stopping_us = 0;
         (void)cia402_device_stopped(&node->device);
     }
+}
+
+/* 0x605A and 0x605E: what the codes from 1 on mean, those from STAY on for 0x605A only. */
+enum { SLOW = 1, CURRENT_LIMIT = 3, VOLTAGE_LIMIT = 4, STAY = 4 };
+
+void drive_node_stop_as(struct drive_node *node, int16_t option)
+{
+    const struct od_drive *v = &node->values;
+    const int16_t how = option > STAY ? (int16_t)(option - STAY) : option;
+    if (!node->braked && (how == CURRENT_LIMIT || how == VOLTAGE_LIMIT)) {
+        node->braked = axis_motion_brake(&node->axis, how == CURRENT_LIMIT ? AXIS_MOTION_CURRENT
+                                                                           : AXIS_MOTION_VOLTAGE);
+        return;
+    }
+    drive_node_stop(node, how == SLOW ? v->profile_deceleration : v->quick_stop_deceleration);
 }

@@ -110,3 +110,13 @@ bool influence_coast(const struct influence *in, struct drive *d, double brake_v
     d->target_counts = influence_read_counts(in, d);
     return motor.speed_rad_s == 0.0 && held;
 }
+
+/* Volts against the motion act as friction does, which stops a motion but does not turn it round. */
+bool influence_brake(const struct influence *in, struct drive *d, double volts)
+{
+    const double most = volts < in->volts_limit ? volts : in->volts_limit;
+    const bool forward = d->state.motor.speed_rad_s > 0.0;
+    const bool rests = influence_coast(in, d, most);
+    d->state.volts = rests ? 0.0 : (forward ? -most : most);
+    return rests;
+}

@@ -49,7 +49,6 @@ NOT_ALL_VALUES = {
     "drive": {
         (0x1003, 0),
         (0x1019, 0),  # only while 0x1006 is 0
-        (0x605A, 0),  # not 3 and 4
         (0x6060, 0),  # takes the modes that there are
         (0x608F, 1),  # the encoder's own
         (0x608F, 2),

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The drive as a whole through the states of CiA 402-2: commands, option codes, stops of the motor. */
+#include <math.h>
+
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 #include "drive_bench.h"
@@ -145,15 +147,77 @@ static void test_quick_stop_codes(void)
     }
 }
 
+/* Way of a motor that is braked from `speed` mm/s with constant volts, mm: the solution of its equation (plant/motor.h). */
+static double braking_way_mm(double speed_mm_s, double volts)
+{
+    const struct drive_plant *plant = &drive_bench_config.plant;
+    const double speed_rad_s = speed_mm_s / plant->screw_mm_rad;
+    const double end_rad_s = plant->gain_rad_s_v * volts; /* where it would go to */
+    const double time_s = plant->time_constant_s * log(1.0 + speed_rad_s / end_rad_s);
+    return plant->screw_mm_rad * (plant->time_constant_s * speed_rad_s - end_rad_s * time_s);
+}
+
+/* 0x605A = 3, 4 and 7, 8: at the limit of the current, of the voltage; by the motor's own law, and it is held there. */
+static void test_quick_stop_at_the_motors_limits(void)
+{
+    static const struct {
+        int16_t code;
+        double volts;
+        enum cia402_state end;
+    } rows[] = {
+        {3, 2.5, CIA402_SWITCH_ON_DISABLED},
+        {4, 5.0, CIA402_SWITCH_ON_DISABLED},
+        {7, 2.5, CIA402_QUICK_STOP_ACTIVE},
+        {8, 5.0, CIA402_QUICK_STOP_ACTIVE},
+    };
+    for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        drive_bench_begin();
+        put(0x605A, rows[i].code);
+        drive_bench_enable();
+        move(400);
+        const double speed_mm_s = (double)axis_motion_speed(&bench.node.axis) * 1e-6;
+        const int32_t from = axis_motion_position(&bench.node.axis);
+        bench.word = CIA402_QUICK_STOP;
+        drive_bench_run(1);
+        TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+        TEST_ASSERT_INT_WITHIN(1, (int)(-1000.0 * rows[i].volts),
+                               drive_volts_mv(&bench.node.axis.drive));
+        drive_bench_run(1500);
+        const double way_mm = (double)(axis_motion_position(&bench.node.axis) - from) * 1e-6;
+        /* half a servo sample at speed, and the encoder's increment */
+        TEST_ASSERT_DOUBLE_WITHIN(0.005, braking_way_mm(speed_mm_s, rows[i].volts), way_mm);
+        TEST_ASSERT_EQUAL_INT(rows[i].end, state());
+        TEST_ASSERT_EQUAL_INT32(0, axis_motion_speed(&bench.node.axis));
+    }
+}
+
+/* A second stop brakes again. */
+static void test_a_quick_stop_that_stays_can_be_left_and_repeated(void)
+{
+    drive_bench_begin();
+    put(0x605A, 8);
+    drive_bench_enable();
+    for (int k = 0; k < 2; k++) {
+        move(300);
+        bench.word = CIA402_QUICK_STOP;
+        drive_bench_run(1);
+        TEST_ASSERT_INT_WITHIN(1, -5000, drive_volts_mv(&bench.node.axis.drive));
+        drive_bench_run(1500);
+        TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_TARGET_REACHED) != 0);
+        bench.target = axis_motion_position(&bench.node.axis);
+        bench.word = CIA402_ENABLE_OPERATION;
+        drive_bench_run(1);
+        TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    }
+}
+
 static void test_codes_that_do_not_exist(void)
 {
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x605A, 0, 3));
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x605A, 0, 4));
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605A, 0, 7));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605A, 0, 9));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_LOW, drive_bench_write(0x605A, 0, -1));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605B, 0, 2));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605C, 0, 2));
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605E, 0, 3));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x605E, 0, 5));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, drive_bench_write(0x6007, 0, 4));
 }
 
@@ -355,6 +419,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_every_command_in_every_state);
     RUN_TEST(test_quick_stop_codes);
+    RUN_TEST(test_quick_stop_at_the_motors_limits);
+    RUN_TEST(test_a_quick_stop_that_stays_can_be_left_and_repeated);
     RUN_TEST(test_codes_that_do_not_exist);
     RUN_TEST(test_leaving_operation_enabled);
     RUN_TEST(test_a_stop_called_off);
