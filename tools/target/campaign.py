@@ -53,6 +53,9 @@ SCENARIOS = (
 )
 
 
+# Of the whole interrupt only: plain adversary, drives that leave every third SYNC unanswered (tests/target/isr.c).
+SILENT = "plain, silent"
+
 SECTIONS = ("motion", "isr", "receive")
 
 
@@ -78,15 +81,21 @@ class Campaign:
             for name, image in group.items()
         }
 
-    def scenario(self, counter: Counter, kernel: str, scenario: Scenario) -> Counts:
-        """All ticks of a scenario."""
+    def scenario(
+        self, counter: Counter, kernel: str, scenario: Scenario, file: Path | None = None
+    ) -> Counts:
+        """All ticks of a scenario. `file` goes to the image as its second word."""
         programs = b"".join(self.images[scenario.programs].values())
-        runs = [counter.count(kernel, programs, _commands(name)) for name in scenario.commands]
+        runs = [
+            counter.count(kernel, programs, _commands(name), setpoints=file)
+            for name in scenario.commands
+        ]
         return np.concatenate(runs)
 
     def interrupts(self, counter: Counter, kernel: str) -> dict[str, Any]:
         """Figures of the interrupts that give setpoints of a program, and of those in which it settles at its end."""
         counts = {s.name: self.scenario(counter, kernel, s) for s in SCENARIOS}
+        counts[SILENT] = self.scenario(counter, kernel, SCENARIOS[1], Path("silent"))
         given = PARTS.index("feed")
         moving = {name: figures(c[c[:, given] > 0]) for name, c in counts.items()}
         plain = counts[SCENARIOS[0].name]
