@@ -7,5 +7,8 @@ KERNELS = ("fixed", "float", "double")
 INTERPOLATIONS = ("linear", "cubic")
 """How a simulated drive goes from setpoint to setpoint, in the order of enum drive_interpolation."""
 
+SPEEDS = ("exact", "differences")
+"""Where a simulated drive's loop has its speed from, in the order of enum drive_speed."""
+
 PACES = ("real-time", "fast")
 """How a controller process of a simulated machine may tick."""

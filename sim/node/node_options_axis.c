@@ -33,6 +33,8 @@ static const struct key keys[] = {
     {"loop_rate_hz", AT(config.loop_rate_hz), KEY_U32, false},
     {"counts_per_mm", AT(config.counts_per_mm), KEY_U32, false},
     {"interpolation", AT(config.interpolation), KEY_U32, false},
+    {"speed", AT(config.speed), KEY_U32, false},
+    {"delay_samples", AT(config.delay_samples), KEY_U32, false},
     {"position_mm", AT(position_mm), KEY_NUMBER, false},
     {"limit_negative_mm", AT(equipment.limit_negative_mm), KEY_NUMBER, false},
     {"limit_positive_mm", AT(equipment.limit_positive_mm), KEY_NUMBER, false},

@@ -32,6 +32,10 @@ int drive_init(struct drive *d, const struct drive_config *c)
     d->sample_fraction = 1.0 / (double)d->samples;
     d->samples_per_s = (double)c->loop_rate_hz;
     d->cubic = c->interpolation == DRIVE_CUBIC;
+    d->delayed = c->delay_samples != 0;
+    d->speed_per_way =
+        c->speed == DRIVE_SPEED_EXACT ? 0.0 : d->samples_per_s / c->plant.screw_mm_rad;
+    d->plain = !d->cubic && !d->delayed && c->speed == DRIVE_SPEED_EXACT;
     drive_place(d, 0);
     return 0;
 }
@@ -41,14 +45,16 @@ static void drive_rest(struct drive *d)
     d->state.motor.speed_rad_s = 0.0;
     d->state.integral_rad = 0.0;
     d->state.volts = 0.0;
+    d->state.next_volts = 0.0;
+    d->state.read_mm = encoder_read_mm(&d->encoder, d->state.motor.position_mm);
     d->way_counts = 0.0;
     d->end_way_counts = 0.0;
 }
 
 void drive_place(struct drive *d, int32_t target_counts)
 {
-    drive_rest(d);
     d->state.motor.position_mm = (double)target_counts * d->mm_per_count;
+    drive_rest(d);
     d->target_counts = target_counts;
     d->same_target_periods = DRIVE_PARK_PERIODS;
     d->parked = true;
@@ -140,17 +146,17 @@ static void drive_run(struct drive *d, int32_t target_counts)
     d->state = state;
 }
 
-static void drive_run_cubic(struct drive *d, int32_t target_counts)
+static void drive_run_any(struct drive *d, int32_t target_counts)
 {
     const struct drive_command c = drive_command(d, target_counts);
     struct drive_state state = d->state;
     for (uint32_t i = 0; i < d->samples; i++) {
-        struct pdff_input in = {
-            .position_mm = encoder_read_mm(&d->encoder, state.motor.position_mm),
-            .speed_rad_s = state.motor.speed_rad_s,
-        };
+        struct pdff_input in;
         drive_command_at(&c, i, &in);
-        state.volts = pdff_step(&d->pdff, &state.integral_rad, &in);
+        in.position_mm = encoder_read_mm(&d->encoder, state.motor.position_mm);
+        in.speed_rad_s = drive_speed(d, &state, in.position_mm);
+        const double computed = pdff_step(&d->pdff, &state.integral_rad, &in);
+        state.volts = drive_volts(d, &state, computed);
         motor_step(&d->motor, &state.motor, state.volts);
     }
     d->state = state;
@@ -158,10 +164,10 @@ static void drive_run_cubic(struct drive *d, int32_t target_counts)
 
 static void drive_run_one(struct drive *d, int32_t target_counts)
 {
-    if (d->cubic) {
-        drive_run_cubic(d, target_counts);
-    } else {
+    if (d->plain) {
         drive_run(d, target_counts);
+    } else {
+        drive_run_any(d, target_counts);
     }
 }
 
@@ -191,7 +197,7 @@ void drive_period_pair(struct drive *first, struct drive *second, const int32_t 
 {
     const bool first_parked = drive_stays_parked(first, target_counts[0], true);
     const bool second_parked = drive_stays_parked(second, target_counts[1], true);
-    const bool alike = first->samples == second->samples && !first->cubic && !second->cubic;
+    const bool alike = first->samples == second->samples && first->plain && second->plain;
     if (!first_parked && !second_parked && alike) {
         drive_run_pair(first, second, target_counts);
         return;

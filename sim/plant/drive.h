@@ -36,6 +36,9 @@ struct drive_state {
     struct motor_state motor;
     double integral_rad;
     double volts; /* held over the last sample */
+    /* Of drives with speed from differences, and with a delay: */
+    double read_mm;    /* at the last sample */
+    double next_volts; /* computed in the last sample, for the next */
 };
 
 /* Fields are for the module's own use; read through the functions below. */
@@ -49,7 +52,10 @@ struct drive {
     double samples_per_s;
     uint32_t samples;
     struct drive_state state;
+    bool plain; /* linear interpolation, exact speed, no delay */
     bool cubic; /* interpolation */
+    bool delayed;
+    double speed_per_way; /* rad/s for a mm of difference between two samples; 0: exact speed */
     double
         way_counts; /* of the last period, and what the command does in a period at the speed it */
     double end_way_counts; /* had at the end of that; both for cubic interpolation */
@@ -73,8 +79,7 @@ void drive_hold(struct drive *drive);
 void drive_period(struct drive *drive, int32_t target_counts);
 
 /* The same for two axes at once: the same bits as two calls, but their chains of arithmetic overlap
- * in the processor (when both have the same number of servo samples per period and interpolate
- * linearly). */
+ * in the processor (when both are plain and have the same number of servo samples per period). */
 void drive_period_pair(struct drive *first, struct drive *second, const int32_t target_counts[2]);
 
 /* Encoder position in bus counts, rounded to nearest and saturated. */

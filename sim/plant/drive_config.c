@@ -71,6 +71,9 @@ int drive_config_check(const struct drive_config *c)
     if (c->interpolation > DRIVE_CUBIC) {
         return DRIVE_ERR_INTERPOLATION;
     }
+    if (c->speed > DRIVE_SPEED_DIFFERENCES || c->delay_samples > 1) {
+        return DRIVE_ERR_SENSING;
+    }
     return 0;
 }
 
@@ -92,6 +95,8 @@ const char *drive_error_text(int code)
         return "the plant's time constant is shorter than one servo sample";
     case DRIVE_ERR_INTERPOLATION:
         return "interpolation must be 0 (linear) or 1 (cubic)";
+    case DRIVE_ERR_SENSING:
+        return "speed must be 0 (exact) or 1 (differences), delay_samples 0 or 1";
     default:
         return "unknown error";
     }

@@ -24,6 +24,9 @@ struct drive_pdff {
 /* How the drive goes from one setpoint to the next (docs/numerics.md section 13). */
 enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1 };
 
+/* Where the loop has its speed from: the motor itself, or the way of the last servo sample by the encoder. */
+enum drive_speed { DRIVE_SPEED_EXACT = 0, DRIVE_SPEED_DIFFERENCES = 1 };
+
 struct drive_config {
     struct drive_plant plant;
     struct drive_pdff pdff;
@@ -32,6 +35,8 @@ struct drive_config {
     uint32_t counts_per_mm;          /* of the bus, 1 ... 10^9 */
     uint32_t period_us;              /* 1 ... 10^6 */
     uint32_t interpolation;          /* enum drive_interpolation */
+    uint32_t speed;                  /* enum drive_speed */
+    uint32_t delay_samples;          /* 0 or 1: servo samples from reading the encoder to volts */
 };
 
 enum drive_error {
@@ -41,6 +46,7 @@ enum drive_error {
     DRIVE_ERR_RATE = -4, /* no whole number of servo samples per period, or too many (over 65536) */
     DRIVE_ERR_STEP = -5, /* the time constant is shorter than one servo sample */
     DRIVE_ERR_INTERPOLATION = -6, /* no enum drive_interpolation */
+    DRIVE_ERR_SENSING = -7,       /* no enum drive_speed, or a delay of more than one sample */
 };
 
 /* 0, or the first enum drive_error that applies. */

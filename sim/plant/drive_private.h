@@ -31,6 +31,22 @@ static inline void drive_command_at(const struct drive_command *c, uint32_t i,
         (c->way_mm[0] + u * (2.0 * c->way_mm[1] + 3.0 * u * c->way_mm[2])) * c->per_s;
 }
 
+/* The speed that the loop sees at a sample, rad/s; notes the reading. */
+static inline double drive_speed(const struct drive *d, struct drive_state *state, double read_mm)
+{
+    const double way_mm = read_mm - state->read_mm;
+    state->read_mm = read_mm;
+    return d->speed_per_way == 0.0 ? state->motor.speed_rad_s : way_mm * d->speed_per_way;
+}
+
+/* The volts of the sample that begins, when these have been computed in it. */
+static inline double drive_volts(const struct drive *d, struct drive_state *state, double computed)
+{
+    const double before = state->next_volts;
+    state->next_volts = computed;
+    return d->delayed ? before : computed;
+}
+
 /* The period's setpoints towards target_counts, which becomes the drive's target. */
 struct drive_command drive_command(struct drive *drive, int32_t target_counts);
 

@@ -86,13 +86,13 @@ void influence_period(const struct influence *in, struct drive *d, int32_t targe
     }
     const struct drive_command c = drive_command(d, target_counts);
     for (uint32_t i = 0; i < d->samples; i++) {
-        struct pdff_input input = {
-            .position_mm = influence_read_mm(in, d),
-            .speed_rad_s = d->state.motor.speed_rad_s,
-        };
+        struct pdff_input input;
         drive_command_at(&c, i, &input);
-        d->state.volts = pdff_step_offset(&pdff, &d->state.integral_rad, &input,
-                                          in->speed_offset_rad_s, in->volts_offset);
+        input.position_mm = influence_read_mm(in, d);
+        input.speed_rad_s = drive_speed(d, &d->state, input.position_mm);
+        const double computed = pdff_step_offset(&pdff, &d->state.integral_rad, &input,
+                                                 in->speed_offset_rad_s, in->volts_offset);
+        d->state.volts = drive_volts(d, &d->state, computed);
         influence_push(in, &d->motor, &d->state.motor, d->state.volts, in->friction_volts);
     }
 }
@@ -107,6 +107,7 @@ bool influence_coast(const struct influence *in, struct drive *d, double brake_v
     }
     drive_hold(d);
     d->state.motor = motor;
+    d->state.read_mm = influence_read_mm(in, d);
     d->target_counts = influence_read_counts(in, d);
     return motor.speed_rad_s == 0.0 && held;
 }

@@ -283,6 +283,47 @@ static void test_cubic_interpolation_follows_more_closely(void)
     TEST_ASSERT_TRUE(cubic_um < linear_um / 3.0 && cubic_um > 0.01);
 }
 
+/* Speed by differences is the mean of the last sample: at constant acceleration half a sample late. A delay puts
+ * out what the sample before computed. */
+static void test_speed_by_differences_and_delay(void)
+{
+    config.encoder_counts_per_rev = 1u << 28;
+    config.speed = DRIVE_SPEED_DIFFERENCES;
+    config.delay_samples = 1;
+    struct drive d = made();
+    struct drive_state state = d.state;
+    const double h = 1.0 / 16000.0, acceleration = 1000.0;
+    for (int i = 0; i < 100; i++) {
+        const double t = i * h;
+        const double read_mm = 0.5 * acceleration * t * t * 1.59;
+        const double seen = drive_speed(&d, &state, read_mm);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, i == 0 ? 0.0 : acceleration * (t - h / 2), seen);
+        TEST_ASSERT_TRUE(drive_volts(&d, &state, i) == (i == 0 ? 0.0 : i - 1.0));
+    }
+}
+
+/* The paper's loop is slow beside a sample: it hardly notices; but other bits they are. */
+static void test_sensing_changes_little(void)
+{
+    struct drive plain = made();
+    config.speed = DRIVE_SPEED_DIFFERENCES;
+    struct drive differences = made();
+    config.delay_samples = 1;
+    struct drive both = made();
+    double least = 1e9, most = 0.0;
+    for (int k = 1; k < TICKS; k++) {
+        drive_period(&plain, target_at(k));
+        drive_period(&differences, target_at(k));
+        drive_period(&both, target_at(k));
+        const double at_mm = plain.state.motor.position_mm;
+        const double one_mm = fabs(differences.state.motor.position_mm - at_mm);
+        const double two_mm = fabs(both.state.motor.position_mm - at_mm);
+        most = fmax(most, fmax(one_mm, two_mm));
+        least = k == 200 ? fmin(one_mm, fabs(one_mm - two_mm)) : least;
+    }
+    TEST_ASSERT_TRUE(least > 1e-7 && most > 1e-4 && most < 5e-3);
+}
+
 static int init_error(void)
 {
     struct drive d;
@@ -316,6 +357,10 @@ static void test_bad_figures_are_refused(void)
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_STEP, init_error());
     config.interpolation = 2;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_INTERPOLATION, init_error());
+    config.speed = 2;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_SENSING, init_error());
+    config.delay_samples = 2;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_SENSING, init_error());
     TEST_ASSERT_EQUAL_INT(0, init_error());
 }
 
@@ -332,6 +377,8 @@ int main(void)
     RUN_TEST(test_far_from_the_target_is_not_parked);
     RUN_TEST(test_cubic_interpolation_has_no_jumps);
     RUN_TEST(test_cubic_interpolation_follows_more_closely);
+    RUN_TEST(test_speed_by_differences_and_delay);
+    RUN_TEST(test_sensing_changes_little);
     RUN_TEST(test_bad_figures_are_refused);
     return UNITY_END();
 }

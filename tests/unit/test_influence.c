@@ -52,10 +52,12 @@ static void test_nothing_has_the_bits_of_the_plain_drive(void)
     nothing_has_the_bits_of_the_plain_drive();
 }
 
-static void test_nor_has_it_others_when_setpoints_are_joined_by_cubics(void)
+static void test_nor_has_it_others_with_everything_that_may_be_asked_for(void)
 {
     struct drive_config config = drive_bench_config;
     config.interpolation = DRIVE_CUBIC;
+    config.speed = DRIVE_SPEED_DIFFERENCES;
+    config.delay_samples = 1;
     TEST_ASSERT_EQUAL_INT(0, drive_init(&plain, &config));
     TEST_ASSERT_EQUAL_INT(0, drive_init(&other, &config));
     nothing_has_the_bits_of_the_plain_drive();
@@ -209,7 +211,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_nothing_has_the_bits_of_the_plain_drive);
-    RUN_TEST(test_nor_has_it_others_when_setpoints_are_joined_by_cubics);
+    RUN_TEST(test_nor_has_it_others_with_everything_that_may_be_asked_for);
     RUN_TEST(test_each_figure_acts);
     RUN_TEST(test_a_load_is_held_by_the_integral);
     RUN_TEST(test_velocity_offset_takes_the_lag_away);

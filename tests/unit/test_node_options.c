@@ -45,7 +45,7 @@ static void test_two_axes_with_defaults_and_without(void)
     TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_OK, parse("node=2," FIGURES, FIGURES
                                                  ",node=127,position_mm=-1.25,counts_per_mm=1000,"
                                                  "loop_rate_hz=8000,encoder_counts_per_rev=4096,"
-                                                 "interpolation=1"));
+                                                 "interpolation=1,speed=1,delay_samples=1"));
     TEST_ASSERT_EQUAL_STRING("vcan0", options.bus);
     TEST_ASSERT_EQUAL_UINT(2, options.axis_count);
     const struct node_options_axis *a = &options.axes[0], *b = &options.axes[1];
@@ -58,6 +58,9 @@ static void test_two_axes_with_defaults_and_without(void)
     TEST_ASSERT_TRUE(a->position_mm == 0.0);
     TEST_ASSERT_EQUAL_UINT32(DRIVE_LINEAR, a->config.interpolation);
     TEST_ASSERT_EQUAL_UINT32(DRIVE_CUBIC, b->config.interpolation);
+    TEST_ASSERT_EQUAL_UINT32(0, a->config.speed + a->config.delay_samples);
+    TEST_ASSERT_EQUAL_UINT32(DRIVE_SPEED_DIFFERENCES, b->config.speed);
+    TEST_ASSERT_EQUAL_UINT32(1, b->config.delay_samples);
     TEST_ASSERT_EQUAL_UINT8(127, b->node);
     TEST_ASSERT_TRUE(b->position_mm == -1.25);
     TEST_ASSERT_EQUAL_UINT32(4096, b->config.encoder_counts_per_rev);

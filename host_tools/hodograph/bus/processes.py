@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import BusError
-from ..names import INTERPOLATIONS
+from ..names import INTERPOLATIONS, SPEEDS
 from .address import BusAddress
 
 if TYPE_CHECKING:
@@ -89,6 +89,8 @@ def _axis_text(node: int, drive: Drive, machine: Machine) -> str:
         "counts_per_mm": machine.counts_per_mm,
         "position_mm": 0,
         "interpolation": INTERPOLATIONS.index(drive.interpolation),
+        "speed": SPEEDS.index(drive.speed),
+        "delay_samples": drive.delay_samples,
         **drive.equipment.given(),
     }
     return ",".join(f"{key}={value:.17g}" for key, value in values.items())

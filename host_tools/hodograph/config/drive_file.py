@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from ..names import INTERPOLATIONS
+from ..names import INTERPOLATIONS, SPEEDS
 from .table import Table, read_toml
 
 
@@ -51,6 +51,10 @@ class Drive:
     loop_rate_hz: int
     interpolation: str = "linear"
     """How it goes from setpoint to setpoint: "linear" or "cubic" (docs/numerics.md section 13)."""
+    speed: str = "exact"
+    """Of the motor for the loop: "exact", or "differences" of the encoder between two servo samples."""
+    delay_samples: int = 0
+    """Servo samples from the encoder to the volts, 0 or 1."""
     equipment: Equipment = Equipment()
 
     @property
@@ -71,8 +75,8 @@ def load_drive(file: Path) -> Drive:
     root = Table(file, "", read_toml(file), _SECTIONS)
     plant = root.table("plant", _PLANT)
     pdff = root.table("pdff", _PDFF)
-    encoder = root.table("encoder", ("counts_per_rev",), required=False)
-    servo = root.table("servo", ("loop_rate_hz", "interpolation"), required=False)
+    encoder = root.table("encoder", ("counts_per_rev", "speed"), required=False)
+    servo = root.table("servo", ("loop_rate_hz", "interpolation", "delay_samples"), required=False)
     return Drive(
         gain_rad_s_v=plant.number("gain_rad_s_v", low=1e-3, high=1e6),
         time_constant_s=plant.number("time_constant_s", low=1e-5, high=1e3),
@@ -87,6 +91,8 @@ def load_drive(file: Path) -> Drive:
         encoder_counts_per_rev=encoder.integer("counts_per_rev", 2**20, low=16, high=2**26),
         loop_rate_hz=_loop_rate(servo),
         interpolation=servo.choice("interpolation", INTERPOLATIONS, "linear"),
+        speed=encoder.choice("speed", SPEEDS, "exact"),
+        delay_samples=servo.integer("delay_samples", 0, low=0, high=1),
         equipment=_equipment(root),
     )
 

@@ -66,7 +66,7 @@ struct drive_pdff {
 struct drive_config {
     struct drive_plant plant;
     struct drive_pdff pdff;
-    uint32_t encoder_counts_per_rev, loop_rate_hz, counts_per_mm, period_us, interpolation;
+    uint32_t encoder_counts_per_rev, loop_rate_hz, counts_per_mm, period_us, interpolation, speed, delay_samples;
 };
 struct drive {
     ...;

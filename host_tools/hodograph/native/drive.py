@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..names import INTERPOLATIONS
+from ..names import INTERPOLATIONS, SPEEDS
 from .library import library, text
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ def drive_config(drive: Drive, counts_per_mm: int, period_us: int) -> dict[str, 
         "counts_per_mm": counts_per_mm,
         "period_us": period_us,
         "interpolation": INTERPOLATIONS.index(drive.interpolation),
+        "speed": SPEEDS.index(drive.speed),
+        "delay_samples": drive.delay_samples,
     }
 
 

@@ -31,6 +31,8 @@ class Case:
     time: Pair = (1.0, 1.0)
     coulomb: float = 0.0
     load: float = 0.0
+    sensed: bool = False
+    """Speed by differences of the encoder, and a servo sample of computing: what real drives have."""
 
     def drives(self, drives: Drives) -> Drives:
         """The drives with this plant; their gains stay."""
@@ -44,6 +46,8 @@ class Case:
             gain_rad_s_v=drive.gain_rad_s_v * self.gain[axis],
             time_constant_s=drive.time_constant_s * self.time[axis],
             equipment=replace(drive.equipment, friction_volts=friction or None),
+            speed="differences" if self.sensed else drive.speed,
+            delay_samples=1 if self.sensed else drive.delay_samples,
         )
 
     def faults(self, drives: Drives) -> tuple[RigFault, ...]:
@@ -76,6 +80,7 @@ CASES = (
     _viscous(f"viscous friction, {100 * VISCOUS:.0f} % more", VISCOUS),
     Case(f"load torque, {100 * LOAD:.0f} % of the limit, from the start on", load=LOAD),
     _viscous("both frictions and the load", VISCOUS, COULOMB, LOAD),
+    Case("speed by encoder differences, a servo sample late", sensed=True),
 )
 
 

@@ -103,13 +103,16 @@ def feedforward_of(drive: Drive, velocity: str = "drive") -> tuple[Drive, Feedfo
     Raises PlanError: a torque offset does not fit its object.
     """
     k, g = drive.gain_rad_s_v, drive.screw_mm_rad
-    permille = 1e6 / (drive.rated_torque_nm * drive.torque_to_volts)
+    permille = 1e6 / (drive.rated_torque_nm * drive.torque_to_volts * g)
+    # Speed by differences is that of half a sample ago: what the loop makes of that is taken back.
+    late_s = 0.0 if drive.speed == "exact" else 0.5 / drive.loop_rate_hz
+    by_lag = drive.torque_to_volts * drive.k_pv_nm_s_rad * late_s
     found = Feedforward(
         velocity=1.0 if velocity == "bus" else 0.0,
-        torque_permille_s2_m=drive.time_constant_s / (k * g) * permille,
-        torque_permille_s_m=1 / (k * g) * permille,
+        torque_permille_s2_m=(drive.time_constant_s / k - by_lag) * permille,
+        torque_permille_s_m=(1 / k - by_lag * drive.k_iv_per_s) * permille,
     )
-    if max(found.torque_permille_s2_m, found.torque_permille_s_m) > _OFFSET_MAX:
+    if max(abs(found.torque_permille_s2_m), abs(found.torque_permille_s_m)) > _OFFSET_MAX:
         raise PlanError(
             f"feedforward: 1 m/s^2 or 1 m/s takes more than {_OFFSET_MAX:.0f} per mille of the rated torque "
             f"{drive.rated_torque_nm:g} N m: is [equipment] rated_torque_nm right?"

@@ -19,6 +19,7 @@ Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 GRID_POINTS = 6000
+_GONE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,9 @@ class Loop:
     volts_per_speed: float
     newton_per_volt: float
     """Force at the table for a volt of load."""
+    speed_per_way: float = 0.0
+    """Speed of the loop for a mm between two samples; 0: the motor's own."""
+    delay_samples: int = 0
 
     @property
     def nyquist_rad_s(self) -> float:
@@ -49,9 +53,11 @@ class Loop:
         return np.geomspace(top * 1e-6, top, GRID_POINTS)
 
     def _plant(self, z: Complex) -> tuple[Complex, Complex]:
-        """Speed and position for a volt."""
+        """Speed, as the loop sees it, and position for a volt."""
         speed = self.speed_from_volts / (z - self.speed_from_speed)
         position = (self.position_from_speed * speed + self.position_from_volts) / (z - 1)
+        if self.speed_per_way:
+            speed = self.speed_per_way * (1 - 1 / z) * position
         return speed, position
 
     def _by_ref(self, z: Complex) -> Complex:
@@ -68,7 +74,7 @@ class Loop:
         back = self._by_ref(z) * self.k_pp_rad_s_mm * position
         back += self.volts_per_integral * self.step_s / (z - 1) * speed
         back += self.volts_per_speed * speed
-        return np.asarray(back * np.exp(-1j * rad_s * delay_s))
+        return np.asarray(back * z**-self.delay_samples * np.exp(-1j * rad_s * delay_s))
 
     def closed(self, rad_s: Float, volts_s_mm: float = 0.0, volts_s2_mm: float = 0.0) -> Complex:
         """Position for a command; the last two are the torque offset, as volts, for speed and acceleration.
@@ -80,6 +86,7 @@ class Loop:
         _, position = self._plant(z)
         volts = self._by_ref(z) * (self.k_pp_rad_s_mm + self.k_pf_rad_mm * s)
         volts += volts_s_mm * s + volts_s2_mm * s * s
+        volts = volts * z**-self.delay_samples
         return np.asarray(position * volts / (1 + self.open(rad_s)))
 
     def compliance(self, rad_s: Float) -> Float:
@@ -89,9 +96,9 @@ class Loop:
         return np.asarray(1000.0 * mm_per_volt / self.newton_per_volt)
 
     def poles(self) -> Complex:
-        """The closed loop's three, as continuous ones, rad/s, slowest first."""
-        values = np.linalg.eigvals(self._transition()[0])
-        found = np.log(values.astype(np.complex128)) / self.step_s
+        """The closed loop's, as continuous ones, rad/s, slowest first; without those that end within a sample."""
+        values = np.linalg.eigvals(self._transition()[0]).astype(np.complex128)
+        found = np.log(values[np.abs(values) > _GONE]) / self.step_s
         return np.asarray(found[np.argsort(np.abs(found))])
 
     @property
@@ -100,29 +107,40 @@ class Loop:
         return bool(np.max(self.poles().real) < 0)
 
     def _transition(self) -> tuple[Float, Float, Float]:
-        """State (position, speed, integral) of the next sample from this one, by state, command and load (volts)."""
-        a: Float = np.zeros((3, 3))
-        a[0, :2] = 1, self.position_from_speed
-        a[1, 1] = self.speed_from_speed
-        a[2] = -self.step_s * self.k_pp_rad_s_mm, -self.step_s, 1
-        b: Float = np.array([self.position_from_volts, self.speed_from_volts, 0.0])
-        back: Float = np.array(
-            [
-                -self.volts_per_ref * self.k_pp_rad_s_mm,
-                -self.volts_per_speed,
-                self.volts_per_integral,
-            ]
-        )
-        command = b * self.volts_per_ref * self.k_pp_rad_s_mm
-        command[2] = self.step_s * self.k_pp_rad_s_mm
-        both: Float = a + b[:, np.newaxis] * back
-        return both, command, -b
+        """The next sample's state from this one's, by state, command and load (volts).
+
+        The state is position, speed, integral, the position before, the volts computed before.
+        """
+        h, k_pp = self.step_s, self.k_pp_rad_s_mm
+        seen: Float = np.array([0.0, 1.0, 0.0, 0.0, 0.0])
+        if self.speed_per_way:
+            seen = self.speed_per_way * np.array([1.0, 0.0, 0.0, -1.0, 0.0])
+        volts: Float = -self.volts_per_speed * seen
+        volts[0] -= self.volts_per_ref * k_pp
+        volts[2] += self.volts_per_integral
+        by_command = self.volts_per_ref * k_pp
+        plant: Float = np.array([self.position_from_volts, self.speed_from_volts, 0.0, 0.0, 0.0])
+        state: Float = np.zeros((5, 5))
+        state[0, :2] = 1, self.position_from_speed
+        state[1, 1] = self.speed_from_speed
+        state[2] = -h * seen
+        state[2, 0] -= h * k_pp
+        state[2, 2] += 1
+        state[3, 0] = 1
+        state[4] = volts
+        command: Float = np.array([0.0, 0.0, h * k_pp, 0.0, by_command])
+        if self.delay_samples:
+            state[:, 4] += plant
+        else:
+            state += plant[:, np.newaxis] * volts
+            command += plant * by_command
+        return state, command, -plant
 
     def steps(self, duration_s: float) -> tuple[Float, Float, Float]:
         """Times; position after a step of the command (of 1); movement after a step of load, um/N."""
         a, command, load = self._transition()
         count = max(2, math.ceil(duration_s / self.step_s))
-        states, both = np.zeros((count, 3, 2)), np.stack([command, load], axis=1)
+        states, both = np.zeros((count, 5, 2)), np.stack([command, load], axis=1)
         for i in range(1, count):
             states[i] = a @ states[i - 1] + both
         per_newton = 1000.0 / self.newton_per_volt
@@ -148,6 +166,8 @@ def loop_of(drive: Drive) -> Loop:
         volts_per_integral=volts * drive.k_iv_per_s,
         volts_per_speed=volts * (1 + drive.k_iv_per_s * h),
         newton_per_volt=1000.0 / (drive.torque_to_volts * g),
+        speed_per_way=0.0 if drive.speed == "exact" else 1 / (h * g),
+        delay_samples=drive.delay_samples,
     )
 
 

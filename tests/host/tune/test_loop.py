@@ -18,9 +18,18 @@ from hodograph.tune.margins import margins
 Drives = tuple[Drive, Drive]
 
 
+@pytest.mark.parametrize("sensed", [False, True])
 @pytest.mark.parametrize("hz", [2.0, 20.0, 60.0])
-def test_closed_loop_is_that_of_the_simulated_drive(drives: Drives, hz: float) -> None:
-    drive = replace(drives[0], interpolation="cubic", volts_limit=30.0)
+def test_closed_loop_is_that_of_the_simulated_drive(
+    drives: Drives, hz: float, sensed: bool
+) -> None:
+    drive = replace(
+        with_poles(drives[0], Poles(1000.0, 0.7, 200.0)) if sensed else drives[0],
+        interpolation="cubic",
+        volts_limit=30.0,
+        speed="differences" if sensed else "exact",
+        delay_samples=int(sensed),
+    )
     rad_s, amplitude_mm, periods = 2 * math.pi * hz, 0.4 / hz, 2000
     t_s = np.arange(1, periods + 1) * 1e-3
     start = np.minimum(t_s / 0.5, 1.0) ** 3
@@ -56,8 +65,22 @@ def test_poles_are_those_asked_for(drives: Drives) -> None:
             assert np.max(found.real) < 0
 
 
+def test_late_sensing_costs_phase(drives: Drives) -> None:
+    plain = with_poles(drives[0], Poles(1000.0, 0.7, 200.0))
+    late = replace(plain, speed="differences", delay_samples=1)
+    lost = margins(loop_of(plain)).phase_deg - margins(loop_of(late)).phase_deg
+    delay = margins(loop_of(plain), 1.5 / plain.loop_rate_hz)
+    assert 5 < lost < 30
+    assert margins(loop_of(late)).phase_deg == pytest.approx(delay.phase_deg, abs=1.0)
+
+
 def test_gain_margins_end_where_the_loop_becomes_unstable(drives: Drives) -> None:
-    for drive in (drives[0], with_poles(drives[1], Poles(900.0, 0.8, 200.0))):
+    stiff = with_poles(drives[1], Poles(900.0, 0.8, 200.0))
+    late = replace(stiff, speed="differences", delay_samples=1)
+    assert not loop_of(
+        replace(late, k_pv_nm_s_rad=1.02 * margins(loop_of(late)).gain_up * late.k_pv_nm_s_rad)
+    ).stable
+    for drive in (drives[0], stiff, late):
         found = margins(loop_of(drive))
         assert 0.01 < found.gain_down < 0.5
 
@@ -89,6 +112,17 @@ def test_the_paper_s_loop(drives: Drives) -> None:
     assert found.crossover_hz == pytest.approx(118.0, abs=0.1)
     assert found.phase_deg == pytest.approx(60.0, abs=0.1)
     assert stiffness_n_um(drives[0]) == pytest.approx(144.9, abs=0.1)
+
+
+def test_feedforward_knows_late_sensing(drives: Drives) -> None:
+    """Constant acceleration: what the loop makes of a speed half a sample late is what the offsets leave out."""
+    late = replace(with_poles(drives[0], Poles(900.0, 0.8, 200.0)), speed="differences")
+    plain, own = feedforward_of(drives[0])[1], feedforward_of(late)[1]
+    volts = (plain.torque_permille_s2_m - own.torque_permille_s2_m) * late.rated_torque_nm
+    by_lag = volts * late.torque_to_volts * late.screw_mm_rad / 1e6
+    gain = late.torque_to_volts * late.k_pv_nm_s_rad
+    assert by_lag == pytest.approx(gain * 0.5 / 16000, rel=1e-9)
+    assert own.torque_permille_s_m < plain.torque_permille_s_m
 
 
 def test_feedforward_inverts_the_plant(drives: Drives) -> None:

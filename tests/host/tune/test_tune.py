@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import shutil
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +32,19 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
     return status, out, err
 
 
-@pytest.mark.parametrize(("name", "paper_um"), [("alpha", 21.353), ("heart", 28.098)])
-def test_the_example_machine_has_a_contour_error_below_a_micrometre(
-    name: str, paper_um: float
+@pytest.mark.parametrize(
+    ("name", "paper_um", "within"),
+    [
+        ("alpha", 21.353, 0.001),
+        ("heart", 28.098, 0.001),
+        ("alpha_optimal", 37.5, 1.0),
+        ("heart_optimal", 34.4, 1.0),
+    ],
+)
+def test_the_example_machine_has_a_contour_error_of_its_encoder(
+    name: str, paper_um: float, within: float
 ) -> None:
+    """Asked for: 1 um at the paper's feed, 2 um at the optimal one."""
     plain = load_chain(EXAMPLES / f"{name}.toml")
     tuned = load_chain(EXAMPLES / f"{name}.toml", MACHINES / "tuned.toml")
     assert plain.image == tuned.image
@@ -45,7 +55,7 @@ def test_the_example_machine_has_a_contour_error_below_a_micrometre(
         motion = simulate(chain.image, drives, feedforward=machine.plane_feedforward)
         assert motion.max_volts < 5.0
         errors.append(motion.max_contour_error_um)
-    assert errors[0] == pytest.approx(paper_um, abs=0.001)
+    assert errors[0] == pytest.approx(paper_um, abs=within)
     assert 0.002 < errors[1] < 0.05
 
 
@@ -53,7 +63,7 @@ def test_the_example_machine_is_what_tune_finds(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The search's last step again: the greatest bandwidth of the damping that was best."""
-    monkeypatch.setattr(search, "DAMPINGS", (1.2,))
+    monkeypatch.setattr(search, "DAMPINGS", (0.85,))
     monkeypatch.setattr(search, "BANDWIDTHS", 1)
     monkeypatch.setattr(search, "SPAN", 1.0)
     chain = load_chain(EXAMPLES / "alpha.toml", machine.file)
@@ -65,6 +75,26 @@ def test_the_example_machine_is_what_tune_finds(
     nominal = found.paths[0].cases[0]
     assert nominal.given.contour_error_um == pytest.approx(21.353, abs=0.001)
     assert nominal.tuned.contour_error_um < nominal.plain.contour_error_um < 0.1
+
+
+@pytest.mark.parametrize(("name", "most_um"), [("alpha", 1.0), ("heart_optimal", 2.0)])
+def test_straight_lines_and_late_sensing_keep_the_goals_too(
+    machine: Machine, name: str, most_um: float
+) -> None:
+    chain = load_chain(EXAMPLES / f"{name}.toml")
+    late = [
+        replace(drive, speed="differences", delay_samples=1, interpolation="cubic")
+        for drive in machine.models(machine.plane)
+    ]
+    axes = tuple(replace(a, drive=d) for a, d in zip(machine.plane, late, strict=True))
+    asked = Asked(bandwidth_hz=214.5, damping=0.85)
+    errors = []
+    for given in (machine, replace(machine, axes=axes)):
+        found = tune(given, [], asked)
+        motion = simulate(chain.image, found.drives, feedforward=found.feedforward)
+        errors.append(motion.max_contour_error_um)
+    assert 0.1 < errors[0] < most_um
+    assert 0.005 < errors[1] < 0.1
 
 
 def test_every_case_differs_from_the_model(drives: tuple[Drive, Drive]) -> None:

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""Contour error of the paper's and of tuned loops, at SYNCs and between them; plants found from noisy reports.
+
+Paths: alpha and heart at the paper's feed and in the least time within all limits. Loops: the paper's; tuned
+(examples/machines/tuned.toml); the same poles in drives that join setpoints by straight lines, and in drives whose
+speed comes from differences of the encoder and whose volts come a servo sample late. Between SYNCs the drive is
+computed again here, servo sample by servo sample.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hodograph.chain import Chain, load_chain
+from hodograph.config import Drive, load_machine
+from hodograph.config.axis_table import Feedforward
+from hodograph.identify import Stretch, identify_axis
+from hodograph.native import AxisInputs, Contour, NativeProgram
+from hodograph.simulate import Motion, simulate
+from hodograph.tune import Asked, tune
+from hodograph.tune.loop import loop_of, offset_volts
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+MACHINES = EXAMPLES / "machines"
+PATHS = ("alpha", "heart", "alpha_optimal", "heart_optimal")
+TUNED_HZ, TUNED_DAMPING = 214.5, 0.85
+"""Of the example's loops, as the search found them."""
+SEEDS, NOISE_COUNTS, NOISE_MV = 10, 20.0, 10.0
+
+Float = NDArray[np.float64]
+Drives = tuple[Drive, Drive]
+Forward = tuple[Feedforward, Feedforward] | None
+
+
+def loops() -> dict[str, tuple[Drives, Forward]]:
+    """Drives and feedforward by name, but the paper's, which each path has its own of."""
+    machine, example = (load_machine(MACHINES / f"{n}.toml") for n in ("paper_alpha", "tuned"))
+    x, y = example.models(example.plane)
+    late = [replace(drive, speed="differences", delay_samples=1) for drive in (x, y)]
+    axes = [replace(axis, drive=d) for axis, d in zip(machine.plane, late, strict=True)]
+    asked = Asked(bandwidth_hz=TUNED_HZ, damping=TUNED_DAMPING)
+    linear = tune(machine, [], replace(asked, interpolation="linear"))
+    sensed = tune(replace(machine, axes=tuple(axes)), [], asked)
+    return {
+        "tuned": ((x, y), example.plane_feedforward),
+        "tuned_linear": (linear.drives, linear.feedforward),
+        "tuned_late": (sensed.drives, sensed.feedforward),
+    }
+
+
+def between_um(chain: Chain, motion: Motion, drives: Drives, forward: Forward) -> dict[str, float]:
+    """Greatest distance of the true position from the curve at any servo sample; how far this model is off at SYNCs."""
+    places = [_axis(motion, axis, drives[axis], forward) for axis in range(2)]
+    per = places[0].shape[1]
+    rows = motion.rows
+    arc = rows["arc_length_q40_mm"].astype(np.float64)
+    before = np.concatenate([arc[:1], arc[:-1]])
+    parts = np.arange(1, per + 1) / per
+    arcs = np.rint(before[:, None] + (arc - before)[:, None] * parts).astype(np.int64)
+    contour = Contour(NativeProgram(chain.image))
+    fine = 8_000_000  # counts a mm, so that rounding does not count
+    positions = np.stack([np.rint(p.ravel() * fine).astype(np.int32) for p in places], axis=1)
+    errors = contour.errors_um(arcs.ravel(), positions, fine)
+    at_sync = np.stack([p[:, -1] for p in places], axis=1) - motion.act_mm
+    return {"contour_um": float(errors.max()), "off_um": 1e3 * float(np.abs(at_sync).max())}
+
+
+def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> Float:
+    """True positions (periods, samples), mm: sim/plant in Python, for exact speed and no delay."""
+    loop, per = loop_of(drive), drive.loop_rate_hz * motion.period_us // 1_000_000
+    step_s, period_s = loop.step_s, motion.period_us * 1e-6
+    increment = 2 * np.pi * drive.screw_mm_rad / drive.encoder_counts_per_rev
+    setpoints = motion.rows["set_counts"][:, axis].tolist()
+    commanded = motion.cmd_mm[:, axis]
+    by_speed, by_acceleration = offset_volts(drive, forward[axis]) if forward else (0.0, 0.0)
+    ways = np.diff(np.concatenate([commanded[:1], commanded])) / period_s
+    volts_ahead = by_speed * ways + by_acceleration * np.diff(ways, prepend=0.0) / period_s
+    volts_ahead[motion.ticks :] = 0.0
+    x, speed, integral, last, slope, way = setpoints[0] * 1e-6, 0.0, 0.0, setpoints[0], 0.0, 0.0
+    places = np.empty((len(setpoints), per))
+    for k, target in enumerate(setpoints):
+        step = float(target - last)
+        end = 1.5 * step - 0.5 * way if drive.interpolation == "cubic" else step
+        begin = slope if drive.interpolation == "cubic" else step
+        for i in range(per):
+            u = i / per
+            r = begin * u + (3 * step - 2 * begin - end) * u**2 + (begin + end - 2 * step) * u**3
+            v = begin + 2 * (3 * step - 2 * begin - end) * u
+            v += 3 * (begin + end - 2 * step) * u**2
+            away = (last + r) * 1e-6 - round(x / increment) * increment
+            ref = loop.k_pp_rad_s_mm * away + loop.k_pf_rad_mm * v * 1e-6 / period_s
+            volts = loop.volts_per_ref * ref + loop.volts_per_integral * integral
+            volts += volts_ahead[k] - loop.volts_per_speed * speed
+            if abs(volts) <= drive.volts_limit:
+                integral += step_s * (ref - speed)
+            volts = max(-drive.volts_limit, min(drive.volts_limit, volts))
+            x += loop.position_from_speed * speed + loop.position_from_volts * volts
+            speed = loop.speed_from_speed * speed + loop.speed_from_volts * volts
+            places[k, i] = x
+        last, way, slope = target, step, end
+    return places
+
+
+def contours() -> dict[str, Any]:
+    """By path and loop."""
+    figures: dict[str, Any] = {}
+    tuned = loops()
+    for name in PATHS:
+        chain = load_chain(EXAMPLES / f"{name}.toml")
+        x, y = chain.machine.models(chain.machine.plane)
+        paper: tuple[Drives, Forward] = ((x, y), None)
+        figures[name] = {}
+        for loop, (drives, forward) in {"paper": paper, **tuned}.items():
+            motion = simulate(chain.image, drives, feedforward=forward)
+            found = {
+                "contour_um": motion.max_contour_error_um,
+                "following_um": motion.max_following_error_um,
+                "volts": motion.max_volts,
+            }
+            if loop != "tuned_late":
+                found["between_syncs"] = between_um(chain, motion, drives, forward)
+            figures[name][loop] = found
+    return figures
+
+
+def plants() -> dict[str, Any]:
+    """Errors of the plants found from noisy reports of the alpha and the heart, %, by friction."""
+    figures: dict[str, Any] = {}
+    for name in ("alpha", "heart"):
+        chain = load_chain(EXAMPLES / f"{name}.toml")
+        given = chain.machine.models(chain.machine.plane)
+        for friction in (0.0, 0.2):
+            truth = [
+                replace(d, equipment=replace(d.equipment, friction_volts=friction)) for d in given
+            ]
+            motion = simulate(chain.image, truth)
+            found = [
+                _found(motion, axis, truth[axis], seed) for seed in range(SEEDS) for axis in (0, 1)
+            ]
+            errors = np.array([errors for errors, _ in found])
+            widths = np.array([widths for _, widths in found])
+            figures[f"{name}_friction_{friction:g}_v"] = {
+                "worst_gain_percent": 100 * float(np.abs(errors[:, 0]).max()),
+                "worst_time_percent": 100 * float(np.abs(errors[:, 1]).max()),
+                "median_interval_percent": 100 * float(np.median(widths)),
+                "inside_percent": 100 * float(np.mean(np.abs(errors) <= widths)),
+            }
+    return figures
+
+
+def _found(motion: Motion, axis: int, truth: Drive, seed: int) -> tuple[list[float], list[float]]:
+    noise = np.random.default_rng(1000 * axis + seed)
+    rows = motion.program_rows
+    still = np.zeros(len(rows), dtype=np.int32)
+    targets = rows["set_counts"][:, axis]
+    inputs = AxisInputs(int(targets[0]), targets, still, still.astype(np.int16))
+    actual = rows["act_counts"][:, axis] + np.rint(noise.normal(0, NOISE_COUNTS, len(rows)))
+    volts = rows["volts_mv"][:, axis] + np.rint(noise.normal(0, NOISE_MV, len(rows)))
+    stretch = Stretch(inputs, actual.astype(np.int32), volts.astype(np.int16))
+    guess = replace(truth, gain_rad_s_v=1.4 * truth.gain_rad_s_v, time_constant_s=0.12)
+    found = identify_axis([stretch], guess, motion.counts_per_mm, motion.period_us)
+    pairs = (
+        (found.gain_rad_s_v, truth.gain_rad_s_v),
+        (found.time_constant_s, truth.time_constant_s),
+    )
+    return [e.value / real - 1 for e, real in pairs], [e.within / real for e, real in pairs]
+
+
+def main() -> None:
+    """Measure and write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path, required=True)
+    out: Path = parser.parse_args().json
+    figures = {"contour": contours(), "identify": plants()}
+    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
