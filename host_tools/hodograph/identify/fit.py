@@ -202,7 +202,7 @@ def _fit(model: _Model, start: Float, rounds: int = _ROUNDS) -> Float:
 
 
 def _standard_errors(model: _Model, figures: Float) -> Float:
-    """Of errors that hang together over MEMORY_PERIODS: the sandwich of Newey and West."""
+    """The greater of two: of independent errors, and of some that hang together for MEMORY_PERIODS (Newey, West)."""
     residuals, jacobian = model.residuals(figures), model.slopes(figures)
     bread = np.linalg.inv(jacobian.T @ jacobian)
     scores = (jacobian * residuals[:, np.newaxis]).reshape(2, model.periods, -1).sum(axis=0)
@@ -211,4 +211,5 @@ def _standard_errors(model: _Model, figures: Float) -> Float:
         weight = 1 - lag / (MEMORY_PERIODS + 1)
         both = scores[lag:].T @ scores[:-lag]
         meat += weight * (both + both.T)
-    return np.sqrt(np.maximum(0.0, np.diag(bread @ meat @ bread)))
+    together = np.diag(bread @ meat @ bread)
+    return np.sqrt(np.maximum(together, np.diag(bread)))
