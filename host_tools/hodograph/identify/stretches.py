@@ -27,6 +27,8 @@ PARK_PERIODS = 250
 
 _FOLLOWS = 0x1027
 _FOLLOWS_MASK = 0x106F
+_STILL = 3
+"""SYNCs with one target before a motion that begins at rest: a run's recording begins a few before its start."""
 _REST = PARK_PERIODS + REACHED_AFTER
 
 Float = NDArray[np.float64]
@@ -74,8 +76,7 @@ def _motions(ticks: Ticks, speeds: NDArray[np.int32], torques: NDArray[np.int16]
     for first, last in runs_of(follows[1:-1] & follows[2:]):
         changes = first + 1 + np.flatnonzero(np.diff(targets[first:last]))
         for begin, end in _groups(changes):
-            start = begin - _REST
-            if start < first:
+            if begin - first < _STILL:
                 continue
             stop = min(end + 1, last)
             span, reached = slice(begin - 1, stop), slice(begin + 1, stop + REACHED_AFTER)
