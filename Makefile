@@ -52,7 +52,7 @@ hub_SRC     := $(filter-out %/main.c,$(wildcard sim/hub/*.c))
 can_SRC     := $(wildcard firmware/can/*.c)
 mps2_SRC    := $(wildcard firmware/port/mps2/command_line.c)
 # Without what is the core's own: tests stand in for that.
-stm32g4_SRC := $(filter-out %/cpu.c %/vectors.c %/port_stm32g4.c,$(wildcard firmware/port/stm32g4/*.c))
+stm32g4_SRC := $(filter-out %/cpu.c %/vectors.c %/port_%.c,$(wildcard firmware/port/stm32g4/*.c))
 od_SRC      := $(OD_C)
 
 BINS            := controller drive injector bridge hub

@@ -112,19 +112,20 @@ static int take_frames(void)
     return 0;
 }
 
-/* At lock step the processor belongs to those who are to answer: so no look at the socket before they can have. */
-static int wait_for_turn(void)
+/* At lock step the processor belongs to those who are to answer: so no look at the socket before they can have. Nor at the clock
+ * when they have, which is a system call where the kernel itself is a process: guard times begin anew with the next request. */
+static int wait_for_turn(uint64_t now_ns)
 {
     bool over = false;
     int error = 0;
     self.reply.header = (struct exchange_header){.count = 0};
-    for (uint64_t now_ns = clock_ns(); !over && error == 0 && bus_signals() < 2u;) {
+    while (!over && error == 0 && bus_signals() < 2u) {
         const uint64_t wait_ns = turn_wait_ns(&self.turn, now_ns);
         struct pollfd wait = {.fd = self.turn.awaiting ? self.socket->fd : -1, .events = POLLIN};
         const struct timespec limit = clock_timespec(wait_ns);
         if (wait_ns > 0u) {
-            (void)ppoll(&wait, 1, &limit, NULL);
-            now_ns = clock_ns();
+            const int ready = ppoll(&wait, 1, &limit, NULL);
+            now_ns = ready > 0 && self.turn.schedule.lock_step ? now_ns : clock_ns();
         }
         error = self.turn.at_once ? 0 : take_frames();
         over = turn_over(&self.turn, self.reply.header.count, now_ns, &self.reply.header);
@@ -136,10 +137,11 @@ static int wait_for_turn(void)
 static int serve(void)
 {
     const uint16_t flags = self.request.header.flags;
-    turn_request(&self.turn, &self.request.header, clock_ns());
+    const uint64_t now_ns = clock_ns();
+    turn_request(&self.turn, &self.request.header, now_ns);
     int error = (flags & EXCHANGE_FILTER) != 0u ? set_filters() : send_frames();
     if (error == 0) {
-        error = wait_for_turn();
+        error = wait_for_turn(now_ns);
     }
     if (bus_signals() > 0u) {
         self.reply.header.flags |= EXCHANGE_STOP;

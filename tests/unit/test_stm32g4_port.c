@@ -23,11 +23,13 @@
 #define port_store_data     board_store_data
 #define port_log            board_log
 #include "port/stm32g4/port_stm32g4.c" /* NOLINT(bugprone-suspicious-include) */
+#include "port/stm32g4/port_store.c"   /* NOLINT(bugprone-suspicious-include) */
 
 #include <string.h>
 
 #include "fdcan_model.h"
 #include "flash_model.h"
+#include "port/cortex_m/startup.h"
 #include "stm32g4_chip.h"
 #include "unity.h"
 

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The port for NUCLEO-G474RE: what port.h asks for, from the modules of this folder. */
+/* The port for NUCLEO-G474RE: what port.h asks for, from the modules of this folder; the store is in port_store.c. */
 #include "port/port.h"
 
-#include "port/cortex_m/startup.h"
 #include "port/stm32g4/clock.h"
 #include "port/stm32g4/console.h"
 #include "port/stm32g4/cpu.h"
+#include "port/stm32g4/faults.h"
 #include "port/stm32g4/fdcan.h"
 #include "port/stm32g4/flash.h"
-#include "port/stm32g4/flash_store.h"
 #include "port/stm32g4/irq.h"
 #include "port/stm32g4/pins.h"
 #include "port/stm32g4/reg_clock.h"
@@ -32,7 +31,6 @@ static struct {
     volatile bool started;
     volatile bool awake;
     uint32_t told_us;
-    uint32_t spoiled_words; /* seen before the start */
 } self;
 
 static int fail(const char *text)
@@ -55,6 +53,7 @@ int port_begin(int argc, char **argv)
 {
     (void)argc;
     (void)argv;
+    faults_begin();
     pins_begin();
     const bool clocked = clock_begin();
     console_begin();
@@ -115,8 +114,9 @@ uint32_t port_time_us(void)
 
 int port_start(const struct port_handlers *handlers, uint32_t period_us)
 {
-    if (self.spoiled_words != 0u) {
-        port_log(PORT_WARNING, "spoiled words in the program store", (int32_t)self.spoiled_words);
+    const uint32_t spoiled_words = faults_from_now_on();
+    if (spoiled_words != 0u) {
+        port_log(PORT_WARNING, "spoiled words in the program store", (int32_t)spoiled_words);
     }
     watchdog_start();
     self.started = true;
@@ -187,56 +187,9 @@ void port_wake(void)
     self.awake = true;
 }
 
-uint32_t port_store_size(void)
-{
-    return FLASH_STORE_BYTES;
-}
-
-/* The mainline may be in the store for a second or two without a wait between. */
-int port_store_erase(unsigned bank)
-{
-    watchdog_feed(irq_ticks());
-    return flash_store_erase(bank) ? 0 : PORT_ERR_STORE;
-}
-
-int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
-{
-    watchdog_feed(irq_ticks());
-    return flash_store_write(bank, offset, data, size) ? 0 : PORT_ERR_STORE;
-}
-
-const uint8_t *port_store_data(unsigned bank)
-{
-    return flash_store_data(bank);
-}
-
 void port_log(enum port_level level, const char *text, int32_t value)
 {
     if (level == PORT_WARNING) {
         console_number(text, value);
     }
-}
-
-/* Before the start the store is looked through for a whole program: a word that lost its power half written is found
- * then, and its CRC tells. Later nobody reads what was not checked: the memory itself has failed. */
-void startup_nmi(void)
-{
-    if (flash_take_ecc_error() && !self.started) {
-        self.spoiled_words++;
-        return;
-    }
-    console_number("the flash memory has failed", 0);
-    cpu_reset();
-}
-
-/* SYNC stops, so the drives stop by themselves. */
-void startup_hard_fault(void)
-{
-    console_hex("hard fault, CFSR", reg_read(0xE000ED28u));
-    cpu_reset();
-}
-
-void startup_exit(int status)
-{
-    console_number("ends with status", status);
 }

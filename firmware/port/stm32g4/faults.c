@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: MIT */
+#include "port/stm32g4/faults.h"
+
+#include <stdbool.h>
+
+#include "port/cortex_m/startup.h"
+#include "port/stm32g4/console.h"
+#include "port/stm32g4/cpu.h"
+#include "port/stm32g4/flash.h"
+#include "port/stm32g4/reg.h"
+
+static struct {
+    volatile bool running;
+    uint32_t spoiled_words;
+} self;
+
+void faults_begin(void)
+{
+    self.running = false;
+    self.spoiled_words = 0;
+}
+
+uint32_t faults_from_now_on(void)
+{
+    self.running = true;
+    return self.spoiled_words;
+}
+
+/* Before the start the store is looked through for a whole program: a word that lost its power half written is found
+ * then, and its CRC tells. Later nobody reads what was not checked: the memory itself has failed. */
+void startup_nmi(void)
+{
+    if (flash_take_ecc_error() && !self.running) {
+        self.spoiled_words++;
+        return;
+    }
+    console_number("the flash memory has failed", 0);
+    cpu_reset();
+}
+
+/* SYNC stops, so the drives stop by themselves. */
+void startup_hard_fault(void)
+{
+    console_hex("hard fault, CFSR", reg_read(0xE000ED28u));
+    cpu_reset();
+}
+
+void startup_exit(int status)
+{
+    console_number("ends with status", status);
+}
