@@ -64,3 +64,18 @@ def test_friction_and_rating_too(capsys: pytest.CaptureFixture[str], tmp_path: P
     for other in ("friction_volts = 0.2", "rated_torque_nm = 2"):
         less = result(capsys, "simulate", alpha(tmp_path / other[:8], gains, other), "--json")
         assert less["encoders_sha256"] != simulated["encoders_sha256"]
+
+
+def test_the_tuned_machine_on_the_bus(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Cubics and torque offsets give the same bits too, and the plant comes out of the recording."""
+    machine = str(EXAMPLES / "machines" / "tuned.toml")
+    given = (str(EXAMPLES / "alpha.toml"), "--machine", machine)
+    file = tmp_path / "run.log"
+    simulated = result(capsys, "simulate", *given, "--json")
+    recorded = result(capsys, "run", *given, "--json", "--pace", "fast", "--record", str(file))
+    assert {key: recorded[key] for key in simulated} == simulated
+    assert 0.002 < simulated["max_contour_error_um"] < 0.05
+    axes = result(capsys, "identify", str(file), "--machine", machine, "--json")["axes"]
+    for axis, gain, time_s in zip(axes, (83.0089, 50.4977), (0.19936, 0.15641), strict=True):
+        assert axis["gain_rad_s_v"]["value"] == pytest.approx(gain, rel=0.01)
+        assert axis["time_constant_s"]["value"] == pytest.approx(time_s, rel=0.01)
