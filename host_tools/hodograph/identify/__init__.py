@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The plant of each axis from a recorded run, with confidence intervals: docs/tuning.md, numerics.md section 19."""
+"""The plant of each axis from a recorded run, with confidence intervals: docs/tuning.md, numerics.md section 18."""
 
 from .fit import Estimate, Plant, identify_axis
 from .stretches import Stretch, stretches
