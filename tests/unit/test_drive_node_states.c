@@ -161,14 +161,14 @@ static double braking_way_mm(double speed_mm_s, double volts)
 static void test_quick_stop_at_the_motors_limits(void)
 {
     static const struct {
-        int16_t code;
         double volts;
         enum cia402_state end;
+        int16_t code;
     } rows[] = {
-        {3, 2.5, CIA402_SWITCH_ON_DISABLED},
-        {4, 5.0, CIA402_SWITCH_ON_DISABLED},
-        {7, 2.5, CIA402_QUICK_STOP_ACTIVE},
-        {8, 5.0, CIA402_QUICK_STOP_ACTIVE},
+        {2.5, CIA402_SWITCH_ON_DISABLED, 3},
+        {5.0, CIA402_SWITCH_ON_DISABLED, 4},
+        {2.5, CIA402_QUICK_STOP_ACTIVE, 7},
+        {5.0, CIA402_QUICK_STOP_ACTIVE, 8},
     };
     for (unsigned i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         drive_bench_begin();
