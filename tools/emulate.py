@@ -58,7 +58,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--serve",
         metavar="HOST:PORT",
-        help="SLCAN on this TCP port instead of a bus, for a program of yours (python-can: slcan:socket://HOST:PORT, with pyserial)",
+        help="SLCAN on this TCP port instead of a bus (python-can, with pyserial: slcan:socket://HOST:PORT)",
     )
     parser.add_argument("--image", type=Path, help="another image than that of make firmware")
     parser.add_argument("--plugin", help="a plugin for QEMU, with its words (tools/count_til.py)")
