@@ -55,7 +55,7 @@ static uint64_t motion_number(const struct motion *motion, uint8_t sub)
     case 2:
         return (uint64_t)(int64_t)motion_feed_um_s(motion);
     default:
-        return motion->time_q32_s;
+        return motion_time_q32_s(motion);
     }
 }
 

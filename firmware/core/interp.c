@@ -64,12 +64,6 @@ static int enter_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
     return INTERP_OK;
 }
 
-static const struct prepared_piece *behind_piece(const struct interp *it,
-                                                 const struct prepared_piece *piece)
-{
-    return (const void *)((const uint8_t *)piece + prepared_piece_size(it->kernel));
-}
-
 /* Makes the piece of this time the present one, crossing `most` ends at most. The last piece has no
  * end here: beyond the duration nothing is evaluated. */
 static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
@@ -88,7 +82,7 @@ static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
         if (most == 0) {
             return INTERP_ERR_JUMP;
         }
-        piece = behind_piece(it, piece);
+        piece = prepared_piece_next(piece, it->kernel);
     }
     it->piece = piece;
     return INTERP_OK;
@@ -122,17 +116,21 @@ static int step_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t m
 {
     const uint32_t size = prepared_segment_size(it->kernel);
     const struct prepared_segment *segment = it->segment;
-    for (; arc_length_q40_mm >= segment->to_q40_mm; most--) {
-        if (most == 0) {
-            return INTERP_ERR_JUMP;
-        }
-        segment = (const void *)((const uint8_t *)segment + size);
-    }
-    for (; arc_length_q40_mm < segment->from_q40_mm; most--) {
-        if (most == 0) {
-            return INTERP_ERR_JUMP;
-        }
-        segment = (const void *)((const uint8_t *)segment - size);
+    uint32_t left = most;
+    if (arc_length_q40_mm >= segment->to_q40_mm) {
+        do {
+            if (left-- == 0) {
+                return INTERP_ERR_JUMP;
+            }
+            segment = (const void *)((const uint8_t *)segment + size);
+        } while (arc_length_q40_mm >= segment->to_q40_mm);
+    } else {
+        do {
+            if (left-- == 0) {
+                return INTERP_ERR_JUMP;
+            }
+            segment = (const void *)((const uint8_t *)segment - size);
+        } while (arc_length_q40_mm < segment->from_q40_mm);
     }
     it->segment = segment;
     return INTERP_OK;

@@ -16,31 +16,12 @@ uint64_t prepared_size(const struct program *p, const struct kernel *kernel)
            (uint64_t)p->header.segment_count * prepared_segment_size(kernel);
 }
 
-static uint32_t least(uint32_t a, uint32_t b)
+static void look_ahead(struct rate_pace ahead[RATE_WINDOWS], const struct program *p, uint32_t i)
 {
-    return a < b ? a : b;
-}
-
-static void take_in(struct prepared_bounds *bounds, const struct program *p, uint32_t i)
-{
-    struct prepared_bounds own;
-    program_piece_override(p, i, &own.factor_q24, &own.rate_q16_per_s, &own.second_q8_per_s2);
-    bounds->factor_q24 = least(bounds->factor_q24, own.factor_q24);
-    bounds->rate_q16_per_s = least(bounds->rate_q16_per_s, own.rate_q16_per_s);
-    bounds->second_q8_per_s2 = least(bounds->second_q8_per_s2, own.second_q8_per_s2);
-}
-
-static void look_ahead(struct prepared_bounds ahead[PREPARED_SPANS], const struct program *p,
-                       uint32_t i)
-{
-    struct prepared_bounds bounds = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
-    uint32_t taken = 0;
-    for (uint32_t k = 0; k < PREPARED_SPANS; k++) {
-        while (taken < 1u << k && i + taken < p->header.piece_count) {
-            take_in(&bounds, p, i + taken);
-            taken++;
-        }
-        ahead[k] = bounds;
+    struct rate_bounds bounds;
+    for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
+        rate_bounds_of(&bounds, p, i, rate_window_pieces(k));
+        rate_pace_make(&ahead[k], &bounds, p->header.period_us);
     }
 }
 
@@ -52,7 +33,6 @@ void prepared_piece_make(struct prepared_piece *out, const struct program *p,
     out->start_q32_s = start_q32_s;
     out->end_q32_s =
         i + 1u == p->header.piece_count ? UINT64_MAX : start_q32_s + piece.duration_q32_s;
-    out->reserved = 0;
     kernel->piece_set(&out->feed, &piece);
 }
 
@@ -98,18 +78,4 @@ void prepared_attach(struct program *p, const struct kernel *kernel, const uint8
 {
     p->prepared = records;
     p->prepared_for = kernel;
-}
-
-const struct prepared_piece *prepared_piece_at(const struct program *p, const struct kernel *kernel,
-                                               uint32_t i)
-{
-    return (const void *)(p->prepared + (size_t)i * prepared_piece_size(kernel));
-}
-
-const struct prepared_segment *prepared_segment_at(const struct program *p,
-                                                   const struct kernel *kernel, uint32_t i)
-{
-    const uint8_t *segments =
-        p->prepared + (size_t)p->header.piece_count * prepared_piece_size(kernel);
-    return (const void *)(segments + (size_t)i * prepared_segment_size(kernel));
 }

@@ -19,25 +19,17 @@
 #include "core/kernel_fixed.h"
 #include "core/kernel_float.h"
 #include "core/program.h"
+#include "core/rate_pace.h"
 
 #define PREPARED_ALIGNMENT 8u /* of the first record */
-#define PREPARED_SPANS     5  /* 1, 2, 4, 8, 16 pieces */
-
-/* Override bounds as in struct program_piece. */
-struct prepared_bounds {
-    uint32_t factor_q24;
-    uint32_t rate_q16_per_s;
-    uint32_t second_q8_per_s2;
-};
 
 /* A record ends behind the kernel's own part. */
 struct prepared_piece {
     uint64_t start_q32_s;
     uint64_t
         end_q32_s; /* UINT64_MAX for the last piece: nothing is evaluated beyond the duration */
-    struct prepared_bounds
-        ahead[PREPARED_SPANS]; /* least of this one and those behind it, 2^k pieces in all */
-    uint32_t reserved;
+    struct rate_pace
+        ahead[RATE_WINDOWS]; /* of the windows that begin with it; for the header's period */
     union {
         struct feed_piece integers;
         struct kernel_double_piece doubles;
@@ -85,9 +77,25 @@ int prepared_make(const struct program *p, const struct kernel *kernel, prepared
 void prepared_attach(struct program *p, const struct kernel *kernel, const uint8_t *records);
 
 /* A record of a program that has them for this kernel. */
-const struct prepared_piece *prepared_piece_at(const struct program *p, const struct kernel *kernel,
-                                               uint32_t i);
-const struct prepared_segment *prepared_segment_at(const struct program *p,
-                                                   const struct kernel *kernel, uint32_t i);
+static inline const struct prepared_piece *
+prepared_piece_at(const struct program *p, const struct kernel *kernel, uint32_t i)
+{
+    return (const void *)(p->prepared + (size_t)i * prepared_piece_size(kernel));
+}
+
+static inline const struct prepared_segment *
+prepared_segment_at(const struct program *p, const struct kernel *kernel, uint32_t i)
+{
+    return (const void *)(p->prepared +
+                          (size_t)p->header.piece_count * prepared_piece_size(kernel) +
+                          (size_t)i * prepared_segment_size(kernel));
+}
+
+/* The piece behind one that is not the last. */
+static inline const struct prepared_piece *prepared_piece_next(const struct prepared_piece *piece,
+                                                               const struct kernel *kernel)
+{
+    return (const void *)((const uint8_t *)piece + prepared_piece_size(kernel));
+}
 
 #endif

@@ -161,6 +161,14 @@ uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 /* floor of the square root: 16 rounds of additions and a 32-bit division. */
 uint64_t qmath_root(uint64_t a);
 
+/* At least the square root of a, 2^30 <= a, and at most 2^-10 of it and 2 more: a straight line, off by 5 %, and one step
+ * of Heron's rule, whose error is half the square of that and always above. */
+static inline uint32_t qmath_root_above(uint32_t a)
+{
+    uint32_t line = ((a >> 16) * 43u >> 6) + 23200u;
+    return ((line + a / line + 1u) >> 1) + 1u;
+}
+
 /* a / 3 and a / 5 for |a| < 2^62, by the reciprocal: at most 2 units below the exact value. */
 int64_t qmath_third(int64_t a);
 int64_t qmath_fifth(int64_t a);

@@ -3,102 +3,69 @@
 
 #include "core/qmath.h"
 
-static int64_t magnitude(int64_t a)
+void rate_ticks_of(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t way_q57)
 {
-    return a < 0 ? -a : a;
+    const uint32_t way_q30 = (uint32_t)(way_q57 >> 27) + 1u;
+    const int shift = qmath_clz32(way_q30) & ~1;
+    const uint32_t root = qmath_root_above(way_q30 << shift);
+    const uint32_t turns =
+        ((uint32_t)(qmath_product_unsigned(root, pace->inverse_root) >> 32) >> (shift / 2)) + 1u;
+    const uint32_t half =
+        ((uint32_t)(qmath_product_unsigned(way_q30, pace->inverse_slope) >> 32) >> 3) + 1u;
+    ticks->rise = turns < pace->turns ? turns : pace->turns;
+    ticks->half = half > ticks->rise ? half : ticks->rise;
 }
 
-static int64_t least(int64_t a, int64_t b)
+int64_t rate_step_of(const struct rate_ticks *ticks, int64_t way_q57)
 {
-    return a < b ? a : b;
+    const uint64_t parts = qmath_product_unsigned(ticks->rise, ticks->half) << 1;
+    return (int64_t)qmath_div_u64((uint64_t)way_q57, parts);
 }
 
-static int64_t clamp(int64_t a, int64_t low, int64_t high)
+uint64_t rate_span_q32(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s)
 {
-    return a < low ? low : a > high ? high : a;
+    const uint32_t mean_q16 = (uint32_t)(mean_q57 >> 41) + 1u;
+    const uint32_t tick_q32_s =
+        (uint32_t)(qmath_product_unsigned(period_q32_s, mean_q16) >> 16) + 1u;
+    return qmath_product_unsigned(ticks->rise + ticks->half, tick_q32_s);
 }
 
-struct rate_bounds rate_bounds_least(const struct rate_bounds *a, const struct rate_bounds *b)
+void rate_move_begin(struct rate_move *move, const struct rate *from,
+                     const struct rate_ticks *ticks, int64_t step_q56)
 {
-    struct rate_bounds out = {
-        .most_q57 = least(a->most_q57, b->most_q57),
-        .slope_q56 = least(a->slope_q56, b->slope_q56),
-        .second_q56 = least(a->second_q56, b->second_q56),
-    };
-    return out;
+    move->step_q56 = step_q56;
+    move->rest_q57 = from->rate_q57;
+    move->rise = ticks->rise;
+    move->even = ticks->half - ticks->rise;
+    move->fall = 0;
 }
 
-/* Greatest b with (1 + ceil(b / second)) b <= room: what is left of the way, b and all slopes after
- * it, when b falls to 0 evenly in ceil(b / second) ticks. */
-static int64_t greatest_slope(int64_t room, int64_t second)
+void rate_move_shorten(struct rate_move *move)
 {
-    uint64_t ratio = qmath_div_u64((uint64_t)room, (uint64_t)second);
-    uint64_t n = qmath_root(ratio);
-    n -= n * (n + 1u) > ratio ? 1u : 0u;
-    return (int64_t)qmath_div_u64((uint64_t)room, n + 2u);
+    move->even = move->even < move->rise ? move->even : move->rise;
 }
 
-int64_t rate_next_slope(const struct rate *rate, int64_t target_q57,
-                        const struct rate_bounds *bounds)
+void rate_move_cut(struct rate_move *move)
 {
-    int64_t room = target_q57 - rate->rate_q57 - rate->slope_q56;
-    int64_t wanted = greatest_slope(magnitude(room), bounds->second_q56);
-    wanted = clamp(room < 0 ? -wanted : wanted, -bounds->slope_q56, bounds->slope_q56);
-    return clamp(wanted, rate->slope_q56 - bounds->second_q56,
-                 rate->slope_q56 + bounds->second_q56);
+    move->rise = 0;
+    move->even = 0;
 }
 
-void rate_move(struct rate *rate, int64_t slope_q56)
+/* A tick more of rise is one more of fall: twice what it raises the rate by. */
+int64_t rate_move_slope(struct rate_move *move, int64_t slope_q56)
 {
-    rate->rate_q57 += rate->slope_q56 + slope_q56;
-    rate->slope_q56 = slope_q56;
-}
-
-/* floor(a / b) of numbers that are not negative */
-static int64_t quotient(int64_t a, int64_t b)
-{
-    return (int64_t)qmath_div_u64((uint64_t)a, (uint64_t)b);
-}
-
-struct rate_stop rate_stop(const struct rate *rate, int64_t second_q56)
-{
-    struct rate_stop stop = {.ticks = 0, .rest_q57 = rate->rate_q57};
-    const int64_t slope = magnitude(rate->slope_q56);
-    if (slope != 0) {
-        stop.ticks = quotient(slope - 1, second_q56) + 1;
-        int bits = 128 - qmath_clz64((uint64_t)stop.ticks) - qmath_clz64((uint64_t)slope);
-        int64_t way = bits > 60 ? (int64_t)1 << 60 : stop.ticks * slope;
-        stop.rest_q57 += rate->slope_q56 < 0 ? -way : way;
+    int64_t next = slope_q56;
+    if (move->rise > 0) {
+        move->rise--;
+        move->fall++;
+        next += move->step_q56;
+        move->rest_q57 += 2 * (slope_q56 + next);
+    } else if (move->even > 0) {
+        move->even--;
+        move->rest_q57 += 2 * slope_q56;
+    } else if (move->fall > 0) {
+        move->fall--;
+        next -= move->step_q56;
     }
-    return stop;
-}
-
-/* Ticks from rest to rest over a way in rate units, at most (section 12, "How long it takes"). */
-static int64_t way_ticks(int64_t way_q57, const struct rate_bounds *bounds)
-{
-    if (way_q57 == 0) {
-        return 0;
-    }
-    int64_t corner = (int64_t)qmath_root((uint64_t)quotient(way_q57 / 2, bounds->second_q56)) + 1;
-    if (corner * bounds->second_q56 <= bounds->slope_q56) {
-        return 2 * corner + 2;
-    }
-    return quotient(way_q57 / 2, bounds->slope_q56) +
-           quotient(bounds->slope_q56, bounds->second_q56) + 5;
-}
-
-int64_t rate_span_q12(const struct rate *rate, const struct rate_stop *stop, int64_t target_q57,
-                      const struct rate_bounds *bounds)
-{
-    int64_t rest = clamp(stop->rest_q57, -RATE_ONE, 2 * RATE_MOST);
-    int64_t away = magnitude(rest - rate->rate_q57);
-    int64_t ticks = stop->ticks + way_ticks(magnitude(target_q57 - rate->rate_q57) + away, bounds);
-    if (ticks >= RATE_SPAN_TICKS) {
-        return INT64_MAX;
-    }
-    int64_t high = rate->rate_q57 > target_q57 ? rate->rate_q57 : target_q57;
-    high = rest > high ? rest : high;
-    /* from rest the way is even: its mean is the middle of both ends */
-    int64_t mean = rate->slope_q56 == 0 ? (rate->rate_q57 + target_q57) / 2 : high;
-    return ticks * ((mean >> 45) + 1) + 3 * ((high >> 45) + 1);
+    return next;
 }

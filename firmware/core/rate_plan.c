@@ -1,181 +1,32 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/rate_plan.h"
 
-#define HIGHEST (RATE_WINDOW_LEVELS - 1u)
+#include <string.h>
 
-static int64_t greater(int64_t a, int64_t b)
+#include "core/rate_search.h"
+#include "core/timebase.h"
+
+#define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
+#define NOWHERE UINT32_MAX
+
+static const struct rate_ticks SHORTEST = {1, 1};
+
+void rate_plan_reset(struct rate_plan *plan)
 {
-    return a > b ? a : b;
+    memset(plan, 0, sizeof *plan);
+    plan->task = RATE_TASK_NONE;
+    plan->searched = NOWHERE;
+    plan->wanted_q57 = -1; /* none yet */
 }
 
-static void get_window(const struct timebase *tb, uint32_t level, struct rate_window *w)
+static int64_t magnitude(int64_t a)
 {
-    rate_window_get(w, &tb->scale, tb->program, tb->piece, tb->piece_end_q32_s, level);
+    return a < 0 ? -a : a;
 }
 
-/* Program time reached after so many ticks at rate 1, at most. */
-static uint64_t reached_q32(const struct timebase *tb, int64_t ticks_q12)
+static int64_t lesser(int64_t a, int64_t b)
 {
-    if (ticks_q12 == INT64_MAX) {
-        return UINT64_MAX - 1u;
-    }
-    return (tb->time_q42_s >> 10) + (((uint64_t)ticks_q12 * tb->period_q32_s) >> 12) + 2u;
-}
-
-/* Whether the way to a target keeps all three bounds in pieces that have these. */
-static int keeps(const struct rate *now, const struct rate_stop *stop, int64_t target_q57,
-                 const struct rate_bounds *bounds)
-{
-    int64_t high = greater(greater(now->rate_q57, stop->rest_q57), target_q57);
-    return stop->rest_q57 >= 0 && high <= bounds->most_q57 && now->slope_q56 <= bounds->slope_q56 &&
-           now->slope_q56 >= -bounds->slope_q56;
-}
-
-enum found { FOUND, NONE, NOT_YET };
-
-/* Bounds with which the target can be reached from here inside all pieces on the way. One window a tick; a wider one in
- * the next. */
-static enum found find_bounds(struct timebase *tb, int64_t target_q57, struct rate_bounds *out)
-{
-    struct rate_window w;
-    get_window(tb, tb->plan_level, &w);
-    struct rate_stop stop = rate_stop(&tb->now, w.bounds.second_q56);
-    if (keeps(&tb->now, &stop, target_q57, &w.bounds)) {
-        *out = w.bounds;
-        if (reached_q32(tb, rate_span_q12(&tb->now, &stop, target_q57, out)) <= w.end_q32_s) {
-            return FOUND;
-        }
-        if (tb->plan_level < HIGHEST) {
-            tb->plan_level++;
-            return NOT_YET;
-        }
-    }
-    *out = tb->least;
-    stop = rate_stop(&tb->now, out->second_q56);
-    return keeps(&tb->now, &stop, target_q57, out) ? FOUND : NONE;
-}
-
-static void plan(struct timebase *tb, int64_t target_q57)
-{
-    struct rate_bounds bounds;
-    int renewed = tb->plan_target_q57 == target_q57;
-    if (renewed && tb->plan_piece == tb->piece) {
-        return;
-    }
-    if (tb->plan_next_q57 != target_q57) {
-        tb->plan_next_q57 = target_q57;
-        tb->plan_level = 0;
-    }
-    enum found found = find_bounds(tb, target_q57, &bounds);
-    if (found == NOT_YET) {
-        return;
-    }
-    tb->plan_level = 0;
-    tb->plan_piece = tb->piece;
-    if (found == NONE) {
-        return;
-    }
-    if (!renewed ||
-        (bounds.slope_q56 >= tb->plan.slope_q56 && bounds.second_q56 >= tb->plan.second_q56)) {
-        tb->plan = bounds;
-        tb->plan_target_q57 = target_q57;
-    }
-}
-
-/* One tick towards the wanted rate, if from its end there is a way back to a rate that all pieces
- * of the program allow: the plan from then on. */
-struct attempt {
-    struct rate after;
-    struct rate_stop stop; /* from there */
-    int64_t target_q57;
-    int64_t back_q57;
-};
-
-static int try_tick(const struct timebase *tb, const struct rate_bounds *bounds, struct attempt *a)
-{
-    const struct rate *now = &tb->now;
-    int64_t wanted = tb->override_q57;
-    a->target_q57 = wanted < bounds->most_q57 ? wanted : bounds->most_q57;
-    int64_t slope = rate_next_slope(now, a->target_q57, bounds);
-    a->after = *now;
-    rate_move(&a->after, slope);
-    a->stop = rate_stop(&a->after, bounds->second_q56);
-    a->back_q57 = a->stop.rest_q57 < tb->least.most_q57 ? a->stop.rest_q57 : tb->least.most_q57;
-    int64_t inside = now->rate_q57 + greater(now->slope_q56, 0);
-    return inside <= bounds->most_q57 && now->slope_q56 <= bounds->slope_q56 &&
-           now->slope_q56 >= -bounds->slope_q56 && keeps(&a->after, &a->stop, a->back_q57, bounds);
-}
-
-/* Slopes move the rate by even steps near the target: the last unit may be left over. */
-static int arrived(int64_t rate_q57, int64_t target_q57)
-{
-    return rate_q57 - target_q57 <= 1 && target_q57 - rate_q57 <= 1;
-}
-
-/* A tick that has been shown to be safe becomes the plan. */
-static void take(struct timebase *tb, const struct attempt *a, const struct rate_window *w,
-                 uint64_t reached_q32_s)
-{
-    int still = a->after.slope_q56 == 0 && arrived(a->after.rate_q57, a->target_q57) &&
-                tb->now.slope_q56 == 0;
-    uint64_t way = reached_q32_s - (tb->time_q42_s >> 10);
-    tb->climb_end_q32_s = still && w->end_q32_s > way ? w->end_q32_s - way : 0;
-    tb->plan = w->bounds;
-    tb->plan_target_q57 = a->back_q57;
-    tb->plan_piece = tb->piece;
-    tb->saturated = a->target_q57 < tb->override_q57;
-}
-
-/* A narrower window next time, if it would do with room for some ticks. */
-static void narrow(struct timebase *tb, uint64_t reached_q32_s, uint64_t margin)
-{
-    struct rate_window w;
-    if (tb->climb_level > 0) {
-        get_window(tb, tb->climb_level - 1u, &w);
-        tb->climb_level -= reached_q32_s + 2u * margin <= w.end_q32_s ? 1u : 0u;
-    }
-}
-
-static int64_t follow(const struct timebase *tb)
-{
-    return rate_next_slope(&tb->now, tb->plan_target_q57, &tb->plan);
-}
-
-/* No attempt before the first piece that may be the one in the way. */
-static void give_up(struct timebase *tb)
-{
-    tb->climb_piece = tb->piece + (tb->climb_level > 1u ? 1u << (tb->climb_level - 1u) : 1u);
-    tb->climb_end_q32_s = 0;
-    tb->climb_level = 0;
-}
-
-/* A tick above the least factor, or along the plan when its window shows no way back. */
-static int64_t climb(struct timebase *tb)
-{
-    struct rate_window w;
-    struct attempt a;
-    uint64_t margin = 4u * (uint64_t)tb->period_q32_s;
-    uint64_t reached = UINT64_MAX;
-    if ((tb->time_q42_s >> 10) + margin <= tb->climb_end_q32_s) {
-        return 0;
-    }
-    get_window(tb, tb->climb_level, &w);
-    int possible = try_tick(tb, &w.bounds, &a);
-    if (possible != 0) {
-        reached = reached_q32(tb, rate_span_q12(&a.after, &a.stop, a.back_q57, &w.bounds)) + margin;
-    }
-    if (possible != 0 && reached <= w.end_q32_s) {
-        take(tb, &a, &w, reached);
-        narrow(tb, reached, margin);
-        return a.after.slope_q56;
-    }
-    if (possible != 0 && tb->climb_level < HIGHEST) {
-        tb->climb_level++;
-    } else {
-        give_up(tb);
-    }
-    tb->saturated = 1;
-    return follow(tb);
+    return a < b ? a : b;
 }
 
 static int64_t wanted_rate(const struct timebase *tb)
@@ -186,24 +37,151 @@ static int64_t wanted_rate(const struct timebase *tb)
 int rate_plan_steady(const struct timebase *tb)
 {
     int64_t wanted = wanted_rate(tb);
-    return wanted <= tb->least.most_q57 && tb->now.slope_q56 == 0 && tb->now.rate_q57 == wanted;
+    return wanted <= tb->least_q57 && tb->now.rate_q57 == wanted && !rate_moves(&tb->plan.move);
+}
+
+/* --- On its way --- */
+
+/* Another wish: the move goes on until a cut would end there, or beyond it. Not above the least factor on the way down,
+ * where nothing says how to leave. */
+static void change_mind(struct timebase *tb, int64_t wanted)
+{
+    struct rate_move *move = &tb->plan.move;
+    if (tb->plan.kind == RATE_LEAVE && move->rest_q57 > tb->least_q57) {
+        return;
+    }
+    if (move->step_q56 > 0 ? move->rest_q57 >= wanted : move->rest_q57 <= wanted) {
+        rate_move_cut(move);
+    }
+}
+
+/* --- At rest --- */
+
+static void begin_move(struct timebase *tb, int64_t step_q56)
+{
+    struct rate_plan *plan = &tb->plan;
+    int down = plan->goal_q57 < tb->now.rate_q57;
+    rate_move_begin(&plan->move, &tb->now, &plan->ticks, down ? -step_q56 : step_q56);
+    if (plan->kind == RATE_SETTLE && plan->window > 1) { /* not inside the present piece */
+        rate_move_shorten(&plan->move);
+    }
+    plan->task = RATE_TASK_NONE;
+    plan->searched = NOWHERE;
+}
+
+static void search(struct rate_plan *plan, enum rate_kind kind, int64_t goal_q57)
+{
+    plan->task = RATE_TASK_SEARCH;
+    plan->kind = kind;
+    plan->goal_q57 = goal_q57;
+    plan->window = 0;
+}
+
+/* The way back that was found before the rate went up. */
+static void go_back(struct timebase *tb)
+{
+    struct rate_plan *plan = &tb->plan;
+    plan->ticks = plan->back;
+    plan->kind = RATE_LEAVE;
+    plan->goal_q57 = tb->least_q57 - RATE_SPARE;
+    plan->task = RATE_TASK_BEGIN;
+}
+
+static void choose_below(struct timebase *tb, int64_t wanted)
+{
+    int64_t away = wanted - tb->now.rate_q57;
+    tb->saturated = 0;
+    if (magnitude(away) <= 1) {
+        tb->now.rate_q57 = wanted;
+    } else if (tb->now.rate_q57 > tb->least_q57) {
+        search(&tb->plan, RATE_LEAVE, lesser(wanted, tb->least_q57 - RATE_SPARE));
+    } else if (magnitude(away) <= SMALL) {
+        tb->plan.ticks = SHORTEST;
+        tb->plan.kind = RATE_SETTLE;
+        tb->plan.goal_q57 = wanted;
+        begin_move(tb, magnitude(away) / 2);
+    } else {
+        search(&tb->plan, RATE_SETTLE, wanted);
+    }
+}
+
+/* What to do next. Above the least factor once in each piece. */
+static void choose(struct timebase *tb)
+{
+    struct rate_plan *plan = &tb->plan;
+    int64_t wanted = wanted_rate(tb);
+    int same = plan->wanted_q57 == wanted;
+    plan->wanted_q57 = wanted;
+    if (wanted <= tb->least_q57) {
+        choose_below(tb, wanted);
+    } else if (!same || plan->searched != tb->piece) {
+        plan->searched = tb->piece;
+        tb->saturated = wanted - tb->now.rate_q57 > RATE_SPARE;
+        search(plan, tb->now.rate_q57 > tb->least_q57 ? RATE_STAY : RATE_CLIMB, wanted);
+    }
+}
+
+/* No window will do. The least bounds of the program always will, below its least factor. */
+static void give_up(struct timebase *tb)
+{
+    struct rate_plan *plan = &tb->plan;
+    plan->task = RATE_TASK_NONE;
+    if (plan->kind == RATE_SETTLE) {
+        rate_ticks_of(&plan->ticks, &tb->least, magnitude(plan->goal_q57 - tb->now.rate_q57));
+        plan->task = RATE_TASK_BEGIN;
+    } else if (plan->kind == RATE_STAY) {
+        search(plan, RATE_CLIMB, plan->wanted_q57);
+    } else if (tb->now.rate_q57 > tb->least_q57) {
+        if (plan->kind == RATE_LEAVE || tb->now.rate_q57 > plan->wanted_q57 + RATE_SPARE) {
+            go_back(tb);
+        }
+    } else if (tb->now.rate_q57 != tb->least_q57) {
+        search(plan, RATE_SETTLE, tb->least_q57);
+    }
+}
+
+static void look(struct timebase *tb)
+{
+    const enum rate_found found = rate_search(tb);
+    if (found == RATE_FOUND) {
+        tb->plan.task = RATE_TASK_BEGIN;
+    } else if (found == RATE_FOUND_NOTHING) {
+        give_up(tb);
+    }
+}
+
+/* The task of a tick at rest, while the rate stays. */
+static void rest(struct timebase *tb)
+{
+    struct rate_plan *plan = &tb->plan;
+    if (rate_plan_steady(tb)) { /* the wish may have come back to it */
+        plan->task = RATE_TASK_NONE;
+        plan->searched = NOWHERE;
+        tb->saturated = 0;
+        return;
+    }
+    if (tb->now.rate_q57 > tb->least_q57 && tb->time_q42_s >> 10 >= plan->leave_q32_s) {
+        go_back(tb);
+    }
+    if (plan->task == RATE_TASK_BEGIN) {
+        begin_move(tb, rate_step_of(&plan->ticks, magnitude(plan->goal_q57 - tb->now.rate_q57)));
+    } else if (plan->task == RATE_TASK_SEARCH) {
+        look(tb);
+    } else {
+        choose(tb);
+    }
 }
 
 int64_t rate_plan_slope(struct timebase *tb)
 {
-    int64_t wanted = wanted_rate(tb);
-    tb->saturated = tb->saturated != 0 && wanted > tb->least.most_q57;
-    if (wanted > tb->least.most_q57) {
-        if (tb->piece >= tb->climb_piece) {
-            return climb(tb);
-        }
-        tb->saturated = 1;
-        wanted = tb->least.most_q57;
-    }
-    if (tb->now.slope_q56 == 0 && arrived(tb->now.rate_q57, wanted)) {
-        tb->now.rate_q57 = wanted;
+    struct rate_plan *plan = &tb->plan;
+    if (!rate_moves(&plan->move)) {
+        rest(tb);
         return 0;
     }
-    plan(tb, wanted);
-    return follow(tb);
+    int64_t wanted = wanted_rate(tb);
+    if (wanted != plan->wanted_q57) {
+        change_mind(tb, wanted);
+    }
+    return rate_move_slope(&plan->move, tb->now.slope_q56);
 }

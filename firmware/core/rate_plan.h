@@ -1,12 +1,46 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Which way the rate goes in the next tick, with a way to a safe rest always at hand; part of the
- * timebase. docs/numerics.md section 12, "Always a way out". Tick context, bounded time.
+ * Where the rate goes next: one decision for a whole way from rest to rest, spread over the ticks before it, with a way to
+ * a safe rest always at hand; part of the timebase. docs/numerics.md section 12, "One move at a time". Tick context,
+ * bounded time.
  */
 #ifndef HODOGRAPH_CORE_RATE_PLAN_H
 #define HODOGRAPH_CORE_RATE_PLAN_H
 
-#include "core/timebase.h"
+#include <stdint.h>
+
+#include "core/rate.h"
+
+#define RATE_SPARE                                                                                 \
+    ((int64_t)1 << 37) /* 10^-6: what a way may leave of itself above the least factor */
+
+struct timebase;
+
+enum rate_task { RATE_TASK_NONE, RATE_TASK_SEARCH, RATE_TASK_BEGIN };
+
+enum rate_kind {
+    RATE_SETTLE, /* at or below the least factor of the program: where it rests, it may rest for ever */
+    RATE_LEAVE, /* from above it to below it */
+    RATE_STAY,  /* no move: how long the present rate above it may last */
+    RATE_CLIMB, /* to a rate above it */
+};
+
+struct rate_plan {
+    struct rate_move move;
+    uint32_t task;      /* what the next tick at rest does, enum rate_task */
+    uint32_t kind;      /* of the move that is on its way or looked for */
+    uint32_t window;    /* looked at next */
+    uint32_t searched;  /* last search above the least factor began in this piece */
+    int64_t wanted_q57; /* what it is all for */
+    int64_t goal_q57;
+    struct rate_ticks ticks; /* of the way there */
+    /* At rest above the least factor: the way back is known, if it begins by then */
+    uint64_t leave_q32_s;
+    struct rate_ticks back;
+};
+
+/* For a new program; at rest. */
+void rate_plan_reset(struct rate_plan *plan);
 
 /* Slope at the end of the next tick; keeps the plan of *tb up to date and its `saturated`. */
 int64_t rate_plan_slope(struct timebase *tb);

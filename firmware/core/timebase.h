@@ -18,9 +18,10 @@
 
 #include <stdint.h>
 
+#include "core/prepared.h"
 #include "core/program.h"
 #include "core/rate.h"
-#include "core/rate_window.h"
+#include "core/rate_plan.h"
 
 enum timebase_state {
     TIMEBASE_RUNNING = 0,  /* at the override, or on the way to it; also with an override of 0 */
@@ -42,30 +43,23 @@ struct timebase {
     uint32_t fine;         /* and in 2^-62 s, by all others; each below 2^-42 s */
     uint64_t period_q42_s; /* rounded down */
     uint32_t period_rest;
-    uint32_t period_q32_s;    /* rounded up, for look-ahead */
-    uint64_t sixth_q70_s;     /* a sixth of the period */
-    uint32_t started;         /* 0 until the first step */
-    uint32_t state;           /* enum timebase_state */
-    uint32_t piece;           /* of the last step, */
-    uint64_t piece_end_q32_s; /* and its end */
-    uint32_t steady; /* 1: at the rate wanted, in which nothing but a command changes anything; */
-    uint64_t steady_q62_s; /* then, at a rate other than 1, program time of a tick */
-    struct rate_scale scale;
-    struct rate_bounds least; /* of all pieces */
+    uint32_t period_us;
+    uint32_t period_q32_s;               /* rounded up, for look-ahead */
+    uint32_t started;                    /* 0 until the first step */
+    uint64_t sixth_q70_s;                /* a sixth of the period */
+    uint32_t state;                      /* enum timebase_state */
+    uint32_t piece;                      /* of the last step, */
+    const struct prepared_piece *record; /* its record, if there are any, */
+    uint64_t piece_end_q42_s;            /* and its end: of the last piece the duration */
+    uint32_t steady; /* 1: at the rate wanted, in which nothing but a command changes anything */
+    uint32_t saturated;
+    uint64_t
+        even_q62_s; /* program time of a tick at rest, at a rate other than 1; 0: not computed */
     struct rate now;
     int64_t override_q57;
-    /* A way from `now` to rest at the target, within the bounds of every piece it touches: what is
-     * done when nothing better is known to be safe. */
-    struct rate_bounds plan;
-    int64_t plan_target_q57; /* at most least.most_q57 */
-    uint32_t plan_piece;     /* looked for a better one last in this piece */
-    uint32_t plan_level;     /* of the window that is tried next */
-    int64_t plan_next_q57;   /* for this target */
-    /* Above the least factor of the program */
-    uint32_t climb_piece;     /* no attempt before this piece */
-    uint32_t climb_level;     /* of the window that is tried next */
-    uint64_t climb_end_q32_s; /* at the present rate the way back is known until then */
-    uint32_t saturated;
+    int64_t least_q57;      /* least factor of all pieces */
+    struct rate_pace least; /* all their bounds */
+    struct rate_plan plan;
 };
 
 /* Sets up for a checked program at time 0, running, override 100 %. period_us: 1000, 2000, 4000 or

@@ -21,7 +21,7 @@
 #include "port/semihost/semihost.h"
 #include "table.h"
 
-enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_MOTION = 6 };
+enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_MOTION = 6, STATUS_TABLE = 7 };
 enum { WORD_KERNEL, WORD_FILE, WORD_COMMANDS, WORD_TIMES, WORD_COUNT };
 
 #define STORE_SIZE    TABLE_AT /* at least as much on every target */
@@ -87,7 +87,9 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel, int fi
     if (program_open(&program, image, size) != 0) {
         return STATUS_PROGRAM;
     }
-    (void)table_make(&program, kernel);
+    if (table_make(&program, kernel) != 0) {
+        return STATUS_TABLE;
+    }
     memset(&config, 0, sizeof config);
     config.period_us = program.header.period_us;
     config.counts_per_mm = COUNTS_PER_MM;

@@ -287,18 +287,17 @@ static void begin(struct override_program *p, int line, uint32_t period_us, uint
 /* Whatever the commands were, the wish is fulfilled in the time that the least bounds take. */
 static void finish(void)
 {
-    const struct rate_bounds *least = &now.tb.least;
-    struct rate from = {RATE_MOST, 0};
-    const struct rate_stop stop = rate_stop(&from, least->second_q56);
-    int64_t ticks = 4 * (rate_span_q12(&from, &stop, 0, least) >> 12) + 100;
+    struct rate_ticks down;
+    rate_ticks_of(&down, &now.tb.least, RATE_MOST);
+    int64_t ticks = 4 * 2 * ((int64_t)down.rise + down.half) + 100;
     int64_t wanted = RATE_ONE / 100 * now.percent;
-    wanted = wanted < least->most_q57 ? wanted : least->most_q57;
+    wanted = wanted < now.tb.least_q57 ? wanted : now.tb.least_q57;
     for (int64_t i = 0; i < ticks && !over(); i++) {
         int64_t rate = now.tb.now.rate_q57;
         int still = now.tb.now.slope_q56 == 0;
         if (now.wish == RUN
                 ? still && rate >= wanted - 100 &&
-                      (now.percent * (RATE_ONE / 100) > least->most_q57 || rate <= wanted + 100)
+                      (now.percent * (RATE_ONE / 100) > now.tb.least_q57 || rate <= wanted + 100)
                 : still && rate == 0) {
             return;
         }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/interp.h"
+#include "core/timebase.h"
 #include "golden.h"
 #include "unity.h"
 
@@ -104,13 +105,13 @@ static void test_same_bits_as_expanded(void)
     }
 }
 
-static void test_spans_hold_the_least_of_their_pieces(void)
+static void test_windows_hold_the_least_of_their_pieces(void)
 {
     const struct kernel *fixed = kernel_find(INTERP_FIXED);
     begin("alpha_exponential.hdgp", INTERP_FIXED);
     for (uint32_t i = 0; i < plain.header.piece_count; i++) {
         const struct prepared_piece *piece = prepared_piece_at(&ready, fixed, i);
-        for (uint32_t k = 0; k < PREPARED_SPANS; k++) {
+        for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
             uint32_t least[3] = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
             for (uint32_t j = i; j < i + (1u << k) && j < plain.header.piece_count; j++) {
                 uint32_t own[3];
@@ -119,9 +120,30 @@ static void test_spans_hold_the_least_of_their_pieces(void)
                     least[n] = own[n] < least[n] ? own[n] : least[n];
                 }
             }
-            TEST_ASSERT_EQUAL_UINT32(least[0], piece->ahead[k].factor_q24);
-            TEST_ASSERT_EQUAL_UINT32(least[1], piece->ahead[k].rate_q16_per_s);
-            TEST_ASSERT_EQUAL_UINT32(least[2], piece->ahead[k].second_q8_per_s2);
+            const struct rate_bounds bounds = {least[0], least[1], least[2]};
+            struct rate_pace pace;
+            rate_pace_make(&pace, &bounds, plain.header.period_us);
+            TEST_ASSERT_EQUAL_MEMORY(&pace, &piece->ahead[k], sizeof pace);
+        }
+    }
+    end();
+}
+
+/* The rate too, whatever is commanded. */
+static void test_same_rate_as_without_records(void)
+{
+    static struct timebase a, b;
+    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    for (int n = 0; n < 100; n++) {
+        timebase_begin(&a, &plain, plain.header.period_us);
+        timebase_begin(&b, &ready, plain.header.period_us);
+        for (int k = 0; k < 3000; k++) {
+            if (golden_random(&seed) % 64u == 0) {
+                const uint32_t percent = (uint32_t)(golden_random(&seed) % 201u);
+                timebase_override(&a, percent);
+                timebase_override(&b, percent);
+            }
+            TEST_ASSERT_TRUE(timebase_step_q42(&a) == timebase_step_q42(&b));
         }
     }
     end();
@@ -141,7 +163,8 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_same_bits_as_expanded);
-    RUN_TEST(test_spans_hold_the_least_of_their_pieces);
+    RUN_TEST(test_windows_hold_the_least_of_their_pieces);
+    RUN_TEST(test_same_rate_as_without_records);
     RUN_TEST(test_an_error_of_the_sink_is_passed_on);
     return UNITY_END();
 }

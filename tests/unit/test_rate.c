@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/rate.h"
 
+#include <math.h>
+
 #include "core/qmath.h"
 #include "golden.h"
 #include "unity.h"
@@ -21,84 +23,159 @@ static int64_t below(int64_t most)
     return (int64_t)(golden_random(&random_state) % (uint64_t)most);
 }
 
-static struct rate_bounds random_bounds(void)
+/* Bounds of the format, R and S in the units of a tick as they are meant, and what is made of them. */
+struct bounds {
+    struct rate_pace pace;
+    double slope;
+    double second;
+    uint32_t period_us;
+};
+
+static struct bounds make_bounds(uint32_t rate_q16_per_s, uint32_t second_q8_per_s2,
+                                 uint32_t period_us)
 {
-    struct rate_bounds b = {RATE_MOST, 0, 0};
-    b.slope_q56 = 1 + (RATE_SLOPE_MOST >> below(13)) - below(1000);
-    b.second_q56 = 1 + (RATE_SLOPE_MOST >> below(22)) - below(1000);
+    const struct rate_bounds raw = {1u << 25, rate_q16_per_s, second_q8_per_s2};
+    const double h = period_us * 1e-6;
+    struct bounds b;
+    rate_pace_make(&b.pace, &raw, period_us);
+    b.slope = fmin(rate_q16_per_s / 65536.0 * h, 1) * 72057594037927936.0;
+    b.second = fmin(second_q8_per_s2 / 256.0 * h * h, 1) * 72057594037927936.0;
+    b.period_us = period_us;
     return b;
 }
 
-/* From any state that a rate can be in: there in finite time, exactly, inside the bounds, in no more than the program time
- * that rate_span says, and not beyond the target unless it has to. */
-static void check_way(const struct rate *from, int64_t target, const struct rate_bounds *b)
+static struct bounds random_bounds(void)
 {
-    struct rate rate = *from;
-    const struct rate_stop stop = rate_stop(&rate, b->second_q56);
-    int64_t span = rate_span_q12(&rate, &stop, target, b);
-    int64_t rest = stop.rest_q57;
-    int rising = target >= rate.rate_q57;
-    int beyond = rising ? rest > target : rest < target;
-    double time_q12 = 0;
-    for (int n = 0; rate.slope_q56 != 0 || rate.rate_q57 < target - 1 || rate.rate_q57 > target + 1;
-         n++) {
-        struct rate before = rate;
-        TEST_ASSERT_TRUE(n < 3000000);
-        rate_move(&rate, rate_next_slope(&rate, target, b));
-        TEST_ASSERT_TRUE(rate.rate_q57 - before.rate_q57 == before.slope_q56 + rate.slope_q56);
-        int64_t second = rate.slope_q56 - before.slope_q56;
-        TEST_ASSERT_TRUE(second <= b->second_q56 && second >= -b->second_q56);
-        TEST_ASSERT_TRUE(rate.slope_q56 <= b->slope_q56 && rate.slope_q56 >= -b->slope_q56);
-        TEST_ASSERT_TRUE(beyond || (rising ? rate.rate_q57 <= target : rate.rate_q57 >= target));
-        TEST_ASSERT_TRUE(before.slope_q56 != 0 || before.rate_q57 != rate.rate_q57 ||
-                         rate.slope_q56 != 0);
-        time_q12 +=
-            ((double)before.rate_q57 * 3 + (double)before.slope_q56 * 2 + (double)rate.slope_q56) /
-            6 / 17592186044416.0;
-    }
-    TEST_ASSERT_TRUE(span == INT64_MAX || time_q12 <= (double)span);
+    uint32_t rate = (uint32_t)(golden_random(&random_state) >> (32 + below(32)));
+    uint32_t second = (uint32_t)(golden_random(&random_state) >> (32 + below(32)));
+    return make_bounds(rate | 1u, second | 1u, 1000u << below(4));
 }
 
-static void test_reaches_the_target(void)
+static struct rate_move move_of(const struct bounds *b, const struct rate *from, int64_t target,
+                                struct rate_ticks *ticks)
 {
-    for (int i = 0; i < 3000; i++) {
-        struct rate_bounds b = random_bounds();
-        struct rate from = {below(RATE_MOST + 1), 0};
-        from.slope_q56 = below(2 * b.slope_q56 + 1) - b.slope_q56;
-        int64_t rest = rate_stop(&from, b.second_q56).rest_q57;
-        from.slope_q56 = rest < 0 || rest > RATE_MOST || i % 3 == 0 ? 0 : from.slope_q56;
-        int64_t target = i % 4 == 0 ? 0 : i % 4 == 1 ? RATE_ONE : below(RATE_MOST + 1);
-        check_way(&from, target, &b);
-    }
+    const int64_t way = target - from->rate_q57;
+    struct rate_move move;
+    rate_ticks_of(ticks, &b->pace, way < 0 ? -way : way);
+    int64_t step = rate_step_of(ticks, way < 0 ? -way : way);
+    TEST_ASSERT_TRUE((double)step * ticks->rise <= b->slope);
+    TEST_ASSERT_TRUE((double)step <= b->second);
+    rate_move_begin(&move, from, ticks, way < 0 ? -step : step);
+    return move;
 }
 
-/* From rest the way takes as long as the continuous one within a few ticks: (rise / rate + rate / second) or 2 sqrt(rise /
- * second). */
-static void test_is_as_fast_as_can_be(void)
+/* Runs it to its end, or to a cut after so many ticks: the slope changes by the step at most, never beyond what it rises
+ * to, and it rests where the move said. Gives the program time in ticks at rate 1. */
+static double run(struct rate_move *move, struct rate *rate, uint64_t cut)
 {
-    const struct rate_bounds flat = {RATE_MOST, RATE_SLOPE_MOST / 100, RATE_SLOPE_MOST / 1000};
-    const struct rate_bounds peaked = {RATE_MOST, RATE_SLOPE_MOST, RATE_SLOPE_MOST / 10000};
-    const struct rate_bounds *bounds[2] = {&flat, &peaked};
-    const int ticks[2] = {100 + 10, 200};
-    for (int i = 0; i < 2; i++) {
-        struct rate rate = {RATE_ONE, 0};
-        int n = 0;
-        for (; rate.rate_q57 > 1 || rate.slope_q56 != 0; n++) {
-            TEST_ASSERT_TRUE(n < 1000);
-            rate_move(&rate, rate_next_slope(&rate, 0, bounds[i]));
+    const int64_t step = move->step_q56;
+    const int64_t most = step * (int64_t)move->rise;
+    double time = 0;
+    for (uint64_t n = 0; rate_moves(move); n++) {
+        const struct rate before = *rate;
+        if (n == cut) {
+            rate_move_cut(move);
         }
-        TEST_ASSERT_INT_WITHIN(2, ticks[i] + 1, n);
+        rate_tick(rate, rate_move_slope(move, rate->slope_q56));
+        const int64_t second = rate->slope_q56 - before.slope_q56;
+        TEST_ASSERT_TRUE(rate->rate_q57 - before.rate_q57 == before.slope_q56 + rate->slope_q56);
+        TEST_ASSERT_TRUE(second == 0 || second == step || second == -step);
+        TEST_ASSERT_TRUE(step < 0 ? rate->slope_q56 <= 0 && rate->slope_q56 >= most
+                                  : rate->slope_q56 >= 0 && rate->slope_q56 <= most);
+        time +=
+            ((double)before.rate_q57 * 3 + (double)before.slope_q56 * 2 + (double)rate->slope_q56) /
+            6 / 72057594037927936.0;
+    }
+    TEST_ASSERT_TRUE(rate->slope_q56 == 0);
+    TEST_ASSERT_TRUE(rate->rate_q57 == move->rest_q57);
+    return time;
+}
+
+/* Ticks of the continuous way: with the slope rising to its bound, or not. */
+static double fewest(const struct bounds *b, double way)
+{
+    const double peak = sqrt(way / 2 * b->second);
+    return peak <= b->slope ? 2 * sqrt(way / 2 / b->second)
+                            : way / 2 / b->slope + b->slope / b->second;
+}
+
+static void test_comes_to_the_target(void)
+{
+    for (int i = 0; i < 20000; i++) {
+        const struct bounds b = random_bounds();
+        struct rate rate = {below(RATE_MOST + 1), 0};
+        const int64_t from = rate.rate_q57;
+        const int64_t target = i % 4 == 0   ? 0
+                               : i % 4 == 1 ? RATE_ONE
+                                            : below(RATE_MOST >> below(40));
+        const double way = fabs((double)(target - from));
+        struct rate_ticks ticks;
+        struct rate_move move = move_of(&b, &rate, target, &ticks);
+        const double total = (double)ticks.rise + ticks.half;
+        TEST_ASSERT_TRUE(total <= fewest(&b, way) * 1.002 + 4);
+        if (total > 10000) {
+            continue; /* too long to run */
+        }
+        const double time = run(&move, &rate, UINT64_MAX);
+        const int64_t left = target > from ? target - rate.rate_q57 : rate.rate_q57 - target;
+        TEST_ASSERT_TRUE(left >= 0 && left < 2 * (int64_t)ticks.rise * ticks.half);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, total * (double)(from + rate.rate_q57) / 2 / RATE_ONE,
+                                  time);
+        const uint32_t period_q32_s = (uint32_t)(b.period_us * 4294.967296) + 1u;
+        const uint64_t span = rate_span_q32(&ticks, (from + rate.rate_q57) / 2, period_q32_s);
+        TEST_ASSERT_TRUE(time * b.period_us * 4294.967296 <= (double)span);
     }
 }
 
-static void test_rest_far_away_is_held(void)
+static void test_a_cut_ends_where_it_said(void)
 {
-    struct rate rate = {RATE_ONE, RATE_SLOPE_MOST};
-    TEST_ASSERT_TRUE(rate_stop(&rate, 1).rest_q57 > 4 * RATE_MOST);
-    rate.slope_q56 = -RATE_SLOPE_MOST;
-    TEST_ASSERT_TRUE(rate_stop(&rate, 1).rest_q57 < -RATE_MOST);
-    rate.slope_q56 = 0;
-    TEST_ASSERT_TRUE(rate_stop(&rate, 1).rest_q57 == RATE_ONE);
+    for (int i = 0; i < 20000; i++) {
+        const struct bounds b = random_bounds();
+        struct rate rate = {below(RATE_MOST + 1), 0};
+        const int64_t from = rate.rate_q57;
+        const int64_t target = below(RATE_MOST + 1);
+        struct rate_ticks ticks;
+        struct rate_move move = move_of(&b, &rate, target, &ticks);
+        if (ticks.half > 5000) {
+            continue;
+        }
+        if (i % 3 == 0) {
+            rate_move_shorten(&move);
+            TEST_ASSERT_TRUE(move.even <= move.rise);
+        }
+        run(&move, &rate, (uint64_t)below((int64_t)ticks.rise + ticks.half + 1));
+        TEST_ASSERT_TRUE(target > from ? rate.rate_q57 >= from && rate.rate_q57 <= target
+                                       : rate.rate_q57 <= from && rate.rate_q57 >= target);
+    }
+}
+
+/* The least bounds that the format has, and the greatest. */
+static void test_bounds_at_the_ends_of_the_format(void)
+{
+    for (uint32_t period_us = 1000; period_us <= 8000; period_us *= 2) {
+        const struct bounds slow = make_bounds(1, 1, period_us);
+        const struct bounds fast = make_bounds(UINT32_MAX, UINT32_MAX, period_us);
+        struct rate rate = {RATE_MOST, 0};
+        struct rate_ticks ticks;
+        move_of(&slow, &rate, 0, &ticks);
+        TEST_ASSERT_TRUE((double)ticks.rise + ticks.half <=
+                         fewest(&slow, (double)RATE_MOST) * 1.002 + 4);
+        struct rate_move move = move_of(&fast, &rate, 0, &ticks);
+        TEST_ASSERT_TRUE(ticks.rise <= 3 && ticks.half <= 4);
+        run(&move, &rate, UINT64_MAX);
+    }
+}
+
+static void test_root_above(void)
+{
+    for (int i = 0; i < 1000000; i++) {
+        const uint32_t a = (uint32_t)golden_random(&random_state) | 1u << 30;
+        const double root = sqrt(a);
+        const uint32_t above = qmath_root_above(a);
+        TEST_ASSERT_TRUE(above >= root && above <= root * (1 + 1.0 / 1024) + 2);
+    }
+    TEST_ASSERT_TRUE(qmath_root_above(UINT32_MAX) >= 65536);
+    TEST_ASSERT_TRUE(qmath_root_above(1u << 30) >= 32768);
 }
 
 static void test_root(void)
@@ -116,9 +193,10 @@ static void test_root(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_reaches_the_target);
-    RUN_TEST(test_is_as_fast_as_can_be);
-    RUN_TEST(test_rest_far_away_is_held);
+    RUN_TEST(test_comes_to_the_target);
+    RUN_TEST(test_a_cut_ends_where_it_said);
+    RUN_TEST(test_bounds_at_the_ends_of_the_format);
+    RUN_TEST(test_root_above);
     RUN_TEST(test_root);
     return UNITY_END();
 }

@@ -42,11 +42,11 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
 {
     const uint64_t time_q42_s = timebase_step_q42(&motion->timebase);
+    interp_hint(&motion->interp, motion->timebase.record);
     const int result = interp_at_q42(&motion->interp, time_q42_s, &motion->point);
     if (result < 0) {
         return result;
     }
-    motion->time_q32_s = (time_q42_s + 512u) >> 10;
     motion->setpoints++;
     to_counts(motion, &motion->point, target_counts);
     return 0;
@@ -81,6 +81,11 @@ bool motion_over(const struct motion *motion)
 {
     const enum timebase_state state = timebase_state(&motion->timebase);
     return state == TIMEBASE_ENDED || state == TIMEBASE_STOPPED;
+}
+
+uint64_t motion_time_q32_s(const struct motion *motion)
+{
+    return (timebase_time_q42(&motion->timebase) + 512u) >> 10;
 }
 
 static int64_t saturated(int64_t value, int64_t most)

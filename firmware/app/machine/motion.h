@@ -19,7 +19,6 @@ struct motion {
     struct interp interp;
     struct timebase timebase;
     struct interp_point point; /* of the last setpoint */
-    uint64_t time_q32_s;       /* of the last setpoint */
     uint32_t setpoints;        /* given so far */
     uint32_t counts_per_mm;
 };
@@ -50,6 +49,9 @@ bool motion_held(const struct motion *motion);
 
 /* True when the last setpoint given was the last one: end of the program or of the stop. */
 bool motion_over(const struct motion *motion);
+
+/* Program time of the last setpoint, to nearest; before the first one that of the start. Under the lock. */
+uint64_t motion_time_q32_s(const struct motion *motion);
 
 /* Feed along the path at the last setpoint, in um/s, held at 2^31 - 1 (2147 m/s). Under the lock. */
 int32_t motion_feed_um_s(const struct motion *motion);

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/rate_search.h"
+
+#include "core/rate_window.h"
+#include "core/timebase.h"
+
+#define MOST_TICKS                                                                                 \
+    ((uint32_t)1 << 18) /* half of a way above the least factor: it leaves less than RATE_SPARE */
+#define MARGIN 8u /* periods: three ticks from decision to move, at twice the rate, and rounding */
+
+static int64_t magnitude(int64_t a)
+{
+    return a < 0 ? -a : a;
+}
+
+static int64_t lesser(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+static int64_t greater(int64_t a, int64_t b)
+{
+    return a > b ? a : b;
+}
+
+static uint64_t margin_q32(const struct timebase *tb)
+{
+    return (uint64_t)MARGIN * tb->period_q32_s;
+}
+
+/* A way that ends where the rate may stay: inside the window. */
+static int fits(struct timebase *tb, const struct rate_window *w)
+{
+    struct rate_plan *plan = &tb->plan;
+    int64_t rate = tb->now.rate_q57;
+    rate_ticks_of(&plan->ticks, w->pace, magnitude(plan->goal_q57 - rate));
+    uint64_t span = rate_span_q32(&plan->ticks, (plan->goal_q57 + rate) / 2, tb->period_q32_s);
+    return (tb->time_q42_s >> 10) + span + margin_q32(tb) <= w->end_q32_s;
+}
+
+static int leaves(struct timebase *tb, const struct rate_window *w)
+{
+    return (int64_t)w->pace->factor_q24 << 33 >= tb->now.rate_q57 && fits(tb, w) &&
+           tb->plan.ticks.half < MOST_TICKS;
+}
+
+/* Until when a rate above the least factor may last: the way back, at most at this rate, ends inside the window. 0: not
+ * at all. */
+static uint64_t back_by(const struct timebase *tb, const struct rate_window *w, int64_t way_q57,
+                        int64_t high_q57, struct rate_ticks *ticks)
+{
+    rate_ticks_of(ticks, w->pace, way_q57);
+    uint64_t span = rate_span_q32(ticks, high_q57, tb->period_q32_s) + margin_q32(tb);
+    return ticks->half < MOST_TICKS && span < w->end_q32_s ? w->end_q32_s - span : 0;
+}
+
+/* The present rate, for longer than is known. */
+static enum rate_found stay(struct timebase *tb, const struct rate_window *w)
+{
+    struct rate_ticks ticks;
+    int64_t rate = tb->now.rate_q57;
+    if ((int64_t)w->pace->factor_q24 << 33 < rate) {
+        return RATE_FOUND_NOTHING;
+    }
+    uint64_t leave = back_by(tb, w, rate - tb->least_q57 + RATE_SPARE, rate, &ticks);
+    if (leave > tb->plan.leave_q32_s) {
+        tb->plan.leave_q32_s = leave;
+        tb->plan.back = ticks;
+    }
+    return RATE_FOUND_NOT_YET;
+}
+
+/* A way to a rate above the least factor, for which it has the time of the way back too. The same ticks are enough for
+ * both. */
+static enum rate_found climb(struct timebase *tb, const struct rate_window *w)
+{
+    struct rate_plan *plan = &tb->plan;
+    int64_t rate = tb->now.rate_q57;
+    int64_t factor = (int64_t)w->pace->factor_q24 << 33;
+    int64_t goal = lesser(plan->wanted_q57, factor);
+    int64_t high = greater(goal, rate);
+    int64_t way = magnitude(goal - rate);
+    if (high > factor || goal <= tb->least_q57 + RATE_SPARE || way <= RATE_SPARE) {
+        return RATE_FOUND_NOTHING;
+    }
+    uint64_t leave =
+        back_by(tb, w, greater(way, high - tb->least_q57 + RATE_SPARE), high, &plan->ticks);
+    uint64_t there = w->end_q32_s - leave; /* by then, if it takes what the way back may take */
+    if (leave == 0 || (tb->time_q42_s >> 10) + there > leave) {
+        return RATE_FOUND_NOT_YET;
+    }
+    plan->goal_q57 = goal;
+    plan->leave_q32_s = leave;
+    plan->back = plan->ticks;
+    tb->saturated = goal < plan->wanted_q57;
+    return RATE_FOUND;
+}
+
+enum rate_found rate_search(struct timebase *tb)
+{
+    struct rate_plan *plan = &tb->plan;
+    struct rate_window w;
+    if (plan->window == RATE_WINDOWS) {
+        return RATE_FOUND_NOTHING;
+    }
+    rate_window_get(&w, tb, plan->window);
+    plan->window++;
+    switch (plan->kind) {
+    case RATE_STAY:
+        return stay(tb, &w);
+    case RATE_CLIMB:
+        return climb(tb, &w);
+    case RATE_LEAVE:
+        return leaves(tb, &w) ? RATE_FOUND : RATE_FOUND_NOT_YET;
+    default:
+        return fits(tb, &w) ? RATE_FOUND : RATE_FOUND_NOT_YET;
+    }
+}
