@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""No tick that was ever counted is longer than the longest path through the instructions of its image."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from longest_path import DOCUMENT, ENTRY, motion_part, table  # noqa: E402
+from target.emulator import TARGETS  # noqa: E402
+from target.image import Function, Image, Instruction  # noqa: E402
+from target.longest import Bounds, Longest, LongestError  # noqa: E402
+
+PAIRS = [(t.name, k) for t in TARGETS.values() for k in t.kernels]
+COUNTS = json.loads((ROOT / "tests/data/counts.json").read_text(encoding="utf-8"))["motion"]
+
+
+@pytest.mark.parametrize(("target", "kernel"), PAIRS)
+def test_nothing_counted_is_longer(target: str, kernel: str) -> None:
+    longest = motion_part(ROOT / "build", target, kernel).of(ENTRY)
+    most = max(row["whole"][2] for row in COUNTS[f"{target} {kernel}"].values())
+    assert most <= longest <= 1.6 * most
+
+
+def test_the_document_has_them() -> None:
+    assert table(ROOT / "build") in DOCUMENT.read_text(encoding="utf-8")
+
+
+class Written(Image):
+    """An image of functions that a test has written."""
+
+    def __init__(self, *functions: Function) -> None:
+        self.is_riscv = False
+        self.__dict__["functions"] = list(functions)
+
+
+def function(name: str, address: int, *lines: str) -> Function:
+    words = [line.partition(" ") for line in lines]
+    code = [Instruction(address + 2 * i, w[0], w[2], "") for i, w in enumerate(words)]
+    return Function(name, address, code)
+
+
+def longest(*functions: Function, **bounds: object) -> int:
+    given = {"rounds": {}, "order": {}, "never": frozenset()} | bounds
+    return Longest(Written(*functions), Bounds(**given)).of("a")  # type: ignore[arg-type]
+
+
+def test_the_longer_branch_counts() -> None:
+    a = function("a", 0, "cmp r0, #0", "beq.n 8 <a+0x8>", "movs r0, #1", "movs r0, #2", "bx lr")
+    assert longest(a) == 5
+
+
+def test_a_loop_counts_as_often_as_it_may_go_round() -> None:
+    a = function("a", 0, "movs r0, #3", "subs r0, #1", "bne.n 2 <a+0x2>", "bx lr")
+    assert longest(a, rounds={"a": 3}) == 8
+    with pytest.raises(LongestError, match="a: 0x2: a loop without a bound"):
+        longest(a)
+
+
+def test_calls_count_and_what_is_never_called_does_not() -> None:
+    a = function("a", 0, "beq.n 6 <a+0x6>", "bl 10 <b>", "bx lr", "bl 20 <c>", "bx lr")
+    b = function("b", 16, "movs r0, #1", "bx lr")
+    c = function("c", 32, *["movs r0, #1"] * 20, "bx lr")
+    assert longest(a, b, c) == 1 + 1 + 21 + 1
+    assert longest(a, b, c, never=frozenset({"c"})) == 1 + 1 + 2 + 1
+
+
+def test_a_call_through_a_pointer_needs_its_row() -> None:
+    a = function("a", 0, "blx r3", "bx lr")
+    b = function("b", 16, "movs r0, #1", "bx lr")
+    assert longest(a, b, order={"a": ["b"]}) == 4
+    with pytest.raises(LongestError, match="a: 1 calls through pointers"):
+        longest(a, b)
+
+
+def test_recursion_has_no_bound() -> None:
+    with pytest.raises(LongestError, match="recursion"):
+        longest(function("a", 0, "bl 0 <a>", "bx lr"))
