@@ -5,17 +5,18 @@
  *
  * prover: eva
  * options: -eva-slevel 60
- * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end rate_pace_make
  * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
  * mutant: core/interp.c: while (i > 0 && => while (
  * mutant: core/interp.c: end = i + 1u == it->program->header.piece_count => end = i == it->program->header.piece_count
  * mutant: core/prepared.c: i + 1u == p->header.piece_count ? UINT64_MAX => i == p->header.piece_count ? UINT64_MAX
  * mutant: core/prepared.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
  * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
- * mutant: core/prepared.c: && i + taken < p->header.piece_count => && i + taken <= p->header.piece_count
+ * mutant: core/rate_pace.c: least(count, left) => count
  */
 #include "core/program.h"
 #include "core/ph_segment.h"
+#include "core/rate_pace.h"
 #include "proof.h"
 
 /*@ requires i < p->header.segment_count;
@@ -57,9 +58,15 @@ void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segm
     ensures -(1 << 60) < end_q48_mm[0] < (1 << 60) && -(1 << 60) < end_q48_mm[1] < (1 << 60); */
 void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[3]);
 
+/*@ requires \initialized(bounds);
+    assigns *out \from *bounds;
+    ensures \initialized(out); */
+void rate_pace_make(struct rate_pace *out, const struct rate_bounds *bounds, uint32_t period_us);
+
 #include "core/interp.c"
 #include "core/kernel.c"
 #include "core/prepared.c"
+#include "core/rate_pace.c"
 
 #define COUNT 3u
 
