@@ -5,6 +5,7 @@
  *
  * prover: eva
  * options: -eva-slevel 60
+ * instead: core/interp.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
  * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end rate_pace_make
  * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
  * mutant: core/interp.c: while (i > 0 && => while (
