@@ -59,7 +59,6 @@ struct drive_node {
     struct axis_motion axis;
     struct equipment equipment;
     struct overload overload;
-    bool overloaded;
     struct home_seek homing;
     struct drive_node_port port;
     double load_per_volt;   /* motor load in units of the rated torque */
@@ -70,11 +69,12 @@ struct drive_node {
     uint32_t own_us;        /* own clock: time not yet turned into periods */
     uint32_t following_us;  /* following error out of its window */
     uint32_t settled_us;    /* a stop: at rest within the position window */
-    bool braked;          /* a stop at the motor's limits: it has come to rest, and is held there */
-    uint32_t stopping_us; /* a stop: since its ramp has ended */
-    bool sync_seen;       /* since the last drive_node_process */
-    bool sync_lost;       /* running on the own clock */
-    bool setpoint_fresh;  /* a target came since the last period */
+    uint32_t stopping_us;   /* a stop: since its ramp has ended */
+    bool overloaded;
+    bool braked;         /* a stop at the motor's limits: it has come to rest, and is held there */
+    bool sync_seen;      /* since the last drive_node_process */
+    bool sync_lost;      /* running on the own clock */
+    bool setpoint_fresh; /* a target came since the last period */
     bool pdos_moved; /* the identifiers of RPDOs changed: for the owner's filters, who clears it */
     bool pdos_want_all; /* a TPDO maps more than what is always up to date */
     bool offsets_act;   /* the last period had a feedforward */
