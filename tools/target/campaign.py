@@ -26,6 +26,8 @@ EXAMPLES = {
     "alpha": ROOT / "tests/data/programs/alpha_exponential.hdgp",
     "heart": ROOT / "tests/data/programs/heart_exponential.hdgp",
     "star": ROOT / "tests/data/counts/star.hdgp",
+    "alpha_optimal": ROOT / "tests/data/counts/alpha_optimal.hdgp",
+    "heart_optimal": ROOT / "tests/data/counts/heart_optimal.hdgp",
 }
 
 # (target, kernel): most instructions of the motion part in a plain tick; docs/counts.md says where it is from.

@@ -108,7 +108,8 @@ def test_a_cluster_gives_the_same_table(
 
 def test_ctrl_c_is_one_line(write: Write, tmp_path: Path) -> None:
     """A terminal sends it to all processes; the next start goes on."""
-    with under_way(write(TEXT), tmp_path / "out") as child:
+    endless = TEXT.replace("samples = 600", "samples = 50000")
+    with under_way(write(endless), tmp_path / "out") as child:
         os.killpg(child.pid, signal.SIGINT)
         _, told = child.communicate(timeout=WAIT_S)
     assert child.returncode == 130

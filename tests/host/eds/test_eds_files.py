@@ -10,6 +10,7 @@ import pytest
 from canopen.objectdictionary import ODVariable, datatypes
 
 ROOT = Path(__file__).resolve().parents[3]
+PDO_OFF = 1 << 31
 CONTROLLER = ROOT / "firmware" / "app" / "controller.eds"
 DRIVE = ROOT / "sim" / "node" / "drive.eds"
 U8, U16, U32, U64 = (
@@ -158,10 +159,13 @@ def test_pdos_of_the_drive() -> None:
 
 
 def test_pdos_of_the_controller_mirror_those_of_the_drives() -> None:
+    """Those of two axes, the default, are on; RPDO2 of the drives is on with velocity feedforward only."""
     od = canopen.import_od(str(CONTROLLER), 1)
     for axis in range(6):
-        assert od[0x1400 + axis][1].default == 0x180 + axis + 2
-        assert od[0x1800 + axis][1].default == 0x200 + axis + 2
+        off = PDO_OFF if axis >= 2 else 0
+        assert od[0x1400 + axis][1].default == off | 0x180 + axis + 2
+        assert od[0x1800 + axis][1].default == off | 0x200 + axis + 2
+        assert od[0x1806 + axis][1].default == PDO_OFF | 0x300 + axis + 2
         assert mapping(od, 0x1600 + axis) == [(0x200A, axis + 1, 16), (0x200B, axis + 1, 32)]
         assert mapping(od, 0x1A00 + axis) == [(0x200E, axis + 1, 16), (0x200D, axis + 1, 32)]
 
