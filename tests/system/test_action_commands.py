@@ -100,7 +100,8 @@ def test_home_here(
     assert controller.state() == OFF
     assert [controller.read(HOMED, axis) for axis in (1, 2)] == [1, 1]
     actual = [controller.read(ACTUAL, axis) for axis in (1, 2)]
-    assert actual == pytest.approx([-12_500_000, 250_000], abs=10)
+    # Two increments of 9.5 nm: between two readings it is never quite at rest, and it coasts when switched off.
+    assert actual == pytest.approx([-12_500_000, 250_000], abs=20)
     assert command(["goto", str(EXAMPLES / "alpha.toml"), "--machine", str(file)]) == 0
 
 
