@@ -10,19 +10,33 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-TIL = [sys.executable, str(ROOT / "tools/til.py"), "--local", str(ROOT / "examples/alpha.toml")]
+EXAMPLES = ROOT / "examples"
+
+
+def in_the_loop(file: Path, link: str) -> None:
+    words = [sys.executable, str(ROOT / "tools/til.py"), "--local", str(file), "--link", link]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    print(done.stdout)
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert "til: the same bits" in done.stdout
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize("link", ["fifo", "slcan"])
 def test_alpha_on_the_board_and_here(link: str) -> None:
     """The second run is the emulated board's; with SLCAN all that passes it is text on its UART, at 1 kHz."""
-    done = subprocess.run(
-        [*TIL, "--link", link], capture_output=True, text=True, timeout=120, check=False
-    )
-    print(done.stdout)
-    assert done.returncode == 0, done.stderr + done.stdout
-    assert "til: the same bits" in done.stdout
+    in_the_loop(EXAMPLES / "alpha.toml", link)
+
+
+@pytest.mark.serial
+def test_the_float_kernel_in_the_interrupt_of_the_board(tmp_path: Path) -> None:
+    """The FPU's registers are stacked and restored around each tick: any that was not would change a bit."""
+    machine = (EXAMPLES / "machines/paper_alpha.toml").read_text()
+    machine = machine.replace('kernel = "fixed"', 'kernel = "float"')
+    (tmp_path / "machine.toml").write_text(machine.replace("../drives", str(EXAMPLES / "drives")))
+    path = (EXAMPLES / "alpha.toml").read_text().replace("machines/paper_alpha", "machine")
+    (tmp_path / "alpha.toml").write_text(path)
+    in_the_loop(tmp_path / "alpha.toml", "fifo")
 
 
 def test_a_bus_that_nobody_serves_is_said(tmp_path: Path) -> None:
