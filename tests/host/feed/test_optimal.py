@@ -137,6 +137,21 @@ def test_windows_agree_with_one_plan_and_join_smoothly() -> None:
         assert one.acceleration[-1] == pytest.approx(following.acceleration[0], abs=1e-3)
 
 
+@pytest.mark.parametrize("intervals", [200, 480])
+def test_windows_do_not_stop_where_volts_alone_bound_the_acceleration(intervals: int) -> None:
+    """Long ramps: the sketch of a window is far above what the feed at its start can brake from."""
+    turns = np.cumsum(np.random.default_rng(5).normal(0.0, 0.3, 6))
+    spline = from_control_polygon(np.cumsum(6.0 * np.exp(1j * turns)), False).spline
+    limits = Limits(jerk_mm_s3=30000.0, volts=5.0, axis=AxisLimits(None, None, (42500.0, 29200.0)))
+    plants = (Plant(1.66, 0.46, 5.0, 0.2), Plant(1.25, 0.15, 5.0))
+    bounds = gather(OPTIMAL, limits, None, plants, 4000)
+    whole = joined(list(plan_windows(spline, bounds, 4e-3, 10**6)))
+    parts = list(plan_windows(spline, bounds, 4e-3, intervals))
+    assert len(parts) > 2
+    assert min(part.feed[-1] for part in parts[:-1]) > 1.0
+    assert joined(parts).times.sum() == pytest.approx(whole.times.sum(), rel=2e-3)
+
+
 def test_each_period_has_pieces_that_the_controller_takes() -> None:
     spline = walk(12, 6)
     for period_us in (1000, 8000):

@@ -13,6 +13,7 @@ from scipy import sparse
 from .rows import Rows
 
 Real = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 _TOLERANCE = 1e-8
 _CURVATURE = 1e-8
@@ -34,36 +35,93 @@ class Problem:
     rows: Rows
 
 
-def solve(problem: Problem) -> Real | None:
-    """The unknowns, or None where there is no solution."""
+def solve(problem: Problem, penalty: float | None = None) -> Real | None:
+    """The unknowns, or None where there is no solution.
+
+    penalty  rows give way, each interval's by a share of its own that costs this much (in units of the objective)
+    """
     scale = problem.scale
     gradient = problem.gradient * scale
     unit = 1.0 / np.abs(gradient).max()
-    columns = 2 * problem.rows.interval[:, None] + np.arange(4)
-    values = problem.rows.coefficients * scale[columns]
-    count = columns.shape[0]
-    matrix = sparse.csr_matrix(
-        (values.ravel(), columns.ravel(), np.arange(0, 4 * count + 1, 4)), shape=(count, scale.size)
-    ).tocsc()
-    solver = piqp.SparseSolver()
-    settings = solver.settings
-    settings.eps_abs = settings.eps_rel = _TOLERANCE
-    settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = _TOLERANCE
-    solver.setup(
+    task = _Task(
         _hessian(problem, unit),
         gradient * unit,
-        None,
-        None,
-        matrix,
+        _matrix(problem),
         problem.rows.low,
         problem.rows.high,
         problem.low / scale,
         problem.high / scale,
     )
-    status = solver.solve()
-    if status != piqp.PIQP_SOLVED:
+    if penalty is not None:
+        task = _elastic(task, problem.rows.interval, penalty * unit)
+    found = _solved(task)
+    return None if found is None else found[: scale.size] * scale
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """As PIQP takes it: least x @ hessian @ x / 2 + gradient @ x, least <= matrix @ x <= most, low <= x <= high."""
+
+    hessian: sparse.csc_matrix
+    gradient: Real
+    matrix: sparse.csc_matrix
+    least: Real
+    most: Real
+    low: Real
+    high: Real
+
+
+def _matrix(problem: Problem) -> sparse.csc_matrix:
+    columns = 2 * problem.rows.interval[:, None] + np.arange(4)
+    values = problem.rows.coefficients * problem.scale[columns]
+    count = columns.shape[0]
+    return sparse.csr_matrix(
+        (values.ravel(), columns.ravel(), np.arange(0, 4 * count + 1, 4)),
+        shape=(count, problem.scale.size),
+    ).tocsc()
+
+
+def _elastic(task: _Task, interval: Index, penalty: float) -> _Task:
+    """With one more unknown for each interval, at least 0: by how much its rows give way, on either side."""
+    size = int(interval.max()) + 1
+    ones = np.ones(interval.size)
+    give = sparse.csr_matrix((ones, interval, np.arange(interval.size + 1)), (ones.size, size))
+    sides = []
+    for sign, bound in ((1.0, task.most), (-1.0, -task.least)):
+        kept = np.isfinite(bound)
+        side = sparse.csr_matrix(sparse.hstack((sign * task.matrix, -give)))[kept]
+        sides.append((side, bound[kept]))
+    most = np.concatenate([bound for _, bound in sides])
+    return _Task(
+        sparse.csc_matrix(sparse.block_diag((task.hessian, _CURVATURE * sparse.identity(size)))),
+        np.append(task.gradient, np.full(size, penalty)),
+        sparse.csc_matrix(sparse.vstack([side for side, _ in sides])),
+        np.full(most.size, -np.inf),
+        most,
+        np.append(task.low, np.zeros(size)),
+        np.append(task.high, np.full(size, np.inf)),
+    )
+
+
+def _solved(task: _Task) -> Real | None:
+    """Unknowns with one value only are equations: as bounds without an inside they keep PIQP from ending."""
+    solver = piqp.SparseSolver()
+    settings = solver.settings
+    settings.eps_abs = settings.eps_rel = _TOLERANCE
+    settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = _TOLERANCE
+    low, high = task.low.copy(), task.high.copy()
+    fixed = np.flatnonzero(low == high)
+    equal = sparse.csc_matrix(
+        (np.ones(fixed.size), (np.arange(fixed.size), fixed)), (fixed.size, low.size)
+    )
+    value = low[fixed]
+    low[fixed], high[fixed] = -np.inf, np.inf
+    solver.setup(
+        task.hessian, task.gradient, equal, value, task.matrix, task.least, task.most, low, high
+    )
+    if solver.solve() != piqp.PIQP_SOLVED:
         return None
-    found = np.asarray(solver.result.x * scale)
+    found = np.asarray(solver.result.x)
     return found if np.isfinite(found).all() else None
 
 

@@ -34,6 +34,8 @@ _LEAST_FALL = 0.1
 _PATIENCE = 6
 _TOLERABLE = 5e-3
 _LEAST_SKETCHED = 1e-3
+_PENALTY = 30.0
+"""What it costs to be above limits by their own size on one interval, in times that the window takes."""
 
 Feed = Callable[[Real], Real]
 """q at arc lengths."""
@@ -223,13 +225,17 @@ def _interval_caps(bounds: Bounds, knots: Real) -> Real:
 
 
 def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
-    """Linear programs about the last feed, with further rows where it was above a limit between the others."""
+    """Linear programs about the last feed, with further rows where it was above a limit between the others.
+
+    One without a solution is solved with limits that give way: the next, about its feed, has one as a rule.
+    """
     grid = setting.grid
     select = Selection(setting.basic)
     about = About(_p_of(sketched, setting.points.interval, setting.points.s, setting))
     inner = About(_p_of(sketched, setting.gauss[0], setting.gauss[1], setting))
     typical = sketched(grid.s)
     best: Solution | None = None
+    gave_way = False
     for rounds in range(1, _MOST_ROUNDS + 1):
         problem = _problem(
             setting,
@@ -240,7 +246,12 @@ def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
         )
         found = solve(problem)
         if found is None:
-            return best if best is not None and best.excess < _TOLERABLE else None
+            if best is not None and best.excess < _TOLERABLE:
+                return best
+            gave_way = True
+            found = solve(problem, _PENALTY * float(_times(setting, inner.p).sum()))
+        if found is None:
+            return None
         q, slope = found[0::2], found[1::2]
         p, d, dd = setting.points.cubic(grid, q, slope)
         excess = _excess(setting, p, d, dd)
@@ -254,6 +265,8 @@ def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
         select.everything = rounds >= _PATIENCE
         if rounds > 1 and excess <= ALLOWED and abs(gain) < _GAIN * times.sum():
             break
+    if gave_way and setting.start is not None and best is not None and best.excess > _TOLERABLE:
+        return None
     return best
 
 
