@@ -79,7 +79,7 @@ static struct rate_ticks any_ticks(void)
     return t;
 }
 
-/* Whatever the plan is: rates up to RATE_MOST, slopes and steps up to half of it (section 15.2). */
+/* Whatever the plan is: rates up to RATE_MOST, slopes and steps up to half of it (section 15.4). */
 static void set_plan(struct timebase *tb)
 {
     struct rate_plan *plan = &tb->plan;
