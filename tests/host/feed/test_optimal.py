@@ -17,6 +17,7 @@ from hodograph.feed.optimal.track import joined
 from hodograph.feed.optimal.windows import plan_windows
 from hodograph.program import check, compile_path
 from hodograph.spline import PHSpline, from_control_polygon
+from hodograph.verify import verify_program
 
 OPTIMAL = FeedRequest("optimal")
 AXES = Limits(axis=AxisLimits(None, (2000.0, 2000.0), (50000.0, 50000.0)))
@@ -73,6 +74,19 @@ def test_random_paths_and_limits_are_kept_and_make_programs(seed: int) -> None:
     assert keeps(plan)
     assert plan.stretch < 1.01
     assert check(compile_path(spline, plan).program) is None
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_the_verifier_finds_no_limit_passed(seed: int) -> None:
+    """It looks between samples too, and shares nothing with the planner."""
+    random = np.random.default_rng(seed)
+    spline = walk(int(random.integers(5, 12)), seed, 10.0 ** random.uniform(-1.0, 1.3))
+    feed = 10.0 ** random.uniform(1.0, 2.5)
+    acceleration = feed / random.uniform(0.02, 0.3)
+    limits = Limits(feed, acceleration, acceleration / random.uniform(0.01, 0.1))
+    plan = plan_optimal(spline, OPTIMAL, limits, None, None, period_us=1000)
+    found = verify_program(compile_path(spline, plan).program, limits)
+    assert found.kept, [str(peak) for peak in found.peaks if not peak.kept]
 
 
 @pytest.mark.parametrize("length_mm", [2e-3, 0.1, 7.0, 300.0])
