@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_image.py [--soft-float] IMAGE: whether a linked image keeps what docs/architecture.md promises; run after each link.
+"""check_image.py [--soft-float] IMAGE: whether a linked image keeps what docs/architecture.md promises.
 
-It has no heap, no double arithmetic, no 64-bit division, no float without an FPU, and its worst stack fits the
-stack of its linker script. A line for each breach; exit status 1 then. --soft-float is for images that compare.
+Run after each link. It has no heap, no double arithmetic, no 64-bit division, no float without an FPU, and its worst
+stack fits the stack of its linker script. A line for each breach; exit status 1 then. --soft-float is for images that compare.
 """
 
 from __future__ import annotations
