@@ -3,7 +3,8 @@
 """check_image.py [--soft-float] IMAGE: whether a linked image keeps what docs/architecture.md promises.
 
 Run after each link. It has no heap, no double arithmetic, no 64-bit division, no float without an FPU, and its worst
-stack fits the stack of its linker script. A line for each breach; exit status 1 then. --soft-float is for images that compare.
+stack fits the stack of its linker script. A line for each breach; exit status 1 then. --soft-float is for images that
+compare.
 """
 
 from __future__ import annotations
