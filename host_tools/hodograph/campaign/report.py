@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import base64
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
-import jinja2
 import numpy as np
 
-from ..errors import InputError
+from ..report.page import Figure, render, write_page
 from ..report.style import styled
 from .definition import Campaign
 from .figures import GROUPS_SHOWN, dependence_figure, spread_figure
@@ -29,12 +26,8 @@ def write_report(campaign: Campaign, results: Results, folder: Path) -> Path:
     found = groups(campaign.design, results)
     with styled():
         figures = _figures(campaign, results, found)
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("hodograph.report", "."),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    text = environment.get_template("campaign.html.j2").render(
+    text = render(
+        "campaign.html.j2",
         name=campaign.file.stem,
         text=campaign.text,
         runs=campaign.design.total,
@@ -44,14 +37,7 @@ def write_report(campaign: Campaign, results: Results, folder: Path) -> Path:
         errors=_errors(results),
         figures=figures,
     )
-    report = folder / "report.html"
-    try:
-        for figure in figures:
-            (folder / f"{figure['name']}.png").write_bytes(figure["png"])
-        report.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{folder}: cannot write the report: {error.strerror}") from None
-    return report
+    return write_page(folder / "report.html", text, ((one.name, one) for one in figures))
 
 
 def _errors(results: Results) -> list[tuple[str, int, int]]:
@@ -63,7 +49,7 @@ def _errors(results: Results) -> list[tuple[str, int, int]]:
     return [(error, count, first[error]) for error, count in told]
 
 
-def _figures(campaign: Campaign, results: Results, found: list[Group]) -> list[dict[str, Any]]:
+def _figures(campaign: Campaign, results: Results, found: list[Group]) -> list[Figure]:
     design, size = campaign.design, campaign.design.group_size
     contour = results.values[:, 0].reshape(-1, size)
     good = [~np.isnan(values) for values in contour]
@@ -72,7 +58,7 @@ def _figures(campaign: Campaign, results: Results, found: list[Group]) -> list[d
     spread = spread_figure(found, [v[m] for v, m in zip(contour, good, strict=True)])
     more = f" (the first {GROUPS_SHOWN} groups)" if len(found) > GROUPS_SHOWN else ""
     figures = [
-        _figure(
+        Figure(
             "spread",
             "The greatest contour error of each run by group: median, quartiles, 5th and 95th percentile, and what "
             f"lies beyond{more}.",
@@ -85,19 +71,10 @@ def _figures(campaign: Campaign, results: Results, found: list[Group]) -> list[d
         values = [contour[group][good[group]] for group in some]
         caption = "The same over each figure that varies; colours are groups."
         figures.append(
-            _figure(
+            Figure(
                 "dependence",
                 caption,
                 dependence_figure(design.varied_columns, varied, [found[i] for i in some], values),
             )
         )
     return figures
-
-
-def _figure(name: str, caption: str, png: bytes) -> dict[str, Any]:
-    return {
-        "name": name,
-        "caption": caption,
-        "png": png,
-        "base64": base64.b64encode(png).decode(),
-    }

@@ -3,23 +3,18 @@
 
 from __future__ import annotations
 
-import base64
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from ..bus.run import BusRun
 from ..chain import Chain
-from ..errors import InputError
 from ..paper import compare, quantity_name, shown
 from ..paper.compare import CASES
 from ..simulate import Motion
 from .feed_figures import feed_figure, search_figure
 from .joint_figures import joint_figure
+from .page import Figure, file_name, render, write_page
 from .path_figures import polygon_figure
 from .run_figures import contour_figure, drive_figure
 from .style import styled
@@ -27,32 +22,17 @@ from .style import styled
 Case = tuple[Chain, Motion, BusRun | None]
 
 
-@dataclass(frozen=True)
-class _Figure:
-    name: str
-    caption: str
-    png: bytes
-
-    @property
-    def base64(self) -> str:
-        return base64.b64encode(self.png).decode()
-
-
 def write_report(cases: Sequence[Case], directory: Path) -> Path:
     """Writes report.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
     with styled():
         shown_cases = _once([_case(*case) for case in cases])
     text = _render(cases, shown_cases)
-    report = directory / "report.html"
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        for case in shown_cases:
-            for figure in case["figures"]:
-                (directory / f"{case['anchor']}_{figure.name}.png").write_bytes(figure.png)
-        report.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{directory}: cannot write the report: {error.strerror}") from None
-    return report
+    figures = (
+        (f"{case['anchor']}_{figure.name}", figure)
+        for case in shown_cases
+        for figure in case["figures"]
+    )
+    return write_page(directory / "report.html", text, figures)
 
 
 def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -71,12 +51,12 @@ def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
     plan = chain.compilation.plan
     source = "recorded on the bus" if run is not None else "simulated"
     figures = [
-        _Figure(
+        Figure(
             "path",
             "Control polygon, nodal points and the C2 PH quintic spline; curvature (paper, figure 1).",
             polygon_figure(chain),
         ),
-        _Figure(
+        Figure(
             "feed",
             "Feed, tangential acceleration and jerk of the plain quintic profile and of the one used "
             "(paper, figures 2 and 4); red: limits of the path file.",
@@ -86,27 +66,27 @@ def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
     search = search_figure(plan)
     if search is not None:
         caption = "Progress of the pattern search for n_c (paper, figure 3)."
-        figures.append(_Figure("search", caption, search))
+        figures.append(Figure("search", caption, search))
     figures += [
-        _Figure(
+        Figure(
             "joints",
             "First and second differences of chord speed over the period at constant feed (paper, figure 5). "
             "The dashed curve is what the shortening of chords on a curve gives by itself.",
             joint_figure(chain, plan),
         ),
-        _Figure(
+        Figure(
             "contour",
             f"Commanded and actual path, the worst place enlarged, and the contour error along the run, {source} "
             "(paper, figure 7).",
             contour_figure(chain, motion),
         ),
-        _Figure(
+        Figure(
             "drives", f"Following error and voltage by axis, {source}.", drive_figure(chain, motion)
         ),
     ]
     return {
         "name": chain.file.name,
-        "anchor": re.sub(r"[^A-Za-z0-9_-]+", "-", chain.file.name).strip("-") or "path",
+        "anchor": file_name(chain.file.name, "path"),
         "file": str(chain.file.file),
         "notes": chain.notes(plan),
         "figures": figures,
@@ -135,13 +115,9 @@ def _load(run: BusRun | None) -> dict[str, Any] | None:
 
 
 def _render(cases: Sequence[Case], shown_cases: list[dict[str, Any]]) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("hodograph.report", "."),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
     buses = sorted({run.bus for _, _, run in cases if run is not None})
-    return environment.get_template("template.html.j2").render(
+    return render(
+        "template.html.j2",
         names=", ".join(case["name"] for case in shown_cases),
         subtitle=f"Recorded on {', '.join(buses)}." if buses else "Simulated without a bus.",
         cases=shown_cases,
