@@ -3,17 +3,12 @@
 
 #include "core/qmath.h"
 
-static int64_t magnitude(int64_t a)
-{
-    return a < 0 ? -a : a;
-}
-
 /* The derivative, as large as 32 bits hold all partial sums. */
 static void set_slope(struct feed_piece *f)
 {
     int64_t sum = 1;
     for (int k = 0; k < 7; k++) {
-        sum += (k + 1) * magnitude(f->c_q44_mm[k]);
+        sum += (k + 1) * qmath_magnitude(f->c_q44_mm[k]);
     }
     int bits = 64 - qmath_clz64((uint64_t)sum);
     f->slope_shift = bits > 32 ? bits - 31 : 1; /* at most 32: |c| <= 2^14 mm */

@@ -46,11 +46,6 @@ static void set_inverses(struct kernel_float_segment *k)
     }
 }
 
-static int64_t magnitude(int64_t a)
-{
-    return a < 0 ? -a : a;
-}
-
 /* Bits that the sums of all powers but the linear one need, in q48. */
 static int bits_of(const struct ph_segment *ph)
 {
@@ -58,7 +53,7 @@ static int bits_of(const struct ph_segment *ph)
     for (int axis = PH_X; axis <= PH_S; axis++) {
         int64_t sum = (int64_t)1 << 31;
         for (int i = 2; i < 6; i++) {
-            sum += magnitude(ph->c_q48_mm[axis][i]);
+            sum += qmath_magnitude(ph->c_q48_mm[axis][i]);
         }
         most = sum > most ? sum : most;
     }

@@ -148,6 +148,22 @@ static inline int64_t qmath_round(int64_t a, int bits)
     return (a + ((int64_t)1 << (bits - 1))) >> bits;
 }
 
+/* |a|; not of INT64_MIN. */
+static inline int64_t qmath_magnitude(int64_t a)
+{
+    return a < 0 ? -a : a;
+}
+
+static inline int64_t qmath_lesser(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+static inline int64_t qmath_greater(int64_t a, int64_t b)
+{
+    return a > b ? a : b;
+}
+
 /* The nearest value of i32. */
 static inline int32_t qmath_clamp32(int64_t a)
 {

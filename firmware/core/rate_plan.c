@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "core/qmath.h"
 #include "core/rate_search.h"
 #include "core/timebase.h"
 
@@ -17,16 +18,6 @@ void rate_plan_reset(struct rate_plan *plan)
     plan->task = RATE_TASK_NONE;
     plan->searched = NOWHERE;
     plan->wanted_q57 = -1; /* none yet */
-}
-
-static int64_t magnitude(int64_t a)
-{
-    return a < 0 ? -a : a;
-}
-
-static int64_t lesser(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
 }
 
 static int64_t wanted_rate(const struct timebase *tb)
@@ -91,15 +82,15 @@ static void choose_below(struct timebase *tb, int64_t wanted)
 {
     int64_t away = wanted - tb->now.rate_q57;
     tb->saturated = 0;
-    if (magnitude(away) <= 1) {
+    if (qmath_magnitude(away) <= 1) {
         tb->now.rate_q57 = wanted;
     } else if (tb->now.rate_q57 > tb->least_q57) {
-        search(&tb->plan, RATE_LEAVE, lesser(wanted, tb->least_q57 - RATE_SPARE));
-    } else if (magnitude(away) <= SMALL) {
+        search(&tb->plan, RATE_LEAVE, qmath_lesser(wanted, tb->least_q57 - RATE_SPARE));
+    } else if (qmath_magnitude(away) <= SMALL) {
         tb->plan.ticks = SHORTEST;
         tb->plan.kind = RATE_SETTLE;
         tb->plan.goal_q57 = wanted;
-        begin_move(tb, magnitude(away) / 2);
+        begin_move(tb, qmath_magnitude(away) / 2);
     } else {
         search(&tb->plan, RATE_SETTLE, wanted);
     }
@@ -127,7 +118,7 @@ static void give_up(struct timebase *tb)
     struct rate_plan *plan = &tb->plan;
     plan->task = RATE_TASK_NONE;
     if (plan->kind == RATE_SETTLE) {
-        rate_ticks_of(&plan->ticks, &tb->least, magnitude(plan->goal_q57 - tb->now.rate_q57));
+        rate_ticks_of(&plan->ticks, &tb->least, qmath_magnitude(plan->goal_q57 - tb->now.rate_q57));
         plan->task = RATE_TASK_BEGIN;
     } else if (plan->kind == RATE_STAY) {
         search(plan, RATE_CLIMB, plan->wanted_q57);
@@ -164,7 +155,8 @@ static void rest(struct timebase *tb)
         go_back(tb);
     }
     if (plan->task == RATE_TASK_BEGIN) {
-        begin_move(tb, rate_step_of(&plan->ticks, magnitude(plan->goal_q57 - tb->now.rate_q57)));
+        begin_move(tb,
+                   rate_step_of(&plan->ticks, qmath_magnitude(plan->goal_q57 - tb->now.rate_q57)));
     } else if (plan->task == RATE_TASK_SEARCH) {
         look(tb);
     } else {

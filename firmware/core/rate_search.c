@@ -1,27 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/rate_search.h"
 
+#include "core/qmath.h"
 #include "core/rate_window.h"
 #include "core/timebase.h"
 
 #define MOST_TICKS                                                                                 \
     ((uint32_t)1 << 18) /* half of a way above the least factor: it leaves less than RATE_SPARE */
 #define MARGIN 8u /* periods: three ticks from decision to move, at twice the rate, and rounding */
-
-static int64_t magnitude(int64_t a)
-{
-    return a < 0 ? -a : a;
-}
-
-static int64_t lesser(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
-}
-
-static int64_t greater(int64_t a, int64_t b)
-{
-    return a > b ? a : b;
-}
 
 static uint64_t margin_q32(const struct timebase *tb)
 {
@@ -33,7 +19,7 @@ static int fits(struct timebase *tb, const struct rate_window *w)
 {
     struct rate_plan *plan = &tb->plan;
     int64_t rate = tb->now.rate_q57;
-    rate_ticks_of(&plan->ticks, w->pace, magnitude(plan->goal_q57 - rate));
+    rate_ticks_of(&plan->ticks, w->pace, qmath_magnitude(plan->goal_q57 - rate));
     uint64_t span = rate_span_q32(&plan->ticks, (plan->goal_q57 + rate) / 2, tb->period_q32_s);
     return (tb->time_q42_s >> 10) + span + margin_q32(tb) <= w->end_q32_s;
 }
@@ -77,14 +63,14 @@ static enum rate_found climb(struct timebase *tb, const struct rate_window *w)
     struct rate_plan *plan = &tb->plan;
     int64_t rate = tb->now.rate_q57;
     int64_t factor = (int64_t)w->pace->factor_q24 << 33;
-    int64_t goal = lesser(plan->wanted_q57, factor);
-    int64_t high = greater(goal, rate);
-    int64_t way = magnitude(goal - rate);
+    int64_t goal = qmath_lesser(plan->wanted_q57, factor);
+    int64_t high = qmath_greater(goal, rate);
+    int64_t way = qmath_magnitude(goal - rate);
     if (high > factor || goal <= tb->least_q57 + RATE_SPARE || way <= RATE_SPARE) {
         return RATE_FOUND_NOTHING;
     }
     uint64_t leave =
-        back_by(tb, w, greater(way, high - tb->least_q57 + RATE_SPARE), high, &plan->ticks);
+        back_by(tb, w, qmath_greater(way, high - tb->least_q57 + RATE_SPARE), high, &plan->ticks);
     uint64_t there = w->end_q32_s - leave; /* by then, if it takes what the way back may take */
     if (leave == 0 || (tb->time_q42_s >> 10) + there > leave) {
         return RATE_FOUND_NOT_YET;

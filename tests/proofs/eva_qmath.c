@@ -7,6 +7,7 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * assumes: qmath_clz64
  * mutant: core/qmath.h: a1 * b1 * 4096 => a1 * b1 * 16384
+ * mutant: core/qmath.h: return a < 0 ? -a : a => return -a
  * mutant: core/qwide.c: (middle & LIMB_MASK) * (LIMB_MASK + 1) => middle * (LIMB_MASK + 1)
  */
 #include "proof.h"
@@ -71,6 +72,8 @@ static void quotients(void)
     qmath_third(a);
     qmath_fifth(a);
     qmath_clamp32(any());
+    prove(qmath_magnitude(a) >= 0);
+    prove(qmath_lesser(a, 0) <= 0 && qmath_greater(a, 0) >= 0);
 }
 
 static struct qwide any_wide(int64_t most)

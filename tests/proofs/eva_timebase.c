@@ -56,9 +56,7 @@ uint64_t rate_span_q32(const struct rate_ticks *ticks, int64_t mean_q57, uint32_
 
 #include "core/rate.c"
 #include "core/rate_plan.c"
-#define magnitude search_magnitude
-#define lesser    search_lesser
-#define climb     search_climb
+#define climb search_climb
 #include "core/rate_search.c"
 #undef climb
 #define look window_look

@@ -127,6 +127,17 @@ static void test_exact_products(void)
     }
 }
 
+static void test_sizes_and_order(void)
+{
+    for (int i = 0; i < CASES; i++) {
+        int64_t a = any(62);
+        int64_t b = any(62);
+        TEST_ASSERT_EQUAL_INT64(a < 0 ? -a : a, qmath_magnitude(a));
+        TEST_ASSERT_EQUAL_INT64(qmath_magnitude(a - b), qmath_greater(a, b) - qmath_lesser(a, b));
+        TEST_ASSERT_EQUAL_INT64(a + b, qmath_greater(a, b) + qmath_lesser(a, b));
+    }
+}
+
 /* Binomial coefficients: (1 + t)^n has b[j] = 2^j-like values that are known: all a[k] = C(n,k) give 2^j. */
 static void test_bernstein_of_a_binomial(void)
 {
@@ -167,6 +178,7 @@ int main(void)
     RUN_TEST(test_product_q44);
     RUN_TEST(test_divisions);
     RUN_TEST(test_shifts);
+    RUN_TEST(test_sizes_and_order);
     RUN_TEST(test_exact_products);
     RUN_TEST(test_bernstein_of_a_binomial);
     RUN_TEST(test_bounds_are_tight);
