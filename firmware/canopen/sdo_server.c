@@ -45,27 +45,6 @@ bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
     return in->id == COB_SDO_ASK + server->node && in->len == SDO_BYTES;
 }
 
-void sdo_server_frame(const struct sdo_server *s, uint8_t command, struct can_msg *out)
-{
-    cob_frame(out, COB_SDO_ANSWER + s->node, SDO_BYTES);
-    out->data[0] = command;
-}
-
-void sdo_server_frame_with_object(const struct sdo_server *s, uint8_t command, struct can_msg *out)
-{
-    sdo_server_frame(s, command, out);
-    cob_put(out->data + 1, s->index, 2);
-    out->data[3] = s->sub;
-}
-
-int sdo_server_fail(struct sdo_server *s, uint32_t code, struct can_msg *out)
-{
-    sdo_server_drop(s);
-    sdo_server_frame_with_object(s, SDO_ABORT_COMMAND_BYTE, out);
-    cob_put(out->data + 4, code, 4);
-    return 1;
-}
-
 /* Forgets a transfer under way and notes the object of the new one. */
 static void begin(struct sdo_server *s, const uint8_t *data)
 {

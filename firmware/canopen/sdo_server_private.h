@@ -28,7 +28,7 @@ uint32_t sdo_server_open_read(struct sdo_server *s); /* sets announced */
 uint32_t sdo_server_get(struct sdo_server *s, uint32_t offset, uint8_t *data, uint32_t size);
 void sdo_server_drop(struct sdo_server *s); /* tells the hooks and becomes idle */
 
-/* sdo_server.c */
+/* sdo_server_answer.c: frames to the client; fail: drops the transfer, *out is the abort */
 void sdo_server_frame(const struct sdo_server *s, uint8_t command, struct can_msg *out);
 void sdo_server_frame_with_object(const struct sdo_server *s, uint8_t command, struct can_msg *out);
 int sdo_server_fail(struct sdo_server *s, uint32_t code, struct can_msg *out);
