@@ -63,3 +63,20 @@ def test_two_files_and_a_report(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert html.count("figure of the search: as for alpha") == 1
     assert not (tmp_path / "report" / "heart_search.png").exists()
     assert found[0]["encoders_sha256"] in html
+
+
+def test_the_optimal_feed_and_the_plant_from_its_recording(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Pieces of any length, axes at their limits: the same bits, no setpoint that jumps, and enough motion to fit."""
+    file, recording = str(EXAMPLES / "alpha_optimal.toml"), str(tmp_path / "run.log")
+    simulated = result(capsys, "simulate", file, "--json")
+    recorded = result(capsys, "run", file, "--json", "--pace", "fast", "--record", recording)
+    assert {key: recorded[key] for key in simulated} == simulated
+    assert simulated["ticks"] < 800
+    assert 3.0 < simulated["max_volts"] < 4.5
+    machine = str(EXAMPLES / "machines" / "paper_alpha.toml")
+    axes = result(capsys, "identify", recording, "--machine", machine, "--json")["axes"]
+    for axis, gain, time_s in zip(axes, (83.0089, 50.4977), (0.19936, 0.15641), strict=True):
+        assert axis["gain_rad_s_v"]["value"] == pytest.approx(gain, rel=0.01)
+        assert axis["time_constant_s"]["value"] == pytest.approx(time_s, rel=0.01)

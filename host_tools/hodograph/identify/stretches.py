@@ -21,6 +21,7 @@ from ..bus.listening.decode import (
 from ..bus.listening.frames import Frames
 from ..errors import RunError
 from ..native import AxisInputs
+from .answers import answered
 
 PARK_PERIODS = 250
 """After so many periods with one target a simulated drive stands exactly there (docs/protocol.md section 3)."""
@@ -53,9 +54,11 @@ def stretches(frames: Frames, node: int) -> list[Stretch]:
             f"node {node} sends no volts (TPDO2): only simulated drives do, and where the controller has set them up"
         )
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
-    sent = [complete_ticks(frames, sync_at, function + node) for function in (RPDO1, TPDO1, TPDO2)]
+    whole = complete_ticks(frames, sync_at, RPDO1 + node)
+    for function in (TPDO1, TPDO2):
+        whole &= answered(frames, sync_at, function + node)
     found = []
-    for begin, end in runs_of(np.logical_and.reduce(sent)):
+    for begin, end in runs_of(whole):
         part = frames[sync_at[begin] : sync_at[end]]
         if end - begin > _REST:
             ticks = decode_ticks(part, (node,))

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Which SYNCs a drive surely answered, also where a slow host sends an answer behind the next SYNC."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bus.listening.frames import Frames
+
+LATE_SYNCS = 100
+"""Answers that are late are made up for within so many SYNCs; else a frame was lost."""
+
+Flags = NDArray[np.bool_]
+
+
+def answered(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -> Flags:
+    """For each SYNC but the last: whether one frame with this identifier belongs to it.
+
+    Frames keep their order, so an interval without one is made up for by a later one with two. Where two come and none
+    is due, what came since the last loss belongs to SYNCs before, and is not taken.
+    """
+    at = np.flatnonzero(frames["id"] == identifier)
+    interval = np.searchsorted(sync_at, at) - 1
+    counts = np.bincount(interval[interval >= 0], minlength=sync_at.size)
+    due = 1 - counts[: max(0, sync_at.size - 1)]
+    flags: Flags = due == 0
+    begin = 0
+    for odd in np.flatnonzero(due).tolist():
+        if flags[odd]:
+            continue
+        still_due = np.cumsum(due[odd : odd + LATE_SYNCS])
+        closed = np.flatnonzero(still_due <= 0)
+        if not closed.size:
+            begin = odd + 1
+        elif still_due[closed[0]] == 0:
+            flags[odd : odd + closed[0] + 1] = True
+        else:
+            end = odd + int(closed[0]) + 1
+            flags[begin:end], begin = False, end
+    return flags
