@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -25,17 +25,26 @@ _PER_SEGMENT = 4
 _PER_RAMP = 0.4
 _LEAST_PERIODS = 1.7
 _FLAT_STRETCH = 8.0
+_PER_FLAT_SEGMENT = 32
+_GROWTH = 0.25
+_KINK = 0.05
+_SUDDEN = 0.5
 _LEAST_Q = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """q (n,) at arc lengths s (n,), rising; t (n,) when; `step_s` (n,) how long intervals may last."""
+    """q (n,) at arc lengths s (n,), rising; t (n,) when; `step_s` (n,) how long intervals may last.
+
+    pull  the acceleration reckoned with; `fine_s` (n,) how long intervals may last where it changes at once
+    """
 
     s: Real
     q: Real
     t: Real
     step_s: Real
+    fine_s: Real
+    pull: float
 
     def squared_feed(self, s: Real) -> Real:
         """q between."""
@@ -96,7 +105,7 @@ def sketch(
         time[0] = np.cbrt(6.0 * (s[1] - s[0]) / jerk)
     time[-1] = np.cbrt(6.0 * (s[-1] - s[-2]) / jerk)
     t = np.concatenate((np.zeros(1), np.cumsum(time)))
-    return Sketch(s, q, t, _steps(spline, bounds, s, q, t, pull, jerk, period_s))
+    return Sketch(s, q, t, *_steps(spline, s, q, t, pull, jerk, period_s), pull)
 
 
 def _from_rest(way: Real, jerk: float) -> Real:
@@ -128,36 +137,46 @@ def stretch_ends(bounds: Bounds, low: float, high: float) -> Real:
 
 
 def _steps(
-    spline: PHSpline,
-    bounds: Bounds,
-    s: Real,
-    q: Real,
-    t: Real,
-    pull: float,
-    jerk: float,
-    period_s: float,
-) -> Real:
-    """How long an interval may last: a share of the time that full acceleration takes to build up."""
+    spline: PHSpline, s: Real, q: Real, t: Real, pull: float, jerk: float, period_s: float
+) -> tuple[Real, Real]:
+    """How long an interval may last: a share of the time that full acceleration takes to build up where the
+    acceleration changes at once, more with the distance from there; and how long it may where it does.
+    """
     ramp = pull / _SHARE / jerk
-    step = _PER_RAMP * min(ramp, t[-1] / 6.0)
-    steps = np.full(s.size, step)
-    # A quarter of the segment at most, where the feed changes.
-    joints = np.searchsorted(spline.segment_starts_mm, s, side="right")
+    fine = _PER_RAMP * min(ramp, t[-1] / 6.0)
+    acceleration = 0.5 * np.diff(q) / np.diff(s)
+    kinks = np.abs(np.diff(acceleration)) > _KINK * pull
+    marked = np.concatenate(([True], kinks, [True]))
     joint_t = np.interp(spline.segment_starts_mm, s, t)
+    joints = np.searchsorted(spline.segment_starts_mm, s, side="right")
     spans = np.maximum(np.diff(joint_t), 1e-9)[np.clip(joints - 1, 0, spline.segment_count - 1)]
-    bent = np.abs(np.diff(q, append=q[-1])) > 1e-6 * q
-    near = _near(t, bent, 2.0 * ramp)
-    steps = np.where(near, np.minimum(steps, spans / _PER_SEGMENT), steps * _FLAT_STRETCH)
-    return np.asarray(np.maximum(steps, _LEAST_PERIODS * period_s))
+    away = np.maximum(_distance(t, t[marked]) - 2.0 * ramp, 0.0)
+    least = _LEAST_PERIODS * period_s
+    beside = np.minimum(fine, spans / _PER_SEGMENT)
+    steps = np.minimum(
+        beside + _GROWTH * away, np.maximum(_FLAT_STRETCH * fine, spans / _PER_FLAT_SEGMENT)
+    )
+    steps = np.where(away > 0.0, steps, beside)
+    return np.maximum(steps, least), np.maximum(beside, least)
 
 
-def _near(t: Real, marked: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
-    places = t[marked]
-    if places.size == 0:
-        return np.zeros(t.size, dtype=np.bool_)
+def refined(sketched: Sketch, s: Real, t: Real, acceleration: Real) -> Sketch:
+    """A sketch with shorter steps beside intervals of a plan in which the acceleration changed much: at arc lengths
+    s (n,), passed at t (n,), were accelerations (n,).
+    """
+    changed = np.abs(np.diff(acceleration)) > _SUDDEN * sketched.pull
+    marked = np.append(changed, False) | np.append(False, changed)
+    if not marked.any():
+        return sketched
+    away = _distance(np.interp(sketched.s, s, t), t[marked])
+    return replace(sketched, step_s=np.minimum(sketched.step_s, sketched.fine_s + _GROWTH * away))
+
+
+def _distance(t: Real, places: Real) -> Real:
+    """To the nearest of places, rising."""
     after = places[np.clip(np.searchsorted(places, t), 0, places.size - 1)]
     before = places[np.clip(np.searchsorted(places, t, side="right") - 1, 0, places.size - 1)]
-    return np.asarray(np.minimum(np.abs(after - t), np.abs(t - before)) <= reach)
+    return np.asarray(np.minimum(np.abs(after - t), np.abs(t - before)))
 
 
 def choose_knots(

@@ -18,7 +18,8 @@ from .track import Track, powers
 Real = NDArray[np.float64]
 
 _US = np.linspace(0.0, 1.0, 33)
-_CHUNK = 50_000
+_FEW_US = np.sort(np.append(np.linspace(0.0, 1.0, 17), (1.0 / 32.0, 31.0 / 32.0)))
+_CHUNK = 2000
 _WITH_RESERVE = ("axis.acceleration", "axis.jerk", "volts")
 
 
@@ -58,19 +59,27 @@ def find_peaks(spline: PHSpline, bounds: Bounds, track: Track) -> dict[str, Peak
     return out
 
 
+def piece_strains(spline: PHSpline, bounds: Bounds, track: Track) -> Real:
+    """The greatest share (n,) that each piece uses of what is meant to be used of any limit."""
+    out = np.zeros(track.shape.shape[0])
+    for value, limit, _ in _values(spline, bounds, track, slice(None), _FEW_US).values():
+        out = np.maximum(out, (value / limit).reshape(-1, _FEW_US.size).max(axis=1))
+    return out
+
+
 def _values(
-    spline: PHSpline, bounds: Bounds, track: Track, part: slice
+    spline: PHSpline, bounds: Bounds, track: Track, part: slice, us: Real = _US
 ) -> dict[str, tuple[Real, Real | float, Real]]:
     shape, h = track.shape[part, None, :], track.seconds[part, None]
-    way, v, a, j = ((powers(shape, k, _US) / h**k).ravel() for k in range(4))
+    way, v, a, j = ((powers(shape, k, us) / h**k).ravel() for k in range(4))
     starts = track.s[:-1][part]
-    s = (starts[:, None] + way.reshape(-1, _US.size)).ravel()
-    side = np.tile(np.where(_US == 0.0, RIGHT, np.where(_US == 1.0, LEFT, 0)), starts.size)
+    s = (starts[:, None] + way.reshape(-1, us.size)).ravel()
+    side = np.tile(np.where(us == 0.0, RIGHT, np.where(us == 1.0, LEFT, 0)), starts.size)
     ends = track.s[1:][part]
     s = np.where(
         side == RIGHT,
-        np.repeat(starts, _US.size),
-        np.where(side == LEFT, np.repeat(ends, _US.size), s),
+        np.repeat(starts, us.size),
+        np.where(side == LEFT, np.repeat(ends, us.size), s),
     )
     f = frames(spline, s, side.astype(np.int8))
     velocity, acceleration = f.r1 * v, f.r1 * a + f.r2 * v * v

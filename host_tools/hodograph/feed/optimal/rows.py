@@ -19,8 +19,9 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-_NEAR = 0.55
+_NEAR = 0.7
 _LEAST_P = 0.05
+_FULL = 0.99
 _FALLEN = 0.11
 
 
@@ -47,10 +48,12 @@ class Selection:
     """Which points make rows: those of `basic` near their limit, others once they were above it; for good.
 
     With `everything` all points make rows: safe, and slow.
-    The sketch has rows at all basic points. So most limits at most points never become rows.
+    A sketch, of which nothing is known, has rows at all points of `sketched`.
+    So most limits at most points never become rows.
     """
 
     basic: Mask
+    sketched: Mask
     kept: dict[str, Mask] = field(default_factory=dict)
     last: Real | None = None
     everything: bool = False
@@ -58,12 +61,13 @@ class Selection:
 
     def choose(self, name: str, used: Real | None, among: Mask | None = None) -> Index:
         """Points for the rows of a quantity, of which the last feed used these shares."""
-        wanted = self.basic if among is None else self.basic & among
+        basic = self.sketched if used is None else self.basic
+        wanted = basic if among is None else basic & among
         if self.everything:
             return np.flatnonzero(np.ones_like(wanted) if among is None else among)
         if used is None:
             return np.flatnonzero(wanted)
-        active = (wanted & (used > _NEAR)) | (used > 1.0)
+        active = (wanted & (used > _NEAR)) | (used > _FULL)
         if name in self.kept:
             active |= self.kept[name]
         self.kept[name] = active

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from ...spline import PHSpline
 from .bounds import Bounds
 from .grid import GAUSS_W, GAUSS_X, Grid, corners, make_grid, squared_feed
-from .knots import Sketch, choose_knots, sketch
+from .knots import Sketch, choose_knots, refined, sketch
 from .motion import Points, make_points
 from .rows import About, Rows, Selection, make_rows
 from .solver import Problem, solve
@@ -32,6 +33,8 @@ _BESIDE = 1e-7
 _LEAST_Q = 1e-12
 _LEAST_FALL = 0.1
 _PATIENCE = 6
+_MOST_TRIALS = 3
+_TRUSTED = 2
 _TOLERABLE = 5e-3
 _LEAST_SKETCHED = 1e-3
 _PENALTY = 30.0
@@ -79,11 +82,13 @@ class _Setting:
     start: State | None
     points: Points
     basic: NDArray[np.bool_]
+    sketched: NDArray[np.bool_]
     once: NDArray[np.bool_]
     most_q: Real  # (n + 1,)
     gauss: tuple[
         Index, Real, Real
     ]  # interval, arc length and basis of p at the points of quadrature
+    tight: Real | None
 
 
 def plan_window(
@@ -95,10 +100,12 @@ def plan_window(
     period_s: float,
     known: Solution | None = None,
     known_to: float = 0.0,
+    tight: Real | None = None,
 ) -> Solution | None:
     """From `low` to rest at `high`; None where the linear programs have no solution (a moving start only).
 
     known  an earlier solution that is good up to arc length known_to
+    tight  of each interval of `known`, good to its end: what its limits are divided by
     """
     guess = sketch(spline, bounds, low, high, None if start is None else start.q, period_s)
     s, t, step = guess.s, guess.t, guess.step_s
@@ -106,18 +113,18 @@ def plan_window(
     about: Feed = guess.squared_feed
     if known is not None:
         about = _blend(known, known_to, guess)
-    for _ in range(3):
+    for trial in range(_MOST_TRIALS):
         knots = choose_knots(spline, bounds, s, t, step, period_s)
         if known is not None:
             knots = _same_knots(knots, known, known_to)
-        setting = _setting(spline, bounds, knots, start)
-        best = _rounds(setting, about)
-        if best is None:
-            return None
-        uneven = _uneven(best, step, s, period_s)
-        if not uneven:
+        last = trial == _MOST_TRIALS - 1
+        even = partial(_even, guess, known_to, period_s)
+        setting = _setting(spline, bounds, knots, start, tight)
+        best = _rounds(setting, about, None if last else even)
+        if best is None or last or even(best):
             break
         about = best.squared_feed
+        guess = _refined(guess, best)
         s, t, step = _retimed(best, guess, period_s)
     return best
 
@@ -139,12 +146,24 @@ def _blend(known: Solution, known_to: float, guess: Sketch) -> Feed:
     return feed
 
 
-def _uneven(found: Solution, step: Real, s: Real, period_s: float) -> bool:
-    """Whether the times of the intervals are far from what was wanted: then the knots have to move."""
-    wanted = np.interp(0.5 * (found.grid.s[1:] + found.grid.s[:-1]), s, step)
+def _even(guess: Sketch, known_to: float, period_s: float, found: Solution) -> bool:
+    """Whether intervals last about as long as was wanted, after knots that are given: else knots have to move."""
+    wish, s = _refined(guess, found), found.grid.s
+    wanted = np.interp(0.5 * (s[1:] + s[:-1]), wish.s, wish.step_s)
+    wanted[s[1:] <= known_to] = np.inf
     inner = found.times[1:-1]
     brief = inner.size > 1 and bool((inner[1:] + inner[:-1]).min() < 2.05 * period_s)
-    return brief or bool((found.times > 2.2 * wanted).any())
+    return not brief and not (found.times > 2.2 * wanted).any()
+
+
+def _refined(guess: Sketch, found: Solution) -> Sketch:
+    """The wish for steps, now that it is known where the acceleration changes."""
+    acceleration = 0.5 * found.slope
+    acceleration[-1] = 0.0
+    if found.grid.grade[0] > 0:
+        acceleration[0] = 0.0
+    t = np.concatenate((np.zeros(1), np.cumsum(found.times)))
+    return refined(guess, found.grid.s, t, acceleration)
 
 
 def _retimed(found: Solution, guess: Sketch, period_s: float) -> tuple[Real, Real, Real]:
@@ -164,7 +183,9 @@ def _retimed(found: Solution, guess: Sketch, period_s: float) -> tuple[Real, Rea
     return s, t, np.maximum(step, 1.7 * period_s)
 
 
-def _setting(spline: PHSpline, bounds: Bounds, knots: Real, start: State | None) -> _Setting:
+def _setting(
+    spline: PHSpline, bounds: Bounds, knots: Real, start: State | None, tight: Real | None
+) -> _Setting:
     grid = make_grid(knots, start is None)
     caps = _interval_caps(bounds, knots)
     joints = spline.segment_starts_mm
@@ -182,13 +203,16 @@ def _setting(spline: PHSpline, bounds: Bounds, knots: Real, start: State | None)
     us = np.concatenate((np.tile(US, grid.size), sides, np.tile(GRADED_US, graded.size)))
     points = make_points(spline, bounds, grid, interval, us, caps)
     basic = np.isin(us, BASIC_US) | (np.arange(us.size) >= grid.size * len(US))
+    sketched = basic & ((us != 0.5) | (grid.grade[interval] != 0))
     most = np.full(knots.size, np.inf)
     at_start, at_end = points.interval[us == 0.0], points.interval[us == 1.0] + 1
     moving = points.sigma[0] > 0.0
     limit = np.where(moving, points.most_p, np.inf) * np.where(moving, points.sigma[0], 1.0) ** 2
     np.minimum.at(most, at_start, limit[us == 0.0])
     np.minimum.at(most, at_end, limit[us == 1.0])
-    return _Setting(bounds, grid, start, points, basic, us < 1.0, most, _gauss(grid))
+    return _Setting(
+        bounds, grid, start, points, basic, sketched, us < 1.0, most, _gauss(grid), tight
+    )
 
 
 def _gauss(grid: Grid) -> tuple[Index, Real, Real]:
@@ -224,13 +248,16 @@ def _interval_caps(bounds: Bounds, knots: Real) -> Real:
     return caps
 
 
-def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
+def _rounds(
+    setting: _Setting, sketched: Feed, even: Callable[[Solution], bool] | None = None
+) -> Solution | None:
     """Linear programs about the last feed, with further rows where it was above a limit between the others.
 
     One without a solution is solved with limits that give way: the next, about its feed, has one as a rule.
+    even  of a solution: where it is False after _TRUSTED rounds the rest is not worth the effort on these knots
     """
     grid = setting.grid
-    select = Selection(setting.basic)
+    select = Selection(setting.basic, setting.sketched)
     about = About(_p_of(sketched, setting.points.interval, setting.points.s, setting))
     inner = About(_p_of(sketched, setting.gauss[0], setting.gauss[1], setting))
     typical = sketched(grid.s)
@@ -262,6 +289,8 @@ def _rounds(setting: _Setting, sketched: Feed) -> Solution | None:
         typical = q
         gain = np.inf if best is None else best.duration_s - times.sum()
         best = Solution(grid, q, slope, times, excess, rounds)
+        if rounds == _TRUSTED and even is not None and not even(best):
+            return best
         select.everything = rounds >= _PATIENCE
         if rounds > 1 and excess <= ALLOWED and abs(gain) < _GAIN * times.sum():
             break
@@ -310,6 +339,9 @@ def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real, least: float
         # The state that the window before ends with may be above its limits by what is allowed.
         rows.high[rows.interval < 2] += 2.0 * ALLOWED
         rows.low[rows.interval < 2] -= 2.0 * ALLOWED
+    if setting.tight is not None:
+        rows.high[:] /= setting.tight[rows.interval]
+        rows.low[:] /= setting.tight[rows.interval]
     return Problem(*_cost(setting, p), scale, low, high, rows)
 
 

@@ -17,8 +17,9 @@ from ...errors import PlanError
 from ...spline import PHSpline
 from .bounds import Bounds
 from .knots import Sketch, sketch
+from .measured import plan_measured
 from .track import Ends, ends_of
-from .window import Solution, State, plan_window
+from .window import Solution, State
 
 Real = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def plan_windows(
         if found is None:
             low = 0.0 if held is None else float(held.grid.s[-1])
             high = overview.window_end(low, intervals)
-            found = plan_window(spline, bounds, low, high, None, period_s)
+            found = plan_measured(spline, bounds, low, high, None, period_s)
         if found is None:
             raise PlanError(
                 "feed: the planner found no feed at all: please report this path and its limits"
@@ -79,7 +80,7 @@ def _continued(
     low = float(held.grid.s[count])
     state = State(float(held.q[count]), float(held.slope[count]))
     high = overview.window_end(low, intervals)
-    return plan_window(
+    return plan_measured(
         spline, bounds, low, high, state, period_s, held, _trusted_to(held, overview.stop_s)
     )
 

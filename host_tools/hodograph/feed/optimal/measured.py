@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""A window planned again where its pieces, not only the feed they stand for, pass a limit; docs/numerics.md 5.6.
+
+Next to rest and at sudden changes a polynomial of degree 7 strays from the feed over arc length that it is made from.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...spline import PHSpline
+from .bounds import Bounds
+from .peaks import piece_strains
+from .track import ends_of, make_track
+from .window import Solution, State, plan_window
+
+Real = NDArray[np.float64]
+
+_STRAINED = 1.001
+_MOST_TRIALS = 3
+_INHERITED = 2
+"""Intervals that what a window begins with binds: their limits stay."""
+
+
+def plan_measured(
+    spline: PHSpline,
+    bounds: Bounds,
+    low: float,
+    high: float,
+    start: State | None,
+    period_s: float,
+    known: Solution | None = None,
+    known_to: float = 0.0,
+) -> Solution | None:
+    """As `plan_window`, with tighter limits on intervals whose piece is above one by more than 0.1 %."""
+    best = found = plan_window(spline, bounds, low, high, start, period_s, known, known_to)
+    if best is None or found is None:
+        return None
+    strain = _strains(spline, bounds, found, start)
+    least, tight = strain.max(), np.ones(strain.size)
+    for _ in range(_MOST_TRIALS):
+        if strain.max() <= _STRAINED:
+            break
+        tight *= np.where(strain > 1.0 + 0.5 * (_STRAINED - 1.0), strain, 1.0)
+        found = plan_window(
+            spline, bounds, low, high, start, period_s, found, float(found.grid.s[-1]), tight
+        )
+        if found is None or found.grid.size != tight.size:
+            break
+        strain = _strains(spline, bounds, found, start)
+        if strain.max() < least:
+            best, least = found, strain.max()
+    return best
+
+
+def _strains(spline: PHSpline, bounds: Bounds, found: Solution, start: State | None) -> Real:
+    track = make_track(ends_of(found, found.grid.size), 1.0, spline.segment_starts_mm)
+    strain = piece_strains(spline, bounds, track)
+    if start is not None:
+        strain[:_INHERITED] = 0.0
+    return strain
