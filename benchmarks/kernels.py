@@ -9,7 +9,8 @@ Compiles firmware/core as a shared object of its own. Prints the figures and wri
   limit of the speed ratio (31 mm to 1e-6 mm) and on the golden programs;
 - noise: third differences of the unrounded output at 1 kHz minus those of the exact points, mm/s^3, and the
   same for the feed (first differences of the chord);
-- speed: time of a tick relative to the double kernel, and instructions of a tick where `valgrind` is there;
+- speed: time of a tick relative to the double kernel, and instructions of a tick where `valgrind` is there (the
+  motion part, to counts, with prepared records, as in the controller; on microcontrollers: benchmarks/counts.py);
 - override: instructions of a tick of the fixed kernel at a constant override, while the rate is on its way all
   the time, and above the factor that every piece allows.
 """
@@ -211,12 +212,11 @@ def accuracy(core: Core, points: int) -> dict[str, Any]:
     return out
 
 
-def noise(core: Core, name: str, ticks: int) -> dict[str, Any]:
-    """Third differences and chord feed of the error in the middle of a program, at 1 kHz."""
+def noise(core: Core, name: str) -> dict[str, Any]:
+    """Third differences and chord feed of the error over a program, at 1 kHz."""
     program = decode((PROGRAMS / f"{name}.hdgp").read_bytes())
-    count = min(ticks, int(program.duration_q42 / 2**42 * 1000) - 1)
-    first = (int(program.duration_q42 / 2**42 * 1000) - count) // 2
-    times = [(2 * (first + k) * 2**42 + 1000) // 2000 for k in range(count)]
+    count = int(program.duration_q42 / 2**42 * 1000)
+    times = [(2 * k * 2**42 + 1000) // 2000 for k in range(count)]
     truth = [exact(program, t) for t in times]
     out = {}
     for kernel, label in enumerate(KERNELS):
@@ -237,52 +237,9 @@ def noise(core: Core, name: str, ticks: int) -> dict[str, Any]:
     return out
 
 
-DRIVER = r"""
-#include <stdio.h>
-#include <stdlib.h>
-#include "core/interp.h"
-#include "core/timebase.h"
-static unsigned char image[1 << 20];
-int main(int argc, char **argv)
-{
-    static struct program p;
-    static struct interp it;
-    static struct timebase tb;
-    struct interp_point point;
-    volatile long long sum = 0;
-    unsigned long ticks = 0;
-    unsigned low = argc > 5 ? (unsigned)atoi(argv[4]) : 100u;
-    unsigned high = argc > 5 ? (unsigned)atoi(argv[5]) : 100u;
-    FILE *f = fopen(argv[1], "rb");
-    size_t size = fread(image, 1, sizeof image, f);
-    program_open(&p, image, (unsigned)size);
-    for (int run = atoi(argv[3]); run > 0; run--) {
-        interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2]));
-        timebase_begin(&tb, &p, p.header.period_us);
-        timebase_override(&tb, high);
-        for (unsigned k = 1; timebase_state(&tb) != TIMEBASE_ENDED; k++) {
-            if (low != high && k % 40u == 0) {
-                timebase_override(&tb, k % 80u == 0 ? high : low);
-            }
-            timebase_step(&tb);
-            interp_at_q42(&it, timebase_time_q42(&tb), &point);
-            sum += point.x_q40_mm + point.y_q40_mm;
-            ticks++;
-        }
-    }
-    printf("%lu\n", ticks);
-    return 0;
-}
-"""
-
-
 def build_driver(compiler: str, folder: Path) -> Path:
-    """A program that runs an image: FILE KERNEL RUNS [LOW HIGH]; prints its ticks.
-
-    The override changes between LOW and HIGH per cent.
-    """
-    source, target = folder / "driver.c", folder / "driver"
-    source.write_text(DRIVER)
+    """The program of support/tick.c."""
+    source, target = ROOT / "benchmarks" / "support" / "tick.c", folder / "tick"
     sources = sorted(str(p) for p in CORE.glob("*.c"))
     subprocess.run(
         [compiler, *FLAGS, f"-I{CORE.parent}", str(source), *sources, "-o", str(target)], check=True
@@ -376,9 +333,7 @@ def main() -> None:
         core = Core(options.compiler, folder)
         figures = {
             "accuracy_mm": accuracy(core, options.points),
-            "noise_1khz": {
-                n: noise(core, n, 400) for n in ("alpha_exponential", "heart_exponential")
-            },
+            "noise_1khz": {n: noise(core, n) for n in ("alpha_exponential", "heart_exponential")},
             "speed": speed(options.compiler, folder),
             "override_tick_instructions": override_cost(options.compiler, folder),
         }

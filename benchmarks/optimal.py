@@ -197,8 +197,10 @@ def measure(case: Case, intervals: int, folder: Path) -> dict[str, Any]:
     lower = bound(task.spline, task.limits)
     out |= {"toppra_s": lower.duration_s, "toppra_axis_jerk_mm_s3": lower.axis_jerk_mm_s3}
     out["papers_kind"] = of_the_papers_kind(case, folder)
-    out["optimal"] = planned(case, Limits.reserve, folder)
-    out["optimal_least_reserve"] = planned(case, LEAST_RESERVE, folder)
+    for name, reserve in (("optimal", Limits.reserve), ("optimal_least_reserve", LEAST_RESERVE)):
+        out[name] = found = planned(case, reserve, folder)
+        if found is not None and out["collocation_s"] is not None:
+            found["of_best"] = found["duration_s"] / out["collocation_s"]
     return out
 
 

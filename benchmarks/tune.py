@@ -2,9 +2,10 @@
 """Contour error of the paper's and of tuned loops, at SYNCs and between them; plants found from noisy reports.
 
 Paths: alpha and heart at the paper's feed and in the least time within all limits. Loops: the paper's; tuned
-(examples/machines/tuned.toml); the same poles in drives that join setpoints by straight lines, and in drives whose
-speed comes from differences of the encoder and whose volts come a servo sample late. Between SYNCs the drive is
-computed again here, servo sample by servo sample.
+(examples/machines/tuned.toml); in drives that join setpoints by straight lines, the same poles, and those that the search
+finds for them; the first in drives whose speed comes from differences of the encoder and whose volts come a servo sample
+late. Between SYNCs the drive is computed again here, servo sample by servo sample, which tells how many of them are at
+the voltage limit.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ MACHINES = EXAMPLES / "machines"
 PATHS = ("alpha", "heart", "alpha_optimal", "heart_optimal")
 TUNED_HZ, TUNED_DAMPING = 214.5, 0.85
 """Of the example's loops, as the search found them."""
+LINES_HZ, LINES_DAMPING = 155.8, 0.6
+"""The same for straight lines, on all four paths."""
 SEEDS, NOISE_COUNTS, NOISE_MV = 10, 20.0, 10.0
 
 Float = NDArray[np.float64]
@@ -46,18 +49,24 @@ def loops() -> dict[str, tuple[Drives, Forward]]:
     late = [replace(drive, speed="differences", delay_samples=1) for drive in (x, y)]
     axes = [replace(axis, drive=d) for axis, d in zip(machine.plane, late, strict=True)]
     asked = Asked(bandwidth_hz=TUNED_HZ, damping=TUNED_DAMPING)
-    linear = tune(machine, [], replace(asked, interpolation="linear"))
+    same = tune(machine, [], replace(asked, interpolation="linear"))
+    lines = tune(machine, [], Asked(LINES_HZ, LINES_DAMPING, interpolation="linear"))
     sensed = tune(replace(machine, axes=tuple(axes)), [], asked)
     return {
         "tuned": ((x, y), example.plane_feedforward),
-        "tuned_linear": (linear.drives, linear.feedforward),
+        "same_poles_linear": (same.drives, same.feedforward),
+        "tuned_linear": (lines.drives, lines.feedforward),
         "tuned_late": (sensed.drives, sensed.feedforward),
     }
 
 
 def between_um(chain: Chain, motion: Motion, drives: Drives, forward: Forward) -> dict[str, float]:
-    """Greatest distance of the true position from the curve at any servo sample; how far this model is off at SYNCs."""
-    places = [_axis(motion, axis, drives[axis], forward) for axis in range(2)]
+    """Greatest distance of the true position from the curve at any servo sample; how far this model is off at SYNCs;
+    samples of both axes at the voltage limit.
+    """
+    places, at_limit = zip(
+        *(_axis(motion, axis, drives[axis], forward) for axis in range(2)), strict=True
+    )
     per = places[0].shape[1]
     rows = motion.rows
     arc = rows["arc_length_q40_mm"].astype(np.float64)
@@ -69,11 +78,17 @@ def between_um(chain: Chain, motion: Motion, drives: Drives, forward: Forward) -
     positions = np.stack([np.rint(p.ravel() * fine).astype(np.int32) for p in places], axis=1)
     errors = contour.errors_um(arcs.ravel(), positions, fine)
     at_sync = np.stack([p[:, -1] for p in places], axis=1) - motion.act_mm
-    return {"contour_um": float(errors.max()), "off_um": 1e3 * float(np.abs(at_sync).max())}
+    return {
+        "contour_um": float(errors.max()),
+        "off_um": 1e3 * float(np.abs(at_sync).max()),
+        "at_limit_percent": 100.0 * sum(at_limit) / (2 * places[0].size),
+    }
 
 
-def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> Float:
-    """True positions (periods, samples), mm: sim/plant in Python, for exact speed and no delay."""
+def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> tuple[Float, int]:
+    """True positions (periods, samples), mm, and how many samples meet the limit: sim/plant in Python, for exact speed
+    and no delay.
+    """
     loop, per = loop_of(drive), drive.loop_rate_hz * motion.period_us // 1_000_000
     step_s, period_s = loop.step_s, motion.period_us * 1e-6
     increment = 2 * np.pi * drive.screw_mm_rad / drive.encoder_counts_per_rev
@@ -84,7 +99,7 @@ def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> Float:
     volts_ahead = by_speed * ways + by_acceleration * np.diff(ways, prepend=0.0) / period_s
     volts_ahead[motion.ticks :] = 0.0
     x, speed, integral, last, slope, way = setpoints[0] * 1e-6, 0.0, 0.0, setpoints[0], 0.0, 0.0
-    places = np.empty((len(setpoints), per))
+    places, limited = np.empty((len(setpoints), per)), 0
     for k, target in enumerate(setpoints):
         step = float(target - last)
         end = 1.5 * step - 0.5 * way if drive.interpolation == "cubic" else step
@@ -100,12 +115,14 @@ def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> Float:
             volts += volts_ahead[k] - loop.volts_per_speed * speed
             if abs(volts) <= drive.volts_limit:
                 integral += step_s * (ref - speed)
+            else:
+                limited += 1
             volts = max(-drive.volts_limit, min(drive.volts_limit, volts))
             x += loop.position_from_speed * speed + loop.position_from_volts * volts
             speed = loop.speed_from_speed * speed + loop.speed_from_volts * volts
             places[k, i] = x
         last, way, slope = target, step, end
-    return places
+    return places, limited
 
 
 def contours() -> dict[str, Any]:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""bench.py: runs every benchmarks/*.py, prints its figures and gathers them in build/bench.json.
+"""bench.py: runs every benchmarks/*.py, prints its figures and gathers them in build/bench.json; at the end every
+goal of benchmarks/goals.toml beside what was measured, and the load of the computer before and after.
 
 Each script takes `--json OUT` and writes one JSON object: name of a figure to its value (a number, text,
 or an object). A script with the line `# bench: bus` near its top runs under tools/with-vcan. Exit status
@@ -11,10 +12,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+
+from bench_goals import goal_lines, judged
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -54,7 +58,7 @@ def main() -> int:
     (build / "bench").mkdir(parents=True, exist_ok=True)
     scripts = sorted((ROOT / "benchmarks").glob("*.py"))
     results: dict[str, Any] = {}
-    failed = False
+    failed, load_before = False, os.getloadavg()[1]
     for script in scripts:
         if script.stem.startswith("_") or (options.names and script.stem not in options.names):
             continue
@@ -69,7 +73,16 @@ def main() -> int:
     for name, value in rows:
         print(f"{name:<{width}}  {value}")
     (build / "bench.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    print(f"\nwritten: {build / 'bench.json'}")
+    goals = [
+        goal
+        for goal in judged(ROOT / "benchmarks" / "goals.toml", results)
+        if goal.kept is not None or not options.names
+    ]
+    print("", *goal_lines(goals), sep="\n")
+    print(
+        f"\nload of {os.cpu_count()} cores: {load_before:.1f} before, {os.getloadavg()[1]:.1f} at the end"
+    )
+    print(f"written: {build / 'bench.json'}")
     return 1 if failed else 0
 
 

@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The motion part of the controller's tick, over and over: FILE KERNEL RUNS [LOW HIGH]. Prints how many ticks that were.
+ * As in the controller, the program has prepared records, which are not part of what is compared: those of all RUNS are
+ * made once. The override changes between LOW and HIGH per cent every 40 ticks, when they differ.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/counts.h"
+#include "core/interp.h"
+#include "core/prepared.h"
+#include "core/timebase.h"
+
+enum { COUNTS_PER_MM = 1000000, SWITCH_TICKS = 40 };
+
+static uint64_t image[1 << 17], records[1 << 17];
+
+static int put(void *context, const uint8_t *bytes, uint32_t size)
+{
+    uint8_t **to = context;
+    memcpy(*to, bytes, size);
+    *to += size;
+    return 0;
+}
+
+static int prepare(struct program *p, uint32_t number)
+{
+    uint8_t *to = (uint8_t *)records;
+    const struct kernel *kernel = kernel_find(number);
+    if (kernel == NULL || prepared_size(p, kernel) > sizeof records ||
+        prepared_make(p, kernel, put, &to) != 0) {
+        return -1;
+    }
+    prepared_attach(p, kernel, (const uint8_t *)records);
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    struct program p;
+    struct interp it;
+    struct timebase tb;
+    struct interp_point point;
+    volatile int64_t sum = 0;
+    unsigned long ticks = 0;
+    FILE *file = argc > 3 ? fopen(argv[1], "rb") : NULL;
+    const size_t size = file != NULL ? fread(image, 1, sizeof image, file) : 0;
+    if (program_open(&p, (const uint8_t *)image, (uint32_t)size) != 0 ||
+        prepare(&p, (uint32_t)atoi(argv[2])) != 0) {
+        return 1;
+    }
+    const uint32_t low = argc > 5 ? (uint32_t)atoi(argv[4]) : 100u;
+    const uint32_t high = argc > 5 ? (uint32_t)atoi(argv[5]) : 100u;
+    for (int run = atoi(argv[3]); run > 0; run--) {
+        (void)interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2]));
+        timebase_begin(&tb, &p, p.header.period_us);
+        timebase_override(&tb, high);
+        for (unsigned k = 1; timebase_state(&tb) != TIMEBASE_ENDED; k++) {
+            if (low != high && k % SWITCH_TICKS == 0) {
+                timebase_override(&tb, k % (2u * SWITCH_TICKS) == 0 ? high : low);
+            }
+            const uint64_t time_q42_s = timebase_step_q42(&tb);
+            interp_hint(&it, tb.record);
+            (void)interp_at_q42(&it, time_q42_s, &point);
+            sum += counts_from_q40_mm(point.x_q40_mm, COUNTS_PER_MM);
+            sum += counts_from_q40_mm(point.y_q40_mm, COUNTS_PER_MM);
+            ticks++;
+        }
+    }
+    printf("%lu\n", ticks);
+    return 0;
+}
