@@ -2,10 +2,10 @@
 """Contour error of the paper's and of tuned loops, at SYNCs and between them; plants found from noisy reports.
 
 Paths: alpha and heart at the paper's feed and in the least time within all limits. Loops: the paper's; tuned
-(examples/machines/tuned.toml); in drives that join setpoints by straight lines, the same poles, and those that the search
-finds for them; the first in drives whose speed comes from differences of the encoder and whose volts come a servo sample
-late. Between SYNCs the drive is computed again here, servo sample by servo sample, which tells how many of them are at
-the voltage limit.
+(examples/machines/tuned.toml); in drives that join setpoints by straight lines, the same poles, and those that the
+search finds for them; the first in drives whose speed comes from differences of the encoder and whose volts come a
+servo sample late. Between SYNCs the drive is computed again here, servo sample by servo sample, which tells how many of
+them are at the voltage limit.
 """
 
 from __future__ import annotations
