@@ -11,9 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..errors import InputError
 
 LINE_AFTER_S, LINE_EVERY_S = 5.0, 10.0
@@ -39,11 +36,6 @@ def aligned(rows: Sequence[tuple[str, str]], least: int = 0) -> list[str]:
     """The lines of names and values in two columns, the first at least so wide."""
     width = max(least, *(len(name) for name, _ in rows))
     return [f"{name:<{width}}  {value}" for name, value in rows]
-
-
-def pairs(values: NDArray[np.complex128]) -> list[list[float]]:
-    """Complex numbers as [[x, y], …]."""
-    return [[float(v.real), float(v.imag)] for v in np.atleast_1d(values)]
 
 
 def number(value: float) -> str:

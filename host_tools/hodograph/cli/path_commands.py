@@ -7,6 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..bustime import require_fit
 from ..chain import Chain, load_chain
@@ -15,7 +16,7 @@ from ..feed import Plan
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.image import MAGIC
 from ..simulate import Motion, simulate, write_trace
-from .output import note, number, pairs, print_json, print_rows, progress, write_file
+from .output import note, number, print_json, print_rows, progress, write_file
 
 
 def spline(options: Namespace) -> None:
@@ -29,7 +30,7 @@ def spline(options: Namespace) -> None:
     result: dict[str, object] = {
         "closed": curve.closed,
         "segments": curve.segment_count,
-        "nodal_points": pairs(nodes),
+        "nodal_points": _pairs(nodes),
         "length_mm": curve.length_mm,
         "segment_lengths_mm": curve.segment_lengths_mm.tolist(),
         "newton_iterations": found.newton_iterations,
@@ -41,8 +42,8 @@ def spline(options: Namespace) -> None:
     }
     if options.at is not None:
         s = _within("--at", options.at, curve.length_mm, "mm")
-        result["points"] = pairs(curve.point(s))
-        result["tangents"] = pairs(curve.tangent(s))
+        result["points"] = _pairs(curve.point(s))
+        result["tangents"] = _pairs(curve.tangent(s))
         result["curvatures"] = np.atleast_1d(curve.curvature(s)).tolist()
     if options.json:
         print_json(result)
@@ -59,6 +60,11 @@ def spline(options: Namespace) -> None:
         print(f"{'s mm':>12} {'x mm':>16} {'y mm':>16} {'curvature /mm':>16}")
         for at, z, k in zip(options.at, curve.point(s), curve.curvature(s), strict=True):
             print(f"{at:12.6g} {z.real:16.9f} {z.imag:16.9f} {k:16.9f}")
+
+
+def _pairs(values: NDArray[np.complex128]) -> list[list[float]]:
+    """Complex numbers as [[x, y], …]."""
+    return [[float(v.real), float(v.imag)] for v in np.atleast_1d(values)]
 
 
 def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray:

@@ -21,6 +21,8 @@ QUIET_S = 0.25
 """Recorded after everything has come to an end, so that what still moves is seen."""
 _SYNCS, _TICK = 1, 2
 _STILL_LOOKS = 5
+_START_S = 120.0
+"""For a command of its own to come up: on a busy machine it loads for longer than any case lasts."""
 
 
 def disturb(record: Record, stand: Stand, controller: Controller, control: Recorder) -> None:
@@ -59,10 +61,11 @@ def _follow(
 ) -> int | None:
     """Until the controller is at rest again, acting on the way; its state, None when it was killed."""
     action, started, acted = record.case.scenario.action, False, False
-    deadline = time.monotonic() + LIMIT_S
+    deadline = time.monotonic() + (LIMIT_S if process is None else _START_S)
     while True:
         state = controller.state()
-        started = started or state in MOVING
+        if state in MOVING and not started:
+            started, deadline = True, time.monotonic() + LIMIT_S
         if state in MOVING and not acted and action != "none":
             acted = controller.read(STATISTICS, _TICK) >= record.case.at
             if acted and not _act(record, stand, process):
@@ -72,7 +75,7 @@ def _follow(
         if process is not None and not started and process.poll() is not None:
             raise RunError(f"hodograph start ended with status {process.returncode}")
         if time.monotonic() > deadline:
-            raise RunError(f"still {STATES.get(state, state)} after {LIMIT_S:g} s")
+            raise RunError(f"still {STATES.get(state, state)} when its time was over")
         time.sleep(LOOK_S)
 
 
