@@ -134,7 +134,7 @@ SOAK_S ?= 3600
 soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame looked at
 	@tools/with-vcan $(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
 
-# TARGET: one of an385 an386 an500 an505; TIL=--local: a bus of its own instead of vcan0; TIL="--local --link slcan": real time
+# TARGET: one of an385 an386 an500 an505 microbit; TIL=--local: a bus of its own instead of vcan0; TIL="--local --link slcan": real time
 TARGET ?= an386
 TIL    ?=
 til: build firmware ## target in the loop: the controller on an emulated board runs alpha and heart, the same bits as here

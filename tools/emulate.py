@@ -21,7 +21,17 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TARGETS = ("an385", "an386", "an500", "an505")
+MACHINES = {
+    "an385": ["mps2-an385"],  # Cortex-M3
+    "an386": ["mps2-an386"],  # Cortex-M4F
+    "an500": ["mps2-an500"],  # Cortex-M7
+    "an505": ["mps2-an505"],  # Cortex-M33
+    # Cortex-M0: RAM for the controller, and for programs (firmware/targets/microbit_controller.ld)
+    "microbit": ["microbit", "-global", f"nrf51-soc.sram-size={2**15 + 2**24}"],
+}
+TARGETS = tuple(MACHINES)
+_SHIFTS = {"microbit": 5}
+"""Of -icount: an instruction takes 2**shift ns, 6 where nothing is said. 32 ns: a Cortex-M0 of 48 MHz, about."""
 _BUS_STATUS, _MACHINE_STATUS, _USAGE_STATUS = 4, 1, 2
 _GRACE_S = 5.0
 """For the board to notice that its bridge is gone, and the other way round."""
@@ -40,7 +50,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         prog="emulate.py", description="The Hodograph controller on a board emulated by QEMU."
     )
     parser.add_argument(
-        "target", choices=TARGETS, help="board: Cortex-M3, -M4F, -M7, -M33 in this order"
+        "target", choices=TARGETS, help="board: Cortex-M3, -M4F, -M7, -M33, -M0 in this order"
     )
     parser.add_argument(
         "--bus",
@@ -70,6 +80,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         options.link = "slcan"
     if options.link == "slcan" and options.pace == "fast":
         parser.error("--pace fast needs --link fifo: a real clock cannot hurry")
+    if options.link == "slcan" and options.target == "microbit":
+        parser.error("microbit has --link fifo only: its UART is not that of the other boards")
     return options
 
 
@@ -77,10 +89,11 @@ def qemu_command(options: argparse.Namespace, ports: tuple[int, int]) -> list[st
     """What runs the board, in the folder of its FIFOs; `ports`: the bridge's and its own, of UDP."""
     words = [f"node={options.node}", f"link={options.link}", f"pace={options.pace}"]
     words += ["verbose"] if options.verbose else []
-    command = ["qemu-system-arm", "-M", f"mps2-{options.target}", "-display", "none"]
+    command = ["qemu-system-arm", "-M", *MACHINES[options.target], "-display", "none"]
     command += ["-monitor", "none", "-accel", "tcg,tb-size=32"]
     if options.link == "fifo":
-        command += ["-serial", "none", "-icount", "shift=6,sleep=off"]
+        shift = _SHIFTS.get(options.target, 6)
+        command += ["-serial", "none", "-icount", f"shift={shift},sleep=off"]
     else:
         command += ["-chardev", f"{_uart(options, ports)},id=uart,mux=on"]
         command += ["-serial", "chardev:uart"]
@@ -170,12 +183,9 @@ class Board:
         uart.close()
 
     def stop(self) -> None:
-        """Asks the controller to end; by the FIFOs, as a board has no signals."""
+        """Asks the controller to end, through the bridge, as a board has no signals; without one, pulls the plug."""
         self._stopping_since = self._stopping_since or time.monotonic()
-        if self.bridge is not None:
-            self.bridge.terminate()
-        if self._options.link == "slcan":
-            self.qemu.terminate()
+        (self.qemu if self.bridge is None else self.bridge).terminate()
 
     def wait(self) -> int:
         """Exit status, when both have ended."""
@@ -192,15 +202,15 @@ class Board:
         if self.bridge is not None and self.bridge.poll() == _BUS_STATUS:
             self.qemu.kill()
             return _BUS_STATUS
-        if self.bridge is not None and self._options.link == "slcan":
+        asked = self._stopping_since is not None
+        if self.bridge is not None and self._options.link == "slcan" and not asked:
             self.bridge.terminate()  # datagrams do not tell that the other end has gone
         qemu = _end(self.qemu)
         bridge = 0 if self.bridge is None else _end(self.bridge)
         if bridge == _BUS_STATUS:
             return _BUS_STATUS
-        asked = self._stopping_since is not None
-        if asked and (self._options.link == "slcan" or (qemu < 0 and bridge == 0)):
-            return 0  # it has no way to end by itself, or had not begun
+        if asked and qemu < 0 and bridge == 0:
+            return 0  # it had not begun
         return qemu if qemu >= 0 else _MACHINE_STATUS
 
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""til.py [--target TARGET] [--link slcan] [--local] FILE...: target in the loop.
+"""til.py [--target TARGET ...] [--link slcan] [--local] FILE...: target in the loop.
 
-Runs paths on the bus twice, with hodograph-controller and with the controller on an emulated board, against the same
-simulated drives; prints both, with the ticks per second of the board. Exit status 1 when a hash differs. On vcan0 it
+Runs paths on the bus with hodograph-controller and with the controller on one or more emulated boards, against the same
+simulated drives; prints all, with the ticks per second. Exit status 1 when a hash differs. On vcan0 it
 is to be run under tools/with-vcan; --local makes a bus of its own (hodograph-hub).
 """
 
@@ -55,21 +55,17 @@ def run(chain: Chain, bus: str, pace: str, controller: str | None) -> BusRun:
 def compare(file: Path, options: argparse.Namespace, bus: str) -> bool:
     """Whether both give the same bits."""
     chain = load_chain(file)
-    target, link = options.target, options.link
-    board = f"{EMULATE} {target} --link {link}"
-    board += f" --image {options.image}" if options.image else ""
-    runs = {
-        "linux": run(chain, bus, "fast", None),
-        target: run(chain, bus, "fast" if link == "fifo" else "real-time", board),
-    }
+    pace = "fast" if options.link == "fifo" else "real-time"
+    image = f" --image {options.image}" if options.image else ""
+    boards = {name: f"{EMULATE} {name} --link {options.link}{image}" for name in options.target}
     found = set()
-    for name, result in runs.items():
+    for name, controller in {"linux": None, **boards}.items():
+        result = run(chain, bus, pace if controller else "fast", controller)
         motion = result.motion
         hashes = (motion.setpoints_sha256, motion.encoders_sha256)
         found.add(hashes)
-        pace = motion.ticks / result.wall_s
         print(
-            f"{file.stem:8} {name:6} {motion.ticks:6} ticks {pace:6.0f} ticks/s  "
+            f"{file.stem:8} {name:8} {motion.ticks:6} ticks {motion.ticks / result.wall_s:6.0f} ticks/s  "
             f"{result.deadline_misses} misses  setpoints {hashes[0][:16]}  encoders {hashes[1][:16]}"
         )
     return len(found) == 1
@@ -78,7 +74,9 @@ def compare(file: Path, options: argparse.Namespace, bus: str) -> bool:
 def main(arguments: list[str]) -> int:
     """Exit status."""
     parser = argparse.ArgumentParser(prog="til.py", description="Target in the loop.")
-    parser.add_argument("--target", choices=TARGETS, default="an386")
+    parser.add_argument(
+        "--target", choices=TARGETS, action="append", help="may be given again (default an386)"
+    )
     parser.add_argument(
         "--link", choices=("fifo", "slcan"), default="fifo", help="slcan: real time, on its UART"
     )
@@ -86,6 +84,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--local", action="store_true", help="a bus of its own, not vcan0")
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
     options = parser.parse_args(arguments)
+    options.target = options.target or ["an386"]
     try:
         with local_bus() if options.local else nullcontext(DEFAULT_BUS) as bus:
             equal = [compare(file, options, bus) for file in options.files]

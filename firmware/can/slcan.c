@@ -84,6 +84,8 @@ bool slcan_decode(struct slcan_decoder *decoder, char character, struct can_msg 
     }
     const uint32_t length = decoder->length;
     decoder->length = 0;
+    decoder->closed =
+        decoder->closed || (length == 1u && decoder->line[0] == 'C' && character == '\r');
     if (length == 0u || decoder->line[0] != 't') {
         return false;
     }

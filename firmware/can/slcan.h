@@ -4,6 +4,7 @@
  *
  *   tiiildd...\r    a frame: identifier (three hex digits), length (one), data (two for each byte)
  *   Sn\r O\r C\r    to an adapter: bit rate (8: 1 Mbit/s), open, close
+ *   C\r             from our bridge to a board: close, that is stop the axes and end; the board's own C says that it has
  *
  * Other lines (extended and remote frames, answers of an adapter) are passed over. A time stamp (four hex digits behind
  * the data) is allowed. Pure; the two directions are independent.
@@ -26,6 +27,7 @@ struct slcan_decoder {
     char line[SLCAN_LINE_MAX + 4u];
     uint32_t length;  /* so far; more than fits: the line is passed over */
     uint32_t refused; /* lines that began like a frame and were none */
+    bool closed;      /* a line C has come */
 };
 
 /* True when the character completed a frame: it is in *message. */

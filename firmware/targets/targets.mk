@@ -56,7 +56,7 @@ taylor_CHECK   := --soft-float
 
 controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/port/common/*.c firmware/can/*.c)
-controller_TARGETS := an385 an386 an500 an505 $(BOARDS)
+controller_TARGETS := an385 an386 an500 an505 microbit $(BOARDS)
 
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -fstack-usage -DNDEBUG $(INCLUDES)
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
@@ -89,15 +89,15 @@ $(foreach t,$(TARGETS) $(BOARDS),$(eval $(call TARGET_RULES,$(t))))
 # What each image is asked after it is linked: no heap, no double, no soft float, no 64-bit division; a stack that fits.
 IMAGE_CHECK := tools/check_image.py firmware/targets/stack.toml $(addprefix tools/target/,effects.py forbidden.py image.py stack.py)
 
-# A board's linker script may lie in the folder of its port.
-target_ld = $(firstword $(wildcard firmware/port/*/$(1).ld) firmware/targets/$(1).ld)
+# A board's linker script may lie in the folder of its port; an image that wants another memory has one of its own.
+target_ld = $(firstword $(wildcard firmware/port/*/$(1).ld firmware/targets/$(1)_$(2).ld) firmware/targets/$(1).ld)
 image_src = $($(2)_MAIN) $(or $($(1)_SRC),$($(2)_SRC)) $(or $($(2)_KERNELS),$($(1)_KERNELS)) $(wildcard firmware/port/$($(1)_CORE)/*.c)
 
 define IMAGE_RULE # target, image
-$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$(image_src)) $(BUILD)/firmware/$(1)/libhodograph.a $(target_ld) firmware/port/$($(1)_CORE)/sections.ld $(IMAGE_CHECK) $(BUILD)/firmware/$(1)/$(2).list
+$(BUILD)/firmware/$(1)/$(2).elf: $(call target_object,$(1),$(image_src)) $(BUILD)/firmware/$(1)/libhodograph.a $(target_ld) $(wildcard firmware/targets/mps2.ld) firmware/port/$($(1)_CORE)/sections.ld $(IMAGE_CHECK) $(BUILD)/firmware/$(1)/$(2).list
 	$$(call say,link,$$@)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $(or $($(1)_LINK),$($(1)_CPU)) -nostartfiles -Wl,--gc-sections -Wl,--fatal-warnings -Wl,-Map,$$(@:.elf=.map) \
-	    -Lfirmware/port/$($(1)_CORE) -T$(target_ld) -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
+	    -Lfirmware/port/$($(1)_CORE) -Lfirmware/targets -T$(target_ld) -o $$@ $$(filter %.o,$$^) $$(filter %.a,$$^)
 	$$(Q)$(PYTHON) tools/check_image.py $($(2)_CHECK) $$@
 $(call NOTE,$(BUILD)/firmware/$(1)/$(2).list,$(image_src) $($(2)_CHECK))
 -include $(patsubst %.o,%.d,$(call target_object,$(1),$(image_src)))

@@ -19,8 +19,8 @@ const char bridge_options_help[] =
     "listens,\n"
     "                   or fd:N, a connected socket that the bridge is started with\n"
     "\n"
-    "SIGTERM or SIGINT asks the board to end, where there are FIFOs; a second one ends the bridge "
-    "at once.\n"
+    "SIGTERM or SIGINT asks the board to stop the axes and to end; a second one ends the bridge at "
+    "once.\n"
     "Exit status: 0 ended as asked, 1 the board is gone, 2 wrong usage, 4 bus not usable.\n";
 
 struct reason {

@@ -16,7 +16,8 @@
 #include "bridge/bus.h"
 #include "can/slcan.h"
 
-#define TEXT_SIZE 4096u
+#define TEXT_SIZE      4096u
+#define SIGNAL_LOOK_MS 100 /* how late a wish to end may be noticed on a silent bus */
 
 static int connect_unix(const char *path)
 {
@@ -93,10 +94,10 @@ static int connect_stream(const char *address)
                                                         : connect_unix(address);
 }
 
-/* Of datagrams: the board's emulator does not listen yet. */
+/* Of datagrams: the board's emulator does not listen yet; once it has been asked to end, any more. */
 static bool passes_over(int error)
 {
-    return error == EINTR || error == EAGAIN || error == ECONNREFUSED;
+    return error == EINTR || error == EAGAIN || (error == ECONNREFUSED && bus_signals() == 0u);
 }
 
 /* What is there, which may be many messages of a character. -1: the stream has ended. */
@@ -135,7 +136,7 @@ static bool write_all(int stream, const char *text, size_t size)
 {
     while (size > 0u) {
         const ssize_t done = write(stream, text, size);
-        if (done < 0 && (!passes_over(errno) || bus_signals() > 0u)) {
+        if (done < 0 && (!passes_over(errno) || bus_signals() > 1u)) {
             return false;
         }
         if (done < 0 && errno == ECONNREFUSED) {
@@ -164,29 +165,48 @@ static int to_stream(struct can_socket *socket, int stream)
     return write_all(stream, text, size) ? 0 : 1;
 }
 
-static int run(struct can_socket *socket, int stream)
+/* What has come, either way; likewise. */
+static int pass_on(struct can_socket *socket, int stream, struct slcan_decoder *decoder)
 {
-    struct slcan_decoder decoder;
     struct pollfd wait[2] = {{.fd = stream, .events = POLLIN},
                              {.fd = socket->fd, .events = POLLIN}};
     int result = 0;
+    if (poll(wait, 2, SIGNAL_LOOK_MS) < 0) {
+        return 0; /* a signal */
+    }
+    if (wait[0].revents != 0) {
+        result = to_bus(socket, stream, decoder);
+    }
+    return wait[1].revents != 0 && result == 0 ? to_stream(socket, stream) : result;
+}
+
+/* Asks the board to end; it stops the axes and switches the drives off, over the bus, before it closes. */
+static int end_board(struct can_socket *socket, int stream, struct slcan_decoder *decoder)
+{
+    int result = write_all(stream, "C\r", 2) ? 0 : 1;
+    decoder->closed = false;
+    while (result == 0 && !decoder->closed && bus_signals() < 2u) {
+        result = pass_on(socket, stream, decoder);
+    }
+    if (result == 0 && !decoder->closed) {
+        return bus_complain(BRIDGE_GONE, "told twice to end", "the board had not closed yet");
+    }
+    return result < 0 ? result : BRIDGE_OK;
+}
+
+static int run(struct can_socket *socket, int stream)
+{
+    struct slcan_decoder decoder;
+    int result = 0;
     memset(&decoder, 0, sizeof decoder);
     while (bus_signals() == 0u && result == 0) {
-        if (poll(wait, 2, -1) < 0) {
-            continue; /* a signal */
-        }
-        if (wait[0].revents != 0) {
-            result = to_bus(socket, stream, &decoder);
-        }
-        if (wait[1].revents != 0 && result == 0) {
-            result = to_stream(socket, stream);
-        }
+        result = pass_on(socket, stream, &decoder);
     }
-    if (result < 0) {
-        return bus_complain(BRIDGE_BUS, "the bus failed", strerror(-result));
+    if (result > 0) {
+        return bus_complain(BRIDGE_GONE, "the board is gone", "its stream has ended");
     }
-    return result == 0 ? BRIDGE_OK
-                       : bus_complain(BRIDGE_GONE, "the board is gone", "its stream has ended");
+    result = result == 0 ? end_board(socket, stream, &decoder) : result;
+    return result < 0 ? bus_complain(BRIDGE_BUS, "the bus failed", strerror(-result)) : result;
 }
 
 int slcan_side_run(struct can_socket *socket, const char *address)

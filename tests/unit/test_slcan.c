@@ -74,6 +74,14 @@ static void test_every_frame_comes_back(void)
     TEST_ASSERT_EQUAL_UINT32(0, decoder.refused);
 }
 
+static void test_a_line_that_closes_is_noted(void)
+{
+    TEST_ASSERT_EQUAL(0, decode("\rO\rCC\rC1\rt0C\rC\a"));
+    TEST_ASSERT_FALSE(decoder.closed);
+    TEST_ASSERT_EQUAL(1, decode("t0000\rC\r"));
+    TEST_ASSERT_TRUE(decoder.closed);
+}
+
 static void test_a_time_stamp_is_allowed(void)
 {
     TEST_ASSERT_EQUAL(1, decode("t0801FF12AB\r"));
@@ -117,6 +125,7 @@ int main(void)
     RUN_TEST(test_frames_become_lines);
     RUN_TEST(test_lines_become_frames);
     RUN_TEST(test_every_frame_comes_back);
+    RUN_TEST(test_a_line_that_closes_is_noted);
     RUN_TEST(test_a_time_stamp_is_allowed);
     RUN_TEST(test_what_is_no_frame_is_passed_over);
     RUN_TEST(test_what_only_looks_like_a_frame_is_refused);

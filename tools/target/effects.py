@@ -59,7 +59,7 @@ def _thumb(image: Image, function: Function, index: int) -> Effect:
     name = re.sub(r"\.[nw]$", "", instruction.mnemonic)
     operands = instruction.operands
     if name in ("b", "bl", "blx", "bx", "cbz", "cbnz") or re.fullmatch(rf"b({_CONDITIONS})", name):
-        return _thumb_branch(image, instruction, name)
+        return _thumb_branch(image, function, index, name)
     conditional = re.fullmatch(rf"(bx|pop|ldr|ldmia|mov)({_CONDITIONS})", name)
     if conditional and "pc" in operands + ("pc" if conditional[1] == "bx" else ""):
         return Effect()  # leaves, or goes on as if it were not there
@@ -73,15 +73,24 @@ def _thumb(image: Image, function: Function, index: int) -> Effect:
     return Effect(_thumb_grows(image, function, index, name))
 
 
-def _thumb_branch(image: Image, instruction: Instruction, name: str) -> Effect:
+def _thumb_branch(image: Image, function: Function, index: int, name: str) -> Effect:
+    instruction = function.instructions[index]
     if name in ("bx", "blx") and not instruction.operands[0].isdigit():
-        returns = name == "bx" and instruction.operands == "lr"
+        returns = name == "bx" and _holds_the_way_back(function, index)
         return Effect(falls=name == "blx", indirect=not returns)
     target = _target(instruction)
     if name in ("bl", "blx"):
         table = target is not None and image.function_at(target).name.startswith("__gnu_thumb1")
         return Effect(jump=True, falls=False) if table else Effect(call=target)
     return Effect(branch=target, falls=name != "b")
+
+
+def _holds_the_way_back(function: Function, index: int) -> bool:
+    """Of `bx`: ARMv6-M pops the saved lr to a low register where arguments are still to be given back."""
+    register = function.instructions[index].operands
+    before = function.instructions[max(index - 2, 0) : index]
+    popped = [(f.mnemonic, f.operands.partition(",")[0]) for f in before]
+    return register == "lr" or popped == [("pop", f"{{{register}}}"), ("add", "sp")]
 
 
 def _thumb_grows(image: Image, function: Function, index: int, name: str) -> int:

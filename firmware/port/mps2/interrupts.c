@@ -107,7 +107,7 @@ static void spin_once(void)
 void port_wait(uint32_t timeout_us)
 {
     const uint32_t began_us = systick_us();
-    while (!self.woken && !self.link->stop_requested() && systick_us() - began_us < timeout_us) {
+    while (!self.woken && systick_us() - began_us < timeout_us) {
         if (self.link->sleeps) {
             sleep_once();
         } else {

@@ -41,8 +41,8 @@ struct link {
     /* What was sent last leaves. Mainline, with the tick ended. */
     void (*end)(void);
 
-    bool (*stop_requested)(void);
-    bool (*failed)(void); /* the other end is gone */
+    bool (*stop_requested)(void); /* when it becomes true the link wakes the mainline */
+    bool (*failed)(void);         /* the other end is gone */
 };
 
 extern const struct link link_fifo;

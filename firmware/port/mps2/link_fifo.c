@@ -65,8 +65,9 @@ static void exchange(uint16_t flags, uint32_t guard_us)
         self.in.header = (struct exchange_header){.flags = EXCHANGE_DUE | EXCHANGE_STOP};
     }
     self.out.header.count = 0;
-    if ((self.in.header.flags & EXCHANGE_STOP) != 0u) {
+    if ((self.in.header.flags & EXCHANGE_STOP) != 0u && !self.stop) {
         self.stop = true;
+        port_wake();
     }
     receive_frames();
 }

@@ -10,6 +10,7 @@ static struct {
     struct slcan_decoder decoder;
     struct can_match filters[PORT_FILTERS];
     size_t filter_count;
+    volatile bool stop;
 } self;
 
 static void take(char character)
@@ -18,6 +19,10 @@ static void take(char character)
     if (slcan_decode(&self.decoder, character, &message) &&
         can_match_any(self.filters, self.filter_count, &message)) {
         interrupts_receive(&message);
+    }
+    if (self.decoder.closed && !self.stop) {
+        self.stop = true;
+        port_wake();
     }
 }
 
@@ -63,7 +68,13 @@ static void end(void)
     }
 }
 
-static bool never(void)
+static bool stop_requested(void)
+{
+    return self.stop;
+}
+
+/* A line does not tell that nobody is at its other end. */
+static bool failed(void)
 {
     return false;
 }
@@ -75,6 +86,6 @@ const struct link link_slcan = {
     .send = send,
     .after_tick = after_tick,
     .end = end,
-    .stop_requested = never,
-    .failed = never,
+    .stop_requested = stop_requested,
+    .failed = failed,
 };
