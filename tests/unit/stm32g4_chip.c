@@ -12,8 +12,9 @@
 
 #define PLAIN_MAX 256u
 #define LINES_MAX 102u
+#define SAID_SIZE 1024u
 
-enum { TIM2 = 0x40000000, TIM5 = 0x40000C00 };
+enum { TIM2 = 0x40000000, TIM5 = 0x40000C00, LPUART1_TDR = 0x40008028 };
 enum {
     CR1 = 0x00,
     DIER = 0x0C,
@@ -42,6 +43,8 @@ struct plain {
 };
 
 static struct {
+    char said[SAID_SIZE];
+    unsigned said_length;
     struct plain plain[PLAIN_MAX];
     unsigned plains;
     struct timer tim2;
@@ -164,6 +167,20 @@ uint32_t reg_read(uint32_t address)
     return timer != NULL ? read_timer(timer, address % 0x400u) : plain(address)->value;
 }
 
+static void hear(uint32_t address, char character)
+{
+    if (address == LPUART1_TDR && self.said_length < SAID_SIZE - 1u) {
+        self.said[self.said_length++] = character;
+    }
+}
+
+const char *chip_said(void)
+{
+    self.said[self.said_length] = '\0';
+    self.said_length = 0;
+    return self.said;
+}
+
 void reg_write(uint32_t address, uint32_t value)
 {
     struct timer *timer = timer_of(address);
@@ -176,6 +193,7 @@ void reg_write(uint32_t address, uint32_t value)
     } else {
         plain(address)->value = value;
         plain(address)->writes++;
+        hear(address, (char)value);
     }
 }
 

@@ -24,6 +24,9 @@ void chip_poke(uint32_t address, uint32_t value);
 /* Writes to an address since power-on. */
 unsigned chip_writes(uint32_t address);
 
+/* What the console (LPUART1) was given since this was last asked: the first kilobyte. */
+const char *chip_said(void);
+
 /* Ends the test: the access breaks a rule of the manual. */
 void chip_forbids(const char *rule, uint32_t address);
 

@@ -261,6 +261,23 @@ static void test_trouble_on_the_bus_is_told_once_a_second(void)
     TEST_ASSERT_EQUAL_UINT(once, said());
 }
 
+static void test_error_counters_are_told_when_the_chip_turns_error_passive(void)
+{
+    start();
+    port_wait(1000000);
+    fdcan_model_fail(15);
+    irq_can();
+    port_wait(1000000);
+    TEST_ASSERT_EQUAL_STRING("", chip_said());
+    fdcan_model_fail(17); /* what was sent meanwhile has brought the counter back to 0 */
+    irq_can();
+    port_wait(1000);
+    TEST_ASSERT_EQUAL_STRING("hodograph: error passive on the CAN bus began or ended, times 1\r\n"
+                             "hodograph: CAN error counter now, sending 136\r\n"
+                             "hodograph: CAN error counter now, receiving 0\r\n",
+                             chip_said());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -274,5 +291,6 @@ int main(void)
     RUN_TEST(test_a_spoiled_word_of_the_code_is_the_end_at_any_time);
     RUN_TEST(test_the_store_is_the_flash);
     RUN_TEST(test_trouble_on_the_bus_is_told_once_a_second);
+    RUN_TEST(test_error_counters_are_told_when_the_chip_turns_error_passive);
     return UNITY_END();
 }

@@ -156,6 +156,16 @@ static void tell(const char *text, uint32_t count)
     }
 }
 
+/* From 128 on it is error passive; 256 when sending is bus-off. */
+static void tell_errors(void)
+{
+    uint8_t transmit = 0;
+    uint8_t receive = 0;
+    fdcan_errors(&transmit, &receive);
+    port_log(PORT_WARNING, "CAN error counter now, sending", transmit);
+    port_log(PORT_WARNING, "CAN error counter now, receiving", receive);
+}
+
 /* Once a second at most: a line takes some milliseconds. */
 static void tell_events(uint32_t now_us)
 {
@@ -166,6 +176,9 @@ static void tell_events(uint32_t now_us)
     const struct fdcan_events events = fdcan_take_events(&self.can);
     tell("left the CAN bus after too many errors, times", events.bus_offs);
     tell("error passive on the CAN bus began or ended, times", events.error_passives);
+    if (events.error_passives != 0u) {
+        tell_errors();
+    }
     tell("frames came too fast, lost", events.lost);
 }
 
