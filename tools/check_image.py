@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: MIT
 """check_image.py [--soft-float] IMAGE: whether a linked image keeps what docs/architecture.md promises.
 
-Run after each link. It has no heap, no double arithmetic, no 64-bit division, no float without an FPU, and its worst
-stack fits the stack of its linker script. A line for each breach; exit status 1 then. --soft-float is for images that
-compare.
+Run after each link. It has no heap, no double arithmetic, no 64-bit division, no float without an FPU, with one no
+instruction on floats outside the float kernel, and its worst stack fits the stack of its linker script. A line for
+each breach; exit status 1 then. --soft-float is for images that compare.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from target.effects import StackError
-from target.forbidden import CLASSES, forbidden
+from target.forbidden import CLASSES, FLOAT, WHY_FLOAT, floats, forbidden
 from target.image import Image
 from target.stack import Rules, Stack
 
@@ -23,11 +23,14 @@ RULES = Path(__file__).resolve().parent.parent / "firmware" / "targets" / "stack
 
 
 def breaches(image: Image, rules: Rules, allowed: Sequence[str] = ()) -> Iterator[str]:
-    """One line each; `allowed` are classes of forbidden.CLASSES."""
+    """One line each; `allowed` are classes of forbidden.CLASSES, and FLOAT."""
     for kind, names in forbidden(image).items():
         if kind in allowed:
             continue
         yield f"{kind}: {', '.join(names)} ({CLASSES[kind][0]})"
+    computing = [] if FLOAT in allowed else floats(image)
+    if computing:
+        yield f"{FLOAT}: {', '.join(computing)} ({WHY_FLOAT})"
     try:
         stack = Stack(image, rules)
         if stack.bytes > stack.room:
@@ -46,7 +49,7 @@ def main() -> int:
     parser.add_argument("--soft-float", action="store_true")
     parser.add_argument("image", type=Path)
     arguments = parser.parse_args()
-    allowed = ["soft float"] if arguments.soft_float else []
+    allowed = ["soft float", FLOAT] if arguments.soft_float else []
     found = list(breaches(Image(arguments.image), Rules.read(RULES), allowed))
     for breach in found:
         print(f"{arguments.image}: {breach}")

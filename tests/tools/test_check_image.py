@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from collections import Counter
 from pathlib import Path
@@ -10,7 +11,8 @@ from pathlib import Path
 import pytest
 
 import check_image
-from target.forbidden import forbidden
+from copied_tree import copied_tree
+from target.forbidden import floats, forbidden
 from target.image import Image
 from target.stack import Rules, Stack, StackError, frame
 
@@ -89,6 +91,41 @@ def test_float_with_an_fpu(tmp_path: Path) -> None:
     assert forbidden(compiled(tmp_path, M4F, "float f(float a, int b) { return a * b; }")) == {}
     wide = "float f(long long a) { return (float)a; }"
     assert "soft float" in forbidden(compiled(tmp_path, M4F, wide))
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ("int f(int a) { return (int)((float)a * 1.5f); }", ["f"]),
+        ("unsigned f(unsigned a) { return (unsigned)(float)a; }", ["f"]),
+        ("int f(float a, float b) { return a < b; }", ["f"]),
+        ("float f(float a) { return -a; }", ["f"]),
+        ("float f(void) { return 1.0f; }", ["f"]),
+        ("float f(float a, float b) { return b; }", ["f"]),
+        ("float kernel_float_f(float a, float b) { return a + b; }", []),
+        ("struct s { long long a[4]; }; void f(struct s *p, const struct s *q) { *p = *q; }", []),
+        ("void f(long long *p, const long long *q) { p[1] = q[0]; p[0] = q[1]; }", []),
+        (CLEAN, []),
+    ],
+)
+def test_floats_outside_the_float_kernel(tmp_path: Path, source: str, found: list[str]) -> None:
+    assert floats(compiled(tmp_path, M4F, source)) == found
+
+
+def test_a_float_in_the_fixed_kernel_fails_the_build(tmp_path: Path) -> None:
+    tree = copied_tree(tmp_path, "an386")
+    kernel = tree / "firmware/core/kernel_fixed.c"
+    body = re.compile(r"(\bkernel_fixed_segment_at\([^)]*\)\n\{\n)")
+    planted, count = body.subn(
+        r"\1    volatile float planted = 1.5f;\n    planted *= 2.0f;\n", kernel.read_text()
+    )
+    assert count == 1
+    kernel.write_text(planted)
+    words = ["make", "build/firmware/an386/setpoints.elf"]
+    built = subprocess.run(words, cwd=tree, capture_output=True, text=True, check=False)
+    assert built.returncode != 0
+    assert "float: kernel_fixed_segment_at (" in built.stdout
+    assert not (tree / words[1]).exists()
 
 
 TAKE = "__attribute__((noinline)) static int take(volatile char *p) { return p[3]; }\n"

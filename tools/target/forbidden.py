@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What no image may be linked with, known by the names of the libraries' functions."""
+"""What no image may hold: functions of libraries, known by their names, and floats outside the float kernel."""
 
 from __future__ import annotations
 
@@ -39,6 +39,26 @@ CLASSES: dict[str, tuple[str, re.Pattern[str]]] = {
         ),
     ),
 }
+
+FLOAT = "float"
+WHY_FLOAT = (
+    "floats are for core/kernel_float alone: the fixed kernel and all around it are integers"
+)
+_FLOAT_KERNEL = re.compile(r"kernel_float_\w+")
+# Thumb's VFP; not vldr, vstr, vmov, vpush, ... without a type, by which the compiler copies integers as well.
+_FLOAT_ARITHMETIC = re.compile(r"v[a-z]+\.(?:[a-z]\d+\.)?f(?:16|32|64)(?:\.[a-z]\d+)?")
+
+
+def floats(image: Image) -> list[str]:
+    """Functions with an instruction that computes with floats, except those of the float kernel."""
+    return sorted(
+        {
+            function.name
+            for function in image.functions
+            if not _FLOAT_KERNEL.fullmatch(function.name)
+            and any(_FLOAT_ARITHMETIC.fullmatch(i.mnemonic) for i in function.instructions)
+        }
+    )
 
 
 def forbidden(image: Image) -> dict[str, list[str]]:
