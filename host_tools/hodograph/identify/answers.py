@@ -1,17 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Which SYNCs a drive surely answered, also where a slow host sends an answer behind the next SYNC."""
+"""Which SYNCs of a recording a drive surely answered: answers may be late, on a slow host, and frames may be lost."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bus.listening.decode import SYNC_ID, SYNC_OVERFLOW
 from ..bus.listening.frames import Frames
 
 LATE_SYNCS = 100
 """Answers that are late are made up for within so many SYNCs; else a frame was lost."""
 
 Flags = NDArray[np.bool_]
+
+
+def unbroken(frames: Frames) -> list[Frames]:
+    """The recording in parts of which no SYNC is missing, each but the first from a SYNC on; empty without SYNCs."""
+    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+    counters = frames["data"][sync_at, 0].astype(np.int64)
+    breaks = np.flatnonzero((np.diff(counters) - 1) % SYNC_OVERFLOW) + 1
+    return list(np.split(frames, sync_at[breaks])) if sync_at.size else []
 
 
 def answered(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -> Flags:

@@ -21,7 +21,7 @@ from ..bus.listening.decode import (
 from ..bus.listening.frames import Frames
 from ..errors import RunError
 from ..native import AxisInputs
-from .answers import answered
+from .answers import answered, unbroken
 
 PARK_PERIODS = 250
 """After so many periods with one target a simulated drive stands exactly there (docs/protocol.md section 3)."""
@@ -49,24 +49,33 @@ def stretches(frames: Frames, node: int) -> list[Stretch]:
 
     Raises RunError: the drive does not report volts, or never moves.
     """
+    parts = unbroken(frames)
+    if not parts:
+        raise RunError("no SYNCs in it: record while the controller runs")
     if not np.any(frames["id"] == TPDO2 + node):
         raise RunError(
             f"node {node} sends no volts (TPDO2): only simulated drives do, and where the controller has set them up"
         )
+    found = [motion for part in parts for motion in _in_part(part, node)]
+    if not found:
+        raise RunError(
+            f"node {node} follows no motion in it that begins at rest: record a run from before its start"
+        )
+    return found
+
+
+def _in_part(frames: Frames, node: int) -> list[Stretch]:
+    """Those of a part without a missing SYNC."""
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
     whole = complete_ticks(frames, sync_at, RPDO1 + node)
     for function in (TPDO1, TPDO2):
         whole &= answered(frames, sync_at, function + node)
     found = []
     for begin, end in runs_of(whole):
-        part = frames[sync_at[begin] : sync_at[end]]
         if end - begin > _REST:
+            part = frames[sync_at[begin] : sync_at[end]]
             ticks = decode_ticks(part, (node,))
             found += _motions(ticks, *decode_offsets(part, node, ticks.count))
-    if not found:
-        raise RunError(
-            f"node {node} follows no motion in it that begins at rest: record a run from before its start"
-        )
     return found
 
 

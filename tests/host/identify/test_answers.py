@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hodograph.errors import RunError
 from hodograph.identify import identify_axis, stretches
 from hodograph.identify.answers import LATE_SYNCS, answered
 
@@ -57,3 +58,16 @@ def test_late_volts_give_the_same_plant() -> None:
     lost = np.delete(frames, syncs[[REST + 100]] - 1)
     (motion,) = stretches(lost, 3)
     assert len(motion.position_counts) < 100
+
+
+def test_a_lost_sync_ends_a_motion_and_spoils_no_other() -> None:
+    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
+    frames = recording(chain, drives, 1)
+    sync = np.flatnonzero(frames["id"] == SYNC)[REST + 700]
+    (motion,) = stretches(np.delete(frames, [sync]), 3)
+    assert 690 < len(motion.position_counts) < 701
+    whole = identify_axis(stretches(frames, 3), drives[1], 1_000_000, 1000)
+    part = identify_axis([motion], drives[1], 1_000_000, 1000)
+    assert part.gain_rad_s_v.value == pytest.approx(whole.gain_rad_s_v.value, rel=0.005)
+    with pytest.raises(RunError, match="no SYNCs in it"):
+        stretches(frames[:0], 3)
