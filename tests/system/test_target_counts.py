@@ -28,13 +28,24 @@ ICOUNT = ("-icount", "shift=7,sleep=off")
 MOST_OF_THE_CALL = 10  # instructions between two looks at the clock that are not the tick's
 
 
-@pytest.mark.parametrize("target", TARGETS.values(), ids=lambda t: t.name)
-def test_the_clock_of_the_core_counts_the_same(target: Target, tmp_path: Path) -> None:
+@pytest.mark.parametrize("image", ["setpoints", "isr"])
+@pytest.mark.parametrize(
+    ("target", "kernel"),
+    [(target, kernel) for target in TARGETS.values() for kernel in target.kernels],
+    ids=lambda which: which if isinstance(which, str) else which.name,
+)
+def test_the_clock_of_the_core_counts_the_same(
+    target: Target, kernel: str, image: str, tmp_path: Path
+) -> None:
+    """The motion part (setpoints) and the whole interrupt, with both kernels."""
     programs = b"".join(adversary.image(a) for a in adversary.ADVERSARIES[:3])
-    counts = Counter(BUILD, target).count(
-        target.kernels[0], programs, adversary.restless(), ICOUNT, tmp_path / "times"
-    )
-    times = np.fromfile(tmp_path / "times", "<u4") * 1000.0 / target.clock_mhz / INSTRUCTION_NS
+    given = (kernel, programs, adversary.restless(), ICOUNT)
+    file = tmp_path / "times"
+    if image == "setpoints":
+        counts = Counter(BUILD, target).count(*given, times=file)
+    else:
+        counts = Counter(BUILD, target, image, image).count(*given, setpoints=file)
+    times = np.fromfile(file, "<u4") * 1000.0 / target.clock_mhz / INSTRUCTION_NS
     assert len(times) == len(counts) > 100
     beside = times - counts.sum(axis=1)
     # a look at the clock rounds to a cycle, which is less than half an instruction

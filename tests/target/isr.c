@@ -2,8 +2,9 @@
 /*
  * An image that runs the whole tick of the controller, with two drives that always obey, on a port that is only memory:
  * to count what the timer interrupt costs on every core, also where no emulated board has a CAN bus. The words are those
- * of setpoints.c, KERNEL FILE COMMANDS, of which FILE is not written; the store holds one program image or several. A
- * FILE of the name "silent" makes both drives leave every third SYNC unanswered, which 0x2004 sub 9 (1) tolerates.
+ * of setpoints.c, KERNEL FILE COMMANDS; FILE gets a u32 for each counted tick: what it took by the core's own clock
+ * (clock.h). The store holds one program image or several. A FILE of the name "silent" is not written; it makes both
+ * drives leave every third SYNC unanswered, which 0x2004 sub 9 (1) tolerates.
  *
  * What a real port adds: its own handler, and writing a frame into the controller's registers instead of memory.
  */
@@ -13,6 +14,7 @@
 
 #include "app/machine/machine.h"
 #include "app/tick.h"
+#include "clock.h"
 #include "commands.h"
 #include "core/program.h"
 #include "port/port.h"
@@ -20,7 +22,8 @@
 #include "table.h"
 
 enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_STATE = 6 };
-enum { DRIVES = 2, FRAMES = 8, LONGEST_WAIT_TICKS = 1000 };
+enum { DRIVES = 2, FRAMES = 8, LONGEST_WAIT_TICKS = 1000, BATCH = 64 };
+enum { WORD_KERNEL, WORD_FILE, WORD_COMMANDS, WORD_COUNT };
 
 /* Statuswords with voltage, remote and, in Operation enabled, "follows" (CiA 402). */
 enum { SWITCH_ON_DISABLED = 0x250, READY = 0x231, SWITCHED_ON = 0x233, ENABLED = 0x1237 };
@@ -41,6 +44,12 @@ static struct {
     uint32_t count;
     uint32_t time_ns;
 } bus;
+static struct {
+    uint32_t took[BATCH];
+    uint32_t count;
+    int file; /* -1: none */
+    bool failed;
+} times = {.file = -1};
 static struct {
     uint16_t statusword;
     int32_t latched_counts; /* reached at the next SYNC */
@@ -68,6 +77,27 @@ void port_tick_await(uint32_t guard_us, bool hurry)
 __attribute__((noinline)) static void isr(uint32_t now_us)
 {
     tick_run(&tick, now_us, 0);
+}
+
+static void write_times(void)
+{
+    const uint32_t size = times.count * (uint32_t)sizeof times.took[0];
+    times.failed = times.failed || semihost_write(times.file, times.took, size) != 0;
+    times.count = 0;
+}
+
+/* A tick between two looks at the clock; inlined, its argument would be computed between them. */
+__attribute__((noinline)) static void timed_isr(uint32_t now_us)
+{
+    const uint32_t before = clock_now();
+    isr(now_us);
+    const uint32_t took = (clock_now() - before) & CLOCK_MASK;
+    if (times.file >= 0) {
+        times.took[times.count++] = took;
+        if (times.count == BATCH) {
+            write_times();
+        }
+    }
 }
 
 /* The other counted part: what its receive interrupt calls. */
@@ -119,7 +149,7 @@ static void period(void)
     const uint32_t period_us = machine.config.period_us;
     bus.time_ns += period_us * 1000u;
     if (machine_on_path(&machine)) {
-        isr(bus.time_ns / 1000u);
+        timed_isr(bus.time_ns / 1000u);
     } else {
         tick_run(&tick, bus.time_ns / 1000u, 0);
     }
@@ -200,15 +230,46 @@ static int run_all(const char *commands_path, uint8_t kernel)
     return status;
 }
 
-int main(void)
+/* False: there are fewer words than these. */
+static bool split_line(char *words[WORD_COUNT])
 {
     static char line[384];
-    const bool there = semihost_command_line(line, sizeof line) == 0;
-    const char *last = there ? strrchr(line, ' ') : NULL;
-    if (last == NULL || line[0] < '0' || line[0] > '1') {
+    char *at = semihost_command_line(line, sizeof line) == 0 ? line : NULL;
+    for (int i = 0; i < WORD_COUNT && at != NULL; i++) {
+        words[i] = at;
+        at = strchr(at, ' ');
+        if (at != NULL) {
+            *at++ = '\0';
+        } else if (i + 1 < WORD_COUNT) {
+            return false;
+        }
+    }
+    return words[0] != NULL;
+}
+
+static int run(char *words[WORD_COUNT])
+{
+    silent = strcmp(words[WORD_FILE], "silent") == 0;
+    times.file = silent ? -1 : semihost_open(words[WORD_FILE], SEMIHOST_WRITE);
+    if (!silent && times.file < 0) {
+        return STATUS_FILE;
+    }
+    clock_begin();
+    const char *path = words[WORD_COMMANDS][0] == '-' ? NULL : words[WORD_COMMANDS];
+    const int status = run_all(path, (uint8_t)(words[WORD_KERNEL][0] - '0'));
+    if (!silent) {
+        write_times();
+        times.failed = semihost_close(times.file) != 0 || times.failed;
+    }
+    return status == 0 && times.failed ? STATUS_FILE : status;
+}
+
+int main(void)
+{
+    char *words[WORD_COUNT] = {NULL};
+    if (!split_line(words) || words[WORD_KERNEL][0] < '0' || words[WORD_KERNEL][0] > '1') {
         semihost_print("usage: KERNEL FILE COMMANDS\n");
         return STATUS_USAGE;
     }
-    silent = strstr(line, " silent ") != NULL;
-    return run_all(last[1] == '-' ? NULL : last + 1, (uint8_t)(line[0] - '0'));
+    return run(words);
 }
