@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Contour error of the paper's and of tuned loops, at SYNCs and between them; plants found from noisy reports.
+"""Contour error of the paper's and of tuned loops, at SYNCs and between them, and on plants that are not the modelled
+one; plants found from noisy reports.
 
 Paths: alpha and heart at the paper's feed and in the least time within all limits. Loops: the paper's; tuned
 (examples/machines/tuned.toml); in drives that join setpoints by straight lines, the same poles, and those that the
 search finds for them; the first in drives whose speed comes from differences of the encoder and whose volts come a
 servo sample late. Between SYNCs the drive is computed again here, servo sample by servo sample, which tells how many of
-them are at the voltage limit.
+them are at the voltage limit. Where the plant is another the optimal feeds are those for 4.5 V, as in the examples, and
+for 3.5 V.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,7 @@ from hodograph.identify import Stretch, identify_axis
 from hodograph.native import AxisInputs, Contour, NativeProgram
 from hodograph.simulate import Motion, simulate
 from hodograph.tune import Asked, tune
+from hodograph.tune.cases import CASES, outcomes
 from hodograph.tune.loop import loop_of, offset_volts
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -35,6 +39,8 @@ TUNED_HZ, TUNED_DAMPING = 214.5, 0.85
 """Of the example's loops, as the search found them."""
 LINES_HZ, LINES_DAMPING = 155.8, 0.6
 """The same for straight lines, on all four paths."""
+WEAKER_VOLTS = 3.5
+"""Of the drives' 5 V: what a plan leaves is for plants that are weaker than their model."""
 SEEDS, NOISE_COUNTS, NOISE_MV = 10, 20.0, 10.0
 
 Float = NDArray[np.float64]
@@ -136,7 +142,7 @@ def contours() -> dict[str, Any]:
         figures[name] = {}
         for loop, (drives, forward) in {"paper": paper, **tuned}.items():
             motion = simulate(chain.image, drives, feedforward=forward)
-            found = {
+            found: dict[str, Any] = {
                 "contour_um": motion.max_contour_error_um,
                 "following_um": motion.max_following_error_um,
                 "volts": motion.max_volts,
@@ -144,6 +150,42 @@ def contours() -> dict[str, Any]:
             if loop != "tuned_late":
                 found["between_syncs"] = between_um(chain, motion, drives, forward)
             figures[name][loop] = found
+    return figures
+
+
+def weaker_volts(name: str, folder: Path) -> Path:
+    """The example with less voltage to plan with."""
+    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
+    file = folder / f"{name}_{WEAKER_VOLTS:g}_v.toml"
+    text = text.replace("volts = 4.5", f"volts = {WEAKER_VOLTS:g}")
+    file.write_text(text.replace('"machines/', f'"{MACHINES}/'), encoding="utf-8")
+    return file
+
+
+def sensitivity() -> dict[str, Any]:
+    """Contour errors by path, plant and loop, um, and whether the voltage limit was met."""
+    figures: dict[str, Any] = {}
+    example = load_machine(MACHINES / "tuned.toml")
+    x, y = example.models(example.plane)
+    with tempfile.TemporaryDirectory() as folder:
+        files = [EXAMPLES / f"{name}.toml" for name in PATHS]
+        files += [weaker_volts(name, Path(folder)) for name in PATHS if "optimal" in name]
+        for file in files:
+            chain = load_chain(file)
+            own_x, own_y = chain.machine.models(chain.machine.plane)
+            loops = {
+                "paper": ((own_x, own_y), None),
+                "no_offsets": ((x, y), None),
+                "tuned": ((x, y), example.plane_feedforward),
+            }
+            found: dict[str, Any] = {"duration_s": chain.plan.duration_s}
+            for loop, (drives, forward) in loops.items():
+                runs = outcomes(chain.image, chain.machine.counts_per_mm, drives, forward)
+                found[loop] = {
+                    case.name: {"contour_um": run.contour_error_um, "at_limit": run.saturated}
+                    for case, run in zip(CASES, runs, strict=True)
+                }
+            figures[file.stem] = found
     return figures
 
 
@@ -195,7 +237,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path, required=True)
     out: Path = parser.parse_args().json
-    figures = {"contour": contours(), "identify": plants()}
+    figures = {"contour": contours(), "sensitivity": sensitivity(), "identify": plants()}
     out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
 
 
