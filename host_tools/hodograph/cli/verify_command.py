@@ -113,7 +113,10 @@ def _text(found: Verification, drives_see: tuple[Sampled, ...], noise: BusNoise)
         "",
     ]
     if found.excesses:
-        lines.append(f"beyond a limit, worst place of each stretch ({len(found.excesses)}):")
+        within = f", none by more than {100 * TOLERANCE:g} %" if found.kept else ""
+        lines.append(
+            f"beyond a limit, worst place of each stretch ({len(found.excesses)}{within}):"
+        )
         lines += [_row(peak) for peak in found.excesses[:_MOST_LINES]]
         if len(found.excesses) > _MOST_LINES:
             lines.append(f"  ... {len(found.excesses) - _MOST_LINES} more (--json lists them)")

@@ -52,8 +52,22 @@ def test_beyond_a_limit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert {one["quantity"] for one in found["excesses"]} == {"y_jerk_mm_s3"}
     assert main(["verify", str(file)]) == 7
     captured = capsys.readouterr()
-    assert "worst place of each stretch" in captured.out
+    assert f"worst place of each stretch ({len(found['excesses'])}):" in captured.out
     assert "beyond its limits by more than 0.1 %: y_jerk_mm_s3" in captured.err
+
+
+def test_a_little_beyond_is_told_and_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    peak = document(capsys, 0, str(EXAMPLES / "alpha.toml"))["peak"]["y_jerk_mm_s3"]["value"]
+    limits = f'policy = "report"\n[limits.axis]\njerk_mm_s3 = [5e4, {peak / 1.0005}]'
+    file = path_file(tmp_path, limits)
+    found = document(capsys, 0, str(file))
+    assert found["kept"]
+    assert found["excesses"][0]["ratio"] == pytest.approx(1.0005, abs=1e-6)
+    assert main(["verify", str(file)]) == 0
+    told = f"({len(found['excesses'])}, none by more than 0.1 %):"
+    assert f"worst place of each stretch {told}" in capsys.readouterr().out
 
 
 def test_a_given_image(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
