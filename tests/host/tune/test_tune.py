@@ -107,6 +107,23 @@ def test_every_case_differs_from_the_model(drives: tuple[Drive, Drive]) -> None:
         assert not found.saturated
 
 
+@pytest.mark.parametrize(("volts", "spoiled"), [(4.5, True), (3.5, False)])
+def test_volts_that_a_plan_leaves_are_for_weaker_plants(
+    tmp_path: Path, volts: float, spoiled: bool
+) -> None:
+    """docs/tuning.md: the fastest feed for 4.5 V of 5 V is none for a plant with a fifth less gain."""
+    text = (EXAMPLES / "alpha_optimal.toml").read_text().replace("volts = 4.5", f"volts = {volts}")
+    file = tmp_path / "alpha.toml"
+    file.write_text(text)
+    chain = load_chain(file, MACHINES / "tuned.toml")
+    drives, forward = chain.machine.models(chain.machine.plane), chain.machine.plane_feedforward
+    weak = next(case for case in CASES if case.name == "gain -20 %")
+    found = outcome(chain.image, 1_000_000, (drives[0], drives[1]), forward, weak)
+    assert found.saturated is spoiled
+    assert (found.contour_error_um > 100) is spoiled
+    assert (found.contour_error_um < 0.1) is not spoiled
+
+
 def test_saturation_is_seen(drives: tuple[Drive, Drive]) -> None:
     chain = load_chain(EXAMPLES / "heart.toml")
     weak = next(c for c in CASES if c.name == "gain -20 %, time constant +20 %")
