@@ -15,9 +15,9 @@ static void set_slope(struct feed_piece *f)
     for (int k = 0; k < 7; k++) {
         f->slope[k] = (int32_t)(((k + 1) * f->c_q44_mm[k]) >> f->slope_shift);
     }
-    f->feed_shift = f->slope_shift - 12 - f->exponent;
-    f->feed_factor = (int32_t)1 << (f->feed_shift > 0 && f->feed_shift < 31 ? f->feed_shift : 0);
-    f->feed_drop = f->feed_shift >= 0 ? 0 : f->feed_shift < -31 ? 31 : -f->feed_shift;
+    const int shift = f->slope_shift - 12 - f->exponent;
+    f->feed_factor = shift < 0 ? 1 : shift < 31 ? (int32_t)1 << shift : INT32_MAX;
+    f->feed_drop = shift >= 0 ? 0 : shift < -31 ? 31 : -shift;
 }
 
 void feed_piece_set(struct feed_piece *f, const struct program_piece *piece)
@@ -53,8 +53,7 @@ void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_poi
     arc =
         qmath_mul_unsigned(arc, tau) + (2 * qmath_mul_hi(slope, low_q63) >> (32 - f->slope_shift));
     out->arc_length_q40_mm = f->start_q40_mm + qmath_round(arc, 4);
-    out->feed_q32_mm_s = f->feed_shift < 31 ? qmath_product(slope >> f->feed_drop, f->feed_factor)
-                                            : qmath_shift_clamp(slope, f->feed_shift);
+    out->feed_q32_mm_s = qmath_product(slope >> f->feed_drop, f->feed_factor);
 }
 
 void feed_piece_make(void *piece, const struct program_piece *from)

@@ -15,15 +15,14 @@ struct feed_piece {
     int64_t c_q44_mm[7];
     int32_t slope[7];    /* coefficients of the derivative in tau, */
     int32_t slope_shift; /* 2^slope_shift times these in q44 */
-    int32_t feed_shift;  /* 2^feed_shift times these in 2^-32 mm/s */
-    int32_t feed_factor; /* that power, 2^0 ... 2^30, */
-    int32_t feed_drop;   /* or, where it is negative, so many bits */
+    int32_t feed_factor; /* these in 2^-32 mm/s: times 2^0 ... 2^30, */
+    int32_t feed_drop;   /* or without so many bits */
     int32_t exponent;    /* tau = t / 2^exponent */
 };
 
 struct feed_point {
     int64_t arc_length_q40_mm; /* from the start of the program */
-    int64_t feed_q32_mm_s;     /* held within 2^62, which only absurd programs reach */
+    int64_t feed_q32_mm_s; /* below 2^62; too low where coefficients sum up to 2^30 mm/s or more */
 };
 
 void feed_piece_set(struct feed_piece *f, const struct program_piece *piece);

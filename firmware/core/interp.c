@@ -31,9 +31,9 @@ static const struct prepared_segment *present_segment(const struct interp *it)
 }
 
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
-static void evaluate_feed(const struct interp *it, uint64_t time_q42_s, struct feed_point *f)
+static void evaluate_feed(const struct interp *it, const struct prepared_piece *piece,
+                          uint64_t time_q42_s, struct feed_point *f)
 {
-    const struct prepared_piece *piece = present_piece(it);
     uint64_t t = time_q42_s - (piece->start_q32_s << FINE_BITS);
     it->kernel->piece_at(&piece->feed, t, f);
     if (f->arc_length_q40_mm < 0) {
@@ -195,18 +195,15 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
     return 0;
 }
 
-int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out)
+int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
+                    struct interp_point *out)
 {
-    uint64_t time_q32_s = time_q42_s >> FINE_BITS;
-    if (time_q32_s >= it->duration_q32_s) {
+    if (time_q42_s >> FINE_BITS >= it->duration_q32_s) {
         *out = it->end;
         return INTERP_END;
     }
     struct feed_point f;
-    if (find_piece(it, time_q32_s, MOST_ENDS) != INTERP_OK) {
-        return INTERP_ERR_JUMP;
-    }
-    evaluate_feed(it, time_q42_s, &f);
+    evaluate_feed(it, piece, time_q42_s, &f);
     if (find_segment(it, f.arc_length_q40_mm, MOST_ENDS) != INTERP_OK) {
         return INTERP_ERR_JUMP;
     }
@@ -217,6 +214,15 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
     out->y_q40_mm = point[1];
     out->feed_q32_mm_s = f.feed_q32_mm_s;
     return INTERP_OK;
+}
+
+int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out)
+{
+    uint64_t time_q32_s = time_q42_s >> FINE_BITS;
+    if (time_q32_s < it->duration_q32_s && find_piece(it, time_q32_s, MOST_ENDS) != INTERP_OK) {
+        return INTERP_ERR_JUMP;
+    }
+    return interp_at_piece(it, present_piece(it), time_q42_s, out);
 }
 
 int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
@@ -234,7 +240,7 @@ int interp_seek(struct interp *it, uint64_t time_q32_s)
         go_to_begin(it);
     }
     find_piece(it, time, UINT32_MAX);
-    evaluate_feed(it, time << FINE_BITS, &f);
+    evaluate_feed(it, present_piece(it), time << FINE_BITS, &f);
     find_segment(it, f.arc_length_q40_mm, UINT32_MAX);
     return 0;
 }

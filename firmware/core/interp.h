@@ -61,14 +61,10 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
  * INTERP_ERR_JUMP. Tick context; bounded time. */
 int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
 
-/* The piece that the next time lies in, or one before it: for whoever has already found it, in the records of the same
- * program. Without effect where the program has none for this kernel. */
-static inline void interp_hint(struct interp *it, const struct prepared_piece *piece)
-{
-    if (it->piece != NULL) {
-        it->piece = piece;
-    }
-}
+/* The same of a program with records, by whoever has already found the piece that this time lies in: its record. Nothing
+ * is looked for but the segment; the cursor of pieces stays where it is. */
+int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
+                    struct interp_point *out);
 
 /* The same at a time in 2^-32 s, for tools. A tick uses the finer one: at 100 mm/s, 2^-33 s of
  * rounding is 1e-8 mm, some 50 mm/s^3 in the third difference at 1 kHz. */

@@ -168,7 +168,7 @@ static inline int64_t qmath_greater(int64_t a, int64_t b)
 static inline int32_t qmath_clamp32(int64_t a)
 {
     int32_t low = (int32_t)a;
-    return low == a ? low : a < 0 ? INT32_MIN : INT32_MAX;
+    return low == a ? low : (int32_t)((uint32_t)(a >> 63) ^ (uint32_t)INT32_MAX);
 }
 
 /* floor(a / b), b not 0: for targets without a 64-bit division. At most four 32-bit divisions, no loop. */

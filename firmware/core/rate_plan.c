@@ -25,10 +25,16 @@ static int64_t wanted_rate(const struct timebase *tb)
     return tb->state == TIMEBASE_RUNNING ? tb->override_q57 : 0;
 }
 
-int rate_plan_steady(const struct timebase *tb)
+int rate_plan_steady(struct timebase *tb)
 {
     int64_t wanted = wanted_rate(tb);
-    return wanted <= tb->least_q57 && tb->now.rate_q57 == wanted && !rate_moves(&tb->plan.move);
+    if (wanted > tb->least_q57 || tb->now.rate_q57 != wanted) {
+        return 0;
+    }
+    tb->plan.task = RATE_TASK_NONE; /* the wish may have come back to it */
+    tb->plan.searched = NOWHERE;
+    tb->saturated = 0;
+    return 1;
 }
 
 /* --- On its way --- */
@@ -112,15 +118,11 @@ static void choose(struct timebase *tb)
     }
 }
 
-/* No window will do. The least bounds of the program always will, below its least factor. */
-static void give_up(struct timebase *tb)
+void rate_plan_give_up(struct timebase *tb)
 {
     struct rate_plan *plan = &tb->plan;
     plan->task = RATE_TASK_NONE;
-    if (plan->kind == RATE_SETTLE) {
-        rate_ticks_of(&plan->ticks, &tb->least, qmath_magnitude(plan->goal_q57 - tb->now.rate_q57));
-        plan->task = RATE_TASK_BEGIN;
-    } else if (plan->kind == RATE_STAY) {
+    if (plan->kind == RATE_STAY) {
         search(plan, RATE_CLIMB, plan->wanted_q57);
     } else if (tb->now.rate_q57 > tb->least_q57) {
         if (plan->kind == RATE_LEAVE || tb->now.rate_q57 > plan->wanted_q57 + RATE_SPARE) {
@@ -131,32 +133,36 @@ static void give_up(struct timebase *tb)
     }
 }
 
-static void look(struct timebase *tb)
+/* There is no further window. Below the least factor of the program its least bounds will always do. */
+static void look_no_more(struct timebase *tb)
 {
-    const enum rate_found found = rate_search(tb);
-    if (found == RATE_FOUND) {
-        tb->plan.task = RATE_TASK_BEGIN;
-    } else if (found == RATE_FOUND_NOTHING) {
-        give_up(tb);
+    struct rate_plan *plan = &tb->plan;
+    if (plan->kind == RATE_SETTLE) {
+        rate_ticks_of(&plan->ticks, &tb->least, qmath_magnitude(plan->goal_q57 - tb->now.rate_q57));
+        plan->task = RATE_TASK_BEGIN;
+    } else {
+        rate_plan_give_up(tb);
     }
 }
 
-/* The task of a tick at rest, while the rate stays. */
-static void rest(struct timebase *tb)
+static void look(struct timebase *tb)
+{
+    if (tb->plan.window < RATE_WINDOWS) {
+        rate_search(tb);
+    } else {
+        look_no_more(tb);
+    }
+}
+
+void rate_plan_decide(struct timebase *tb)
 {
     struct rate_plan *plan = &tb->plan;
-    if (rate_plan_steady(tb)) { /* the wish may have come back to it */
-        plan->task = RATE_TASK_NONE;
-        plan->searched = NOWHERE;
-        tb->saturated = 0;
-        return;
-    }
     if (tb->now.rate_q57 > tb->least_q57 && tb->time_q42_s >> 10 >= plan->leave_q32_s) {
         go_back(tb);
     }
     if (plan->task == RATE_TASK_BEGIN) {
-        begin_move(tb,
-                   rate_step_of(&plan->ticks, qmath_magnitude(plan->goal_q57 - tb->now.rate_q57)));
+        const int64_t way = qmath_magnitude(plan->goal_q57 - tb->now.rate_q57);
+        begin_move(tb, rate_step_of(&plan->ticks, way));
     } else if (plan->task == RATE_TASK_SEARCH) {
         look(tb);
     } else {
@@ -164,13 +170,9 @@ static void rest(struct timebase *tb)
     }
 }
 
-int64_t rate_plan_slope(struct timebase *tb)
+int64_t rate_plan_move(struct timebase *tb)
 {
     struct rate_plan *plan = &tb->plan;
-    if (!rate_moves(&plan->move)) {
-        rest(tb);
-        return 0;
-    }
     int64_t wanted = wanted_rate(tb);
     if (wanted != plan->wanted_q57) {
         change_mind(tb, wanted);

@@ -42,10 +42,17 @@ struct rate_plan {
 /* For a new program; at rest. */
 void rate_plan_reset(struct rate_plan *plan);
 
-/* Slope at the end of the next tick; keeps the plan of *tb up to date and its `saturated`. */
-int64_t rate_plan_slope(struct timebase *tb);
+/* While the rate moves: slope at the end of the next tick. */
+int64_t rate_plan_move(struct timebase *tb);
 
-/* 1 when the rate is where it is wanted and may stay there whatever the pieces are: the next tick is like this one. */
-int rate_plan_steady(const struct timebase *tb);
+/* At rest: 1 when the rate is where it is wanted and may stay there whatever the pieces are. Then the next tick is like
+ * this one, and what was planned is off. */
+int rate_plan_steady(struct timebase *tb);
+
+/* At rest, and not steady: one step of deciding what to do next. Keeps `saturated` of *tb. */
+void rate_plan_decide(struct timebase *tb);
+
+/* For rate_search: no window will do for what it looked for, which was not to settle. */
+void rate_plan_give_up(struct timebase *tb);
 
 #endif

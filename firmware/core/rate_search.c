@@ -41,24 +41,24 @@ static uint64_t back_by(const struct timebase *tb, const struct rate_window *w, 
 }
 
 /* The present rate, for longer than is known. */
-static enum rate_found stay(struct timebase *tb, const struct rate_window *w)
+static void stay(struct timebase *tb, const struct rate_window *w)
 {
     struct rate_ticks ticks;
     int64_t rate = tb->now.rate_q57;
     if ((int64_t)w->pace->factor_q24 << 33 < rate) {
-        return RATE_FOUND_NOTHING;
+        rate_plan_give_up(tb);
+        return;
     }
     uint64_t leave = back_by(tb, w, rate - tb->least_q57 + RATE_SPARE, rate, &ticks);
     if (leave > tb->plan.leave_q32_s) {
         tb->plan.leave_q32_s = leave;
         tb->plan.back = ticks;
     }
-    return RATE_FOUND_NOT_YET;
 }
 
 /* A way to a rate above the least factor, for which it has the time of the way back too. The same ticks are enough for
  * both. */
-static enum rate_found climb(struct timebase *tb, const struct rate_window *w)
+static void climb(struct timebase *tb, const struct rate_window *w)
 {
     struct rate_plan *plan = &tb->plan;
     int64_t rate = tb->now.rate_q57;
@@ -67,38 +67,40 @@ static enum rate_found climb(struct timebase *tb, const struct rate_window *w)
     int64_t high = qmath_greater(goal, rate);
     int64_t way = qmath_magnitude(goal - rate);
     if (high > factor || goal <= tb->least_q57 + RATE_SPARE || way <= RATE_SPARE) {
-        return RATE_FOUND_NOTHING;
+        rate_plan_give_up(tb);
+        return;
     }
     uint64_t leave =
         back_by(tb, w, qmath_greater(way, high - tb->least_q57 + RATE_SPARE), high, &plan->ticks);
     uint64_t there = w->end_q32_s - leave; /* by then, if it takes what the way back may take */
     if (leave == 0 || (tb->time_q42_s >> 10) + there > leave) {
-        return RATE_FOUND_NOT_YET;
+        return;
     }
     plan->goal_q57 = goal;
     plan->leave_q32_s = leave;
     plan->back = plan->ticks;
     tb->saturated = goal < plan->wanted_q57;
-    return RATE_FOUND;
+    plan->task = RATE_TASK_BEGIN;
 }
 
-enum rate_found rate_search(struct timebase *tb)
+void rate_search(struct timebase *tb)
 {
     struct rate_plan *plan = &tb->plan;
     struct rate_window w;
-    if (plan->window == RATE_WINDOWS) {
-        return RATE_FOUND_NOTHING;
-    }
     rate_window_get(&w, tb, plan->window);
     plan->window++;
     switch (plan->kind) {
     case RATE_STAY:
-        return stay(tb, &w);
+        stay(tb, &w);
+        break;
     case RATE_CLIMB:
-        return climb(tb, &w);
+        climb(tb, &w);
+        break;
     case RATE_LEAVE:
-        return leaves(tb, &w) ? RATE_FOUND : RATE_FOUND_NOT_YET;
+        plan->task = leaves(tb, &w) ? RATE_TASK_BEGIN : RATE_TASK_SEARCH;
+        break;
     default:
-        return fits(tb, &w) ? RATE_FOUND : RATE_FOUND_NOT_YET;
+        plan->task = fits(tb, &w) ? RATE_TASK_BEGIN : RATE_TASK_SEARCH;
+        break;
     }
 }

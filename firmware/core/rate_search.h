@@ -8,13 +8,9 @@
 
 struct timebase;
 
-enum rate_found {
-    RATE_FOUND, /* the plan has goal and ticks of a move, and of the way back where it needs one */
-    RATE_FOUND_NOT_YET, /* the next window may do */
-    RATE_FOUND_NOTHING, /* no further one will */
-};
-
-/* For the kind and the goal of the plan of *tb, from where it is, at rest. */
-enum rate_found rate_search(struct timebase *tb);
+/* Looks at the next window (there is one) for the kind and the goal of the plan of *tb, from where it is, at rest. The
+ * plan's task is then to begin, with goal and ticks of a move and of the way back where it needs one; or to look at the
+ * window after that; or what rate_plan_give_up makes of it. */
+void rate_search(struct timebase *tb);
 
 #endif

@@ -53,8 +53,7 @@ struct timebase {
     uint64_t piece_end_q42_s;            /* and its end: of the last piece the duration */
     uint32_t steady; /* 1: at the rate wanted, in which nothing but a command changes anything */
     uint32_t saturated;
-    uint64_t
-        even_q62_s; /* program time of a tick at rest, at a rate other than 1; 0: not computed */
+    uint64_t even_q62_s; /* at rest, at a rate other than 1: program time of a tick */
     struct rate now;
     int64_t override_q57;
     int64_t least_q57;      /* least factor of all pieces */

@@ -5,13 +5,13 @@
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
- * mutant: core/timebase.c: tb->piece + 1u == tb->program->header.piece_count => tb->piece + 2u == tb->program->header.piece_count
- * mutant: core/timebase.c: if (tb->time_q42_s >= tb->duration_q42_s) { => if (tb->time_q42_s > tb->duration_q42_s) {
- * mutant: core/timebase.c: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
+ * mutant: core/timebase_private.h: tb->piece + 1u == tb->program->header.piece_count => tb->piece + 2u == tb->program->header.piece_count
+ * mutant: core/timebase_step.c: if (time_q42_s >= tb->duration_q42_s) { => if (time_q42_s > tb->duration_q42_s) {
+ * mutant: core/timebase_private.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
  */
 #include "proof.h"
 
-#include "core/timebase.c"
+#include "core/timebase_step.c"
 
 #define COUNT 3u
 
@@ -25,7 +25,8 @@ uint64_t program_piece_duration(const struct program *p, uint32_t i)
 
 static struct prepared_piece records[COUNT];
 static struct program program;
-static struct kernel kernel = {.piece_size = sizeof(struct prepared_piece) - offsetof(struct prepared_piece, feed)};
+static struct kernel kernel = {.piece_size = sizeof(struct prepared_piece) -
+                                             offsetof(struct prepared_piece, feed)};
 
 /* In piece i, whose end has been reached. */
 static void place(struct timebase *tb, uint32_t i)
@@ -33,8 +34,10 @@ static void place(struct timebase *tb, uint32_t i)
     tb->program = &program;
     tb->duration_q42_s = (uint64_t)any_between(1, INT64_MAX);
     tb->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
+    tb->rest = (uint32_t)any_between(0, TIMEBASE_REST_UNIT - 1);
+    tb->fine = (uint32_t)any_between(0, (1 << TIMEBASE_FINE_BITS) - 1);
     tb->piece = i;
-    tb->piece_end_q42_s = end_q42_s(tb, nondet_uint64());
+    tb->piece_end_q42_s = timebase_end_q42_s(tb, nondet_uint64());
     tb->record = program.prepared_for != 0 ? &records[i] : 0;
 }
 
@@ -49,8 +52,9 @@ void harness(void)
     uint32_t i = nondet_uint32();
     __CPROVER_assume(i < COUNT);
     place(&tb, i);
-    if (tb.time_q42_s >= tb.piece_end_q42_s) {
-        pass_end(&tb);
+    const uint64_t time_q42_s = timebase_rounded_q42(&tb);
+    if (time_q42_s >= tb.piece_end_q42_s) {
+        pass_end(&tb, time_q42_s);
     }
     prove(tb.piece < COUNT);
     prove(tb.record == 0 || tb.record == &records[tb.piece]);

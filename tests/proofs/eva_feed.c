@@ -7,11 +7,12 @@
  * options: -eva-slevel 100
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/feed_piece.c: slope = 2 * qmath_mul_hi(slope, tau_q31) + f->slope[k] => slope = (int32_t)any_between(INT32_MIN, INT32_MAX)
- * assumes: qmath_clz64 qmath_shift_clamp
+ * assumes: qmath_clz64
  * mutant: core/feed_piece.c: int shift = 22 - exponent => int shift = 62 - exponent
  * mutant: core/feed_piece.c: piece->c_q40_mm[k] * 16 => piece->c_q40_mm[k] * 256
  * mutant: core/feed_piece.c: bits > 32 ? bits - 31 : 1 => bits > 32 ? bits : 1
- * mutant: core/feed_piece.c: f->feed_shift < -31 ? 31 => f->feed_shift < -31 ? 32
+ * mutant: core/feed_piece.c: shift < -31 ? 31 => shift < -31 ? 32
+ * mutant: core/feed_piece.c: shift < 31 ? (int32_t)1 => shift < 33 ? (int32_t)1
  */
 #include "proof.h"
 
@@ -21,10 +22,6 @@
     assigns \result \from a;
     ensures 0 <= \result <= 63 && (a < 0x8000000000000000 ==> \result >= 1); */
 static inline int qmath_clz64(uint64_t a);
-
-/*@ assigns \result \from a, shift;
-    ensures -(1 << 62) < \result < (1 << 62); */
-int64_t qmath_shift_clamp(int64_t a, int shift);
 
 #include "core/feed_piece.c"
 #include "core/program.c"

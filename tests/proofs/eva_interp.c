@@ -15,8 +15,8 @@
  * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
  * mutant: core/rate_pace.c: least(count, left) => count
  */
-#include "core/program.h"
 #include "core/ph_segment.h"
+#include "core/program.h"
 #include "core/rate_pace.h"
 #include "proof.h"
 
@@ -110,7 +110,8 @@ static const struct kernel any_kernel = {
 
 const struct kernel *const kernels_linked[KERNELS] = {&any_kernel, NULL, NULL};
 
-static uint64_t records[COUNT * (sizeof(struct prepared_piece) + sizeof(struct prepared_segment)) / 8];
+static uint64_t
+    records[COUNT * (sizeof(struct prepared_piece) + sizeof(struct prepared_segment)) / 8];
 static uint32_t filled;
 
 static int take(void *context, const uint8_t *bytes, uint32_t size)
@@ -142,7 +143,8 @@ static void place(struct interp *it, uint32_t i)
 static void stays(const struct interp *it)
 {
     if (it->piece != NULL) {
-        prove((const void *)it->piece < (const void *)prepared_segment_at(it->program, it->kernel, 0));
+        prove((const void *)it->piece <
+              (const void *)prepared_segment_at(it->program, it->kernel, 0));
         prove(it->segment >= prepared_segment_at(it->program, it->kernel, 0));
     }
 }
@@ -158,6 +160,11 @@ static void interpolate(const struct program *p)
         place(&it, i);
         interp_at_q42(&it, any_time(), &point);
         stays(&it);
+        place(&it, i);
+        if (it.piece != NULL) {
+            interp_at_piece(&it, it.piece, any_time(), &point);
+            stays(&it);
+        }
         place(&it, i);
         interp_seek(&it, any_time());
         stays(&it);

@@ -6,11 +6,11 @@
  * prover: eva
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
- * instead: core/timebase.c: find_piece(tb, MOST_ENDS); => (void)find_piece;
+ * instead: core/timebase_step.c: timebase_find_piece(tb, time_q42_s, TIMEBASE_MOST_ENDS); => (void)timebase_find_piece;
  * assumes: qmath_div_u64 program_piece_duration rate_bounds_of rate_pace_make rate_ticks_of rate_step_of rate_span_q32
  * mutant: core/rate_window.c: behind < left ? behind : left => behind
- * mutant: core/rate_search.c: plan->window == RATE_WINDOWS => plan->window > RATE_WINDOWS
- * mutant: core/timebase.c: 3 * tb->now.rate_q57 => 64 * tb->now.rate_q57
+ * mutant: core/rate_plan.c: tb->plan.window < RATE_WINDOWS => tb->plan.window <= RATE_WINDOWS
+ * mutant: core/timebase_change.c: 3 * tb->now.rate_q57 => 64 * tb->now.rate_q57
  */
 #include "core/timebase.h"
 #include "proof.h"
@@ -63,6 +63,8 @@ uint64_t rate_span_q32(const struct rate_ticks *ticks, int64_t mean_q57, uint32_
 #include "core/rate_window.c"
 #undef look
 #include "core/timebase.c"
+#include "core/timebase_change.c"
+#include "core/timebase_step.c"
 
 #define COUNT 3u
 
@@ -119,12 +121,12 @@ static void place(struct timebase *tb, uint32_t i)
     const struct program *p = tb->program;
     tb->piece = i;
     tb->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    tb->piece_end_q42_s = end_q42_s(tb, (uint64_t)any_between(0, INT64_MAX));
+    tb->piece_end_q42_s = timebase_end_q42_s(tb, (uint64_t)any_between(0, INT64_MAX));
     if (p->prepared_for != NULL) {
         tb->record = prepared_piece_at(p, p->prepared_for, i);
     }
-    tb->rest = (uint32_t)any_between(0, REST_UNIT - 1);
-    tb->fine = (uint32_t)any_between(0, (1 << FINE_BITS) - 1);
+    tb->rest = (uint32_t)any_between(0, TIMEBASE_REST_UNIT - 1);
+    tb->fine = (uint32_t)any_between(0, (1 << TIMEBASE_FINE_BITS) - 1);
     tb->state = (uint32_t)any_between(0, 5);
     tb->steady = (uint32_t)any_between(0, 1);
     tb->started = (uint32_t)any_between(0, 1);

@@ -105,6 +105,31 @@ static void test_same_bits_as_expanded(void)
     }
 }
 
+/* What a tick of the controller does: the piece is looked for by the timebase only. */
+static void test_the_piece_of_the_timebase_is_the_one(void)
+{
+    for (size_t i = 0; i < NAMES; i++) {
+        struct timebase tb;
+        struct interp a, b;
+        struct interp_point p, q;
+        begin(names[i], INTERP_FIXED);
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &plain, INTERP_FIXED));
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready, INTERP_FIXED));
+        timebase_begin(&tb, &ready, ready.header.period_us);
+        timebase_override(&tb, 200);
+        for (int result = INTERP_OK; result == INTERP_OK;) {
+            const uint64_t time_q42_s = timebase_step_q42(&tb);
+            memset(&p, 0, sizeof p);
+            memset(&q, 0, sizeof q);
+            result = interp_at_q42(&a, time_q42_s, &p);
+            TEST_ASSERT_EQUAL_INT(result, interp_at_piece(&b, tb.record, time_q42_s, &q));
+            TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
+        }
+        TEST_ASSERT_EQUAL_INT(TIMEBASE_ENDED, timebase_state(&tb));
+        end();
+    }
+}
+
 static void test_windows_hold_the_least_of_their_pieces(void)
 {
     const struct kernel *fixed = kernel_find(INTERP_FIXED);
@@ -163,6 +188,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_same_bits_as_expanded);
+    RUN_TEST(test_the_piece_of_the_timebase_is_the_one);
     RUN_TEST(test_windows_hold_the_least_of_their_pieces);
     RUN_TEST(test_same_rate_as_without_records);
     RUN_TEST(test_an_error_of_the_sink_is_passed_on);

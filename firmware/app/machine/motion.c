@@ -42,8 +42,10 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
 {
     const uint64_t time_q42_s = timebase_step_q42(&motion->timebase);
-    interp_hint(&motion->interp, motion->timebase.record);
-    const int result = interp_at_q42(&motion->interp, time_q42_s, &motion->point);
+    const struct prepared_piece *piece = motion->timebase.record;
+    const int result = motion->interp.piece != NULL
+                           ? interp_at_piece(&motion->interp, piece, time_q42_s, &motion->point)
+                           : interp_at_q42(&motion->interp, time_q42_s, &motion->point);
     if (result < 0) {
         return result;
     }
