@@ -37,6 +37,8 @@ def blocks(figures: dict[str, Any]) -> dict[str, str]:
         "isr parts": tables.parts_table(figures, "isr"),
         "receive": tables.parts_table(figures, "receive"),
         "taylor": tables.taylor_table(figures),
+        "strips": tables.strips_table(figures, "motion"),
+        "isr strips": tables.strips_table(figures, "isr"),
         "histogram": f"```\n{bars}```\n",
     }
 

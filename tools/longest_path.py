@@ -3,7 +3,7 @@
 """longest_path.py: the longest path through the motion part of a tick, from the instructions of its image.
 
     .venv/bin/python tools/longest_path.py an386 float
-    .venv/bin/python tools/longest_path.py --update     # the table of docs/wcet.md
+    .venv/bin/python tools/longest_path.py --update     # the tables of docs/wcet.md
 
 Needs `make firmware`. Prints each function with all that it calls, in instructions; docs/wcet.md compares the sum with
 what was counted. Exit status 1 when no bound can be shown.
@@ -15,46 +15,71 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
-from target import emulator
+from target import emulator, tables
 from target.image import Image
 from target.longest import Bounds, Longest, LongestError
 
 ROOT = Path(__file__).resolve().parents[1]
 COUNTS = ROOT / "tests/data/counts.json"
 DOCUMENT = ROOT / "docs/wcet.md"
-_BEGIN, _END = "<!-- longest -->\n", "<!-- end longest -->\n"
 ENTRY = "tick"  # of setpoints.elf: motion_step and the call of it
+# What a tick does not call while nothing changes the rate; its first one, and all after the end, are plain too.
+NOT_PLAIN = {"plain": ("timebase_change",), "override": ()}
 
 
-def motion_part(build: Path, target: str, kernel: str) -> Longest:
-    """Ready to be asked for functions of setpoints.elf with this kernel."""
+def motion_part(build: Path, target: str, kernel: str, kind: str = "override") -> Longest:
+    """Ready to be asked for functions of setpoints.elf with this kernel; `kind` is of NOT_PLAIN."""
     others = [f"kernel_{k}_segment_at" for k in emulator.KERNELS if k != kernel]
-    bounds = Bounds.read(ROOT / "firmware/targets/loops.toml", *others)
+    rules = ROOT / "firmware/targets/loops.toml"
+    bounds = Bounds.read(rules, *others, *NOT_PLAIN[kind])
     return Longest(Image(build / "firmware" / target / "setpoints.elf"), bounds)
 
 
+def counted_at_most(counts: dict[str, Any], kind: str) -> int:
+    """Of the scenarios without override, or of all: the bound with override covers both."""
+    rows = (row for name, row in counts.items() if kind == "override" or name.startswith(kind))
+    return int(max(row["whole"][2] for row in rows))
+
+
 def table(build: Path) -> str:
-    """The longest path of each kernel on each core beside the most that was counted."""
+    """The longest path of each kernel on each core beside the most that was counted, and the goal."""
     counted = json.loads(COUNTS.read_text(encoding="utf-8"))["motion"]
     rows = [
-        "| core, kernel | longest path | counted at most | ratio |",
-        "| --- | --- | --- | --- |",
+        "| core, kernel |  | longest path | counted at most | ratio | goal |",
+        "| --- | --- | --- | --- | --- | --- |",
     ]
     for target in emulator.TARGETS.values():
         for kernel in target.kernels:
-            path = motion_part(build, target.name, kernel).of(ENTRY)
-            most = max(s["whole"][2] for s in counted[f"{target.name} {kernel}"].values())
             name = f"{target.core} ({target.name}) {kernel}"
-            rows.append(f"| {name} | {path} | {most} | {path / most:.2f} |")
+            for kind in NOT_PLAIN:
+                path = motion_part(build, target.name, kernel, kind).of(ENTRY)
+                most = counted_at_most(counted[f"{target.name} {kernel}"], kind)
+                goal = tables.goal_text("motion", target.name, kernel, kind, path)
+                rows.append(f"| {name} | {kind} | {path} | {most} | {path / most:.2f} | {goal} |")
+                name = ""
     return "".join(f"{row}\n" for row in rows)
 
 
+def document(build: Path, text: str) -> str:
+    """docs/wcet.md with what is generated between its marks."""
+    figures = json.loads(COUNTS.read_text(encoding="utf-8"))
+    blocks = {
+        "longest": table(build),
+        "kinds": tables.kinds_table(figures),
+        "floor": tables.floor_table(figures, "an386 float"),
+    }
+    for name, block in blocks.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->\n"
+        before, rest = text.split(begin)
+        text = before + begin + block + end + rest.split(end)[1]
+    return text
+
+
 def update(build: Path) -> None:
-    """The table between its marks."""
-    text = DOCUMENT.read_text(encoding="utf-8")
-    before, rest = text.split(_BEGIN)
-    DOCUMENT.write_text(before + _BEGIN + table(build) + _END + rest.split(_END)[1], "utf-8")
+    """Writes the document anew."""
+    DOCUMENT.write_text(document(build, DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def show(longest: Longest) -> None:
@@ -70,14 +95,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("target", nargs="?", choices=emulator.TARGETS, default="an386")
     parser.add_argument("kernel", nargs="?", choices=emulator.KERNELS, default="float")
-    parser.add_argument("--update", action="store_true", help="the table of docs/wcet.md")
+    parser.add_argument("--plain", action="store_true", help="of a tick in which no rate changes")
+    parser.add_argument("--update", action="store_true", help="the tables of docs/wcet.md")
     parser.add_argument("--build", type=Path, default=Path("build"))
     options = parser.parse_args()
     try:
         if options.update:
             update(options.build)
         else:
-            show(motion_part(options.build, options.target, options.kernel))
+            kind = "plain" if options.plain else "override"
+            show(motion_part(options.build, options.target, options.kernel, kind))
     except LongestError as error:
         print(f"longest_path: {error}", file=sys.stderr)
         return 1

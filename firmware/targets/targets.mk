@@ -43,7 +43,7 @@ setpoints_float_KERNELS := firmware/targets/kernels_float.c
 setpoints_float_CHECK   := --soft-float
 
 isr_MAIN := tests/target/isr.c
-isr_SRC  := $(filter-out %/setpoints.c,$(setpoints_SRC))
+isr_SRC  := $(setpoints_SRC) tests/target/trouble.c
 
 interrupted_MAIN    := tests/target/interrupted.c
 interrupted_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)

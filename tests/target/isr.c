@@ -3,8 +3,8 @@
  * An image that runs the whole tick of the controller, with two drives that always obey, on a port that is only memory:
  * to count what the timer interrupt costs on every core, also where no emulated board has a CAN bus. The words are those
  * of setpoints.c, KERNEL FILE COMMANDS; FILE gets a u32 for each counted tick: what it took by the core's own clock
- * (clock.h). The store holds one program image or several. A FILE of the name "silent" is not written; it makes both
- * drives leave every third SYNC unanswered, which 0x2004 sub 9 (1) tolerates.
+ * (clock.h). The store holds one program image or several. A FILE of a name that trouble.h has is not written: it makes
+ * the drives misbehave, in every program.
  *
  * What a real port adds: its own handler, and writing a frame into the controller's registers instead of memory.
  */
@@ -20,6 +20,7 @@
 #include "port/port.h"
 #include "port/semihost/semihost.h"
 #include "table.h"
+#include "trouble.h"
 
 enum { STATUS_USAGE = 2, STATUS_PROGRAM = 4, STATUS_FILE = 5, STATUS_STATE = 6 };
 enum { DRIVES = 2, FRAMES = 8, LONGEST_WAIT_TICKS = 1000, BATCH = 64 };
@@ -27,6 +28,7 @@ enum { WORD_KERNEL, WORD_FILE, WORD_COMMANDS, WORD_COUNT };
 
 /* Statuswords with voltage, remote and, in Operation enabled, "follows" (CiA 402). */
 enum { SWITCH_ON_DISABLED = 0x250, READY = 0x231, SWITCHED_ON = 0x233, ENABLED = 0x1237 };
+enum { FOLLOWING_ERROR = 0x2000 };
 
 #define STORE_SIZE    TABLE_AT
 #define COUNTS_PER_MM 1000000u
@@ -38,7 +40,8 @@ static struct motion prepared;
 static struct machine machine;
 static struct tick tick;
 static struct commands commands;
-static bool silent;
+static struct trouble trouble;
+static uint32_t path_ticks; /* of this program */
 static struct {
     struct can_msg frames[FRAMES];
     uint32_t count;
@@ -124,6 +127,12 @@ static uint16_t obey(uint16_t controlword)
     }
 }
 
+static bool answers(uint32_t drive)
+{
+    const bool lost = drive == DRIVES - 1u && path_ticks >= trouble.lost_from;
+    return !lost && (!trouble.silent || machine.statistics.syncs % 3u != 0u);
+}
+
 /* Drives answer the SYNC of this tick and take the setpoints that followed it. */
 static void drives_answer(uint32_t now_us)
 {
@@ -138,7 +147,10 @@ static void drives_answer(uint32_t now_us)
             answer.data[2 + k] = (uint8_t)((uint32_t)drives[i].position_counts >> (8 * k));
         }
         drives[i].statusword = obey(axis->controlword);
-        if (!silent || machine.statistics.syncs % 3u != 0u) {
+        if (path_ticks >= trouble.error_from) {
+            drives[i].statusword |= FOLLOWING_ERROR;
+        }
+        if (answers(i)) {
             receive(&answer, now_us);
         }
     }
@@ -204,14 +216,15 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel)
     if (!switch_on(&config) || machine_start(&machine, &prepared, anywhere) != MACHINE_ACCEPTED) {
         return STATUS_STATE;
     }
-    for (uint32_t k = 0; machine_on_path(&machine); k++) {
-        commands_give(&commands, k, &machine.motion);
+    for (path_ticks = 0; machine_on_path(&machine); path_ticks++) {
+        commands_give(&commands, path_ticks, &machine.motion);
         period();
         if (motion_held(&machine.motion) && !commands.more) {
             break;
         }
     }
-    return machine.state == MACHINE_FAULT ? STATUS_STATE : 0;
+    path_ticks = 0;
+    return (machine.state == MACHINE_FAULT) == trouble_is_fatal(&trouble) ? 0 : STATUS_STATE;
 }
 
 static int run_all(const char *commands_path, uint8_t kernel)
@@ -249,15 +262,15 @@ static bool split_line(char *words[WORD_COUNT])
 
 static int run(char *words[WORD_COUNT])
 {
-    silent = strcmp(words[WORD_FILE], "silent") == 0;
-    times.file = silent ? -1 : semihost_open(words[WORD_FILE], SEMIHOST_WRITE);
-    if (!silent && times.file < 0) {
+    const bool written = !trouble_read(&trouble, words[WORD_FILE]);
+    times.file = written ? semihost_open(words[WORD_FILE], SEMIHOST_WRITE) : -1;
+    if (written && times.file < 0) {
         return STATUS_FILE;
     }
     clock_begin();
     const char *path = words[WORD_COMMANDS][0] == '-' ? NULL : words[WORD_COMMANDS];
     const int status = run_all(path, (uint8_t)(words[WORD_KERNEL][0] - '0'));
-    if (!silent) {
+    if (written) {
         write_times();
         times.failed = semihost_close(times.file) != 0 || times.failed;
     }

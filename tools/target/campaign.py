@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from target import adversary
 from target.counting import Command, Counter, Counts
@@ -55,10 +56,37 @@ SCENARIOS = (
 )
 
 
-# Of the whole interrupt only: plain adversary, drives that leave every third SYNC unanswered (tests/target/isr.c).
-SILENT = "plain, silent"
+# Of the whole interrupt only, with the adversaries: drives that leave every third SYNC unanswered (tests/target/isr.c).
+SILENT = {"plain, silent": SCENARIOS[1], "override, silent": SCENARIOS[3]}
+# Ticks that find both drives in a fault and begin to brake along the path: one in each program and run, at about these.
+FAULTY = {"fault": (None, (60, 61, 64)), "fault, override": ("steady", (40, 41, 44))}
 
-SECTIONS = ("motion", "isr", "receive")
+SECTIONS = ("motion", "isr", "receive", "kinds")
+
+
+# What a tick does with the rate, and the function of the core that only such a tick calls; the first that fits.
+KINDS = {
+    "start": "timebase_start",
+    "moves": "rate_plan_move",
+    "looks": "rate_search",
+    "begins": "rate_step_of",
+    "chooses": "rate_plan_decide",
+    "steady": "timebase_step_q42",
+}
+_FEED, _SUPERVISION = PARTS.index("feed"), PARTS.index("supervision")
+
+
+def kinds_of(names: Sequence[str], called: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """For each tick the position of its kind; `called` says which functions (columns) it called."""
+    marks = [called[:, names.index(function)] for function in KINDS.values()]
+    kind: npt.NDArray[np.int64] = np.column_stack(marks).argmax(axis=1)
+    return kind
+
+
+def _rising(counts: Counts) -> npt.NDArray[np.bool_]:
+    """The first tick of each row of those whose supervision takes the thorough way."""
+    thorough = counts[:, _SUPERVISION] > np.median(counts[:, _SUPERVISION])
+    return thorough & ~np.roll(thorough, 1)
 
 
 class Campaign:
@@ -97,11 +125,35 @@ class Campaign:
     def interrupts(self, counter: Counter, kernel: str) -> dict[str, Any]:
         """Figures of the interrupts that give setpoints of a program, and of those in which it settles at its end."""
         counts = {s.name: self.scenario(counter, kernel, s) for s in SCENARIOS}
-        counts[SILENT] = self.scenario(counter, kernel, SCENARIOS[1], Path("silent"))
-        given = PARTS.index("feed")
-        moving = {name: figures(c[c[:, given] > 0]) for name, c in counts.items()}
+        for name, scenario in SILENT.items():
+            counts[name] = self.scenario(counter, kernel, scenario, Path("silent"))
+        for name, (commands, ticks) in FAULTY.items():
+            runs = [self.trouble(counter, kernel, commands, f"error:{k}") for k in ticks]
+            counts[name] = np.concatenate([run[_rising(run)] for run in runs])
+        moving = {name: figures(c[c[:, _FEED] > 0]) for name, c in counts.items()}
         plain = counts[SCENARIOS[0].name]
-        return moving | {"settling": figures(plain[plain[:, given] == 0])}
+        runs = [self.trouble(counter, kernel, None, f"lost:{k}") for k in FAULTY["fault"][1]]
+        lost = np.concatenate(runs)
+        return moving | {
+            "drive lost": figures(lost[lost[:, _FEED] == 0]),
+            "settling": figures(plain[plain[:, _FEED] == 0]),
+        }
+
+    def trouble(self, counter: Counter, kernel: str, commands: str | None, what: str) -> Counts:
+        """The adversaries with drives that misbehave (tests/target/isr.c)."""
+        programs = b"".join(self.images["adversary"].values())
+        return counter.count(kernel, programs, _commands(commands), setpoints=Path(what))
+
+    def kinds(self, motion: Counter, kernel: str) -> dict[str, Any]:
+        """Instructions of the rate, by what a tick does with it, over all scenarios."""
+        by_name = Counter(self.build, motion.target, functions=True)
+        rate, called = [], []
+        for scenario in SCENARIOS:
+            rate.append(self.scenario(motion, kernel, scenario)[:, PARTS.index("rate")])
+            called.append(self.scenario(by_name, kernel, scenario) > 0)
+        kind = kinds_of(by_name.names, np.concatenate(called))
+        column = np.concatenate(rate)[:, np.newaxis]
+        return {name: figures(column[kind == i]) for i, name in enumerate(KINDS)}
 
     def pair(self, target: Target, kernel: str) -> dict[str, Any]:
         """The figures of one kernel on one core: of the motion part, of the whole interrupts."""
@@ -111,6 +163,7 @@ class Campaign:
             "motion": {s.name: figures(self.scenario(motion, kernel, s)) for s in SCENARIOS},
             "isr": self.interrupts(tick, kernel),
             "receive": {"plain": figures(self.scenario(receive, kernel, SCENARIOS[0]))},
+            "kinds": self.kinds(motion, kernel),
         }
 
     def run(self) -> dict[str, Any]:
@@ -142,12 +195,18 @@ def _first_line(command: list[str]) -> str:
 
 
 def figures(counts: Counts) -> dict[str, Any]:
-    """Least, median and most of the whole and of the parts that there are, and the histogram of the whole."""
-    whole = counts.sum(axis=1)
-    bins = collections.Counter(_two_digits(int(n)) for n in whole)
-    out: dict[str, Any] = {"ticks": len(whole), "whole": _three(whole)}
-    out |= {p: _three(counts[:, i]) for i, p in enumerate(PARTS) if counts[:, i].any()}
-    return out | {"histogram": {str(low): bins[low] for low in sorted(bins)}}
+    """Least, median and most of the whole and of the parts that there are, and their histograms."""
+    columns = {"whole": counts.sum(axis=1)}
+    if counts.shape[1] == len(PARTS):
+        columns |= {p: counts[:, i] for i, p in enumerate(PARTS) if counts[:, i].any()}
+    out: dict[str, Any] = {"ticks": len(counts)}
+    out |= {name: _three(column) for name, column in columns.items()}
+    return out | {"histogram": {name: _bins(column) for name, column in columns.items()}}
+
+
+def _bins(column: Counts) -> dict[str, int]:
+    bins = collections.Counter(_two_digits(int(n)) for n in column)
+    return {str(low): bins[low] for low in sorted(bins)}
 
 
 def _two_digits(count: int) -> int:

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from target.effects import effect
+from target.effects import Effect, effect
 from target.image import Function, Image
 
 _NEVER = -(10**9)  # what cannot be on the way
@@ -114,18 +114,30 @@ class Longest:
             follow = [i + 1] if does.falls and i + 1 < len(function.instructions) else []
             if does.branch in index:
                 follow.append(index[does.branch])
-            elif does.branch is not None:
-                called.append(self.image.function_at(does.branch))
-            there = [f for f in called if f.name not in self.bounds.never]
-            if called and not there:
-                graph.cost[i], graph.follow[i] = _NEVER, []
-                continue
-            graph.cost[i] = 1 + max((self._of(f) for f in there), default=0)
-            graph.follow[i] = follow
-            todo += follow
+            graph.cost[i] = 1 + self._dearest(called)
+            graph.follow[i] = follow if graph.cost[i] > 0 else []
+            todo += graph.follow[i]
+            if does.branch is not None and does.branch not in index:
+                self._leave(graph, i, i + len(function.instructions), does)
             if does.jump:
                 jumps.append(i)
         return graph
+
+    def _dearest(self, called: list[Function]) -> int:
+        """Of what an instruction may call; far below zero where it calls what is never called."""
+        there = [f for f in called if f.name not in self.bounds.never]
+        if called and not there:
+            return _NEVER
+        return max((self._of(f) for f in there), default=0)
+
+    def _leave(self, graph: _Graph, at: int, leaving: int, does: Effect) -> None:
+        """A jump into another function, which returns to the caller: whoever takes it does nothing else."""
+        cost = self._dearest([self.image.function_at(does.branch or 0)])
+        if cost > 0:
+            graph.cost[leaving], graph.follow[leaving] = cost, []
+            graph.follow[at] = [*graph.follow[at], leaving]
+        elif not does.falls:
+            graph.cost[at] = _NEVER
 
     def _pointed(self, function: Function, at: int) -> list[Function]:
         """What a call through a pointer may call: the first of them what is first in loops.toml, and so on."""

@@ -16,23 +16,33 @@ from dataclasses import dataclass
 from pathlib import Path
 
 # Numbers of the plugin are positions in this list.
-PARTS = ("rest", "rate", "feed", "search", "newton", "position", "frames", "supervision")
+PARTS = (
+    "rest",
+    "rate",
+    "feed",
+    "search",
+    "newton",
+    "position",
+    "packing",
+    "sending",
+    "supervision",
+)
 
 # FILE:FUNCTION, the first that is found; those of one file from the most special to the most general.
 RULES = (
-    (r"core/(timebase|rate\w*)\.\w:", "rate"),
+    (r"core/(timebase|rate)\w*\.\w:", "rate"),
     (r"core/feed_piece\.\w:feed_piece_(at|point)", "feed"),
     (r"core/interp\.\w:evaluate_feed", "feed"),
     (r"core/kernel_\w+\.\w:(set_|\w+_set$)", "search"),
     (r"core/feed_piece\.\w:\w+_(set|make)$", "search"),
     (r"core/(ph_segment|prepared)\.\w:", "search"),
-    (r"core/interp\.\w:(find_|load_|interp_hint)", "search"),
+    (r"core/interp\.\w:(find_|load_)", "search"),
     (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),
     (r"core/kernel_\w+\.\w:\w+_at$", "position"),
     (r"core/counts\.\w:", "position"),
-    (r"app/machine/axis\.\w:(axis_setpoint|axis_sent)", "frames"),
-    (r"app/tick\.\w:(send|find)_", "frames"),
-    (r"canopen/(sync|pdo\w*|cob)\.\w:", "frames"),
+    (r"app/machine/axis\.\w:(axis_setpoint|axis_sent)", "packing"),
+    (r"canopen/(sync|pdo\w*|cob)\.\w:", "packing"),
+    (r"app/tick\.\w:(send|find)_", "sending"),
     (r"app/machine/(machine_|status_watch|answers|statistics)\w*\.\w:", "supervision"),
 )
 _RULES = tuple((re.compile(pattern), PARTS.index(part)) for pattern, part in RULES)
@@ -70,14 +80,11 @@ def disassemble(cross: str, image: Path) -> list[Instruction]:
 
 def returns_to(code: list[Instruction], function: str) -> list[int]:
     """Addresses behind the calls of a function."""
-    after = [
+    return [
         behind.address
         for call, behind in itertools.pairwise(code)
         if call.name in _CALLS and call.operands.endswith(f"<{function}>")
     ]
-    if not after:
-        raise RuntimeError(f"{function} is called from nowhere: was it inlined?")
-    return after
 
 
 def frames(cross: str, image: Path, code: list[Instruction]) -> Iterator[list[str]]:
@@ -135,14 +142,28 @@ class Map:
     names: tuple[str, ...]
 
 
-def interrupt_lines(code: list[Instruction], handler: str) -> Iterator[str]:
-    """`pause` where a handler begins, `resume` where it returns."""
-    own = [i for i in code if i.function == handler]
-    ends = [i for i in own if _RETURN.search(f"{i.name} {i.operands}")]
+def _returns(handler: list[Instruction]) -> list[int]:
+    ends = [i for i in handler if _RETURN.search(f"{i.name} {i.operands}")]
     if not ends or ends[-1].name.endswith(("eq", "ne")):
-        raise RuntimeError(f"{handler}: where it returns cannot be seen")
-    yield f"pause {own[0].address:x}"
-    yield from (f"resume {i.address:x}" for i in ends)
+        raise RuntimeError(f"{handler[0].function}: where it returns cannot be seen")
+    return [i.address for i in ends]
+
+
+def interrupt_lines(code: list[Instruction], handler: str) -> Iterator[str]:
+    """`pause` where a handler begins, `resume` where it returns; static functions can share a name."""
+    for name, block in itertools.groupby(code, lambda i: i.function):
+        if name == handler:
+            own = list(block)
+            yield f"pause {own[0].address:x}"
+            yield from (f"resume {a:x}" for a in _returns(own))
+
+
+def _ends(code: list[Instruction], entry: str) -> Iterator[str]:
+    """Where a call is over: behind what calls it; of a handler in the table of vectors where it returns."""
+    after = returns_to(code, entry)
+    yield from (f"end {a:x}" for a in after)
+    if not after:
+        yield from (f"last {a:x}" for a in _returns([i for i in code if i.function == entry]))
 
 
 def _map(
@@ -153,7 +174,9 @@ def _map(
 ) -> Map:
     begin = [i.address for i in code if i.function == counted.entry][:1]
     lines = [f"begin {a:x}" for a in begin]
-    lines += [f"end {a:x}" for a in returns_to(code, counted.entry)]
+    if not begin:
+        raise RuntimeError(f"{counted.entry} is not there: was it inlined?")
+    lines += _ends(code, counted.entry)
     for handler in counted.interrupts:
         lines += interrupt_lines(code, handler)
     return Map("".join(f"{line}\n" for line in (*lines, *ranges)), tuple(names))

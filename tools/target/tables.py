@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from target.campaign import FLOOR, GOALS, INTERRUPT_GOAL, OVERRIDE_GOAL, SCENARIOS, SPREAD_GOAL
@@ -12,6 +14,8 @@ from target.emulator import TARGETS
 from target.parts import PARTS
 
 Figures = dict[str, Any]
+
+_BARS = "▁▂▃▄▅▆▇█"
 
 
 def stored(figures: Figures) -> str:
@@ -24,7 +28,7 @@ def stored(figures: Figures) -> str:
         rows = [f"{indent}{json.dumps(k)}: {lines(v, depth + 1, deep)}" for k, v in value.items()]
         return "{\n" + ",\n".join(rows) + "\n" + " " * depth + "}"
 
-    return lines(figures, 0, 4) + "\n"
+    return lines(figures, 0, 5) + "\n"
 
 
 def _table(head: list[str], rows: Iterator[list[str]]) -> str:
@@ -58,9 +62,9 @@ def whole_table(figures: Figures, section: str) -> str:
 def goal_of(section: str, target: str, kernel: str, scenario: str) -> int | None:
     """Most instructions wanted, None where there is no goal."""
     goal = GOALS.get((target, kernel))
-    if goal is None or section == "receive" or scenario == "settling":
+    if goal is None or section == "receive" or scenario in ("settling", "drive lost"):
         return None
-    times = OVERRIDE_GOAL if scenario.startswith("override") else 1.0
+    times = 1.0 if scenario.startswith("plain") else OVERRIDE_GOAL
     return round(goal * times * (INTERRUPT_GOAL if section == "isr" else 1))
 
 
@@ -72,7 +76,7 @@ def goal_text(section: str, target: str, kernel: str, scenario: str, most: int) 
 
 
 def parts_table(figures: Figures, section: str) -> str:
-    """Most (and median) instructions of the parts, each by itself."""
+    """Least, median and most instructions of the parts, each by itself."""
     rows_of = [row for *_, s in _pairs(figures, section) for row in s.values()]
     names = [p for p in PARTS if any(p in row for row in rows_of)]
     head = ["core, kernel", "scenario", *names]
@@ -81,7 +85,7 @@ def parts_table(figures: Figures, section: str) -> str:
         for _target, _kernel, title, scenarios in _pairs(figures, section):
             for name, row in scenarios.items():
                 cells = [row.get(part, [0, 0, 0]) for part in names]
-                yield [title, name, *(f"{c[1]} … {c[2]}" for c in cells)]
+                yield [title, name, *(" ".join(map(str, c)) for c in cells)]
                 title = ""
 
     return _table(head, rows())
@@ -138,13 +142,103 @@ def histogram(figures: Figures, pair: str) -> str:
     """Bars of text for the scenarios of one pair; a bin is named by its least count."""
     lines = []
     for scenario in SCENARIOS:
-        bins = figures["motion"][pair][scenario.name]["histogram"]
+        bins = figures["motion"][pair][scenario.name]["histogram"]["whole"]
         total = sum(bins.values())
         lines.append(f"{scenario.name} ({total} ticks)")
         for low, ticks in bins.items():
             bar = "#" * max(1, round(50 * ticks / total))
             lines.append(f"  {int(low):6} {ticks:6} {bar}")
     return "\n".join(lines) + "\n"
+
+
+def _together(rows: Iterable[Figures], part: str) -> dict[int, int]:
+    """Bins of a part over several scenarios."""
+    bins: Counter[int] = Counter()
+    for row in rows:
+        found = row["histogram"].get(part, {"0": row["ticks"]})
+        bins.update({int(low): ticks for low, ticks in found.items()})
+    return dict(bins)
+
+
+def strip(bins: dict[int, int], columns: int = 12) -> str:
+    """Least and greatest bin, and between them a bar for each of `columns` stretches, as high as the logarithm of its
+    ticks; `·` where there are none."""
+    low, high = min(bins), max(bins)
+    if low == high:
+        return str(low)
+    ticks = [0] * columns
+    for at, count in bins.items():
+        ticks[min((at - low) * columns // (high - low), columns - 1)] += count
+    most = math.log(1 + max(ticks))
+    bars = (_BARS[math.ceil(len(_BARS) * math.log(1 + n) / most) - 1] if n else "·" for n in ticks)
+    return f"{low} {''.join(bars)} {high}"
+
+
+def strips_table(figures: Figures, section: str) -> str:
+    """Histograms of the whole and of the parts on each core: all scenarios without override together, all with it."""
+    pairs = list(_pairs(figures, section))
+    names = [p for p in PARTS if p != "rest" and any(p in row for row in pairs[0][3].values())]
+    head = ["core, kernel", "", "whole", *names]
+
+    def rows() -> Iterator[list[str]]:
+        for _target, _kernel, title, scenarios in pairs:
+            for kind in ("plain", "override"):
+                chosen = [row for name, row in scenarios.items() if name.startswith(kind)]
+                yield [title, kind, *(strip(_together(chosen, part)) for part in ("whole", *names))]
+                title = ""
+
+    return _table(head, rows())
+
+
+_ABOVE = {
+    "position": "position: three polynomials of degree 5 to 2^-40 mm, tangent, counts",
+    "feed": "arc length: a polynomial of degree 7, 64 x 32 bits, and its slope",
+    "rate": "program time, in integers without drift, rounded, and two ends of pieces",
+    "newton": "Newton",
+    "search": "finding the segment, two ends",
+    "rest": "calls",
+}
+
+
+def floor_table(figures: Figures, pair: str) -> str:
+    """The parts of a plain tick, each at its most."""
+    chosen = [row for name, row in figures["motion"][pair].items() if name.startswith("plain")]
+    most = {part: max(row[part][2] for row in chosen) for part in _ABOVE}
+    rows = [[_ABOVE[part], str(count)] for part, count in most.items()]
+    rows += [["sum", str(sum(most.values()))], ["a whole tick, at most", str(worst_of(chosen))]]
+    return _table(["", "instructions"], iter(rows))
+
+
+def worst_of(rows: Iterable[Figures]) -> int:
+    """Most of the whole over some scenarios."""
+    return int(max(row["whole"][2] for row in rows))
+
+
+_KINDS = {
+    "start": "first of a program",
+    "steady": "steady, or found to be",
+    "moves": "the rate moves",
+    "chooses": "chooses",
+    "looks": "looks at a window",
+    "begins": "begins a move",
+}
+
+
+def kinds_table(figures: Figures) -> str:
+    """Instructions of the rate by what a tick does with it, on the cores that have goals."""
+    chosen = [f"{target} {kernel}" for target, kernel in GOALS]
+    cores = [TARGETS[target].core for target, _ in GOALS]
+    head = [
+        "tick",
+        *(cell for core in cores for cell in (f"{core}: ticks", "min", "median", "max")),
+    ]
+
+    def rows() -> Iterator[list[str]]:
+        for kind, title in _KINDS.items():
+            found = [figures["kinds"][pair][kind] for pair in chosen]
+            yield [title, *(str(n) for f in found for n in (f["ticks"], *f["whole"]))]
+
+    return _table(head, rows())
 
 
 def taylor_table(figures: Figures) -> str:
