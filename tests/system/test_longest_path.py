@@ -20,6 +20,8 @@ from longest_path import (  # noqa: E402
     document,
     motion_part,
 )
+from target.campaign import EXAMPLES  # noqa: E402
+from target.counting import Counter  # noqa: E402
 from target.emulator import TARGETS  # noqa: E402
 from target.image import Function, Image, Instruction  # noqa: E402
 from target.longest import Bounds, Longest, LongestError  # noqa: E402
@@ -48,6 +50,18 @@ def test_nothing_counted_is_longer(target: str, kernel: str, kind: str) -> None:
 )
 def test_goals_are_kept_by_construction(target: str, kernel: str, kind: str, goal: int) -> None:
     assert motion_part(ROOT / "build", target, kernel, kind).of(ENTRY) <= goal
+
+
+@pytest.mark.parametrize("name", ["alpha", "heart_optimal"])
+def test_plain_ticks_call_nothing_that_plain_excludes(name: str) -> None:
+    """At 100 % and without commands; and what is never called in a tick is called in none."""
+    counter = Counter(ROOT / "build", TARGETS["an386"], functions=True)
+    counts = counter.count("float", EXAMPLES[name].read_bytes())
+    never = Bounds.read(ROOT / "firmware/targets/loops.toml", *NOT_PLAIN["plain"]).never
+    called = {n for n, column in zip(counter.names, counts.T, strict=True) if column.any()}
+    assert "motion_step" in called
+    assert "timebase_change" in counter.names
+    assert not called & never
 
 
 def test_the_document_has_them() -> None:
