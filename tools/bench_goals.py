@@ -63,7 +63,7 @@ def _at(figures: Any, way: Sequence[str]) -> Iterator[Any]:
 def _shown(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.4g}"
+    return f"{value:.5g}"
 
 
 def goal_lines(found: Sequence[Judged]) -> list[str]:
