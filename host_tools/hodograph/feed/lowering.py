@@ -7,9 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from math import exp, log
+from math import log
 
 from ..errors import PlanError
+from .bracket import highest
 from .limits import ControllerLimits, Limits
 from .quantise import LONGEST_PIECE_MM
 from .ramp import ACCELERATION, JERK
@@ -116,34 +117,20 @@ def _bounds(limits: Limits, controller: ControllerLimits | None) -> list[Bound]:
 def _lowered(
     make: Callable[[float], Shape], feed_mm_s: float, bounds: list[Bound]
 ) -> tuple[Shape, Bound | None]:
-    """The shape at `feed_mm_s`, or at the highest feed below where no bound is broken, with that bound.
-
-    Peaks go about with the feed: first steps in proportion until one obeys, then the secant between the
-    logarithms of feed and excess.
-    """
+    """The shape at `feed_mm_s`, or at the highest feed below where no bound is broken, with that bound."""
     shape = make(feed_mm_s)
     excess, bound = _excess(shape, bounds)
     if bound is None or excess <= 0.0:
         return shape, None
-    high, high_excess = log(feed_mm_s), excess
-    low = low_excess = 0.0
-    best: tuple[Shape, Bound | None] | None = None
-    for _ in range(_MOST_TRIALS):
-        if best is None:
-            trial = high - high_excess - _HAIR
-        else:
-            share = -low_excess / (high_excess - low_excess)
-            trial = low + (high - low) * max(0.05, min(0.95, share))
-        shape = make(exp(trial))
-        excess, bound = _excess(shape, bounds)
-        if excess > 0.0:
-            high, high_excess = trial, excess
-            continue
-        best, low, low_excess = (shape, bound), trial, excess
-        if excess > -_CLOSE or high - low < _CLOSE:
-            break
+
+    def attempt(feed: float) -> tuple[tuple[Shape, Bound | None], float]:
+        tried = make(feed)
+        found, broken = _excess(tried, bounds)
+        return (tried, broken), found
+
+    best = highest(feed_mm_s, excess, attempt, _CLOSE, _HAIR, _MOST_TRIALS)
     if best is None:
-        raise PlanError(f"feed: no feed obeys {bound.reason if bound else 'the limits'}: raise it")
+        raise PlanError(f"feed: no feed obeys {bound.reason}: raise it")
     return best
 
 

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp, log
+from math import log
 
 from ..errors import PlanError
 from ..spline import PHSpline
 from .along import PathBounds
+from .bracket import highest
 from .limits import ControllerLimits, Limits
 from .obeying import Strain, strains
 from .plan import Excess, FeedPlan
@@ -49,27 +50,20 @@ def plan_path(
 
 
 def _lowered(plan: FeedPlan, bounds: PathBounds) -> FeedPlan:
-    """The plan at the highest feed that the bounds allow: secant of log excess over log feed."""
-    high, worst = log(plan.feed_mm_s), _worst(plan, bounds)
-    high_excess = log(worst.ratio)
-    if high_excess <= 0.0:
+    """The plan at the highest feed that the bounds allow."""
+    worst = _worst(plan, bounds)
+    if worst.ratio <= 1.0:
         return plan
-    low = low_excess = 0.0
-    best: FeedPlan | None = None
-    for _ in range(_MOST_TRIALS):
-        if best is None:
-            trial = high - high_excess - _HAIR
-        else:
-            share = -low_excess / (high_excess - low_excess)
-            trial = low + (high - low) * max(0.05, min(0.95, share))
-        tried = plan_again(plan, exp(trial), worst.reason)
+
+    def attempt(feed: float) -> tuple[FeedPlan, float]:
+        nonlocal worst
+        tried = plan_again(plan, feed, worst.reason)
         found = _worst(tried, bounds)
         if found.ratio > 1.0:
-            high, high_excess, worst = trial, log(found.ratio), found
-            continue
-        best, low, low_excess = tried, trial, log(found.ratio)
-        if low_excess > -_CLOSE or high - low < _CLOSE:
-            break
+            worst = found
+        return tried, log(found.ratio)
+
+    best = highest(plan.feed_mm_s, log(worst.ratio), attempt, _CLOSE, _HAIR, _MOST_TRIALS)
     if best is None:
         raise PlanError(f"feed: no feed obeys {worst.reason}: raise it")
     return best
