@@ -86,10 +86,11 @@ def override_bounds(
 
 
 def _hold_s(rate_q16: Real, second_q8: Real) -> Real:
-    """Time from rate 1 to rest within these bounds."""
+    """Time from rate 1 to rest within these bounds; inf where one is 0."""
     rate = np.maximum(rate_q16, 0.5) / 2.0**16
     second = np.maximum(second_q8, 0.5) / 2.0**8
-    return np.asarray(np.where(second < rate**2, 2.0 / np.sqrt(second), 1.0 / rate + rate / second))
+    time_s = np.where(second < rate**2, 2.0 / np.sqrt(second), 1.0 / rate + rate / second)
+    return np.asarray(np.where((rate_q16 > 0.0) & (second_q8 > 0.0), time_s, np.inf))
 
 
 def _shared(peak: Real, limit: float) -> Real:

@@ -151,8 +151,10 @@ class Plan(Protocol):
         """The plan in integers."""
         ...
 
-    def pieces_over(self, length_q40: int) -> FeedPieces:
-        """The same over exactly this length, which may differ a little (rounding)."""
+    def pieces_over(
+        self, length_q40: int, joints_q40: NDArray[np.int64] | None = None
+    ) -> FeedPieces:
+        """The same over exactly this length, which may differ a little (rounding), as the joints may."""
         ...
 
     def slowed(self, caps: Sequence[FeedCap], reason: str) -> Plan:
@@ -251,7 +253,9 @@ class FeedPlan:
         """`raw` with the override bounds of each piece."""
         return with_override(self.raw, self.controller, self.limits, self.path)
 
-    def pieces_over(self, length_q40: int) -> FeedPieces:
+    def pieces_over(
+        self, length_q40: int, joints_q40: NDArray[np.int64] | None = None
+    ) -> FeedPieces:
         """The plan in integers over exactly `length_q40`, which may differ a little (rounding)."""
         if length_q40 == self._length_q40:
             return self.pieces

@@ -122,7 +122,7 @@ def _fit_feed(plan: Plan, joints_q40: Int, spline: PHSpline) -> tuple[Plan, Feed
     """The plan with its feed low enough for the segments, and its pieces over their exact length."""
     length_q40 = int(joints_q40[-1])
     for _ in range(_MOST_ROUNDS):
-        pieces = plan.pieces_over(length_q40)
+        pieces = plan.pieces_over(length_q40, joints_q40)
         pairs, way_mm, allowed_mm_s = brief_pairs(joints_q40, pieces, plan.period_us)
         if not pairs.size:
             return plan, pieces

@@ -11,11 +11,16 @@ from .bernstein import Complex, Real, basis
 _MOST_STEPS = 200
 
 
-def invert(arc: Real, w: Complex, segment: NDArray[np.intp], s_mm: Real) -> Real:
+EXACT = 2.0**-52
+
+
+def invert(
+    arc: Real, w: Complex, segment: NDArray[np.intp], s_mm: Real, tolerance: float = EXACT
+) -> Real:
     """xi (n,) in [0, 1] with arc length `s_mm` (n,) from the start of `segment` (n,).
 
     `arc` (N, 6) are the Bernstein coefficients of the arc length of each segment, `w` (N, 3)
-    those of w. The error in arc length is about 1e-15 of the segment's length. The bracket
+    those of w. The error in arc length is about 1e-15 of the segment's length, or `tolerance`. The bracket
     shrinks every step, so this ends also where the speed all but vanishes.
     """
     length = arc[segment, 5]
@@ -37,7 +42,7 @@ def invert(arc: Real, w: Complex, segment: NDArray[np.intp], s_mm: Real) -> Real
         newton = x - step
         inside = (newton > lo) & (newton < hi)
         moved = np.where(inside, newton, (lo + hi) / 2.0)
-        done = np.abs(excess) <= 2.0**-52 * length[active]
+        done = np.abs(excess) <= tolerance * length[active]
         xi[active] = np.where(done, x, moved)
         active = active[~done & (np.abs(moved - x) > 2.0**-53)]
     return np.asarray(xi)

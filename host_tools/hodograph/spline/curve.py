@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .arclength import invert
+from .arclength import EXACT, invert
 from .bernstein import Complex, Real, basis, square, square_modulus
 from .extremum import greatest_curvature
 from .splitting import split_segments
@@ -119,8 +119,8 @@ class PHSpline:
 
     # By arc length
 
-    def locate(self, s_mm: ArrayLike) -> tuple[Index, Real]:
-        """Segment and xi of the points at arc lengths `s_mm`, to about 1e-13 of the segment."""
+    def locate(self, s_mm: ArrayLike, tolerance: float = EXACT) -> tuple[Index, Real]:
+        """Segment and xi of the points at arc lengths `s_mm`, to about 1e-13 of the segment, or `tolerance`."""
         s = np.asarray(s_mm, dtype=np.float64)
         length = self.length_mm
         slack = 1e-9 * length
@@ -130,7 +130,8 @@ class PHSpline:
         s = np.clip(s, 0.0, length)
         starts = self.segment_starts_mm
         segment = np.searchsorted(starts[1:-1], s, side="right")
-        xi = invert(self._arc_coefficients, self.w, segment.ravel(), (s - starts[segment]).ravel())
+        own = (s - starts[segment]).ravel()
+        xi = invert(self._arc_coefficients, self.w, segment.ravel(), own, tolerance)
         return segment, xi.reshape(s.shape)
 
     def point(self, s_mm: ArrayLike) -> Complex:

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from time import process_time
 
 import numpy as np
 import pytest
 
 from hodograph.errors import InputError, PlanError
 from hodograph.feed import AxisLimits, ControllerLimits, FeedCap, FeedRequest, Limits, Plant
-from hodograph.feed.optimal import OptimalPlan, plan_optimal
+from hodograph.feed.optimal import OptimalPlan, plan_optimal, solver
 from hodograph.feed.optimal.bounds import gather
 from hodograph.feed.optimal.track import joined
 from hodograph.feed.optimal.windows import plan_windows
@@ -208,9 +209,22 @@ def test_no_limits_at_all_are_refused() -> None:
         plan_optimal(straight(10.0), OPTIMAL, Limits())
 
 
-def test_effort_grows_in_proportion_to_the_path() -> None:
-    """Intervals and pieces, which all effort is in proportion to: counted, since time is noisy."""
-    counts = [
-        plan_optimal(walk(n + 2, 1), OPTIMAL, AXES, CONTROLLER).track.s.size for n in (30, 120)
-    ]
-    assert 3.0 < counts[1] / counts[0] < 5.5
+def test_effort_grows_in_proportion_to_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the solver is given, counted, since time is noisy; time within a generous bound."""
+    work: list[int] = []
+    solved = solver._solved
+
+    def counted(task: solver._Task) -> np.ndarray | None:
+        work[-1] += task.matrix.nnz
+        return solved(task)
+
+    monkeypatch.setattr(solver, "_solved", counted)
+    seconds, pieces = [], []
+    for n in (150, 600):
+        work.append(0)
+        began = process_time()
+        pieces.append(plan_optimal(walk(n + 2, 1), OPTIMAL, AXES, CONTROLLER).track.s.size)
+        seconds.append(process_time() - began)
+    for counts in (work, pieces):
+        assert 3.0 < counts[1] / counts[0] < 5.5
+    assert seconds[1] < 8.0 * seconds[0] + 0.5

@@ -18,10 +18,27 @@ Real = NDArray[np.float64]
 
 FREE: PerAxis = (inf, inf)
 
+_MOST_BY_ACCELERATION, _MOST_BY_JERK = 2.0**13, 24.0
+"""Greatest feed over what is left of an acceleration, of a jerk: rates of 2^-16 / s and 2^-8 / s^2 are the least of the
+format, and a factor above 1 and the other rate take half of the room each; docs/numerics.md section 7."""
+
 _PERIODS_TO_FULL_ACCELERATION = 8
 """Without any limit of the jerk the acceleration still builds up within so many periods."""
 
 _PERIODS_TO_FULL_FEED = 16
+
+
+@dataclass(frozen=True)
+class Source:
+    """Whose a bound is: section and key, and the part of the value given there that may be used."""
+
+    section: str
+    key: str
+    share: float = 1.0
+
+
+_NONE = Source("", "no limit")
+TAKEN = Source("", "taken for want of a limit")
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +47,7 @@ class Bounds:
 
     axis_share  the part of the axes' accelerations, jerks and volts that is meant to be used; what is said here
                 of them has the reserve taken off already
-    sources  whose the tangential bounds are, in words: feed, acceleration, jerk
+    sources  whose the tangential bounds are: feed, acceleration, jerk
     """
 
     feed_mm_s: float
@@ -43,7 +60,7 @@ class Bounds:
     plants: Plants | None
     axis_share: float
     caps: Real
-    sources: tuple[str, str, str]
+    sources: tuple[Source, Source, Source]
     notes: tuple[str, ...] = ()
 
     @property
@@ -61,6 +78,14 @@ class Bounds:
     def least_feed(self) -> float:
         """The least bound of feed and axis velocities, caps aside."""
         return min(self.feed_mm_s, *self.velocity, *(p.reach_mm_s for p in self.plants or ()))
+
+    def eased(self, least_s: float) -> Bounds:
+        """The same with jerks that let all acceleration build up within `least_s` at the soonest."""
+        most = self.least_acceleration / least_s
+        x, y = self.jerk
+        return replace(
+            self, jerk_mm_s3=min(self.jerk_mm_s3, most), jerk=(min(x, most), min(y, most))
+        )
 
     def with_caps(self, caps: Real) -> Bounds:
         """The same with further caps."""
@@ -81,18 +106,19 @@ def gather(
     """
     period_s = 1e-6 * period_us
     feed, feed_source = _least(
-        ("format, pieces of 32 mm", 0.45 * LONGEST_PIECE_MM / period_s),
-        ("feed nominal_mm_s", request.nominal_mm_s),
-        ("limits feed_mm_s", limits.feed_mm_s),
-        ("controller feed_mm_s less its reserve", _kept(controller, "feed_mm_s")),
+        (Source("format", "pieces of 32 mm"), 0.45 * LONGEST_PIECE_MM / period_s),
+        (Source("feed", "nominal_mm_s"), request.nominal_mm_s),
+        (Source("limits", "feed_mm_s"), limits.feed_mm_s),
+        *_kept(controller, "feed_mm_s"),
+        *_held(limits, controller),
     )
     acceleration, acceleration_source = _least(
-        ("limits acceleration_mm_s2", limits.acceleration_mm_s2),
-        ("controller acceleration_mm_s2 less its reserve", _kept(controller, "acceleration_mm_s2")),
+        (Source("limits", "acceleration_mm_s2"), limits.acceleration_mm_s2),
+        *_kept(controller, "acceleration_mm_s2"),
     )
     jerk, jerk_source = _least(
-        ("limits jerk_mm_s3", limits.jerk_mm_s3),
-        ("controller jerk_mm_s3 less its reserve", _kept(controller, "jerk_mm_s3")),
+        (Source("limits", "jerk_mm_s3"), limits.jerk_mm_s3),
+        *_kept(controller, "jerk_mm_s3"),
     )
     axis = limits.axis
     notes = []
@@ -119,7 +145,7 @@ def gather(
         notes.append(
             f"no limit bounds the jerk: {jerk:.4g} mm/s^3 is taken, a few periods to full acceleration"
         )
-        sources = (feed_source, acceleration_source, "jerk taken for want of a limit")
+        sources = (feed_source, acceleration_source, TAKEN)
         bounds = replace(bounds, jerk_mm_s3=jerk, sources=sources, notes=tuple(notes))
     return bounds
 
@@ -134,12 +160,35 @@ def _weaker(plant: Plant, share: float) -> Plant:
     return replace(plant, volts=plant.friction_volts + left)
 
 
-def _kept(controller: ControllerLimits | None, name: str) -> float | None:
+def _kept(controller: ControllerLimits | None, key: str) -> list[tuple[Source, float]]:
     if controller is None:
-        return None
-    return float(getattr(controller, name)) * (1.0 - controller.kept_free)
+        return []
+    share = 1.0 - controller.kept_free
+    return [(Source("controller", key, share), float(getattr(controller, key)) * share)]
 
 
-def _least(*candidates: tuple[str, float | None]) -> tuple[float, str]:
-    given = [(value, name) for name, value in candidates if value is not None]
-    return min(given, default=(inf, "no limit"))
+def _held(limits: Limits, controller: ControllerLimits | None) -> list[tuple[Source, float]]:
+    """Feeds up to which the reserve of a limit leaves the rates of a hold room that the format knows."""
+    given = [
+        (Source("limits", f"axis.{key} of {axis}"), value, limits.reserve, by)
+        for key, both, by in (
+            ("acceleration_mm_s2", limits.axis.acceleration_mm_s2, _MOST_BY_ACCELERATION),
+            ("jerk_mm_s3", limits.axis.jerk_mm_s3, _MOST_BY_JERK),
+        )
+        for axis, value in zip("xy", both or (), strict=False)
+    ]
+    if controller is not None:
+        for key, by in (
+            ("acceleration_mm_s2", _MOST_BY_ACCELERATION),
+            ("jerk_mm_s3", _MOST_BY_JERK),
+        ):
+            source = Source("controller", key)
+            given.append((source, float(getattr(controller, key)), controller.kept_free, by))
+    return [
+        (replace(source, share=free * by), value * free * by) for source, value, free, by in given
+    ]
+
+
+def _least(*candidates: tuple[Source, float | None]) -> tuple[float, Source]:
+    given = [(value, source) for source, value in candidates if value is not None]
+    return min(given, default=(inf, _NONE), key=lambda one: one[0])

@@ -19,6 +19,7 @@ Index = NDArray[np.intp]
 
 LEFT, RIGHT = -1, 1
 _AT_JOINT = 1e-9
+_CLOSE = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Frames:
 
 def frames(spline: PHSpline, s_mm: Real, side: NDArray[np.int8]) -> Frames:
     """At arc lengths `s_mm` (n,); at joints those of the segment to the LEFT or RIGHT, by `side` (n,)."""
-    segment, xi = spline.locate(np.clip(s_mm, 0.0, spline.length_mm))
+    segment, xi = spline.locate(np.clip(s_mm, 0.0, spline.length_mm), _CLOSE)
     back = (xi < _AT_JOINT) & (side == LEFT) & (segment > 0)
     on = (xi > 1.0 - _AT_JOINT) & (side == RIGHT) & (segment < spline.segment_count - 1)
     segment = segment - back + on

@@ -1,82 +1,221 @@
 # SPDX-License-Identifier: MIT
-"""Limits that leave no feed worth the name: which, where, and what would do; docs/numerics.md 5.6."""
+"""Limits that leave no feed worth the name: which, where, and what would do; docs/numerics.md 5.6.
+
+Every path without corners can be run inside any limits, if slowly enough. The bounds of slowness are LEAST_FEED_MM_S
+at every place and the longest time that the format knows. What each limit allows is taken at constant feed; of
+accelerations and jerks along the way, by the fastest motion from rest to rest.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import cbrt, inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PlanError
 from ...spline import PHSpline
+from ..plant import Plant
 from ..request import LEAST_FEED_MM_S
-from .bounds import Bounds
+from .bounds import Bounds, Source
 from .curve import LEFT, RIGHT, frames
 
 Real = NDArray[np.float64]
 
 _SAMPLES = 32
+_HAIR = 1e-6
+_BEYOND = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Constant:
-    """What a limit allows at constant feed: feed (n,) at points, and how the limit goes with it."""
+class Allowed:
+    """What one limit alone allows: feed (n,) at points (inf where it does not bind) and the time of the whole.
 
-    name: str
-    limit: float
-    feed: Real
-    power: int
-
-
-def check_feasible(spline: PHSpline, bounds: Bounds) -> None:
-    """Raises PlanError where a limit allows less than LEAST_FEED_MM_S even at constant feed.
-
-    Every path without corners can be run inside any limits, if slowly enough; this is the bound of slowness.
+    `given` is what the user gave. With the feed k times as fast everywhere the limit would have to be
+    offset + (given - offset) k^power.
     """
+
+    source: Source
+    given: float
+    feed: Real
+    time_s: float
+    power: int
+    offset: float
+
+    @property
+    def name(self) -> str:
+        """Section, key and value, for messages."""
+        less = "" if self.source.share == 1.0 else " (less its reserve)"
+        return f"{self.source.section}: {self.source.key} = {self.given:g}{less}"
+
+    def rounded(self, value: float) -> str:
+        """A value of the limit, what is above `offset` rounded up to three digits."""
+        return f"{self.offset + float(rounded_up(value - self.offset)):.9g}"
+
+    def times(self, k: float) -> float:
+        """The limit at which the feed may be k times as fast."""
+        return self.offset + (self.given - self.offset) * k**self.power
+
+    def needed(self, feed_mm_s: float, place: int) -> float:
+        """The least value that allows a feed at a point."""
+        return self.times(feed_mm_s / float(self.feed[place]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Volts(Allowed):
+    """Volts: speed |c1| and T |c2| (n,), what is needed for each feed and feed^2 at points."""
+
+    plant: Plant
+    speed: Real
+    bend: Real
+
+    def needed(self, feed_mm_s: float, place: int) -> float:
+        reach = self.speed[place] * feed_mm_s + self.bend[place] * feed_mm_s**2
+        return self.offset + float(reach) / (self.plant.gain_mm_s_v * self.source.share)
+
+
+def check_feasible(spline: PHSpline, bounds: Bounds, longest_s: float) -> None:
+    """Raises PlanError where limits allow less than LEAST_FEED_MM_S, or take longer than `longest_s`, each by itself.
+
+    The message names all such limits, where each is worst, and the least values that would do.
+    """
+    s = _places(spline)[0]
+    slow: dict[str, tuple[float, str]] = {}
+    long: dict[str, tuple[float, str]] = {}
+    for one in allowed(spline, bounds):
+        worst = int(np.argmin(one.feed))
+        feed = float(one.feed[worst])
+        if feed < LEAST_FEED_MM_S:
+            least = one.needed(LEAST_FEED_MM_S, worst)
+            text = (
+                f"{one.name} allows {feed:.3g} mm/s at arc length {s[worst]:.6g} mm, less than the "
+                f"{LEAST_FEED_MM_S:g} mm/s that a feed has to be: {one.rounded(least)} would do there"
+            )
+            slow[one.source.key] = max(slow.get(one.source.key, (0.0, "")), (least, text))
+        elif one.time_s >= longest_s:
+            k = one.time_s / longest_s
+            text = too_long(one, s[worst], one.time_s, longest_s, k)
+            long[one.source.key] = max(long.get(one.source.key, (0.0, "")), (one.times(k), text))
+    if slow or long:
+        raise PlanError("; ".join(text for _, text in (slow or long).values()))
+
+
+def too_long(one: Allowed, s_mm: float, time_s: float, longest_s: float, k: float) -> str:
+    """The message for a limit that makes a program last too long; k times as fast is fast enough."""
+    return (
+        f"{one.name}, lowest at arc length {s_mm:.6g} mm, makes the path take {time_s:.4g} s, longer than the "
+        f"{longest_s:.7g} s of a program: {one.rounded(one.times(1.02 * k))} would do"
+    )
+
+
+def rounded_up(value: float) -> str:
+    """Three digits, not below the value."""
+    text = f"{value:.3g}"
+    return text if float(text) >= value * (1.0 + _HAIR) else f"{value * 1.0051:.3g}"
+
+
+def binding_most(spline: PHSpline, bounds: Bounds) -> tuple[Allowed, float]:
+    """The limit that by itself takes the longest, and the arc length where it allows least."""
+    found = max(allowed(spline, bounds), key=lambda one: one.time_s)
+    return found, float(_places(spline)[0][int(np.argmin(found.feed))])
+
+
+def least_time_s(spline: PHSpline, bounds: Bounds) -> float:
+    """What the path takes at least."""
+    return max(one.time_s for one in allowed(spline, bounds))
+
+
+def within_reach(spline: PHSpline, bounds: Bounds) -> Bounds:
+    """The same with the feed bounded where acceleration and jerk along the path cannot bring it: a bound far beyond
+    spoils the numbers of the programs.
+    """
+    s, _ = _places(spline)
+    _, acceleration, jerk = bounds.sources
+    reach = min(
+        float(_reached(s, acceleration, bounds.acceleration_mm_s2, 1.0, 2).feed.min()),
+        float(_reached(s, jerk, bounds.jerk_mm_s3, 1.0, 3).feed.min()),
+    )
+    return replace(bounds, feed_mm_s=min(bounds.feed_mm_s, _BEYOND * reach))
+
+
+def allowed(spline: PHSpline, bounds: Bounds) -> Iterator[Allowed]:
+    """All limits, one by one, at points of the path."""
+    s, side = _places(spline)
+    yield from _along(s, bounds)
+    f = frames(spline, s, side)
+    with np.errstate(divide="ignore"):
+        bend = bounds.centripetal_mm_s2 / np.abs(f.curvature)
+    yield _steady(
+        s, Source("limits", "centripetal_mm_s2"), bounds.centripetal_mm_s2, np.sqrt(bend), 2
+    )
+    for k, of in enumerate((np.real, np.imag)):
+        one, two, three = (np.abs(of(vector)) for vector in (f.r1, f.r2, f.r3))
+        for key, bound, vector, power in (
+            ("velocity_mm_s", bounds.velocity[k], one, 1),
+            ("acceleration_mm_s2", bounds.acceleration[k], two, 2),
+            ("jerk_mm_s3", bounds.jerk[k], three, 3),
+        ):
+            source = Source(
+                "limits", f"axis.{key} of {'xy'[k]}", bounds.axis_share if power > 1 else 1.0
+            )
+            with np.errstate(divide="ignore"):
+                yield _steady(s, source, bound, (bound / vector) ** (1.0 / power), power)
+            if power > 1:
+                yield _reached(s, source, bound, float(one.max()), power)
+        if bounds.plants is not None:
+            yield _volts(s, bounds.plants[k], bounds.axis_share, "xy"[k], one, two)
+
+
+def _places(spline: PHSpline) -> tuple[Real, NDArray[np.int8]]:
     u = np.linspace(0.0, 1.0, _SAMPLES + 1)
     joints = spline.segment_starts_mm
     s = (joints[:-1, None] + np.diff(joints)[:, None] * u).ravel()
     side = np.tile(np.where(u == 0.0, RIGHT, np.where(u == 1.0, LEFT, 0)), joints.size - 1)
-    for limit in _limits(spline, bounds, s, side.astype(np.int8)):
-        worst = int(np.argmin(limit.feed))
-        feed = float(limit.feed[worst])
-        if feed < LEAST_FEED_MM_S:
-            least = limit.limit * (LEAST_FEED_MM_S / feed) ** limit.power * (1.0 + 1e-6)
-            raise PlanError(
-                f"limits: {limit.name} = {limit.limit:g} allows {feed:.3g} mm/s at arc length {s[worst]:.6g} mm, "
-                f"less than the {LEAST_FEED_MM_S:g} mm/s that a feed has to be: {_rounded_up(least)} would do there"
-            )
+    return s, side.astype(np.int8)
 
 
-def _rounded_up(value: float) -> str:
-    """Three digits, not below the value."""
-    text = f"{value:.3g}"
-    return text if float(text) >= value else f"{value * 1.005:.3g}"
-
-
-def _limits(spline: PHSpline, bounds: Bounds, s: Real, side: NDArray[np.int8]) -> list[_Constant]:
-    f = frames(spline, s, side)
+def _along(s: Real, bounds: Bounds) -> Iterator[Allowed]:
+    feed, acceleration, jerk = bounds.sources
     flat = np.ones(s.size)
-    with np.errstate(divide="ignore"):
-        out = [
-            _Constant("feed_mm_s", bounds.feed_mm_s, bounds.feed_mm_s * flat, 1),
-            _Constant(
-                "centripetal_mm_s2",
-                bounds.centripetal_mm_s2,
-                np.sqrt(bounds.centripetal_mm_s2 / np.abs(f.curvature)),
-                2,
-            ),
-        ]
-        for low, high, feed in bounds.caps:
-            within = (s >= low) & (s <= high)
-            out.append(_Constant("cap feed_mm_s", float(feed), np.where(within, feed, np.inf), 1))
-        for k, of in enumerate((np.real, np.imag)):
-            for name, limit, vector, power in (
-                ("axis.velocity_mm_s", bounds.velocity[k], f.r1, 1),
-                ("axis.acceleration_mm_s2", bounds.acceleration[k], f.r2, 2),
-                ("axis.jerk_mm_s3", bounds.jerk[k], f.r3, 3),
-            ):
-                allowed = (limit / np.abs(of(vector))) ** (1.0 / power)
-                out.append(_Constant(f"{name} of {'xy'[k]}", limit, allowed, power))
-    return out
+    yield _steady(s, feed, bounds.feed_mm_s, bounds.feed_mm_s * flat, 1)
+    for low, high, most in bounds.caps:
+        within = np.where((s >= low) & (s <= high), most, inf)
+        if not np.isfinite(within).any():  # between two points
+            within[int(np.argmin(np.abs(s - 0.5 * (low + high))))] = most
+        yield _steady(
+            s, Source("limits", f"cap of {low:g} to {high:g} mm, feed_mm_s"), most, within, 1
+        )
+    yield _reached(s, acceleration, bounds.acceleration_mm_s2, 1.0, 2)
+    if jerk.section:
+        yield _reached(s, jerk, bounds.jerk_mm_s3, 1.0, 3)
+
+
+def _steady(s: Real, source: Source, bound: float, feed: Real, power: int) -> Allowed:
+    slowness = 1.0 / feed
+    time_s = float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(s)))
+    return Allowed(source, bound / source.share, feed, time_s, power, 0.0)
+
+
+def _reached(s: Real, source: Source, bound: float, part: float, power: int) -> Allowed:
+    """From rest to rest inside one acceleration (power 2) or jerk (3), of which the path has at most `part`."""
+    length = float(s[-1] - s[0])
+    most = bound / max(part, 1e-12)
+    peak = sqrt(most * length) if power == 2 else cbrt(most * length**2 / 4.0)
+    feed = np.full(s.size, inf)
+    feed[int(np.searchsorted(s, s[0] + 0.5 * length))] = peak
+    return Allowed(source, bound / source.share, feed, 2.0 * length / peak, power, 0.0)
+
+
+def _volts(s: Real, plant: Plant, share: float, axis: str, one: Real, two: Real) -> Allowed:
+    """Reach >= |c1| v + T |c2| v^2 at constant feed v."""
+    reach, bend = max(plant.reach_mm_s, 0.0), plant.time_constant_s * two
+    with np.errstate(divide="ignore", invalid="ignore"):
+        feed = 2.0 * reach / (one + np.sqrt(one**2 + 4.0 * bend * reach))
+        feed = np.where(np.isnan(feed), inf, feed)
+        slowness = 1.0 / feed
+    time_s = float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(s)))
+    given = plant.friction_volts + (plant.volts - plant.friction_volts) / share
+    source = Source("limits", f"volts of {axis}", share)
+    return _Volts(source, given, feed, time_s, 2, plant.friction_volts, plant, one, bend)

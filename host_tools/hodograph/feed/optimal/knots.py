@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,7 @@ _PER_FLAT_SEGMENT = 32
 _GROWTH = 0.25
 _KINK = 0.05
 _SUDDEN = 0.5
-_LEAST_Q = 1e-12
+_LEAST_Q = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,18 +52,23 @@ class Sketch:
 
 def steady_caps(spline: PHSpline, bounds: Bounds, s: Real) -> Real:
     """The greatest q at which a constant feed keeps every limit."""
-    q = np.full(s.size, inf)
-    for side in (LEFT, RIGHT):
-        f = frames(spline, s, np.full(s.size, side, dtype=np.int8))
-        with np.errstate(divide="ignore"):
-            q = np.minimum(q, bounds.feed_mm_s**2)
-            q = np.minimum(q, bounds.centripetal_mm_s2 / np.abs(f.curvature))
-            for part, velocity, acceleration, jerk in zip(
-                (np.real, np.imag), bounds.velocity, bounds.acceleration, bounds.jerk, strict=True
-            ):
-                q = np.minimum(q, (velocity / np.abs(part(f.r1))) ** 2)
-                q = np.minimum(q, acceleration / np.abs(part(f.r2)))
-                q = np.minimum(q, (jerk / np.abs(part(f.r3))) ** (2.0 / 3.0))
+    q = _steady_caps(spline, bounds, s, LEFT)
+    joint = np.flatnonzero(np.isin(s, spline.segment_starts_mm))
+    q[joint] = np.minimum(q[joint], _steady_caps(spline, bounds, s[joint], RIGHT))
+    return q
+
+
+def _steady_caps(spline: PHSpline, bounds: Bounds, s: Real, side: int) -> Real:
+    q: Real = np.full(s.size, bounds.feed_mm_s**2)
+    f = frames(spline, s, np.full(s.size, side, dtype=np.int8))
+    with np.errstate(divide="ignore"):
+        q = np.minimum(q, bounds.centripetal_mm_s2 / np.abs(f.curvature))
+        for part, velocity, acceleration, jerk in zip(
+            (np.real, np.imag), bounds.velocity, bounds.acceleration, bounds.jerk, strict=True
+        ):
+            q = np.minimum(q, (velocity / np.abs(part(f.r1))) ** 2)
+            q = np.minimum(q, acceleration / np.abs(part(f.r2)))
+            q = np.minimum(q, (jerk / np.abs(part(f.r3))) ** (2.0 / 3.0))
     for plant in bounds.plants or ():
         q = np.minimum(q, plant.reach_mm_s**2)
     for low, high, feed in bounds.caps:
@@ -82,7 +86,7 @@ def sketch(
 ) -> Sketch:
     """From `low`, at rest (q_start None) or moving, to rest at `high`."""
     s = _samples(spline, bounds, low, high)
-    cap = np.maximum(steady_caps(spline, bounds, s), _LEAST_Q)
+    cap = steady_caps(spline, bounds, s)
     jerk = bounds.least_jerk
     reach = (jerk * (high - low) ** 2) ** (1.0 / 3.0)
     slowness = 1.0 / np.minimum(np.sqrt(cap), reach)
@@ -98,7 +102,7 @@ def sketch(
     q = np.minimum.accumulate(q - rise) + rise
     fall = 2.0 * pull * (high - s)
     q = (np.minimum.accumulate((q - fall)[::-1]))[::-1] + fall
-    q = np.maximum(q, _LEAST_Q)
+    q = np.maximum(q, _LEAST_Q * q.max())
     feed = np.sqrt(q)
     time = 2.0 * np.diff(s) / (feed[1:] + feed[:-1])
     if q_start is None:

@@ -13,11 +13,11 @@ from ...spline import PHSpline
 from .bounds import Bounds
 from .peaks import piece_strains
 from .track import ends_of, make_track
-from .window import Solution, State, plan_window
+from .window import Solution, State, plan_window, tightened
 
 Real = NDArray[np.float64]
 
-_STRAINED = 1.001
+_STRAINED = 1.003
 _MOST_TRIALS = 3
 _INHERITED = 2
 """Intervals that what a window begins with binds: their limits stay."""
@@ -33,7 +33,7 @@ def plan_measured(
     known: Solution | None = None,
     known_to: float = 0.0,
 ) -> Solution | None:
-    """As `plan_window`, with tighter limits on intervals whose piece is above one by more than 0.1 %."""
+    """As `plan_window`, with tighter limits on intervals whose piece is above one by more than 0.3 %."""
     best = found = plan_window(spline, bounds, low, high, start, period_s, known, known_to)
     if best is None or found is None:
         return None
@@ -42,11 +42,9 @@ def plan_measured(
     for _ in range(_MOST_TRIALS):
         if strain.max() <= _STRAINED:
             break
-        tight *= np.where(strain > 1.0 + 0.5 * (_STRAINED - 1.0), strain, 1.0)
-        found = plan_window(
-            spline, bounds, low, high, start, period_s, found, float(found.grid.s[-1]), tight
-        )
-        if found is None or found.grid.size != tight.size:
+        tight *= np.where(strain > 1.0 + 0.3 * (_STRAINED - 1.0), strain, 1.0)
+        found = tightened(found, tight)
+        if found is None:
             break
         strain = _strains(spline, bounds, found, start)
         if strain.max() < least:
@@ -59,4 +57,6 @@ def _strains(spline: PHSpline, bounds: Bounds, found: Solution, start: State | N
     strain = piece_strains(spline, bounds, track)
     if start is not None:
         strain[:_INHERITED] = 0.0
+    if found.grid.s[-1] < spline.length_mm:
+        strain[found.grid.grade < 0] = 0.0  # the stop at the end of a window is not kept
     return strain

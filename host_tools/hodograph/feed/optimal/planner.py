@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,17 +24,25 @@ from ..plant import Plants
 from ..quantise import RawPieces, round_pieces
 from ..request import FeedRequest, check_period
 from .bounds import Bounds, gather
-from .feasible import check_feasible
+from .feasible import binding_most, check_feasible, least_time_s, rounded_up, within_reach
 from .peaks import Peak, find_peaks
-from .track import Track, joined, make_track
-from .windows import plan_windows
+from .track import Ends, Track, joined, make_track
+from .windows import NothingFoundError, plan_windows
 
 Real = NDArray[np.float64]
+Int = NDArray[np.int64]
 
 _ABOVE = 3e-4
 """A plan may be above a limit by this share; what is more is taken out by running it slower."""
 
+_DRIFT_Q40 = 1024
+"""Joints of a program are within so many 2^-40 mm (1e-9 mm) of those of its path."""
+
 _CAP_SHARE, _BESIDE_MM = 0.998, 2.0**-12
+
+_EASED = (1e-5, 1e-4, 1e-3)
+_POOR = 1.02
+_MANY_PERIODS = 100.0
 
 _POWER = {"acceleration": 2, "jerk": 3, "centripetal": 2}
 
@@ -130,9 +140,13 @@ class OptimalPlan:
         """`raw` with the override bounds of each piece."""
         return with_override(self.raw, self.controller, self.limits, self._path)
 
-    def pieces_over(self, length_q40: int) -> FeedPieces:
-        """The plan in integers over exactly `length_q40`, which may differ a little (rounding)."""
-        raw = _raw(self.track, length_q40)
+    def pieces_over(self, length_q40: int, joints_q40: Int | None = None) -> FeedPieces:
+        """The plan in integers over exactly `length_q40`, which may differ a little (rounding).
+
+        joints_q40  (segments + 1,) of the program: pieces that begin at a joint begin there, since limited quantities
+                    jump at joints
+        """
+        raw = _raw(self.track, length_q40, self.spline.segment_starts_mm, joints_q40)
         return with_override(raw, self.controller, self.limits, self._path)
 
     def _widened(self, cap: FeedCap) -> FeedCap:
@@ -186,16 +200,10 @@ def plan_optimal(
             'feed: profile "optimal" has no limit to obey: add one to [limits] at least'
         )
     bounds = gather(request, limits, controller, plants, period_us)
-    check_feasible(spline, bounds)
-    ends = joined(list(plan_windows(spline, bounds, 1e-6 * period_us)))
-    track = make_track(ends, 1.0, spline.segment_starts_mm)
-    stretch = _needed_stretch(find_peaks(spline, bounds, track))
-    if stretch > 1.0:
-        track = make_track(ends, stretch, spline.segment_starts_mm)
+    check_feasible(spline, bounds, LONGEST_S)
+    track, stretch = _run(spline, bounds, 1e-6 * period_us)
     if track.duration_s >= LONGEST_S:
-        raise PlanError(
-            f"feed: the path takes {track.duration_s:.4g} s inside its limits, longer than {LONGEST_S:.7g} s"
-        )
+        raise PlanError(_too_long(spline, bounds, track.duration_s))
     return OptimalPlan(
         request,
         limits,
@@ -211,6 +219,54 @@ def plan_optimal(
     )
 
 
+def _run(spline: PHSpline, bounds: Bounds, period_s: float) -> tuple[Track, float]:
+    """Pieces of the plan, and by how much they were slowed.
+
+    Where limits are so far apart that no feed is found, or a poor one, with jerks that let the acceleration build up
+    within a small share of the time that three segments take on average.
+    """
+    near = within_reach(spline, bounds)
+    tries = [near]
+    if near.least_acceleration < inf:
+        time_s = 3.0 * least_time_s(spline, bounds) / spline.segment_count
+        # Where that costs nothing to speak of it comes first: numbers far apart also take long to fail.
+        slow = _EASED[1] * time_s > _MANY_PERIODS * period_s
+        eased = [near.eased(max(period_s, share * time_s)) for share in _EASED]
+        tries = eased[1:] if slow else [near, *eased]
+    best: tuple[Track, float] | None = None
+    for one in tries:
+        with suppress(NothingFoundError):
+            found = _track(spline, bounds, joined(list(plan_windows(spline, one, period_s))))
+            if best is None or found[0].duration_s < best[0].duration_s:
+                best = found
+        if best is not None and best[1] < _POOR:
+            return best
+    if best is None:
+        raise PlanError(
+            "feed: the planner found no feed at all: please report this path and its limits"
+        )
+    return best
+
+
+def _track(spline: PHSpline, bounds: Bounds, ends: Ends) -> tuple[Track, float]:
+    track = make_track(ends, 1.0, spline.segment_starts_mm)
+    stretch = _needed_stretch(find_peaks(spline, bounds, track))
+    if stretch > 1.0:
+        track = make_track(ends, stretch, spline.segment_starts_mm)
+    return track, stretch
+
+
+def _too_long(spline: PHSpline, bounds: Bounds, duration_s: float) -> str:
+    """Several limits together make the path take too long: raised alike, all let it be so much faster exactly."""
+    one, s_mm = binding_most(spline, bounds)
+    k = 1.05 * duration_s / LONGEST_S
+    return (
+        f"{one.name}, lowest at arc length {s_mm:.6g} mm, takes most of {duration_s:.4g} s, longer than the "
+        f"{LONGEST_S:.7g} s of a program: with all limits it has to be raised, feeds and velocities by "
+        f"{rounded_up(k)}, accelerations and volts by {rounded_up(k**2)}, jerks by {rounded_up(k**3)}"
+    )
+
+
 def _needed_stretch(peaks: dict[str, Peak]) -> float:
     """By how much to slow down so that no limit is exceeded by more than is allowed."""
     stretch = 1.0
@@ -220,8 +276,16 @@ def _needed_stretch(peaks: dict[str, Peak]) -> float:
     return stretch
 
 
-def _raw(track: Track, length_q40: int) -> RawPieces:
+def _raw(
+    track: Track, length_q40: int, joints: Real | None = None, joints_q40: Int | None = None
+) -> RawPieces:
     starts = np.rint(track.s * 2.0**40).astype(np.int64)
+    if joints is not None and joints_q40 is not None:
+        near = joints_q40[
+            np.clip(np.searchsorted(joints_q40, starts - _DRIFT_Q40), 0, joints_q40.size - 1)
+        ]
+        moved = np.isin(track.s, joints) & (np.abs(near - starts) <= _DRIFT_Q40)
+        starts = np.where(moved, near, starts)
     starts[-1] = length_q40
     c = round_pieces(track.t_q32, starts, track.shape)
     return RawPieces(np.diff(track.t_q32), starts[:-1], c, 0.0, 0.0)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -30,7 +30,9 @@ ALLOWED = 5e-4
 _MOST_ROUNDS = 9
 _GAIN = 1e-4
 _BESIDE = 1e-7
-_LEAST_Q = 1e-12
+_LEAST_Q = 1e-14
+_LEAST_TYPICAL = 1e-12
+_LEAST_P = 1e-300
 _LEAST_FALL = 0.1
 _PATIENCE = 6
 _MOST_TRIALS = 3
@@ -62,6 +64,7 @@ class Solution:
     times: Real
     excess: float
     rounds: int
+    setting: _Setting
 
     @property
     def duration_s(self) -> float:
@@ -70,7 +73,9 @@ class Solution:
 
     def squared_feed(self, s: Real) -> Real:
         """q at arc lengths, above 0 at least by a hair."""
-        return np.maximum(squared_feed(self.grid, self.q, self.slope, s), _LEAST_Q)
+        return np.maximum(
+            squared_feed(self.grid, self.q, self.slope, s), _LEAST_Q * float(self.q.max())
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +93,7 @@ class _Setting:
     gauss: tuple[
         Index, Real, Real
     ]  # interval, arc length and basis of p at the points of quadrature
-    tight: Real | None
+    tight: Real | None = None  # (n,): what the limits of each interval are divided by
 
 
 def plan_window(
@@ -100,12 +105,10 @@ def plan_window(
     period_s: float,
     known: Solution | None = None,
     known_to: float = 0.0,
-    tight: Real | None = None,
 ) -> Solution | None:
     """From `low` to rest at `high`; None where the linear programs have no solution (a moving start only).
 
     known  an earlier solution that is good up to arc length known_to
-    tight  of each interval of `known`, good to its end: what its limits are divided by
     """
     guess = sketch(spline, bounds, low, high, None if start is None else start.q, period_s)
     s, t, step = guess.s, guess.t, guess.step_s
@@ -119,7 +122,7 @@ def plan_window(
             knots = _same_knots(knots, known, known_to)
         last = trial == _MOST_TRIALS - 1
         even = partial(_even, guess, known_to, period_s)
-        setting = _setting(spline, bounds, knots, start, tight)
+        setting = _setting(spline, bounds, knots, start)
         best = _rounds(setting, about, None if last else even)
         if best is None or last or even(best):
             break
@@ -127,6 +130,11 @@ def plan_window(
         guess = _refined(guess, best)
         s, t, step = _retimed(best, guess, period_s)
     return best
+
+
+def tightened(found: Solution, tight: Real) -> Solution | None:
+    """The same window, on the same knots, with the limits of each interval divided by `tight` (n,)."""
+    return _rounds(replace(found.setting, tight=tight), found.squared_feed, None, found)
 
 
 def _same_knots(knots: Real, known: Solution, known_to: float) -> Real:
@@ -173,8 +181,7 @@ def _retimed(found: Solution, guess: Sketch, period_s: float) -> tuple[Real, Rea
     s = grid.sigma(interval, np.tile(u, grid.size))[0]
     s = np.concatenate((grid.s[:1], s))
     s[-1] = grid.s[-1]
-    q = np.maximum(found.squared_feed(s), 1e-12)
-    feed = np.sqrt(q)
+    feed = np.sqrt(found.squared_feed(s))
     part = 2.0 * np.diff(s) / (feed[1:] + feed[:-1])
     part = part.reshape(grid.size, u.size)
     part *= (found.times / part.sum(axis=1))[:, None]
@@ -183,9 +190,7 @@ def _retimed(found: Solution, guess: Sketch, period_s: float) -> tuple[Real, Rea
     return s, t, np.maximum(step, 1.7 * period_s)
 
 
-def _setting(
-    spline: PHSpline, bounds: Bounds, knots: Real, start: State | None, tight: Real | None
-) -> _Setting:
+def _setting(spline: PHSpline, bounds: Bounds, knots: Real, start: State | None) -> _Setting:
     grid = make_grid(knots, start is None)
     caps = _interval_caps(bounds, knots)
     joints = spline.segment_starts_mm
@@ -210,9 +215,7 @@ def _setting(
     limit = np.where(moving, points.most_p, np.inf) * np.where(moving, points.sigma[0], 1.0) ** 2
     np.minimum.at(most, at_start, limit[us == 0.0])
     np.minimum.at(most, at_end, limit[us == 1.0])
-    return _Setting(
-        bounds, grid, start, points, basic, sketched, us < 1.0, most, _gauss(grid), tight
-    )
+    return _Setting(bounds, grid, start, points, basic, sketched, us < 1.0, most, _gauss(grid))
 
 
 def _gauss(grid: Grid) -> tuple[Index, Real, Real]:
@@ -249,18 +252,27 @@ def _interval_caps(bounds: Bounds, knots: Real) -> Real:
 
 
 def _rounds(
-    setting: _Setting, sketched: Feed, even: Callable[[Solution], bool] | None = None
+    setting: _Setting,
+    sketched: Feed,
+    even: Callable[[Solution], bool] | None = None,
+    known: Solution | None = None,
 ) -> Solution | None:
     """Linear programs about the last feed, with further rows where it was above a limit between the others.
 
     One without a solution is solved with limits that give way: the next, about its feed, has one as a rule.
-    even  of a solution: where it is False after _TRUSTED rounds the rest is not worth the effort on these knots
+    even   of a solution: where it is False after _TRUSTED rounds the rest is not worth the effort on these knots
+    known  a solution of nearly the same on the same knots
     """
     grid = setting.grid
     select = Selection(setting.basic, setting.sketched)
     about = About(_p_of(sketched, setting.points.interval, setting.points.s, setting))
     inner = About(_p_of(sketched, setting.gauss[0], setting.gauss[1], setting))
     typical = sketched(grid.s)
+    last_s = np.inf
+    if known is not None:
+        p, d, dd = setting.points.cubic(grid, known.q, known.slope)
+        about = About(np.maximum(p, _LEAST_P), (d, dd))
+        typical, last_s = known.q, known.duration_s
     best: Solution | None = None
     gave_way = False
     for rounds in range(1, _MOST_ROUNDS + 1):
@@ -269,7 +281,7 @@ def _rounds(
             make_rows(setting.points, about, select, setting.once),
             inner.p,
             typical,
-            _LEAST_FALL if rounds > 1 else _LEAST_SKETCHED,
+            _LEAST_FALL if np.isfinite(last_s) else _LEAST_SKETCHED,
         )
         found = solve(problem)
         if found is None:
@@ -287,12 +299,12 @@ def _rounds(
         inner = About(np.maximum(p, _LEAST_FALL * inner.p))
         times = _times(setting, inner.p)
         typical = q
-        gain = np.inf if best is None else best.duration_s - times.sum()
-        best = Solution(grid, q, slope, times, excess, rounds)
+        gain, last_s = last_s - float(times.sum()), float(times.sum())
+        best = Solution(grid, q, slope, times, excess, rounds, setting)
         if rounds == _TRUSTED and even is not None and not even(best):
             return best
         select.everything = rounds >= _PATIENCE
-        if rounds > 1 and excess <= ALLOWED and abs(gain) < _GAIN * times.sum():
+        if excess <= ALLOWED and abs(gain) < _GAIN * last_s:
             break
     if gave_way and setting.start is not None and best is not None and best.excess > _TOLERABLE:
         return None
@@ -318,7 +330,7 @@ def _times(setting: _Setting, p: Real) -> Real:
 def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real, least: float) -> Problem:
     """The quadratic program: least time to second order about a feed, p at the Gauss points, q at the knots."""
     grid = setting.grid
-    typical = np.maximum(typical, 1e-6 * np.max(typical))
+    typical = np.maximum(typical, _LEAST_TYPICAL * np.max(typical))
     scale = np.empty(2 * grid.size + 2)
     scale[0::2] = typical
     width = np.diff(grid.s)

@@ -23,7 +23,7 @@ from .window import Solution, State
 
 Real = NDArray[np.float64]
 
-INTERVALS = 480
+INTERVALS = 960
 """About so many intervals a window."""
 
 _STOPS = 4.0
@@ -32,10 +32,14 @@ _STOPS = 4.0
 _RETREATS = 4
 
 
+class NothingFoundError(PlanError):
+    """The programs of a window that begins at rest have no solution, or none that the solver finds."""
+
+
 def plan_windows(
     spline: PHSpline, bounds: Bounds, period_s: float, intervals: int = INTERVALS
 ) -> Iterator[Ends]:
-    """The parts of the plan in order."""
+    """The parts of the plan in order. Raises NothingFoundError."""
     length = spline.length_mm
     overview = _overview(spline, bounds, period_s)
     held: Solution | None = None
@@ -57,9 +61,7 @@ def plan_windows(
             high = overview.window_end(low, intervals)
             found = plan_measured(spline, bounds, low, high, None, period_s)
         if found is None:
-            raise PlanError(
-                "feed: the planner found no feed at all: please report this path and its limits"
-            )
+            raise NothingFoundError(f"feed: nothing found from arc length {low:g} mm")
         held = found
         if found.grid.s[-1] >= length:
             yield ends_of(found, found.grid.size)
