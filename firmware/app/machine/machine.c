@@ -4,16 +4,7 @@
 
 #include <string.h>
 
-#include "app/machine/machine_private.h"
-
 #define US_PER_MS 1000u
-
-void machine_command(struct machine *machine, enum cia402_goal goal)
-{
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        axis_command(&machine->axes[i], goal);
-    }
-}
 
 void machine_enter_boot(struct machine *machine)
 {
@@ -153,4 +144,12 @@ bool machine_receive(struct machine *machine, uint8_t node, const struct pdo_act
     }
     axis_receive(axis, actual, now_us);
     return all_answered(machine);
+}
+
+bool machine_time_is_up(struct machine *machine)
+{
+    if (machine->ticks_left > 0u) {
+        machine->ticks_left--;
+    }
+    return machine->ticks_left == 0u;
 }

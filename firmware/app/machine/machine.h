@@ -9,8 +9,9 @@
  *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
  * The state changes in two places only: in the requests (mainline, under the lock; machine_requests.c) and in the
- * timer's functions (machine_tick.c, machine_supervise.c, machine_fault.c). The whole struct is guarded by the port's
- * lock.
+ * timer's functions (machine_tick.c, machine_supervise.c, machine_fault.c), and where a fault is raised (machine_raise.c).
+ * The whole struct is guarded by the port's lock. Who uses whom: tick -> fault -> raise -> drives -> machine, and supervise and
+ * requests -> raise.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H
@@ -163,6 +164,8 @@ void machine_supervise(struct machine *machine, uint32_t now_us);
 void machine_note_sent(struct machine *machine, bool sync, bool all);
 /* Moves on by one tick: states, goals and targets of the axes. */
 void machine_step(struct machine *machine);
+/* Counts ticks_left down; true when there are none left. */
+bool machine_time_is_up(struct machine *machine);
 /* How long answers may be late, from the configuration. */
 uint32_t machine_answer_wait_us(const struct machine *machine);
 /* Whether every drive has answered a SYNC since BOOT began. */

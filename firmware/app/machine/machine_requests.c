@@ -2,7 +2,8 @@
 /* What the mainline asks of the machine. docs/architecture.md has the table of requests by state. */
 #include "app/machine/machine.h"
 
-#include "app/machine/machine_private.h"
+#include "app/machine/machine_drives.h"
+#include "app/machine/machine_raise.h"
 
 /* What keeps most requests from being looked at any further. */
 static enum machine_refusal not_available(const struct machine *machine)

@@ -2,12 +2,7 @@
 /* Supervision of the drives, once a tick: answers, states, bits of the statusword, own frames. */
 #include "app/machine/machine.h"
 
-#include "app/machine/machine_private.h"
-
-uint16_t machine_code_of(const struct axis *axis, uint16_t code)
-{
-    return axis->error_code != EMCY_NO_ERROR && fault_is_vague(code) ? axis->error_code : code;
-}
+#include "app/machine/machine_drives.h"
 
 static uint16_t trouble_of(const struct axis *axis)
 {

@@ -2,26 +2,9 @@
 /* The states that time moves on. */
 #include "app/machine/machine.h"
 
-#include "app/machine/machine_private.h"
-
-const struct axis *machine_straggler(const struct machine *machine)
-{
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        const struct axis *axis = &machine->axes[i];
-        if (axis->answers.present && !axis->answers.lost && !axis_reached(axis)) {
-            return axis;
-        }
-    }
-    return NULL;
-}
-
-bool machine_time_is_up(struct machine *machine)
-{
-    if (machine->ticks_left > 0u) {
-        machine->ticks_left--;
-    }
-    return machine->ticks_left == 0u;
-}
+#include "app/machine/machine_drives.h"
+#include "app/machine/machine_fault.h"
+#include "app/machine/machine_raise.h"
 
 static uint8_t silent_node(const struct machine *machine)
 {
@@ -64,7 +47,7 @@ static void step_enabling(struct machine *machine)
 }
 
 /* Without a point there is nothing to brake along. */
-void machine_next_targets(struct machine *machine)
+static void next_targets(struct machine *machine)
 {
     int32_t target_counts[PLANE_AXES];
     const int result = motion_step(&machine->motion, target_counts);
@@ -81,12 +64,32 @@ void machine_next_targets(struct machine *machine)
 static void step_motion(struct machine *machine)
 {
     if (!motion_over(&machine->motion)) {
-        machine_next_targets(machine);
+        next_targets(machine);
         if (machine->state == MACHINE_HOLDING && motion_held(&machine->motion)) {
             machine->state = MACHINE_HELD;
         }
     } else if (machine_time_is_up(machine)) {
         machine->state = MACHINE_READY;
+    }
+}
+
+static void step_braking(struct machine *machine)
+{
+    if (!machine_obeyed(machine)) {
+        machine_fault_quick(machine);
+    } else if (!motion_over(&machine->motion)) {
+        next_targets(machine);
+    } else if (machine_time_is_up(machine)) {
+        machine_switch_off(machine);
+    }
+}
+
+static void step_fault(struct machine *machine)
+{
+    if (machine->fault_phase == MACHINE_FAULT_BRAKING) {
+        step_braking(machine);
+    } else {
+        machine_step_fault(machine);
     }
 }
 
@@ -122,7 +125,7 @@ void machine_step(struct machine *machine)
         step_quick_stop(machine);
         break;
     case MACHINE_FAULT:
-        machine_step_fault(machine);
+        step_fault(machine);
         break;
     case MACHINE_BOOT:
         step_boot(machine);

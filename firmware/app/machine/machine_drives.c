@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/machine/machine_drives.h"
+
+void machine_command(struct machine *machine, enum cia402_goal goal)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        axis_command(&machine->axes[i], goal);
+    }
+}
+
+bool machine_obeyed(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (!axis_obeys(&machine->axes[i])) {
+            return false;
+        }
+    }
+    return machine->unsent_ticks <= MACHINE_UNSENT_MAX;
+}
+
+const struct axis *machine_not_stopped(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (!axis_left(&machine->axes[i])) {
+            return &machine->axes[i];
+        }
+    }
+    return NULL;
+}
+
+const struct axis *machine_straggler(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const struct axis *axis = &machine->axes[i];
+        if (axis->answers.present && !axis->answers.lost && !axis_reached(axis)) {
+            return axis;
+        }
+    }
+    return NULL;
+}
+
+uint16_t machine_code_of(const struct axis *axis, uint16_t code)
+{
+    return axis->error_code != EMCY_NO_ERROR && fault_is_vague(code) ? axis->error_code : code;
+}
