@@ -16,6 +16,9 @@ Unsigned = NDArray[np.uint32]
 
 GREATEST_FACTOR = 2.0
 
+_LEAST_FACTOR = 1.05
+"""Along a path a factor below is 1: it would take half of the room that a hold has, and be of no use."""
+
 _HAIR = 1.0 - 1e-9
 _U32_MAX = 2.0**32 - 1.0
 _TINY = 1e-12
@@ -54,15 +57,17 @@ def override_bounds(
             np.cbrt(_ratio(program.jerk_mm_s3, j)),
         )
     )
+    binding = room if room is not None and room.bounds.obeyed else None
     if room is not None:
         factor = np.minimum(factor, room.factor())
+    if binding is not None:
+        factor = np.where(factor < _LEAST_FACTOR, 1.0, factor)
     # Rounded first: the rates then use the room that the stored factor really leaves.
     factor_q24 = np.floor(np.clip(factor * _HAIR, 1.0, GREATEST_FACTOR) * 2.0**24)
     factor = factor_q24 / 2.0**24
     room_a = controller.acceleration_mm_s2 - factor**2 * a
     room_j = controller.jerk_mm_s3 - factor**3 * j
     own_rate = np.minimum(room_a / v, 0.5 * room_j / (3.0 * factor * a))
-    binding = room if room is not None and room.bounds.obeyed else None
 
     def rates(share: float) -> tuple[Real, Real]:
         rate = own_rate

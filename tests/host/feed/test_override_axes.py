@@ -184,6 +184,15 @@ def test_commands_use_the_reserve_and_come_to_rest() -> None:
     assert State.ENDED in states
 
 
+def test_a_factor_of_no_use_leaves_its_room_to_holds() -> None:
+    """Half of what the reserve leaves would go to an override of 102 %."""
+    limits = Limits(axis=AxisLimits(acceleration_mm_s2=(1500.0, 1500.0)), reserve=0.05)
+    pieces = plan_optimal(wavy(2), FeedRequest("optimal"), limits).pieces
+    factor = pieces.override_factor_q24 / 2.0**24
+    assert ((factor == 1.0) | (factor >= 1.05)).all()
+    assert (factor == 1.0).sum() > 10
+
+
 def test_without_such_limits_nothing_changes() -> None:
     spline = wavy(3)
     request = FeedRequest("minimax", 100.0, 0.1)
