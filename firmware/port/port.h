@@ -69,7 +69,9 @@ struct port_handlers {
     /* now_us: port_time_us() of this interrupt, so that the clock is read once only. */
     void (*receive)(void *self, const struct can_msg *message, uint32_t now_us);
     /* late_ns: how long after its due time the tick began (4.29 s at most are told). A late tick is
-     * called late, never skipped; two ticks are never closer than three quarters of a period. */
+     * called late. Where the port has the choice it skips none, and no two are closer than three quarters
+     * of a period; a timer whose interrupts merge (SysTick) drops those that are a whole period late and
+     * is on time with the next. Either way a program goes on with its next tick: only time is lost. */
     void (*tick)(void *self, uint32_t now_us, uint32_t late_ns);
 };
 
@@ -80,7 +82,7 @@ uint32_t port_time_us(void); /* wraps after 71 minutes */
 /* Turns both interrupts on; the first tick comes one period later. Mainline, once. */
 int port_start(const struct port_handlers *handlers, uint32_t period_us);
 
-/* Changes the period from the next tick on. */
+/* Changes the period: that before the next tick, or, where a timer has loaded it already, that behind it. */
 void port_tick_period(uint32_t period_us);
 
 /* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
