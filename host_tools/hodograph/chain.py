@@ -13,6 +13,7 @@ from time import perf_counter
 from .config import Drive, Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
 from .feed import ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
+from .feed.idle_limits import idle_limits
 from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
 from .program import (
     Compilation,
@@ -60,7 +61,8 @@ def _plant(drive: Drive, volts: float) -> Plant:
     )
     if not plant.reach_mm_s > 0.0:
         raise InputError(
-            f"[limits] volts {volts:g}: friction alone takes {plant.friction_volts:g} V of a drive"
+            f"[limits] volts {volts:g}: friction alone takes {plant.friction_volts:g} V of a drive, "
+            f"which has {drive.volts_limit:g}: give more than that friction, or another drive"
         )
     return plant
 
@@ -208,7 +210,10 @@ class Chain:
     def notes(self, plan: Plan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""
         excesses = tuple(f"feed: {excess}" for excess in plan.excesses)
-        return (*self.spline_result.notes, *plan.notes, *excesses)
+        limits = self.file.limits
+        length_mm = self.spline_result.spline.length_mm
+        idle = idle_limits(limits, self.feed, length_mm, plants(self.machine_or_none, limits))
+        return (*self.spline_result.notes, *plan.notes, *excesses, *idle)
 
 
 @contextmanager
