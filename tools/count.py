@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ ROOT = Path(__file__).resolve().parents[1]
 COMMITTED = ROOT / "tests/data/counts.json"
 DOCUMENT = ROOT / "docs/counts.md"
 _SHOWN = "an386 float"
+_PORT = r"The port adds (\d+) to each tick"
+_WAIT = r"\*supervision\* (\d+), since simulated drives are awaited"
 
 
 def blocks(figures: dict[str, Any]) -> dict[str, str]:
@@ -31,6 +34,7 @@ def blocks(figures: dict[str, Any]) -> dict[str, str]:
     return {
         "compilers": f"Compilers: {versions}; -O2, the tick's own files -O3.\n",
         "goals": tables.goal_lines(figures),
+        "spread": tables.spread_text(figures),
         "motion": tables.whole_table(figures, "motion"),
         "parts": tables.parts_table(figures, "motion"),
         "isr": tables.whole_table(figures, "isr"),
@@ -49,8 +53,13 @@ def everything(build: Path) -> dict[str, Any]:
 
 
 def document(figures: dict[str, Any], text: str) -> str:
-    """The document with the blocks between their marks."""
-    for name, block in blocks(figures).items():
+    """The document with the blocks between their marks.
+
+    What a port adds is measured elsewhere (tools/count_til.py): the document's own sentence has it.
+    """
+    port, wait = (int(re.findall(pattern, text)[0]) for pattern in (_PORT, _WAIT))
+    made = blocks(figures) | {"port": tables.port_table(figures, port, wait)}
+    for name, block in made.items():
         begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->\n"
         before, rest = text.split(begin)
         text = before + begin + block + end + rest.split(end)[1]

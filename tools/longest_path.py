@@ -69,6 +69,7 @@ def document(build: Path, text: str) -> str:
         "longest": table(build),
         "kinds": tables.kinds_table(figures),
         "floor": tables.floor_table(figures, "an386 float"),
+        "fault": tables.fault_text(figures, "an386 float"),
     }
     for name, block in blocks.items():
         begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->\n"

@@ -62,8 +62,7 @@ int main(int argc, char **argv)
                 timebase_override(&tb, k % (2u * SWITCH_TICKS) == 0 ? high : low);
             }
             const uint64_t time_q42_s = timebase_step_q42(&tb);
-            interp_hint(&it, tb.record);
-            (void)interp_at_q42(&it, time_q42_s, &point);
+            (void)interp_at_piece(&it, tb.record, time_q42_s, &point);
             sum += counts_from_q40_mm(point.x_q40_mm, COUNTS_PER_MM);
             sum += counts_from_q40_mm(point.y_q40_mm, COUNTS_PER_MM);
             ticks++;

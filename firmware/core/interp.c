@@ -57,15 +57,14 @@ static int enter_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
         i++;
         start = end;
         end = i + 1u == it->program->header.piece_count
-                  ? UINT64_MAX
+                  ? it->duration_q32_s
                   : end + program_piece_duration(it->program, i);
     }
     load_piece(it, i, start);
     return INTERP_OK;
 }
 
-/* Makes the piece of this time the present one, crossing `most` ends at most. The last piece has no
- * end here: beyond the duration nothing is evaluated. */
+/* Makes the piece of this time, below the duration, the present one, crossing `most` ends at most. */
 static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
 {
     const struct prepared_piece *piece = present_piece(it);
@@ -195,12 +194,21 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
     return 0;
 }
 
+/* Beyond the end of the piece: the last one ends with the program. */
+static int beyond(const struct interp *it, uint64_t time_q42_s, struct interp_point *out)
+{
+    if (time_q42_s >> FINE_BITS < it->duration_q32_s) {
+        return INTERP_ERR_JUMP;
+    }
+    *out = it->end;
+    return INTERP_END;
+}
+
 int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out)
 {
-    if (time_q42_s >> FINE_BITS >= it->duration_q32_s) {
-        *out = it->end;
-        return INTERP_END;
+    if (time_q42_s >> FINE_BITS >= piece->end_q32_s) {
+        return beyond(it, time_q42_s, out);
     }
     struct feed_point f;
     evaluate_feed(it, piece, time_q42_s, &f);

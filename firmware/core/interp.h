@@ -62,7 +62,8 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
 int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
 
 /* The same of a program with records, by whoever has already found the piece that this time lies in: its record. Nothing
- * is looked for but the segment; the cursor of pieces stays where it is. */
+ * is looked for but the segment; the cursor of pieces stays where it is. INTERP_ERR_JUMP too when the piece ends before
+ * this time and is not the last; it must not begin behind it. */
 int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out);
 

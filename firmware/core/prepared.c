@@ -31,8 +31,8 @@ void prepared_piece_make(struct prepared_piece *out, const struct program *p,
     struct program_piece piece;
     program_piece_get(p, i, &piece);
     out->start_q32_s = start_q32_s;
-    out->end_q32_s =
-        i + 1u == p->header.piece_count ? UINT64_MAX : start_q32_s + piece.duration_q32_s;
+    out->end_q32_s = i + 1u == p->header.piece_count ? p->header.duration_q32_s
+                                                     : start_q32_s + piece.duration_q32_s;
     kernel->piece_set(&out->feed, &piece);
 }
 

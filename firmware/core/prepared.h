@@ -26,8 +26,7 @@
 /* A record ends behind the kernel's own part. */
 struct prepared_piece {
     uint64_t start_q32_s;
-    uint64_t
-        end_q32_s; /* UINT64_MAX for the last piece: nothing is evaluated beyond the duration */
+    uint64_t end_q32_s; /* of the last piece the duration */
     struct rate_pace
         ahead[RATE_WINDOWS]; /* of the windows that begin with it; for the header's period */
     union {

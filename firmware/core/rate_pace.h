@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What the pieces ahead allow the rate of program time, in the form in which a tick uses it: nothing is left to divide
- * (docs/numerics.md section 12, "The way to a target"). Made in the main loop, with the prepared records.
+ * (docs/numerics.md section 12, "One move at a time"). Made in the main loop, with the prepared records.
  */
 #ifndef HODOGRAPH_CORE_RATE_PACE_H
 #define HODOGRAPH_CORE_RATE_PACE_H

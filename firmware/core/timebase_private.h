@@ -87,7 +87,7 @@ static inline void timebase_read_ends(struct timebase *tb, uint64_t time_q42_s, 
 }
 
 /* The time is not in the present piece, nor at the end of the program: goes to the one that it is in, crossing
- * `most` ends at most. The record of the last one has no end. */
+ * `most` ends at most. When they are not enough, the piece ends before the time, which interp_at_piece refuses. */
 static inline void timebase_find_piece(struct timebase *tb, uint64_t time_q42_s, uint32_t most)
 {
     const struct prepared_piece *record = tb->record;
@@ -103,7 +103,7 @@ static inline void timebase_find_piece(struct timebase *tb, uint64_t time_q42_s,
     } while (time_q32_s >= record->end_q32_s && left > 0);
     tb->record = record;
     tb->piece += most - left;
-    tb->piece_end_q42_s = timebase_end_q42_s(tb, record->end_q32_s << TIMEBASE_FINE);
+    tb->piece_end_q42_s = record->end_q32_s << TIMEBASE_FINE;
 }
 
 #endif

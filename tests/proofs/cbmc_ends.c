@@ -32,7 +32,7 @@ static struct kernel kernel = {.piece_size = sizeof(struct prepared_piece) -
 static void place(struct timebase *tb, uint32_t i)
 {
     tb->program = &program;
-    tb->duration_q42_s = (uint64_t)any_between(1, INT64_MAX);
+    tb->duration_q42_s = program.header.duration_q32_s << TIMEBASE_FINE;
     tb->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     tb->rest = (uint32_t)any_between(0, TIMEBASE_REST_UNIT - 1);
     tb->fine = (uint32_t)any_between(0, (1 << TIMEBASE_FINE_BITS) - 1);
@@ -45,9 +45,10 @@ void harness(void)
 {
     struct timebase tb;
     program.header.piece_count = COUNT;
+    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> TIMEBASE_FINE);
     program.prepared_for = nondet_uint32() != 0 ? &kernel : 0;
     for (uint32_t k = 0; k < COUNT; k++) {
-        records[k].end_q32_s = k + 1u == COUNT ? UINT64_MAX : nondet_uint64();
+        records[k].end_q32_s = k + 1u == COUNT ? program.header.duration_q32_s : nondet_uint64();
     }
     uint32_t i = nondet_uint32();
     __CPROVER_assume(i < COUNT);

@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 
 import count  # noqa: E402
 from target import adversary  # noqa: E402
-from target.campaign import EXAMPLES  # noqa: E402
+from target.campaign import EXAMPLES, KINDS  # noqa: E402
 from target.counting import Counter  # noqa: E402
 from target.emulator import TARGETS, Target  # noqa: E402
 
@@ -58,6 +58,17 @@ def test_the_counts_of_a_run_are_those_of_the_next() -> None:
     program = adversary.image(adversary.ADVERSARIES[2])
     first, second = (counter.count("float", program, adversary.jitter()) for _ in range(2))
     assert np.array_equal(first, second)
+
+
+def test_a_tick_does_one_thing_with_the_rate() -> None:
+    """docs/wcet.md: none starts, moves, looks at a window and begins a move but one of these."""
+    counter = Counter(BUILD, TARGETS["an386"], functions=True)
+    programs = b"".join(adversary.image(a) for a in adversary.ADVERSARIES)
+    counts = counter.count("float", programs, adversary.restless())
+    columns = [counter.names.index(KINDS[kind]) for kind in ("start", "moves", "looks", "begins")]
+    done = counts[:, columns] > 0
+    assert done.any(axis=0).all()
+    assert done.sum(axis=1).max() == 1
 
 
 def test_interrupts_inside_do_not_count(tmp_path: Path) -> None:

@@ -130,6 +130,38 @@ static void test_the_piece_of_the_timebase_is_the_one(void)
     }
 }
 
+/* An image that program_check would refuse: pieces so short that a tick crosses more ends than it may. */
+static void test_a_tick_that_crosses_three_ends_is_refused(void)
+{
+    for (uint64_t ends = 2; ends <= 3; ends++) {
+        struct timebase tb;
+        struct interp it;
+        struct interp_point point, before;
+        begin("alpha_exponential.hdgp", INTERP_FIXED);
+        const uint64_t tick_q32_s = (uint64_t)ready.header.period_us * 4294967296u / 1000000u;
+        struct prepared_piece *piece = (void *)records.bytes;
+        for (uint64_t k = 1; k <= ends; k++) { /* all between the second tick and the third */
+            const uint64_t end_q32_s = tick_q32_s + tick_q32_s * k / (ends + 1u);
+            piece->end_q32_s = end_q32_s;
+            piece = (void *)((uint8_t *)piece + prepared_piece_size(ready.prepared_for));
+            piece->start_q32_s = end_q32_s;
+        }
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &ready, INTERP_FIXED));
+        timebase_begin(&tb, &ready, ready.header.period_us);
+        tb.piece_end_q42_s = tb.record->end_q32_s << 10; /* as if from the image */
+        for (int k = 0; k < 2; k++) {
+            const uint64_t time_q42_s = timebase_step_q42(&tb);
+            TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_piece(&it, tb.record, time_q42_s, &point));
+        }
+        memcpy(&before, &point, sizeof point);
+        const uint64_t time_q42_s = timebase_step_q42(&tb);
+        const int result = interp_at_piece(&it, tb.record, time_q42_s, &point);
+        TEST_ASSERT_EQUAL_INT(ends == 2 ? INTERP_OK : INTERP_ERR_JUMP, result);
+        TEST_ASSERT_EQUAL_INT(ends == 2 ? 1 : 0, memcmp(&before, &point, sizeof point) != 0);
+        end();
+    }
+}
+
 static void test_windows_hold_the_least_of_their_pieces(void)
 {
     const struct kernel *fixed = kernel_find(INTERP_FIXED);
@@ -189,6 +221,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_same_bits_as_expanded);
     RUN_TEST(test_the_piece_of_the_timebase_is_the_one);
+    RUN_TEST(test_a_tick_that_crosses_three_ends_is_refused);
     RUN_TEST(test_windows_hold_the_least_of_their_pieces);
     RUN_TEST(test_same_rate_as_without_records);
     RUN_TEST(test_an_error_of_the_sink_is_passed_on);

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from target.effects import Effect, effect
+from target.effects import effect
 from target.image import Function, Image
 
 _NEVER = -(10**9)  # what cannot be on the way
@@ -118,7 +118,8 @@ class Longest:
             graph.follow[i] = follow if graph.cost[i] > 0 else []
             todo += graph.follow[i]
             if does.branch is not None and does.branch not in index:
-                self._leave(graph, i, i + len(function.instructions), does)
+                to = self.image.function_at(does.branch)
+                self._leave(graph, i, i + len(function.instructions), to, does.falls)
             if does.jump:
                 jumps.append(i)
         return graph
@@ -130,13 +131,13 @@ class Longest:
             return _NEVER
         return max((self._of(f) for f in there), default=0)
 
-    def _leave(self, graph: _Graph, at: int, leaving: int, does: Effect) -> None:
+    def _leave(self, graph: _Graph, at: int, leaving: int, to: Function, falls: bool) -> None:
         """A jump into another function, which returns to the caller: whoever takes it does nothing else."""
-        cost = self._dearest([self.image.function_at(does.branch or 0)])
+        cost = self._dearest([to])
         if cost > 0:
             graph.cost[leaving], graph.follow[leaving] = cost, []
             graph.follow[at] = [*graph.follow[at], leaving]
-        elif not does.falls:
+        elif not falls:
             graph.cost[at] = _NEVER
 
     def _pointed(self, function: Function, at: int) -> list[Function]:

@@ -97,6 +97,10 @@ def worst(scenarios: Figures, kind: str) -> tuple[int, int]:
     return scenarios[kind]["whole"][1], most
 
 
+# Scenarios of the interrupt alone, and the kind whose median they are compared with.
+_FAULTS = {"fault": "plain", "fault, override": "override"}
+
+
 def _spread(most: int, median: int) -> str:
     spread = most / median
     return f"{spread:.2f}" + ("" if spread <= SPREAD_GOAL else " (missed)")
@@ -134,8 +138,65 @@ def goal_lines(figures: Figures) -> str:
                     _spread(interrupt, usual),
                 ]
                 title = ""
+            for name, kind in _FAULTS.items():
+                usual, most = interrupts[kind]["whole"][1], interrupts[name]["whole"][2]
+                goal = goal_text("isr", target, kernel, name, most)
+                yield ["", name, "", "", "", "", str(most), goal, _spread(most, usual)]
 
     return _table(head, rows())
+
+
+def spread_text(figures: Figures) -> str:
+    """The greatest ratios of worst and median in words, each with where it is."""
+    found: dict[str, list[tuple[float, str]]] = {
+        "motion": [],
+        "isr": [],
+        "fault": [],
+        "settling": [],
+    }
+    for section in ("motion", "isr"):
+        for *_, title, scenarios in _pairs(figures, section):
+            for kind in ("plain", "override"):
+                median, most = worst(scenarios, kind)
+                found[section].append((most / median, f"{title}, {kind}"))
+    for *_, title, scenarios in _pairs(figures, "isr"):
+        for name, kind in _FAULTS.items():
+            ratio = scenarios[name]["whole"][2] / scenarios[kind]["whole"][1]
+            found["fault"].append((ratio, f"{title}, {name}"))
+        _, median, most = scenarios["settling"]["whole"]
+        found["settling"].append((most / median, title))
+    motion, running, fault, settling = (f"{r:.2f} ({w})" for r, w in map(max, found.values()))
+    return (
+        f"Greatest ratios to the median of the examples: of a motion part {motion}; of an interrupt\n"
+        f"while a program runs, drives silent or not, {running}; of one that finds a fault {fault};\n"
+        f"and where axes settle, whose median is a tick that does next to nothing, {settling}.\n"
+    )
+
+
+def port_table(figures: Figures, port: int, wait: int) -> str:
+    """The worst interrupts of the M4F with what a port adds, `wait` of it to wait for simulated drives."""
+    target, kernel = "an386", "float"
+    scenarios = figures["isr"][f"{target} {kernel}"]
+    most = {name: row["whole"][2] for name, row in scenarios.items()}
+    most["plain"] = max(most["plain"], most["plain, adversary"])
+
+    def rows() -> Iterator[list[str]]:
+        for name in ("plain", "plain, silent", "override, silent", *_FAULTS):
+            sums = (most[name] + port, most[name] + port - wait)
+            goals = [goal_text("isr", target, kernel, name, count) for count in sums]
+            yield [name, str(most[name]), str(sums[0]), goals[0], str(sums[1]), goals[1]]
+
+    head = ["M4F, float kernel", "isr.elf", "with the port", "goal", "without the wait", "goal"]
+    return _table(head, rows())
+
+
+def fault_text(figures: Figures, pair: str) -> str:
+    """What finding a fault adds to supervision."""
+    scenarios = figures["isr"][pair]
+    usual = scenarios["plain"]["supervision"][1]
+    most = max(scenarios[name]["supervision"][2] for name in _FAULTS)
+    more = f"{most - usual} more in supervision ({most}, usually {usual})"
+    return f"The tick that finds both drives in a fault takes {more}.\n"
 
 
 def histogram(figures: Figures, pair: str) -> str:
