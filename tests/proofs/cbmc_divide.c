@@ -5,6 +5,7 @@
  *
  * prover: cbmc
  * options: --unwind 70
+ * shows: qmath_clz64 qmath_div_u64
  * mutant: core/qmath.c: int shift = qmath_clz32(b); => int shift = 0;
  * mutant: core/qmath.h: return high != 0 ? => return high == 0 ?
  */

@@ -5,6 +5,7 @@
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
+ * shows: timebase_find_piece
  * mutant: core/timebase_private.h: tb->piece + 1u == tb->program->header.piece_count => tb->piece + 2u == tb->program->header.piece_count
  * mutant: core/timebase_step.c: if (time_q42_s >= tb->duration_q42_s) { => if (time_q42_s > tb->duration_q42_s) {
  * mutant: core/timebase_private.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)

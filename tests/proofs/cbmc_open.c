@@ -6,6 +6,7 @@
  * prover: cbmc
  * options: --unwind 40
  * replaces: read_u16:some_u16 read_u32:some_u32 read_u64:some_u64
+ * shows: program_open
  * mutant: core/program.c: h->image_size > size || =>
  * mutant: core/program.c: NULL || size < PROGRAM_HEADER_SIZE => NULL || size < 64
  * mutant: core/program.c: (uint64_t)h->segment_count * PROGRAM_SEGMENT_SIZE => h->segment_count * PROGRAM_SEGMENT_SIZE

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The square root: no division by 0, no shift out of range, no zero counted, for any number; the root of a word is exact,
- * and no root is above 2^32 - 1.
+ * no root is above 2^32 - 1, none of 2^28
+ * or more below 2^14 - 1.
  *
  * prover: cbmc
  * options: --unwind 70 --unsigned-overflow-check
+ * shows: qmath_root
  * mutant: core/qmath.c: qmath_clz64(a) & ~1 => 0
  * mutant: core/qmath.c: bit = (uint32_t)1 << 30 => bit = (uint32_t)1 << 31
  * mutant: core/qmath.c: bit >>= 2 => bit >>= 3
@@ -28,6 +30,9 @@ void harness(void)
     __CPROVER_assume(word >= 1u << 30);
     uint32_t root = root_of_word(word, &rest);
     prove(root >= 1u << 15 && root < 1u << 16 && rest <= 2u * root);
-    prove(qmath_root(nondet_uint64()) < (uint64_t)1 << 32);
+    uint64_t a = nondet_uint64();
+    uint64_t of_a = qmath_root(a);
+    prove(of_a < (uint64_t)1 << 32);
+    prove(a < (uint64_t)1 << 28 || of_a >= 0x3FFF);
     reached();
 }

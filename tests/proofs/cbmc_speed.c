@@ -7,6 +7,7 @@
  * prover: cbmc
  * options: --unwind 10
  * replaces: qwide_add_product:some_product
+ * shows: check_speed
  * mutant: core/segment_check.c: qwide_add(least, least) => qwide_add(greatest, least)
  * mutant: core/segment_check.c: LONGEST_MM      32 => LONGEST_MM      64
  */

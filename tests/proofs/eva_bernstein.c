@@ -4,6 +4,7 @@
  * nowhere. Its search through the halves: docs/numerics.md section 15.2.
  *
  * prover: eva
+ * shows: bernstein_within
  * mutant: core/bernstein.c: return (a >> 1) + (b >> 1) + (a & b & 1); => return (a + b) >> 1;
  * mutant: core/bernstein.c: right[degree - step] => right[degree + step]
  */

@@ -7,10 +7,12 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * options: -eva-slevel 40
  * assumes: qmath_clz64 qmath_shift_clamp bernstein_within
+ * shows: feed_bounds_start feed_bounds_end feed_bounds_contained feed_bounds_within
  * mutant: core/feed_bounds.c: a[k] >>= 4; => a[k] >>= 2;
  * mutant: core/feed_bounds.c: int shift = 32 - => int shift = 31 -
  * mutant: core/bernstein.c: k <= degree; k++ => k <= 8; k++
  */
+#include "piece_bounds.h"
 #include "proof.h"
 
 /*@ requires a != 0;

@@ -8,6 +8,7 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/feed_piece.c: slope = 2 * qmath_mul_hi(slope, tau_q31) + f->slope[k] => slope = (int32_t)any_between(INT32_MIN, INT32_MAX)
  * assumes: qmath_clz64
+ * shows: feed_piece_set feed_piece_at
  * mutant: core/feed_piece.c: int shift = 22 - exponent => int shift = 62 - exponent
  * mutant: core/feed_piece.c: piece->c_q40_mm[k] * 16 => piece->c_q40_mm[k] * 256
  * mutant: core/feed_piece.c: bits > 32 ? bits - 31 : 1 => bits > 32 ? bits : 1
@@ -46,7 +47,7 @@ int main(void)
         c.c_q40_mm[k] = any_between(-POWER(54), POWER(54));
     }
     feed_piece_set(&f, &c);
-    feed_piece_at(&f, (uint64_t)any_between(0, INT64_MAX), &at);
+    feed_piece_at(&f, (uint64_t)any_between(INT64_MIN, INT64_MAX), &at);
     prove(at.feed_q32_mm_s < POWER(62) && at.feed_q32_mm_s > -POWER(62));
     reached();
     return 0;

@@ -6,6 +6,7 @@
  * prover: eva
  * options: -eva-domains equality,symbolic-locations
  * assumes: segment_check_all piece_check_all crossing_check_all
+ * shows: program_check
  * mutant: core/program_check.c: i < NAME_SIZE && => i <= NAME_SIZE &&
  * mutant: core/program_check.c: h->length_q40_mm <= 0 || =>
  * mutant: core/program_check.c: period_us != 8000 => period_us > 8000

@@ -7,6 +7,7 @@
  * options: -eva-slevel 60
  * instead: core/interp.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
  * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end rate_pace_make
+ * shows: interp_at_q42 interp_seek prepared_make
  * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
  * mutant: core/interp.c: while (i > 0 && => while (
  * mutant: core/interp.c: end = i + 1u == it->program->header.piece_count => end = i == it->program->header.piece_count
@@ -17,13 +18,14 @@
  */
 #include "core/ph_segment.h"
 #include "core/program.h"
-#include "core/rate_pace.h"
 #include "proof.h"
+#include "rate_contracts.h"
+#include "segment_bounds.h"
 
 /*@ requires i < p->header.segment_count;
     assigns *out \from i;
     ensures \initialized(out) && 0 <= out->start_q40_mm < (1 << 62);
-    ensures -(1 << 52) < out->x_q40_mm < (1 << 52) && -(1 << 52) < out->y_q40_mm < (1 << 52); */
+    ensures -(1 << 52) < out->x_q40_mm < (1 << 52) && -(1 << 52) < out->y_q40_mm < (1 << 52) && is_bounded(out); */
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
 
 /*@ requires i < p->header.segment_count;
@@ -41,13 +43,7 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
     ensures 0 < \result <= (1 << 54); */
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
-/*@ requires i < p->header.piece_count;
-    assigns *factor_q24, *rate_q16_per_s, *second_q8_per_s2 \from i;
-    ensures \initialized(factor_q24) && \initialized(rate_q16_per_s) && \initialized(second_q8_per_s2); */
-void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
-                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2);
-
-/*@ requires \initialized(segment);
+/*@ requires \initialized(segment) && is_bounded(segment);
     assigns *ph \from \nothing;
     ensures \initialized(ph); */
 void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segment);
@@ -58,11 +54,6 @@ void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segm
     ensures \initialized(end_q48_mm + (0 .. 2));
     ensures -(1 << 60) < end_q48_mm[0] < (1 << 60) && -(1 << 60) < end_q48_mm[1] < (1 << 60); */
 void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[3]);
-
-/*@ requires \initialized(bounds);
-    assigns *out \from *bounds;
-    ensures \initialized(out); */
-void rate_pace_make(struct rate_pace *out, const struct rate_bounds *bounds, uint32_t period_us);
 
 #include "core/interp.c"
 #include "core/kernel.c"
@@ -111,7 +102,8 @@ static const struct kernel any_kernel = {
 const struct kernel *const kernels_linked[KERNELS] = {&any_kernel, NULL, NULL};
 
 static uint64_t
-    records[COUNT * (sizeof(struct prepared_piece) + sizeof(struct prepared_segment)) / 8];
+    records[COUNT * (sizeof(struct prepared_piece) + sizeof(struct prepared_segment)) / 8 +
+                        1];
 static uint32_t filled;
 
 static int take(void *context, const uint8_t *bytes, uint32_t size)
@@ -181,6 +173,7 @@ int main(void)
     p.image = image;
     p.header.segment_count = COUNT;
     p.header.piece_count = COUNT;
+    p.header.period_us = (uint32_t)1000 << any_between(0, 3);
     p.header.duration_q32_s = (uint64_t)any_between(1, POWER(54) - 1);
     p.header.length_q40_mm = any_between(1, POWER(62) - 1);
     p.prepared = NULL;

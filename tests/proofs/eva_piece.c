@@ -6,6 +6,7 @@
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000
  * assumes: qmath_div_u64 feed_bounds_start feed_bounds_end feed_bounds_contained feed_bounds_within
+ * shows: piece_check_all program_piece_get program_piece_duration program_piece_override
  * mutant: core/piece_check.c: COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 54) => COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 57)
  * mutant: core/piece_check.c: ((int64_t)1 << 50) => ((int64_t)1 << 61)
  */
@@ -16,6 +17,14 @@
     assigns \result \from a, b;
     ensures \result <= a; */
 uint64_t qmath_div_u64(uint64_t a, uint64_t b);
+
+/* What eva_interp.c, eva_crossing.c and eva_rate.c take for granted of pieces */
+/*@ ensures \result < 0 || (\result == 0 && in_range(c) && 0 <= c->start_q40_mm < (1 << 62)); */
+static int check_ranges(const struct program_piece *c);
+
+/*@ ensures \result < 0 || (\result == 0 && 0x1000000 <= c->override_factor_q24 <= 0x2000000 &&
+            c->override_rate_q16_per_s > 0 && c->override_second_q8_per_s2 > 0); */
+static int check_override(const struct program_piece *c);
 
 #include "core/piece_check.c"
 #include "core/program.c"

@@ -4,6 +4,7 @@
  * and a product of small factors is small. The sum is 0 here; qwide_add_product only adds to it.
  *
  * prover: eva
+ * shows: qwide_add_product
  * mutant: core/qwide.c: int64_t high = a1 * b1 => int64_t high = a1 * b1 / 2
  * mutant: core/qwide.c: weight * high => high
  * mutant: core/qwide.c: a >> 25 => a >> 23

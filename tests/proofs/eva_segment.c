@@ -8,6 +8,7 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * options: -eva-domains equality,symbolic-locations
  * assumes: check_speed qmath_clz64
+ * shows: segment_check_all program_segment_get program_segment_start ph_segment_expand ph_segment_end
  * mutant: core/segment_check.c: target_q40 * 256 => target_q40 * 1024
  * mutant: core/ph_segment.c: 8 * (e3 - e1) => 64 * (e3 - e1)
  * mutant: core/segment_check.c: *index < p->header.segment_count => *index <= p->header.segment_count
@@ -20,6 +21,11 @@
     assigns \result \from *g;
     ensures \result < 0 || (\result == 0 && is_bounded(g)); */
 static int check_speed(const struct program_segment *g);
+
+/* What eva_interp.c and eva_crossing.c take for granted of segments */
+/*@ ensures \result < 0 || (\result == 0 && in_range(g) && 0 <= g->start_q40_mm < (1 << 62) &&
+            -(1 << 52) < g->x_q40_mm < (1 << 52) && -(1 << 52) < g->y_q40_mm < (1 << 52)); */
+static int check_ranges(const struct program_segment *g);
 
 /*@ requires a != 0;
     assigns \result \from a;

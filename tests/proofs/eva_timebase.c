@@ -1,67 +1,53 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A tick of the timebase, for any program of three pieces, with records and without, wherever its time and its plan are
- * and after any command: nothing overflows, no window asks for what is behind the last piece. Which piece it is in: cbmc_ends.c.
+ * A tick of the timebase, for any program of three pieces, with records and without, wherever its time is and after any
+ * command: nothing overflows, no window asks for what is behind the last piece. The rate: cbmc_plan.c. Which piece it is in: cbmc_ends.c.
  *
  * prover: eva
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/timebase_step.c: timebase_find_piece(tb, time_q42_s, TIMEBASE_MOST_ENDS); => (void)timebase_find_piece;
- * assumes: qmath_div_u64 program_piece_duration rate_bounds_of rate_pace_make rate_ticks_of rate_step_of rate_span_q32
+ * assumes: qmath_div_u64 program_piece_duration rate_bounds_of rate_pace_make rate_plan_reset rate_plan_move rate_plan_decide rate_plan_steady
+ * shows: rate_window_get
  * mutant: core/rate_window.c: behind < left ? behind : left => behind
- * mutant: core/rate_plan.c: tb->plan.window < RATE_WINDOWS => tb->plan.window <= RATE_WINDOWS
+ * mutant: core/rate_window.c: last + 1u - tb->piece => last - tb->piece
+ * mutant: core/timebase.c: percent < TIMEBASE_MOST_PERCENT ? percent => percent < 2 * TIMEBASE_MOST_PERCENT ? percent
  * mutant: core/timebase_change.c: 3 * tb->now.rate_q57 => 64 * tb->now.rate_q57
  */
 #include "core/timebase.h"
 #include "proof.h"
-
-/* Its value: test_qmath.c. */
-/*@ requires b != 0;
-    assigns \result \from a, b;
-    ensures \result == a / b; */
-uint64_t qmath_div_u64(uint64_t a, uint64_t b);
+#include "qmath_contracts.h"
+#include "rate_contracts.h"
 
 /*@ requires i < p->header.piece_count;
     assigns \result \from i;
     ensures 0 < \result <= (1 << 54); */
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
-/* eva_rate.c has these. */
-/*@ requires first < p->header.piece_count && count > 0;
-    assigns *out \from first, count;
-    ensures \initialized(out); */
-void rate_bounds_of(struct rate_bounds *out, const struct program *p, uint32_t first,
-                    uint32_t count);
+/*@ assigns *plan \from \nothing;
+    ensures \initialized(plan); */
+void rate_plan_reset(struct rate_plan *plan);
 
-/*@ predicate is_pace(struct rate_pace *pace) =
-      0x1000000 <= pace->factor_q24 <= 0x2000000 && pace->turns >= 1; */
-/*@ requires \initialized(bounds);
-    assigns *out \from period_us;
-    ensures \initialized(out) && is_pace(out); */
-void rate_pace_make(struct rate_pace *out, const struct rate_bounds *bounds, uint32_t period_us);
+/*@ predicate is_timebase(struct timebase *tb) =
+      IS_RATE(tb->now.rate_q57) && -RATE_MOST <= tb->now.slope_q56 <= RATE_MOST && IS_RATE(tb->override_q57) &&
+      RATE_ONE <= tb->least_q57 <= RATE_MOST && tb->state <= TIMEBASE_HELD; */
 
-/*@ requires -(1 << 60) <= way_q57 <= (1 << 60) && \initialized(pace);
-    assigns *ticks \from way_q57;
-    ensures \initialized(ticks) && ticks->rise >= 1 && ticks->half >= 1; */
-void rate_ticks_of(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t way_q57);
+/*@ requires is_timebase(tb);
+    assigns \result, tb->plan \from tb->now.rate_q57;
+    ensures -RATE_MOST <= \result <= RATE_MOST; */
+int64_t rate_plan_move(struct timebase *tb);
 
-/*@ requires ticks->rise >= 1 && ticks->half >= 1 && -(1 << 60) <= way_q57 <= (1 << 60);
-    assigns \result \from way_q57;
-    ensures 0 <= \result <= (1 << 59); */
-int64_t rate_step_of(const struct rate_ticks *ticks, int64_t way_q57);
+/*@ requires is_timebase(tb);
+    assigns tb->plan, tb->now.rate_q57, tb->saturated \from tb->now.rate_q57;
+    ensures IS_RATE(tb->now.rate_q57); */
+void rate_plan_decide(struct timebase *tb);
 
-/*@ requires \initialized(ticks);
-    assigns \result \from mean_q57, period_q32_s; */
-uint64_t rate_span_q32(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s);
+/*@ requires is_timebase(tb);
+    assigns \result, tb->plan.task, tb->plan.searched, tb->saturated \from tb->now.rate_q57;
+    ensures \result == 0 || \result == 1; */
+int rate_plan_steady(struct timebase *tb);
 
-#include "core/rate.c"
-#include "core/rate_plan.c"
-#define climb search_climb
-#include "core/rate_search.c"
-#undef climb
-#define look window_look
 #include "core/rate_window.c"
-#undef look
 #include "core/timebase.c"
 #include "core/timebase_change.c"
 #include "core/timebase_step.c"
@@ -72,27 +58,16 @@ static uint64_t records[COUNT * sizeof(struct prepared_piece) / 8];
 
 static const struct kernel any_kernel = {.piece_size = sizeof(struct feed_piece)};
 
-static struct rate_ticks any_ticks(void)
+/* Rates up to RATE_MOST, slopes up to a whole way: cbmc_plan.c. */
+static void set_rate(struct timebase *tb)
 {
-    struct rate_ticks t = {(uint32_t)any_between(1, UINT32_MAX),
-                           (uint32_t)any_between(1, UINT32_MAX)};
-    return t;
+    tb->now.rate_q57 = any_between(0, RATE_MOST);
+    tb->now.slope_q56 = any_between(-RATE_MOST, RATE_MOST);
 }
 
-/* Whatever the plan is: rates up to RATE_MOST, slopes and steps up to half of it (section 15.4). */
-static void set_plan(struct timebase *tb)
+static uint32_t any_period(void)
 {
-    struct rate_plan *plan = &tb->plan;
-    Frama_C_make_unknown((char *)plan, sizeof *plan);
-    plan->window = (uint32_t)any_between(0, RATE_WINDOWS);
-    plan->goal_q57 = any_between(0, RATE_MOST);
-    plan->wanted_q57 = any_between(-1, RATE_MOST);
-    plan->move.step_q56 = any_between(-RATE_ONE, RATE_ONE);
-    plan->move.rest_q57 = any_between(-POWER(60), POWER(60));
-    plan->ticks = any_ticks();
-    plan->back = any_ticks();
-    tb->now.rate_q57 = any_between(0, RATE_MOST);
-    tb->now.slope_q56 = any_between(-RATE_ONE, RATE_ONE);
+    return (uint32_t)1000 << any_between(0, 3);
 }
 
 static void command(struct timebase *tb)
@@ -132,18 +107,39 @@ static void place(struct timebase *tb, uint32_t i)
     tb->started = (uint32_t)any_between(0, 1);
 }
 
+static void look_ahead(const struct timebase *tb)
+{
+    struct rate_window w;
+    //@ loop unroll 5;
+    for (uint32_t window = 0; window < RATE_WINDOWS; window++) {
+        rate_window_get(&w, tb, window);
+        const struct rate_pace pace = *w.pace;
+        prove(IS_FACTOR(pace.factor_q24) && pace.turns >= 1);
+        prove(pace.inverse_slope <= 0x80000001 && pace.inverse_root <= 0x80040000);
+    }
+}
+
 static void tick(const struct program *p)
 {
     struct timebase tb;
-    timebase_begin(&tb, p, (uint32_t)any_between(1000, 8000));
+    timebase_begin(&tb, p, any_period());
     //@ loop unroll 3;
     for (uint32_t i = 0; i < COUNT; i++) {
-        set_plan(&tb);
+        set_rate(&tb);
         place(&tb, i);
+        look_ahead(&tb);
         command(&tb);
         timebase_step_q42(&tb);
         timebase_rate_q30(&tb);
     }
+}
+
+static struct rate_pace any_pace(void)
+{
+    struct rate_pace pace = {
+        (uint32_t)any_between(1 << 24, 1 << 25), (uint32_t)any_between(1, UINT32_MAX),
+        (uint32_t)any_between(0, 0x80000001), (uint32_t)any_between(0, 0x80040000)};
+    return pace;
 }
 
 int main(void)
@@ -162,7 +158,7 @@ int main(void)
         struct prepared_piece *record = (void *)prepared_piece_at(&p, &any_kernel, i);
         record->end_q32_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(1, POWER(54));
         for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
-            record->ahead[k].factor_q24 = (uint32_t)any_between(1 << 24, 1 << 25);
+            record->ahead[k] = any_pace();
         }
     }
     tick(&p);

@@ -86,6 +86,25 @@ static void test_divisions(void)
     }
 }
 
+/* docs/numerics.md section 15.2: never above floor(a / n), less than 2.1 below a / n. Multiples, their neighbours, powers of
+ * two, and the ends of the range, where 2^-64 |a| is largest. */
+static void test_thirds_and_fifths_at_the_corners(void)
+{
+    const int64_t most = ((int64_t)1 << 62) - 1;
+    for (int bits = 1; bits <= 62; bits++) {
+        for (int64_t near = -16; near <= 16; near++) {
+            int64_t a = ((int64_t)1 << bits) + near;
+            a = a > most ? most + near - 16 : a;
+            for (int sign = -1; sign <= 1; sign += 2) {
+                int64_t third = sign * a - 3 * qmath_third(sign * a);
+                int64_t fifth = sign * a - 5 * qmath_fifth(sign * a);
+                TEST_ASSERT_TRUE(third >= 0 && third <= 6);
+                TEST_ASSERT_TRUE(fifth >= 0 && fifth <= 10);
+            }
+        }
+    }
+}
+
 static void test_shifts(void)
 {
     const int64_t most = ((int64_t)1 << 62) - 1;
@@ -177,6 +196,7 @@ int main(void)
     RUN_TEST(test_wide_products);
     RUN_TEST(test_product_q44);
     RUN_TEST(test_divisions);
+    RUN_TEST(test_thirds_and_fifths_at_the_corners);
     RUN_TEST(test_shifts);
     RUN_TEST(test_sizes_and_order);
     RUN_TEST(test_exact_products);

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""prove.py [--build DIR] [--jobs N] [--no-mutants] [NAME...]: runs the proofs of tests/proofs and prints what came out.
+"""prove.py [--build DIR] [--jobs N] [--no-mutants] [--contracts] [NAME...]: runs the proofs of tests/proofs.
 
 A proof is a C file with a first comment that says, line by line, `prover: eva` or `prover: cbmc`, the functions whose
-contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), more `options:`, what stands `instead:` of something
-equal that the prover cannot follow, and its `mutant:`s, both `FILE: OLD => NEW`. It counts as proven when the prover
-has no doubt left and has come to the proof's end, reached(); then in each mutant, a copy of the firmware with that
-mistake, the prover must find something: so no proof holds of nothing. The last line is `N passed, N failed`, mutants
-counted too. Exit status 1 unless all is as it should be.
+contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), those that it `shows:`, more `options:`, what stands
+`instead:` of something equal that the prover cannot follow, and its `mutant:`s, both `FILE: OLD => NEW`. It counts as
+proven when the prover has no doubt left and has come to the proof's end, reached(), for machines of 64 and of 32 bits;
+then in each mutant, a copy of the firmware with that mistake, the prover must find something: so no proof holds of
+nothing. What one proof takes for granted another has to show, or argued.txt has it, with the argument and a test;
+--contracts prints that table and runs nothing. The last line is `N passed, N failed`, mutants counted too. Exit status
+1 unless all is as it should be.
 """
 
 from __future__ import annotations
@@ -29,14 +31,15 @@ ROOT = Path(__file__).resolve().parents[2]
 PROOFS = ROOT / "tests" / "proofs"
 LIMIT_S = 120  # of processor time, for one run of a prover
 PATIENCE = 10  # times that, of wall time: machines may be busy
+MACHDEP = {64: "gcc_x86_64", 32: "gcc_x86_32"}  # Eva's machines by bits of a pointer
+PICOLIBC = "/usr/lib/picolibc/arm-none-eabi/picolibc.specs"  # what the firmware is built with
+PLAIN = (
+    f"--specs={PICOLIBC}",
+    "-U__arm__",
+    "-D__IEEE_LITTLE_ENDIAN",
+)  # no assembler: CBMC does not read it
 EVA = (
-    *(
-        "-machdep",
-        "gcc_x86_64",
-        "-eva",
-        "-eva-no-results",
-        "-eva-msg-key=-initial-state,-final-states",
-    ),
+    *("-eva", "-eva-no-results", "-eva-msg-key=-initial-state,-final-states"),
     *("-eva-slevel", "200", "-eva-split-limit", "200", "-eva-auto-loop-unroll", "20"),
     *("-eva-equality-through-calls", "all", "-eva-split-return", "full"),
 )
@@ -54,6 +57,7 @@ class Proof:
     prover: str = ""
     assumes: list[str] = field(default_factory=list)
     replaces: list[str] = field(default_factory=list)
+    shows: list[str] = field(default_factory=list)
     options: list[str] = field(default_factory=list)
     mutants: list[tuple[str, str, str]] = field(default_factory=list)
     instead: list[tuple[str, str, str]] = field(default_factory=list)
@@ -81,7 +85,7 @@ def read_proof(path: Path) -> Proof:
                 raise BadProof(f"{path}: {key} is not FILE: OLD => NEW: {value}")
             list_ = proof.mutants if key == "mutant" else proof.instead
             list_.append((found[1], found[2], found[3] or ""))
-        elif key in ("assumes", "replaces", "options"):
+        elif key in ("assumes", "replaces", "shows", "options"):
             getattr(proof, key).extend(value.split())
     if proof.prover not in ("eva", "cbmc") or not proof.mutants:
         raise BadProof(f"{path}: needs a prover, eva or cbmc, and at least one mutant")
@@ -110,15 +114,22 @@ class CannotTell(Exception):
     """A prover gave up, or never came to the end of a proof."""
 
 
-def _eva(proof: Proof, firmware: Path, bin_: Path, work: Path) -> str:
+def _undeclared(proof: Proof, out: str) -> list[str]:
+    """Functions that Eva took a contract for though the proof does not say so."""
+    used = set(re.findall(r"using specification for function (\w+)", out))
+    own = {name for name in used if re.match("Frama_C_|__|mem|prove$", name)}
+    return sorted(used - own - set(proof.assumes))
+
+
+def _eva(proof: Proof, firmware: Path, bin_: Path, work: Path, bits: int) -> str:
     specified = ["-eva-use-spec", ",".join(proof.assumes)] if proof.assumes else []
-    if work.name != proof.name:  # a mutant: one alarm is enough
+    if not work.parent.name.isdigit():  # a mutant: one alarm is enough
         specified += ["-eva-stop-at-nth-alarm", "1"]
     source = PROOFS / f"{proof.name}.c"
     status, out = _call(
         [
             *(str(bin_ / "frama-c"), f"-cpp-extra-args=-I{firmware} -I{PROOFS}", str(source)),
-            *(*EVA, *specified, *proof.options),
+            *("-machdep", MACHDEP[bits], *EVA, *specified, *proof.options),
         ]
     )
     doubts = re.findall(r"^\[eva:alarm\] (.+?)\s*$\n(?:  )?(.*)$", out, re.MULTILINE)
@@ -130,18 +141,22 @@ def _eva(proof: Proof, firmware: Path, bin_: Path, work: Path) -> str:
         return "a contract was not proven: " + out[-900:]
     if "Frama_C_show_each_reached" not in out:
         raise CannotTell("its end was not reached")
+    if undeclared := _undeclared(proof, out):
+        return f"takes for granted, and does not say so: {' '.join(undeclared)}"
     return ""
 
 
-def _cbmc(proof: Proof, firmware: Path, bin_: Path, work: Path) -> str:
-    whole, replaced = work / "whole.gb", work / "replaced.gb"
-    source = PROOFS / f"{proof.name}.c"
-    steps = [
-        [
-            *(str(bin_ / "goto-cc"), "-o", str(whole), "--function", "harness"),
-            *(f"-I{firmware}", f"-I{PROOFS}", str(source)),
+def _cbmc(proof: Proof, firmware: Path, bin_: Path, work: Path, bits: int) -> str:
+    whole, replaced, source = work / "whole.gb", work / "replaced.gb", PROOFS / f"{proof.name}.c"
+    paths = [f"-I{firmware}", f"-I{PROOFS}"]
+    compile_ = [str(bin_ / "goto-cc"), "-o", str(whole), "--function", "harness"]
+    steps = [[*compile_, *paths, str(source)]]
+    if bits == 32:  # with the headers of a 32-bit C library
+        one = work / "whole.i"
+        steps = [
+            ["arm-none-eabi-gcc", *PLAIN, "-E", *paths, "-o", str(one), str(source)],
+            [*compile_, "-m32", str(one)],
         ]
-    ]
     calls = [word for pair in proof.replaces for word in ("--replace-calls", pair)]
     steps.append([str(bin_ / "goto-instrument"), *calls, str(whole), str(replaced)])
     for step in steps:
@@ -158,12 +173,12 @@ def _cbmc(proof: Proof, firmware: Path, bin_: Path, work: Path) -> str:
     return ""
 
 
-def run(proof: Proof, firmware: Path, bin_: Path, work: Path) -> Verdict:
-    """Runs the prover on one proof, with the firmware from a folder."""
+def run(proof: Proof, firmware: Path, bin_: Path, work: Path, bits: int) -> Verdict:
+    """Runs the prover on one proof, with the firmware from a folder, for a machine of so many bits."""
     work.mkdir(parents=True, exist_ok=True)
     start = time.monotonic()
     try:
-        why = (_eva if proof.prover == "eva" else _cbmc)(proof, firmware, bin_, work)
+        why = (_eva if proof.prover == "eva" else _cbmc)(proof, firmware, bin_, work, bits)
         proven, doubt = why == "", why != ""
     except CannotTell as error:
         proven, doubt, why = False, False, str(error)
@@ -183,28 +198,73 @@ def make_copy(changes: list[tuple[str, str, str]], work: Path) -> Path:
     return firmware
 
 
-def _report(proof: Proof, what: str, good: bool, verdict: Verdict, said: str) -> dict[str, object]:
+@dataclass
+class Run:
+    """A proof, or one of its mutants, for one machine."""
+
+    proof: Proof
+    bits: int
+    mutant: int | None = None
+
+
+def _report(run_: Run, what: str, good: bool, verdict: Verdict, said: str) -> dict[str, object]:
+    proof = run_.proof
     print(
-        f"  {said:9} {verdict.seconds:6.1f} s  {proof.prover:4}  {proof.name}  {what}", flush=True
+        f"  {said:9} {verdict.seconds:6.1f} s  {proof.prover:4}  {run_.bits}  {proof.name}  {what}",
+        flush=True,
     )
     if not good:
         print(f"    {verdict.why}", flush=True)
-    return {"proof": proof.name, "what": what, "good": good, "seconds": round(verdict.seconds, 1)}
+    seconds = round(verdict.seconds, 1)
+    return {
+        "proof": proof.name,
+        "bits": run_.bits,
+        "what": what,
+        "good": good,
+        "seconds": seconds,
+    }
 
 
-def check(proof: Proof, mutant: int | None, build: Path) -> dict[str, object]:
+def check(run_: Run, build: Path) -> dict[str, object]:
     """The proof, or one of its mutants; as an entry of the JSON."""
-    bin_, work = build / "provers" / "bin", build / "proofs" / proof.name
-    if mutant is None:
-        verdict = run(proof, make_copy(proof.instead, work), bin_, work)
+    proof, bits = run_.proof, run_.bits
+    bin_, work = build / "provers" / "bin", build / "proofs" / str(bits) / proof.name
+    if run_.mutant is None:
+        verdict = run(proof, make_copy(proof.instead, work), bin_, work, bits)
         good = verdict.proven
-        return _report(proof, "", good, verdict, "proven" if good else "NOT")
-    change = proof.mutants[mutant]
-    work = work / str(mutant)
-    verdict = run(proof, make_copy([*proof.instead, change], work), bin_, work)
+        return _report(run_, "", good, verdict, "proven" if good else "NOT")
+    change = proof.mutants[run_.mutant]
+    work = work / str(run_.mutant)
+    verdict = run(proof, make_copy([*proof.instead, change], work), bin_, work, bits)
     good = verdict.doubt
     what = f"mutant: {change[1]} => {change[2]}"
-    return _report(proof, what, good, verdict, "found" if good else "MISSED")
+    return _report(run_, what, good, verdict, "found" if good else "MISSED")
+
+
+def read_argued() -> dict[str, str]:
+    """What no prover shows: by function, the argument and its test."""
+    lines = (PROOFS / "argued.txt").read_text().splitlines()
+    pairs = (line.split(None, 1) for line in lines if line and not line.startswith("#"))
+    return {name: how.strip() for name, how in pairs}
+
+
+def contracts(proofs: list[Proof]) -> list[tuple[str, str, str]]:
+    """Each function that a proof takes for granted, by which, and what shows it; BadProof when nothing does."""
+    argued = read_argued()
+    users: dict[str, list[str]] = {}
+    for proof in proofs:
+        for name in (*proof.assumes, *(pair.split(":")[0] for pair in proof.replaces)):
+            users.setdefault(name, []).append(proof.name)
+    table = []
+    for name, assumed in sorted(users.items()):
+        shown = [f"`{proof.name}`" for proof in proofs if name in proof.shows]
+        shown += [argued[name]] if name in argued else []
+        if not shown:
+            raise BadProof(f"{assumed[0]} takes {name} for granted, which nothing shows")
+        table.append((name, ", ".join(f"`{a}`" for a in assumed), "; ".join(shown)))
+    if spare := sorted(set(argued) - set(users)):
+        raise BadProof(f"argued.txt has what no proof takes for granted: {' '.join(spare)}")
+    return table
 
 
 def main() -> int:
@@ -214,16 +274,22 @@ def main() -> int:
     parser.add_argument("--build", type=Path, default=ROOT / "build")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--no-mutants", action="store_true", help="only the proofs themselves")
+    parser.add_argument("--contracts", action="store_true", help="what each takes for granted")
     options = parser.parse_args()
     build = options.build.resolve()
     try:
-        paths = [PROOFS / f"{name}.c" for name in options.names] or sorted(PROOFS.glob("*.c"))
-        proofs = [read_proof(path) for path in paths]
-        runs: list[tuple[Proof, int | None]] = [(proof, None) for proof in proofs]
+        everything = [read_proof(path) for path in sorted(PROOFS.glob("*.c"))]
+        table = contracts(everything)
+        if options.contracts:
+            print("| function | taken for granted by | shown by |\n| --- | --- | --- |")
+            print("\n".join(f"| `{name}` | {users} | {shown} |" for name, users, shown in table))
+            return 0
+        proofs = [read_proof(PROOFS / f"{name}.c") for name in options.names] or everything
+        runs = [Run(proof, bits) for proof in proofs for bits in MACHDEP]
         if not options.no_mutants:
-            runs += [(proof, i) for proof in proofs for i in range(len(proof.mutants))]
+            runs += [Run(proof, 64, i) for proof in proofs for i in range(len(proof.mutants))]
         with ThreadPoolExecutor(options.jobs) as pool:
-            entries = list(pool.map(lambda one: check(one[0], one[1], build), runs))
+            entries = list(pool.map(lambda one: check(one, build), runs))
     except BadProof as error:
         print(f"prove.py: {error}", file=sys.stderr)
         return 1

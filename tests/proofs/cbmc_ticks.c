@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * A way has no more ticks of rise than of half, whatever the products of rate_ticks_of are, so `even` is not negative; and
+ * a step is a half of its way at most.
+ *
+ * prover: cbmc
+ * replaces: qmath_product_unsigned:some_product qmath_div_u64:some_quotient
+ * shows: rate_ticks_of rate_step_of
+ * mutant: core/rate.c: half > ticks->rise ? half => half > ticks->rise + 1u ? half
+ * mutant: core/rate.c: ? half : ticks->rise => ? half : ticks->rise - 1u
+ * mutant: core/rate.c: ticks->rise, ticks->half) << 1 => ticks->rise, ticks->half)
+ */
+#include "proof.h"
+#include "rate_contracts.h"
+
+uint64_t some_product(uint32_t a, uint32_t b)
+{
+    uint64_t product = nondet_uint64();
+    assume(a == 0 || b == 0 || a > MOST_HALF || b > MOST_HALF ||
+           (product > 0 && product <= (uint64_t)1 << 56));
+    return product;
+}
+
+uint64_t some_quotient(uint64_t a, uint64_t b)
+{
+    uint64_t quotient = nondet_uint64();
+    prove(b != 0);
+    assume(quotient <= a && (b < 2 || quotient <= a / 2));
+    return quotient;
+}
+
+#include "core/qmath.c"
+#include "core/rate.c"
+
+void harness(void)
+{
+    struct rate_pace pace;
+    struct rate_ticks ticks;
+    int64_t way_q57 = any_between(0, RATE_MOST);
+    assume(IS_PACE(&pace));
+    rate_ticks_of(&ticks, &pace, way_q57);
+    prove(ticks.rise <= ticks.half);
+    ticks.rise = nondet_uint32();
+    ticks.half = nondet_uint32();
+    assume(IS_TICKS(&ticks));
+    prove(rate_step_of(&ticks, way_q57) <= way_q57 / 2);
+    reached();
+}

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The text of any code: found inside the table, and never none.
+ *
+ * prover: eva
+ * shows: program_error_text
+ * mutant: core/program_error.c: i < sizeof texts => i <= sizeof texts
+ * mutant: core/program_error.c: return "unknown error" => return NULL
+ */
+#include "proof.h"
+
+#include "core/program_error.c"
+
+int main(void)
+{
+    const char *text = program_error_text((int)any_between(INT32_MIN, INT32_MAX));
+    prove(text != NULL);
+    prove(text[0] != '\0');
+    reached();
+    return 0;
+}

@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What holds of the plan of the rate before and behind every tick, `is_sound`: the rate is in [0, 2], so is where a move
+ * ends, no slope is greater than a way, and what is looked for or about to begin can be. cbmc_plan.c shows it for ticks at
+ * rest, with every command, and from the first tick on; docs/numerics.md section 15.4 argues it for ticks of a move.
+ *
+ * With d the step, f the ticks risen, r and e those of rise and of even slope that are left, the slope is d f, a cut would
+ * raise the rate by d f^2, and what is still to come before the fall raises it by 4 d f r + 2 d r^2 + 2 d e (f + r) more:
+ * three numbers of their own here.
+ */
+#ifndef HODOGRAPH_PLAN_IS_SOUND_H
+#define HODOGRAPH_PLAN_IS_SOUND_H
+
+#include "proof.h"
+#include "rate_contracts.h"
+
+#include "core/rate.c"
+#include "core/rate_plan.c"
+#define climb search_climb
+#include "core/rate_search.c"
+#undef climb
+
+/* --- What the plan stands on: rate_contracts.h --- */
+
+static int64_t begun_q57; /* the way that a step was made for */
+
+void some_ticks(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t way_q57)
+{
+    (void)pace;
+    prove(IS_RATE(way_q57));
+    ticks->rise = nondet_uint32();
+    ticks->half = nondet_uint32();
+    assume(IS_TICKS(ticks));
+}
+
+int64_t some_step(const struct rate_ticks *ticks, int64_t way_q57)
+{
+    prove(IS_TICKS(ticks));
+    prove(IS_RATE(way_q57));
+    begun_q57 = way_q57;
+    return any_between(0, way_q57 / 2);
+}
+
+uint64_t some_span(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s)
+{
+    (void)period_q32_s;
+    prove(IS_TICKS(ticks));
+    prove(IS_RATE(mean_q57));
+    uint64_t span = nondet_uint64();
+    assume(span <= MOST_SPAN);
+    return span;
+}
+
+void some_window(struct rate_window *w, const struct timebase *tb, uint32_t window)
+{
+    (void)tb;
+    prove(window < RATE_WINDOWS);
+    w->own.factor_q24 = nondet_uint32();
+    assume(IS_FACTOR(w->own.factor_q24));
+    w->pace = &w->own;
+    w->end_q32_s = nondet_uint64();
+}
+
+/* --- A move --- */
+
+struct way {
+    int64_t slope; /* d f */
+    int64_t fall;  /* d f^2 */
+    int64_t ahead; /* what rise and even slope still add to where a cut would end */
+};
+
+static int along(int64_t a, int64_t step)
+{
+    return step < 0 ? a <= 0 : a >= 0;
+}
+
+static int64_t end_of(const struct timebase *tb, const struct way *way)
+{
+    return tb->now.rate_q57 + way->fall + way->ahead;
+}
+
+static int is_way(const struct timebase *tb, const struct way *way)
+{
+    const struct rate_move *m = &tb->plan.move;
+    if (!(IS_RATE(tb->now.rate_q57) && tb->now.slope_q56 == way->slope)) {
+        return 0;
+    }
+    if (!rate_moves(m)) {
+        return way->slope == 0 && way->fall == 0 && way->ahead == 0;
+    }
+    return m->rest_q57 == tb->now.rate_q57 + way->fall && IS_RATE(end_of(tb, way)) &&
+           m->rise <= MOST_HALF && m->fall <= MOST_HALF && m->rise + m->fall <= MOST_HALF &&
+           along(way->slope, m->step_q56) && along(way->fall, m->step_q56) &&
+           along(way->ahead, m->step_q56);
+}
+
+/* --- The plan --- */
+
+static int task_is_sound(const struct timebase *tb)
+{
+    const struct rate_plan *plan = &tb->plan;
+    int above = tb->now.rate_q57 > tb->least_q57;
+    if (plan->task == RATE_TASK_NONE) {
+        return 1;
+    }
+    if (rate_moves(&plan->move) || !IS_RATE(plan->goal_q57) || plan->wanted_q57 < 0 ||
+        (plan->task == RATE_TASK_BEGIN && !IS_TICKS(&plan->ticks))) {
+        return 0;
+    }
+    switch (plan->kind) {
+    case RATE_STAY:
+        return above && plan->task == RATE_TASK_SEARCH;
+    case RATE_LEAVE:
+        return above && plan->goal_q57 <= tb->least_q57;
+    case RATE_SETTLE:
+        return !above && plan->goal_q57 <= tb->least_q57;
+    default:
+        return plan->task == RATE_TASK_SEARCH || IS_TICKS(&plan->back);
+    }
+}
+
+/* Above the least factor the way back is known. */
+static int is_sound(const struct timebase *tb, const struct way *way)
+{
+    const struct rate_plan *plan = &tb->plan;
+    int above = tb->now.rate_q57 > tb->least_q57 || end_of(tb, way) > tb->least_q57;
+    return is_way(tb, way) && task_is_sound(tb) && plan->task <= RATE_TASK_BEGIN &&
+           plan->kind <= RATE_CLIMB && plan->window <= RATE_WINDOWS && plan->wanted_q57 >= -1 &&
+           plan->wanted_q57 <= RATE_MOST && (!above || IS_TICKS(&plan->back));
+}
+
+static void any_timebase(struct timebase *tb, struct way *way)
+{
+    assume(IS_FACTOR(tb->least.factor_q24));
+    tb->least_q57 = (int64_t)tb->least.factor_q24 << 33;
+    assume(IS_RATE(tb->override_q57));
+    assume(tb->state <= TIMEBASE_HELD);
+    assume(IS_RATE(tb->now.rate_q57));
+    way->slope = any_between(-RATE_MOST, RATE_MOST);
+    way->fall = any_between(-RATE_MOST, RATE_MOST);
+    way->ahead = any_between(-RATE_MOST, RATE_MOST);
+    assume(tb->plan.move.step_q56 >= -RATE_MOST && tb->plan.move.step_q56 <= RATE_MOST);
+    assume(is_sound(tb, way));
+}
+
+#endif

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What other proofs take for granted of qmath. Which proof or test shows each: docs/numerics.md section 15.5.
+ */
+#ifndef HODOGRAPH_QMATH_CONTRACTS_H
+#define HODOGRAPH_QMATH_CONTRACTS_H
+
+#include <stdint.h>
+
+/*@ requires a != 0;
+    assigns \result \from a;
+    ensures 0 <= \result <= 63 && (a < 0x8000000000000000 ==> \result >= 1); */
+static inline int qmath_clz64(uint64_t a);
+
+/*@ assigns \result \from a, shift;
+    ensures -(1 << 62) < \result < (1 << 62); */
+int64_t qmath_shift_clamp(int64_t a, int shift);
+
+/*@ requires b != 0;
+    assigns \result \from a, b;
+    ensures \result == a / b; */
+uint64_t qmath_div_u64(uint64_t a, uint64_t b);
+
+/*@ assigns \result \from a;
+    ensures \result < 0x100000000 && (a >= 0x10000000 ==> \result >= 0x3FFF); */
+uint64_t qmath_root(uint64_t a);
+
+/*@ requires -(1 << 62) < a < (1 << 62);
+    assigns \result \from a;
+    ensures a / 3 - 3 <= \result <= a / 3; */
+int64_t qmath_third(int64_t a);
+
+/*@ requires -(1 << 62) < a < (1 << 62);
+    assigns \result \from a;
+    ensures a / 5 - 3 <= \result <= a / 5; */
+int64_t qmath_fifth(int64_t a);
+
+#endif

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What the parts of the rate promise each other: docs/numerics.md sections 12, "The rate", and 15.4. Each contract stands
+ * here once, for the proof that shows it and for those that take it for granted (section 15.5).
+ */
+#ifndef HODOGRAPH_RATE_CONTRACTS_H
+#define HODOGRAPH_RATE_CONTRACTS_H
+
+#include "core/rate.h"
+#include "core/rate_pace.h"
+
+#define MOST_HALF ((uint32_t)1 << 28) /* ticks of half a way: 2^27 and 1 for the slowest bounds */
+#define MOST_SPAN ((uint64_t)1 << 57)
+
+#define IS_PERIOD(us) ((us) == 1000 || (us) == 2000 || (us) == 4000 || (us) == 8000)
+#define IS_FACTOR(f)  (0x1000000 <= (f) && (f) <= 0x2000000)
+#define IS_RATE(q57)  (0 <= (q57) && (q57) <= RATE_MOST)
+#define IS_TICKS(t)   (1 <= (t)->rise && (t)->rise <= (t)->half && (t)->half <= MOST_HALF)
+#define IS_POSITIVE(b)                                                                             \
+    (IS_FACTOR((b)->factor_q24) && (b)->rate_q16_per_s > 0 && (b)->second_q8_per_s2 > 0)
+#define IS_PACE(p)                                                                                 \
+    (IS_FACTOR((p)->factor_q24) && (p)->turns >= 1 && (p)->inverse_slope <= 0x80000001 &&          \
+     (p)->inverse_root <= 0x80040000)
+
+#if defined(__FRAMAC__)
+
+/*@ requires i < p->header.piece_count;
+    assigns *factor_q24, *rate_q16_per_s, *second_q8_per_s2 \from i;
+    ensures \initialized(factor_q24) && \initialized(rate_q16_per_s) && \initialized(second_q8_per_s2);
+    ensures IS_FACTOR(*factor_q24) && *rate_q16_per_s > 0 && *second_q8_per_s2 > 0; */
+void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
+                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2);
+
+/*@ requires first < p->header.piece_count && count > 0;
+    assigns *out \from first, count;
+    ensures \initialized(out) && IS_POSITIVE(out); */
+void rate_bounds_of(struct rate_bounds *out, const struct program *p, uint32_t first,
+                    uint32_t count);
+
+/*@ requires \initialized(bounds) && IS_POSITIVE(bounds) && IS_PERIOD(period_us);
+    assigns *out \from *bounds, period_us;
+    ensures \initialized(out) && IS_PACE(out); */
+void rate_pace_make(struct rate_pace *out, const struct rate_bounds *bounds, uint32_t period_us);
+
+/* Of this and the next, cbmc_ticks.c shows what compares two numbers: rise <= half, twice a step <= the way. */
+/*@ requires \initialized(pace) && IS_PACE(pace) && IS_RATE(way_q57);
+    assigns *ticks \from *pace, way_q57;
+    ensures \initialized(ticks) && 1 <= ticks->rise && 1 <= ticks->half <= MOST_HALF; */
+void rate_ticks_of(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t way_q57);
+
+/*@ requires 1 <= ticks->rise <= MOST_HALF && 1 <= ticks->half <= MOST_HALF && IS_RATE(way_q57);
+    assigns \result \from *ticks, way_q57;
+    ensures 0 <= \result <= RATE_ONE; */
+int64_t rate_step_of(const struct rate_ticks *ticks, int64_t way_q57);
+
+/*@ requires 1 <= ticks->rise <= MOST_HALF && 1 <= ticks->half <= MOST_HALF;
+    requires IS_RATE(mean_q57) && 0 < period_q32_s <= (1 << 26);
+    assigns \result \from *ticks, mean_q57, period_q32_s;
+    ensures \result <= MOST_SPAN; */
+uint64_t rate_span_q32(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s);
+
+#endif
+
+#endif
