@@ -49,16 +49,14 @@ static int enter_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
     uint32_t i = it->piece_index;
     uint64_t start = it->own_piece.start_q32_s;
     uint64_t end = it->own_piece.end_q32_s;
-    while (time_q32_s >= end) {
+    while (i + 1u < it->program->header.piece_count && time_q32_s >= end) {
         if (most == 0) {
             return INTERP_ERR_JUMP;
         }
         most--;
         i++;
         start = end;
-        end = i + 1u == it->program->header.piece_count
-                  ? it->duration_q32_s
-                  : end + program_piece_duration(it->program, i);
+        end += program_piece_duration(it->program, i);
     }
     load_piece(it, i, start);
     return INTERP_OK;
@@ -77,7 +75,9 @@ static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
     if (it->piece == NULL) {
         return enter_piece(it, time_q32_s, most);
     }
-    for (; time_q32_s >= piece->end_q32_s; most--) {
+    const struct prepared_piece *last =
+        prepared_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
+    for (; piece != last && time_q32_s >= piece->end_q32_s; most--) {
         if (most == 0) {
             return INTERP_ERR_JUMP;
         }

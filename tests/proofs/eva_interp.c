@@ -10,8 +10,8 @@
  * shows: interp_at_q42 interp_seek prepared_make
  * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
  * mutant: core/interp.c: while (i > 0 && => while (
- * mutant: core/interp.c: end = i + 1u == it->program->header.piece_count => end = i == it->program->header.piece_count
- * mutant: core/prepared.c: i + 1u == p->header.piece_count ? UINT64_MAX => i == p->header.piece_count ? UINT64_MAX
+ * mutant: core/interp.c: while (i + 1u < it->program->header.piece_count && => while (i < it->program->header.piece_count &&
+ * mutant: core/interp.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
  * mutant: core/prepared.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
  * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
  * mutant: core/rate_pace.c: least(count, left) => count
