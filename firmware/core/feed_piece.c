@@ -10,6 +10,7 @@ static void set_slope(struct feed_piece *f)
     for (int k = 0; k < 7; k++) {
         sum += (k + 1) * qmath_magnitude(f->c_q44_mm[k]);
     }
+    sum += sum >> 26; /* sums that are negative are rounded away from 0: 20 units of 2^31 at most */
     int bits = 64 - qmath_clz64((uint64_t)sum);
     f->slope_shift = bits > 32 ? bits - 31 : 1; /* at most 32: |c| <= 2^14 mm */
     for (int k = 0; k < 7; k++) {

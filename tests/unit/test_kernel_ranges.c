@@ -230,9 +230,8 @@ static void test_feed_with_a_full_slope_does_not_overflow(void)
         struct feed_piece feed;
         struct feed_point at;
         memset(&c, 0, sizeof c);
-        /* negative feeds are refused, but for those that creep: section 15.3 */
         int sign = golden_random(&seed) % 4u == 0 ? -1 : 1;
-        fill_up(&c, sign < 0 ? 20 + i % 14 : 20 + i % 43, sign);
+        fill_up(&c, 20 + i % 43, sign);
         c.duration_q32_s = (uint64_t)1 << (golden_random(&seed) % 55u);
         c.duration_q32_s -= golden_random(&seed) % 2u != 0 && c.duration_q32_s > 2 ? 1 : 0;
         feed_piece_set(&feed, &c);
@@ -245,11 +244,31 @@ static void test_feed_with_a_full_slope_does_not_overflow(void)
     }
 }
 
+/* A sum of negative slopes that rounding alone would carry past 31 bits: one is full, each other a unit of q40. */
+static void test_feed_slopes_rounded_away_from_zero_do_not_overflow(void)
+{
+    for (int shift = 5; shift <= 27; shift++) {
+        struct program_piece c;
+        struct feed_piece feed;
+        struct feed_point at;
+        memset(&c, 0, sizeof c);
+        for (int k = 0; k < 7; k++) {
+            c.c_q40_mm[k] = -1;
+        }
+        c.c_q40_mm[0] -= (int64_t)INT32_MAX << (shift - 4);
+        c.duration_q32_s = (uint64_t)1 << 40;
+        feed_piece_set(&feed, &c);
+        feed_piece_at(&feed, (c.duration_q32_s << 10) - 1u, &at);
+        TEST_ASSERT_TRUE(at.feed_q32_mm_s < 0);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_corners_do_not_overflow);
     RUN_TEST(test_feed_with_a_full_slope_does_not_overflow);
+    RUN_TEST(test_feed_slopes_rounded_away_from_zero_do_not_overflow);
     RUN_TEST(test_w_just_below_a_power_of_two);
     return UNITY_END();
 }
