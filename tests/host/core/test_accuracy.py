@@ -40,7 +40,7 @@ def test_every_error_is_seen(core: Any) -> None:
 
 
 def test_third_difference_noise(core: Any) -> None:
-    found = kernels.noise(core, "alpha_exponential", 150)
+    found = kernels.noise(core, "alpha_exponential")
     for kernel, most in (("fixed", 0.01), ("float", 1000.0), ("double", 0.01)):
         assert found[kernel]["third_difference_peak_mm_s3"] <= most
     assert found["fixed"]["feed_ripple_peak_mm_s"] <= 1e-8
