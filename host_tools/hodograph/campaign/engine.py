@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from multiprocessing.resource_tracker import ensure_running
+from threading import current_thread, main_thread
+from types import FrameType
 from typing import Any, Protocol, TypeVar
 
 from .. import __version__
@@ -64,17 +66,19 @@ class OnDask:
         dask = _dask()
         waiting = iter(tasks)
         ahead = AHEAD * max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
-        running = dask.as_completed(self._submit(function, waiting, ahead))
-        for future in running:
-            try:
-                result = future.result()
-            except dask.KilledWorker as error:
-                raise RunError(
-                    f"campaign: workers died over the same task ({one_line(error)}): look at their memory and their "
-                    "logs; given again, the command goes on where it was"
-                ) from None
-            running.update(self._submit(function, waiting, 1))
-            yield result
+        with _interruptions() as take:
+            running = dask.as_completed(self._submit(function, waiting, ahead))
+            for future in running:
+                take()
+                try:
+                    result = future.result()
+                except dask.KilledWorker as error:
+                    raise RunError(
+                        f"campaign: workers died over the same task ({one_line(error)}): look at their memory and "
+                        "their logs; given again, the command goes on where it was"
+                    ) from None
+                running.update(self._submit(function, waiting, 1))
+                yield result
 
     def _submit(self, function: Callable[..., T], tasks: Iterator[Task], most: int) -> list[Any]:
         return [
@@ -143,6 +147,34 @@ def _deaf_children() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _interruptions() -> Iterator[Callable[[], None]]:
+    """Ctrl-C counts where the result is called: inside Dask it could leave a lock held that closing then waits for.
+
+    A second one counts at once.
+    """
+    asked = False
+
+    def ask(_number: int, _frame: FrameType | None) -> None:
+        nonlocal asked
+        if asked:
+            raise KeyboardInterrupt
+        asked = True
+
+    def take() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    if current_thread() is not main_thread():  # nobody else gets signals
+        yield take
+        return
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield take
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
