@@ -14,15 +14,7 @@
  */
 #include "piece_bounds.h"
 #include "proof.h"
-
-/*@ requires a != 0;
-    assigns \result \from a;
-    ensures 0 <= \result <= 63; */
-static inline int qmath_clz64(uint64_t a);
-
-/*@ assigns \result \from a, shift;
-    ensures -(1 << 62) < \result < (1 << 62); */
-int64_t qmath_shift_clamp(int64_t a, int shift);
+#include "qmath_contracts.h"
 
 /*@ requires 4 <= degree <= 7 && \initialized(b + (0 .. degree));
     assigns \result \from b[0 .. 7], low, high;

@@ -15,14 +15,10 @@
  * mutant: core/feed_piece.c: shift < -31 ? 31 => shift < -31 ? 32
  * mutant: core/feed_piece.c: shift < 31 ? (int32_t)1 => shift < 33 ? (int32_t)1
  */
+#include "clz_contract.h"
 #include "proof.h"
 
 #include "core/feed_piece.h"
-
-/*@ requires a != 0;
-    assigns \result \from a;
-    ensures 0 <= \result <= 63 && (a < 0x8000000000000000 ==> \result >= 1); */
-static inline int qmath_clz64(uint64_t a);
 
 #include "core/feed_piece.c"
 #include "core/program.c"

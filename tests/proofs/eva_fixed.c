@@ -22,6 +22,7 @@
  */
 #include "kernel_bounds.h"
 #include "proof.h"
+#include "thirds_contract.h"
 
 #include "core/kernel_fixed.h"
 
@@ -42,17 +43,6 @@ static int32_t quadratic(const int32_t c[3], int32_t z);
     behavior far_behind: assumes FAR_Q30 < s_q30; ensures FAR_Z_Q31 <= \result;
     complete behaviors; disjoint behaviors; */
 static int32_t first_guess(const struct kernel_fixed_segment *k, int32_t s_q30);
-
-/* Section 15.2 */
-/*@ requires -(1 << 62) < a < (1 << 62);
-    assigns \result \from a;
-    ensures a / 3 - 3 <= \result <= a / 3; */
-int64_t qmath_third(int64_t a);
-
-/*@ requires -(1 << 62) < a < (1 << 62);
-    assigns \result \from a;
-    ensures a / 5 - 3 <= \result <= a / 5; */
-int64_t qmath_fifth(int64_t a);
 
 static int64_t behind_q48;
 static int64_t from_middle_q48;

@@ -11,12 +11,8 @@
  * mutant: core/qmath.h: return a < 0 ? -a : a => return -a
  * mutant: core/qwide.c: (middle & LIMB_MASK) * (LIMB_MASK + 1) => middle * (LIMB_MASK + 1)
  */
+#include "clz_contract.h"
 #include "proof.h"
-
-/*@ requires a != 0;
-    assigns \result \from a;
-    ensures 0 <= \result <= 63; */
-static inline int qmath_clz64(uint64_t a);
 
 #include "core/counts.h"
 #include "core/qmath.c"

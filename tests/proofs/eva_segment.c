@@ -14,6 +14,7 @@
  * mutant: core/segment_check.c: *index < p->header.segment_count => *index <= p->header.segment_count
  */
 
+#include "clz_contract.h"
 #include "proof.h"
 #include "segment_bounds.h"
 
@@ -26,11 +27,6 @@ static int check_speed(const struct program_segment *g);
 /*@ ensures \result < 0 || (\result == 0 && in_range(g) && 0 <= g->start_q40_mm < (1 << 62) &&
             -(1 << 52) < g->x_q40_mm < (1 << 52) && -(1 << 52) < g->y_q40_mm < (1 << 52)); */
 static int check_ranges(const struct program_segment *g);
-
-/*@ requires a != 0;
-    assigns \result \from a;
-    ensures 0 <= \result <= 63; */
-static inline int qmath_clz64(uint64_t a);
 
 #include "core/ph_segment.c"
 #include "core/program.c"

@@ -7,10 +7,8 @@
 
 #include <stdint.h>
 
-/*@ requires a != 0;
-    assigns \result \from a;
-    ensures 0 <= \result <= 63 && (a < 0x8000000000000000 ==> \result >= 1); */
-static inline int qmath_clz64(uint64_t a);
+#include "clz_contract.h"
+#include "thirds_contract.h"
 
 /*@ assigns \result \from a, shift;
     ensures -(1 << 62) < \result < (1 << 62); */
@@ -24,15 +22,5 @@ uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 /*@ assigns \result \from a;
     ensures \result < 0x100000000 && (a >= 0x10000000 ==> \result >= 0x3FFF); */
 uint64_t qmath_root(uint64_t a);
-
-/*@ requires -(1 << 62) < a < (1 << 62);
-    assigns \result \from a;
-    ensures a / 3 - 3 <= \result <= a / 3; */
-int64_t qmath_third(int64_t a);
-
-/*@ requires -(1 << 62) < a < (1 << 62);
-    assigns \result \from a;
-    ensures a / 5 - 3 <= \result <= a / 5; */
-int64_t qmath_fifth(int64_t a);
 
 #endif
