@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...spline import PHSpline
-from .bounds import Bounds
 from .peaks import piece_strains
 from .track import ends_of, make_track
-from .window import Solution, State, plan_window, tightened
+from .window import Solution, tightened
 
 Real = NDArray[np.float64]
 
@@ -23,39 +22,28 @@ _INHERITED = 2
 """Intervals that what a window begins with binds: their limits stay."""
 
 
-def plan_measured(
-    spline: PHSpline,
-    bounds: Bounds,
-    low: float,
-    high: float,
-    start: State | None,
-    period_s: float,
-    known: Solution | None = None,
-    known_to: float = 0.0,
-) -> Solution | None:
-    """As `plan_window`, with tighter limits on intervals whose piece is above one by more than 0.3 %."""
-    best = found = plan_window(spline, bounds, low, high, start, period_s, known, known_to)
-    if best is None or found is None:
-        return None
-    strain = _strains(spline, bounds, found, start)
+def measured(spline: PHSpline, found: Solution) -> Solution:
+    """A window, with tighter limits on intervals whose piece is above one by more than 0.3 %."""
+    best, trial = found, found
+    strain = _strains(spline, found)
     least, tight = strain.max(), np.ones(strain.size)
     for _ in range(_MOST_TRIALS):
         if strain.max() <= _STRAINED:
             break
         tight *= np.where(strain > 1.0 + 0.3 * (_STRAINED - 1.0), strain, 1.0)
-        found = tightened(found, tight)
-        if found is None:
+        tried = tightened(trial, tight)
+        if tried is None:
             break
-        strain = _strains(spline, bounds, found, start)
+        trial, strain = tried, _strains(spline, tried)
         if strain.max() < least:
-            best, least = found, strain.max()
+            best, least = trial, strain.max()
     return best
 
 
-def _strains(spline: PHSpline, bounds: Bounds, found: Solution, start: State | None) -> Real:
+def _strains(spline: PHSpline, found: Solution) -> Real:
     track = make_track(ends_of(found, found.grid.size), 1.0, spline.segment_starts_mm)
-    strain = piece_strains(spline, bounds, track)
-    if start is not None:
+    strain = piece_strains(spline, found.setting.bounds, track)
+    if found.setting.start is not None:
         strain[:_INHERITED] = 0.0
     if found.grid.s[-1] < spline.length_mm:
         strain[found.grid.grade < 0] = 0.0  # the stop at the end of a window is not kept

@@ -17,9 +17,9 @@ from ...errors import PlanError
 from ...spline import PHSpline
 from .bounds import Bounds
 from .knots import Sketch, sketch
-from .measured import plan_measured
+from .measured import measured
 from .track import Ends, ends_of
-from .window import Solution, State
+from .window import Solution, State, plan_window
 
 Real = NDArray[np.float64]
 
@@ -59,10 +59,10 @@ def plan_windows(
         if found is None:
             low = 0.0 if held is None else float(held.grid.s[-1])
             high = overview.window_end(low, intervals)
-            found = plan_measured(spline, bounds, low, high, None, period_s)
+            found = plan_window(spline, bounds, low, high, None, period_s)
         if found is None:
             raise NothingFoundError(f"feed: nothing found from arc length {low:g} mm")
-        held = found
+        held = found = measured(spline, found)
         if found.grid.s[-1] >= length:
             yield ends_of(found, found.grid.size)
             return
@@ -82,7 +82,7 @@ def _continued(
     low = float(held.grid.s[count])
     state = State(float(held.q[count]), float(held.slope[count]))
     high = overview.window_end(low, intervals)
-    return plan_measured(
+    return plan_window(
         spline, bounds, low, high, state, period_s, held, _trusted_to(held, overview.stop_s)
     )
 
