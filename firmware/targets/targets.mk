@@ -69,11 +69,11 @@ target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD
 
 define TARGET_RULES # target
 $(call NOTE,$(BUILD)/firmware/$(1)/obj/flags,$($(1)_CROSS) $($(1)_CPU) $(TARGET_CFLAGS))
-$(BUILD)/firmware/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages-firmware
+$(BUILD)/firmware/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(READY)/packages-firmware
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) $$(TICK_CFLAGS) -MMD -MP -c -o $$@ $$<
-$(BUILD)/firmware/$(1)/obj/%.o: %.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages-firmware
+$(BUILD)/firmware/$(1)/obj/%.o: %.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(READY)/packages-firmware
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) $$(TICK_CFLAGS) -MMD -MP -c -o $$@ $$<
@@ -123,7 +123,7 @@ size: firmware ## code, data, RAM and worst stack of every image; what changed s
 PICOLIBC := /usr/lib/picolibc
 bare_arm  := --target=thumbv7em-none-eabihf -mfpu=fpv4-sp-d16 -isystem $(PICOLIBC)/arm-none-eabi/include
 bare_rv32 := --target=riscv32-none-elf -march=rv32imc -isystem $(PICOLIBC)/riscv64-unknown-elf/include
-$(BARE_C:%=$(BUILD)/lint/%.tidy): $(BUILD)/lint/%.tidy: % $(OWN_H) .clang-tidy firmware/port/.clang-tidy $(OD_H) | $(STAMPS)/packages-firmware $(VENV)/.ready
+$(BARE_C:%=$(BUILD)/lint/%.tidy): $(BUILD)/lint/%.tidy: % $(OWN_H) .clang-tidy firmware/port/.clang-tidy $(OD_H) | $(READY)/packages-firmware $(VENV)/.ready
 	@mkdir -p $(@D)
 	$(call say,tidy,$<)
 	$(Q)$(VENV)/bin/clang-tidy --quiet $< -- $(if $(findstring /rv32/,$<),$(bare_rv32),$(bare_arm)) -std=c99 $(INCLUDES) 2> $@.err || { cat $@.err; exit 1; }

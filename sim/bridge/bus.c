@@ -28,6 +28,15 @@ int bus_catch_signals(void)
     return sigaction(SIGTERM, &action, NULL) == 0 ? sigaction(SIGINT, &action, NULL) : -1;
 }
 
+void bus_heed_signals(void)
+{
+    sigset_t ends;
+    (void)sigemptyset(&ends);
+    (void)sigaddset(&ends, SIGINT);
+    (void)sigaddset(&ends, SIGTERM);
+    (void)sigprocmask(SIG_UNBLOCK, &ends, NULL);
+}
+
 unsigned bus_signals(void)
 {
     return (unsigned)signals;

@@ -15,6 +15,9 @@ enum bridge_status { BRIDGE_OK = 0, BRIDGE_GONE = 1, BRIDGE_USAGE = 2, BRIDGE_BU
 int bus_catch_signals(void);
 unsigned bus_signals(void); /* how many have come */
 
+/* They come at any time, while the board is waited for as well: clock_join() puts them off. */
+void bus_heed_signals(void);
+
 /* Sends all of them; waits while the queue of the interface is full. Returns 0, or a negative errno. */
 int bus_send(struct can_socket *socket, const struct can_msg *messages, size_t count);
 

@@ -4,7 +4,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <poll.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -122,10 +121,13 @@ static int wait_for_turn(uint64_t now_ns)
     while (!over && error == 0 && bus_signals() < 2u) {
         const uint64_t wait_ns = turn_wait_ns(&self.turn, now_ns);
         struct pollfd wait = {.fd = self.turn.awaiting ? self.socket->fd : -1, .events = POLLIN};
-        const struct timespec limit = clock_timespec(wait_ns);
         if (wait_ns > 0u) {
-            const int ready = ppoll(&wait, 1, &limit, NULL);
+            const int ready = clock_poll(&wait, 1, 1, wait_ns);
             now_ns = ready > 0 && self.turn.schedule.lock_step ? now_ns : clock_ns();
+            error = ready < 0 && ready != -EINTR ? ready : 0;
+        }
+        if (error != 0) {
+            break;
         }
         error = self.turn.at_once ? 0 : take_frames();
         over = turn_over(&self.turn, self.reply.header.count, now_ns, &self.reply.header);

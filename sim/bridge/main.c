@@ -10,6 +10,7 @@
 #include "bridge/bus.h"
 #include "bridge/fifo_side.h"
 #include "bridge/slcan_side.h"
+#include "port/linux/clock.h"
 
 /* A batch thread is woken once for all answers of the drives, not by the first of them; nor by each character of a UART.
  * Whoever has given us a real-time priority means that. */
@@ -29,6 +30,9 @@ static int run(const struct bridge_options *options)
     if (bus_catch_signals() != 0) {
         return bus_complain(BRIDGE_GONE, "cannot catch signals", strerror(errno));
     }
+    (void)clock_join(options->bus,
+                     "bridge"); /* opening the socket says what is wrong with the bus */
+    bus_heed_signals();
     if (can_socket_open(&socket, options->bus, reason, sizeof reason) != 0) {
         return bus_complain(BRIDGE_BUS, options->bus, reason);
     }
@@ -36,6 +40,7 @@ static int run(const struct bridge_options *options)
     const int status = options->slcan != NULL ? slcan_side_run(&socket, options->slcan)
                                               : fifo_side_run(&socket, options->out, options->in);
     can_socket_close(&socket);
+    clock_leave();
     return status;
 }
 

@@ -4,128 +4,568 @@
 
 #include <errno.h>
 #include <poll.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
 
-#include <linux/can.h>
+#include "hub/frame_bits.h"
 
-enum { BATCH = 32, BUFFER_BYTES = 4 * 1024 * 1024 };
+enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, LOOK_MS = 20 };
 
-struct batch {
-    struct can_frame frames[BATCH];
-    struct iovec vectors[BATCH];
-    struct mmsghdr headers[BATCH];
+#define NS_PER_S 1000000000u
+
+/* A packet from a process. */
+union packet {
+    struct can_frame frame;
+    struct local_bus_control control;
+    struct local_bus_filters filters;
+    uint32_t mark;
 };
 
-int hub_open(struct hub *hub, const char *path)
+static uint64_t clock_of(clockid_t clock)
 {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    memset(hub, 0, sizeof *hub);
-    if (strlen(path) >= sizeof address.sun_path) {
-        return -ENAMETOOLONG;
-    }
-    memcpy(address.sun_path, path, strlen(path) + 1u);
-    hub->listener = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (hub->listener >= 0 &&
-        bind(hub->listener, (const struct sockaddr *)&address, sizeof address) == 0 &&
-        listen(hub->listener, (int)HUB_MEMBERS) == 0) {
-        return 0;
-    }
-    return -errno;
+    struct timespec now;
+    (void)clock_gettime(clock, &now);
+    return (uint64_t)now.tv_sec * NS_PER_S + (uint64_t)now.tv_nsec;
 }
 
-static void take_member(struct hub *hub)
+/* --- Connections --- */
+
+/* The path is there when it is served, not before. */
+static int listen_at(const char *path)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    struct stat found;
+    const int length = snprintf(address.sun_path, sizeof address.sun_path, "%s.new", path);
+    if (length < 0 || (size_t)length >= sizeof address.sun_path) {
+        return -ENAMETOOLONG;
+    }
+    if (lstat(path, &found) == 0) {
+        return -EADDRINUSE;
+    }
+    const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && bind(fd, (const struct sockaddr *)&address, sizeof address) == 0 &&
+        listen(fd, (int)HUB_CONNECTIONS) == 0 && rename(address.sun_path, path) == 0) {
+        return fd;
+    }
+    const int error = -errno;
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    return error;
+}
+
+int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub_options options,
+             size_t *failed)
+{
+    memset(hub, 0, sizeof *hub);
+    hub->options = options;
+    virtual_time_init(&hub->time);
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        hub->connections[i].fd = -1;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const int fd = listen_at(paths[i]);
+        if (fd < 0) {
+            *failed = i;
+            return fd;
+        }
+        hub->listeners[hub->bus_count++] = fd;
+    }
+    return 0;
+}
+
+/* What a member sent before it left is still to go out. */
+static bool in_use(const struct hub *hub, size_t at)
+{
+    bool sends = hub->connections[at].queue.count > 0u;
+    for (size_t i = 0; i < hub->bus_count; ++i) {
+        sends = sends || (hub->buses[i].busy && hub->buses[i].sender == at);
+    }
+    return sends || hub->connections[at].fd >= 0;
+}
+
+static void take_connection(struct hub *hub, unsigned bus)
 {
     const int bytes = BUFFER_BYTES;
-    const int fd = accept4(hub->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (fd < 0) {
-        return;
+    const int fd = accept4(hub->listeners[bus], NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    size_t at = 0;
+    while (at < HUB_CONNECTIONS && in_use(hub, at)) {
+        at++;
     }
-    if (hub->count == HUB_MEMBERS) {
+    if (fd < 0 || at == HUB_CONNECTIONS) {
         (void)close(fd);
         return;
     }
     if (setsockopt(fd, SOL_SOCKET, SO_SNDBUFFORCE, &bytes, sizeof bytes) != 0) {
         (void)setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
     }
-    hub->members[hub->count++] = fd;
+    struct hub_connection *fresh = &hub->connections[at];
+    fresh->fd = fd;
+    fresh->role = HUB_STRANGER;
+    fresh->bus = bus;
+    fresh->number = 0;
+    fresh->filter_count = 0;
+    fresh->deferred_count = 0;
+    fresh->queue.count = 0;
 }
 
-static void drop_member(struct hub *hub, size_t index)
+/* Whether the packet has left: who has gone is dropped in its turn. In virtual time nothing is lost, so a process that
+ * does not take its frames is waited for. */
+static bool send_packet(const struct hub *hub, int fd, const void *packet, size_t size)
 {
-    (void)close(hub->members[index]);
-    hub->members[index] = hub->members[--hub->count];
-}
-
-/* Frames that lie in the socket; 0: the member has gone, or there is none. */
-static size_t receive(int fd, struct batch *batch, bool *gone)
-{
-    memset(batch->headers, 0, sizeof batch->headers);
-    for (size_t i = 0; i < BATCH; ++i) {
-        batch->vectors[i] = (struct iovec){&batch->frames[i], sizeof batch->frames[i]};
-        batch->headers[i].msg_hdr.msg_iov = &batch->vectors[i];
-        batch->headers[i].msg_hdr.msg_iovlen = 1;
+    struct pollfd writable = {.fd = fd, .events = POLLOUT};
+    ssize_t sent = send(fd, packet, size, MSG_DONTWAIT | MSG_NOSIGNAL);
+    while (sent < 0 && errno == EAGAIN && hub->options.is_virtual) {
+        (void)poll(&writable, 1, -1);
+        sent = send(fd, packet, size, MSG_DONTWAIT | MSG_NOSIGNAL);
     }
-    const int got = recvmmsg(fd, batch->headers, BATCH, MSG_DONTWAIT, NULL);
-    size_t count = 0;
-    while (got > 0 && count < (size_t)got &&
-           batch->headers[count].msg_len == sizeof batch->frames[0]) {
-        ++count;
-    }
-    *gone = got < 0 ? errno != EAGAIN && errno != EINTR : count < (size_t)got;
-    return count;
+    return sent >= 0 || errno != EAGAIN;
 }
 
-static void send_to(struct hub *hub, int fd, struct batch *batch, size_t count)
+static void send_control(const struct hub *hub, int fd, uint16_t kind, uint32_t number,
+                         const char *name)
 {
-    const int sent = sendmmsg(fd, batch->headers, (unsigned)count, MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (sent >= 0 || errno == EAGAIN) { /* else it has left, and is dropped in its turn */
-        hub->lost += count - (size_t)(sent > 0 ? sent : 0);
+    struct local_bus_control control = {.mark = LOCAL_BUS_MARK,
+                                        .version = LOCAL_BUS_VERSION,
+                                        .kind = kind,
+                                        .number = number,
+                                        .time_ns = hub->time.now_ns};
+    control.flags = hub->options.is_virtual ? LOCAL_BUS_VIRTUAL : 0;
+    if (name != NULL) {
+        memcpy(control.name, name, sizeof control.name);
     }
+    (void)send_packet(hub, fd, &control, sizeof control);
 }
 
-/* False: the member has gone. */
-static bool pass_on(struct hub *hub, size_t from)
+static const struct hub_connection *participant_connection(const struct hub *hub, uint32_t number)
 {
-    static struct batch batch;
-    bool gone = false;
-    const size_t count = receive(hub->members[from], &batch, &gone);
-    for (size_t i = 0; i < hub->count && count > 0u; ++i) {
-        if (i != from) {
-            send_to(hub, hub->members[i], &batch, count);
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        const struct hub_connection *each = &hub->connections[i];
+        if (each->fd >= 0 && each->role == HUB_PARTICIPANT && each->number == number) {
+            return each;
         }
     }
-    return !gone;
+    return NULL;
+}
+
+/* Tells those who watch; a leave ends their wait, too. */
+static void tell(struct hub *hub, uint16_t kind, const struct participant *about)
+{
+    for (size_t i = 0; i < hub->time.count; ++i) {
+        const struct participant *each = &hub->time.participants[i];
+        const struct hub_connection *to = participant_connection(hub, each->number);
+        if (each->watches && each != about && to != NULL) {
+            send_control(hub, to->fd, kind, about->number, about->name);
+            if (kind == LOCAL_BUS_LEFT) {
+                virtual_time_wake(&hub->time, each->number);
+            }
+        }
+    }
+}
+
+static void drop_connection(struct hub *hub, struct hub_connection *gone)
+{
+    (void)close(gone->fd);
+    gone->fd = -1;
+    if (gone->role == HUB_PARTICIPANT) {
+        const struct participant *about = virtual_time_find(&hub->time, gone->number);
+        if (about != NULL) {
+            tell(hub, LOCAL_BUS_LEFT, about);
+        }
+        virtual_time_leave(&hub->time, gone->number);
+    }
+}
+
+/* --- Frames --- */
+
+static bool matches(const struct can_filter *filters, size_t count, const struct can_frame *frame)
+{
+    for (size_t i = 0; i < count; ++i) {
+        if (((frame->can_id ^ filters[i].can_id) & filters[i].can_mask) == 0u) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* A suspended process takes nothing, and is not waited for: what its socket has no room for is lost to it, as to a processor
+ * that stands still. */
+static bool send_frame(struct hub *hub, const struct hub_connection *to,
+                       const struct local_bus_frame *frame)
+{
+    const struct participant *owner = virtual_time_find(&hub->time, to->number);
+    if (owner != NULL && owner->suspended) {
+        (void)send(to->fd, frame, sizeof *frame, MSG_DONTWAIT | MSG_NOSIGNAL);
+        return true;
+    }
+    return send_packet(hub, to->fd, frame, sizeof *frame);
+}
+
+/* To all other members of the bus of connection `sender`; those that are to be woken are. */
+static void deliver(struct hub *hub, size_t sender, const struct can_frame *frame, uint64_t now_ns)
+{
+    const unsigned bus = hub->connections[sender].bus;
+    struct local_bus_frame out;
+    memset(&out, 0, sizeof out);
+    out.frame = *frame;
+    out.time_ns = now_ns;
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        const struct hub_connection *to = &hub->connections[i];
+        if (i == sender || to->fd < 0 || to->role != HUB_MEMBER || to->bus != bus ||
+            (to->filter_count > 0u && !matches(to->filters, to->filter_count, frame))) {
+            continue;
+        }
+        hub->lost += send_frame(hub, to, &out) ? 0u : 1u;
+        if (!matches(to->deferred, to->deferred_count, frame)) {
+            virtual_time_wake(&hub->time, to->number);
+        }
+        virtual_time_note_frame(&hub->time, to->number);
+    }
+}
+
+/* Of two frames the one with the lower value wins the bus. */
+static uint32_t arbitration(const struct can_frame *frame)
+{
+    return (frame->can_id & CAN_EFF_FLAG) != 0u ? frame->can_id & CAN_EFF_MASK
+                                                : (frame->can_id & CAN_SFF_MASK) << 18;
+}
+
+/* A full queue takes nothing more: false. */
+static bool enqueue(struct hub_queue *queue, const struct can_frame *frame)
+{
+    if (queue->count == HUB_QUEUE) {
+        return false;
+    }
+    size_t at = queue->first + queue->count;
+    while (at > queue->first &&
+           arbitration(&queue->frames[(at - 1u) % HUB_QUEUE]) > arbitration(frame)) {
+        queue->frames[at % HUB_QUEUE] = queue->frames[(at - 1u) % HUB_QUEUE];
+        at--;
+    }
+    queue->frames[at % HUB_QUEUE] = *frame;
+    queue->count++;
+    return true;
+}
+
+static void take_frame(struct hub *hub, struct hub_connection *from, const struct can_frame *frame)
+{
+    if (!hub->options.is_virtual) {
+        deliver(hub, (size_t)(from - hub->connections), frame, clock_of(CLOCK_REALTIME));
+    } else {
+        hub->lost += enqueue(&from->queue, frame) ? 0u : 1u;
+    }
+}
+
+/* What goes first on a bus that is free: the lowest identifier among the members' first frames. HUB_CONNECTIONS: nothing waits. */
+static size_t arbitrate(const struct hub *hub, unsigned bus)
+{
+    size_t best = HUB_CONNECTIONS;
+    uint32_t lowest = UINT32_MAX;
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        const struct hub_connection *each = &hub->connections[i];
+        if (each->bus != bus || each->queue.count == 0u) {
+            continue;
+        }
+        const uint32_t value = arbitration(&each->queue.frames[each->queue.first]);
+        if (best == HUB_CONNECTIONS || value < lowest) {
+            best = i;
+            lowest = value;
+        }
+    }
+    return best;
+}
+
+static void start_transmission(struct hub *hub, unsigned number)
+{
+    struct hub_bus *bus = &hub->buses[number];
+    const size_t sender = bus->busy ? HUB_CONNECTIONS : arbitrate(hub, number);
+    if (sender == HUB_CONNECTIONS) {
+        return;
+    }
+    struct hub_queue *queue = &hub->connections[sender].queue;
+    bus->frame = queue->frames[queue->first];
+    bus->sender = sender;
+    bus->busy = true;
+    bus->end_ns =
+        hub->time.now_ns + (uint64_t)frame_bits(&bus->frame) * NS_PER_S / hub->options.bitrate;
+    queue->first = (queue->first + 1u) % HUB_QUEUE;
+    queue->count--;
+}
+
+/* --- Virtual time --- */
+
+static uint64_t next_event_ns(struct hub *hub)
+{
+    uint64_t next_ns = virtual_time_next_ns(&hub->time);
+    for (unsigned i = 0; i < hub->bus_count; ++i) {
+        start_transmission(hub, i);
+        if (hub->buses[i].busy && hub->buses[i].end_ns < next_ns) {
+            next_ns = hub->buses[i].end_ns;
+        }
+    }
+    return next_ns;
+}
+
+/* Who reacts to a frame takes some time for that: so a frame that waits already goes first, whatever its identifier. Else two
+ * that answer each other at once would keep the bus from all that is less urgent. */
+static void end_transmissions(struct hub *hub)
+{
+    for (unsigned i = 0; i < hub->bus_count; ++i) {
+        struct hub_bus *bus = &hub->buses[i];
+        if (bus->busy && bus->end_ns <= hub->time.now_ns) {
+            const struct can_frame frame = bus->frame;
+            const size_t sender = bus->sender;
+            bus->busy = false;
+            start_transmission(hub, i);
+            deliver(hub, sender, &frame, hub->time.now_ns);
+        }
+    }
+}
+
+/* Milliseconds of real time until this instant may come; 0: it may come now. A simulation that is behind does not hurry. */
+static int pace_ms(struct hub *hub, uint64_t next_ns)
+{
+    const uint64_t real_ns = clock_of(CLOCK_MONOTONIC);
+    if (hub->options.speed <= 0.0) {
+        return 0;
+    }
+    if (hub->pace_real_ns == 0u) {
+        hub->pace_real_ns = real_ns;
+        hub->pace_virtual_ns = hub->time.now_ns;
+    }
+    const double ahead_ns = (double)(next_ns - hub->pace_virtual_ns) / hub->options.speed;
+    const double due_ns = (double)hub->pace_real_ns + ahead_ns;
+    if (due_ns <= (double)real_ns) {
+        hub->pace_real_ns = real_ns;
+        hub->pace_virtual_ns = next_ns;
+        return 0;
+    }
+    const double left_ms = (due_ns - (double)real_ns) / 1e6;
+    return left_ms < 1000.0 ? (int)left_ms + 1 : 1000;
+}
+
+static void grant(const struct hub *hub, struct participant *next)
+{
+    const struct hub_connection *to = participant_connection(hub, next->number);
+    struct local_bus_control granted = {.mark = LOCAL_BUS_MARK,
+                                        .version = LOCAL_BUS_VERSION,
+                                        .kind = LOCAL_BUS_GRANT,
+                                        .number = next->grant,
+                                        .time_ns = hub->time.now_ns};
+    granted.flags = next->frames ? LOCAL_BUS_FRAMES : 0;
+    next->frames = false;
+    (void)send_packet(hub, to->fd, &granted, sizeof granted);
+}
+
+/* Hands out the next grant, when time is not held. Returns how long to wait for processes, in ms: -1 without a limit. */
+static int go_on(struct hub *hub)
+{
+    while (!virtual_time_is_held(&hub->time)) {
+        struct participant *next = virtual_time_grant(&hub->time);
+        if (next != NULL) {
+            grant(hub, next);
+            return -1;
+        }
+        const uint64_t next_ns = next_event_ns(hub);
+        if (next_ns == LOCAL_BUS_NEVER) {
+            return -1;
+        }
+        const int wait_ms = pace_ms(hub, next_ns);
+        if (wait_ms > 0) {
+            return wait_ms;
+        }
+        hub->time.now_ns = next_ns > hub->time.now_ns ? next_ns : hub->time.now_ns;
+        end_transmissions(hub);
+    }
+    return -1;
+}
+
+/* --- What processes say --- */
+
+static void take_packets(struct hub *hub, struct hub_connection *from, size_t most);
+
+static void greet(struct hub *hub, struct hub_connection *from,
+                  const struct local_bus_control *hello)
+{
+    if (hello->kind == LOCAL_BUS_HELLO_MEMBER) {
+        from->role = HUB_MEMBER;
+        from->number = hub->options.is_virtual ? hello->number : 0u;
+        send_control(hub, from->fd, LOCAL_BUS_WELCOME, 0, NULL);
+        return;
+    }
+    if (hub->options.is_virtual) {
+        from->number =
+            virtual_time_join(&hub->time, hello->name, (hello->flags & LOCAL_BUS_WATCHES) != 0u);
+        from->role = from->number != 0u ? HUB_PARTICIPANT : HUB_STRANGER;
+        if (from->number == 0u) {
+            drop_connection(hub, from);
+            return;
+        }
+        tell(hub, LOCAL_BUS_JOINED, virtual_time_find(&hub->time, from->number));
+    }
+    send_control(hub, from->fd, LOCAL_BUS_WELCOME, from->number, NULL);
+}
+
+/* What the participant has sent before it says that it waits is on the bus before time goes on. */
+static void take_wait(struct hub *hub, const struct hub_connection *from,
+                      const struct local_bus_control *wait)
+{
+    const bool sent = (wait->flags & LOCAL_BUS_SENT) != 0u;
+    for (size_t i = 0; i < HUB_CONNECTIONS && sent; ++i) {
+        struct hub_connection *each = &hub->connections[i];
+        if (each->fd >= 0 && each->role == HUB_MEMBER && each->number == from->number) {
+            take_packets(hub, each, SIZE_MAX);
+        }
+    }
+    if (virtual_time_wait(&hub->time, from->number, wait->number, wait->time_ns)) {
+        const struct participant *interrupted = virtual_time_find(&hub->time, from->number);
+        tell(hub, LOCAL_BUS_INTERRUPTED, interrupted);
+    }
+}
+
+static bool take_control(struct hub *hub, struct hub_connection *from,
+                         const struct local_bus_control *control)
+{
+    if (from->role == HUB_STRANGER) {
+        greet(hub, from, control);
+        return true;
+    }
+    struct participant *named = NULL;
+    switch (control->kind) {
+    case LOCAL_BUS_WAIT:
+        take_wait(hub, from, control);
+        break;
+    case LOCAL_BUS_SUSPEND:
+    case LOCAL_BUS_CONTINUE:
+        named = virtual_time_named(&hub->time, control->name);
+        if (named != NULL) {
+            named->suspended = control->kind == LOCAL_BUS_SUSPEND;
+        }
+        break;
+    default:
+        return false;
+    }
+    return true;
+}
+
+static void take_filters(struct hub_connection *from, const struct local_bus_filters *told,
+                         size_t size)
+{
+    const size_t bytes = told->count * sizeof told->filters[0];
+    if (told->count > LOCAL_BUS_FILTERS ||
+        size != offsetof(struct local_bus_filters, filters) + bytes) {
+        return;
+    }
+    if (told->kind == LOCAL_BUS_FILTER) {
+        memcpy(from->filters, told->filters, bytes);
+        from->filter_count = told->count;
+    } else {
+        memcpy(from->deferred, told->filters, bytes);
+        from->deferred_count = told->count;
+    }
+}
+
+/* False: nobody that we know talks like this. */
+static bool take_packet(struct hub *hub, struct hub_connection *from, const union packet *packet,
+                        size_t size)
+{
+    if (size < sizeof packet->mark) {
+        return false;
+    }
+    if (packet->mark != LOCAL_BUS_MARK) {
+        if (from->role != HUB_MEMBER || size != sizeof packet->frame) {
+            return false;
+        }
+        take_frame(hub, from, &packet->frame);
+    } else if (from->role == HUB_MEMBER && (packet->control.kind == LOCAL_BUS_FILTER ||
+                                            packet->control.kind == LOCAL_BUS_DEFER)) {
+        take_filters(from, &packet->filters, size);
+    } else {
+        return size == sizeof packet->control && packet->control.version == LOCAL_BUS_VERSION &&
+               take_control(hub, from, &packet->control);
+    }
+    return true;
+}
+
+static void take_packets(struct hub *hub, struct hub_connection *from, size_t most)
+{
+    union packet packet;
+    bool over = false;
+    for (size_t i = 0; i < most && from->fd >= 0 && !over; ++i) {
+        const ssize_t size = recv(from->fd, &packet, sizeof packet, MSG_DONTWAIT);
+        if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
+            return;
+        }
+        if (size <= 0 || !take_packet(hub, from, &packet, (size_t)size)) {
+            drop_connection(hub, from);
+        }
+        over = from->role == HUB_PARTICIPANT; /* mostly it says one thing, then waits */
+    }
+}
+
+/* --- The hub --- */
+
+/* What participants have sent is taken when they wait. Until then their members are looked at only now and then (`all`), so
+ * that one that sends very much finds room. */
+static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *who, bool all)
+{
+    size_t count = 0;
+    wait[count++] = (struct pollfd){.fd = end, .events = POLLIN};
+    for (size_t i = 0; i < hub->bus_count; ++i) {
+        wait[count++] = (struct pollfd){.fd = hub->listeners[i], .events = POLLIN};
+    }
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        const struct hub_connection *each = &hub->connections[i];
+        const bool quiet = each->role == HUB_MEMBER && each->number != 0u && !all;
+        if (each->fd >= 0 && !quiet) {
+            who[count] = i;
+            wait[count++] = (struct pollfd){.fd = each->fd, .events = POLLIN};
+        }
+    }
+    return count;
 }
 
 bool hub_turn(struct hub *hub, int end)
 {
-    struct pollfd wait[HUB_MEMBERS + 2u] = {{.fd = end, .events = POLLIN},
-                                            {.fd = hub->listener, .events = POLLIN}};
-    for (size_t i = 0; i < hub->count; ++i) {
-        wait[i + 2u] = (struct pollfd){.fd = hub->members[i], .events = POLLIN};
-    }
-    if (poll(wait, hub->count + 2u, -1) < 0) {
+    struct pollfd wait[1u + HUB_BUSES + HUB_CONNECTIONS];
+    size_t who[1u + HUB_BUSES + HUB_CONNECTIONS];
+    const int limit_ms = hub->options.is_virtual ? go_on(hub) : -1;
+    const bool held = hub->options.is_virtual && virtual_time_is_held(&hub->time);
+    const bool all = !held || hub->look_at_all;
+    const size_t count = fill(hub, end, wait, who, all);
+    const int ready = poll(wait, count, all ? limit_ms : LOOK_MS);
+    if (ready < 0) {
         return errno == EINTR;
     }
-    /* From the last: who leaves changes places with one that has had its turn. */
-    for (size_t i = hub->count; i-- > 0u;) {
-        if (wait[i + 2u].revents != 0 && !pass_on(hub, i)) {
-            drop_member(hub, i);
+    hub->look_at_all = ready == 0 && !all;
+    for (size_t i = 1u + hub->bus_count; i < count; ++i) {
+        struct hub_connection *each = &hub->connections[who[i]];
+        if (wait[i].revents != 0 && each->fd == wait[i].fd) {
+            take_packets(hub, each, PACKETS_AT_ONCE);
         }
     }
-    if (wait[1].revents != 0) {
-        take_member(hub);
+    for (unsigned i = 0; i < hub->bus_count; ++i) {
+        if (wait[1u + i].revents != 0) {
+            take_connection(hub, i);
+        }
     }
     return wait[0].revents == 0;
 }
 
 void hub_close(struct hub *hub)
 {
-    while (hub->count > 0u) {
-        drop_member(hub, hub->count - 1u);
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        if (hub->connections[i].fd >= 0) {
+            (void)close(hub->connections[i].fd);
+            hub->connections[i].fd = -1;
+        }
     }
-    (void)close(hub->listener);
+    for (size_t i = 0; i < hub->bus_count; ++i) {
+        (void)close(hub->listeners[i]);
+    }
 }

@@ -1,10 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * hub: a CAN bus without bits, without a kernel's CAN: each frame that one of its members sends goes to all others, in one order.
+ * hub: CAN buses for the processes of one machine, whose kernel need not have CAN, in real or in virtual time.
  *
- * A member is a connection of type SOCK_SEQPACKET; a message is one struct can_frame of linux/can.h. So whoever can use a raw
- * CAN socket can be a member (port/linux/can_socket.h). A member that does not take its frames loses those for which its buffer of
- * some megabytes has no room; nobody waits for it.
+ * What a process says to it is in port/linux/local_bus.h. Each frame that a member sends goes to all other members of its bus, in one order.
+ *
+ * In real time it goes at once. A member that does not take its frames loses those for which its buffer of some megabytes
+ * has no room; nobody waits for it.
+ *
+ * In virtual time a frame takes its bits (frame_bits.h) on a bus that carries one at a time. Of the frames that wait, the lowest identifier
+ * goes first (CAN arbitration), also among those of one member, as in the mailboxes of a CAN controller; equal identifiers keep their
+ * order. What is sent when a frame has ended comes after what has waited for that. Nothing is lost but what a member sends beyond
+ * HUB_QUEUE frames ahead of the bus. Time goes on when every participant waits (virtual_time.h).
  */
 #ifndef HUB_HUB_H
 #define HUB_HUB_H
@@ -13,22 +19,70 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define HUB_MEMBERS 32u
+#include "hub/virtual_time.h"
+#include "port/linux/local_bus.h"
 
-struct hub {
-    int listener;
-    int members[HUB_MEMBERS];
-    size_t count;
-    uint64_t lost; /* frames that found no room */
+#define HUB_BUSES       4u
+#define HUB_CONNECTIONS 64u
+#define HUB_QUEUE       2048u
+
+struct hub_options {
+    bool is_virtual;
+    uint32_t bitrate; /* of each bus, in virtual time */
+    double speed;     /* virtual time: at most so much per real time; 0: no limit */
 };
 
-/* Serves the bus at `path`, which is made and must not be there. 0 or a negative errno. */
-int hub_open(struct hub *hub, const char *path);
+/* Frames of a member that wait for the bus. */
+struct hub_queue {
+    struct can_frame frames[HUB_QUEUE];
+    size_t first;
+    size_t count;
+};
+
+enum hub_role { HUB_STRANGER, HUB_MEMBER, HUB_PARTICIPANT }; /* a stranger has said nothing yet */
+
+struct hub_connection {
+    int fd; /* -1: not in use */
+    enum hub_role role;
+    unsigned bus;
+    uint32_t number; /* member: of the participant that it wakes; participant: its own; 0: none */
+    struct can_filter filters[LOCAL_BUS_FILTERS]; /* none: all frames pass */
+    size_t filter_count;
+    struct can_filter deferred[LOCAL_BUS_FILTERS]; /* what wakes nobody */
+    size_t deferred_count;
+    struct hub_queue queue;
+};
+
+/* A bus in virtual time. */
+struct hub_bus {
+    struct can_frame frame; /* on the wire */
+    size_t sender;          /* its connection */
+    uint64_t end_ns;        /* its last bit */
+    bool busy;
+};
+
+struct hub {
+    struct hub_options options;
+    int listeners[HUB_BUSES];
+    size_t bus_count;
+    struct hub_bus buses[HUB_BUSES];
+    struct hub_connection connections[HUB_CONNECTIONS];
+    struct virtual_time time;
+    uint64_t pace_real_ns;    /* where speed is limited: an instant of real time, */
+    uint64_t pace_virtual_ns; /* and that of virtual time which may not come before it */
+    bool look_at_all;         /* at members of participants that compute, too */
+    uint64_t lost;            /* frames that found no room */
+};
+
+/* Serves a bus at each of these paths, which are made and must not be there. 0, or a negative errno with the index of the path that
+ * failed in `*failed`. */
+int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub_options options,
+             size_t *failed);
 
 /* Waits for something to happen and does it. False: `end` has become readable, or nothing can happen any more. */
 bool hub_turn(struct hub *hub, int end);
 
-/* Ends the bus for all its members. */
+/* Ends the buses for all their members. */
 void hub_close(struct hub *hub);
 
 #endif

@@ -3,7 +3,6 @@
  * sleeps until frames or a signal come, or a delayed frame is due. */
 #define _GNU_SOURCE
 #include <errno.h>
-#include <poll.h>
 #include <sched.h>
 #include <stdio.h>
 #include <string.h>
@@ -93,13 +92,10 @@ static int await(const struct injector *injector, struct pollfd wait[3])
 {
     const uint64_t due_ns = bridge_due_ns(&injector->bridge);
     if (due_ns == UINT64_MAX) {
-        return poll(wait, 3, -1);
+        return clock_poll(wait, 2, 3, CLOCK_NEVER);
     }
     const uint64_t now_ns = clock_ns();
-    const uint64_t left_ns = due_ns > now_ns ? due_ns - now_ns : 0u;
-    const struct timespec limit = {.tv_sec = (time_t)(left_ns / 1000000000u),
-                                   .tv_nsec = (long)(left_ns % 1000000000u)};
-    return ppoll(wait, 3, &limit, NULL);
+    return clock_poll(wait, 2, 3, due_ns > now_ns ? due_ns - now_ns : 0u);
 }
 
 static int run(struct injector *injector, int signals)
@@ -109,8 +105,8 @@ static int run(struct injector *injector, int signals)
                              {.fd = signals, .events = POLLIN}};
     while (injector->failed == 0) {
         const int ready = await(injector, wait);
-        if (ready < 0 && errno != EINTR) {
-            injector->failed = -errno;
+        if (ready < 0 && ready != -EINTR) {
+            injector->failed = ready;
         } else if (ready > 0 && wait[2].revents != 0) {
             return EXIT_OK;
         }
@@ -144,6 +140,7 @@ static int start(struct injector *injector, const struct injector_options *optio
     if (signals < 0) {
         return complain(EXIT_BUS, strerror(errno));
     }
+    (void)clock_join(options->bus[0], "injector"); /* opening the sockets says what is wrong */
     for (unsigned side = 0; side < 2u; side++) {
         if (can_socket_open(&injector->sockets[side], options->bus[side], reason, sizeof reason) !=
             0) {
@@ -174,5 +171,6 @@ int main(int argc, char **argv)
     const int status = start(&injector, &options);
     can_socket_close(&injector.sockets[0]);
     can_socket_close(&injector.sockets[1]);
+    clock_leave();
     return status;
 }

@@ -57,6 +57,22 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
     return 0;
 }
 
+/* What waits for SYNC need not wake the process before it; fault rules look at each frame as it comes. */
+static int drives_defer(struct drives *drives)
+{
+    struct can_match frames[DRIVE_NODE_PDOS * NODE_OPTIONS_AXES];
+    size_t n = 0;
+    for (size_t i = 0; i < drives->count && drives->rules.count == 0; i++) {
+        for (int k = 0; k < DRIVE_NODE_PDOS; k++) {
+            const struct pdo_map *map = &drives->nodes[i].rpdos[k];
+            if (map->valid && !pdo_map_event_driven(map)) {
+                frames[n++] = (struct can_match){map->cob_id, CAN_ID_MAX};
+            }
+        }
+    }
+    return can_socket_defer(&drives->socket, frames, n);
+}
+
 int drives_filter(struct drives *drives)
 {
     struct can_match filters[4 + (1 + DRIVE_NODE_PDOS) * NODE_OPTIONS_AXES] = {
@@ -75,7 +91,8 @@ int drives_filter(struct drives *drives)
         }
         node->pdos_moved = false;
     }
-    return can_socket_filter(&drives->socket, filters, n);
+    const int error = can_socket_filter(&drives->socket, filters, n);
+    return error != 0 ? error : drives_defer(drives);
 }
 
 /* Cyclic frames need no process(). */

@@ -3,7 +3,6 @@
  * a signal come. */
 #define _GNU_SOURCE
 #include <errno.h>
-#include <poll.h>
 #include <sched.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -19,9 +18,9 @@
 /* Below the controller's tick, above everything ordinary. */
 #define PRIORITY 20
 
-enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, WAKE_MS = 10, ASLEEP_US = 1000000 };
+enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, WAKE_NS = 10000000, ASLEEP_US = 1000000 };
 
-/* Looking at the clock costs a system call, as much as a frame: within a run every fourth wake is enough. */
+/* Looking at the real clock costs a system call, as much as a frame: within a run every fourth wake is enough. */
 enum { WAKES_PER_LOOK = 4 };
 
 static int complain(int status, const char *reason)
@@ -49,16 +48,16 @@ static bool run(struct drives *drives, int signals)
     int wakes = 0;
     process(drives, &last_ns);
     while (drives->failed == 0) {
-        const int ready = poll(wait, 2, WAKE_MS);
-        if (ready < 0 && errno != EINTR) {
-            drives->failed = -errno;
+        const int ready = clock_poll(wait, 1, 2, WAKE_NS);
+        if (ready < 0 && ready != -EINTR) {
+            drives->failed = ready;
         } else if (ready > 0 && wait[1].revents != 0) {
             return true;
         } else if (ready > 0 && drives_receive(drives)) {
             wakes = WAKES_PER_LOOK;
         }
         wakes++;
-        if (ready <= 0 || wakes >= WAKES_PER_LOOK) {
+        if (ready <= 0 || wakes >= WAKES_PER_LOOK || clock_is_virtual()) {
             process(drives, &last_ns);
             wakes = 0;
         }
@@ -76,6 +75,7 @@ static void ask_for_priority(void)
 static int start(struct drives *drives, const struct node_options *options)
 {
     char reason[512];
+    char name[32];
     uint8_t node = 0;
     const int signals = end_signals_open();
     if (options->faults != NULL &&
@@ -91,6 +91,8 @@ static int start(struct drives *drives, const struct node_options *options)
     if (signals < 0) {
         return complain(EXIT_BUS, strerror(errno));
     }
+    (void)snprintf(name, sizeof name, "drive-%u", drives->nodes[0].id);
+    (void)clock_join(options->bus, name); /* opening the socket says what is wrong with the bus */
     if (can_socket_open(&drives->socket, options->bus, reason, sizeof reason) != 0) {
         return complain(EXIT_BUS, reason);
     }
@@ -123,5 +125,6 @@ int main(int argc, char **argv)
     }
     const int status = start(&drives, &options);
     can_socket_close(&drives.socket);
+    clock_leave();
     return status;
 }

@@ -3,6 +3,7 @@
 #include "port/linux/can_socket.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -10,6 +11,9 @@
 #include <linux/can.h>
 #include <linux/can/raw.h>
 #include <linux/sock_diag.h>
+
+#include "port/linux/clock.h"
+#include "port/linux/local_bus.h"
 
 void can_socket_close(struct can_socket *socket)
 {
@@ -19,23 +23,51 @@ void can_socket_close(struct can_socket *socket)
     }
 }
 
+/* For the hub: it looks at frames of the base format, without remote frames. */
+static void raw_filters(struct can_filter *raw, const struct can_match *filters, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        raw[i].can_id = filters[i].id;
+        raw[i].can_mask = (canid_t)(filters[i].mask | CAN_EFF_FLAG | CAN_RTR_FLAG);
+    }
+}
+
+static int tell_hub(const struct can_socket *socket, uint16_t kind, const struct can_match *filters,
+                    size_t count)
+{
+    struct local_bus_filters told = {
+        .mark = LOCAL_BUS_MARK, .kind = kind, .count = (uint16_t)count};
+    const size_t size =
+        offsetof(struct local_bus_filters, filters) + count * sizeof told.filters[0];
+    raw_filters(told.filters, filters, count);
+    clock_note_sent();
+    return send(socket->fd, &told, size, MSG_NOSIGNAL) == (ssize_t)size ? 0 : -errno;
+}
+
 int can_socket_filter(struct can_socket *socket, const struct can_match *filters, size_t count)
 {
     struct can_filter raw[CAN_SOCKET_FILTERS];
     if (count > CAN_SOCKET_FILTERS) {
         return -EINVAL;
     }
-    if (socket->local) {
+    if (socket
+            ->local) { /* here at once, and soon at the hub, which then wakes nobody for other frames */
         memcpy(socket->filters, filters, count * sizeof filters[0]);
         socket->filter_count = count;
-        return 0;
+        return tell_hub(socket, LOCAL_BUS_FILTER, filters, count);
     }
-    for (size_t i = 0; i < count; ++i) {
-        raw[i].can_id = filters[i].id;
-        raw[i].can_mask = (canid_t)(filters[i].mask | CAN_EFF_FLAG | CAN_RTR_FLAG);
-    }
+    raw_filters(raw, filters, count);
     const socklen_t bytes = (socklen_t)(count * sizeof raw[0]);
     return setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_FILTER, raw, bytes) == 0 ? 0 : -errno;
+}
+
+int can_socket_defer(struct can_socket *socket, const struct can_match *frames, size_t count)
+{
+    if (count > CAN_SOCKET_FILTERS) {
+        return -EINVAL;
+    }
+    return socket->local && clock_is_virtual() ? tell_hub(socket, LOCAL_BUS_DEFER, frames, count)
+                                               : 0;
 }
 
 static struct can_frame raw_frame(const struct can_msg *message)
@@ -46,6 +78,13 @@ static struct can_frame raw_frame(const struct can_msg *message)
     frame.can_dlc = message->len;
     memcpy(frame.data, message->data, sizeof frame.data);
     return frame;
+}
+
+/* In virtual time the hub takes every frame: it is waited for. */
+static bool await_room(const struct can_socket *socket)
+{
+    struct pollfd writable = {.fd = socket->fd, .events = POLLOUT};
+    return socket->local && clock_is_virtual() && errno == EAGAIN && poll(&writable, 1, -1) >= 0;
 }
 
 int can_socket_send_many(struct can_socket *socket, const struct can_msg *messages, size_t count)
@@ -62,7 +101,11 @@ int can_socket_send_many(struct can_socket *socket, const struct can_msg *messag
         headers[i].msg_hdr.msg_iov = &vectors[i];
         headers[i].msg_hdr.msg_iovlen = 1;
     }
-    const int sent = sendmmsg(socket->fd, headers, (unsigned)count, MSG_DONTWAIT);
+    int sent = 0;
+    clock_note_sent();
+    do {
+        sent = sendmmsg(socket->fd, headers, (unsigned)count, MSG_DONTWAIT);
+    } while (sent < 0 && await_room(socket));
     if (sent < 0) {
         return errno == ENOBUFS || errno == EINTR ? -EAGAIN : -errno;
     }
@@ -72,9 +115,12 @@ int can_socket_send_many(struct can_socket *socket, const struct can_msg *messag
 int can_socket_send(struct can_socket *socket, const struct can_msg *message)
 {
     const struct can_frame frame = raw_frame(message);
-    if (write(socket->fd, &frame, sizeof frame) == (ssize_t)sizeof frame) {
-        return 0;
-    }
+    clock_note_sent();
+    do {
+        if (write(socket->fd, &frame, sizeof frame) == (ssize_t)sizeof frame) {
+            return 0;
+        }
+    } while (await_room(socket));
     return errno == ENOBUFS ? -EAGAIN : -errno;
 }
 
@@ -98,7 +144,7 @@ static void convert(struct can_msg *message, const struct can_frame *frame)
     memcpy(message->data, frame->data, frame->can_dlc);
 }
 
-/* An empty message is how a local bus ends. */
+/* An empty message is how a local bus ends; what came before it is still given. */
 static int at_end(const struct mmsghdr *headers, int got)
 {
     return got > 0 && headers[got - 1].msg_len == 0u;
@@ -107,13 +153,14 @@ static int at_end(const struct mmsghdr *headers, int got)
 int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],
                        int *more)
 {
-    struct can_frame frames[CAN_SOCKET_BATCH];
+    struct local_bus_frame frames[CAN_SOCKET_BATCH];
     struct iovec vectors[CAN_SOCKET_BATCH];
     struct mmsghdr headers[CAN_SOCKET_BATCH];
+    const size_t size = socket->local ? sizeof frames[0] : sizeof frames[0].frame;
     memset(headers, 0, sizeof headers);
     for (size_t i = 0; i < CAN_SOCKET_BATCH; ++i) {
         vectors[i].iov_base = &frames[i];
-        vectors[i].iov_len = sizeof frames[i];
+        vectors[i].iov_len = size;
         headers[i].msg_hdr.msg_iov = &vectors[i];
         headers[i].msg_hdr.msg_iovlen = 1;
     }
@@ -124,13 +171,13 @@ int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SO
     }
     int count = 0;
     for (int i = 0; i < got; ++i) {
-        if (headers[i].msg_len == sizeof frames[i] && plain_frame(&frames[i])) {
-            convert(&messages[count], &frames[i]);
+        if (headers[i].msg_len == size && plain_frame(&frames[i].frame)) {
+            convert(&messages[count], &frames[i].frame);
             count += passes(socket, &messages[count]) ? 1 : 0;
         }
     }
     *more = got == (int)CAN_SOCKET_BATCH;
-    return socket->local && at_end(headers, got) ? -ENETDOWN : count;
+    return count == 0 && socket->local && at_end(headers, got) ? -ENETDOWN : count;
 }
 
 uint32_t can_socket_waiting_bytes(const struct can_socket *socket)

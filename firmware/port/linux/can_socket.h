@@ -21,7 +21,7 @@
 
 struct can_socket {
     int fd; /* for poll(); -1 when closed */
-    /* On a local bus the kernel cannot look at frames: filters are applied here. */
+    /* On a local bus the kernel cannot look at frames: filters are applied here, and by the hub in virtual time. */
     struct can_match filters[CAN_SOCKET_FILTERS];
     size_t filter_count;
     bool local;
@@ -34,6 +34,10 @@ void can_socket_close(struct can_socket *socket);
 
 /* Lets only these frames through (none: all). At most CAN_SOCKET_FILTERS. 0 or negative errno. */
 int can_socket_filter(struct can_socket *socket, const struct can_match *filters, size_t count);
+
+/* Virtual time: these frames do not wake the process, which takes them when it wakes for something else. At most
+ * CAN_SOCKET_FILTERS. Without effect elsewhere. 0 or negative errno. */
+int can_socket_defer(struct can_socket *socket, const struct can_match *frames, size_t count);
 
 /* 0; -EAGAIN when the queue is full (the frame is not sent); else a negative errno (interface down,
  * removed). */

@@ -10,11 +10,13 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <linux/can.h>
 #include <linux/can/raw.h>
+
+#include "port/linux/clock.h"
+#include "port/linux/local_connection.h"
 
 #define RECEIVE_BUFFER_BYTES (4 * 1024 * 1024)
 
@@ -93,11 +95,6 @@ static void enlarge_buffers(int fd)
     }
 }
 
-static int open_sequenced(void)
-{
-    return socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-}
-
 static int open_raw(const char *interface, char *reason, size_t size)
 {
     const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
@@ -115,25 +112,28 @@ static int open_raw(const char *interface, char *reason, size_t size)
     return fail_plainly(reason, size, errno, interface);
 }
 
-/* As if it were a raw socket: one frame of linux/can.h is one message. */
 static int open_local(struct can_socket *socket, const char *path, char *reason, size_t size)
 {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (strlen(path) >= sizeof address.sun_path) {
+    const struct local_bus_control hello = {.mark = LOCAL_BUS_MARK,
+                                            .version = LOCAL_BUS_VERSION,
+                                            .kind = LOCAL_BUS_HELLO_MEMBER,
+                                            .number = clock_participant()};
+    struct local_bus_control welcome;
+    const int fd = local_connection_open(path, &hello, &welcome);
+    switch (fd) {
+    case -ENAMETOOLONG:
         return fail(reason, size, ENAMETOOLONG, "%s is too long for the path of a local bus", path);
+    case -EPROTO:
+    case -ETIMEDOUT:
+        return fail(reason, size, -fd, "no hodograph-hub of this version at %s: build both anew",
+                    path);
+    default:
+        break;
     }
-    memcpy(address.sun_path, path, strlen(path) + 1u);
-    const int fd = open_sequenced();
     if (fd < 0) {
-        return fail_plainly(reason, size, errno, path);
-    }
-    if (connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
-        const int error = errno;
-        (void)close(fd);
-        return fail(reason, size, error, "no local bus at %s: start one there with hodograph-hub",
+        return fail(reason, size, -fd, "no local bus at %s: start one there with hodograph-hub",
                     path);
     }
-    enlarge_buffers(fd);
     socket->local = true;
     socket->fd = fd;
     return 0;
@@ -143,7 +143,7 @@ int can_socket_open(struct can_socket *socket, const char *interface, char *reas
 {
     memset(socket, 0, sizeof *socket);
     socket->fd = -1;
-    if (strchr(interface, '/') != NULL) {
+    if (local_connection_named(interface)) {
         return open_local(socket, interface, reason, size);
     }
     const int fd = open_raw(interface, reason, size);

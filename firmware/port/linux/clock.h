@@ -1,20 +1,46 @@
 /* SPDX-License-Identifier: MIT */
-/* clock: the monotonic clock of the Linux port, in 64 bits. Users define _GNU_SOURCE first. */
+/*
+ * clock: the time of a process: the monotonic clock of the system, or, when it takes part in a local bus whose hub has
+ * virtual time (local_bus.h), that.
+ *
+ * One thread of a process takes part. It sleeps in clock_poll() only: whatever it does between two calls takes no virtual
+ * time. Its SIGINT and SIGTERM come while it sleeps there. Users define _GNU_SOURCE first.
+ */
 #ifndef PORT_LINUX_CLOCK_H
 #define PORT_LINUX_CLOCK_H
 
+#include <poll.h>
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <time.h>
 
 #define CLOCK_NS_PER_S 1000000000u
+#define CLOCK_NEVER    UINT64_MAX
+
+/* Takes part in the time of this bus from now on, where its time is virtual; else changes nothing. Call it before
+ * can_socket_open(). `name`: what others know the process by, unless LOCAL_BUS_NAME_VARIABLE of the environment has another name.
+ * Returns 0 or a negative errno. */
+int clock_join(const char *bus, const char *name);
+
+/* Ends the part in virtual time: nobody waits for this process any more. Harmless without one. */
+void clock_leave(void);
+
+bool clock_is_virtual(void);
+
+/* The number of this process for the members that wake it; 0 without virtual time. */
+uint32_t clock_participant(void);
+
+/* A member of this process has sent something: the hub looks for it when the process waits. */
+void clock_note_sent(void);
 
 /* Monotonic. */
-static inline uint64_t clock_ns(void)
-{
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * CLOCK_NS_PER_S + (uint64_t)now.tv_nsec;
-}
+uint64_t clock_ns(void);
+
+/* As ppoll(): until one of `fds` is ready, a signal comes or `timeout_ns` (CLOCK_NEVER: no limit) are over. The first `buses` of
+ * `fds` are sockets of CAN buses. Returns how many are ready, or a negative errno: -EINTR in real time only, -ENETDOWN when the hub has
+ * gone. */
+int clock_poll(struct pollfd *fds, size_t buses, size_t count, uint64_t timeout_ns);
 
 static inline struct timespec clock_timespec(uint64_t ns)
 {

@@ -3,7 +3,6 @@
 #include "port/linux/interrupts.h"
 
 #include <errno.h>
-#include <poll.h>
 #include <pthread.h>
 #include <string.h>
 #include <time.h>
@@ -18,8 +17,9 @@
 static struct {
     pthread_mutex_t lock; /* port_lock(); guards schedule too */
     pthread_t thread;
-    bool started;
-    bool ending; /* these two by atomic access: C99 has none, gcc and clang have builtins */
+    bool running; /* port_start() was called */
+    bool started; /* there is a thread */
+    bool ending;  /* these two by atomic access: C99 has none, gcc and clang have builtins */
     int error;
     struct can_socket *socket;
     struct port_handlers handlers;
@@ -121,28 +121,47 @@ static uint64_t mainline_had_ns(void)
 static bool gives_way(void)
 {
     const uint32_t turns = __atomic_load_n(&self.mainline_turns, __ATOMIC_RELAXED);
-    return !self.lock_step && schedule_overdue(&self.schedule, self.now_ns, turns) &&
+    return !self.lock_step && !clock_is_virtual() &&
+           schedule_overdue(&self.schedule, self.now_ns, turns) &&
            schedule_yield(&self.schedule, self.now_ns, mainline_had_ns());
+}
+
+/* Sleeps until frames come or a tick is due, `longest_ns` at most, and does what they ask for. */
+static void step(uint64_t longest_ns)
+{
+    struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
+    const uint64_t wait_ns = time_to_sleep_ns();
+    const int ready = clock_poll(&waited, 1, 1, wait_ns < longest_ns ? wait_ns : longest_ns);
+    self.now_ns = clock_ns();
+    if (ready > 0) {
+        receive_waiting();
+    } else if (ready < 0 && ready != -EINTR) {
+        __atomic_store_n(&self.error, ready, __ATOMIC_RELEASE);
+        clock_leave(); /* the way out needs a clock that goes on */
+    }
+    schedule_wait(&self.schedule, self.now_ns);
+    if (self.now_ns >= self.schedule.due_ns && !gives_way()) {
+        run_tick();
+    }
 }
 
 static void *run(void *unused)
 {
     (void)unused;
     while (!__atomic_load_n(&self.ending, __ATOMIC_ACQUIRE) && interrupts_error() == 0) {
-        struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
-        const struct timespec timeout = clock_timespec(time_to_sleep_ns());
-        const int ready = ppoll(&waited, 1, &timeout, NULL);
-        self.now_ns = clock_ns();
-        if (ready > 0) {
-            receive_waiting();
-        }
-        schedule_wait(&self.schedule, self.now_ns);
-        if (self.now_ns >= self.schedule.due_ns && !gives_way()) {
-            run_tick();
-        }
+        step(UINT64_MAX);
     }
     port_wake();
     return NULL;
+}
+
+void interrupts_run(uint64_t longest_ns)
+{
+    if (self.running) {
+        step(longest_ns);
+    } else if (clock_poll(NULL, 0, 0, longest_ns) < 0) {
+        clock_leave();
+    }
 }
 
 static int make_lock(void)
@@ -165,7 +184,7 @@ int interrupts_begin(struct can_socket *socket, bool lock_step)
 {
     memset(&self, 0, sizeof self);
     self.socket = socket;
-    self.lock_step = lock_step;
+    self.lock_step = lock_step && !clock_is_virtual();
     return make_lock() == 0 ? 0 : PORT_ERR_SYSTEM;
 }
 
@@ -177,6 +196,10 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
         return PORT_ERR_SYSTEM;
     }
     schedule_begin(&self.schedule, self.now_ns, (uint64_t)period_us * 1000u, self.lock_step);
+    self.running = true;
+    if (clock_is_virtual()) {
+        return 0;
+    }
     const int error = self.lock_step ? interrupts_thread_batch(&self.thread, run)
                                      : interrupts_thread_real_time(&self.thread, run);
     self.started = error == 0;
@@ -185,6 +208,7 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
 
 void interrupts_end(void)
 {
+    self.running = false;
     __atomic_store_n(&self.ending, true, __ATOMIC_RELEASE);
     if (self.started) {
         (void)pthread_join(self.thread, NULL);

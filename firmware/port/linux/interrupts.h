@@ -8,11 +8,15 @@
  * SCHED_FIFO and locked memory; where that is not permitted it says so once and runs as an ordinary
  * thread. Ticks give way to a mainline that gets no turn (schedule.h). At fast pace it is a batch thread: it shall not take the processor from the simulated
  * drives it waits for.
+ *
+ * In virtual time (clock.h) there is no thread: the mainline runs the interrupts while it sleeps, so that what
+ * the controller does is one sequence.
  */
 #ifndef PORT_LINUX_INTERRUPTS_H
 #define PORT_LINUX_INTERRUPTS_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "port/linux/can_socket.h"
 #include "port/port.h"
@@ -26,6 +30,9 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us);
 /* The mainline goes to sleep, for INTERRUPTS_SLEEP_MAX_US at most: it has had its turn. */
 #define INTERRUPTS_SLEEP_MAX_US 10000u
 void interrupts_mainline_sleeps(void);
+
+/* Virtual time: sleeps until an interrupt comes, for `longest_ns` at most, and runs it. Mainline. */
+void interrupts_run(uint64_t longest_ns);
 
 /* Ends the thread and waits for it. Harmless when it never started. */
 void interrupts_end(void);

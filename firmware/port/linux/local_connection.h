@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/* local_connection: opening a connection to the hub of a local bus (local_bus.h). */
+#ifndef PORT_LINUX_LOCAL_CONNECTION_H
+#define PORT_LINUX_LOCAL_CONNECTION_H
+
+#include <stdbool.h>
+
+#include "port/linux/local_bus.h"
+
+/* Whether this names a local bus: a path, which has a '/' in it. Network interfaces have none. */
+bool local_connection_named(const char *bus);
+
+/* Connects to the hub at this path, says `hello` and waits for its welcome. Returns a descriptor that does not block, the
+ * caller's to close, or a negative errno: -ENOENT or -ECONNREFUSED where nobody serves the path, -EPROTO where whoever does is no hub of
+ * this version. */
+int local_connection_open(const char *path, const struct local_bus_control *hello,
+                          struct local_bus_control *welcome);
+
+#endif

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * virtual_time: who takes part in virtual time, and whose turn it is: conservative co-simulation. No I/O.
+ *
+ * A participant is active from its grant to its next wait, and time stands still meanwhile. When none is active, the next grant
+ * goes to one that is due or was woken: of several, in the order of their names, and among equal names of their coming. When none is, time goes on to the
+ * next instant at which one is due, or something else happens.
+ */
+#ifndef HUB_VIRTUAL_TIME_H
+#define HUB_VIRTUAL_TIME_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "port/linux/local_bus.h"
+
+#define VIRTUAL_TIME_PARTICIPANTS 32u
+
+/* The beginning: 2000-01-01 in nanoseconds since 1970, so that recordings have a date that their formats can hold. */
+#define VIRTUAL_TIME_BEGIN_NS 946684800000000000u
+
+struct participant {
+    uint32_t number; /* 0: none */
+    char name[LOCAL_BUS_NAME];
+    bool active;
+    bool woken;
+    bool frames; /* some have come since its last grant */
+    bool suspended;
+    bool watches;
+    uint64_t until_ns;
+    uint32_t grant; /* number of the last one */
+};
+
+struct virtual_time {
+    struct participant participants[VIRTUAL_TIME_PARTICIPANTS]; /* in the order of their grants */
+    size_t count;
+    uint64_t now_ns;
+    uint32_t last_number;
+};
+
+void virtual_time_init(struct virtual_time *time);
+
+/* A new participant, active. Its number; 0 when there is no room. */
+uint32_t virtual_time_join(struct virtual_time *time, const char *name, bool watches);
+
+void virtual_time_leave(struct virtual_time *time, uint32_t number);
+
+/* NULL: there is none of this number or name. */
+struct participant *virtual_time_find(struct virtual_time *time, uint32_t number);
+struct participant *virtual_time_named(struct virtual_time *time, const char *name);
+
+/* The participant has finished its turn. A wait with the number of an older grant is out of date, and changes nothing. A second one
+ * for the same grant ends the wait before its time: true. */
+bool virtual_time_wait(struct virtual_time *time, uint32_t number, uint32_t grant,
+                       uint64_t until_ns);
+
+/* It is due now; one that is active will be as soon as it waits. Without effect on one that is not there. */
+void virtual_time_wake(struct virtual_time *time, uint32_t number);
+
+/* A frame has come for it, which its next grant tells. */
+void virtual_time_note_frame(struct virtual_time *time, uint32_t number);
+
+bool virtual_time_is_held(const struct virtual_time *time); /* one is active */
+
+/* Makes the next one active that is due now; NULL: none is. Only while time is not held. */
+struct participant *virtual_time_grant(struct virtual_time *time);
+
+/* When the next one is due; LOCAL_BUS_NEVER: none will be. */
+uint64_t virtual_time_next_ns(const struct virtual_time *time);
+
+#endif
