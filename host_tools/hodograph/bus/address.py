@@ -14,6 +14,8 @@ from pathlib import Path
 from ..errors import BusError, InputError
 
 DEFAULT_BUS = "socketcan:vcan0"
+BUS_VARIABLE = "HODOGRAPH_BUS"
+"""Of the environment: the bus of commands that are not given one."""
 _SIOCGIFFLAGS = 0x8913
 _IFF_UP = 1
 
@@ -27,6 +29,11 @@ class BusAddress:
 
     def __str__(self) -> str:
         return f"{self.interface}:{self.channel}"
+
+    @property
+    def name(self) -> str:
+        """A short name of the bus, as log formats want one."""
+        return Path(self.channel).name if self.is_local else self.channel
 
     @property
     def is_local(self) -> bool:

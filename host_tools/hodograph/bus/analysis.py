@@ -28,7 +28,8 @@ _AROUND = 220
 class BusRun:
     """A recorded run: the motion, and how the bus did. `frames` counts all that were recorded.
 
-    `bus` is the file's name when it was read from one; then the deadline misses are not known.
+    `bus` is the file's name when it was read from one; then the deadline misses are not known. `wall_s` is by the clock
+    of the bus.
     """
 
     motion: Motion

@@ -6,21 +6,25 @@ from __future__ import annotations
 import os
 import shlex
 import shutil
+import signal
 import subprocess
 import tempfile
-import time
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from ..errors import BusError
 from ..names import INTERPOLATIONS, SPEEDS
 from .address import BusAddress
+from .clock import VirtualClock, hub_clock
 
 if TYPE_CHECKING:
     from ..config import Drive, Machine
 
 CONTROLLER, DRIVE = "hodograph-controller", "hodograph-drive"
+END_S = 8.0
+"""For a process to end: a controller stops the axes and switches them off in 6 s at most."""
 _REPOSITORY = Path(__file__).resolve().parents[3]
 
 
@@ -102,26 +106,115 @@ def guarded(command: list[str]) -> list[str]:
     return [guard, "--pdeathsig", "TERM", "--", *command] if guard else command
 
 
-class Rig:
-    """Controller and drives as child processes; ends them on leaving.
+class Process:
+    """A child and what it says. In virtual time (`clock`) it takes part under `name`.
 
-    The children form their own session, so that Ctrl-C reaches only us and the axes can be stopped first;
-    they get SIGTERM when we die. All are pinned to one core: waking across cores costs more than it gains.
+    It forms its own session, so that Ctrl-C reaches only us and the axes can be stopped first, and gets SIGTERM when we
+    die. All are pinned to one core: waking across cores costs more than it gains.
     """
+
+    def __init__(self, name: str, command: list[str], clock: VirtualClock | None = None) -> None:
+        self.name = name
+        self._clock = clock
+        self._program = Path(command[0]).name
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the child)
+
+        def start(environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+            return subprocess.Popen(
+                guarded(command),
+                stdin=subprocess.DEVNULL,
+                stdout=self._output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                env={**os.environ, **environment},
+            )
+
+        self.child = start({}) if clock is None else clock.spawn(name, start)
+        with suppress(OSError):
+            os.sched_setaffinity(self.child.pid, {max(os.sched_getaffinity(0))})
+
+    def ended(self) -> bool:
+        """Whether it has ended, by itself or by us."""
+        return self.child.poll() is not None
+
+    def check(self) -> None:
+        """Raises BusError with its last words when it has ended."""
+        if self.ended():
+            raise BusError(
+                f"{self._program} ended by itself (status {self.child.returncode}): {self._last_line()}"
+            )
+
+    def kill(self) -> None:
+        """As a crash would end it."""
+        if self._clock is not None and not self.ended():
+            self._clock.kill(self.name, self.child)
+        else:
+            self.child.kill()
+            self.child.wait()
+
+    def text(self) -> str:
+        """All it has said."""
+        self._output.seek(0)
+        return self._output.read().decode(errors="replace")
+
+    def _last_line(self) -> str:
+        lines = self.text()[-2000:].strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
+    def ask_to_end(self) -> None:
+        """SIGTERM."""
+        if self.ended():
+            return
+        if self._clock is not None:
+            self._clock.signal(self.name, self.child, signal.SIGTERM)
+        else:
+            self.child.terminate()
+
+    def end(self, wait_s: float = END_S) -> None:
+        """SIGTERM, and SIGKILL after `wait_s`."""
+        try:
+            self.ask_to_end()
+            if self._clock is not None:
+                self._clock.await_end(self.name, self.child, wait_s)
+            else:
+                self.child.wait(wait_s)
+        except (subprocess.TimeoutExpired, BusError):
+            self.child.kill()
+            self.child.wait()
+        self._output.close()
+
+
+def virtual_clock(address: BusAddress) -> VirtualClock | None:
+    """Our part in the virtual time of a bus, for the caller to release; None: its time is real. Raises BusError."""
+    if not address.is_local:
+        return None
+    try:
+        return hub_clock(address.channel)
+    except OSError as error:
+        raise BusError(
+            f"{address}: nobody serves it: start hodograph-hub {address.channel} ({error})"
+        ) from None
+
+
+class Rig:
+    """Controller and drives as child processes; ends them on leaving."""
 
     def __init__(
         self, machine: Machine, address: BusAddress, pace: str, controller: str | None = None
     ) -> None:
-        self._commands = [
-            drive_command(machine, address),
-            controller_command(machine, address, pace, controller),
-        ]
-        self._children: list[tuple[subprocess.Popen[bytes], IO[bytes]]] = []
+        self._machine, self._address, self._pace = machine, address, pace
+        self._program = controller
+        self._clock: VirtualClock | None = None
+        self._children: list[Process] = []
 
     def __enter__(self) -> Rig:
+        self._clock = virtual_clock(self._address)
+        # In virtual time ticks cost what they take to compute: nothing is gained by leaving out the time between them.
+        pace = self._pace if self._clock is None else "real-time"
         try:
-            for command in self._commands:
-                self._spawn(command)
+            self._spawn("drives", drive_command(self._machine, self._address))
+            command = controller_command(self._machine, self._address, pace, self._program)
+            self._spawn(f"controller-{self._machine.node}", command)
         except BaseException:
             self.end()
             raise
@@ -130,58 +223,25 @@ class Rig:
     def __exit__(self, *_: object) -> None:
         self.end()
 
-    def _spawn(self, command: list[str]) -> None:
-        output = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the child)
-        child = subprocess.Popen(
-            guarded(command),
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-        self._children.append((child, output))
-        with suppress(OSError):
-            os.sched_setaffinity(child.pid, {max(os.sched_getaffinity(0))})
+    def _spawn(self, name: str, command: list[str]) -> None:
+        self._children.append(Process(name, command, self._clock))
 
     @property
-    def process_ids(self) -> list[int]:
-        """Of the drives and of the controller, in this order."""
-        return [child.pid for child, _ in self._children]
+    def processes(self) -> tuple[Process, Process]:
+        """The drives and the controller."""
+        drives, controller = self._children
+        return drives, controller
 
     def check(self) -> None:
         """Raises BusError with its last words when a child has ended."""
-        for child, output in self._children:
-            if child.poll() is not None:
-                name = Path(_program(child)).name
-                raise BusError(
-                    f"{name} ended by itself (status {child.returncode}): {_last_line(output)}"
-                )
+        for child in self._children:
+            child.check()
 
     def end(self) -> None:
-        """Ends all children: SIGTERM, and SIGKILL after five seconds."""
-        for child, _ in reversed(self._children):
-            if child.poll() is None:
-                child.terminate()
-        deadline = time.monotonic() + 5.0
-        for child, output in self._children:
-            try:
-                child.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                child.kill()
-                child.wait()
-            output.close()
+        """Ends all children, the controller first."""
+        for child in reversed(self._children):
+            child.end()
         self._children.clear()
-
-
-def _program(child: subprocess.Popen[bytes]) -> str:
-    words = (
-        [str(word) for word in child.args] if isinstance(child.args, list) else [str(child.args)]
-    )
-    return words[4] if words[0].endswith("setpriv") else words[0]
-
-
-def _last_line(output: IO[bytes]) -> str:
-    size = output.seek(0, os.SEEK_END)
-    output.seek(max(0, size - 2000))
-    lines = output.read().decode(errors="replace").strip().splitlines()
-    return lines[-1] if lines else "it said nothing"
+        if self._clock is not None:
+            self._clock.release()
+            self._clock = None

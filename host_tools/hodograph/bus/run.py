@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -37,6 +36,8 @@ __all__ = [
 _SYNCS, _TICK, _MISSES = 1, 2, 3
 _MARGIN_TICKS = 50
 """Recorded beyond what is needed, so that late answers can be told from lost ones."""
+_REST_TICKS = 10
+"""Recorded before the start: `hodograph identify` wants to see that a motion begins at rest."""
 
 Progress = Callable[[int], None]
 
@@ -93,10 +94,10 @@ def station(
 
 
 def _await_rig(controller: Controller, rig: Rig, wait_s: float) -> None:
-    deadline = time.monotonic() + wait_s
+    deadline = controller.clock.now_s() + wait_s
     while not controller.answers(0.25):
         rig.check()
-        if time.monotonic() > deadline:
+        if controller.clock.now_s() > deadline:
             raise BusError(f"the controller started here does not answer within {wait_s:g} s")
 
 
@@ -122,11 +123,13 @@ def run_program(
     goto(controller, machine, (int(setpoints[0, 0]), int(setpoints[0, 1])))
     controller.upload(image)
     with Recorder(controller.address) as recorder:
-        begun = time.monotonic()
+        _await_syncs(controller, _REST_TICKS)
+        begun_s = controller.clock.now_s()
         controller.start()
         _follow(at, progress)
-        wall_s = time.monotonic() - begun
-        _settle(controller, settling_ticks(machine.period_us))
+        took_s = controller.clock.now_s() - begun_s
+        behind = settling_ticks(machine.period_us) + REACHED_AFTER + _MARGIN_TICKS
+        _await_syncs(controller, behind)
     misses = controller.read(STATISTICS, _MISSES)  # of this run: start sets it to 0
     if recorder.dropped:
         raise RunError(
@@ -135,15 +138,15 @@ def run_program(
         )
     frames = recorder.frames()
     if record is not None:
-        write_recording(record, frames, controller.address.channel)
+        write_recording(record, frames, controller.address.name)
     motion, load = analyse_recording(frames, image, machine, kernel)
     return BusRun(
         motion=motion,
         bus=str(controller.address),
         deadline_misses=misses,
-        pace=at.pace or measured_pace(motion, wall_s),
+        pace=at.pace or measured_pace(motion, took_s),
         frames=int(frames.size),
-        wall_s=wall_s,
+        wall_s=took_s,
         load=load,
     )
 
@@ -161,13 +164,13 @@ def _follow(at: Station, progress: Progress | None) -> None:
     controller.wait_for((READY,), math.inf, tick)
 
 
-def _settle(controller: Controller, settling: int) -> None:
-    end = controller.read(STATISTICS, _SYNCS) + settling + REACHED_AFTER + _MARGIN_TICKS
-    deadline = time.monotonic() + 30.0
+def _await_syncs(controller: Controller, count: int) -> None:
+    end = controller.read(STATISTICS, _SYNCS) + count
+    deadline = controller.clock.now_s() + 30.0
     while controller.read(STATISTICS, _SYNCS) < end:
-        if time.monotonic() > deadline:
+        if controller.clock.now_s() > deadline:
             raise BusError("the controller has stopped sending SYNC: see hodograph status")
-        time.sleep(0.01)
+        controller.clock.sleep(0.01)
 
 
 def rig_until_interrupted(
@@ -193,7 +196,7 @@ def rig_until_interrupted(
             try:
                 while True:
                     rig.check()
-                    time.sleep(0.2)
+                    controller.clock.sleep(0.2)
             except KeyboardInterrupt:
                 with unbroken(), suppress(HodographError):
                     controller.stop_and_wait()

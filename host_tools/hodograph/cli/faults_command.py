@@ -9,6 +9,7 @@ from ..bus.address import parse_address
 from ..data import EXAMPLES
 from ..errors import InputError, RunError
 from ..faults.campaign import run_campaign
+from ..faults.run_case import Buses
 from ..faults.scenario import find_scenarios
 from ..faults.table import text
 from .output import note, print_json
@@ -27,8 +28,7 @@ def faults(options: Namespace) -> None:
     for verdict in run_campaign(
         scenarios,
         seeds,
-        parse_address(options.bus),
-        parse_address(options.drives_bus),
+        None if options.buses is None else _two(options.buses),
         options.part,
     ):
         verdicts.append(verdict)
@@ -41,6 +41,11 @@ def faults(options: Namespace) -> None:
         print(text(verdicts))
     if violations:
         raise RunError(f"{violations} violations in {len(verdicts)} cases")
+
+
+def _two(buses: list[str]) -> Buses:
+    controller, drives = map(parse_address, buses)
+    return controller, drives
 
 
 COMMANDS = {"faults": faults}

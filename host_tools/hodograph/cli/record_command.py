@@ -3,16 +3,17 @@
 
 from __future__ import annotations
 
-import time
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from ..bus.address import BusAddress, check_raw, parse_address
+from ..bus.clock import REAL_CLOCK, Clock, VirtualClock
 from ..bus.listening.frames import Frames
 from ..bus.listening.recorder import Recorder
 from ..bus.listening.recordings import RecordingWriter, check_suffix
 from ..bus.listening.setpoint_check import Jump, Step, limits_at, step_limits
 from ..bus.listening.setpoint_watch import SetpointWatch, jumps
+from ..bus.processes import virtual_clock
 from ..bus.sdo.configuration import configured_limits, configured_nodes
 from ..bus.sdo.controller import connect
 from ..errors import BusError, HodographError, RunError
@@ -64,30 +65,39 @@ class _Recording:
         self._options = options
         self._watch = SetpointWatch(None if machine is None else machine.nodes)
         self._worst: dict[tuple[str, tuple[int, ...]], Step] = {}
-        self._writer = RecordingWriter(options.file, address.channel)
+        self._writer = RecordingWriter(options.file, address.name)
+        self._virtual: VirtualClock | None = None
         try:
+            self._virtual = virtual_clock(address)
             self._recorder = Recorder(address)
         except BaseException:
-            self._writer.close()
+            self._release()
             raise
+        self._clock: Clock = self._virtual or REAL_CLOCK
 
     def __enter__(self) -> _Recording:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._recorder.stop()
+        self._release()
+
+    def _release(self) -> None:
         self._writer.close()
+        if self._virtual is not None:
+            self._virtual.release()
+            self._virtual = None
 
     def go_on(self) -> None:
         """Until the time is over or Ctrl-C, which is how it is meant to end."""
-        recorder, seconds = self._recorder, self._options.seconds
-        begun = recorder.started_s
+        recorder, clock, seconds = self._recorder, self._clock, self._options.seconds
+        begun = clock.now_s()
         try:
-            while seconds is None or time.monotonic() - begun < seconds:
+            while seconds is None or clock.now_s() - begun < seconds:
                 left_s = _WRITE_EVERY_S
                 if seconds is not None:
-                    left_s = min(left_s, begun + seconds - time.monotonic())
-                time.sleep(max(0.0, left_s))
+                    left_s = min(left_s, begun + seconds - clock.now_s())
+                clock.sleep(left_s)
                 self._keep(recorder.take())
         except KeyboardInterrupt as error:
             if type(error) is not KeyboardInterrupt:  # SIGTERM ends it as well, with its own status
@@ -95,7 +105,7 @@ class _Recording:
         finally:
             recorder.stop()
             self._keep(recorder.take())
-            self.seconds = time.monotonic() - begun
+            self.seconds = clock.now_s() - begun
         self._look(self._watch.close())
 
     def _keep(self, frames: Frames) -> None:

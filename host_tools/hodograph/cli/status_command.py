@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -13,6 +12,7 @@ from datetime import datetime
 from typing import Any
 
 from ..bus.address import BusAddress, parse_address
+from ..bus.clock import Clock
 from ..bus.listening.load import LEAST_LISTEN_S, BusLoad, LoadMeter
 from ..bus.sdo.controller import Controller, connect
 from ..bus.sdo.status import Status, snapshot
@@ -34,18 +34,18 @@ def status(options: Namespace) -> None:
     with ExitStack() as stack:
         controller = stack.enter_context(connect(address, to.node, to.bitrate))
         controller.require(options.wait)
-        meter = _meter(address, to, stack)
+        meter = _meter(address, to, controller.clock, stack)
         if options.watch:
             _watch(controller, meter, to, options)
         else:
             _once(controller, meter, to, options)
 
 
-def _meter(address: BusAddress, to: Target, stack: ExitStack) -> LoadMeter | None:
+def _meter(address: BusAddress, to: Target, clock: Clock, stack: ExitStack) -> LoadMeter | None:
     """Only SocketCAN lets us listen beside what we ask."""
     if not address.is_raw:
         return None
-    return stack.enter_context(LoadMeter(address, to.bitrate))
+    return stack.enter_context(LoadMeter(address, to.bitrate, clock))
 
 
 def _once(controller: Controller, meter: LoadMeter | None, to: Target, options: Namespace) -> None:
@@ -67,32 +67,34 @@ class _Screen:
 
     names: tuple[str, ...]
     as_json: bool
+    clock: Clock
 
     def show(self, found: Status, load: BusLoad | None) -> None:
         if self.as_json:
-            print_json({"time": _now()} | _document(found, load))
+            print_json({"time": self._now()} | _document(found, load))
         elif sys.stdout.isatty():
             self._draw(status_rows(found, load, self.names))
         else:
-            print(f"{_now()} {status_line(found, load)}")
+            print(f"{self._now()} {status_line(found, load)}")
         sys.stdout.flush()
 
     def lost(self, words: str) -> None:
         if self.as_json:
-            print_json({"time": _now(), "error": words})
+            print_json({"time": self._now(), "error": words})
         elif sys.stdout.isatty():
             self._draw([("controller", words)])
         else:
-            print(f"{_now()} {words}")
+            print(f"{self._now()} {words}")
         sys.stdout.flush()
 
     def _draw(self, rows: list[Row]) -> None:
-        lines = [*aligned([("time", _now()), *rows], _NAME_WIDTH), "", "Ctrl-C ends"]
+        lines = [*aligned([("time", self._now()), *rows], _NAME_WIDTH), "", "Ctrl-C ends"]
         sys.stdout.write(_HOME + "".join(f"{line}{_CLEAR_LINE}\n" for line in lines) + _CLEAR_BELOW)
 
-
-def _now() -> str:
-    return datetime.now().astimezone().isoformat(timespec="milliseconds")
+    def _now(self) -> str:
+        """By the clock of the bus."""
+        now = datetime.fromtimestamp(self.clock.stamp_ns() / 1e9)
+        return now.astimezone().isoformat(timespec="milliseconds")
 
 
 @contextmanager
@@ -110,13 +112,13 @@ def _own_screen() -> Iterator[None]:
 
 
 def _watch(controller: Controller, meter: LoadMeter | None, to: Target, options: Namespace) -> None:
-    screen = _Screen(to.axis_names, options.json)
+    screen = _Screen(to.axis_names, options.json, controller.clock)
     try:
         with _own_screen():
             while True:
-                begun = time.monotonic()
+                begun = controller.clock.now_s()
                 _look(controller, meter, screen)
-                time.sleep(max(0.0, begun + options.interval - time.monotonic()))
+                controller.clock.sleep(begun + options.interval - controller.clock.now_s())
     except KeyboardInterrupt as error:
         if type(error) is not KeyboardInterrupt:  # SIGTERM
             raise

@@ -3,18 +3,16 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from typing import Any
 
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ..bus.address import BusAddress
+from ..bus.clock import Clock, VirtualClock
+from ..bus.processes import Process
 from ..bus.sdo.controller import Controller
 from ..bus.sdo.network import open_network
 from ..bus.sdo.objects import PROGRAM
@@ -43,25 +41,9 @@ def cut_upload(controller: Controller, image: bytes, at: int, *, polite: bool) -
             controller.sdo.abort()
 
 
-def spawn_command(*words: str) -> subprocess.Popen[bytes]:
+def spawn_command(clock: VirtualClock | None, *words: str) -> Process:
     """A hodograph command of its own, to be killed."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "hodograph", *words],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-
-
-def spawn_upload(path: Path, bus: BusAddress) -> subprocess.Popen[bytes]:
-    """`hodograph upload` as a process."""
-    return spawn_command("upload", str(path), "--bus", str(bus))
-
-
-def kill(process: subprocess.Popen[bytes]) -> None:
-    """SIGKILL, and wait for the end."""
-    process.send_signal(signal.SIGKILL)
-    process.wait()
+    return Process("command", [sys.executable, "-m", "hodograph", *words], clock)
 
 
 @contextmanager
@@ -77,9 +59,11 @@ def drives_at(bus: BusAddress, nodes: Sequence[int], bitrate: int) -> Iterator[l
         yield clients
 
 
-def await_rest(clients: Sequence[Any], tolerance_counts: int, wait_s: float) -> float:
-    """Monotonic time at which the drives, asked by SDO, had come to rest, not enabled. Raises RunError: they do not."""
-    deadline = time.monotonic() + wait_s
+def await_rest(clients: Sequence[Any], clock: Clock, tolerance_counts: int, wait_s: float) -> float:
+    """When the drives, asked by SDO, had come to rest, not enabled: seconds as `Clock.now_s`. Raises RunError: they
+    do not.
+    """
+    deadline = clock.now_s() + wait_s
     rests = {id(client): (0, 0.0, 0) for client in clients}  # place, since when, looks
     while True:
         for client in clients:
@@ -92,9 +76,9 @@ def await_rest(clients: Sequence[Any], tolerance_counts: int, wait_s: float) -> 
             if off and abs(now - place) <= tolerance_counts and looks > 0:
                 rests[id(client)] = (place, since_s, looks + 1)
             else:
-                rests[id(client)] = (now, time.monotonic(), 1 if off else 0)
+                rests[id(client)] = (now, clock.now_s(), 1 if off else 0)
         if all(looks >= _STILL_LOOKS for _, _, looks in rests.values()):
             return max(since_s for _, since_s, _ in rests.values())
-        if time.monotonic() > deadline:
+        if clock.now_s() > deadline:
             raise RunError(f"without a controller, a drive is not off and at rest in {wait_s:g} s")
-        time.sleep(_WATCH_S)
+        clock.sleep(_WATCH_S)

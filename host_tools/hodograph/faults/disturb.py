@@ -3,16 +3,16 @@
 
 from __future__ import annotations
 
-import subprocess
-import time
 import zlib
 
+from ..bus.clock import Clock
 from ..bus.listening.recorder import Recorder
+from ..bus.processes import Process
 from ..bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, Controller
 from ..bus.sdo.objects import ACTUAL, FAULT, MOVING, STATISTICS
 from ..bus.words.texts import STATES
 from ..errors import BusError, RunError
-from .actions import await_rest, drives_at, kill, spawn_command
+from .actions import await_rest, drives_at, spawn_command
 from .record import LIMIT_S, LOOK_S, REST_TOLERANCE_COUNTS, Record
 from .stand import Stand
 from .uploads import disturb_upload
@@ -38,14 +38,15 @@ def disturb(record: Record, stand: Stand, controller: Controller, control: Recor
         return
     process = None
     if case.scenario.action == "kill-host":
-        process = spawn_command("start", "--follow", "--bus", str(stand.bus))
+        process = spawn_command(stand.clock, "start", "--follow", "--bus", str(stand.bus))
     else:
         controller.start()
     try:
         state = _follow(record, stand, controller, process)
     finally:
         if process is not None:
-            kill(process)
+            process.kill()
+            process.end()
     if state is None:  # a fresh controller: nothing to ask it
         return
     record.finished = state == READY and controller.read(STATISTICS, _TICK) == job.clean.ticks - 1
@@ -57,76 +58,76 @@ def disturb(record: Record, stand: Stand, controller: Controller, control: Recor
 
 
 def _follow(
-    record: Record, stand: Stand, controller: Controller, process: subprocess.Popen[bytes] | None
+    record: Record, stand: Stand, controller: Controller, process: Process | None
 ) -> int | None:
     """Until the controller is at rest again, acting on the way; its state, None when it was killed."""
     action, started, acted = record.case.scenario.action, False, False
-    deadline = time.monotonic() + (LIMIT_S if process is None else _START_S)
+    deadline = controller.clock.now_s() + (LIMIT_S if process is None else _START_S)
     while True:
         state = controller.state()
         if state in MOVING and not started:
-            started, deadline = True, time.monotonic() + LIMIT_S
+            started, deadline = True, controller.clock.now_s() + LIMIT_S
         if state in MOVING and not acted and action != "none":
             acted = controller.read(STATISTICS, _TICK) >= record.case.at
-            if acted and not _act(record, stand, process):
+            if acted and not _act(record, stand, controller.clock, process):
                 return None
         if state in (FAULT_STATE, OFF, BOOT) or (started and state == READY):
             return state
-        if process is not None and not started and process.poll() is not None:
-            raise RunError(f"hodograph start ended with status {process.returncode}")
-        if time.monotonic() > deadline:
+        if process is not None and not started and process.ended():
+            raise RunError(f"hodograph start ended with status {process.child.returncode}")
+        if controller.clock.now_s() > deadline:
             raise RunError(f"still {STATES.get(state, state)} when its time was over")
-        time.sleep(LOOK_S)
+        controller.clock.sleep(LOOK_S)
 
 
-def _act(record: Record, stand: Stand, process: subprocess.Popen[bytes] | None) -> bool:
+def _act(record: Record, stand: Stand, clock: Clock, process: Process | None) -> bool:
     """Does what the scenario asks of the host; whether there still is a controller."""
     action = record.case.scenario.action
     if action == "watch-drives":
-        _watch_drives(record, stand)
+        _watch_drives(record, stand, clock)
         return True
-    record.began_us = time.time_ns() // 1000
+    record.began_us = clock.stamp_ns() // 1000
     if action == "kill-drives":
         for drive in stand.drives:
             drive.kill()
     elif action == "kill-one-drive":
         stand.drives[record.job.machine.nodes.index(int(record.case.drawn["node"]))].kill()
     elif process is not None:
-        kill(process)
+        process.kill()
     elif action == "kill-controller":
         stand.controller.kill()
-        _watch_drives(record, stand)
+        _watch_drives(record, stand, clock)
         return False
     return True
 
 
-def _watch_drives(record: Record, stand: Stand) -> None:
+def _watch_drives(record: Record, stand: Stand, clock: Clock) -> None:
     machine = record.job.machine
     with drives_at(stand.drives_bus, machine.nodes, machine.bitrate) as clients:
-        rest_s = await_rest(clients, REST_TOLERANCE_COUNTS, LIMIT_S)
-    record.rest_us = int((rest_s + time.time() - time.monotonic()) * 1e6)
+        rest_s = await_rest(clients, clock, REST_TOLERANCE_COUNTS, LIMIT_S)
+    record.rest_us = round((rest_s - clock.now_s()) * 1e6) + clock.stamp_ns() // 1000
 
 
 def _await_end_of_rules(record: Record, controller: Controller) -> None:
     """Until no rule acts any more, and a little longer; ticks go on as long as there is a controller."""
     case = record.case
     base = controller.read(STATISTICS, _SYNCS) - controller.read(STATISTICS, _TICK)
-    deadline = time.monotonic() + LIMIT_S
+    deadline = controller.clock.now_s() + LIMIT_S
     while controller.read(STATISTICS, _SYNCS) < base + case.last_tick:
-        if time.monotonic() > deadline:
+        if controller.clock.now_s() > deadline:
             raise BusError("SYNCs have stopped")
-        time.sleep(LOOK_S)
-    time.sleep(case.longest_ms / 1000)
+        controller.clock.sleep(LOOK_S)
+    controller.clock.sleep(case.longest_ms / 1000)
     _await_rest(controller, len(record.job.machine.axes))
-    time.sleep(QUIET_S)
+    controller.clock.sleep(QUIET_S)
 
 
 def _await_rest(controller: Controller, axes: int) -> None:
     """Until the axes stand, by what the controller hears: one that is off rolls on. If they do not, the judge sees."""
-    deadline = time.monotonic() + LIMIT_S
+    deadline = controller.clock.now_s() + LIMIT_S
     place, looks = [0] * axes, 0
-    while looks < _STILL_LOOKS and time.monotonic() < deadline:
+    while looks < _STILL_LOOKS and controller.clock.now_s() < deadline:
         now = [controller.read(ACTUAL, axis) for axis in range(1, axes + 1)]
         away = max(abs(a - b) for a, b in zip(now, place, strict=True))
         place, looks = (place, looks + 1) if away <= REST_TOLERANCE_COUNTS else (now, 0)
-        time.sleep(LOOK_S)
+        controller.clock.sleep(LOOK_S)

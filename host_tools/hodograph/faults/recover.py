@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import suppress
 
 from ..bus.run import Station, run_program
@@ -24,22 +23,22 @@ def recover(record: Record, stand: Stand, controller: Controller) -> None:
         for drive in stand.drives:
             drive.end()
         stand.start_drives(faulty=False)
-    began_s = time.monotonic()
+    began_s = controller.clock.now_s()
     _reset(controller)
-    record.recovery_ms = 1000 * (time.monotonic() - began_s)
+    record.recovery_ms = 1000 * (controller.clock.now_s() - began_s)
     run = run_program(Station(controller, "fast", None), job.machine, job.image, "fixed")
     record.again = run.motion
 
 
 def _reset(controller: Controller) -> None:
     """Resets until the fault is gone and the drives are found: braking comes first, drives take their time."""
-    deadline = time.monotonic() + LIMIT_S
+    deadline = controller.clock.now_s() + LIMIT_S
     while (state := controller.state()) not in (OFF, READY):
-        if time.monotonic() > deadline:
+        if controller.clock.now_s() > deadline:
             raise RunError(
                 f"{STATES.get(state, state)} after {LIMIT_S:g} s of resets: {controller.fault_text()}"
             )
         if state == FAULT_STATE:
             with suppress(CommandRefusedError):
                 controller.command(RESET)
-        time.sleep(0.05)
+        controller.clock.sleep(0.05)

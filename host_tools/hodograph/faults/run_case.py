@@ -6,6 +6,8 @@ from __future__ import annotations
 import time
 
 from ..bus.address import BusAddress
+from ..bus.clock import Clock
+from ..bus.hub import LocalHub
 from ..bus.listening.recorder import Recorder
 from ..bus.sdo.controller import connect
 from ..errors import HodographError
@@ -19,8 +21,22 @@ from .stand import Stand
 _TAKE_S = 0.05
 
 
-def run_case(case: Case, bus: BusAddress, drives_bus: BusAddress) -> Record:
-    """Runs a case to its end, whatever happens; troubles are in the record. Raises BusError: no bus to run on."""
+Buses = tuple[BusAddress, BusAddress]
+"""The controller's and the drives'."""
+
+
+def run_case(case: Case, buses: Buses | None) -> Record:
+    """Runs a case to its end, whatever happens; troubles are in the record. Raises BusError: no bus to run on.
+
+    Without buses it has its own, in virtual time: the same record each time.
+    """
+    if buses is not None:
+        return _run(case, *buses)
+    with LocalHub(buses=2) as hub:
+        return _run(case, hub.addresses[0], hub.addresses[1])
+
+
+def _run(case: Case, bus: BusAddress, drives_bus: BusAddress) -> Record:
     began_s = time.monotonic()
     record = Record(case, load_job(case.scenario.path))
     machine = record.job.machine
@@ -35,22 +51,25 @@ def run_case(case: Case, bus: BusAddress, drives_bus: BusAddress) -> Record:
             disturb(record, stand, controller, control)
         except HodographError as error:
             record.troubles.append(f"disturbed run: {error}")
-        _gather(record, stand, control, drives)
+        _gather(record, stand, controller.clock, control, drives)
         try:
             recover(record, stand, controller)
         except HodographError as error:
             record.troubles.append(f"recovery: {error}")
-        record.control = control.frames()
+        record.control = control.so_far()
         record.troubles += stand.complaints()
     record.wall_s = time.monotonic() - began_s
     return record
 
 
-def _gather(record: Record, stand: Stand, control: Recorder, drives: Recorder) -> None:
+def _gather(
+    record: Record, stand: Stand, clock: Clock, control: Recorder, drives: Recorder
+) -> None:
     record.injections = stand.injections()
-    record.evidence = Evidence(control.frames(), drives.frames(), record.job.machine.nodes)
+    record.evidence = Evidence(control.so_far(), drives.so_far(), record.job.machine.nodes)
     if control.dropped or drives.dropped:
         record.troubles.append("the kernel dropped frames of a recording")
     if record.injections and not record.began_us:
         ns = int(str(record.injections[0]["t_ns"]))
-        record.began_us = (ns + time.time_ns() - time.monotonic_ns()) // 1000
+        offset_ns = 0 if clock.is_virtual else time.time_ns() - time.monotonic_ns()
+        record.began_us = (ns + offset_ns) // 1000

@@ -4,60 +4,23 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
-import subprocess
 import tempfile
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..bus.address import BusAddress
-from ..bus.processes import controller_command, drive_command, find_program, guarded
+from ..bus.processes import (
+    Process,
+    controller_command,
+    drive_command,
+    find_program,
+    virtual_clock,
+)
 from ..config import Machine
 
 INJECTOR = "hodograph-injector"
-
-
-class Process:
-    """A child and what it says."""
-
-    def __init__(self, command: list[str]) -> None:
-        self._output = tempfile.TemporaryFile()  # noqa: SIM115  (lives as long as the child)
-        self.child = subprocess.Popen(
-            guarded(command),
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-        with suppress(OSError):
-            os.sched_setaffinity(self.child.pid, {max(os.sched_getaffinity(0))})
-
-    def kill(self) -> None:
-        """As a crash would end it."""
-        self.child.send_signal(signal.SIGKILL)
-        self.child.wait()
-
-    def ended(self) -> bool:
-        """Whether it has ended, by itself or by us."""
-        return self.child.poll() is not None
-
-    def text(self) -> str:
-        """All it has said."""
-        self._output.seek(0)
-        return self._output.read().decode(errors="replace")
-
-    def end(self) -> None:
-        """SIGTERM, SIGKILL after two seconds."""
-        if not self.ended():
-            self.child.terminate()
-            try:
-                self.child.wait(2.0)
-            except subprocess.TimeoutExpired:
-                self.kill()
-        self._output.close()
 
 
 class Stand:
@@ -77,13 +40,15 @@ class Stand:
         self._gone: list[Process] = []
 
     def __enter__(self) -> Stand:
+        self.clock = virtual_clock(self.bus)
         try:
             self.injector = self._start(
+                "injector",
                 [
                     str(find_program(INJECTOR)),
                     *("--bus", self.bus.channel, "--bus", self.drives_bus.channel),
                     *("--rules", str(self._rules), "--verbose"),
-                ]
+                ],
             )
             self.start_drives(faulty=True)
             self.start_controller()
@@ -95,14 +60,16 @@ class Stand:
     def __exit__(self, *_: object) -> None:
         self.end()
 
-    def _start(self, command: list[str]) -> Process:
-        process = Process(command)
+    def _start(self, name: str, command: list[str]) -> Process:
+        process = Process(name, command, self.clock)
         self._others.append(process)
         return process
 
     def start_controller(self) -> None:
         """A fresh controller."""
-        self.controller = self._start(controller_command(self.machine, self.bus, "fast"))
+        pace = "fast" if self.clock is None else "real-time"
+        command = controller_command(self.machine, self.bus, pace)
+        self.controller = self._start(f"controller-{self.machine.node}", command)
 
     def start_drives(self, *, faulty: bool) -> None:
         """Fresh drives, with the rules or without."""
@@ -111,7 +78,11 @@ class Stand:
         groups = [(axis,) for axis in axes] if self._apart else [axes]
         self._gone += self.drives
         self.drives = [
-            Process(drive_command(replace(self.machine, axes=group), self.drives_bus) + more)
+            Process(
+                f"drive-{group[0].node}",
+                drive_command(replace(self.machine, axes=group), self.drives_bus) + more,
+                self.clock,
+            )
             for group in groups
         ]
 
@@ -134,4 +105,6 @@ class Stand:
         """Ends everything, the controller first."""
         for process in (*reversed(self._others), *self.drives, *self._gone):
             process.end()
+        if self.clock is not None:
+            self.clock.release()
         self._folder.cleanup()

@@ -3,16 +3,16 @@
 
 from __future__ import annotations
 
-import subprocess
-import time
 import zlib
 
 import numpy as np
 
+from ..bus.clock import Clock
 from ..bus.listening.recorder import Recorder
+from ..bus.processes import Process
 from ..bus.sdo.controller import FAULT_STATE, READY, Controller
 from ..errors import BusError, RefusedError, RunError
-from .actions import cut_upload, kill, spawn_upload
+from .actions import cut_upload, spawn_command
 from .record import LIMIT_S, LOOK_S, Record, load_job
 from .stand import Stand
 
@@ -22,13 +22,20 @@ _SDO_ASK = 0x600
 def disturb_upload(record: Record, stand: Stand, controller: Controller, control: Recorder) -> None:
     """Breaks an upload of another program off; what was there must stay."""
     other = load_job(record.job.other).image
-    record.began_us = time.time_ns() // 1000
+    record.began_us = controller.clock.stamp_ns() // 1000
     if record.case.scenario.action == "kill-upload":
-        process = spawn_upload(record.job.other, stand.bus)
-        _await_frames(
-            control, _SDO_ASK + controller.node_id, int(record.case.drawn["frames"]), process
+        process = spawn_command(
+            stand.clock, "upload", str(record.job.other), "--bus", str(stand.bus)
         )
-        kill(process)
+        _await_frames(
+            controller.clock,
+            control,
+            _SDO_ASK + controller.node_id,
+            int(record.case.drawn["frames"]),
+            process,
+        )
+        process.kill()
+        process.end()
     else:
         at = int(record.case.drawn["permille"]) * len(other) // 1000
         cut_upload(controller, other, at, polite=record.case.drawn["manner"] == "abort")
@@ -45,36 +52,36 @@ def disturb_upload(record: Record, stand: Stand, controller: Controller, control
 
 
 def _await_frames(
-    control: Recorder, identifier: int, more: int, process: subprocess.Popen[bytes]
+    clock: Clock, control: Recorder, identifier: int, more: int, process: Process
 ) -> None:
     """Until so many frames have come since now, or the process has ended."""
 
     def count() -> int:
-        return int(np.count_nonzero(control.frames()["id"] == identifier))
+        return int(np.count_nonzero(control.so_far()["id"] == identifier))
 
     wanted = count() + more
-    deadline = time.monotonic() + LIMIT_S
-    while count() < wanted and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(LOOK_S)
+    deadline = clock.now_s() + LIMIT_S
+    while count() < wanted and not process.ended() and clock.now_s() < deadline:
+        clock.sleep(LOOK_S)
 
 
 def _crc_after_cut(controller: Controller) -> int | None:
     """The program's CRC when the server has done with the broken transfer (a read ends it)."""
-    deadline = time.monotonic() + 5.0
+    deadline = controller.clock.now_s() + 5.0
     while True:
         try:
             return controller.program_crc()
         except (BusError, RefusedError):  # the rest of the old transfer
-            if time.monotonic() > deadline:
+            if controller.clock.now_s() > deadline:
                 raise
-            time.sleep(0.05)
+            controller.clock.sleep(0.05)
 
 
 def _run_old(record: Record, controller: Controller) -> None:
     """The program that was there before runs as if nothing had been."""
     controller.start()
-    deadline = time.monotonic() + LIMIT_S
+    deadline = controller.clock.now_s() + LIMIT_S
     while controller.state() != READY:
-        if controller.state() == FAULT_STATE or time.monotonic() > deadline:
+        if controller.state() == FAULT_STATE or controller.clock.now_s() > deadline:
             raise RunError(f"the old program does not run: {controller.fault_text()}")
-        time.sleep(LOOK_S)
+        controller.clock.sleep(LOOK_S)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bus.listening.decode import RPDO1, SYNC_ID, SYNC_OVERFLOW, TPDO1
-from ..bus.listening.frames import FRAME_DTYPE, Frames
+from ..bus.listening.frames import Frames
 
 HELD_BACK = 3
 """SYNCs that wait for late answers."""
@@ -55,7 +55,7 @@ class Decoder:
 
     def __init__(self, nodes: Sequence[int]) -> None:
         self._nodes = tuple(nodes)
-        self._tail = np.empty(0, dtype=FRAME_DTYPE)
+        self._tail: Frames | None = None
         self._wanted = np.array([SYNC_ID, *self._identifiers()])
         self._used = dict.fromkeys(
             self._identifiers(), 0
@@ -68,7 +68,9 @@ class Decoder:
 
     def feed(self, frames: Frames) -> Samples:
         """The samples that are complete with these frames."""
-        frames = np.concatenate([self._tail, frames[np.isin(frames["id"], self._wanted)]])
+        frames = frames[np.isin(frames["id"], self._wanted)]
+        if self._tail is not None:
+            frames = np.concatenate([self._tail, frames])
         sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
         done = max(0, sync_at.size - HELD_BACK)
         if done == 0:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ..bus.listening.frames import Frames
 from ..bus.words.texts import fault_words
 
@@ -12,27 +14,55 @@ WINDOW_S = 1.0
 MOST_TOLD = 10
 """Events in a window; of the same node and code one."""
 _EMCY, _NODES = 0x080, 0x7F
+_WINDOW_US = round(1e6 * WINDOW_S)
 
 
 class Emergencies:
-    """Told as they come, within the bounds of each window; what was left out is counted at its end."""
+    """Told as they come, within the bounds of each window; what was left out is counted at its end.
+
+    A window begins with an emergency frame, and ends by the time stamps of the bus: what is told of a recording does
+    not depend on how it is cut into pieces.
+    """
 
     def __init__(self) -> None:
-        self._since_s = -WINDOW_S
+        self._since_us: int | None = None
         self._told: set[tuple[int, int]] = set()
         self._left_out = 0
 
-    def feed(self, frames: Frames, now_s: float) -> list[dict[str, Any]]:
-        """Messages for these frames; to be called without frames too, since windows end."""
-        events = []
-        if now_s - self._since_s >= WINDOW_S:
-            if self._left_out:
-                text = f"{self._left_out} more emergency frames in {now_s - self._since_s:.1f} s"
-                events.append({"type": "event", "text": text, "fault": True})
-            self._since_s, self._left_out = now_s, 0
-            self._told.clear()
+    def feed(self, frames: Frames, now_us: int | None = None) -> list[dict[str, Any]]:
+        """Messages for these frames (`RECORD_DTYPE`). `now_us`: the present, where it is known; without frames it ends
+        a window, too.
+        """
         identifiers = frames["id"]
         found = frames[(identifiers > _EMCY) & (identifiers <= _EMCY + _NODES)]
+        events: list[dict[str, Any]] = []
+        while found.size:
+            first_us = int(found["time_us"][0])
+            events += self._end_before(first_us)
+            self._since_us = first_us if self._since_us is None else self._since_us
+            since_us = found["time_us"] - self._since_us
+            beyond = np.flatnonzero((since_us < 0) | (since_us >= _WINDOW_US))
+            inside = int(beyond[0]) if beyond.size else found.size
+            events += self._tell(found[:inside])
+            found = found[inside:]
+        if now_us is None and frames.size:
+            now_us = int(frames["time_us"][-1])
+        return events if now_us is None else events + self._end_before(now_us)
+
+    def _end_before(self, now_us: int) -> list[dict[str, Any]]:
+        """Closes the window when its time is over, or the clock was set back."""
+        if self._since_us is None or 0 <= now_us - self._since_us < _WINDOW_US:
+            return []
+        left_out = self._left_out
+        self._since_us, self._left_out = None, 0
+        self._told.clear()
+        if not left_out:
+            return []
+        text = f"{left_out} more emergency frames in {WINDOW_S:.1f} s"
+        return [{"type": "event", "text": text, "fault": True}]
+
+    def _tell(self, found: Frames) -> list[dict[str, Any]]:
+        events = []
         nodes = found["id"].astype(int) - _EMCY
         codes = found["data"][:, 0].astype(int) | found["data"][:, 1].astype(int) << 8
         for node, code in dict.fromkeys(zip(nodes.tolist(), codes.tolist(), strict=True)):

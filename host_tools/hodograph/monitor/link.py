@@ -2,23 +2,24 @@
 """The controller by SDO, in a thread of its own: its state a few times a second, commands in between.
 
 A command does not wait until a state has been read: it goes between two objects of it; a program that is just being
-fetched is given up for it.
+fetched is given up for it. In virtual time the thread takes part, and what it waits for is counted in that time.
 """
 
 from __future__ import annotations
 
 import queue
 import threading
-import time
 import zlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from typing import Any
 
+import can
 from canopen.sdo.exceptions import SdoAbortedError, SdoError
 
 from ..bus.address import BusAddress
+from ..bus.clock import Clock, VirtualClock
 from ..bus.sdo.controller import Controller
 from ..bus.sdo.network import open_network
 from ..bus.sdo.objects import MOTION, OVERRIDE, PROGRAM
@@ -73,6 +74,8 @@ class Link:
         self._wake = threading.Event()
         self._ending = threading.Event()
         self._in_command = False
+        self._clock: VirtualClock | None = None
+        """Of the present connection, where time is virtual."""
         self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
 
     def start(self) -> None:
@@ -82,7 +85,7 @@ class Link:
     def close(self) -> None:
         """Ends the thread; commands that wait fail."""
         self._ending.set()
-        self._wake.set()
+        self._stir()
         if self._thread.is_alive():
             self._thread.join()
         self._fail_commands(BusError("the monitor has ended"))
@@ -96,8 +99,15 @@ class Link:
         """Gives a command; the future has a HodographError when it was not taken."""
         done: Future[None] = Future()
         self._commands.put((command, done))
-        self._wake.set()
+        self._stir()
         return done
+
+    def _stir(self) -> None:
+        """There is something to do for the thread."""
+        self._wake.set()
+        clock = self._clock
+        if clock is not None:
+            clock.interrupt()
 
     # -- in the thread ------------------------------------------------------------------------
 
@@ -106,7 +116,7 @@ class Link:
             try:
                 with self._open() as controller:
                     self._attend(controller)
-            except HodographError as error:
+            except (HodographError, can.CanError) as error:
                 self._lost(str(error))
                 self._ending.wait(_RETRY_S)
 
@@ -114,16 +124,20 @@ class Link:
     def _open(self) -> Iterator[_Prompt]:
         with open_network(self._address, self._node, self._bitrate) as network:
             remote = network.add_node(self._node, str(CONTROLLER_EDS))
-            controller = _Prompt(self._address, self._node, remote)
+            controller = _Prompt(self._address, self._node, remote, network.clock)
             controller.sdo.RESPONSE_TIMEOUT = _ANSWER_S
             controller.before_read = lambda: self._obey(controller)
+            if isinstance(network.clock, VirtualClock):
+                self._clock = network.clock
             try:
                 yield controller
             finally:
+                self._clock = None
                 controller.close()
 
     def _attend(self, controller: _Prompt) -> None:
         status: dict[str, Any] | None = None
+        clock = controller.clock
         whole_due_s = 0.0
         failures = 0
         while not self._ending.is_set():
@@ -133,12 +147,12 @@ class Link:
                     f"no answer from {controller.who()}: waiting for a controller to be started"
                 )
                 continue
-            begun_s = time.monotonic()
+            begun_s = clock.now_s()
             try:
                 if status is None or begun_s >= whole_due_s or _changed(controller, status):
                     status = read_status(controller)
                     self._look_at_program(controller, status["program"])
-                    took_s = time.monotonic() - begun_s
+                    took_s = clock.now_s() - begun_s
                     whole_due_s = begun_s + max(WHOLE_S, 5 * took_s)
                 else:
                     status = status | _moving_part(controller)
@@ -151,8 +165,17 @@ class Link:
             self._publish({"type": "status", "connected": True, "note": "", "status": status})
             self._obey(controller)
             # However slow the bus or this computer is, others find the controller's channel free most of the time.
-            self._wake.wait(max(PAUSE_S, 2 * (time.monotonic() - begun_s)))
-            self._wake.clear()
+            self._pause(clock, max(PAUSE_S, 2 * (clock.now_s() - begun_s)))
+
+    def _pause(self, clock: Clock, seconds: float) -> None:
+        """Until somebody stirs us."""
+        if isinstance(clock, VirtualClock):
+            until_s = clock.now_s() + seconds
+            while not self._wake.is_set() and clock.now_s() < until_s:
+                clock.wait(until_s)
+        else:
+            self._wake.wait(seconds)
+        self._wake.clear()
 
     def _lost(self, note: str) -> None:
         self._publish({"type": "status", "connected": False, "note": note, "status": None})

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The thread that turns frames into messages: some 25 times a second, whatever the bus brings."""
+"""The thread that turns frames into messages: some 25 times a second, whatever the bus brings.
+
+What the messages say counts in the time stamps of the frames; the time of this computer only paces them.
+"""
 
 from __future__ import annotations
 
@@ -116,6 +119,7 @@ class Pump:
                 self._ending.wait(_RETRY_S)
                 continue
             self._publish({"type": "bus", "there": True, "note": ""})
+            self._emergencies = Emergencies()
             self._load = Listener(self._layout.bitrate)
             self._watch = SetpointWatch(self._layout.nodes)
             self._decoder = Decoder(self._layout.nodes)
@@ -135,7 +139,7 @@ class Pump:
             taken = source.take()
             if taken.frames.size:
                 self._pass_on(taken)
-            for event in self._emergencies.feed(taken.frames, time.monotonic()):
+            for event in self._emergencies.feed(taken.frames, taken.now_us):
                 self._publish(event)
             self._tally.busy_s += time.thread_time() - begun_s
             self._tell(taken)
@@ -148,13 +152,13 @@ class Pump:
 
     def _pass_on(self, taken: Taken) -> None:
         self._tally.frames += taken.frames.size
-        if taken.bus_s is not None:
-            self._load.feed(taken.frames, taken.bus_s)
+        newest_us = int(taken.frames["time_us"][-1])
+        self._load.feed(taken.frames, newest_us / 1e6)
         self._check_setpoints(taken)
         samples = self._decoder.feed(taken.frames)
         rows = self._derivation.feed(samples, self._path)
         if rows.count:
-            age_ms = None if taken.newest_s is None else 1000 * (time.time() - taken.newest_s)
+            age_ms = None if taken.now_us is None else (taken.now_us - newest_us) / 1000
             self._publish(rows_message(rows, self._layout.period_us / 1e6, age_ms))
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S

@@ -9,34 +9,33 @@ from pathlib import Path
 import numpy as np
 
 from ..bus.listening.decode import SYNC_ID, SYNC_OVERFLOW
-from ..bus.listening.frames import FRAME_DTYPE, Frames
+from ..bus.listening.frames import Frames
 from ..bus.listening.recordings import read_recording
 from ..errors import InputError
-from .source import NOTHING, Taken
+from .source import NO_FRAMES, Taken
 
 
 def load_recording(file: Path) -> Frames:
     """The frames of a recording. Raises InputError: not readable, or nothing to show in it."""
-    recorded = read_recording(file)
-    frames = np.zeros(recorded.size, dtype=FRAME_DTYPE)
-    for name in ("id", "length", "data"):
-        frames[name] = recorded[name]
+    frames = read_recording(file)
     if np.count_nonzero(frames["id"] == SYNC_ID) < 2:
         raise InputError(f"{file}: has no SYNCs (0x080): is it a recording of a running machine?")
     return frames
 
 
 class ReplaySource:
-    """A recording by its SYNCs: one a period, `speed` times as fast; time is not read from the file."""
+    """A recording by its SYNCs: one a period, `speed` times as fast; frames are stamped so, too, not as in the file."""
 
     def __init__(self, frames: Frames, period_us: int, speed: float) -> None:
-        self._frames = frames
+        self._frames = frames.copy()
         self._sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
         counters = frames["data"][self._sync_at, 0].astype(np.int64)
         steps = (np.diff(counters, prepend=counters[0]) - 1) % SYNC_OVERFLOW + 1
         steps[0] = 0
-        self._bus_s = np.cumsum(steps) * (period_us / 1e6)
-        self._time_s = self._bus_s / speed
+        sync_us = np.cumsum(steps) * period_us
+        before = np.searchsorted(self._sync_at, np.arange(frames.size), side="right") - 1
+        self._frames["time_us"] = sync_us[np.maximum(before, 0)]
+        self._time_s = sync_us / (1e6 * speed)
         self._begun_s = time.monotonic()
         self._given = 0
 
@@ -47,11 +46,10 @@ class ReplaySource:
         ended = syncs >= self._sync_at.size
         end = self._frames.size if ended else int(self._sync_at[syncs])
         if end == self._given:
-            return Taken(NOTHING.frames, None, ended=ended)
+            return Taken(NO_FRAMES, ended=ended)
         frames = self._frames[self._given : end]
         self._given = end
-        bus_s = float(self._bus_s[min(syncs, self._sync_at.size - 1)])
-        return Taken(frames, time.time(), bus_s, ended=ended)
+        return Taken(frames, int(frames["time_us"][-1]), ended=ended)
 
     def close(self) -> None:
         """See Source."""

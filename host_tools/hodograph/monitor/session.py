@@ -91,9 +91,9 @@ class Session:
             if self._image is not None:
                 pump.show(self._image)
             pump.start()
+            self._say(f"monitor: {self._place.url}")
             if link is not None:
                 link.start()
-            self._say(f"monitor: {self._place.url}")
             while not ending.is_set():
                 _require_alive(pump, link)
                 hub.publish(usage.message(hub.count))

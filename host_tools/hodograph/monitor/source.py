@@ -14,8 +14,9 @@ import can
 import numpy as np
 
 from ..bus.address import BusAddress, check_raw
+from ..bus.clock import has_virtual_time
 from ..bus.listening.frame_batch import BATCH, FrameBatch, open_socket
-from ..bus.listening.frames import FRAME_DTYPE, Frames
+from ..bus.listening.frames import RECORD_DTYPE, Frames
 from ..errors import BusError, one_line
 
 MOST_FRAMES = 65536
@@ -24,19 +25,19 @@ MOST_FRAMES = 65536
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """What has come since the last look; `newest_s` is the age reference: time.time() of the last frame."""
+    """What has come since the last look."""
 
     frames: Frames
-    newest_s: float | None
-    bus_s: float | None = None
-    """When the last frame came by the clock of the bus: of a recording that of the machine, else time.time()."""
+    """`RECORD_DTYPE`, stamped by the clock of the bus: of a recording that of the machine."""
+    now_us: int | None = None
+    """The present by that clock; None: nobody knows it, as virtual time goes on by itself."""
     dropped: int = 0
     """Frames lost since the start, for want of somebody to take them."""
     ended: bool = False
     """A recording is at its end."""
 
 
-NOTHING = Taken(np.empty(0, dtype=FRAME_DTYPE), None)
+NO_FRAMES = np.empty(0, dtype=RECORD_DTYPE)
 
 
 class Source(Protocol):
@@ -60,33 +61,38 @@ def open_source(address: BusAddress, bitrate: int) -> Source:
 
 
 class SocketSource:
-    """SocketCAN. The kernel keeps what waits, and counts what it has no room for."""
+    """SocketCAN, whose kernel keeps what waits, and counts what it has no room for; or a local bus.
+
+    It takes no part in virtual time: nobody waits for what is only looked at.
+    """
 
     def __init__(self, address: BusAddress) -> None:
         self._address = address
+        try:
+            self._is_virtual = address.is_local and has_virtual_time(address.channel)
+        except OSError as error:
+            raise BusError(f"{address}: {one_line(error)}: is hodograph-hub gone?") from error
         self._socket = open_socket(address, timestamps=True)
-        self._batch = FrameBatch()
+        self._batch = FrameBatch(address)
         self._dropped = 0
 
     def take(self) -> Taken:
         """See Source."""
-        chunks: list[bytes] = []
-        newest_s: float | None = None
+        chunks: list[Frames] = []
         count = BATCH
         try:
             while count == BATCH and len(chunks) < MOST_FRAMES // BATCH:
                 count = self._batch.receive(self._socket.fileno())
                 if count:
-                    chunks.append(self._batch.taken(count))
-                    newest_s = self._batch.time_s(count - 1)
+                    chunks.append(self._batch.records(count))
                     self._dropped = self._batch.dropped(count - 1) or self._dropped
                     self._batch.rearm(count)
         except OSError as error:
             raise BusError(
                 f"{self._address}: {error.strerror}: did the interface go down?"
             ) from error
-        frames = np.frombuffer(b"".join(chunks), dtype=FRAME_DTYPE)
-        return Taken(frames, newest_s, newest_s, self._dropped)
+        frames = np.concatenate(chunks) if chunks else NO_FRAMES
+        return Taken(frames, None if self._is_virtual else _now_us(), self._dropped)
 
     def close(self) -> None:
         """See Source."""
@@ -104,11 +110,10 @@ class PythonCanSource:
             )
         except Exception as error:
             raise BusError(f"{address}: cannot be opened: {one_line(error)}") from error
-        self._waiting: deque[tuple[int, bytes]] = deque(maxlen=MOST_FRAMES)
+        self._waiting: deque[tuple[int, int, bytes]] = deque(maxlen=MOST_FRAMES)
         self._came = 0
         self._given = 0
         self._lock = threading.Lock()
-        self._newest_s: float | None = None
         self._error: Exception | None = None
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._work, name="monitor-bus", daemon=True)
@@ -124,9 +129,8 @@ class PythonCanSource:
             if message is None or message.is_error_frame or message.is_extended_id:
                 continue
             with self._lock:
-                self._waiting.append((message.arbitration_id, bytes(message.data)))
+                self._waiting.append((_now_us(), message.arbitration_id, bytes(message.data)))
                 self._came += 1
-                self._newest_s = time.time()
 
     def take(self) -> Taken:
         """See Source."""
@@ -135,13 +139,12 @@ class PythonCanSource:
         with self._lock:
             waiting = list(self._waiting)
             self._waiting.clear()
-            dropped, newest_s = self._came - self._given - len(waiting), self._newest_s
+            dropped = self._came - self._given - len(waiting)
             self._given += len(waiting)
-        frames = np.zeros(len(waiting), dtype=FRAME_DTYPE)
-        for row, (identifier, data) in zip(frames, waiting, strict=True):
-            _fill(row, identifier, data)
-        newest_s = newest_s if waiting else None
-        return Taken(frames, newest_s, newest_s, dropped)
+        frames = np.zeros(len(waiting), dtype=RECORD_DTYPE)
+        for row, (time_us, identifier, data) in zip(frames, waiting, strict=True):
+            _fill(row, time_us, identifier, data)
+        return Taken(frames, _now_us(), dropped)
 
     def close(self) -> None:
         """See Source."""
@@ -151,6 +154,10 @@ class PythonCanSource:
             self._bus.shutdown()
 
 
-def _fill(row: Any, identifier: int, data: bytes) -> None:
-    row["id"], row["length"] = identifier, len(data)
+def _now_us() -> int:
+    return time.time_ns() // 1000
+
+
+def _fill(row: Any, time_us: int, identifier: int, data: bytes) -> None:
+    row["time_us"], row["id"], row["length"] = time_us, identifier, len(data)
     row["data"][: len(data)] = np.frombuffer(data, dtype=np.uint8)

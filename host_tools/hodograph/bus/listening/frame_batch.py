@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Taking frames from a SocketCAN socket in batches: recvmmsg, outside Python's interpreter lock.
+"""Taking frames from the socket of a bus in batches: recvmmsg, outside Python's interpreter lock.
 
-About one system call per thousand frames. The frames stay the raw 16-byte structures of linux/can.h, for numpy to
-look at. What the kernel says beside the last frame of a batch comes along: how many frames it had to drop for this
-socket (SO_RXQ_OVFL) and when it got the frame (SO_TIMESTAMP).
+About one system call per thousand frames. The frames stay the raw structures of linux/can.h, for numpy to look at. What
+the kernel says beside a frame comes along: how many frames it had to drop for this socket (SO_RXQ_OVFL) and when it
+got the frame (SO_TIMESTAMP). A local bus sends the time with each frame.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from ...errors import BusError
 from ..address import BusAddress
-from ..local_bus import connect_local
-from .frames import FRAME_DTYPE, Frames
+from ..clock import member_connection
+from .frames import FRAME_DTYPE, RECORD_DTYPE, Frames
 
-__all__ = ["BATCH", "FRAME_BYTES", "FRAME_DTYPE", "FrameBatch", "Frames", "open_socket"]
+__all__ = ["BATCH", "FRAME_DTYPE", "RECORD_DTYPE", "FrameBatch", "Frames", "open_socket"]
 
-FRAME_BYTES = 16
 BATCH = 1024
+_LOCAL_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_ns", "<u8")])
 _CONTROL_BYTES = 64
 _BUFFER_BYTES = 64 * 2**20
 _SO_RCVBUFFORCE = 33
@@ -50,7 +50,7 @@ def open_socket(address: BusAddress, *, timestamps: bool = False) -> socket.sock
     listener: socket.socket | None = None
     try:
         if address.is_local:
-            listener = connect_local(address.channel)
+            listener = member_connection(address.channel, 0)
         else:
             listener = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         _enlarge(listener)
@@ -94,10 +94,13 @@ class _MMsgHdr(ctypes.Structure):
 
 
 class FrameBatch:
-    """Buffers of one recvmmsg call and the call itself."""
+    """Buffers of one recvmmsg call and the call itself, for a socket of this bus."""
 
-    def __init__(self) -> None:
-        self.frames = bytearray(BATCH * FRAME_BYTES)
+    def __init__(self, address: BusAddress) -> None:
+        dtype = _LOCAL_DTYPE if address.is_local else FRAME_DTYPE
+        frame_bytes = dtype.itemsize
+        self.frames = bytearray(BATCH * frame_bytes)
+        self._rows = np.frombuffer(self.frames, dtype=dtype)
         self._control = bytearray(BATCH * _CONTROL_BYTES)
         frames = (ctypes.c_char * len(self.frames)).from_buffer(self.frames)
         control = (ctypes.c_char * len(self._control)).from_buffer(self._control)
@@ -113,8 +116,8 @@ class FrameBatch:
             strides=(ctypes.sizeof(_MMsgHdr),),
         )
         for i in range(BATCH):
-            self._vectors[i].base = ctypes.addressof(frames) + i * FRAME_BYTES
-            self._vectors[i].length = FRAME_BYTES
+            self._vectors[i].base = ctypes.addressof(frames) + i * frame_bytes
+            self._vectors[i].length = frame_bytes
             header = self._messages[i].header
             header.vectors = ctypes.pointer(self._vectors[i])
             header.vector_count = 1
@@ -134,9 +137,17 @@ class FrameBatch:
             raise OSError(errno.ENETDOWN, os.strerror(errno.ENETDOWN))
         return count
 
-    def taken(self, count: int) -> bytes:
-        """The first `count` frames."""
-        return bytes(self.frames[: count * FRAME_BYTES])
+    def records(self, count: int) -> Frames:
+        """The first `count` frames and when they came (`RECORD_DTYPE`); 0 where the socket has no time stamps."""
+        rows = self._rows[:count]
+        records = np.zeros(count, dtype=RECORD_DTYPE)
+        for name in ("id", "length", "data"):
+            records[name] = rows[name]
+        if rows.dtype is _LOCAL_DTYPE:
+            records["time_us"] = rows["time_ns"] // 1000
+        else:
+            records["time_us"] = self._stamps_us(count)
+        return records
 
     def dropped(self, last: int) -> int | None:
         """The kernel's drop count that came with frame `last`; None when none did."""
@@ -145,16 +156,8 @@ class FrameBatch:
                 return int(struct.unpack_from("<I", data)[0])
         return None
 
-    def time_s(self, last: int) -> float | None:
-        """When the kernel got frame `last`, by its clock of the day; None when the socket has no time stamps."""
-        for kind, data in self._words_beside(last):
-            if kind == _SO_TIMESTAMP:
-                seconds, microseconds = struct.unpack_from("<qq", data)
-                return float(seconds + microseconds * 1e-6)
-        return None
-
-    def times_us(self, count: int) -> NDArray[np.int64]:
-        """When the kernel got each of the first `count` frames, microseconds since 1970; 0 without time stamps."""
+    def _stamps_us(self, count: int) -> NDArray[np.int64]:
+        """When the kernel got each of the first `count` frames."""
         stamps = self._stamps[:count]
         times = stamps["seconds"] * 1_000_000 + stamps["microseconds"]
         is_stamp = (stamps["level"] == socket.SOL_SOCKET) & (stamps["kind"] == _SO_TIMESTAMP)

@@ -5,7 +5,6 @@ over the time of the bus. `hodograph status` and the live page show this one.
 
 from __future__ import annotations
 
-import time
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...bustime.frame_bits import ERROR, EXTENDED, exact_bits
 from ..address import BusAddress
+from ..clock import REAL_CLOCK, Clock
 from .frames import Frames
 from .recorder import Recorder
 
@@ -91,11 +91,6 @@ def _kinds(identifiers: NDArray[np.uint32]) -> NDArray[np.int64]:
     return kinds
 
 
-def _now_us() -> int:
-    """By the clock that the kernel stamps frames with."""
-    return time.time_ns() // 1000
-
-
 class Listener:
     """For somebody who gets the frames anyway: the load since the last question."""
 
@@ -128,24 +123,28 @@ class Listener:
 
 
 class LoadMeter:
-    """Listens to a SocketCAN bus; a context manager. Raises BusError."""
+    """Listens to a bus; a context manager. `clock` is that of a connection to it. Raises BusError."""
 
-    def __init__(self, address: BusAddress, bitrate: int) -> None:
+    def __init__(self, address: BusAddress, bitrate: int, clock: Clock = REAL_CLOCK) -> None:
+        self._clock = clock
         self._recorder = Recorder(address)
         self._bitrate = bitrate
-        self._since_us = _now_us()
+        self._since_us = self._now_us()
         self._left = self._recorder.take()[:0]
 
     def measure(self, least_s: float = LEAST_LISTEN_S) -> BusLoad:
         """The load since the beginning or the last call, waiting until that is `least_s` ago."""
         due_us = self._since_us + round(1e6 * least_s)
-        time.sleep(max(0, due_us - _now_us()) / 1e6)
-        now_us = _now_us()
+        self._clock.sleep((due_us - self._now_us()) / 1e6)
+        now_us = self._now_us()
         frames = np.concatenate([self._left, self._recorder.take()])
         in_time = (frames["time_us"] >= self._since_us) & (frames["time_us"] < now_us)
         self._left = frames[frames["time_us"] >= now_us]
         seconds, self._since_us = (now_us - self._since_us) / 1e6, now_us
         return bus_load(frames[in_time], max(seconds, 1e-6), self._bitrate)
+
+    def _now_us(self) -> int:
+        return self._clock.stamp_ns() // 1000
 
     def __enter__(self) -> LoadMeter:
         return self

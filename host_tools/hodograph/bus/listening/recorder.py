@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Recording every frame of a SocketCAN bus, fast enough for a bus at full pace.
+"""Recording every frame of a bus, fast enough for a bus at full pace.
 
-A thread takes frames in batches (frame_batch) and keeps the raw 16-byte structures of linux/can.h and the kernel's time
-stamps. They are looked at afterwards, with numpy.
+A thread takes frames in batches (frame_batch). On a local bus it takes no part in virtual time, and has everything
+that was sent up to the present instant of whoever asks.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import threading
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import BusError
 from ..address import BusAddress
@@ -30,16 +29,15 @@ class Recorder:
         """Opens the socket; frames queue up from here on, and are taken every `pause_s`. Raises BusError."""
         self._pause_s = pause_s
         self._socket = open_socket(address, timestamps=True)
-        self._chunks: list[tuple[bytes, NDArray[np.int64]]] = []
+        self._chunks: list[Frames] = []
         self._count = 0
         self._dropped = 0
         self._error: OSError | None = None
         self._ending = threading.Event()
         self._emptied = 0
-        self._batch = FrameBatch()
+        self._batch = FrameBatch(address)
         self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
         self._thread.start()
-        self.started_s = time.monotonic()
 
     def __enter__(self) -> Recorder:
         return self
@@ -55,7 +53,7 @@ class Recorder:
                 ending = self._ending.is_set()
                 count = batch.receive(descriptor)
                 if count:
-                    self._chunks.append((batch.taken(count), batch.times_us(count)))
+                    self._chunks.append(batch.records(count))
                     self._count += count
                     self._dropped = batch.dropped(count - 1) or self._dropped
                     batch.rearm(count)
@@ -91,6 +89,11 @@ class Recorder:
         self._check()
         return _joined(list(self._chunks))
 
+    def so_far(self) -> Frames:
+        """Everything that was on the bus up to now, as `frames`; the recording goes on."""
+        self._catch_up()
+        return self.frames()
+
     def take(self) -> Frames:
         """What came since the last call, up to now; it is forgotten here. Raises BusError as `frames`."""
         self._catch_up()
@@ -110,11 +113,5 @@ class Recorder:
             raise BusError(f"recording ended: {self._error.strerror}: did the interface go down?")
 
 
-def _joined(chunks: list[tuple[bytes, NDArray[np.int64]]]) -> Frames:
-    raw = np.frombuffer(b"".join(chunk for chunk, _ in chunks), dtype=FRAME_DTYPE)
-    frames = np.zeros(raw.size, dtype=RECORD_DTYPE)
-    for name in ("id", "length", "data"):
-        frames[name] = raw[name]
-    if chunks:
-        frames["time_us"] = np.concatenate([times for _, times in chunks])
-    return frames
+def _joined(chunks: list[Frames]) -> Frames:
+    return np.concatenate(chunks) if chunks else np.zeros(0, dtype=RECORD_DTYPE)

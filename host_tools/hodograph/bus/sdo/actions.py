@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 
 from ...errors import BusError, RunError
@@ -77,15 +76,15 @@ def reset(controller: Controller, wait_s: float = BOOT_S) -> bool:
     """
     if controller.state() != FAULT_STATE:
         return False
-    deadline = time.monotonic() + wait_s
+    deadline = controller.clock.now_s() + wait_s
     asked = False
     while controller.state() == FAULT_STATE:
-        if time.monotonic() > deadline:
+        if controller.clock.now_s() > deadline:
             raise RunError(f"{controller.who()} is still in fault: {controller.fault_text()}")
         asked = asked or _accepted(controller)
-        time.sleep(POLL_S)
+        controller.clock.sleep(POLL_S)
     try:
-        controller.wait_for((OFF, READY), max(BOOT_S, deadline - time.monotonic()))
+        controller.wait_for((OFF, READY), max(BOOT_S, deadline - controller.clock.now_s()))
     except BusError as error:
         raise BusError(f"the fault is reset, but {error}") from error
     return True

@@ -7,7 +7,6 @@ Every failure is a BusError (nothing or nonsense comes back) or a RefusedError (
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -148,14 +147,14 @@ class Controller(Node):
 
         `tick` is called at every look. `wait_s` infinite: as long as it takes.
         """
-        deadline = time.monotonic() + wait_s
+        deadline = self.clock.now_s() + wait_s
         while True:
             state = self.state()
             if state in states:
                 return state
             if state == FAULT_STATE:
                 raise RunError(f"{self.who()} is in fault: {self.fault_advice()}")
-            if time.monotonic() > deadline:
+            if self.clock.now_s() > deadline:
                 names = " or ".join(STATES[s] for s in states)
                 raise BusError(
                     f"{self.who()} is still {STATES.get(state, state)} after {wait_s:g} s, "
@@ -163,7 +162,7 @@ class Controller(Node):
                 )
             if tick is not None:
                 tick()
-            time.sleep(POLL_S)
+            self.clock.sleep(POLL_S)
 
     def _waiting_for(self, state: int) -> str:
         if state in (BOOT, ENABLING):
@@ -207,16 +206,16 @@ class Controller(Node):
         """
         if from_mm is not None:
             self.write(START_POSITION, None, round(from_mm * 2**40))
-        deadline = time.monotonic() + wait_s
+        deadline = self.clock.now_s() + wait_s
         while True:
             try:
                 self.command(START if from_mm is None else START_FROM)
                 return
             except CommandRefusedError as error:
                 moving = self.state() in MOVING
-                if error.reason != REFUSED_MOVING or moving or time.monotonic() > deadline:
+                if error.reason != REFUSED_MOVING or moving or self.clock.now_s() > deadline:
                     raise
-            time.sleep(POLL_S)
+            self.clock.sleep(POLL_S)
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand."""
@@ -298,7 +297,7 @@ def connect(
             remote = network.add_node(node, str(eds))
         except Exception as error:
             raise BusError(f"{eds}: not a usable EDS file: {one_line(error)}") from error
-        controller = Controller(address, node, remote)
+        controller = Controller(address, node, remote, network.clock)
         try:
             yield controller
         finally:

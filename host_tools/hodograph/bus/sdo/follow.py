@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import time
+import math
 from collections.abc import Callable
 
 from .controller import Controller
@@ -19,11 +19,11 @@ class Follower:
         self._controller = controller
         self._note = note
         self._said = ""
-        self._next_s = 0.0
+        self._next_s = -math.inf
 
     def __call__(self) -> None:
         """Looks when it is time to."""
-        now_s = time.monotonic()
+        now_s = self._controller.clock.now_s()
         if now_s < self._next_s:
             return
         self._next_s = now_s + LOOK_S

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import errno
 import logging
+import queue
 import struct
-import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -17,9 +18,11 @@ from can.interfaces.socketcan import SocketcanBus
 
 from ...errors import BusError, one_line
 from ..address import BusAddress, check_raw
+from ..clock import REAL_CLOCK, Clock
 from ..local_bus import LocalBus
 
 SEND_TIMEOUT_S = 1.0
+_SEND_PAUSE_S = 0.001
 _FRAME = struct.Struct("=IB3x8s")  # struct can_frame of linux/can.h
 
 logging.getLogger("canopen").addHandler(logging.NullHandler())
@@ -28,30 +31,92 @@ for _name in ("canopen", "can"):
     logging.getLogger(_name).propagate = False
 
 
-class _Network(canopen.Network):
-    """canopen's network, patient when the transmit queue of a slow bus is full.
+class _Answers:
+    """What an SDO client takes for its queue of answers; in virtual time nobody fills one in the background."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._answers: deque[bytes] = deque()
+
+    def put(self, answer: bytes) -> None:
+        """An answer has come."""
+        self._answers.append(answer)
+
+    def empty(self) -> bool:
+        """True, always: what came before a request is no answer to it."""
+        self._network.take_waiting()
+        self._answers.clear()
+        return True
+
+    def get(self, block: bool = True, timeout: float | None = None) -> bytes:
+        """The next answer. Raises queue.Empty."""
+        if not self._network.wait_until(lambda: bool(self._answers), timeout if block else 0.0):
+            raise queue.Empty
+        return self._answers.popleft()
+
+
+class Network(canopen.Network):
+    """canopen's network, patient when the transmit queue of a slow bus is full, and able to run in virtual time.
 
     On SocketCAN it writes to the socket itself: on a busy single core python-can's way takes ten times as long, and
-    an upload is some thousand frames.
+    an upload is some thousand frames. In virtual time no thread receives: frames are taken while something is waited
+    for.
     """
 
+    def __init__(self, bus: can.BusABC) -> None:
+        super().__init__(bus)
+        self._frames = bus
+        self.clock: Clock = bus.clock if isinstance(bus, LocalBus) else REAL_CLOCK
+        if not self.clock.is_virtual:
+            self.connect()
+
+    def add_node(self, node: Any, *arguments: Any, **options: Any) -> Any:
+        """See canopen.Network."""
+        added = super().add_node(node, *arguments, **options)
+        if self.clock.is_virtual and isinstance(added, canopen.RemoteNode):
+            added.sdo.responses = _Answers(self)
+        return added
+
+    def take_waiting(self) -> None:
+        """Virtual time: hands over the frames that have come."""
+        while (message := self._frames.recv(0)) is not None:
+            self.notify(message.arbitration_id, message.data, message.timestamp)
+
+    def wait_until(self, happened: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Virtual time: takes frames until it has happened; false when it has not after `timeout_s`."""
+        limit_s = None if timeout_s is None else self.clock.now_s() + timeout_s
+        self.take_waiting()
+        while not happened():
+            left_s = None if limit_s is None else limit_s - self.clock.now_s()
+            if left_s is not None and left_s <= 0:
+                return False
+            message = self._frames.recv(left_s)
+            if message is not None:
+                self.notify(message.arbitration_id, message.data, message.timestamp)
+        return True
+
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        deadline = time.monotonic() + SEND_TIMEOUT_S
+        """See canopen.Network."""
+        deadline = self.clock.now_s() + SEND_TIMEOUT_S
         while True:
             try:
                 self._send_once(can_id, data, remote)
                 return
             except (can.CanOperationError, OSError) as error:
                 code = error.errno if isinstance(error, OSError) else error.error_code
-                if code != errno.ENOBUFS or time.monotonic() > deadline:
+                if code != errno.ENOBUFS or self.clock.now_s() > deadline:
                     raise
-                time.sleep(0.001)
+                self.clock.sleep(_SEND_PAUSE_S)
 
     def _send_once(self, can_id: int, data: bytes, remote: bool) -> None:
         if remote or not isinstance(self.bus, (SocketcanBus, LocalBus)):
             super().send_message(can_id, data, remote)
+            return
+        frame = _FRAME.pack(can_id, len(data), bytes(data))
+        if isinstance(self.bus, LocalBus):
+            self.bus.send_raw(frame)
         else:
-            self.bus.socket.send(_FRAME.pack(can_id, len(data), bytes(data)))
+            self.bus.socket.send(frame)
 
 
 def _filters(node: int) -> list[dict[str, Any]]:
@@ -74,17 +139,15 @@ def _open(address: BusAddress, node: int, bitrate: int) -> can.BusABC:
 
 
 @contextmanager
-def open_network(address: BusAddress, node: int, bitrate: int) -> Iterator[canopen.Network]:
+def open_network(address: BusAddress, node: int, bitrate: int) -> Iterator[Network]:
     """A canopen network that hears what `node` says to us. Raises BusError when it can't be opened."""
     if address.is_raw:
         check_raw(address)
-    network = _Network()
     try:
         bus = _open(address, node, bitrate)
     except Exception as error:
         raise BusError(f"{address}: cannot be opened: {one_line(error)}") from error
-    network.bus = bus
-    network.connect()
+    network = Network(bus)
     try:
         yield network
     finally:

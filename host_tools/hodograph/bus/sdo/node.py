@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import queue
 import struct
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
@@ -17,6 +16,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...errors import BusError, RefusedError, one_line
 from ..address import BusAddress
+from ..clock import REAL_CLOCK, Clock
 from .objects import STATE
 from .turns import TURN_WAIT_S, Turns
 
@@ -37,10 +37,18 @@ class _SilentError(BusError):
 class Node:
     """A node with an SDO server, as its EDS describes it."""
 
-    def __init__(self, address: BusAddress, node_id: int, node: canopen.RemoteNode) -> None:
+    def __init__(
+        self,
+        address: BusAddress,
+        node_id: int,
+        node: canopen.RemoteNode,
+        clock: Clock = REAL_CLOCK,
+    ) -> None:
+        """`clock` is that of the node's network: time-outs are counted by it."""
         self.address = address
         self.node_id = node_id
-        self._turns = Turns(address, node_id)
+        self.clock = clock
+        self._turns = Turns(address, node_id, clock)
         self._under_way = False
         self._identified = False
         self.sdo: Any = node.sdo
@@ -75,16 +83,22 @@ class Node:
         The question is for an object that does not exist, another one for everybody and each time, so the answer is an
         abort that names it. Until it has come nothing else may be asked: it would be taken for the answer to that.
         """
-        nowhere = _nowhere()
+        nowhere = self._nowhere()
         self.sdo.send_request(bytearray(b"\x40" + nowhere + bytes(4)))
-        deadline = time.monotonic() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+        deadline = self.clock.now_s() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
         with suppress(queue.Empty):
-            while (left := deadline - time.monotonic()) > 0:
+            while (left := deadline - self.clock.now_s()) > 0:
                 answer = self.sdo.responses.get(timeout=left)
                 if answer[1:4] == nowhere:
                     self._under_way = False
                     return
         raise _SilentError(f"{self.who()} stopped answering: is its process or its power gone?")
+
+    def _nowhere(self) -> bytes:
+        """Another one each time, and for everybody; in virtual time the same in each run."""
+        if self.clock.is_virtual:
+            return _nowhere(self.clock.stamp_ns() // 1000)
+        return _nowhere(int.from_bytes(os.urandom(3), "little"))
 
     def read(self, index: int, sub: int | None = None) -> int:
         """An integer object."""
@@ -133,7 +147,7 @@ class Node:
         Raises BusError when another command keeps it to itself for longer than `turn_wait_s`.
         """
         patience, self.sdo.RESPONSE_TIMEOUT = self.sdo.RESPONSE_TIMEOUT, min(0.25, wait_s)
-        deadline = time.monotonic() + wait_s
+        deadline = self.clock.now_s() + wait_s
         try:
             while True:
                 try:
@@ -146,7 +160,7 @@ class Node:
                         f"{self.who()} is not a Hodograph controller: {error}"
                     ) from error
                 except (SdoCommunicationError, _SilentError):
-                    if time.monotonic() >= deadline:
+                    if self.clock.now_s() >= deadline:
                         return False
         finally:
             self.sdo.RESPONSE_TIMEOUT = patience
@@ -177,10 +191,9 @@ class Node:
             )
 
 
-def _nowhere() -> bytes:
+def _nowhere(number: int) -> bytes:
     """One of a million objects that no EDS has, as three bytes of an SDO: index and sub-index."""
-    number = int.from_bytes(os.urandom(3), "little")
-    return struct.pack("<HB", NOWHERE | (number & 0xFFF), number >> 16)
+    return struct.pack("<HB", NOWHERE | (number & 0xFFF), number >> 16 & 0xFF)
 
 
 def _name(index: int, sub: int | None) -> str:

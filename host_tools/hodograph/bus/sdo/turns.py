@@ -12,13 +12,13 @@ import fcntl
 import os
 import re
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ...errors import BusError
 from ..address import BusAddress
+from ..clock import REAL_CLOCK, Clock
 
 TURN_WAIT_S = 30.0
 """Patience for a turn where nothing else is asked for: mid-way in a job, giving up would cost more than waiting."""
@@ -34,7 +34,8 @@ class Turns:
     who wait, however quickly it asks.
     """
 
-    def __init__(self, address: BusAddress, node: int) -> None:
+    def __init__(self, address: BusAddress, node: int, clock: Clock = REAL_CLOCK) -> None:
+        self._clock = clock
         self._who = f"node {node} on {address}"
         self._depth = 0
         self._sign = os.urandom(_SIGN_BYTES)
@@ -42,7 +43,7 @@ class Turns:
         self._files: list[int] = []
         with suppress(OSError):
             for ending in ("next", "lock"):
-                self._files.append(_open(_folder() / f"{name}.{ending}"))
+                self._files.append(_open(_folder(address) / f"{name}.{ending}"))
 
     def close(self) -> None:
         """Gives the lock files back."""
@@ -67,10 +68,10 @@ class Turns:
             fcntl.flock(self._files[1], fcntl.LOCK_UN)
 
     def _take(self, wait_s: float) -> None:
-        deadline = time.monotonic() + wait_s
+        deadline = self._clock.now_s() + wait_s
         following, turn = self._files
         try:
-            got = _lock(following, deadline) and _lock(turn, deadline)
+            got = self._lock(following, deadline) and self._lock(turn, deadline)
         finally:
             fcntl.flock(following, fcntl.LOCK_UN)
         if not got:
@@ -79,9 +80,21 @@ class Turns:
                 "try again when it is done"
             )
 
+    def _lock(self, file: int, deadline: float) -> bool:
+        while True:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return True
+            except BlockingIOError:
+                if self._clock.now_s() >= deadline:
+                    return False
+            self._clock.sleep(_LOOK_S)
 
-def _folder() -> Path:
-    """Where all users of this kernel, and no others, find the same files."""
+
+def _folder(address: BusAddress) -> Path:
+    """Where all users of this bus, and no others, find the same files; those of a local bus go with its folder."""
+    if address.is_local:
+        return Path(address.channel).resolve().parent
     return LOCK_FOLDER if os.access(LOCK_FOLDER, os.W_OK) else Path(tempfile.gettempdir())
 
 
@@ -92,17 +105,6 @@ def _open(file: Path) -> int:
     with suppress(PermissionError):  # another user was quicker: then it is theirs to open to all
         os.fchmod(descriptor, 0o666)
     return descriptor
-
-
-def _lock(file: int, deadline: float) -> bool:
-    while True:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return True
-        except BlockingIOError:
-            if time.monotonic() >= deadline:
-                return False
-        time.sleep(_LOOK_S)
 
 
 def _put_down(sign: bytes, file: int) -> bool:

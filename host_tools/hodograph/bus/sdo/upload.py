@@ -13,6 +13,10 @@ from .node import Node
 from .objects import PROGRAM, STATE
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
+_GAP_S = 0.01
+"""Between two blocks the bus is left to heartbeats, over which SDO has right of way. A tick of a bus as full as
+`require_fit` allows leaves room for one or two frames.
+"""
 
 Progress = Callable[[int], None]
 
@@ -42,6 +46,8 @@ def _block_download(node: Node, image: bytes, progress: Progress | None) -> None
     try:
         while stream.pos < len(image):
             stream.write(image[stream.pos : stream.pos + 7])
+            if stream._seqno == 0:  # the block is acknowledged
+                node.clock.sleep(_GAP_S)
             if progress is not None:
                 progress(stream.pos)
     except BaseException as error:

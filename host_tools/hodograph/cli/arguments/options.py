@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable
 from pathlib import Path
 
-from ...bus.address import DEFAULT_BUS
+from ...bus.address import BUS_VARIABLE, DEFAULT_BUS
 from ...names import KERNELS
 from ..values import finite, node_number, seconds
 
@@ -19,9 +20,9 @@ def bus_name(parser: argparse.ArgumentParser) -> None:
     """--bus."""
     parser.add_argument(
         "--bus",
-        default=DEFAULT_BUS,
+        default=os.environ.get(BUS_VARIABLE) or DEFAULT_BUS,
         metavar="INTERFACE:CHANNEL",
-        help=f"as python-can has it (default {DEFAULT_BUS})",
+        help=f"as python-can has it (default ${BUS_VARIABLE}, else {DEFAULT_BUS})",
     )
 
 

@@ -71,10 +71,10 @@ def _faults(command: Command) -> None:
     faults.add_argument("--seed", type=count, metavar="N", help="one case only, with this seed")
     faults.add_argument("--folder", type=Path, metavar="DIR", help="of other scenario files")
     faults.add_argument(
-        "--drives-bus",
-        default="socketcan:vcan1",
-        metavar="INTERFACE:CHANNEL",
-        help="the drives' side (default socketcan:vcan1)",
+        "--buses",
+        nargs=2,
+        metavar=("CONTROLLER", "DRIVES"),
+        help="virtual CAN buses to use, in real time (default: local ones of its own, in virtual time)",
     )
     faults.add_argument(
         "--part",
@@ -84,7 +84,6 @@ def _faults(command: Command) -> None:
         help="every N-th case only, from the K-th on",
     )
     faults.add_argument("--verbose", action="store_true", help="a line for each case on stderr")
-    options.bus(faults)
     options.json(faults)
 
 

@@ -1,0 +1,405 @@
+# SPDX-License-Identifier: MIT
+"""The time of a bus: that of this computer, or the virtual time of a local bus (docs/virtual-time.md).
+
+Whoever talks to nodes counts its time-outs and pauses by the clock of the connection. In virtual time the hub hands
+out the
+time: it stands still while we compute, and goes on while we wait. One thread of a process is one participant; all its
+connections to a hub share it.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import struct
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import Protocol
+
+from ..errors import BusError
+
+NAME_VARIABLE = "HODOGRAPH_PARTICIPANT"
+"""Of the environment: what a process is called in virtual time."""
+_NAME_BYTES = 32
+_MARK = 0xFFFFFFFF
+_NEVER_NS = 2**64 - 1
+_CONTROL = struct.Struct(f"=IHHIIQ{_NAME_BYTES}s")
+_WATCHES, _VIRTUAL, _SENT = 1, 2, 4
+_VERSION = 1
+_HELLO_MEMBER, _HELLO_PARTICIPANT, _FILTER, _WAIT, _SUSPEND, _CONTINUE = 1, 2, 3, 5, 6, 7
+_WELCOME, _GRANT, _JOINED, _LEFT, _INTERRUPTED = 16, 17, 18, 19, 20
+_LOOK_S = 0.05
+"""Of real time, while a process of ours is about to join: between two looks whether it has ended instead."""
+_WELCOME_S = 60.0
+"""Of real time: a hub that works answers at once."""
+
+
+class Clock(Protocol):
+    """What passes while nodes are waited for."""
+
+    @property
+    def is_virtual(self) -> bool:
+        """Whether time is what a hub says, and stands still while we compute."""
+        ...
+
+    def now_s(self) -> float:
+        """Monotonic: only differences mean anything."""
+        ...
+
+    def stamp_ns(self) -> int:
+        """Now, as frames are stamped: nanoseconds since 1970."""
+        ...
+
+    def sleep(self, seconds: float) -> None:
+        """Lets time pass."""
+        ...
+
+
+class RealClock:
+    """The clock of this computer."""
+
+    is_virtual = False
+
+    def now_s(self) -> float:
+        """See Clock."""
+        return time.monotonic()
+
+    def stamp_ns(self) -> int:
+        """See Clock."""
+        return time.time_ns()
+
+    def sleep(self, seconds: float) -> None:
+        """See Clock."""
+        if seconds > 0:
+            time.sleep(seconds)
+
+
+REAL_CLOCK = RealClock()
+
+
+class Inbox(Protocol):
+    """Something that takes in what came for this thread while it waited."""
+
+    def fill(self) -> None:
+        """Takes what lies in the socket."""
+        ...
+
+
+class VirtualClock:
+    """Our part in the virtual time of a hub: one for each thread and hub, shared by its connections (`clock_of`)."""
+
+    is_virtual = True
+
+    def __init__(self, hub: int, connection: socket.socket, number: int, now_ns: int) -> None:
+        self.number = number
+        self._hub = hub
+        self._connection = connection
+        self._now_ns = now_ns
+        self._grant = 0
+        self._waiting = False
+        self._users = 0
+        self._thread = threading.get_ident()
+        self._saying = threading.Lock()
+        self._inboxes: list[Inbox] = []
+        self._notices: list[tuple[int, str]] = []
+        self._ended: BusError | None = None
+
+    # -- time ---------------------------------------------------------------------------------
+
+    def now_s(self) -> float:
+        """See Clock."""
+        return self._now_ns * 1e-9
+
+    def stamp_ns(self) -> int:
+        """See Clock."""
+        return self._now_ns
+
+    def sleep(self, seconds: float) -> None:
+        """See Clock."""
+        until_ns = self._now_ns + round(seconds * 1e9)
+        while self._now_ns < until_ns:
+            self._wait(until_ns)
+
+    def wait(self, until_s: float | None) -> None:
+        """Until this instant (None: without a limit), or before it when a frame comes for this thread, or a process
+        leaves.
+        """
+        until_ns = _NEVER_NS if until_s is None else round(until_s * 1e9)
+        if until_ns > self._now_ns:
+            self._wait(until_ns)
+
+    def activate(self) -> None:
+        """After an interrupted wait: time stands still for us again. Call it before sending."""
+        if self._waiting:
+            self._say_wait(0)
+            self._await_grant()
+
+    def interrupt(self) -> None:
+        """From any thread: ends the wait of the thread that this clock belongs to, before its time."""
+        with self._saying:
+            if self._waiting:
+                with suppress(BusError):
+                    self._send(_WAIT, number=self._grant)
+
+    def _wait(self, until_ns: int) -> None:
+        self._require_thread()
+        self.activate()
+        self._say_wait(until_ns)
+        self._await_grant()
+
+    def _say_wait(self, until_ns: int) -> None:
+        with self._saying:
+            self._waiting = True
+            self._send(_WAIT, flags=_SENT, number=self._grant, time_ns=until_ns)
+
+    def _await_grant(self) -> None:
+        while self._waiting:
+            self._take()
+        for inbox in tuple(self._inboxes):
+            inbox.fill()
+
+    def _take(self) -> None:
+        """The next message; its kinds other than grants are kept.
+
+        A signal may raise an exception between any two steps of this, Ctrl-C for one. A grant that is lost would hold
+        time for ever: so a message stays in the socket until it has been acted on, and may then be seen twice.
+        """
+        try:
+            data = self._connection.recv(_CONTROL.size, socket.MSG_PEEK)
+            if len(data) == _CONTROL.size:
+                self._act_on(data)
+                self._connection.recv(_CONTROL.size)
+        except OSError as error:
+            raise self._gone() from error
+        if len(data) != _CONTROL.size:
+            raise self._gone()
+
+    def _act_on(self, data: bytes) -> None:
+        _, kind, _, number, _, now_ns, name = _CONTROL.unpack(data)
+        if kind != _GRANT:
+            self._notices.append((kind, name.partition(b"\0")[0].decode(errors="replace")))
+        elif number != self._grant:
+            self._now_ns = now_ns
+            self._waiting = False
+            self._grant = number  # last: by this it is known to have been taken
+
+    def _send(
+        self, kind: int, *, flags: int = 0, number: int = 0, time_ns: int = 0, name: str = ""
+    ) -> None:
+        try:
+            self._connection.send(
+                _control(kind, flags=flags, number=number, time_ns=time_ns, name=name)
+            )
+        except OSError as error:
+            raise self._gone() from error
+
+    def _gone(self) -> BusError:
+        self._ended = BusError("the local bus has ended: is hodograph-hub gone?")
+        return self._ended
+
+    def _require_thread(self) -> None:
+        if threading.get_ident() != self._thread:
+            raise RuntimeError("a connection in virtual time belongs to the thread that opened it")
+        if self._ended is not None:
+            raise self._ended
+
+    # -- other processes ----------------------------------------------------------------------
+
+    def spawn(
+        self,
+        name: str,
+        start: Callable[[Mapping[str, str]], subprocess.Popen[bytes]],
+    ) -> subprocess.Popen[bytes]:
+        """Starts a process that will take part under this name, and returns when it does, or has ended instead.
+
+        `start` is given what the environment of the process has to have besides ours.
+        """
+        self.activate()
+        self._forget(name)
+        child = start({NAME_VARIABLE: name})
+        while not self._noticed(_JOINED, name) and child.poll() is None:
+            self._look()
+        return child
+
+    def await_end(
+        self, name: str, child: subprocess.Popen[bytes], wait_s: float | None = None
+    ) -> int:
+        """Lets time pass until a process that was started by `spawn` has ended; its exit status.
+
+        It may leave and take part again: time stands still meanwhile. Raises subprocess.TimeoutExpired after `wait_s`
+        of this time.
+        """
+        limit_s = None if wait_s is None else self.now_s() + wait_s
+        while child.poll() is None:
+            if self._has_left(name):
+                self.activate()
+                self._look()
+            elif limit_s is not None and self.now_s() >= limit_s:
+                raise subprocess.TimeoutExpired(child.args, wait_s or 0.0)
+            else:
+                self.wait(limit_s)
+        return child.wait()
+
+    def signal(self, name: str, child: subprocess.Popen[bytes], number: int) -> None:
+        """Sends a signal to a process, and returns when it has acted on it at the present instant, or has ended."""
+        self.activate()
+        self._forget(name)
+        child.send_signal(number)
+        while child.poll() is None and not (
+            self._noticed(_INTERRUPTED, name) or self._noticed(_LEFT, name)
+        ):
+            self._look()
+
+    def kill(self, name: str, child: subprocess.Popen[bytes]) -> None:
+        """Kills a process, as a crash would end it, at the present instant."""
+        self.activate()
+        child.kill()
+        child.wait()
+        while not self._has_left(name):
+            self._take()
+
+    def suspend(self, name: str) -> None:
+        """The process of this name stands still, as if its processor did, while time goes on."""
+        self.activate()
+        self._send(_SUSPEND, name=name)
+
+    def resume(self, name: str) -> None:
+        """It goes on."""
+        self.activate()
+        self._send(_CONTINUE, name=name)
+
+    def _look(self) -> None:
+        """Takes the next message, if one comes soon, while time stands still."""
+        if select.select([self._connection], [], [], _LOOK_S)[0]:
+            self._take()
+
+    def _has_left(self, name: str) -> bool:
+        """Whether that is the last that we heard of it."""
+        heard = [kind for kind, of in self._notices if of == name and kind in (_JOINED, _LEFT)]
+        return bool(heard) and heard[-1] == _LEFT
+
+    def _noticed(self, kind: int, name: str) -> bool:
+        return (kind, name) in self._notices
+
+    def _forget(self, name: str) -> None:
+        self._notices = [notice for notice in self._notices if notice[1] != name]
+
+    # -- connections --------------------------------------------------------------------------
+
+    def attach(self, inbox: Inbox) -> None:
+        """It is filled whenever time has passed."""
+        self._inboxes.append(inbox)
+
+    def detach(self, inbox: Inbox) -> None:
+        """It is filled no more."""
+        with suppress(ValueError):
+            self._inboxes.remove(inbox)
+
+    def hold(self) -> VirtualClock:
+        """One more user: time waits for this thread until `release` was called as often."""
+        self._users += 1
+        return self
+
+    def release(self) -> None:
+        """The last one ends our part: time goes on without us."""
+        self._users -= 1
+        if self._users == 0:
+            self._connection.close()
+            _clocks().pop(self._hub, None)
+
+
+_local = threading.local()
+
+
+def _clocks() -> dict[int, VirtualClock]:
+    """Of this thread, by the process number of the hub, which may serve several buses."""
+    clocks: dict[int, VirtualClock] | None = getattr(_local, "clocks", None)
+    if clocks is None:
+        clocks = _local.clocks = {}
+    return clocks
+
+
+def hub_clock(path: str) -> VirtualClock | None:
+    """Our part in the virtual time of the hub at `path`, held for the caller, who calls `release`; None: its time is
+    real.
+
+    Raises OSError when nobody serves the path.
+    """
+    connection = _connect(path)
+    hub = _process_behind(connection)
+    known = _clocks().get(hub)
+    if known is not None:
+        connection.close()
+        return known.hold()
+    name = os.environ.get(NAME_VARIABLE, "client")
+    flags, number, now_ns = _greet(connection, _HELLO_PARTICIPANT, _WATCHES, 0, name)
+    if not flags & _VIRTUAL:
+        connection.close()
+        return None
+    clock = _clocks()[hub] = VirtualClock(hub, connection, number, now_ns)
+    return clock.hold()
+
+
+def has_virtual_time(path: str) -> bool:
+    """Whether the time of the hub at `path` is virtual. Raises OSError when nobody serves the path."""
+    with _connect(path) as connection:
+        flags, _, _ = _greet(connection, _HELLO_MEMBER, 0, 0, "")
+        return bool(flags & _VIRTUAL)
+
+
+def _process_behind(connection: socket.socket) -> int:
+    credentials = struct.Struct("=iII")
+    data = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, credentials.size)
+    return int(credentials.unpack(data)[0])
+
+
+def member_connection(path: str, participant: int) -> socket.socket:
+    """A connection for frames; those that come wake `participant` (0: nobody). Raises OSError."""
+    connection = _connect(path)
+    _greet(connection, _HELLO_MEMBER, 0, participant, "")
+    return connection
+
+
+def filter_message(filters: Sequence[tuple[int, int]]) -> bytes:
+    """Tells the hub which frames a member wants: identifier and mask of each kind."""
+    packed = b"".join(struct.pack("=II", identifier, mask) for identifier, mask in filters)
+    return struct.pack("=IHH", _MARK, _FILTER, len(filters)) + packed
+
+
+def _connect(path: str) -> socket.socket:
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    try:
+        connection.connect(path)
+    except OSError:
+        connection.close()
+        raise
+    return connection
+
+
+def _greet(
+    connection: socket.socket, kind: int, flags: int, number: int, name: str
+) -> tuple[int, int, int]:
+    """Says hello to the hub: flags, number and time of its welcome. Raises OSError, with the connection closed."""
+    try:
+        connection.send(_control(kind, flags=flags, number=number, name=name))
+        connection.settimeout(_WELCOME_S)
+        data = connection.recv(_CONTROL.size)
+        if len(data) != _CONTROL.size or _CONTROL.unpack(data)[:2] != (_MARK, _WELCOME):
+            raise ConnectionRefusedError("it is no hodograph-hub of this version")
+        connection.settimeout(None)
+    except OSError:
+        connection.close()
+        raise
+    _, _, given, own, _, now_ns, _ = _CONTROL.unpack(data)
+    return given, own, now_ns
+
+
+def _control(
+    kind: int, *, flags: int = 0, number: int = 0, time_ns: int = 0, name: str = ""
+) -> bytes:
+    text = name.encode()[: _NAME_BYTES - 1]
+    return _CONTROL.pack(_MARK, kind, flags, number, _VERSION, time_ns, text)

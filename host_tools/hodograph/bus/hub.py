@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""A hodograph-hub of our own: local buses for processes that we start (docs/virtual-time.md)."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from ..errors import BusError
+from .address import BusAddress
+from .processes import find_program, guarded
+
+HUB = "hodograph-hub"
+_LOOK_S = 0.002
+
+
+def _is_served(path: Path) -> bool:
+    """Whether a hub listens there: the socket is there a moment before."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
+        return probe.connect_ex(str(path)) == 0
+
+
+class LocalHub:
+    """Serves `buses` local buses while its context is open; their addresses are in `addresses`."""
+
+    def __init__(self, *, virtual: bool = True, buses: int = 1, speed: float | None = None) -> None:
+        """`virtual`: its time is virtual, and goes on `speed` times as fast as real time at most (None: as fast as
+        it can).
+        """
+        self._words = ["--time", "virtual" if virtual else "real"]
+        if speed is not None:
+            self._words += ["--speed", f"{speed:g}"]
+        self._names = ["bus", *(f"bus{k}" for k in range(1, buses))]
+        self.addresses: tuple[BusAddress, ...] = ()
+        self.child: subprocess.Popen[bytes] | None = None
+
+    @property
+    def address(self) -> BusAddress:
+        """Of the first bus."""
+        return self.addresses[0]
+
+    def __enter__(self) -> LocalHub:
+        self._folder = tempfile.TemporaryDirectory(prefix="hodograph-")
+        paths = [Path(self._folder.name) / name for name in self._names]
+        command = [str(find_program(HUB)), *self._words, *map(str, paths)]
+        child = self.child = subprocess.Popen(
+            guarded(command), stdin=subprocess.DEVNULL, start_new_session=True
+        )
+        while not all(_is_served(path) for path in paths):
+            if child.poll() is not None:
+                self._folder.cleanup()
+                raise BusError(f"{HUB} ended by itself (status {child.returncode})")
+            time.sleep(_LOOK_S)
+        self.addresses = tuple(BusAddress("local", str(path)) for path in paths)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.child is not None:
+            self.child.terminate()
+            self.child.wait()
+        self._folder.cleanup()
