@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: MIT
+"""A plugin of pytest: properties are tried with few examples, since each mutant waits for all of them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import settings
+
+MOST = 25
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Lowers the number of examples of every property that asks for more."""
+    for item in items:
+        test = getattr(item, "obj", None)
+        own = getattr(test, "_hypothesis_internal_use_settings", None)
+        if test is not None and own is not None and own.max_examples > MOST:
+            test._hypothesis_internal_use_settings = settings(own, max_examples=MOST)
