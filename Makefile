@@ -20,7 +20,17 @@ BUILD  ?= build
 PYTHON ?= python3
 CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
 CLANG  ?= clang
-STAMPS := $(BUILD)/stamps
+READY  := $(BUILD)/stamps
+
+# What was proved or counted once is not proved or counted again while nothing it depends on has changed (docs/testing.md).
+# STAMPS=off: it is.
+STAMPS ?= on
+stamps_option = $(if $(filter off,$(STAMPS)),--no-stamps)
+
+define newline
+
+
+endef
 
 # V=1 shows the commands, else one short line for each file.
 Q   := $(if $(V),,@)
@@ -66,6 +76,10 @@ BINS            := $(foreach b,$(BINS),$(if $($(b)_MAIN),$(b)))
 UNIT_SRC      := $(wildcard tests/unit/test_*.c)
 UNIT_SUPPORT  := $(filter-out $(UNIT_SRC),$(wildcard tests/unit/*.c))
 UNIT_NAMES    := $(UNIT_SRC:tests/unit/%.c=%)
+# An archive, as the libraries: a test is linked with what it needs, so that its binary changes with nothing else.
+# Fakes, which stand in for what a library has, are linked always.
+UNIT_FAKES    := $(wildcard tests/unit/fake_*.c)
+support_SRC   := $(filter-out $(UNIT_FAKES),$(UNIT_SUPPORT))
 
 OWN_C    := $(wildcard firmware/targets/*.c) $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
 OWN_H    := $(wildcard firmware/*/*.h firmware/app/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
@@ -92,16 +106,16 @@ asan_LDFLAGS := -fsanitize=address,undefined
 clang_CC      := $(CLANG)
 clang_CFLAGS  := $(COMMON) -O2 -g
 clang_LDFLAGS :=
-clang_NEEDS   := $(STAMPS)/packages-lint
+clang_NEEDS   := $(READY)/packages-lint
 VARIANTS := host asan clang
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c test unit pytest run til faults lint format soak bench clean distclean help lock packages venv FORCE
+.PHONY: build c check test test-all unit unit-plain pytest run til faults lint format soak bench mutants clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1\t\2/p' $(filter %Makefile %.mk,$(MAKEFILE_LIST)) | awk -F'\t' '{printf "  %-10s %s\n", $$1, $$2}'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1\t\2/p' $(filter %Makefile %.mk,$(MAKEFILE_LIST)) | awk -F'\t' '{printf "  %-10s %s\n", $$1, $$2}'
 
 build: c $(VENV)/.editable $(if $(wildcard host_tools/hodograph/native/build_native.py),native) ## prepare everything: packages, .venv, C programs, Python module
 	@true
@@ -111,16 +125,30 @@ c: $(HOST_LIBS) $(BINS:%=$(BUILD)/bin/hodograph-%) ## the C archives and program
 
 # Property tests with so many cases that the sanitized build runs only a part of them: optimised, in full.
 PLAIN_BINS := $(BUILD)/host/tests/test_override $(BUILD)/host/tests/test_stm32g4_flash
-UNIT_BINS := $(UNIT_NAMES:%=$(BUILD)/asan/tests/%) $(PLAIN_BINS)
-test: build $(STAMPS)/packages-test $(UNIT_BINS) $(BINS:%=$(BUILD)/asan/bin/hodograph-%) ## every test, C and Python; ends with "N passed, N failed"
+ASAN_BINS := $(UNIT_NAMES:%=$(BUILD)/asan/tests/%)
+UNIT_BINS := $(ASAN_BINS) $(PLAIN_BINS)
+TESTED    := build $(READY)/packages-test $(UNIT_BINS) $(BINS:%=$(BUILD)/asan/bin/hodograph-%)
+
+# CHECK_S: seconds that the tests of `make check` may take together
+CHECK_S ?= 40
+check: build $(ASAN_BINS) lint-changed ## what an edit can break, in 90 s: C tests and Python tests that it reaches, lint of what changed
+	@$(PY) tools/run_tests.py --build $(BUILD) --suite check --budget $(CHECK_S)
+
+test: $(TESTED) ## the tests that show whether the tree is sound, C and Python, in 10 min; ends with "N passed, N failed"
 	@$(PY) tools/run_tests.py --build $(BUILD)
+
+# One after the other: each has the machine for itself. (By the plain word make: `make -n` would run a line with the variable.)
+ALONE := env -u MAKEFLAGS -u MFLAGS make --no-print-directory BUILD=$(BUILD) STAMPS=off
+test-all: $(TESTED) ## every test, the long ones too, all proofs and all counts, nothing taken from stamps; ends with "N passed, N failed"
+	@$(PY) tools/run_parts.py --tests tests "$(PY) tools/run_tests.py --build $(BUILD) --suite all" \
+	    --tests proofs "$(ALONE) proofs" --step count "$(ALONE) count"
 
 unit: $(UNIT_BINS) ## the C tests only, under the sanitizers
 	@$(PY) tools/run_tests.py --build $(BUILD) --only unit
 
 unit-plain: $(UNIT_NAMES:%=$(BUILD)/host/tests/%)
 
-pytest: build $(STAMPS)/packages-test ## the Python tests only
+pytest: build $(READY)/packages-test ## the Python tests only
 	@$(PY) tools/run_tests.py --build $(BUILD) --only python
 
 # RUN="..." adds options of `hodograph run`
@@ -132,7 +160,7 @@ run: build ## run the alpha and the heart on a CAN bus, write a report to out/, 
 # SOAK_S: bus time in seconds
 SOAK_S ?= 3600
 soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame looked at
-	@tools/with-vcan $(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
+	@$(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
 
 # TARGET: one of an385 an386 an500 an505 microbit; TIL=--local: a bus of its own instead of vcan0; TIL="--local --link slcan": real time
 TARGET ?= an386
@@ -148,6 +176,12 @@ faults: build ## inject faults into simulated machines, judge what comes of them
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/bench.py --build $(BUILD)
 
+# AREA: some of those that tools/mutants.py --list names; COUNT mistakes for each
+AREA  ?= core
+COUNT ?= 20
+mutants: build $(READY)/packages-test $(UNIT_BINS) ## plant mistakes in AREA="core ...", tell which the tests do not notice
+	@$(PY) tools/mutants.py --build $(BUILD) --count $(COUNT) $(AREA)
+
 clean: ## remove build/ and the cffi module
 	rm -rf $(BUILD) host_tools/hodograph/native/_native*.so
 
@@ -158,39 +192,39 @@ FORCE:
 
 ## ---- what the machine must have --------------------------------------------------------------
 
-packages: $(STAMPS)/packages
-$(STAMPS)/packages: tools/packages.py
+packages: $(READY)/packages
+$(READY)/packages: tools/packages.py
 	@mkdir -p $(@D)
 	@$(PYTHON) tools/packages.py build
 	@touch $@
 
-$(STAMPS)/packages-test: tools/packages.py | $(STAMPS)/packages
+$(READY)/packages-test: tools/packages.py | $(READY)/packages
 	@$(PYTHON) tools/packages.py test
 	@touch $@
 
-$(STAMPS)/packages-firmware: tools/packages.py | $(STAMPS)/packages
+$(READY)/packages-firmware: tools/packages.py | $(READY)/packages
 	@mkdir -p $(@D)
 	@$(PYTHON) tools/packages.py firmware
 	@touch $@
 
-$(STAMPS)/packages-lint: tools/packages.py | $(STAMPS)/packages
+$(READY)/packages-lint: tools/packages.py | $(READY)/packages
 	@$(PYTHON) tools/packages.py lint
 	@touch $@
 
 venv: $(VENV)/.editable
-$(VENV)/.ready: requirements.lock tools/make_venv.sh | $(STAMPS)/packages
+$(VENV)/.ready: requirements.lock tools/make_venv.sh | $(READY)/packages
 	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(VENV) requirements.lock
 
 $(VENV)/.editable: host_tools/pyproject.toml $(VENV)/.ready
 	@$(PY) -m pip install --quiet --no-deps --no-build-isolation --no-index -e host_tools
 	@touch $@
 
-lock: $(STAMPS)/uv/bin/uv ## write requirements.lock anew from requirements.in (newest versions)
-	$(STAMPS)/uv/bin/uv pip compile --universal --python-version 3.11 --generate-hashes --upgrade \
+lock: $(READY)/uv/bin/uv ## write requirements.lock anew from requirements.in (newest versions)
+	$(READY)/uv/bin/uv pip compile --universal --python-version 3.11 --generate-hashes --upgrade \
 	    --no-header --quiet requirements.in -o requirements.lock
-$(STAMPS)/uv/bin/uv: | $(STAMPS)/packages
-	$(PYTHON) -m venv $(STAMPS)/uv
-	$(STAMPS)/uv/bin/pip install --quiet uv
+$(READY)/uv/bin/uv: | $(READY)/packages
+	$(PYTHON) -m venv $(READY)/uv
+	$(READY)/uv/bin/pip install --quiet uv
 
 ## ---- Unity, fetched ----------------------------------------------------------------------------
 
@@ -246,7 +280,7 @@ $(BUILD)/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/$(1)/obj/flags 
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)
 	$$(Q)$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
-$(BUILD)/$(1)/obj/%.o: %.c $(BUILD)/$(1)/obj/flags | $(OD_H) $(STAMPS)/packages $($(1)_NEEDS)
+$(BUILD)/$(1)/obj/%.o: %.c $(BUILD)/$(1)/obj/flags | $(OD_H) $(READY)/packages $($(1)_NEEDS)
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)
 	$$(Q)$$($(1)_CC) $$($(1)_CFLAGS) -MMD -MP -c -o $$@ $$<
@@ -254,8 +288,8 @@ $(BUILD)/$(1)/obj/unity.o: $(UNITY_DIR)/unity.c $(BUILD)/$(1)/obj/flags
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)
 	$$(Q)$$($(1)_CC) $$(filter-out -W%,$$($(1)_CFLAGS)) $(UNITY_DEF) -c -o $$@ $$<
-$(foreach l,$(LIBS),$(eval $(call LIB_RULE,$(1),$(l))))
-$(BUILD)/$(1)/tests/%: $(BUILD)/$(1)/obj/tests/unit/%.o $(call object_of,$(1),$(UNIT_SUPPORT)) $(BUILD)/$(1)/obj/unity.o $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a)
+$(foreach l,$(LIBS) support,$(eval $(call LIB_RULE,$(1),$(l))))
+$(BUILD)/$(1)/tests/%: $(BUILD)/$(1)/obj/tests/unit/%.o $(call object_of,$(1),$(UNIT_FAKES)) $(BUILD)/$(1)/obj/unity.o $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a) $(BUILD)/$(1)/libhodograph_support.a
 $(call LINK,$(1))
 endef
 $(foreach v,$(VARIANTS),$(eval $(call VARIANT_RULES,$(v))))
@@ -303,11 +337,12 @@ $(BUILD)/lint/%.tidy: % $(BUILD)/clang/obj/%.tidy-deps .clang-tidy
 # A file is looked at again when its clang object is newer: that one knows the headers.
 $(BUILD)/clang/obj/%.c.tidy-deps: $(BUILD)/clang/obj/%.o
 	@touch $@
-lint-cppcheck: $(STAMPS)/packages-lint $(OD_H)
+CPPCHECK := --quiet --std=c99 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
+            --suppress=missingIncludeSystem --suppress=shiftTooManyBitsSigned $(INCLUDES)
+lint-cppcheck: $(READY)/packages-lint $(OD_H)
 	$(call say,cppcheck,firmware sim)
 	@mkdir -p $(BUILD)/lint/cppcheck
-	$(Q)cppcheck --quiet --std=c99 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
-	    --suppress=missingIncludeSystem --suppress=shiftTooManyBitsSigned --cppcheck-build-dir=$(BUILD)/lint/cppcheck $(INCLUDES) $(OWN_C) $(BARE_C) $(TARGET_TEST_SRC)
+	$(Q)cppcheck $(CPPCHECK) -j$(shell nproc) --cppcheck-build-dir=$(BUILD)/lint/cppcheck $(OWN_C) $(BARE_C) $(TARGET_TEST_SRC)
 lint-clang-format: $(VENV)/.ready
 	$(call say,format,C)
 	$(Q)$(VENV)/bin/clang-format --dry-run -Werror $(C_FILES)
@@ -317,15 +352,34 @@ lint-ruff: $(VENV)/.ready
 lint-mypy: $(VENV)/.editable
 	$(call say,mypy,host_tools tools)
 	$(Q)$(VENV)/bin/mypy --no-error-summary host_tools/hodograph tools
-lint-shellcheck: $(STAMPS)/packages-lint
+lint-shellcheck: $(READY)/packages-lint
 	$(call say,shell,$(SH_FILES))
 	$(Q)shellcheck $(SH_FILES)
-lint-js: $(STAMPS)/packages-lint
+lint-js: $(READY)/packages-lint
 	$(call say,js,$(JS_FILES))
 	$(Q)for file in $(JS_FILES); do node --input-type=module --check < $$file || { echo "in $$file"; exit 1; }; done
 lint-directions:
 	$(call say,who,may use whom)
 	$(Q)$(PYTHON) tools/check_directions.py
+
+# The same for what differs from the last commit and was not linted as it is now; of the C files only those themselves,
+# not those that include them. Ruff, mypy and the directions are quick enough for the whole tree.
+.PHONY: lint-changed lint-files
+lint-changed: $(VENV)/.editable $(OD_H)
+	@$(PY) tools/lint_changed.py
+
+FILES  ?=
+SOME_C  := $(filter $(LINTED_C) $(BARE_C),$(FILES))
+SOME_CH := $(filter $(C_FILES),$(FILES))
+SOME_SH := $(filter $(SH_FILES),$(FILES))
+SOME_JS := $(filter $(JS_FILES),$(FILES))
+lint-files: $(if $(filter %.py tools/with-vcan pyproject.toml requirements.lock,$(FILES)),lint-ruff lint-mypy) \
+            $(if $(filter %.py %.c %.h,$(FILES)),lint-directions) $(if $(filter %.eds,$(FILES)),lint-eds) $(SOME_C:%=$(BUILD)/lint/%.tidy)
+	$(if $(SOME_CH),$(Q)$(VENV)/bin/clang-format --dry-run -Werror $(SOME_CH))
+	$(if $(filter-out tests/%,$(SOME_C)),$(Q)cppcheck $(CPPCHECK) $(filter-out tests/%,$(SOME_C)))
+	$(if $(SOME_SH),$(Q)shellcheck $(SOME_SH))
+	$(foreach file,$(SOME_JS),$(Q)node --input-type=module --check < $(file) || { echo "in $(file)"; exit 1; }$(newline))
+	@echo "lint of $(words $(FILES)) changed files: all is well"
 
 format: $(VENV)/.ready ## bring C and Python into the formats that lint asks for
 	$(VENV)/bin/clang-format -i $(C_FILES)

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from bus_beats import AFTER, RESET, RESET_COMMUNICATION, START, Beats
 from bus_drives import Drive, field_of
 from bus_streams import Stream
-from bus_tap import Stretch
 from hodograph.bus.listening.frame_batch import Frames
 from hodograph.bus.sdo.node import NOWHERE
 from hodograph.config import Machine
@@ -42,6 +41,14 @@ _NO_OBJECT = 0x06020000
 _KEPT_FINDINGS = 50
 _SAMPLE = 499
 """cantools itself decodes each frame whose number this divides; the rest is decoded by numpy."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Frames in the order of the bus, and the time of each in seconds."""
+
+    frames: Frames
+    times_s: NDArray[np.float64]
 
 
 @dataclass
@@ -105,9 +112,9 @@ class BusChecker:
         """The longest time between two heartbeats of a node."""
         return self._beats.worst_s
 
-    def take(self, stretch: Stretch) -> None:
-        """Looks at the frames that follow those of the last call."""
-        frames, times_s = stretch.frames, stretch.times_s
+    def take(self, frames: Frames) -> None:
+        """Looks at the frames that follow those of the last call (`RECORD_DTYPE`), by their time stamps."""
+        times_s = frames["time_us"] / 1e6
         commands = np.flatnonzero(frames["id"] == _NMT)
         start = 0
         for end in [*commands.tolist(), frames.size]:

@@ -3,8 +3,9 @@
 """count.py: `make count`: instructions of the tick on all cores, compared with the committed ones.
 
 Prints the tables, writes them as JSON, and compares with tests/data/counts.json with no tolerance. Exit status 1 when
-a count differs; `--update` takes the new ones over, there and into docs/counts.md. Counts belong to a compiler: with
-another version nothing is compared, and this is said.
+a count differs; `--update` takes the new ones over, there and into docs/counts.md. A core is not counted again while
+its images, the emulator and the programs are the same (testing/cache.py); `--no-stamps` counts all. Counts belong to a
+compiler: with another version nothing is compared, and this is said.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from target import campaign, tables, taylor
+from target.emulator import TARGETS
+from testing.cache import Stamps
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMITTED = ROOT / "tests/data/counts.json"
@@ -47,9 +50,17 @@ def blocks(figures: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def everything(build: Path) -> dict[str, Any]:
-    """All that is counted."""
-    return campaign.Campaign(build).run() | {"taylor": taylor.compare(build)}
+def everything(build: Path, stamps: Stamps | None = None) -> dict[str, Any]:
+    """All that is counted; with `stamps`, only what has changed since it was."""
+    counting = campaign.Campaign(build, stamps)
+    figures = counting.run()
+    cores = [TARGETS[core] for core, _ in taylor.CORES]
+    images = ("taylor", "setpoints")
+    name = f"taylor {taylor.polygon().hex()}"
+    figures["taylor"] = counting.stamped(name, cores, images, lambda: taylor.compare(build))
+    if stamps is not None:
+        print(f"counts: {counting.counted} counted now, {counting.taken} taken from stamps")
+    return figures
 
 
 def document(figures: dict[str, Any], text: str) -> str:
@@ -101,8 +112,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, default=Path("build"))
     parser.add_argument("--update", action="store_true")
+    parser.add_argument("--no-stamps", action="store_true", help="count everything now")
     options = parser.parse_args()
-    figures = everything(options.build)
+    figures = everything(options.build, Stamps("counts", used=not options.no_stamps))
     (options.build / "count.json").write_text(tables.stored(figures), encoding="utf-8")
     for block in blocks(figures).values():
         print(block)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import select
 import shutil
 import signal
 import socket
@@ -33,8 +34,14 @@ TARGETS = tuple(MACHINES)
 _SHIFTS = {"microbit": 5}
 """Of -icount: an instruction takes 2**shift ns, 6 where nothing is said. 32 ns: a Cortex-M0 of 48 MHz, about."""
 _BUS_STATUS, _MACHINE_STATUS, _USAGE_STATUS = 4, 1, 2
-_GRACE_S = 5.0
-"""For the board to notice that its bridge is gone, and the other way round."""
+_GRACE_S = 60.0
+"""For the board to notice that its bridge is gone, and the other way round: at once, if they get the processor."""
+_UNBEGUN_S = 5.0
+"""For a board that was told to end, or has SLCAN: one that waits for a bridge to open its FIFO, or for datagrams, would
+wait for ever.
+"""
+_LOOK_S = 0.1
+"""Between two looks whether the time for an end is over."""
 _PRIORITY = 15
 """Of a board in real time, where permitted: below the simulated drives (20), above everything ordinary. One for all its
 threads and its bridge, which take turns: one above another would be woken by each character.
@@ -42,7 +49,9 @@ threads and its bridge, which take turns: one above another would be woken by ea
 _SO_RCVBUFFORCE = 33
 _BUFFER_BYTES = 4 * 2**20
 _STOP_S = 8.0
-"""For the controller to stop the axes and switch them off: it takes 6 s at most."""
+"""In real time, for the controller to stop the axes and switch them off: it takes 6 s at most. With FIFOs its clock is
+its own, and nobody knows how long it takes here: a second signal ends it.
+"""
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
@@ -183,30 +192,38 @@ class Board:
         uart.close()
 
     def stop(self) -> None:
-        """Asks the controller to end, through the bridge, as a board has no signals; without one, pulls the plug."""
+        """Asks the controller to end, through the bridge, as a board has no signals; without one, pulls the plug.
+
+        Asked twice, it ends at once.
+        """
         self._stopping_since = self._stopping_since or time.monotonic()
         (self.qemu if self.bridge is None else self.bridge).terminate()
 
     def wait(self) -> int:
         """Exit status, when both have ended."""
-        while self.qemu.poll() is None and (self.bridge is None or self.bridge.poll() is None):
-            if (
-                self._stopping_since is not None
-                and time.monotonic() > self._stopping_since + _STOP_S
-            ):
-                break
-            time.sleep(0.02)
+        parts = [part for part in (self.qemu, self.bridge) if part is not None]
+        ends = [os.pidfd_open(part.pid) for part in parts]
+        while all(part.poll() is None for part in parts) and not self._is_overdue():
+            select.select(ends, [], [], _LOOK_S)
+        for end in ends:
+            os.close(end)
         return self._status()
+
+    def _is_overdue(self) -> bool:
+        since_s = self._stopping_since
+        in_real_time = self._options.link == "slcan"
+        return in_real_time and since_s is not None and time.monotonic() > since_s + _STOP_S
 
     def _status(self) -> int:
         if self.bridge is not None and self.bridge.poll() == _BUS_STATUS:
             self.qemu.kill()
             return _BUS_STATUS
         asked = self._stopping_since is not None
-        if self.bridge is not None and self._options.link == "slcan" and not asked:
-            self.bridge.terminate()  # datagrams do not tell that the other end has gone
-        qemu = _end(self.qemu)
-        bridge = 0 if self.bridge is None else _end(self.bridge)
+        if self.bridge is not None and self.qemu.poll() is not None and not asked:
+            self.bridge.terminate()  # what waits for a FIFO, or for datagrams, is not told of the end
+        told = not asked and self._options.link == "fifo"
+        qemu = _end(self.qemu, _GRACE_S if told else _UNBEGUN_S)
+        bridge = 0 if self.bridge is None else _end(self.bridge, _GRACE_S)
         if bridge == _BUS_STATUS:
             return _BUS_STATUS
         if asked and qemu < 0 and bridge == 0:
@@ -214,10 +231,10 @@ class Board:
         return qemu if qemu >= 0 else _MACHINE_STATUS
 
 
-def _end(child: subprocess.Popen[bytes]) -> int:
+def _end(child: subprocess.Popen[bytes], wait_s: float) -> int:
     """QEMU answers no SIGTERM while it waits for a FIFO."""
     try:
-        return child.wait(_GRACE_S)
+        return child.wait(wait_s)
     except subprocess.TimeoutExpired:
         child.kill()
         return child.wait()

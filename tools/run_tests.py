@@ -1,190 +1,151 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""run_tests.py: runs every test there is, C and Python, and counts them together.
+"""run_tests.py: runs tests, C and Python, and counts them together: `make check`, `make test` and `make test-all`.
 
-The last line of its output is `N passed, N failed` (and `, N skipped` where there are any); the exit
-status is 0 only when none has failed and at least one has passed. A C test binary that crashes, or says
-nothing, counts as one failed test. Three groups of Python tests run after the C tests: those that need no
-bus (two at a time), those that must be alone, and those marked `bus` under tools/with-vcan.
+    --suite check   what a change can reach since it last passed, as much as the budget allows; says what is left
+    --suite test    everything but the tests marked `long`
+    --suite all     everything
+
+The last line of its output is `N passed, N failed` (and `, N skipped` where there are any); the exit status is 0 only
+when none has failed and, but for `check`, at least one has passed. A C test binary that crashes, or says nothing,
+counts as one failed test. What has passed is kept in the cache (testing/cache.py), which only `check` looks at.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import re
-import subprocess
+import signal
 import sys
-import xml.etree.ElementTree as ElementTree
-from concurrent.futures import ThreadPoolExecutor
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from testing.cache import Stamps
+from testing.choice import Choice, choose
+from testing.groups import MARKS, Groups
+from testing.reach import Reach
+from testing.units import Units
+from testing.verdict import Count
+
 ROOT = Path(__file__).resolve().parent.parent
-_UNIT_LIMIT_S = 300
-_RESULT = re.compile(
-    r"^(?P<where>[^:\n]+:\d+):(?P<name>\w+):(?P<result>PASS|FAIL|IGNORE)(?P<why>.*)$"
-)
-_IN_FULL = (
-    "test_override",
-    "test_stm32g4_flash",
-)  # optimised too, with all cases: the PLAIN_BINS of the Makefile
-_SUMMARY = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored", re.MULTILINE)
+_SLOWEST = 10  # tests named at the end
+_UNIT_WORKERS = 1  # beside the free Python tests, which take the other processors
 
 
 @dataclass
-class Count:
-    """Tests so far; `failures` has a line for each failed one."""
+class Run:
+    """One run of a suite."""
 
-    passed: int = 0
-    skipped: int = 0
-    failures: list[str] = field(default_factory=list)
+    build: Path
+    suite: str
+    total: Count = field(default_factory=Count)
+    times: list[tuple[str, float, str]] = field(default_factory=list)
 
-    def add(self, other: Count) -> None:
-        """Takes the figures of another group in."""
-        self.passed += other.passed
-        self.skipped += other.skipped
-        self.failures += other.failures
+    def __post_init__(self) -> None:
+        self.began_s = time.time()
+        is_check = self.suite == "check"
+        self.units = Units(ROOT, self.build, Stamps("units", used=is_check))
+        self.reach = Reach(ROOT, Stamps("python"))
+        self.groups = Groups(ROOT, self.build / "tests", is_long=self.suite == "all")
 
-    def __str__(self) -> str:
-        skipped = f", {self.skipped} skipped" if self.skipped else ""
-        return f"{self.passed} passed, {len(self.failures)} failed{skipped}"
+    def everything(self, only: str | None) -> None:
+        """All tests of the suite: the C tests beside the free Python tests, then what must be alone."""
+        with ThreadPoolExecutor(1) as pool:
+            unit = None
+            if only != "python":
+                workers = _UNIT_WORKERS if only is None else os.cpu_count() or 1
+                unit = pool.submit(self._units, self.units.binaries(), workers)
+            if only != "unit":
+                self._group("free")
+            self._wait(unit)
+        if only != "unit":
+            self._group("serial")
+            self._group("bus")
 
+    def chosen(self, choice: Choice) -> None:
+        """What `check` has chosen."""
+        with ThreadPoolExecutor(1) as pool:
+            unit = pool.submit(self._units, choice.binaries, _UNIT_WORKERS)
+            for group in MARKS:
+                if choice.files[group]:
+                    self._group(group, choice.files[group])
+            self._wait(unit)
 
-def read_unity(name: str, output: str, status: int) -> Count:
-    """What a Unity binary's output and exit status mean."""
-    count = Count()
-    for line in output.splitlines():
-        found = _RESULT.match(line)
-        if found is None:
-            continue
-        if found["result"] == "PASS":
-            count.passed += 1
-        elif found["result"] == "FAIL":
-            count.failures.append(f"{found['where']}: {found['name']}{found['why']}")
-        else:
-            count.skipped += 1
-            print(f"skipped: {name}: {found['name']}{found['why']}")
-    summary = _SUMMARY.search(output)
-    if summary is None:
-        count.failures.append(f"{name}: ended before its summary (exit status {status})")
-    elif int(summary[1]) == 0:
-        count.failures.append(f"{name}: has no tests")
-    elif status != 0 and not count.failures:
-        count.failures.append(f"{name}: exit status {status} after its tests")
-    return count
+    def keep(self) -> None:
+        """Stamps for the Python test files that have passed."""
+        self.reach.keep(self.groups.recorded(), self.began_s)
+        self.units.stamps.prune()
+        self.reach.stamps.prune()
 
+    def say(self) -> None:
+        """The slowest tests, the time of each group, the failures and the count, which is the last line."""
+        slow = sorted(self._seconds(), reverse=True)[:_SLOWEST]
+        if slow:
+            print("\nslowest:")
+            print("\n".join(f"  {seconds:7.1f} s  {name}" for seconds, name in slow))
+        if self.times:
+            print("\ngroups:")
+            print("\n".join(f"  {s:7.1f} s  {name:8} {count}" for name, s, count in self.times))
+        print()
+        for failure in self.total.failures:
+            print(f"failed: {failure}")
+        print(self.total, flush=True)
 
-def run_unit(binary: Path) -> Count:
-    """Runs one Unity binary; prints what it says unless all is well."""
-    try:
-        done = subprocess.run(
-            [binary],
-            cwd=ROOT,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            timeout=_UNIT_LIMIT_S,
-            check=False,
-        )
-    except OSError as error:
-        return Count(failures=[f"{binary.name}: {error.strerror}"])
-    except subprocess.TimeoutExpired:
-        return Count(failures=[f"{binary.name}: not finished after {_UNIT_LIMIT_S} s"])
-    count = read_unity(binary.name, done.stdout, done.returncode)
-    print(f"{binary.name}: {count}")
-    if count.failures:
-        print(done.stdout)
-    return count
+    def _seconds(self) -> list[tuple[float, str]]:
+        tests = self.groups.recorded().seconds.values()
+        python = [(seconds, name) for file in tests for name, seconds in file.items()]
+        return python + [(seconds, name) for name, seconds in self.units.seconds.items()]
 
+    def _units(self, binaries: list[Path], workers: int) -> Count:
+        began_s = time.monotonic()
+        count = self.units.run(binaries, workers)
+        if binaries:
+            self.times.append(("C", time.monotonic() - began_s, str(count)))
+        return count
 
-def run_all_units(build: Path) -> Count:
-    """Every C test, one binary for each tests/unit/test_*.c, and those of _IN_FULL once more."""
-    total = Count()
-    sources = sorted((ROOT / "tests/unit").glob("test_*.c"))
-    binaries = [build / "host/tests" / name for name in _IN_FULL]
-    binaries += [build / "asan/tests" / source.stem for source in sources]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for count in pool.map(run_unit, binaries):
-            total.add(count)
-    return total
+    def _wait(self, unit: Future[Count] | None) -> None:
+        if unit is not None:
+            self.total.add(unit.result())
 
-
-def read_junit(path: Path, group: str, status: int) -> Count:
-    """What pytest's XML report and exit status mean."""
-    if not path.exists():
-        return Count(failures=[f"pytest ({group}): no report, exit status {status}"])
-    count = Count()
-    for case in ElementTree.parse(path).iter("testcase"):
-        name = f"{case.get('classname')}::{case.get('name')}"
-        if any(case.find(tag) is not None for tag in ("failure", "error")):
-            count.failures.append(name)
-        elif case.find("skipped") is not None:
-            count.skipped += 1
-        else:
-            count.passed += 1
-    if status not in (0, 1) or (status == 1 and not count.failures):  # 5: a group without tests
-        count.failures.append(f"pytest ({group}): exit status {status}")
-    return count
+    def _group(self, group: str, files: list[str] | None = None) -> None:
+        print(f"\n== Python tests: {group}", flush=True)
+        began_s = time.monotonic()
+        count = self.groups.run(group, files or ())
+        sys.stdout.flush()
+        self.times.append((group, time.monotonic() - began_s, str(count)))
+        self.total.add(count)
 
 
-def run_pytest(build: Path, group: str, before: list[str], options: list[str]) -> Count:
-    """One run of pytest."""
-    print(f"\n== Python tests: {group}", flush=True)
-    report = build / f"pytest-{group}.xml"
-    report.unlink(missing_ok=True)
-    command = [
-        *before,
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        f"--junitxml={report}",
-        *options,
-    ]
-    status = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
-    sys.stdout.flush()
-    return read_junit(report, group, status)
-
-
-def run_python(build: Path) -> Count:
-    """The groups of Python tests."""
-    workers = str(min(os.cpu_count() or 1, 8))
-    total = Count()
-    for group, before, options in (
-        ("free", [], ["-m", "not bus and not serial", "-n", workers]),
-        ("serial", [], ["-m", "serial and not bus"]),
-        (
-            "bus",
-            [str(ROOT / "tools/with-vcan"), "--own", "--name", f"test-{os.getpid()}"],
-            ["-m", "bus"],
-        ),
-    ):
-        total.add(run_pytest(build, group, before, options))
-    return total
+def _ended(number: int, _: object) -> None:
+    """A signal ends what is running first; see groups.py."""
+    raise SystemExit(128 + number)
 
 
 def main() -> int:
     """Exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=Path, default=Path("build"))
-    parser.add_argument("--only", choices=("unit", "python"))
+    parser.add_argument("--suite", choices=("check", "test", "all"), default="test")
+    parser.add_argument("--only", choices=("unit", "python"), help="not with check")
+    parser.add_argument("--budget", type=float, default=60.0, help="seconds, of check")
     options = parser.parse_args()
     build = options.build.resolve()
     build.mkdir(exist_ok=True)
-    total = Count()
-    if options.only != "python":
-        print("== C tests (address and undefined-behaviour sanitizers)", flush=True)
-        total.add(run_all_units(build))
-    if options.only != "unit":
-        total.add(run_python(build))
-    print()
-    for failure in total.failures:
-        print(f"failed: {failure}")
-    print(total, flush=True)
-    return 0 if total.passed and not total.failures else 1
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _ended)
+    run = Run(build, options.suite)
+    if options.suite == "check":
+        choice = choose(ROOT, run.units, run.reach, options.budget)
+        print(choice.text(), flush=True)
+        run.chosen(choice)
+    else:
+        run.everything(options.only)
+    run.keep()
+    run.say()
+    has_passed = run.total.passed > 0 or options.suite == "check"
+    return 0 if has_passed and not run.total.failures else 1
 
 
 if __name__ == "__main__":

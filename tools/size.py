@@ -54,10 +54,10 @@ def measure(image: Image, rules: Rules) -> Row:
     }
 
 
-def measure_all(build: Path) -> Table:
-    """All images that are built."""
+def measure_all(build: Path, target: str = "*") -> Table:
+    """All images that are built, or those of one target."""
     rules = Rules.read(RULES)
-    files = sorted((build / "firmware").glob("*/*.elf"))
+    files = sorted((build / "firmware").glob(f"{target}/*.elf"))
     with ThreadPoolExecutor(2) as pool:
         rows = pool.map(lambda file: measure(Image(file), rules), files)
     table: Table = {}

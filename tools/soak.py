@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: MIT
 """Runs programs over and over on a virtual bus and looks at every frame.
 
-    tools/with-vcan .venv/bin/python tools/soak.py [--seconds 3600] [--periods 1000,2000] [--json FILE] [--bus vcan0]
+    .venv/bin/python tools/soak.py [--seconds 3600] [--periods 1000,2000] [--json FILE] [--bus vcan0]
 
-`--seconds` is bus time: SYNCs times period. It is shared equally by the periods. Setpoints and encoders of each
-repetition must have the hashes that `hodograph simulate` gives for the program. Prints a summary; exit status 1 when
-anything unexpected was on the bus, 4 when the machine failed.
+Without --bus it has local buses of its own, in virtual time. `--seconds` is bus time: SYNCs times period. It is shared
+equally by the periods. Setpoints and encoders of each repetition must have the hashes that `hodograph simulate` gives
+for the program. Prints a summary; exit status 1 when anything unexpected was on the bus, 4 when the machine failed.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bus_checker import BusChecker
-from bus_tap import Tap
 from hodograph.bus.address import BusAddress
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.run import run_program, station
 from hodograph.chain import Chain, load_chain
 from hodograph.errors import HodographError
@@ -70,7 +71,7 @@ class Soak:
         """Runs until so much bus time has passed and the last program has ended. Raises HodographError."""
         begun = told = time.monotonic()
         with (
-            Tap(self.address) as tap,
+            Recorder(self.address) as recorder,
             station(self.machine, self.address, "fast", 10.0, self.note) as at,
         ):
             while self.bus_s < seconds:
@@ -83,14 +84,14 @@ class Soak:
                 self.program_ticks += run.motion.ticks
                 self.deadline_misses += run.deadline_misses or 0
                 known = len(self.checker.findings)
-                self.checker.take(tap.take())
+                self.checker.take(recorder.take())
                 for finding in self.checker.findings[known:]:
                     self.note(finding)
                 self.wall_s = time.monotonic() - begun
                 if time.monotonic() - told > _REPORT_S:
                     told = time.monotonic()
                     self.note(self.line())
-            self.dropped = tap.dropped
+            self.dropped = recorder.dropped
         if self.dropped:
             self.checker.found(
                 f"{self.dropped} frames dropped by the kernel: not all were looked at"
@@ -137,6 +138,15 @@ def _machine_with(period_us: int) -> Iterator[Path]:
         yield file
 
 
+@contextmanager
+def _bus(interface: str | None) -> Iterator[BusAddress]:
+    if interface is not None:
+        yield BusAddress("socketcan", interface)
+    else:
+        with LocalHub() as hub:
+            yield hub.address
+
+
 def _note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
@@ -154,7 +164,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--periods", type=_periods, default=list(PERIODS_US), help="in us, some of %(default)s"
     )
-    parser.add_argument("--bus", default="vcan0")
+    parser.add_argument("--bus", help="a CAN interface (default: local buses of its own)")
     parser.add_argument("--json", type=Path, help="write the figures there")
     return parser
 
@@ -165,8 +175,8 @@ def main(arguments: list[str]) -> int:
     soaks = []
     try:
         for period_us in options.periods:
-            with _machine_with(period_us) as machine:
-                soak = Soak(BusAddress("socketcan", options.bus), machine, _note)
+            with _machine_with(period_us) as machine, _bus(options.bus) as address:
+                soak = Soak(address, machine, _note)
                 soak.run(options.seconds / len(options.periods))
             soaks.append(soak)
             print(soak.line(), flush=True)

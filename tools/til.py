@@ -4,23 +4,21 @@
 
 Runs paths on the bus with hodograph-controller and with the controller on one or more emulated boards, against the same
 simulated drives; prints all, with the ticks per second. Exit status 1 when a hash differs. On vcan0 it
-is to be run under tools/with-vcan; --local makes a bus of its own (hodograph-hub).
+is to be run under tools/with-vcan; --local makes a bus of its own (hodograph-hub): in virtual time, or in real time
+with --link slcan.
 """
 
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from emulate import TARGETS
 from hodograph.bus.address import DEFAULT_BUS, parse_address
-from hodograph.bus.processes import find_program
+from hodograph.bus.hub import LocalHub
 from hodograph.bus.run import BusRun, run_program, station
 from hodograph.chain import Chain, load_chain
 from hodograph.errors import HodographError
@@ -33,17 +31,10 @@ def _note(text: str) -> None:
 
 
 @contextmanager
-def local_bus() -> Iterator[str]:
-    """A bus of our own, as an address."""
-    with ExitStack() as stack:
-        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="hodograph-"))
-        path = Path(folder) / "bus"
-        hub = subprocess.Popen([str(find_program("hodograph-hub")), str(path)])
-        stack.callback(hub.wait)
-        stack.callback(hub.terminate)
-        while not path.exists() and hub.poll() is None:
-            time.sleep(0.01)
-        yield f"local:{path}"
+def local_bus(*, virtual: bool = True) -> Iterator[str]:
+    """A bus of our own, as an address; in virtual time no clock of this computer decides anything."""
+    with LocalHub(virtual=virtual) as hub:
+        yield str(hub.address)
 
 
 def run(chain: Chain, bus: str, pace: str, controller: str | None) -> BusRun:
@@ -86,7 +77,8 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     options.target = options.target or ["an386"]
     try:
-        with local_bus() if options.local else nullcontext(DEFAULT_BUS) as bus:
+        own = local_bus(virtual=options.link == "fifo")
+        with own if options.local else nullcontext(DEFAULT_BUS) as bus:
             equal = [compare(file, options, bus) for file in options.files]
     except HodographError as error:
         print(f"til.py: {error}", file=sys.stderr)

@@ -9,6 +9,7 @@ import os
 import shutil
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,16 @@ import aiohttp
 
 from hodograph.bus.processes import guarded
 
-START_S = 60.0
-ANSWER_S = 60.0
+LOST_S = 600.0
+"""Without a word for so long the browser hangs: no page takes that, however busy the machine is."""
+MOST_LOOKS = 20_000
+"""At a page, each at another frame of its screen, until it shows what is waited for: some minutes."""
+_NEXT_FRAME = "new Promise(r => { requestAnimationFrame(r); setTimeout(r, 100); })"
+"""A page that is not seen has no frames."""
+
+
+def _nothing() -> None:
+    pass
 
 
 class Browser:
@@ -67,13 +76,13 @@ class Browser:
 
     def _find_port(self) -> int:
         file = self._folder / "DevToolsActivePort"
-        deadline = time.monotonic() + START_S
+        deadline = time.monotonic() + LOST_S
         while time.monotonic() < deadline:
             assert self._process.poll() is None, "chromium ended by itself"
             if file.exists() and (text := file.read_text().split()):
                 return int(text[0])
             time.sleep(0.05)
-        raise AssertionError(f"chromium did not start in {START_S:.0f} s")
+        raise AssertionError(f"chromium did not start in {LOST_S:.0f} s")
 
     def open(self, url: str, width: int = 1440, height: int = 1000) -> Page:
         """A new tab with this address."""
@@ -99,6 +108,8 @@ class Page:
         self._loop, self._ids = loop, 0
         self._opened = (loop, session, port, url.partition("#")[0], width, height)
         self.complaints: list[str] = []
+        self.meanwhile: Callable[[], None] = _nothing
+        """Done between two looks while something is waited for: lets time pass where it is virtual."""
         self._socket = loop.run_until_complete(_attach(session, port))
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
@@ -110,7 +121,7 @@ class Page:
         """One command of the protocol; its result."""
         self._ids += 1
         request = {"id": self._ids, "method": method, "params": parameters}
-        return self._loop.run_until_complete(asyncio.wait_for(self._ask(request), ANSWER_S))
+        return self._loop.run_until_complete(asyncio.wait_for(self._ask(request), LOST_S))
 
     async def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
         await self._socket.send_json(request)
@@ -136,7 +147,9 @@ class Page:
 
     def again(self) -> Page:
         """Another tab with the same address, without what is behind the #, as a browser of its own would."""
-        return Page(*self._opened)
+        page = Page(*self._opened)
+        page.meanwhile = self.meanwhile
+        return page
 
     def js(self, expression: str) -> Any:
         """The value of an expression; promises are waited for."""
@@ -146,16 +159,17 @@ class Page:
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
-    def wait(self, condition: str, wait_s: float = 120.0) -> Any:
+    def wait(self, condition: str) -> Any:
         """Waits until an expression is truthy, this tab being the one that is seen and so drawn; its value."""
         self.call("Page.bringToFront")
-        deadline = time.monotonic() + wait_s
-        while not (value := self.js(condition)):
-            assert time.monotonic() < deadline, (
-                f"not within {wait_s:g} s: {condition}\n{self.text()}\n{self.complaints}"
-            )
-            time.sleep(0.1)
-        return value
+        for _ in range(MOST_LOOKS):
+            if value := self.js(condition):
+                return value
+            self.meanwhile()
+            self.js(_NEXT_FRAME)
+        raise AssertionError(
+            f"not within {MOST_LOOKS} looks: {condition}\n{self.text()}\n{self.complaints}"
+        )
 
     def text(self, selector: str = "body") -> str:
         """The words that are to be seen."""

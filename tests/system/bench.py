@@ -7,23 +7,30 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hodograph.bus.address import parse_address
+from hodograph.bus.address import BusAddress, parse_address
+from hodograph.bus.clock import Clock
 from hodograph.bus.processes import Rig
 from hodograph.bus.sdo.controller import Controller
 from hodograph.config import Machine
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PAPER_ALPHA = EXAMPLES / "machines" / "paper_alpha.toml"
-BUS = parse_address("socketcan:vcan0")
+VCAN0 = parse_address("socketcan:vcan0")
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A simulated machine on vcan0 and its controller: configured, drives off."""
+    """A simulated machine on a bus and its controller: configured, drives off."""
 
     machine: Machine
     rig: Rig
     controller: Controller
+    bus: BusAddress
+
+    @property
+    def clock(self) -> Clock:
+        """What passes on this bus."""
+        return self.controller.clock
 
 
 MakeBench = Callable[..., Bench]

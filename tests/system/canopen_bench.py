@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""What the tests with python canopen as client share: one device on vcan0, a client of it, and frames made by hand."""
+"""What the tests with python canopen as client share: devices on a local bus in virtual time, a client of them, and
+frames made by hand.
+"""
 
 from __future__ import annotations
 
-import subprocess
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import can
 import canopen
-from canopen.objectdictionary import ODVariable
+from canopen.objectdictionary import ODVariable, import_od
+
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.local_bus import LocalBus
+from hodograph.bus.processes import Process, virtual_clock
+from hodograph.bus.sdo.network import Network
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTROLLER_EDS = ROOT / "firmware/app/controller.eds"
@@ -31,18 +37,35 @@ TOO_LONG, TOO_SHORT = 0x06070012, 0x06070013
 VALUE, TOO_HIGH, TOO_LOW = 0x06090030, 0x06090031, 0x06090032
 STATE = 0x08000022
 
+LOOK_S = 0.001
 
-def frames_of(*bases: int, node: int) -> list[dict[str, int]]:
+
+@cache
+def dictionary(eds: Path, node: int) -> canopen.ObjectDictionary:
+    """Of an EDS file: reading one takes longer than most tests."""
+    return import_od(str(eds), node)
+
+
+def frames_of(*bases: int, node: int) -> list[dict[str, Any]]:
     """Filters for these services of a node."""
     return [{"can_id": base + node, "can_mask": 0x7FF} for base in bases]
 
 
-def until(happened: Callable[[], Any], limit_s: float = 30.0) -> None:
-    """Waits for what a thread or process does."""
-    end = time.monotonic() + limit_s
-    while not happened():
-        assert time.monotonic() < end, f"it did not happen within {limit_s:g} s"
-        time.sleep(0.005)
+def listener(hub: LocalHub, *bases: int, node: int = 0) -> LocalBus:
+    """Hears these services of a node; with no base all frames."""
+    return LocalBus(hub.address.channel, can_filters=frames_of(*bases, node=node) or None)
+
+
+def until(network: Network, happened: Callable[[], Any], limit_s: float = 30.0) -> None:
+    """Lets time pass until it has happened: looks after each frame that comes, and every millisecond."""
+    end_s = network.clock.now_s() + limit_s
+    while not network.wait_until(happened, LOOK_S):
+        assert network.clock.now_s() < end_s, f"it did not happen within {limit_s:g} s"
+
+
+def let_pass(network: Network, seconds: float) -> None:
+    """Takes the frames of this time."""
+    network.wait_until(lambda: False, seconds)
 
 
 def drain(bus: can.BusABC) -> None:
@@ -52,58 +75,73 @@ def drain(bus: can.BusABC) -> None:
 
 
 @contextmanager
-def process(node: int, *words: str) -> Iterator[subprocess.Popen[bytes]]:
+def process(hub: LocalHub, node: int, *words: str) -> Iterator[Process]:
     """A device, from its boot-up frame to its end."""
-    filters = frames_of(0x700, node=node)
-    with can.Bus(interface="socketcan", channel="vcan0", can_filters=filters) as bus:
-        drain(bus)  # what came before the filters were set
-        device = subprocess.Popen(words, stderr=subprocess.DEVNULL)
-        try:
-            frame = bus.recv(10)
-            assert frame is not None, "no boot-up frame within 10 s"
-            assert (frame.arbitration_id, bytes(frame.data)) == (0x700 + node, b"\0")
-            yield device
-        finally:
-            device.kill()
-            device.wait()
+    clock = virtual_clock(hub.address)
+    assert clock is not None
+    try:
+        with listener(hub, 0x700, node=node) as bus:
+            device = Process(f"node-{node}", list(words), clock)
+            try:
+                frame = bus.recv(1.0)
+                assert frame is not None, f"no boot-up frame within 1 s: {device.text()}"
+                assert (frame.arbitration_id, bytes(frame.data)) == (0x700 + node, b"\0")
+                yield device
+            finally:
+                device.kill()
+                device.end()
+    finally:
+        clock.release()
 
 
-def drive_process(node: int = DRIVE, axis: str = "") -> Any:
+def drive_process(
+    hub: LocalHub, node: int = DRIVE, axis: str = ""
+) -> AbstractContextManager[Process]:
     """A simulated drive."""
-    axis = f"node={node},{FIGURES}{axis}"
-    return process(node, str(ROOT / "build/bin/hodograph-drive"), "--bus", "vcan0", "--axis", axis)
+    program, figures = str(ROOT / "build/bin/hodograph-drive"), f"node={node},{FIGURES}{axis}"
+    return process(hub, node, program, "--bus", hub.address.channel, "--axis", figures)
 
 
-def controller_process(node: int = CONTROLLER) -> Any:
+def controller_process(hub: LocalHub, node: int = CONTROLLER) -> AbstractContextManager[Process]:
     """A controller; without drives it stays in state boot."""
     program = str(ROOT / "build/bin/hodograph-controller")
-    return process(node, program, "--bus", "vcan0", "--node", str(node))
+    return process(hub, node, program, "--bus", hub.address.channel, "--node", str(node))
 
 
 @contextmanager
-def client(node: canopen.RemoteNode) -> Iterator[canopen.Network]:
+def client(hub: LocalHub, node: canopen.RemoteNode) -> Iterator[Network]:
     """A network with this node; hears of it SDO, EMCY, heartbeats and its first three TPDOs."""
-    network = canopen.Network()
-    network.NOTIFIER_CYCLE = 0.05
-    filters = frames_of(0x080, 0x180, 0x280, 0x380, 0x580, 0x700, node=node.id)
-    network.connect(interface="socketcan", channel="vcan0", can_filters=filters)
+    network = Network(listener(hub, 0x080, 0x180, 0x280, 0x380, 0x580, 0x700, node=node.id))
     network.add_node(node)
-    node.sdo.RESPONSE_TIMEOUT = 10.0
+    node.sdo.RESPONSE_TIMEOUT = 3.0
     try:
         yield network
     finally:
         network.disconnect()
 
 
+@contextmanager
+def drive_node(hub: LocalHub, node: int = DRIVE, axis: str = "") -> Iterator[canopen.RemoteNode]:
+    """A simulated drive just switched on, as python canopen has it."""
+    remote = canopen.RemoteNode(node, dictionary(DRIVE_EDS, node))
+    with drive_process(hub, node, axis), client(hub, remote):
+        yield remote
+
+
+@contextmanager
+def controller_node(hub: LocalHub, node: int = CONTROLLER) -> Iterator[canopen.RemoteNode]:
+    """A controller just switched on, as python canopen has it."""
+    remote = canopen.RemoteNode(node, dictionary(CONTROLLER_EDS, node))
+    with controller_process(hub, node), client(hub, remote):
+        yield remote
+
+
 class Hand:
     """SDO frames made by hand."""
 
-    def __init__(self, node: int) -> None:
+    def __init__(self, hub: LocalHub, node: int) -> None:
         self.node = node
-        self.bus = can.Bus(
-            interface="socketcan", channel="vcan0", can_filters=frames_of(0x580, node=node)
-        )
-        drain(self.bus)
+        self.bus = listener(hub, 0x580, node=node)
 
     def send(self, data: bytes, length: int = 8) -> None:
         """A request, filled up with zeros."""
@@ -122,7 +160,7 @@ class Hand:
         assert (frame.arbitration_id, frame.dlc) == (0x580 + self.node, 8)
         return bytes(frame.data)
 
-    def silence(self, wait_s: float = 0.1) -> None:
+    def silence(self, wait_s: float = 0.5) -> None:
         """No answer comes."""
         frame = self.bus.recv(wait_s)
         assert frame is None, frame
@@ -143,24 +181,13 @@ class Hand:
 
 
 @contextmanager
-def hand(node: int) -> Iterator[Hand]:
+def hand(hub: LocalHub, node: int) -> Iterator[Hand]:
     """A client by hand, for a node."""
-    made = Hand(node)
+    made = Hand(hub, node)
     try:
         yield made
     finally:
         made.close()
-
-
-def settle(node: canopen.RemoteNode) -> None:
-    """python canopen forgets the answers to a client by hand, which it has heard too.
-
-    All that came before the answer to a question of its own is old.
-    """
-    question = object_bytes(0x1018, 2)
-    node.network.send_message(0x600 + node.id, b"\x40" + question + bytes(4))
-    while node.sdo.responses.get(timeout=5.0)[:4] != b"\x43" + question:
-        pass
 
 
 def object_bytes(index: int, sub: int) -> bytes:

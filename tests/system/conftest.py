@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""What system tests share: where the tree is, and the bus that tests marked `bus` need."""
+"""What system tests share: where the tree is, and the bus that they run on.
+
+A test runs in virtual time on a local bus of its own (fixtures `hub`, `make_bench`); one that needs the CAN of the
+kernel is marked `bus`, and has vcan0.
+"""
 
 from __future__ import annotations
 
+import os
 import socket
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
 
-from bench import BUS, EXAMPLES, PAPER_ALPHA, Bench, MakeAlpha, MakeBench
-from hodograph.bus.processes import Rig
+from bench import EXAMPLES, PAPER_ALPHA, VCAN0, Bench, MakeAlpha, MakeBench
+from hodograph.bus.address import BUS_VARIABLE
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.processes import Rig, virtual_clock
 from hodograph.bus.sdo.controller import connect
 from hodograph.config import load_machine
 
@@ -19,19 +27,59 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
-def make_bench() -> Iterator[MakeBench]:
-    """Starts the machine of a machine file at a pace; ended with the test."""
+def one_core() -> Iterator[None]:
+    """This process and its children share a core: a simulation runs one process at a time, and waking across cores
+    costs more than it gains.
+    """
+    cores = sorted(os.sched_getaffinity(0))
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
+    os.sched_setaffinity(0, {cores[int(worker) % len(cores)]})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+@pytest.fixture
+def hub(one_core: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalHub]:
+    """A local bus in virtual time, which commands use by default."""
+    with LocalHub() as served:
+        monkeypatch.setenv(BUS_VARIABLE, str(served.address))
+        yield served
+
+
+@pytest.fixture
+def clock(hub: LocalHub) -> Iterator[VirtualClock]:
+    """The test's part in the time of `hub`: it stands still unless the test waits."""
+    held = virtual_clock(hub.address)
+    assert held is not None
+    yield held
+    with suppress(Exception):
+        held.release()
+
+
+def _benches(stack: ExitStack, request: pytest.FixtureRequest) -> MakeBench:
+    on_vcan = request.node.get_closest_marker("bus") is not None
+    bus = VCAN0 if on_vcan else request.getfixturevalue("hub").address
+    if not on_vcan:
+        request.getfixturevalue("clock")
+
+    def make(pace: str = "real-time", file: Path = PAPER_ALPHA) -> Bench:
+        machine = load_machine(file)
+        rig = stack.enter_context(Rig(machine, bus, pace))
+        controller = stack.enter_context(connect(bus, machine.node, machine.bitrate))
+        controller.require(20.0)
+        controller.configure(machine, "fixed")
+        return Bench(machine, rig, controller, bus)
+
+    return make
+
+
+@pytest.fixture
+def make_bench(request: pytest.FixtureRequest) -> Iterator[MakeBench]:
+    """Starts the machine of a machine file, on vcan0 in a test marked `bus`; ended with the test."""
     with ExitStack() as stack:
-
-        def make(pace: str, file: Path = PAPER_ALPHA) -> Bench:
-            machine = load_machine(file)
-            rig = stack.enter_context(Rig(machine, BUS, pace))
-            controller = stack.enter_context(connect(BUS, machine.node, machine.bitrate))
-            controller.require(20.0)
-            controller.configure(machine, "fixed")
-            return Bench(machine, rig, controller)
-
-        yield make
+        yield _benches(stack, request)
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Feedforward on a real SocketCAN bus: remapped PDOs, offsets, and still the same bits as without a bus."""
+"""Feedforward on a bus: remapped PDOs, offsets, and still the same bits as without a bus."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from hodograph.cli.main import main
 
-pytestmark = pytest.mark.bus
+pytestmark = pytest.mark.usefixtures("hub")
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -48,7 +48,7 @@ def test_the_same_bits_as_without_a_bus(capsys: pytest.CaptureFixture[str], tmp_
     }
     file = alpha(tmp_path / "forward", gains)
     simulated = result(capsys, "simulate", file, "--json")
-    recorded = result(capsys, "run", file, "--json", "--pace", "fast")
+    recorded = result(capsys, "run", file, "--json")
     assert {key: recorded[key] for key in simulated} == simulated
     plain = result(capsys, "simulate", alpha(tmp_path / "plain", {}), "--json")
     assert plain["setpoints_sha256"] == simulated["setpoints_sha256"]
@@ -59,7 +59,7 @@ def test_friction_and_rating_too(capsys: pytest.CaptureFixture[str], tmp_path: P
     gains = {"x": "feedforward = { torque_permille_s_m = 500 }"}
     file = alpha(tmp_path / "equipped", gains, "friction_volts = 0.2\nrated_torque_nm = 2")
     simulated = result(capsys, "simulate", file, "--json")
-    recorded = result(capsys, "run", file, "--json", "--pace", "fast")
+    recorded = result(capsys, "run", file, "--json")
     assert {key: recorded[key] for key in simulated} == simulated
     for other in ("friction_volts = 0.2", "rated_torque_nm = 2"):
         less = result(capsys, "simulate", alpha(tmp_path / other[:8], gains, other), "--json")
@@ -72,7 +72,7 @@ def test_the_tuned_machine_on_the_bus(capsys: pytest.CaptureFixture[str], tmp_pa
     given = (str(EXAMPLES / "alpha.toml"), "--machine", machine)
     file = tmp_path / "run.log"
     simulated = result(capsys, "simulate", *given, "--json")
-    recorded = result(capsys, "run", *given, "--json", "--pace", "fast", "--record", str(file))
+    recorded = result(capsys, "run", *given, "--json", "--record", str(file))
     assert {key: recorded[key] for key in simulated} == simulated
     assert 0.002 < simulated["max_contour_error_um"] < 0.05
     axes = result(capsys, "identify", str(file), "--machine", machine, "--json")["axes"]

@@ -5,33 +5,36 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import cantools
 import pytest
 
-from hodograph.bus.address import parse_address
+from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Recorder
+from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.dbc import dbc_text
-
-pytestmark = pytest.mark.bus
+from hodograph.native import NativeProgram
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
-def test_load_and_dbc_of_a_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_load_and_dbc_of_a_run(
+    hub: LocalHub, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     machine = load_machine(EXAMPLES / "machines" / "paper_alpha.toml")
-    database = cantools.database.load_string(dbc_text(machine), "dbc", strict=True)
+    database: Any = cantools.database.load_string(dbc_text(machine), "dbc", strict=True)
     report = tmp_path / "report"
-    with Recorder(parse_address("socketcan:vcan0")) as recorder:
-        file = str(EXAMPLES / "alpha.toml")
-        status = main(["run", file, "--pace", "fast", "--json", "--report", str(report)])
+    file = EXAMPLES / "alpha.toml"
+    with Recorder(hub.address) as recorder:
+        status = main(["run", str(file), "--json", "--report", str(report)])
     out, err = capsys.readouterr()
     assert status == 0, err
     load = json.loads(out)["bus_load"]
     assert load["model_least_percent"] <= load["measured_percent"] <= load["model_worst_percent"]
-    assert 50 < load["measured_percent"] < 65
+    assert load["measured_percent"] == pytest.approx(59.8, abs=0.1)  # docs/bus-time.md section 3
     assert "Bus load" in (report / "report.html").read_text()
 
     frames = recorder.frames()
@@ -42,4 +45,8 @@ def test_load_and_dbc_of_a_run(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         if frame["id"] == 0x202:
             targets.append(float(decoded["Drive2_TargetPosition"]))
     assert targets[0] == 0
-    assert max(targets) == pytest.approx(66.0, abs=40)
+    program = NativeProgram(load_chain(file).image)
+    _, setpoints = program.setpoints("fixed", machine.counts_per_mm)
+    assert (min(targets), max(targets)) == pytest.approx(
+        (setpoints[:, 0].min() / 1e6, setpoints[:, 0].max() / 1e6)
+    )

@@ -11,16 +11,18 @@ from typing import Any
 import pytest
 
 from hodograph.bus import processes
+from hodograph.bus.hub import LocalHub
 from hodograph.cli.main import main
-
-pytestmark = pytest.mark.bus
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RULES = "load at=200 for=60 node=2 volts=1.5\nsaturate at=400 for=40 node=3 volts=3.5\n"
 
 
 def test_the_same_bits(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    hub: LocalHub,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     rules = tmp_path / "rules"
     rules.write_text(RULES)
@@ -31,7 +33,7 @@ def test_the_same_bits(
 
     monkeypatch.setattr(processes, "drive_command", faulty)
     alpha = EXAMPLES / "alpha.toml"
-    assert main(["run", str(alpha), "--pace", "fast", "--json"]) == 0
+    assert main(["run", str(alpha), "--json"]) == 0
     on_bus = json.loads(capsys.readouterr().out)
 
     file = tmp_path / "campaign.toml"

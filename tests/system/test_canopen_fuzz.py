@@ -6,21 +6,22 @@ from __future__ import annotations
 import random
 import struct
 import threading
-import time
+from functools import cache
 from pathlib import Path
 
 import can
 import pytest
 
-from hodograph.bus.address import BusAddress
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.run import run_program, station
-from hodograph.chain import load_chain
-from hodograph.simulate import simulate
+from hodograph.chain import Chain, load_chain
+from hodograph.simulate import Motion, simulate
 
-pytestmark = pytest.mark.bus
-
-FRAMES_S = 400
-"""Random frames a second of wall time."""
+BURST = 4
+"""Random frames at most at one instant: a period has room for a few more than the machine's own."""
+MEAN_PAUSE_S = 0.002
 OUR_NODES = (2, 3)
 
 
@@ -57,44 +58,57 @@ def random_frame(chance: random.Random) -> can.Message:
 
 
 class Noise:
-    """Sends random frames from a thread."""
+    """Sends random frames from a thread, which takes part in virtual time by itself."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, hub: LocalHub, clock: VirtualClock, seed: int) -> None:
         self.sent = 0
-        self.ended = threading.Event()
-        self.chance = random.Random(seed)
-        self.thread = threading.Thread(target=self._work, daemon=True)
+        self._channel = hub.address.channel
+        self._clock = clock
+        self._chance = random.Random(seed)
+        self._ended = False
+        self._joined = threading.Event()
+        self._thread = threading.Thread(target=self._work, daemon=True)
 
     def _work(self) -> None:
-        with can.Bus(interface="socketcan", channel="vcan0") as bus:
-            while not self.ended.is_set():
-                for _ in range(FRAMES_S // 100):
-                    bus.send(random_frame(self.chance))
+        with LocalBus(self._channel, can_filters=[{"can_id": 0x7FF, "can_mask": 0x7FF}]) as bus:
+            self._joined.set()
+            while not self._ended:
+                for _ in range(self._chance.randint(1, BURST)):
+                    bus.send(random_frame(self._chance))
                     self.sent += 1
-                time.sleep(0.01)
+                bus.clock.sleep(min(self._chance.expovariate(1 / MEAN_PAUSE_S), 5 * MEAN_PAUSE_S))
 
     def __enter__(self) -> Noise:
-        self.thread.start()
+        self._thread.start()
+        assert self._joined.wait(30.0)  # time stands still for it meanwhile
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.ended.set()
-        self.thread.join()
+        self._ended = True
+        self._clock.sleep(5 * MEAN_PAUSE_S)
+        self._thread.join()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_random_frames_change_nothing(root: Path, seed: int) -> None:
+@cache
+def alpha(root: Path) -> tuple[Chain, Motion]:
+    """The program, and what it does undisturbed."""
     chain = load_chain(root / "examples/alpha.toml")
+    drives = [axis.drive for axis in chain.machine.plane if axis.drive is not None]
+    return chain, simulate(chain.image, drives, counts_per_mm=chain.machine.counts_per_mm)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_frames_change_nothing(
+    hub: LocalHub, clock: VirtualClock, root: Path, seed: int
+) -> None:
+    chain, expected = alpha(root)
     machine = chain.machine
-    drives = [axis.drive for axis in machine.plane if axis.drive is not None]
-    expected = simulate(chain.image, drives, counts_per_mm=machine.counts_per_mm)
-    address = BusAddress("socketcan", "vcan0")
-    with station(machine, address, "fast", 10.0, print) as at:
+    with station(machine, hub.address, "real-time", 10.0, print) as at:
         at.controller.configure(machine, "fixed")
         at.controller.enable()
-        with Noise(seed) as noise:
+        with Noise(hub, clock, seed) as noise:
             motion = run_program(at, machine, chain.image, "fixed").motion
             at.controller.read(0x2002)
-        assert noise.sent > 200
+        assert noise.sent > 2000
     assert motion.setpoints_sha256 == expected.setpoints_sha256
     assert motion.encoders_sha256 == expected.encoders_sha256

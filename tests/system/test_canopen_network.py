@@ -3,34 +3,39 @@
 
 from __future__ import annotations
 
-import itertools
 import struct
-import time
 from collections.abc import Iterator
 
 import can
 import canopen
+import numpy as np
 import pytest
 from canopen_bench import (
-    CONTROLLER,
-    CONTROLLER_EDS,
     DRIVE,
-    DRIVE_EDS,
     NO_OBJECT,
     VALUE,
     abort_code,
-    client,
-    controller_process,
-    drain,
-    drive_process,
+    controller_node,
+    drive_node,
+    let_pass,
+    listener,
     until,
 )
 
-pytestmark = pytest.mark.bus
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.listening.frames import Frames
+from hodograph.bus.listening.recorder import Recorder
+from hodograph.bus.processes import virtual_clock
+from hodograph.bustime.frame_bits import exact_bits
 
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
-QUICK = 0.3
-"""Seconds in which an answer that must not come would have come."""
+QUICK_STOP = 0x07
+"""Quick stop active, of the statusword."""
+QUIET_S = 1.0
+"""In which an answer that must not come would have come."""
+DRIVE_LOOK_MS = 10.2
+"""A drive that hears nothing looks at its clock every 10 ms; then its frame has to go over the bus."""
 
 
 class Listened:
@@ -42,7 +47,13 @@ class Listened:
         node.nmt.add_heartbeat_callback(self._beat)
 
     def _beat(self, state: int) -> None:
-        self.beats.append((time.monotonic(), state))
+        self.beats.append((self.node.nmt.timestamp, state))
+
+    def states(self, count: int) -> list[int]:
+        """Of the next heartbeats."""
+        self.beats.clear()
+        until(self.node.network, lambda: len(self.beats) >= count)
+        return [state for _, state in self.beats]
 
     def told(self, state: int) -> bool:
         return any(beat == state for _, beat in self.beats)
@@ -51,52 +62,43 @@ class Listened:
         """An NMT command, until a heartbeat tells the state."""
         self.beats.clear()
         self.node.nmt.state = name
-        until(lambda: self.told(state))
+        until(self.node.network, lambda: self.told(state))
 
 
 @pytest.fixture
-def drive() -> Iterator[Listened]:
-    with drive_process(), client(canopen.RemoteNode(DRIVE, str(DRIVE_EDS))) as network:
-        yield Listened(network[DRIVE])
+def drive(hub: LocalHub, clock: VirtualClock) -> Iterator[Listened]:
+    with drive_node(hub) as node:
+        yield Listened(node)
 
 
 @pytest.fixture
-def controller() -> Iterator[Listened]:
-    with (
-        controller_process(),
-        client(canopen.RemoteNode(CONTROLLER, str(CONTROLLER_EDS))) as network,
-    ):
-        yield Listened(network[CONTROLLER])
+def controller(hub: LocalHub, clock: VirtualClock) -> Iterator[Listened]:
+    with controller_node(hub) as node:
+        yield Listened(node)
 
 
-def sends_on_sync(node: canopen.RemoteNode) -> bool:
-    """Whether a SYNC is answered with a TPDO1."""
-    with can.Bus(
-        interface="socketcan",
-        channel="vcan0",
-        can_filters=[{"can_id": 0x180 + node.id, "can_mask": 0x7FF}],
-    ) as bus:
-        drain(bus)
+def answers_to_sync(hub: LocalHub, node: canopen.RemoteNode) -> list[int]:
+    """COB-IDs of what a SYNC is answered with."""
+    with listener(hub, 0x180, 0x280, 0x380, 0x480, node=node.id) as bus:
         node.network.send_message(0x80, b"\x01")
-        return bus.recv(QUICK) is not None
+        let_pass(node.network, QUIET_S)
+        return [frame.arbitration_id - node.id for frame in iter(lambda: bus.recv(0), None)]
 
 
-def test_all_commands(drive: Listened) -> None:
+def test_all_commands(hub: LocalHub, drive: Listened) -> None:
     node = drive.node
-    assert node.nmt.wait_for_heartbeat(5) == "PRE-OPERATIONAL"
-    assert not sends_on_sync(node)
+    assert drive.states(2) == [PRE_OPERATIONAL] * 2
+    assert answers_to_sync(hub, node) == []
     drive.command("OPERATIONAL", OPERATIONAL)
-    assert sends_on_sync(node)
+    assert answers_to_sync(hub, node) == [0x180, 0x280]
     assert node.sdo[0x1000].raw == 0x00020192
     drive.command("STOPPED", STOPPED)
-    assert not sends_on_sync(node)
-    node.sdo.RESPONSE_TIMEOUT = QUICK
+    assert answers_to_sync(hub, node) == []
     with pytest.raises(canopen.SdoCommunicationError):
         node.sdo.upload(0x1000, 0)
-    node.sdo.RESPONSE_TIMEOUT = 3.0
     drive.command("PRE-OPERATIONAL", PRE_OPERATIONAL)
     assert node.sdo[0x1000].raw == 0x00020192
-    assert not sends_on_sync(node)
+    assert answers_to_sync(hub, node) == []
 
 
 @pytest.mark.parametrize("command", ["RESET", "RESET COMMUNICATION"])
@@ -106,8 +108,9 @@ def test_resets_from_every_state(drive: Listened, command: str, before: str) -> 
     states = {"OPERATIONAL": OPERATIONAL, "STOPPED": STOPPED, "PRE-OPERATIONAL": PRE_OPERATIONAL}
     drive.command(before, states[before])
     drive.command(command, BOOT_UP)
-    until(lambda: drive.told(PRE_OPERATIONAL))
-    assert [state for _, state in drive.beats].count(BOOT_UP) == 1
+    until(drive.node.network, lambda: len(drive.beats) >= 4)
+    told = [state for _, state in drive.beats]
+    assert told[told.index(BOOT_UP) :] == [BOOT_UP, *[PRE_OPERATIONAL] * 3]
     assert drive.node.sdo[0x1000].raw == 0x00020192
 
 
@@ -117,25 +120,21 @@ def test_commands_to_all_and_to_others(drive: Listened) -> None:
     network.send_message(0, bytes([99, DRIVE]))  # no such command
     network.send_message(0, bytes([1]))  # too short
     network.send_message(0, bytes([1, DRIVE, 0]))  # too long
-    drive.beats.clear()
-    until(lambda: len(drive.beats) >= 3)
-    assert {state for _, state in drive.beats} == {PRE_OPERATIONAL}
+    assert drive.states(3) == [PRE_OPERATIONAL] * 3
     network.send_message(0, bytes([1, 0]))
-    until(lambda: drive.told(OPERATIONAL))
+    let_pass(network, 0.001)
+    assert drive.states(3) == [OPERATIONAL] * 3
 
 
-def test_the_heartbeat_follows_0x1017(drive: Listened) -> None:
-    for period_ms in (50, 250):
-        drive.node.sdo[0x1017].raw = period_ms
-        drive.beats.clear()
-        until(lambda: len(drive.beats) >= 9)
-        times = [at for at, _ in drive.beats[1:]]
-        mean_ms = (times[-1] - times[0]) / (len(times) - 1) * 1000
-        assert period_ms * 0.8 < mean_ms < period_ms * 1.6, mean_ms
+@pytest.mark.parametrize("period_ms", [50, 250])
+def test_the_heartbeat_follows_0x1017(drive: Listened, period_ms: int) -> None:
+    drive.node.sdo[0x1017].raw = period_ms
+    drive.states(9)
+    times_ms = 1000 * np.array([at for at, _ in drive.beats])
+    assert np.diff(times_ms) == pytest.approx(period_ms, abs=0.001)
     drive.node.sdo[0x1017].raw = 0
-    time.sleep(0.3)
     drive.beats.clear()
-    time.sleep(QUICK)
+    let_pass(drive.node.network, QUIET_S)
     assert drive.beats == []
 
 
@@ -145,119 +144,120 @@ def enabled(drive: Listened) -> canopen.RemoteNode:
     node.nmt.state = "OPERATIONAL"
     for controlword in (6, 7, 15):
         node.sdo[0x6040].raw = controlword
-    until(lambda: node.sdo[0x6041].raw & 0x6F == 0x27)
+    assert node.sdo[0x6041].raw & 0x6F == 0x27
     return node
 
 
-def test_the_drive_watches_a_heartbeat(drive: Listened) -> None:
-    """0x1016: when the master that it has heard falls silent, EMCY 0x8130 and no more motion."""
+@pytest.mark.parametrize("beats", [1, 6])
+@pytest.mark.parametrize("limit_ms", [110, 400, 1000])
+def test_the_drive_watches_a_heartbeat(drive: Listened, limit_ms: int, beats: int) -> None:
+    """0x1016: when the master that it has heard falls silent, EMCY 0x8130 and quick stop."""
     node = drive.node
     node.sdo[0x2101][6].raw = 60_000  # SYNC may stay away: this is about heartbeats
-    node.sdo[0x1016][1].raw = (1 << 16) | 400
+    node.sdo[0x1016][1].raw = (1 << 16) | limit_ms
     enabled(drive)
-    for _ in range(6):
+    let_pass(node.network, 2.0)  # nobody is missed who was never heard
+    for _ in range(beats):
+        last_s = node.network.clock.stamp_ns() * 1e-9
         node.network.send_message(0x701, bytes([OPERATIONAL]))
-        time.sleep(0.1)
+        let_pass(node.network, 0.1)
     assert node.emcy.log == []
     assert node.sdo[0x6041].raw & 0x6F == 0x27
-    until(lambda: len(node.emcy.log) > 0)
-    assert (node.emcy.log[0].code, node.emcy.log[0].register & 0x11) == (0x8130, 0x11)
-    until(lambda: node.sdo[0x6041].raw & 0x6F != 0x27)
+    until(node.network, lambda: len(node.emcy.log) > 0)
+    late_ms = (node.emcy.log[0].timestamp - last_s) * 1000 - limit_ms
+    assert abs(late_ms) < DRIVE_LOOK_MS
+    assert (node.emcy.log[0].code, node.emcy.log[0].register) == (0x8130, 0x11)
+    assert node.sdo[0x6041].raw & 0x6F == QUICK_STOP
     assert node.sdo[0x1003][0].raw == 1
     assert node.sdo[0x1003][1].raw & 0xFFFF == 0x8130
 
 
 def test_emergencies_with_history_and_reset(drive: Listened) -> None:
     """Loss of SYNC in Operation enabled; the history newest first, emptied by writing 0."""
-    node = drive.node
-    node.sdo[0x2101][6].raw = 100
-    codes = []
-    for _ in range(3):
+    node, limit_ms = drive.node, 100
+    node.sdo[0x2101][6].raw = limit_ms
+    for count in range(1, 4):
         enabled(drive)
+        last_s = node.network.clock.stamp_ns() * 1e-9
         node.network.send_message(0x80, b"\x01")
-        seen = len(node.emcy.log)
-        until(lambda n=seen: len(node.emcy.log) > n)
-        codes.append(node.emcy.log[seen].code)
-        until(lambda: node.sdo[0x6041].raw & 0x6F != 0x27)
+        until(node.network, lambda n=count: len(node.emcy.log) == 2 * n - 1)
+        late_ms = (node.emcy.log[-1].timestamp - last_s) * 1000 - limit_ms
+        assert 0 < late_ms < DRIVE_LOOK_MS
+        assert node.sdo[0x6041].raw & 0x6F == QUICK_STOP
         node.sdo[0x6040].raw = 0
         node.sdo[0x6040].raw = 0x80
-        until(lambda: node.sdo[0x6041].raw & 0x4F == 0x40)
-    assert set(codes) == {0x8700}
-    count = node.sdo[0x1003][0].raw
-    assert count >= 3
-    history = [node.sdo[0x1003][i].raw & 0xFFFF for i in range(1, min(count, 8) + 1)]
-    assert history.count(0x8700) >= 3
+        assert node.sdo[0x6041].raw & 0x4F == 0x40
+        assert len(node.emcy.log) == 2 * count - 1
+    enabled(drive)  # which ends the error
+    let_pass(node.network, 0.001)
+    assert [(error.code, error.register) for error in node.emcy.log] == 3 * [(0x8700, 0x11), (0, 0)]
+    assert [node.sdo[0x1003][i].raw & 0xFFFF for i in range(5)] == [3, 0x8700, 0x8700, 0x8700, 0]
     assert abort_code(lambda: node.sdo.download(0x1003, 0, b"\x02")) == VALUE
     node.sdo[0x1003][0].raw = 0
     assert node.sdo[0x1003][0].raw == 0
     assert node.sdo[0x1003][1].raw == 0
 
 
-def test_node_guarding_is_refused(drive: Listened, controller: Listened) -> None:
+@pytest.mark.parametrize("kind", ["drive", "controller"])
+def test_node_guarding_is_refused(request: pytest.FixtureRequest, kind: str) -> None:
     """Remote frames get no answer, and its objects are not there."""
-    for listened in (drive, controller):
-        node = listened.node
-        for index in (0x100C, 0x100D):
-            assert abort_code(lambda n=node, i=index: n.sdo.upload(i, 0)) == NO_OBJECT
-            assert abort_code(lambda n=node, i=index: n.sdo.download(i, 0, b"\0")) == NO_OBJECT
-        node.sdo[0x1017].raw = 0
-        time.sleep(0.3)
-        listened.beats.clear()
-        for base in (0x700, 0x180, 0x080, 0x580):
-            node.network.send_message(base + node.id, b"", remote=True)
-        time.sleep(QUICK)
-        assert listened.beats == []
-        assert node.sdo[0x1017].raw == 0
+    listened: Listened = request.getfixturevalue(kind)
+    node = listened.node
+    for index in (0x100C, 0x100D):
+        assert abort_code(lambda i=index: node.sdo.upload(i, 0)) == NO_OBJECT
+        assert abort_code(lambda i=index: node.sdo.download(i, 0, b"\0")) == NO_OBJECT
+    node.sdo[0x1017].raw = 0
+    listened.beats.clear()
+    for base in (0x700, 0x180, 0x080, 0x580):
+        node.network.send_message(base + node.id, b"", remote=True)
+    let_pass(node.network, QUIET_S)
+    assert listened.beats == []
+    assert node.sdo[0x1017].raw == 0
 
 
 def test_the_sync_counter(drive: Listened) -> None:
     """The drive's clock is the counter: differences are periods, repetitions and losses are counted."""
     node = drive.node
-    node.nmt.state = "OPERATIONAL"
-    until(lambda: drive.told(OPERATIONAL))
+    drive.command("OPERATIONAL", OPERATIONAL)
     simulation = node.sdo[0x2101]
     for counter in (1, 2, 3, 7, 7, 8, 240, 1):
         node.network.send_message(0x80, bytes([counter]))
-        time.sleep(0.01)
-    until(lambda: simulation[4].raw == 1)
-    assert simulation[3].raw == 3 + 231
+    assert (simulation[3].raw, simulation[4].raw) == (3 + 231, 1)
     for wrong in (b"", b"\0", b"\xf1", b"\1\2"):
         node.network.send_message(0x80, wrong)
-    time.sleep(0.05)
     assert (simulation[3].raw, simulation[4].raw) == (3 + 231, 1)
 
 
-def test_the_controller_sends_sync_with_its_counter(controller: Listened) -> None:
-    with can.Bus(
-        interface="socketcan", channel="vcan0", can_filters=[{"can_id": 0x80, "can_mask": 0x7FF}]
-    ) as bus:
-        drain(bus)
-        frames = [bus.recv(1.0) for _ in range(500)]
-    counters = [frame.data[0] for frame in frames if frame is not None and frame.dlc == 1]
-    assert len(counters) == 500
-    assert {(b - a) % 240 for a, b in itertools.pairwise(counters)} == {1}
+def test_the_controller_sends_sync_with_its_counter(hub: LocalHub, controller: Listened) -> None:
+    with Recorder(hub.address) as recorder:
+        let_pass(controller.node.network, 0.5)
+        frames = recorder.so_far()
+    syncs = frames[frames["id"] == 0x80]
+    counters = syncs["data"][:, 0].astype(int)
+    begins_us = syncs["time_us"] - exact_bits(syncs)
+    assert syncs.size == 500
+    assert (np.diff(begins_us) == 1000).all()
+    assert (syncs["length"] == 1).all()
+    assert set(np.diff(counters) % 240) == {1}
     assert set(counters) == set(range(1, 241))
     assert controller.node.sdo[0x1019].raw == 240
 
 
 def test_the_controller_obeys_resets_only(controller: Listened) -> None:
     """It is the master: it starts itself, and nobody stops it."""
-    until(lambda: controller.told(OPERATIONAL))
+    assert controller.states(1) == [OPERATIONAL]
     for name in ("STOPPED", "PRE-OPERATIONAL"):
-        controller.beats.clear()
         controller.node.nmt.state = name
-        until(lambda: len(controller.beats) >= 3)
-        assert {state for _, state in controller.beats} == {OPERATIONAL}
+        assert controller.states(3) == [OPERATIONAL] * 3
     for name in ("RESET", "RESET COMMUNICATION"):
-        controller.command(name, BOOT_UP)
-        until(lambda: controller.told(OPERATIONAL))
-        assert [state for _, state in controller.beats].count(BOOT_UP) == 1
+        controller.node.nmt.state = name
+        assert controller.states(3) == [BOOT_UP, OPERATIONAL, OPERATIONAL]
 
 
-def test_foreign_frames_do_no_harm(drive: Listened) -> None:
+def test_foreign_frames_do_no_harm(hub: LocalHub, drive: Listened) -> None:
     """Extended and remote frames with our identifiers are not ours."""
     node = drive.node
-    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+    with listener(hub) as bus:
         for identifier in (0x000, 0x080, 0x200 + DRIVE, 0x600 + DRIVE):
             for extended, remote in ((True, False), (False, True)):
                 bus.send(
@@ -269,19 +269,39 @@ def test_foreign_frames_do_no_harm(drive: Listened) -> None:
                         is_remote_frame=remote,
                     )
                 )
-    drive.beats.clear()
-    until(lambda: len(drive.beats) >= 3)
-    assert {state for _, state in drive.beats} == {PRE_OPERATIONAL}
+    assert drive.states(3) == [PRE_OPERATIONAL] * 3
     assert node.sdo[0x1000].raw == 0x00020192
 
 
-def test_drives_watch_the_controller_whatever_its_node() -> None:
+def test_drives_watch_the_controller_whatever_its_node(hub: LocalHub, clock: VirtualClock) -> None:
     """0x1016 of the drives names the node that configured them."""
-    with drive_process(2), drive_process(3):
-        with (
-            controller_process(5),
-            client(canopen.RemoteNode(5, str(CONTROLLER_EDS))) as network,
-        ):
-            until(lambda: network[5].sdo[0x2002].raw == 1)
-        with client(canopen.RemoteNode(2, str(DRIVE_EDS))) as network:
-            assert network[2].sdo[0x1016][1].raw >> 16 == 5
+    with drive_node(hub, 2) as first, drive_node(hub, 3) as second:
+        with controller_node(hub, 5) as node:
+            until(node.network, lambda: node.sdo[0x2002].raw == 1)
+        for drive in (first, second):
+            assert drive.sdo[0x1016][1].raw >> 16 == 5
+
+
+def recorded(hub_of: LocalHub) -> Frames:
+    """A drive and a controller, from power-on through commands, resets and SDO transfers."""
+    with Recorder(hub_of.address) as recorder, drive_node(hub_of, 2) as drive:
+        with controller_node(hub_of) as controller:
+            let_pass(controller.network, 0.5)
+            for name in ("OPERATIONAL", "RESET", "STOPPED", "RESET COMMUNICATION"):
+                drive.nmt.state = name
+                let_pass(drive.network, 0.2)
+            assert controller.sdo[0x1008].raw == "Hodograph controller"
+            let_pass(controller.network, 0.2)
+        return recorder.so_far()
+
+
+def test_the_same_frames_at_the_same_times_in_every_run(one_core: None) -> None:
+    runs = []
+    for _ in range(2):
+        with LocalHub() as hub_of:
+            clock_of = virtual_clock(hub_of.address)
+            assert clock_of is not None
+            runs.append(recorded(hub_of))
+            clock_of.release()
+    assert runs[0].size > 1500
+    assert np.array_equal(runs[0], runs[1])

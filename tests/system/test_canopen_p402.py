@@ -4,59 +4,104 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
 
+import can
 import pytest
-from canopen.profiles.p402 import BaseNode402
-from canopen_bench import DRIVE, DRIVE_EDS, client, drive_process, until
+from canopen.pdo.base import PdoMap
+from canopen.profiles import p402
+from canopen_bench import DRIVE, DRIVE_EDS, client, dictionary, drive_process, let_pass, until
 
-pytestmark = pytest.mark.bus
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.local_bus import LocalBus
+from hodograph.bus.sdo.network import Network
 
-PERIOD_S = 0.004
-"""Of SYNC by the wall clock; the drive counts periods of a millisecond."""
+PERIOD_S = 0.001
+SETPOINT_AHEAD_S = 0.0002
+"""Of SYNC, which would go first where both wait for the bus."""
+"""Of SYNC, which is what the drive takes it for."""
+
+
+class Reception:
+    """What canopen waits on for a PDO, in the time of the bus instead of that of a thread which receives."""
+
+    def __init__(self, network: Network, pdo: PdoMap) -> None:
+        self._network, self._pdo = network, pdo
+
+    def __enter__(self) -> Reception:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def notify_all(self) -> None:
+        """The waiting one looks by itself."""
+
+    def wait(self, timeout_s: float) -> None:
+        self._network.wait_until(lambda: self._pdo.is_received, timeout_s)
 
 
 class Master:
-    """SYNC with its counter from a thread, and the drive as canopen's profile sees it."""
+    """SYNC with its counter from a thread, and the drive as canopen's profile sees it.
 
-    def __init__(self, node: BaseNode402) -> None:
+    The thread takes part in virtual time by itself, so SYNC goes on whatever the test waits for.
+    """
+
+    def __init__(self, hub: LocalHub, node: p402.BaseNode402) -> None:
         self.node = node
-        self.counter = 0
-        self.lock = threading.Lock()
-        self.ended = threading.Event()
-        self.thread = threading.Thread(target=self._work, daemon=True)
-        self.thread.start()
+        self.sent = 0
+        self._channel = hub.address.channel
+        self._clock = node.network.clock
+        self._ended = False
+        self._joined = threading.Event()
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._thread.start()
+        assert self._joined.wait(30.0)  # time stands still for it meanwhile
 
     def _work(self) -> None:
-        while not self.ended.wait(PERIOD_S):
-            self.tick()
+        with LocalBus(self._channel, can_filters=[{"can_id": 0x7FF, "can_mask": 0x7FF}]) as bus:
+            self._joined.set()
+            while not self._ended:
+                self.tick(bus)
+                bus.clock.sleep(PERIOD_S - SETPOINT_AHEAD_S)
 
-    def tick(self) -> None:
+    def tick(self, bus: LocalBus) -> None:
         """The setpoint and one SYNC: the profile leaves RPDOs of SYNC type to the master's cycle."""
-        with self.lock:
-            self.counter = self.counter % 240 + 1
-            self.node.rpdo[1].transmit()
-            self.node.network.send_message(0x80, bytes([self.counter]))
+        self._send(bus, self.node.rpdo[1].cob_id, bytes(self.node.rpdo[1].data))
+        bus.clock.sleep(SETPOINT_AHEAD_S)
+        self.sent += 1
+        self._send(bus, 0x80, bytes([(self.sent - 1) % 240 + 1]))
+
+    def _send(self, bus: LocalBus, identifier: int, data: bytes) -> None:
+        bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def pass_periods(self, count: int) -> None:
+        """Lets so many SYNCs pass."""
+        let_pass(self.node.network, count * PERIOD_S)
 
     def close(self) -> None:
-        self.ended.set()
-        self.thread.join()
+        """Ends SYNC."""
+        self._ended = True
+        self._clock.sleep(2 * PERIOD_S)
+        self._thread.join()
 
 
-def set_up(axis: str = "") -> Iterator[Master]:
-    node = BaseNode402(DRIVE, str(DRIVE_EDS))
-    with drive_process(axis=axis), client(node):
-        node.TIMEOUT_CHECK_TPDO = 2.0
-        node.TIMEOUT_SWITCH_STATE_FINAL = 10.0
-        node.TIMEOUT_SWITCH_STATE_SINGLE = 5.0
-        node.TIMEOUT_SWITCH_OP_MODE = 5.0
-        until(lambda: node.nmt.state == "PRE-OPERATIONAL")
-        node.sdo[0x2101][6].raw = 5000  # patience with SYNC on a slow host
+@contextmanager
+def set_up(hub: LocalHub, monkeypatch: pytest.MonkeyPatch, axis: str = "") -> Iterator[Master]:
+    node: Any = p402.BaseNode402(DRIVE, dictionary(DRIVE_EDS, DRIVE))
+    with drive_process(hub, axis=axis), client(hub, node) as network:
+        monkeypatch.setattr(p402, "time", SimpleNamespace(monotonic=network.clock.now_s))
+        let_pass(network, 0.2)
+        assert node.nmt.state == "PRE-OPERATIONAL"
         node.setup_402_state_machine()
+        for pdo in node.tpdo.values():
+            pdo.receive_condition = Reception(network, pdo)
         node.nmt.state = "OPERATIONAL"
-        until(lambda: node.sdo[0x1001].raw == 0)
-        master = Master(node)
+        master = Master(hub, node)
         try:
             node.check_statusword()
             yield master
@@ -65,11 +110,12 @@ def set_up(axis: str = "") -> Iterator[Master]:
 
 
 @pytest.fixture
-def master() -> Iterator[Master]:
-    yield from set_up()
+def master(hub: LocalHub, clock: VirtualClock, monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
+    with set_up(hub, monkeypatch) as made:
+        yield made
 
 
-def hold_target(node: BaseNode402) -> None:
+def hold_target(node: p402.BaseNode402) -> None:
     """Setpoint = actual, as every bumpless start has it."""
     node.rpdo[1]["Target position"].raw = node.sdo[0x6064].raw
 
@@ -115,7 +161,7 @@ def test_quick_stop_and_back(master: Master) -> None:
     node.sdo[0x605A].raw = 2  # stop, then off by itself
     node.state = "OPERATION ENABLED"
     node.controlword = 0x0002
-    until(lambda: node.state == "SWITCH ON DISABLED")
+    until(node.network, lambda: node.state == "SWITCH ON DISABLED", 2.0)
 
 
 def test_a_fault_is_seen_and_reset(master: Master) -> None:
@@ -126,10 +172,9 @@ def test_a_fault_is_seen_and_reset(master: Master) -> None:
     hold_target(node)
     node.state = "OPERATION ENABLED"
     node.rpdo[1]["Target position"].raw = node.sdo[0x6064].raw + 5_000_000
-    until(lambda: node.state == "FAULT")
+    until(node.network, lambda: node.state == "FAULT", 1.0)
     assert node.is_faulted()
-    until(lambda: len(node.emcy.log) > 0)
-    assert node.emcy.log[0].code == 0x8611
+    assert [error.code for error in node.emcy.log] == [0x8611]
     assert node.sdo[0x603F].raw == 0x8611
     assert node.sdo[0x1001].raw != 0
     hold_target(node)
@@ -137,7 +182,7 @@ def test_a_fault_is_seen_and_reset(master: Master) -> None:
     node.reset_from_fault()
     assert node.state == "OPERATION ENABLED"
     assert not node.is_faulted()
-    until(lambda: node.emcy.log[-1].code == 0)
+    assert [error.code for error in node.emcy.log] == [0x8611, 0]
     assert node.sdo[0x1001].raw == 0
 
 
@@ -158,19 +203,17 @@ def test_targets_in_csp(master: Master) -> None:
     node = master.node
     hold_target(node)
     node.state = "OPERATION ENABLED"
-    master.close()
     start = node.sdo[0x6064].raw
     for step in range(1, 301):
         node.rpdo[1]["Target position"].raw = start + 2000 * step
-        master.tick()
-        time.sleep(0.001)
-    for _ in range(500):
-        master.tick()
-        time.sleep(0.0005)
-    until(lambda: node.sdo[0x2101][2].raw >= 800)
+        master.pass_periods(1)
+        if step > 50:
+            assert abs(node.tpdo[1]["Position actual value"].raw - start - 2000 * step) < 1600
+    master.pass_periods(500)
+    assert node.sdo[0x2101][2].raw == master.sent
     assert node.statusword & 0x1000
     assert node.sdo[0x6062].raw == start + 600_000
-    assert abs(node.sdo[0x6064].raw - start - 600_000) < 200
+    assert abs(node.sdo[0x6064].raw - start - 600_000) <= 1
     assert node.emcy.log == []
     assert node.sdo[0x2101][5].raw == 1, "reproducible"
 
@@ -183,20 +226,23 @@ def test_homing_on_the_spot(master: Master, method: int) -> None:
     hold_target(node)
     assert node.homing(timeout=20)
     assert node.is_homed()
-    assert abs(node.sdo[0x6064].raw - 123_456) <= 10
+    assert abs(node.sdo[0x6064].raw - 123_456) <= 1
     hold_target(node)  # the one before belongs to the old zero
     node.op_mode = "CYCLIC SYNCHRONOUS POSITION"
     node.check_statusword()
     assert node.state == "OPERATION ENABLED"
-    assert abs(node.sdo[0x6064].raw - 123_456) <= 10
+    assert abs(node.sdo[0x6064].raw - 123_456) <= 1
 
 
 SWITCHES = ",position_mm=2,limit_negative_mm=-3,limit_positive_mm=6"
 
 
 @pytest.fixture
-def master_with_switches() -> Iterator[Master]:
-    yield from set_up(SWITCHES)
+def master_with_switches(
+    hub: LocalHub, clock: VirtualClock, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Master]:
+    with set_up(hub, monkeypatch, SWITCHES) as made:
+        yield made
 
 
 @pytest.mark.parametrize("method", [17, 18])
@@ -212,7 +258,7 @@ def test_homing_with_a_limit_switch(master_with_switches: Master, method: int) -
     begun = node.sdo[0x6064].raw
     assert node.homing(timeout=60)
     assert node.is_homed()
-    assert abs(node.sdo[0x6064].raw) < 100_000
+    assert abs(node.sdo[0x6064].raw) <= 1
     assert abs(node.sdo[0x6064].raw - begun) > 1_000_000 or method == 18
     switch = 1 if method == 17 else 2
     assert node.sdo[0x60FD].raw & switch == 0

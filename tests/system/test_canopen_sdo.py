@@ -13,10 +13,8 @@ from canopen_bench import (
     BLOCK_SIZE,
     COMMAND,
     CONTROLLER,
-    CONTROLLER_EDS,
     CRC,
     DRIVE,
-    DRIVE_EDS,
     SEQUENCE,
     TIMEOUT,
     TOGGLE,
@@ -25,48 +23,46 @@ from canopen_bench import (
     VALUE,
     Hand,
     abort_code,
-    client,
-    controller_process,
-    drive_process,
+    controller_node,
+    drive_node,
     hand,
     object_bytes,
     program,
-    settle,
 )
 
-pytestmark = pytest.mark.bus
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
 
 IMAGES = ("line_tiny", "alpha_minimax", "star_minimax")
 PROGRAM = object_bytes(0x2000, 1)
 NAME = object_bytes(0x1008, 0)
 SEGMENTS = 127
+PROGRAM_TOO_SHORT = -1
+CONTROLLER_PATIENCE_S, DRIVE_PATIENCE_S = 2.0, 1.0
+"""Silence of a client after which a server gives up; a block that does not go on gets its answer after half of it."""
+TICK_S = 0.001
 
 
-@pytest.fixture(scope="module")
-def controller() -> Iterator[canopen.RemoteNode]:
-    with (
-        controller_process(),
-        client(canopen.RemoteNode(CONTROLLER, str(CONTROLLER_EDS))) as network,
-    ):
-        node = network[CONTROLLER]
+@pytest.fixture
+def controller(hub: LocalHub, clock: VirtualClock) -> Iterator[canopen.RemoteNode]:
+    """With limits that the golden programs keep."""
+    with controller_node(hub) as node:
         for sub, limit in ((2, 500_000), (3, 5_000_000), (4, 200_000)):
             node.sdo[0x2004][sub].raw = limit
         yield node
 
 
-@pytest.fixture(scope="module")
-def drive() -> Iterator[canopen.RemoteNode]:
-    with drive_process(), client(canopen.RemoteNode(DRIVE, str(DRIVE_EDS))) as network:
-        yield network[DRIVE]
+@pytest.fixture
+def drive(hub: LocalHub, clock: VirtualClock) -> Iterator[canopen.RemoteNode]:
+    with drive_node(hub) as node:
+        yield node
 
 
 @pytest.fixture
-def by_hand(controller: canopen.RemoteNode) -> Iterator[Hand]:
+def by_hand(hub: LocalHub, controller: canopen.RemoteNode) -> Iterator[Hand]:
     """Nothing is under way, and line_tiny is the active program."""
-    settle(controller)
-    if active(controller) != (2, own_crc(program("line_tiny"))):
-        download(controller, program("line_tiny"))
-    with hand(CONTROLLER) as made:
+    download(controller, program("line_tiny"))
+    with hand(hub, CONTROLLER) as made:
         yield made
 
 
@@ -76,13 +72,11 @@ def own_crc(image: bytes) -> int:
 
 
 def is_active(node: canopen.RemoteNode, image: bytes) -> bool:
-    """Whether this program is the active one. The answers to a client by hand are let pass."""
-    settle(node)
+    """Whether this program is the active one."""
     return active(node) == (2, own_crc(image))
 
 
 def download(node: canopen.RemoteNode, image: bytes) -> None:
-    settle(node)
     with node.sdo[0x2000][1].open(
         "wb", size=len(image), block_transfer=True, buffering=0
     ) as stream:
@@ -91,7 +85,6 @@ def download(node: canopen.RemoteNode, image: bytes) -> None:
 
 
 def upload(node: canopen.RemoteNode) -> bytes:
-    settle(node)
     with node.sdo[0x2000][1].open("rb", block_transfer=True) as stream:
         return bytes(stream.read())
 
@@ -126,9 +119,7 @@ def test_a_download_of_any_size_is_judged_whole(
     controller: canopen.RemoteNode, size: int, block: bool
 ) -> None:
     """The beginning of a program is no program: refused, and the one that is there stays."""
-    good = program("line_tiny")
-    if active(controller)[0] != 2:
-        download(controller, good)
+    download(controller, program("line_tiny"))
     before = active(controller)
     image = program("alpha_quintic")[:size]
     if block:
@@ -137,7 +128,7 @@ def test_a_download_of_any_size_is_judged_whole(
         code = abort_code(lambda: controller.sdo.download(0x2000, 1, image, force_segment=True))
     assert code == VALUE
     assert active(controller) == before
-    assert controller.sdo[0x2000][3].raw < 0
+    assert controller.sdo[0x2000][3].raw == PROGRAM_TOO_SHORT
 
 
 def test_values_by_every_kind_of_transfer(controller: canopen.RemoteNode) -> None:
@@ -211,6 +202,17 @@ def send_blocks(by_hand: Hand, image: bytes, size: int, lose: frozenset[int] = f
     return blocks
 
 
+def blocks_needed(count: int, lose: set[int]) -> int:
+    """Blocks of SEGMENTS for so many segments when these are lost once: each goes on behind the last good one."""
+    done, blocks, lost = 0, 0, set(lose)
+    while done < count:
+        block = range(done, min(done + SEGMENTS, count))
+        done = min((place for place in block if place in lost), default=block.stop)
+        lost -= set(block)
+        blocks += 1
+    return blocks
+
+
 def test_block_download_by_hand(controller: canopen.RemoteNode, by_hand: Hand) -> None:
     image = program("line_slow")
     size = initiate_block(by_hand, len(image))
@@ -232,8 +234,21 @@ def test_block_download_with_lost_segments(
     image = program("line_slow")
     size = initiate_block(by_hand, len(image))
     assert len(segments_of(image)) == 444
-    assert send_blocks(by_hand, image, size, frozenset(lose)) >= 4
+    assert send_blocks(by_hand, image, size, frozenset(lose)) == blocks_needed(444, lose)
     assert end_block(by_hand, image, xmodem(image))[0] == 0xA1
+    assert is_active(controller, image)
+
+
+def test_block_download_with_a_segment_lost_anywhere(
+    controller: canopen.RemoteNode, by_hand: Hand
+) -> None:
+    image = program("line_tiny")
+    count = len(segments_of(image))
+    for place in (*range(0, count, 12), count - 2, count - 1):
+        size = initiate_block(by_hand, len(image))
+        blocks = send_blocks(by_hand, image, size, frozenset({place}))
+        assert blocks == blocks_needed(count, {place}), place
+        assert end_block(by_hand, image, xmodem(image))[0] == 0xA1, place
     assert is_active(controller, image)
 
 
@@ -258,35 +273,48 @@ def test_block_download_out_of_sequence(controller: canopen.RemoteNode, by_hand:
     assert is_active(controller, program("line_tiny"))
 
 
-@pytest.mark.parametrize(("told", "code"), [(100, TOO_LONG), (5000, TOO_SHORT)])
-def test_block_download_of_another_size_than_told(
-    controller: canopen.RemoteNode, by_hand: Hand, told: int, code: int
-) -> None:
+def test_block_download_of_more_than_told(controller: canopen.RemoteNode, by_hand: Hand) -> None:
     image = program("line_tiny")
-    initiate_block(by_hand, told)
+    initiate_block(by_hand, 100)
     for number, data in enumerate(segments_of(image)[:126], start=1):
         by_hand.send(bytes([number]) + data)
-    if code == TOO_SHORT:
-        by_hand.send(b"\xff" + bytes(7))
-        assert by_hand.answer()[:2] == b"\xa2\x7f"
-        found = by_hand.aborted(by_hand.ask(b"\xc1\0\0"))
-        assert found in (TOO_SHORT, CRC)
-    else:
-        assert by_hand.aborted(by_hand.answer()) == TOO_LONG
+    assert by_hand.aborted(by_hand.answer()) == TOO_LONG
     by_hand.silence()
     assert is_active(controller, image)
 
 
-def test_a_client_aborts_in_mid_transfer(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+@pytest.mark.parametrize(("wrong", "code"), [(0, TOO_SHORT), (1, CRC)])
+def test_block_download_of_less_than_told(
+    controller: canopen.RemoteNode, by_hand: Hand, wrong: int, code: int
+) -> None:
+    """The CRC is looked at first."""
+    image = program("line_tiny")
+    begun = image[: SEGMENTS * 7]
+    initiate_block(by_hand, 5000)
+    for number, data in enumerate(segments_of(begun), start=1):
+        by_hand.send(bytes([number | 0x80 * (number == SEGMENTS)]) + data)
+    assert by_hand.answer()[:2] == b"\xa2\x7f"
+    assert by_hand.aborted(end_block(by_hand, begun, xmodem(begun) ^ wrong)) == code
+    by_hand.silence()
+    assert is_active(controller, image)
+
+
+@pytest.mark.parametrize("sent", [0, 1, 2, 50])
+def test_a_client_aborts_in_mid_transfer(
+    controller: canopen.RemoteNode, by_hand: Hand, sent: int
+) -> None:
     image = program("line_slow")
+    parts = segments_of(image)
     begun = by_hand.ask(b"\x21" + PROGRAM + struct.pack("<I", len(image)))
     assert begun[0] == 0x60
-    assert by_hand.ask(b"\0" + image[:7])[0] == 0x20
+    for number in range(sent):
+        assert by_hand.ask(bytes([number % 2 << 4]) + parts[number])[0] == 0x20 | number % 2 << 4
     by_hand.send(b"\x80" + PROGRAM + struct.pack("<I", 0x08000000))
     by_hand.silence()
-    assert by_hand.aborted(by_hand.ask(b"\x10" + image[7:14])) == COMMAND
+    assert by_hand.aborted(by_hand.ask(bytes([sent % 2 << 4]) + parts[sent])) == COMMAND
     initiate_block(by_hand, len(image))
-    by_hand.send(b"\1" + image[:7])
+    for number in range(1, sent + 1):
+        by_hand.send(bytes([number]) + parts[number - 1])
     by_hand.send(b"\x80" + PROGRAM + struct.pack("<I", 0x08000000))
     by_hand.silence()
     assert is_active(controller, program("line_tiny"))
@@ -305,24 +333,69 @@ def test_toggle_bits_that_do_not_toggle(controller: canopen.RemoteNode, by_hand:
     assert is_active(controller, program("line_tiny"))
 
 
-@pytest.mark.parametrize("kind", ["download", "upload", "block download", "block upload"])
-def test_a_client_that_falls_silent(
-    controller: canopen.RemoteNode, by_hand: Hand, kind: str
-) -> None:
-    """The server gives up by itself (a block first gets its answer) and is ready for the next transfer."""
-    first = {
-        "download": b"\x21" + PROGRAM + struct.pack("<I", 2000),
-        "upload": b"\x40" + PROGRAM,
-        "block download": b"\xc6" + PROGRAM + struct.pack("<I", 2000),
-        "block upload": b"\xa4" + PROGRAM + b"\x7f",
-    }[kind]
-    answer = by_hand.ask(first)
-    assert answer[0] != 0x80
-    if kind == "block download":
-        by_hand.send(b"\1" + bytes(7))
-        assert by_hand.answer(10.0)[:2] == b"\xa2\1"
+def awaits_timeout(by_hand: Hand, patience_s: float, since_s: float | None = None) -> None:
+    """The server aborts after this time of silence, and says nothing more."""
+    clock = by_hand.bus.clock
+    begun_s = clock.now_s() if since_s is None else since_s
     assert by_hand.aborted(by_hand.answer(10.0)) == TIMEOUT
-    by_hand.silence()
+    assert clock.now_s() - begun_s == pytest.approx(patience_s, abs=TICK_S)
+    by_hand.silence(3.0)
+
+
+@pytest.mark.parametrize("sent", [0, 1, 2, 50])
+def test_a_client_falls_silent_in_a_download(
+    controller: canopen.RemoteNode, by_hand: Hand, sent: int
+) -> None:
+    """The server gives up by itself and is ready for the next transfer; so in all tests that follow."""
+    assert by_hand.ask(b"\x21" + PROGRAM + struct.pack("<I", 2000))[0] == 0x60
+    for number in range(sent):
+        toggle = number % 2 << 4
+        assert by_hand.ask(bytes([toggle]) + bytes(7))[0] == 0x20 | toggle
+    awaits_timeout(by_hand, CONTROLLER_PATIENCE_S)
+    assert is_active(controller, program("line_tiny"))
+
+
+@pytest.mark.parametrize("taken", [0, 1, 2, 50])
+def test_a_client_falls_silent_in_an_upload(
+    controller: canopen.RemoteNode, by_hand: Hand, taken: int
+) -> None:
+    parts = segments_of(program("line_tiny"))
+    assert by_hand.ask(b"\x40" + PROGRAM)[0] == 0x41
+    for number in range(taken):
+        toggle = number % 2 << 4
+        assert by_hand.ask(bytes([0x60 | toggle])) == bytes([toggle]) + parts[number]
+    awaits_timeout(by_hand, CONTROLLER_PATIENCE_S)
+    assert is_active(controller, program("line_tiny"))
+
+
+@pytest.mark.parametrize("sent", [1, 2, 50, 126])
+def test_a_client_falls_silent_in_a_block_download(
+    controller: canopen.RemoteNode, by_hand: Hand, sent: int
+) -> None:
+    """The block first gets its answer."""
+    clock = by_hand.bus.clock
+    initiate_block(by_hand, 2000)
+    for number in range(1, sent + 1):
+        by_hand.send(bytes([number]) + bytes(7))
+    begun_s = clock.now_s()
+    assert by_hand.answer(10.0)[:2] == bytes([0xA2, sent])
+    transmission_s = 0.00014 * sent
+    silent_s = clock.now_s() - begun_s - transmission_s
+    assert silent_s == pytest.approx(CONTROLLER_PATIENCE_S / 2, abs=2 * TICK_S)
+    awaits_timeout(by_hand, CONTROLLER_PATIENCE_S / 2)
+    assert is_active(controller, program("line_tiny"))
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_client_falls_silent_in_a_block_upload(
+    controller: canopen.RemoteNode, by_hand: Hand, begun: bool
+) -> None:
+    assert by_hand.ask(b"\xa4" + PROGRAM + bytes([SEGMENTS]))[0] == 0xC6
+    since_s = by_hand.bus.clock.now_s()  # the server hands over a block at once
+    if begun:
+        by_hand.send(b"\xa3")
+        assert [by_hand.answer()[0] for _ in range(SEGMENTS)] == list(range(1, SEGMENTS + 1))
+    awaits_timeout(by_hand, CONTROLLER_PATIENCE_S, since_s)
     assert is_active(controller, program("line_tiny"))
 
 
@@ -331,7 +404,6 @@ def test_a_new_transfer_replaces_the_one_under_way(
 ) -> None:
     """A client that lost an answer may simply begin again."""
     assert by_hand.ask(b"\x21" + PROGRAM + struct.pack("<I", 2000))[0] == 0x60
-    settle(controller)
     assert controller.sdo[0x1000].raw == 0
     assert by_hand.ask(b"\xa4" + PROGRAM + b"\x7f")[0] == 0xC6
     assert is_active(controller, program("line_tiny"))
@@ -342,7 +414,6 @@ def test_commands_that_begin_nothing(
     controller: canopen.RemoteNode, by_hand: Hand, command: int
 ) -> None:
     assert by_hand.aborted(by_hand.ask(bytes([command]) + PROGRAM)) == COMMAND
-    settle(controller)
     assert controller.sdo[0x1000].raw == 0
 
 
@@ -352,12 +423,11 @@ def test_short_requests_are_no_requests(by_hand: Hand, length: int) -> None:
     by_hand.silence()
 
 
-def test_expedited_without_a_size(drive: canopen.RemoteNode) -> None:
+def test_expedited_without_a_size(hub: LocalHub, drive: canopen.RemoteNode) -> None:
     """The dictionary knows how many of the four bytes count (CiA 301, 7.2.4.3.3)."""
-    with hand(DRIVE) as by_hand:
+    with hand(hub, DRIVE) as by_hand:
         assert by_hand.ask(b"\x22" + object_bytes(0x6065, 0) + b"\1\2\3\4")[0] == 0x60
         assert by_hand.ask(b"\x22" + object_bytes(0x6066, 0) + b"\5\6\7\x08")[0] == 0x60
-    settle(drive)
     assert drive.sdo[0x6065].raw == 0x04030201
     assert drive.sdo[0x6066].raw == 0x0605
 
@@ -420,10 +490,9 @@ def test_block_upload_with_an_answer_beyond_the_block(by_hand: Hand) -> None:
     assert by_hand.aborted(by_hand.ask(b"\xa2\x05\x04")) == SEQUENCE
 
 
-def test_a_late_client_finds_the_drive_ready(drive: canopen.RemoteNode) -> None:
-    """The drive's server has a second; then the same dialogue works again."""
-    with hand(DRIVE) as by_hand:
+def test_a_late_client_finds_the_drive_ready(hub: LocalHub, drive: canopen.RemoteNode) -> None:
+    """After the time-out the same dialogue works again."""
+    with hand(hub, DRIVE) as by_hand:
         assert by_hand.ask(b"\x40" + NAME)[0] == 0x41
-        assert by_hand.aborted(by_hand.answer(5.0)) == TIMEOUT
-    settle(drive)
+        awaits_timeout(by_hand, DRIVE_PATIENCE_S)
     assert drive.sdo[0x1008].raw == "Hodograph simulated drive"

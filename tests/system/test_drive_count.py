@@ -4,22 +4,19 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bench import BUS, EXAMPLES, MakeBench
+from bench import EXAMPLES, MakeBench
+from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import OFF, READY
 from hodograph.bus.sdo.network import open_network
 from hodograph.bus.sdo.objects import ACTUAL, TARGET
 from hodograph.bustime import axis_choice, drive_pdos
 from hodograph.cli.main import main
 from hodograph.data import DRIVE_EDS
-
-pytestmark = pytest.mark.bus
 
 ALPHA = str(EXAMPLES / "alpha.toml")
 
@@ -49,15 +46,17 @@ def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
 
 @pytest.mark.parametrize(("drives", "period_us"), [(3, 1000), (6, 2000)])
 def test_the_plane_moves_as_with_two_drives(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, drives: int, period_us: int
+    hub: LocalHub,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    drives: int,
+    period_us: int,
 ) -> None:
     two = machine_of(tmp_path, 2, period_us)
     many = machine_of(tmp_path, drives, period_us)
     simulated = result(capsys, "simulate", ALPHA, "--machine", str(two), "--json")
     report = ("--report", str(tmp_path / "report")) if drives == 6 else ()
-    recorded = result(
-        capsys, "run", ALPHA, "--machine", str(many), "--json", "--pace", "fast", *report
-    )
+    recorded = result(capsys, "run", ALPHA, "--machine", str(many), "--json", *report)
     assert {key: recorded[key] for key in simulated} == simulated
     load = recorded["bus_load"]
     assert load["model_least_percent"] <= load["measured_percent"] <= load["model_worst_percent"]
@@ -75,7 +74,7 @@ def test_further_axes_hold(
     period_us: int,
 ) -> None:
     file = machine_of(tmp_path, drives, period_us)
-    controller = make_bench("fast", file).controller
+    controller = make_bench(file=file).controller
     assert main(["goto", ALPHA, "--machine", str(file)]) == 0
     held = [controller.read(TARGET, axis) for axis in range(3, drives + 1)]
     assert main(["start", "--follow"]) == 0
@@ -90,7 +89,7 @@ def test_one_drive_takes_no_program(
     make_bench: MakeBench, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     file = machine_of(tmp_path, 1, 1000)
-    controller = make_bench("fast", file).controller
+    controller = make_bench(file=file).controller
     image = tmp_path / "alpha.hdgp"
     assert main(["compile", ALPHA, "-o", str(image)]) == 0
     for command in ("compile", "upload", "run", "goto", "simulate"):
@@ -115,11 +114,11 @@ def test_the_model_has_the_pdos_that_drives_are_given(
 ) -> None:
     file = machine_of(tmp_path, 2, 2000)
     file.write_text(file.read_text() + f"\n[axis.feedforward]\n{feedforward}\n")
-    bench = make_bench("real-time", file)
+    bench = make_bench(file=file)
     bench.controller.enable()
-    os.kill(bench.rig.process_ids[1], signal.SIGKILL)  # one SDO client at a time
+    bench.rig.processes[1].kill()  # one SDO client at a time
     for axis in bench.machine.axes:
-        with open_network(BUS, axis.node, 1_000_000) as network:
+        with open_network(bench.bus, axis.node, 1_000_000) as network:
             drive = network.add_node(axis.node, str(DRIVE_EDS))
             drive.sdo.RESPONSE_TIMEOUT = 5.0
             drive.tpdo.read()

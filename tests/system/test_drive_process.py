@@ -3,24 +3,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import struct
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import can
 import canopen
 import pytest
+from canopen_bench import DRIVE_EDS, FIGURES, dictionary, let_pass, listener
+
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.local_bus import LocalBus
+from hodograph.bus.processes import Process
+from hodograph.bus.sdo.network import Network
 
 DRIVE = "build/bin/hodograph-drive"
-EDS = "sim/node/drive.eds"
-FIGURES = (
-    "gain_rad_s_v=83.0089,time_constant_s=0.19936,screw_mm_rad=1.59,torque_to_volts=1.39664804469,"
-    "volts_limit=5,k_pp_rad_s_mm=97.38,k_pv_nm_s_rad=1.19,k_iv_per_s=252.8,k_pf_rad_mm=0.8,k_vf=0.85"
-)
 MODELLED = {0x1018, 0x2101, 0x6041, 0x6062, 0x6063, 0x6064, 0x6075, 0x6076, 0x607A, 0x6092}
 """Objects whose value is the model's, not the default of the EDS."""
 
@@ -58,37 +58,30 @@ def test_help(root: Path) -> None:
 
 
 @pytest.fixture
-def drives(root: Path) -> Iterator[subprocess.Popen[bytes]]:
+def drives(root: Path, hub: LocalHub, clock: VirtualClock) -> Iterator[Process]:
     """Two drives: node 42 at 1.5 mm, node 43 at 0 with a limit switch at -2 mm."""
-    with can.Bus(interface="socketcan", channel="vcan0") as bus:
-        words = [str(root / DRIVE), "--bus", "vcan0"]
-        for axis in ("node=42,position_mm=1.5", "node=43,limit_negative_mm=-2"):
-            words += ["--axis", f"{axis},{FIGURES}"]
-        process = subprocess.Popen(words, stderr=subprocess.PIPE)
-        missing = {0x700 + 42, 0x700 + 43}
-        limit = time.monotonic() + 10
-        while missing and time.monotonic() < limit:
-            frame = bus.recv(0.1)
-            missing -= {frame.arbitration_id} if frame else set()
-        assert not missing
+    words = [str(root / DRIVE), "--bus", hub.address.channel]
+    for axis in ("node=42,position_mm=1.5", "node=43,limit_negative_mm=-2"):
+        words += ["--axis", f"{axis},{FIGURES}"]
+    with listener(hub) as bus:
+        process = Process("drives", words, clock)
+        booted = [bus.recv(1.0) for _ in range(2)]
+    assert [frame.arbitration_id for frame in booted if frame] == [0x700 + 42, 0x700 + 43]
     yield process
-    with contextlib.suppress(ProcessLookupError):
-        process.kill()
-    process.communicate()
+    process.kill()
+    process.end()
 
 
 @pytest.fixture
-def network(root: Path, drives: subprocess.Popen[bytes]) -> Iterator[canopen.Network]:
-    network = canopen.Network()
-    network.connect(interface="socketcan", channel="vcan0")
+def network(hub: LocalHub, drives: Process) -> Iterator[Network]:
+    network = Network(LocalBus(hub.address.channel))
     for node in (42, 43):
-        network.add_node(node, str(root / EDS)).sdo.RESPONSE_TIMEOUT = 2.0
+        network.add_node(node, dictionary(DRIVE_EDS, node)).sdo.RESPONSE_TIMEOUT = 2.0
     yield network
     network.disconnect()
 
 
-@pytest.mark.bus
-def test_every_object_reads_back_as_the_eds_says(network: canopen.Network) -> None:
+def test_every_object_reads_back_as_the_eds_says(network: Network) -> None:
     node = network[42]
     entries = 0
     for entry in node.object_dictionary.values():
@@ -111,30 +104,23 @@ def test_every_object_reads_back_as_the_eds_says(network: canopen.Network) -> No
     assert int.from_bytes(feed, "little") == 9_990_265
 
 
-@pytest.mark.bus
-def test_two_nodes_answer_a_sync_each(network: canopen.Network) -> None:
-    reports = (0x180 + 42, 0x180 + 43, 0x280 + 42, 0x280 + 43)
+def test_two_nodes_answer_a_sync_each(hub: LocalHub, network: Network) -> None:
     network.nmt.send_command(1)
-    time.sleep(0.1)
-    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+    let_pass(network, 0.01)
+    with listener(hub) as bus:
         for counter in range(1, 6):
             bus.send(can.Message(arbitration_id=0x80, data=[counter], is_extended_id=False))
-            found: dict[tuple[int, int], bytes] = {}
-            limit = time.monotonic() + 2
-            while len(found) < 4 and time.monotonic() < limit:
-                frame = bus.recv(0.1)
-                if frame is not None and frame.arbitration_id in reports:
-                    found[frame.arbitration_id & 0x780, frame.arbitration_id & 0x7F] = bytes(
-                        frame.data
-                    )
-            word, position = struct.unpack("<Hi", found[0x180, 42])
+            bus.clock.sleep(0.001)
+            frames = list(iter(lambda: bus.recv(0), None))
+            found = {frame.arbitration_id: bytes(frame.data) for frame in frames}
+            assert list(found) == [0x180 + 42, 0x180 + 43, 0x280 + 42, 0x280 + 43]
+            word, position = struct.unpack("<Hi", found[0x180 + 42])
             assert (word & 0x6F, position) == (0x40, 1_500_003)
-            assert struct.unpack("<Hi", found[0x180, 43])[1] == 0
-            assert struct.unpack("<h", found[0x280, 43]) == (0,)
+            assert struct.unpack("<Hi", found[0x180 + 43])[1] == 0
+            assert struct.unpack("<h", found[0x280 + 43]) == (0,)
 
 
-@pytest.mark.bus
-def test_a_moved_pdo_is_heard(network: canopen.Network) -> None:
+def test_a_moved_pdo_is_heard(network: Network) -> None:
     """The filters of the process follow the COB-ID; type 255 acts without SYNC."""
     sdo = network[42].sdo
     network.nmt.send_command(1)
@@ -148,25 +134,26 @@ def test_a_moved_pdo_is_heard(network: canopen.Network) -> None:
     assert sdo[0x6041].raw & 0x6F == 0x21
 
 
-@pytest.mark.bus
-def test_homes_by_sdo_without_sync(network: canopen.Network) -> None:
+def test_homes_by_sdo_without_sync(network: Network) -> None:
     sdo = network[43].sdo
     sdo[0x6060].raw = 6
     assert sdo[0x6061].raw == 6
     sdo[0x6098].raw = 17
     for word in (0x06, 0x07, 0x0F, 0x1F):
         sdo[0x6040].raw = word
-    limit = time.monotonic() + 20
-    while sdo[0x6041].raw & 0x3400 == 0 and time.monotonic() < limit:
-        time.sleep(0.1)
+    begun_s = network.clock.now_s()
+    while sdo[0x6041].raw & 0x3400 == 0:
+        assert network.clock.now_s() - begun_s < 20.0
+        network.clock.sleep(0.01)
     assert sdo[0x6041].raw & 0x3400 == 0x1400
     assert sdo[0x60FD].raw == 0  # the switch is off again
-    assert 0 <= sdo[0x6064].raw < 200_000  # it passed home slowly
+    assert abs(sdo[0x6064].raw) <= 1  # back at home
 
 
-@pytest.mark.bus
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
-def test_ends_cleanly(drives: subprocess.Popen[bytes], end: signal.Signals) -> None:
-    drives.send_signal(end)
-    _, stderr = drives.communicate(timeout=5)
-    assert (drives.returncode, stderr) == (0, b"")
+def test_ends_cleanly(clock: VirtualClock, drives: Process, end: signal.Signals) -> None:
+    begun_s = clock.now_s()
+    clock.signal(drives.name, drives.child, end)
+    assert clock.await_end(drives.name, drives.child, 5.0) == 0
+    assert clock.now_s() == begun_s
+    assert drives.text() == ""

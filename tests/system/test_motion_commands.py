@@ -5,22 +5,20 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from typing import Any
 
 import pytest
 
 from bench import MakeAlpha, MakeBench
+from hodograph.bus.clock import VirtualClock
 from hodograph.bus.sdo.controller import HELD, READY, RUNNING, Controller
 from hodograph.cli.main import main
-
-pytestmark = pytest.mark.bus
 
 
 @pytest.fixture
 def controller(make_bench: MakeBench) -> Controller:
-    """A configured controller with its drives, off, in real time."""
-    return make_bench("real-time").controller
+    """A configured controller with its drives, off."""
+    return make_bench().controller
 
 
 @pytest.fixture
@@ -37,24 +35,24 @@ def status(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
 
 
 def test_hold_override_resume(
-    controller: Controller, slow: str, capsys: pytest.CaptureFixture[str]
+    controller: Controller, clock: VirtualClock, slow: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["hold"]) == 5
     assert main(["goto", slow]) == 0
     assert main(["start"]) == 0
-    time.sleep(1.0)
+    clock.sleep(1.0)
     assert main(["hold"]) == 0
     assert controller.state() == HELD
     held = status(capsys)
     assert held["state"] == "held"
     assert held["motion"]["feed_mm_s"] == 0
     assert held["override"] == {"wanted_percent": 100, "actual_percent": 0, "saturated": False}
-    time.sleep(0.3)
+    clock.sleep(0.3)
     assert status(capsys)["motion"]["arc_length_mm"] == held["motion"]["arc_length_mm"]
     assert main(["override", "50"]) == 0
     assert controller.state() == HELD
     assert main(["resume"]) == 0
-    time.sleep(1.0)
+    clock.sleep(1.0)
     half = status(capsys)
     assert half["override"]["actual_percent"] == 50
     assert math.isclose(half["motion"]["feed_mm_s"], 5, rel_tol=1e-3)
@@ -66,17 +64,23 @@ def test_hold_override_resume(
     )
 
 
+@pytest.mark.parametrize("after_s", [0.2, 1.5, 9.0])
 def test_goes_on_where_it_was_stopped(
-    controller: Controller, slow: str, capsys: pytest.CaptureFixture[str]
+    controller: Controller,
+    clock: VirtualClock,
+    slow: str,
+    capsys: pytest.CaptureFixture[str],
+    after_s: float,
 ) -> None:
     assert main(["goto", slow]) == 0
     assert main(["start"]) == 0
-    time.sleep(1.5)
+    clock.sleep(after_s)
     assert main(["stop"]) == 0
     arc_mm = status(capsys)["motion"]["arc_length_mm"]
-    assert 5 < arc_mm < 50
+    assert arc_mm == pytest.approx(10 * after_s, rel=0.2)
     assert main(["start", "--from", f"{arc_mm + 1.0}"]) == 5
     assert main(["start", "--from", f"{arc_mm!r}"]) == 0
     assert controller.state() == RUNNING
+    clock.sleep(0.1)
     assert main(["stop"]) == 0
     assert status(capsys)["motion"]["arc_length_mm"] > arc_mm

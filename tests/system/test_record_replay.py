@@ -5,28 +5,26 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 import struct
-import subprocess
-import sys
-import threading
-import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from bench import EXAMPLES, MakeBench
+from commands import running
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.frames import RECORD_DTYPE
 from hodograph.bus.listening.recordings import read_recording, write_recording
+from hodograph.bus.local_bus import LocalBus
 from hodograph.cli.main import main
-
-pytestmark = pytest.mark.bus
 
 ALPHA = str(EXAMPLES / "alpha.toml")
 MACHINE = str(EXAMPLES / "machines" / "paper_alpha.toml")
 FRAME = struct.Struct("=IB3x8s")
 NOT_RECORDED = {"bus", "deadline_misses", "pace"}
+PERIOD_S = 0.001
 
 
 def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
@@ -53,12 +51,15 @@ def same(live: dict[str, Any], again: dict[str, Any]) -> None:
     assert again["deadline_misses"] is None
 
 
-def test_run_record_replay(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_run_record_replay(
+    hub: LocalHub, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     log = tmp_path / "alpha.log"
     traces = [tmp_path / "live.csv", tmp_path / "again.csv"]
     live = result(capsys, "run", ALPHA, "--json", "--record", str(log), "--trace", str(traces[0]))
     again = result(capsys, "replay", str(log), ALPHA, "--json", "--trace", str(traces[1]))
     same(live, again)
+    print("LIVE", live)
     assert again["bus"] == str(log)
     assert again["pace"] == "real-time"
     assert live["frames"] == log.read_bytes().count(b"\n")
@@ -95,18 +96,17 @@ def test_run_record_replay(capsys: pytest.CaptureFixture[str], tmp_path: Path) -
     assert (status, "0 SYNCs recorded" in line) == (6, True), line
 
 
-def test_a_recording_from_beside(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_recording_from_beside(
+    hub: LocalHub, clock: VirtualClock, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     """`hodograph record` hears all that happens: going to the start as well as the run."""
     file = tmp_path / "beside.blf"
-    words = [sys.executable, "-m", "hodograph", "record", str(file), "--json"]
-    words += ["--machine", MACHINE]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
-        until_there(file)
-        heart = str(EXAMPLES / "heart.toml")
-        live = result(capsys, "run", heart, "--json", "--pace", "fast")
-        child.send_signal(signal.SIGINT)
-        out, _ = child.communicate(timeout=120)
-        assert child.returncode == 0
+    heart = str(EXAMPLES / "heart.toml")
+    with running(clock, "record", str(file), "--json", "--machine", MACHINE) as command:
+        live = result(capsys, "run", heart, "--json")
+        command.signal(signal.SIGINT)
+        assert command.wait() == 0
+        out = command.out
     told = json.loads(out)
     assert told["jumps"] == []
     frames = read_recording(file)
@@ -117,48 +117,34 @@ def test_a_recording_from_beside(capsys: pytest.CaptureFixture[str], tmp_path: P
         assert again[key] == live[key], key
 
 
-def until_there(file: Path) -> None:
-    """Waits for a recording to begin: its socket is opened right after its file."""
-    deadline = time.monotonic() + 60
-    while not file.exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-    time.sleep(0.5)
-
-
-def motion(jump_at: int, recording: Path) -> None:
+def motion(hub: LocalHub, clock: VirtualClock, jump_at: int) -> None:
     """Two axes at 50 mm/s beyond SYNC 20; at `jump_at` the first one steps aside by 1 mm."""
-    until_there(recording)
-    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as out:
-        out.bind(("vcan0",))
+    with LocalBus(hub.address.channel) as out:
         x, speed = 0, 0
         for k in range(1300):
             speed = min(50_000, speed + 4000) if k > 20 else 0
             x += speed + (1_000_000 if k == jump_at else 0)
-            out.send(FRAME.pack(0x80, 1, bytes([k % 240 + 1])))
+            out.send_raw(FRAME.pack(0x80, 1, bytes([k % 240 + 1])))
             for node, counts in ((2, x), (3, 0)):
-                out.send(FRAME.pack(0x180 + node, 6, struct.pack("<Hi", 0x1237, counts)))
-                out.send(FRAME.pack(0x200 + node, 6, struct.pack("<Hi", 0x0F, counts)))
-            if k % 50 == 0:
-                time.sleep(0.01)
+                out.send_raw(FRAME.pack(0x180 + node, 6, struct.pack("<Hi", 0x1237, counts)))
+                out.send_raw(FRAME.pack(0x200 + node, 6, struct.pack("<Hi", 0x0F, counts)))
+            clock.sleep(PERIOD_S)
 
 
-@pytest.mark.parametrize("jump_at", [-1, 1100])
+@pytest.mark.parametrize("jump_at", [-1, 100, 500, 1100, 1299])
 def test_a_jump_on_the_bus_is_told(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, jump_at: int
+    hub: LocalHub, clock: VirtualClock, tmp_path: Path, jump_at: int
 ) -> None:
     def record(name: str, *more: str) -> tuple[int, dict[str, Any], str]:
-        file = tmp_path / name
-        sender = threading.Thread(target=motion, args=(jump_at, file))
-        sender.start()
-        capsys.readouterr()
-        status = main(["record", str(file), "--seconds", "4", "--json", *more])
-        out, err = capsys.readouterr()
-        sender.join()
-        return status, json.loads(out), err
+        words = ("record", str(tmp_path / name), "--seconds", "1.5", "--json", *more)
+        with running(clock, *words) as command:
+            motion(hub, clock, jump_at)
+            status = command.wait()
+            return status, json.loads(command.out), command.err
 
     status, told, err = record("jump.log", "--machine", MACHINE)
     assert told["frames"] == 1300 * 5
+    assert told["seconds"] == pytest.approx(1.5, abs=1e-6)
     if jump_at < 0:
         assert (status, told["jumps"], err) == (0, [], "")
         return
@@ -173,24 +159,39 @@ def test_a_jump_on_the_bus_is_told(
 
 
 def test_without_a_machine_file_the_controller_is_asked(
-    make_bench: MakeBench, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    make_bench: MakeBench,
+    clock: VirtualClock,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
-    make_bench("fast")
-    words = [sys.executable, "-m", "hodograph", "goto", ALPHA, "--to", "3", "4"]
-    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as child:
+    make_bench()
+    with running(clock, "goto", ALPHA, "--to", "3", "4") as command:
         told = result(capsys, "record", str(tmp_path / "goto.log"), "--seconds", "4", "--json")
-        assert child.wait() == 0
+        assert command.wait() == 0
     assert told["jumps"] == []
+    assert told["frames"] > 4000
 
 
-def test_for_some_seconds(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_for_some_seconds(
+    hub: LocalHub, clock: VirtualClock, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     file = tmp_path / "silence.log"
-    begun = time.monotonic()
+    begun_ns = clock.stamp_ns()
     assert main(["record", str(file), "--seconds", "0.7"]) == 0
-    assert time.monotonic() - begun >= 0.7
-    assert "0 frames in 0." in capsys.readouterr().out
+    assert clock.stamp_ns() - begun_ns == pytest.approx(700_000_000, abs=300)
+    assert capsys.readouterr().out == f"{file}: 0 frames in 0.7 s\n"
     assert file.read_bytes() == b""
     status, line = failed(capsys, "record", str(tmp_path / "bus.txt"))
     assert (status, "told by its name" in line) == (2, True), line
-    status, line = failed(capsys, "record", str(file), "--bus", "socketcan:nocan7")
-    assert (status, "no such network interface" in line) == (4, True), line
+    status, line = failed(capsys, "record", str(file), "--bus", f"local:{tmp_path / 'none'}")
+    assert (status, "nobody serves it" in line) == (4, True), line
+
+
+def test_two_runs_give_the_same_recording(one_core: None, tmp_path: Path) -> None:
+    """Byte by byte: frames, their order and their times."""
+    logs = [tmp_path / "first.log", tmp_path / "second.log"]
+    for log in logs:
+        with LocalHub() as hub:
+            assert main(["run", ALPHA, "--record", str(log), "--bus", str(hub.address)]) == 0
+    assert logs[0].stat().st_size > 100_000
+    assert logs[0].read_bytes() == logs[1].read_bytes()

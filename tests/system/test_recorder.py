@@ -1,61 +1,63 @@
 # SPDX-License-Identifier: MIT
-"""The recorder: every frame of the bus, in order, with the time it came."""
+"""The recorder on a local bus: every frame, in order, with the time of its last bit."""
 
 from __future__ import annotations
 
-import socket
 import struct
-import time
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from hodograph.bus.address import BusAddress
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.listening.recordings import read_recording, write_recording
+from hodograph.bus.local_bus import LocalBus
+from hodograph.bustime.frame_bits import exact_bits
 
-pytestmark = pytest.mark.bus
-
-VCAN0 = BusAddress("socketcan", "vcan0")
 FRAME = struct.Struct("=IB3x8s")
 
 
-def send(count: int, first: int = 0) -> None:
-    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as out:
-        out.bind(("vcan0",))
+def send(hub: LocalHub, count: int, first: int = 0) -> None:
+    """All at one instant."""
+    with LocalBus(hub.address.channel) as out:
         for i in range(first, first + count):
-            out.send(FRAME.pack(0x123, 4, struct.pack("<I", i)))
+            out.send_raw(FRAME.pack(0x123, 4, struct.pack("<I", i)))
 
 
-def test_all_frames_in_order_with_their_times(tmp_path: Path) -> None:
-    before_us = time.time_ns() // 1000
-    with Recorder(VCAN0) as recorder:
-        send(3000)
-    after_us = time.time_ns() // 1000
+def test_all_frames_in_order_with_their_times(
+    hub: LocalHub, clock: VirtualClock, tmp_path: Path
+) -> None:
+    begun_us = clock.stamp_ns() // 1000
+    with Recorder(hub.address) as recorder:
+        for first in range(0, 3000, 1500):
+            send(hub, 1500, first)
+            clock.sleep(0.5)
     frames = recorder.frames()
     assert recorder.dropped == 0
     assert recorder.frame_count == frames.size == 3000
     assert (frames["id"] == 0x123).all()
     assert (frames["data"][:, :4].copy().view("<u4")[:, 0] == np.arange(3000)).all()
-    times = frames["time_us"]
-    assert before_us <= times[0]
-    assert times[-1] <= after_us
-    assert (np.diff(times) >= 0).all()
-    assert np.unique(times).size > 100
+    sent_us = np.repeat([begun_us, begun_us + 500_000], 1500)
+    bits = exact_bits(frames).reshape(2, 1500)
+    assert (frames["time_us"] == sent_us + np.cumsum(bits, axis=1).reshape(-1)).all()
     for suffix in (".log", ".asc", ".blf"):
         write_recording(tmp_path / f"bus{suffix}", frames)
         assert np.array_equal(read_recording(tmp_path / f"bus{suffix}"), frames)
 
 
-def test_taking_frames_bit_by_bit() -> None:
+def test_taking_frames_bit_by_bit(hub: LocalHub, clock: VirtualClock) -> None:
+    """What was on the bus up to now, and no more."""
     taken = []
-    with Recorder(VCAN0) as recorder:
+    with Recorder(hub.address) as recorder:
         for i in range(5):
-            send(40, 40 * i)
-            time.sleep(0.01)
+            send(hub, 40, 40 * i)
+            clock.sleep(0.002)
             taken.append(recorder.take())
+            assert recorder.take().size == 0
+            clock.sleep(0.002)
     taken.append(recorder.take())
+    assert all(0 < part.size < 40 for part in (taken[0], taken[-1]))
     frames = np.concatenate(taken)
     assert recorder.frame_count == frames.size == 200
     assert (frames["data"][:, :4].copy().view("<u4")[:, 0] == np.arange(200)).all()

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""An emulated board in real time, with SLCAN on its UART: no frame is lost in 10 000 ticks, either way."""
+"""An emulated board in real time, with SLCAN on its UART: no frame is lost in 10 000 ticks, either way.
+
+Its pace is printed, beside how late this computer itself was, and not judged: a tick that the host keeps the board from
+is left out, and no frame is lost by that.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +20,15 @@ from pathlib import Path
 
 import pytest
 
+from lateness import Lateness
+
 ROOT = Path(__file__).resolve().parents[2]
 EMULATE = ROOT / "tools/emulate.py"
 TICKS = 10_000
 FLOOD = 66_000  # characters
 COUNTER_OVERFLOW = 240
+HANGS_S = 600.0
+LOOK_S = 0.01
 OBJECTS = (b"\x00\x10\x00", b"\x18\x10\x01", b"\x18\x10\x02", b"\x06\x10\x00")
 """Index and subindex, little-endian, of objects that can be read in one frame."""
 
@@ -40,23 +48,22 @@ def address() -> Iterator[tuple[str, int]]:
     words = [sys.executable, str(EMULATE), "an386", "--serve", f"127.0.0.1:{port}"]
     board = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     try:
+        _await_listener(board, port)
         yield "127.0.0.1", port
         board.send_signal(signal.SIGTERM)
-        assert board.wait(20) == 0, board.communicate()[1]
+        assert board.wait(HANGS_S) == 0, board.communicate()[1]
     finally:
         board.kill()
         board.communicate()
         os.sched_setaffinity(0, before)
 
 
-def connected(address: tuple[str, int]) -> socket.socket:
-    deadline = time.monotonic() + 20
-    while True:
-        try:
-            return socket.create_connection(address, timeout=20)
-        except ConnectionRefusedError:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+def _await_listener(board: subprocess.Popen[str], port: int) -> None:
+    """Until somebody listens at the port: the first who connects to it gets the board."""
+    listening = f" 0100007F:{port:04X} 00000000:0000 0A "
+    while listening not in Path("/proc/net/tcp").read_text():
+        assert board.poll() is None, board.communicate()[1]
+        time.sleep(LOOK_S)
 
 
 class Peer:
@@ -103,24 +110,23 @@ class Peer:
             self.stream.sendall(out)
 
 
-@pytest.mark.serial
 def test_no_frame_is_lost(address: tuple[str, int]) -> None:
-    with connected(address) as stream:
+    with socket.create_connection(address, timeout=HANGS_S) as stream:
         stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         peer = Peer(stream)
-        while peer.syncs < TICKS or peer.asked is not None:
-            peer.take()
+        with Lateness() as host:
+            while peer.syncs < TICKS or peer.asked is not None:
+                peer.take()
     rate = (peer.syncs - 1) / (peer.last_s - peer.first_s)
-    load = os.getloadavg()[0]
-    print(f"{peer.syncs} ticks, {peer.answers} answers, {rate:.1f} ticks/s at load {load:.1f}")
+    late_ms = 1000 * host.worst_s
+    print(f"{peer.syncs} ticks, {peer.answers} answers, {rate:.1f} ticks/s; host {late_ms:.1f} ms")
     assert peer.answers > TICKS / 100
 
 
-@pytest.mark.serial
 def test_a_flood_is_taken(address: tuple[str, int]) -> None:
     """Frames that nobody wants as fast as the UART takes them, and behind them a question, which is answered."""
     flood = b"t12380011223344556677\r" * (FLOOD // 22)
-    peer = Peer(connected(address))
+    peer = Peer(socket.create_connection(address, timeout=HANGS_S))
     with peer.stream as stream:
         while peer.syncs == 0:
             peer.take()

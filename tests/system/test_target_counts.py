@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 
 import count  # noqa: E402
 from target import adversary  # noqa: E402
-from target.campaign import EXAMPLES, KINDS  # noqa: E402
+from target.campaign import EXAMPLES, KINDS, SECTIONS, Campaign, compilers  # noqa: E402
 from target.counting import Counter  # noqa: E402
 from target.emulator import TARGETS, Target  # noqa: E402
 
@@ -83,6 +83,17 @@ def test_interrupts_inside_do_not_count(tmp_path: Path) -> None:
     assert len(counted("startup_systick")) == 1
 
 
+def test_the_counts_of_one_core_are_the_committed_ones() -> None:
+    """The others: the next test."""
+    committed = json.loads(count.COMMITTED.read_text(encoding="utf-8"))
+    reason = count.incomparable({"compilers": compilers()}, committed)
+    if reason is not None:
+        pytest.skip(reason)
+    counted = Campaign(BUILD).pair(TARGETS["an386"], "float")
+    assert counted == {section: committed[section]["an386 float"] for section in SECTIONS}
+
+
+@pytest.mark.long
 def test_the_counts_are_the_committed_ones() -> None:
     """Changed on purpose: `make count UPDATE=1`, and commit what it writes."""
     counted = count.everything(BUILD)

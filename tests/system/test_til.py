@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Target in the loop: the controller on an emulated board, on the bus, against the simulated drives."""
+"""Target in the loop: the controller on an emulated board, on a bus in virtual time, against the simulated drives."""
 
 from __future__ import annotations
 
@@ -11,18 +11,26 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import canopen
+import numpy as np
 import pytest
 
+from boards import BRIDGE, EMULATE, QEMU, board, children, stop_for
+from hodograph.bus.address import BusAddress
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.listening.recorder import Frames, Recorder
+from hodograph.bus.processes import Process
+from hodograph.bus.run import BusRun, run_program, station
+from hodograph.bus.sdo.controller import connect
+from hodograph.bus.sdo.objects import BOOT
+from hodograph.chain import load_chain
 from hodograph.cli.main import main
 
-pytestmark = pytest.mark.bus
-
 ROOT = Path(__file__).resolve().parents[2]
-EMULATE = ROOT / "tools/emulate.py"
 FILES = [str(ROOT / "examples" / f"{name}.toml") for name in ("alpha", "heart")]
 HASHES = ("setpoints_sha256", "encoders_sha256")
-FILTERS = [{"can_id": 0x581, "can_mask": 0x7FF}, {"can_id": 0x701, "can_mask": 0x7FF}]
+BITRATE = 1_000_000
+MIDWAY_TICKS = 500  # of 1101
 
 
 def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
@@ -32,65 +40,97 @@ def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     return json.loads(out)
 
 
-def test_the_m4f_runs_alpha_and_heart(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_m4f_runs_alpha_and_heart(
+    hub: LocalHub, clock: VirtualClock, capsys: pytest.CaptureFixture[str]
+) -> None:
     """`simulate` gives the hashes of `run` with the Linux controller (test_bus_run)."""
-    board = ("--controller", f"{EMULATE} an386", "--pace", "fast", "--wait", "20")
-    for run, file in zip(result(capsys, "run", *FILES, "--json", *board), FILES, strict=True):
+    controller = ("--controller", f"{EMULATE} an386")
+    runs = result(capsys, "run", *FILES, "--json", *controller)
+    for run, file in zip(runs, FILES, strict=True):
         simulated = result(capsys, "simulate", file, "--json")
         assert [run[key] for key in HASHES] == [simulated[key] for key in HASHES]
         assert run["deadline_misses"] == 0
 
 
-@pytest.mark.parametrize(
-    ("target", "link"),
-    [("an385", "fifo"), ("an500", "slcan"), ("an505", "fifo"), ("an505", "slcan")],
-)
-def test_the_other_boards_answer_and_end(target: str, link: str) -> None:
-    words = [sys.executable, str(EMULATE), target, "--bus", "vcan0", "--node", "9", "--link", link]
-    board = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    filters = [{"can_id": each["can_id"] + 8, "can_mask": 0x7FF} for each in FILTERS]
-    network = canopen.Network()
-    network.connect(interface="socketcan", channel="vcan0", can_filters=filters)
-    try:
-        node: Any = network.add_node(9, str(ROOT / "firmware/app/controller.eds"))
-        node.nmt.wait_for_heartbeat(timeout=20)
-        node.sdo.RESPONSE_TIMEOUT = 5.0
-        assert node.sdo[0x2002].raw == 0
-        board.send_signal(signal.SIGTERM)
-        assert board.wait(20) == 0, board.communicate()[1]
-    finally:
-        network.disconnect()
-        board.kill()
-        board.communicate()
+def _recorded_run(target: str, stopped: str | None = None) -> tuple[Frames, BusRun]:
+    """The alpha at the board; `stopped`: a program of it that stands still for a second on the way."""
+    chain = load_chain(Path(FILES[0]))
+    victims: list[int] = []
+
+    def progress(tick: int) -> None:
+        if tick >= MIDWAY_TICKS and victims:
+            stop_for(victims.pop(), 1.0)
+
+    with (
+        LocalHub() as hub,
+        Recorder(hub.address) as recorder,
+        station(chain.machine, hub.address, "fast", 15.0, print, f"{EMULATE} {target}") as at,
+    ):
+        assert at.rig is not None
+        if stopped is not None:
+            victims += children(at.rig.processes[1].child.pid, stopped)
+        run = run_program(at, chain.machine, chain.image, chain.machine.kernel, progress)
+        assert not victims
+        return recorder.so_far(), run
 
 
-def test_without_its_bridge_the_board_ends() -> None:
-    words = [sys.executable, str(EMULATE), "an386", "--bus", "vcan0", "--node", "9", "--verbose"]
-    board = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    assert board.stderr is not None
-    assert "this board is node 9" in board.stderr.readline()
-    for bridge in _children("hodograph-bridge", board.pid):
-        os.kill(bridge, signal.SIGKILL)
-    _, words_of_it = board.communicate(timeout=20)
-    assert board.returncode == 4
-    assert "the bridge is gone" in words_of_it
+@pytest.mark.parametrize("target", ["an386", "microbit"])
+def test_the_same_frames_at_the_same_times(one_core: None, target: str) -> None:
+    """Each bit of a run, though the emulator or the bridge stands still for a second in the middle of it."""
+    frames, run = _recorded_run(target)
+    assert frames.size > 10 * run.motion.ticks
+    for stopped in (None, QEMU, BRIDGE):
+        again, other = _recorded_run(target, stopped)
+        assert np.array_equal(frames, again), stopped
+        assert other.motion.encoders_sha256 == run.motion.encoders_sha256
 
 
-def _children(name: str, parent: int) -> list[int]:
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            stat = (folder / "stat").read_text()
-            command = (folder / "cmdline").read_bytes().split(b"\0")[0].decode()
-        except OSError:
-            continue
-        if int(stat.rpartition(")")[2].split()[1]) == parent and command.endswith(name):
-            found.append(int(folder.name))
-    return found
+@pytest.mark.parametrize("target", ["an385", "an505", "microbit"])
+def test_the_other_boards_answer_and_end(hub: LocalHub, clock: VirtualClock, target: str) -> None:
+    process = board(target, hub.address, 9, clock)
+    _answers_and_ends(hub.address, process)
+
+
+@pytest.mark.parametrize("target", ["an500", "an505"])
+def test_boards_answer_and_end_in_real_time(one_core: None, target: str) -> None:
+    with LocalHub(virtual=False) as hub:
+        process = board(target, hub.address, 9, None, "--link", "slcan")
+        _answers_and_ends(hub.address, process)
+
+
+def _answers_and_ends(address: BusAddress, process: Process) -> None:
+    with connect(address, 9, BITRATE) as controller:
+        controller.require(300.0)
+        assert controller.state() == BOOT
+        process.end(300.0)
+        assert process.child.returncode == 0
+        assert not controller.answers(0.5)
+
+
+def test_without_its_bridge_the_board_ends(hub: LocalHub, clock: VirtualClock) -> None:
+    process = board("an386", hub.address, 9, clock, "--verbose")
+    (bridge,) = children(process.child.pid, BRIDGE)
+    clock.sleep(1.0)
+    os.kill(bridge, signal.SIGKILL)
+    assert process.child.wait() == 4
+    begin, *_, last = process.text().splitlines()
+    assert "this board is node 9" in begin
+    assert "the bridge is gone" in last
+    process.end()
+
+
+def test_a_board_whose_emulator_dies_ends(hub: LocalHub, clock: VirtualClock) -> None:
+    process = board("an386", hub.address, 9, clock)
+    (qemu,) = children(process.child.pid, QEMU)
+    clock.sleep(1.0)
+    os.kill(qemu, signal.SIGKILL)
+    assert clock.await_end(process.name, process.child) == 1
+    assert "the emulated board is gone" in process.text()
+    process.end()
 
 
 def test_no_bus_is_said(tmp_path: Path) -> None:
-    words = [sys.executable, str(EMULATE), "an386", "--bus", "vcan77"]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=30, check=False)
+    words = [sys.executable, str(EMULATE), "an386", "--bus", str(tmp_path / "bus")]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 4
-    assert "no interface vcan77" in done.stderr
+    assert "start one there with hodograph-hub" in done.stderr

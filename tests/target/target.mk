@@ -10,7 +10,7 @@ TARGET_HOST_BINS := $(TARGET_HOSTS:%=$(BUILD)/target/setpoints-%)
 
 define TARGET_HOST_RULE # compiler, level
 $(call NOTE,$(BUILD)/target/$(1)-$(2).flags,$(1) $(2) $(COMMON) $(TARGET_HOST_SRC))
-$(BUILD)/target/setpoints-$(1)-$(2): $(TARGET_HOST_SRC) $(wildcard tests/target/*.h) $(OWN_H) $(BUILD)/target/$(1)-$(2).flags | $(STAMPS)/packages $(if $(filter clang,$(1)),$(STAMPS)/packages-lint)
+$(BUILD)/target/setpoints-$(1)-$(2): $(TARGET_HOST_SRC) $(wildcard tests/target/*.h) $(OWN_H) $(BUILD)/target/$(1)-$(2).flags | $(READY)/packages $(if $(filter clang,$(1)),$(READY)/packages-lint)
 	$$(call say,$(1),$$@)
 	$$(Q)$(if $(filter clang,$(1)),$(CLANG),gcc) $(COMMON) -$(2) -Dmain=target_main -c -o $$@.o tests/target/setpoints.c
 	$$(Q)$(if $(filter clang,$(1)),$(CLANG),gcc) $(COMMON) -$(2) -o $$@ $$@.o $$(filter-out %/setpoints.c,$$(filter %.c,$$^))
@@ -21,7 +21,7 @@ $(foreach c,gcc clang,$(foreach l,O0 O2,$(eval $(call TARGET_HOST_RULE,$(c),$(l)
 target-hosts: $(TARGET_HOST_BINS)
 
 # What the tests of the bits run; and the hashes they compare with, for when a kernel is meant to change its bits.
-test pytest: firmware target-hosts
+test test-all pytest: firmware target-hosts
 .PHONY: golden
 golden: build target-hosts ## write the golden hashes of tests/data/bits anew
 	@$(PY) tests/support/target_bits.py $(BUILD)

@@ -9,6 +9,8 @@
 
 static struct {
     struct port_handlers handlers;
+    struct can_match filters[PORT_FILTERS];
+    size_t filter_count;
     uint64_t now_ns;
     uint32_t period_us;
     uint32_t awaited_us;
@@ -60,6 +62,9 @@ void fake_port_tick(uint32_t late_ns)
 
 void fake_port_receive(const struct can_msg *message)
 {
+    if (!can_match_any(self.filters, self.filter_count, message)) {
+        return;
+    }
     port_lock();
     self.handlers.receive(self.handlers.self, message, port_time_us());
     port_unlock();
@@ -145,8 +150,12 @@ uint8_t port_node_id(void)
 
 int port_can_accept(const struct can_match *filters, size_t count)
 {
-    (void)filters;
-    return count <= PORT_FILTERS ? 0 : PORT_ERR_SYSTEM;
+    if (count > PORT_FILTERS) {
+        return PORT_ERR_SYSTEM;
+    }
+    memcpy(self.filters, filters, count * sizeof filters[0]);
+    self.filter_count = count;
+    return 0;
 }
 
 int port_can_send(const struct can_msg *message)

@@ -20,7 +20,7 @@ void fake_port_advance_us(uint32_t us);
 /* The oldest frame sent and not yet taken; false: none. */
 bool fake_port_take(struct can_msg *message);
 
-/* Interrupts, called as a port does. */
+/* Interrupts, called as a port does: a frame that the filters of port_can_accept do not pass is not received. */
 void fake_port_tick(uint32_t late_ns);
 void fake_port_receive(const struct can_msg *message);
 

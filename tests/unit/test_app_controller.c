@@ -60,6 +60,9 @@ static void expect_refusal(unsigned command, enum machine_refusal refusal)
 
 static void test_boot_configures_each_drive_then_starts_it(void)
 {
+    app_bench_settle(&bench);
+    TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
+    TEST_ASSERT_EQUAL_UINT32(DRIVE_LOOK_SDO_TIMEOUT_US, bench.controller.look.client.timeout_us);
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     TEST_ASSERT_EQUAL_UINT32(2, bench.starts);
     for (uint32_t i = 0; i < BENCH_DRIVES; ++i) {
@@ -269,6 +272,36 @@ static void test_a_refused_image_leaves_the_old_program(void)
     TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, app_bench_read(&bench, 0x2000, 14));
 }
 
+static void test_what_is_told_of_the_program(void)
+{
+    for (uint8_t sub = 2; sub <= 15u; ++sub) {
+        TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2000, sub));
+    }
+    load();
+    const int64_t expected[] = {
+        PROGRAM_SLOT_READY,
+        0,
+        0,
+        (int64_t)cob_get(image + 12, 4),
+        APP_IMAGE_SIZE,
+        1,
+        1,
+        APP_IMAGE_TICKS,
+        INT64_C(1) << 31,
+        INT64_C(4) << 40,
+        X_COUNTS,
+        Y_COUNTS,
+        X_COUNTS + 4000000,
+        Y_COUNTS,
+    };
+    for (size_t i = 0; i < sizeof expected / sizeof expected[0]; ++i) {
+        const int64_t found = app_bench_read(&bench, 0x2000, (uint8_t)(i + 2u));
+        TEST_ASSERT_EQUAL_INT64(expected[i], i == 3u ? found & UINT32_MAX : found);
+    }
+    bench.controller.slot.refused.index = 77;
+    TEST_ASSERT_EQUAL_INT64(77, app_bench_read(&bench, 0x2000, 4));
+}
+
 static void test_the_active_image_can_be_read_back(void)
 {
     static uint8_t back[APP_IMAGE_SIZE];
@@ -361,9 +394,17 @@ static void test_one_missed_answer_is_counted_and_tolerated(void)
 
 static void test_a_lost_heartbeat_is_a_fault(void)
 {
-    switch_on();
-    bench.drives[0].dead = true;
-    (void)app_bench_until(&bench, MACHINE_FAULT, 1200);
+    for (uint32_t i = 0; i < BENCH_DRIVES; ++i) {
+        setUp();
+        switch_on();
+        app_bench_periods(&bench,
+                          2u * DRIVE_HEARTBEAT_MS); /* monitoring begins with the first one */
+        bench.drives[i].silent_heart = true;
+        const uint32_t periods = app_bench_until(&bench, MACHINE_FAULT, 1200);
+        TEST_ASSERT_UINT32_WITHIN(DRIVE_HEARTBEAT_MS, 1000, periods);
+        TEST_ASSERT_EQUAL_HEX16(EMCY_HEARTBEAT, app_bench_read(&bench, 0x2003, 1));
+        TEST_ASSERT_EQUAL_INT(bench.drives[i].node, app_bench_read(&bench, 0x2003, 2));
+    }
 }
 
 static void test_a_drive_that_restarts_while_off_is_configured_again(void)
@@ -466,6 +507,7 @@ static void test_shutting_down_while_running_stops_on_the_path(void)
     fake_port_on_wait(tick_in_wait, NULL);
     TEST_ASSERT_TRUE(controller_shut_down(&bench.controller));
     app_bench_settle(&bench);
+    TEST_ASSERT_LESS_THAN_INT32(X_COUNTS + 3500000, bench.drives[0].position_counts);
     TEST_ASSERT_TRUE(bench.drives[0].worst_step_counts <= 15001);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
     TEST_ASSERT_EQUAL_INT(NMT_PRE_OPERATIONAL, bench.drives[1].nmt.state);
@@ -543,6 +585,7 @@ int main(void)
     RUN_TEST(test_disable_and_stop_when_there_is_nothing_to_do);
     RUN_TEST(test_upload_while_running_changes_nothing);
     RUN_TEST(test_a_refused_image_leaves_the_old_program);
+    RUN_TEST(test_what_is_told_of_the_program);
     RUN_TEST(test_the_active_image_can_be_read_back);
     RUN_TEST(test_configuration_only_while_off_and_same_values_cost_nothing);
     RUN_TEST(test_the_period_changes_everywhere);

@@ -85,9 +85,10 @@ static void test_times_heartbeats_and_reactions(void)
     TEST_ASSERT_EQUAL_UINT16(200, values->simulation.sync_timeout);
     /* the counter of SYNC only changes while the period is 0 */
     TEST_ASSERT_EQUAL_UINT32(1, fake_drive_written(drive(0), 0x101900, &counter));
-    if (fake_drive_written(drive(0), 0x100600, &zero) == 2u) {
-        TEST_ASSERT_TRUE(zero < counter);
-    }
+    TEST_ASSERT_EQUAL_UINT32(240, drive(0)->writes[counter].value);
+    TEST_ASSERT_EQUAL_UINT32(2, fake_drive_written(drive(0), 0x100600, &zero));
+    TEST_ASSERT_EQUAL_UINT32(0, drive(0)->writes[zero].value);
+    TEST_ASSERT_TRUE(zero < counter);
     TEST_ASSERT_EQUAL_UINT32(1000, values->communication_cycle_period);
 }
 
@@ -247,6 +248,15 @@ static void test_a_drive_without_the_mode(void)
     TEST_ASSERT_EQUAL_HEX32(0x20, app_bench_read(&bench, 0x2025, 4));
 }
 
+/* The low half of 0x1000 is the profile: all 16 bits of it. */
+static void test_a_device_of_another_profile(void)
+{
+    drive(0)->values.device_type ^= 0x4000u;
+    expect_trouble(2, 0x100000, SDO_OK);
+    drive(0)->values.device_type ^= 0x4000u ^ 0x80000000u; /* the upper half is the drive's */
+    boot();
+}
+
 static void test_a_mode_that_is_not_taken(void)
 {
     drive(1)->mode_stuck = 1;
@@ -321,6 +331,7 @@ int main(void)
     RUN_TEST(test_objects_that_it_must_have);
     RUN_TEST(test_a_window_that_is_wanted_must_be_there);
     RUN_TEST(test_a_drive_without_the_mode);
+    RUN_TEST(test_a_device_of_another_profile);
     RUN_TEST(test_a_mode_that_is_not_taken);
     RUN_TEST(test_a_value_that_is_refused_is_told);
     RUN_TEST(test_a_node_that_is_given_twice_is_told);

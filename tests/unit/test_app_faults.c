@@ -96,12 +96,18 @@ static void until_phase(enum machine_fault_phase phase, uint32_t most)
     }
 }
 
-static void expect_off(void)
+/* The drives are switched off, but for the one that has a fault of its own: it stays in that. */
+static void expect_off_but(uint8_t faulty)
 {
     for (unsigned i = 0; i < BENCH_DRIVES; ++i) {
-        const enum cia402_state state = drive(i)->state.state;
-        TEST_ASSERT_TRUE(state == CIA402_SWITCH_ON_DISABLED || state == CIA402_FAULT);
+        TEST_ASSERT_EQUAL_INT(drive(i)->node == faulty ? CIA402_FAULT : CIA402_SWITCH_ON_DISABLED,
+                              drive(i)->state.state);
     }
+}
+
+static void expect_off(void)
+{
+    expect_off_but(0);
 }
 
 static void recover(void)
@@ -283,7 +289,7 @@ static void test_a_drive_in_fault_makes_a_quick_stop_of_the_others(void)
     TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, drive(0)->state.state);
     refused(COMMAND_RESET, MACHINE_MOVING);
     until_phase(MACHINE_FAULT_OFF, 10);
-    expect_off();
+    expect_off_but(3);
     recover();
 }
 
@@ -528,7 +534,7 @@ static void test_a_drive_that_faults_in_a_quick_stop(void)
     app_bench_periods(&bench, 2);
     expect_fault(EMCY_GENERIC, 2);
     until_phase(MACHINE_FAULT_OFF, 200);
-    expect_off();
+    expect_off_but(2);
 }
 
 /* --- Homing --- */
@@ -678,7 +684,9 @@ static void test_a_reset_with_one_more_axis_leads_to_boot(void)
     drive(1)->dead = true;
     (void)app_bench_until(&bench, MACHINE_FAULT, 10);
     until_phase(MACHINE_FAULT_OFF, 10);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2005, 3, 9, 1));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2004, 1, 3, 1));
+    TEST_ASSERT_EQUAL_UINT8(9, machine()->axes[2].node);
     command(COMMAND_RESET);
     (void)app_bench_until(&bench, MACHINE_BOOT, 10);
 }
@@ -697,6 +705,26 @@ static void test_each_fault_is_told(void)
     app_bench_periods(&bench, 10);
     expect_fault(EMCY_GENERIC, 3);
     TEST_ASSERT_EQUAL_INT(2, app_bench_read(&bench, 0x1003, 0));
+}
+
+/* A host that has just reset the communication learns what is wrong without asking. */
+static void test_a_fault_that_stays_is_told_after_a_reset_of_the_communication(void)
+{
+    struct can_msg reset;
+    nmt_master_command(NMT_RESET_COMMUNICATION, 1, &reset);
+    run_some(100);
+    (void)cia402_device_fault(&drive(0)->state);
+    (void)cia402_device_stopped(&drive(0)->state);
+    app_bench_periods(&bench, 2);
+    until_phase(MACHINE_FAULT_OFF, 10);
+    TEST_ASSERT_EQUAL_INT(1, app_bench_read(&bench, 0x1003, 0));
+    bench.emergency = 0;
+    fake_port_receive(&reset);
+    app_bench_periods(&bench, 2);
+    expect_fault(EMCY_GENERIC, 2);
+    TEST_ASSERT_EQUAL_INT(1, app_bench_read(&bench, 0x1003, 0));
+    TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
+    recover();
 }
 
 /* --- Heartbeats --- */
@@ -768,6 +796,7 @@ int main(void)
     RUN_TEST(test_a_reset_without_the_drive_leaves_it_to_boot);
     RUN_TEST(test_a_reset_with_one_more_axis_leads_to_boot);
     RUN_TEST(test_each_fault_is_told);
+    RUN_TEST(test_a_fault_that_stays_is_told_after_a_reset_of_the_communication);
     RUN_TEST(test_a_node_has_one_entry_in_1016);
     RUN_TEST(test_heartbeat_time_is_object_1016);
     RUN_TEST(test_an_error_that_was_cleared_is_not_the_cause_of_a_later_fault);

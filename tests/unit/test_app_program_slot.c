@@ -177,6 +177,7 @@ static void test_after_power_on_the_newest_program_is_there(void)
         power_on();
         expect_active(image);
         TEST_ASSERT_TRUE(slot.acceptable);
+        TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.prepared_for);
         TEST_ASSERT_EQUAL_INT32(x * 1000000, slot.start_counts[0]);
     }
     const unsigned bank = slot.bank;

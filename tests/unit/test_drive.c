@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "plant/drive_private.h"
+#include "rig/axis_run.h"
 #include "unity.h"
 
 enum { TICKS = 400 };
@@ -117,22 +118,67 @@ static void test_sampling_converges_to_the_continuous_loop(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 4.0, usual / fine);
 }
 
-static void test_pair_gives_the_bits_of_single_drives(void)
+/* A drive of the figures above beside one of `config`, in either order. */
+static void check_pair(void)
 {
-    struct drive a = made(), b = made(), c = a, d = b;
-    config.pdff.k_pv_nm_s_rad = 1.53;
-    TEST_ASSERT_EQUAL_INT(0, drive_init(&b, &config));
-    d = b;
+    struct drive b = made();
+    setUp();
+    struct drive a = made(), c = a, d = b, e = a, f = b;
     for (int k = 0; k < TICKS; k++) {
         const int32_t targets[2] = {target_at(k), k < 50 ? 0 : -target_at(k)};
+        const int32_t turned[2] = {targets[1], targets[0]};
         drive_period(&a, targets[0]);
         drive_period(&b, targets[1]);
         drive_period_pair(&c, &d, targets);
-        TEST_ASSERT_TRUE(a.state.motor.position_mm == c.state.motor.position_mm &&
-                         a.state.volts == c.state.volts);
-        TEST_ASSERT_TRUE(b.state.motor.position_mm == d.state.motor.position_mm &&
-                         b.state.volts == d.state.volts);
+        drive_period_pair(&f, &e, turned);
+        TEST_ASSERT_EQUAL_MEMORY(&a.state, &c.state, sizeof a.state);
+        TEST_ASSERT_EQUAL_MEMORY(&b.state, &d.state, sizeof b.state);
+        TEST_ASSERT_EQUAL_MEMORY(&a.state, &e.state, sizeof a.state);
+        TEST_ASSERT_EQUAL_MEMORY(&b.state, &f.state, sizeof b.state);
     }
+}
+
+static void test_pair_gives_the_bits_of_single_drives(void)
+{
+    config.pdff.k_pv_nm_s_rad = 1.53;
+    check_pair();
+    config.loop_rate_hz = 8000;
+    check_pair();
+    config.delay_samples = 1;
+    check_pair();
+    config.interpolation = DRIVE_CUBIC;
+    check_pair();
+}
+
+/* The run of one axis is that of a drive by itself, and an axis with friction lags behind it. */
+static void test_an_axis_run_is_that_of_the_drive(void)
+{
+    static int32_t targets[TICKS], speeds[TICKS];
+    static int16_t torques[TICKS];
+    double position_mm[TICKS], volts[TICKS];
+    struct drive d = made();
+    for (int k = 0; k < TICKS; k++) {
+        targets[k] = 1000 + target_at(k);
+    }
+    struct axis_run run = {.target_counts = targets,
+                           .speed_counts_s = speeds,
+                           .torque_permille = torques,
+                           .count = TICKS,
+                           .start_counts = 1000,
+                           .rated_torque_nm = 1.0};
+    TEST_ASSERT_EQUAL_INT(0, axis_run(&config, &run, position_mm, volts));
+    drive_place(&d, 1000);
+    for (int k = 0; k < TICKS; k++) {
+        drive_period(&d, targets[k]);
+        TEST_ASSERT_TRUE(d.state.motor.position_mm == position_mm[k]);
+        TEST_ASSERT_TRUE(d.state.volts == volts[k]);
+    }
+    run.friction_volts = 0.3;
+    double slowed_mm[TICKS];
+    TEST_ASSERT_EQUAL_INT(0, axis_run(&config, &run, slowed_mm, volts));
+    TEST_ASSERT_TRUE(slowed_mm[60] < position_mm[60]);
+    config.plant.gain_rad_s_v = 0.0;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_PLANT, axis_run(&config, &run, position_mm, volts));
 }
 
 static void test_parked_drive_does_not_move(void)
@@ -347,7 +393,13 @@ static void test_bad_figures_are_refused(void)
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_GAIN, init_error());
     config.encoder_counts_per_rev = 0;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_ENCODER, init_error());
+    config.encoder_counts_per_rev = (UINT32_C(1) << 28) + 1u;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_ENCODER, init_error());
+    config.encoder_counts_per_rev = UINT32_C(1) << 28;
+    TEST_ASSERT_EQUAL_INT(0, init_error());
     config.counts_per_mm = 0;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_ENCODER, init_error());
+    config.counts_per_mm = 1000000001u;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_ENCODER, init_error());
     config.loop_rate_hz = 16001;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_RATE, init_error());
@@ -369,6 +421,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_sampling_converges_to_the_continuous_loop);
     RUN_TEST(test_pair_gives_the_bits_of_single_drives);
+    RUN_TEST(test_an_axis_run_is_that_of_the_drive);
     RUN_TEST(test_parked_drive_does_not_move);
     RUN_TEST(test_parks_after_250_periods_in_the_same_state);
     RUN_TEST(test_held_drive_starts_from_where_it_is);

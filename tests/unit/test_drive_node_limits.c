@@ -236,6 +236,40 @@ static void test_short_frames_are_told_once_until_a_good_one(void)
     drive_bench_expect_emcy(EMCY_PDO_LENGTH, EMCY_REGISTER_COMMUNICATION | EMCY_REGISTER_GENERIC);
 }
 
+/* Each PDO by itself: what was short has to be well again. */
+static void test_a_short_frame_of_another_pdo(void)
+{
+    struct can_msg brief, whole;
+    put(0x1401, 1, 0x300 + DRIVE_BENCH_ID);
+    cob_frame(&brief, COB_RPDO2 + DRIVE_BENCH_ID, 3);
+    cob_frame(&whole, COB_RPDO2 + DRIVE_BENCH_ID, 4);
+    drive_node_receive(&bench.node, &brief);
+    drive_bench_expect_emcy(EMCY_PDO_LENGTH, EMCY_REGISTER_COMMUNICATION | EMCY_REGISTER_GENERIC);
+    drive_bench_sync();
+    drive_bench_setpoint(bench.word, bench.target);
+    drive_node_process(&bench.node, 0);
+    TEST_ASSERT_NULL(drive_bench_newest(COB_EMCY));
+    drive_node_receive(&bench.node, &whole);
+    drive_bench_expect_emcy(EMCY_NO_ERROR, 0);
+}
+
+/* A mapping is changed only while its PDO is off: of all eight. */
+static void test_the_mapping_of_a_pdo_that_is_on_stays(void)
+{
+    static const uint16_t first[] = {0x1400, 0x1800};
+    for (unsigned k = 0; k < 2u; k++) {
+        for (uint16_t i = 0; i < 4u; i++) {
+            const uint16_t index = (uint16_t)(first[k] + i);
+            const uint32_t cob = (uint32_t)drive_bench_read(index, 1);
+            put(index, 1, cob & 0x7FFFFFFFu);
+            TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE,
+                                    drive_bench_write((uint16_t)(index + 0x200u), 0, 0));
+            put(index, 1, cob | 0x80000000u);
+            put((uint16_t)(index + 0x200u), 0, 0);
+        }
+    }
+}
+
 static void test_torque_that_leaves_its_object(void)
 {
     drive_bench_enable();
@@ -374,6 +408,8 @@ int main(void)
     RUN_TEST(test_software_limits);
     RUN_TEST(test_a_short_frame_is_not_processed);
     RUN_TEST(test_short_frames_are_told_once_until_a_good_one);
+    RUN_TEST(test_a_short_frame_of_another_pdo);
+    RUN_TEST(test_the_mapping_of_a_pdo_that_is_on_stays);
     RUN_TEST(test_torque_that_leaves_its_object);
     RUN_TEST(test_setpoints_that_stay_away);
     RUN_TEST(test_scaling);

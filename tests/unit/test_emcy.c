@@ -111,6 +111,22 @@ static void test_a_flood_of_one_code_does_not_push_out_another(void)
     TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
 }
 
+/* Also where that is the first of the queue, and another of its code is behind it. */
+static void test_of_a_repeated_code_the_oldest_goes(void)
+{
+    const uint8_t raised[] = {2, 3, 2, 1, 2};
+    const uint8_t sent[] = {3, 2, 1, 2};
+
+    for (size_t i = 0; i < sizeof raised; i++) {
+        emcy_producer_raise(&producer, raised[i], 0, NULL);
+    }
+    for (size_t i = 0; i < sizeof sent; i++) {
+        TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+        TEST_ASSERT_EQUAL_UINT8(sent[i], out.data[0]);
+    }
+    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
+}
+
 static void test_no_error_when_the_last_one_is_gone(void)
 {
     struct emcy got;
@@ -167,6 +183,7 @@ int main(void)
     RUN_TEST(test_messages_keep_their_order);
     RUN_TEST(test_a_full_queue_keeps_the_newest);
     RUN_TEST(test_a_flood_of_one_code_does_not_push_out_another);
+    RUN_TEST(test_of_a_repeated_code_the_oldest_goes);
     RUN_TEST(test_no_error_when_the_last_one_is_gone);
     RUN_TEST(test_decode_ignores_other_frames);
     RUN_TEST(test_texts);

@@ -1,8 +1,13 @@
 /* SPDX-License-Identifier: MIT */
+#define _POSIX_C_SOURCE 200809L /* mkstemp */
+
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "faults/fault_file.h"
+#include "faults/fault_log.h"
 #include "faults/fault_parse.h"
 #include "faults/fault_watch.h"
 #include "faults/tick_count.h"
@@ -133,6 +138,57 @@ static void test_a_file_that_is_not_there(void)
     TEST_ASSERT_EQUAL_STRING("/no/such/rules: No such file or directory", reason);
 }
 
+static void write_file(const char *path, const char *text, size_t times)
+{
+    FILE *file = fopen(path, "wb");
+    TEST_ASSERT_NOT_NULL(file);
+    for (size_t i = 0; i < times; i++) {
+        TEST_ASSERT_EQUAL_UINT(strlen(text), fwrite(text, 1, strlen(text), file));
+    }
+    TEST_ASSERT_EQUAL_INT(0, fclose(file));
+}
+
+static void test_a_file_of_rules(void)
+{
+    char path[] = "/tmp/hodograph-rules-XXXXXX";
+    const int opened = mkstemp(path);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, opened);
+    TEST_ASSERT_EQUAL_INT(0, close(opened));
+    write_file(path, "# two\ndrop at=5 id=0x182\nstop at=4 node=2\n", 1);
+    TEST_ASSERT_EQUAL_INT(0, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_UINT32(2, rules.count);
+    TEST_ASSERT_EQUAL_UINT32(3, rules.rules[1].line);
+    write_file(path, "drop at=5\n", 1);
+    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, ": line 1: drop needs id="), reason);
+    write_file(path, "# 16 characters\n", FAULT_FILE_MAX / 16u);
+    TEST_ASSERT_EQUAL_INT(0, fault_file_read(&rules, path, reason, sizeof reason));
+    write_file(path, "# 17 characters!\n", FAULT_FILE_MAX / 16u);
+    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, "longer than 16384 bytes"), reason);
+    TEST_ASSERT_EQUAL_INT(0, remove(path));
+}
+
+static void test_lines_of_the_log(void)
+{
+    static const char expected[] = "{\"t_ns\":12,\"tick\":5,\"line\":1,\"kind\":\"drop\","
+                                   "\"from\":\"drives\",\"id\":386,\"data\":\"00af10\"}\n"
+                                   "{\"t_ns\":13,\"tick\":-1,\"line\":2,\"kind\":\"stop\","
+                                   "\"node\":3,\"on\":true}\n";
+    char text[400] = "";
+    const struct can_msg frame = {.id = 386, .len = 3, .data = {0, 0xAF, 0x10, 0xFF}};
+    parse("drop at=5 id=386\nstop at=0 node=3\n");
+    const struct fault_event drop = {&rules.rules[0], 12, 5}, stop = {&rules.rules[1], 13, -1};
+    FILE *log = tmpfile();
+    TEST_ASSERT_NOT_NULL(log);
+    fault_log_frame(log, &drop, FAULT_SIDE_DRIVES, &frame);
+    fault_log_state(log, &stop, true);
+    rewind(log);
+    TEST_ASSERT_EQUAL_UINT(strlen(expected), fread(text, 1, sizeof text - 1u, log));
+    TEST_ASSERT_EQUAL_INT(0, fclose(log));
+    TEST_ASSERT_EQUAL_STRING(expected, text);
+}
+
 static void test_ticks_and_frames_of_a_rule(void)
 {
     struct fault_watch watch;
@@ -176,6 +232,25 @@ static void test_probability_is_met_and_repeats(void)
         hits += hit ? 1u : 0u;
     }
     TEST_ASSERT_UINT_WITHIN(150, 3000, hits); /* more than three deviations of 46 */
+}
+
+/* SplitMix64 of the seed, computed elsewhere: a scenario is the same on every machine and for ever. */
+static void test_which_frames_a_seed_takes(void)
+{
+    static const unsigned expected[] = {1, 5, 8, 10, 21, 26, 31, 36, 38, 39};
+    struct fault_watch watch;
+    const struct can_msg frame = {.id = 0x182};
+    unsigned hits = 0;
+    parse("drop at=0 id=0x182 for=100 p=0.25 seed=7");
+    fault_watch_init(&watch, &rules.rules[0]);
+    for (unsigned i = 0; i < 40u; i++) {
+        if (fault_watch_takes(&watch, &frame)) {
+            TEST_ASSERT_LESS_THAN_UINT(sizeof expected / sizeof expected[0], hits);
+            TEST_ASSERT_EQUAL_UINT(expected[hits], i);
+            hits++;
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(sizeof expected / sizeof expected[0], hits);
 }
 
 static bool sync(struct tick_count *count, uint8_t counter)
@@ -233,9 +308,12 @@ int main(void)
     RUN_TEST(test_what_is_wrong_is_said_with_its_line);
     RUN_TEST(test_bounds_of_text);
     RUN_TEST(test_a_file_that_is_not_there);
+    RUN_TEST(test_a_file_of_rules);
+    RUN_TEST(test_lines_of_the_log);
     RUN_TEST(test_ticks_and_frames_of_a_rule);
     RUN_TEST(test_wall_time_of_a_rule);
     RUN_TEST(test_probability_is_met_and_repeats);
+    RUN_TEST(test_which_frames_a_seed_takes);
     RUN_TEST(test_tick_0_is_the_sync_after_the_first_step);
     RUN_TEST(test_ticks_go_by_the_counter);
     return UNITY_END();

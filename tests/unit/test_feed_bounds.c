@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Bounds of feed, acceleration and jerk against values sampled in double, for every piece of golden programs. */
+#include "core/bernstein.h"
 #include "core/feed_bounds.h"
 
 #include <math.h>
@@ -147,6 +148,23 @@ static void test_the_way_of_extreme_coefficients(void)
     TEST_ASSERT_TRUE(feed_bounds_contained(&c));
 }
 
+/* A touch of the bound from below that halving never decides: refused at the greatest depth, wherever it is. */
+static void test_what_cannot_be_decided_is_refused(void)
+{
+    static const int64_t high = INT64_C(1) << 40;
+    for (int k = 0; k <= 1024; k += 31) {
+        const double at = (k + 1.0 / 3.0) / 1025.0;
+        const double powers[3] = {-at * at, 2.0 * at, -1.0}; /* -(tau - at)^2 */
+        int64_t b[5];
+        for (int i = 0; i <= 4; i++) {
+            const double value = powers[0] + powers[1] * i / 4.0 + powers[2] * i * (i - 1) / 12.0;
+            b[i] = high + (int64_t)(value * 1099511627776.0);
+        }
+        TEST_ASSERT_TRUE(bernstein_within(b, 4, -high * 4, high + (high >> 12)));
+        TEST_ASSERT_FALSE(bernstein_within(b, 4, -high * 4, high - 1000));
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -155,5 +173,6 @@ int main(void)
     RUN_TEST(test_extreme_durations);
     RUN_TEST(test_a_piece_stays_between_its_ends);
     RUN_TEST(test_the_way_of_extreme_coefficients);
+    RUN_TEST(test_what_cannot_be_decided_is_refused);
     return UNITY_END();
 }

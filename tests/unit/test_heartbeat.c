@@ -121,6 +121,21 @@ static void test_consumer_entry_of_0x1016(void)
     TEST_ASSERT_EQUAL_INT(HEARTBEAT_NOTHING, hear(5));
 }
 
+/* 0x1016: no node in two entries, whatever their times; entries without node or time do not count. */
+static void test_a_node_is_monitored_by_one_entry_only(void)
+{
+    const uint32_t entries[] = {0x000501F4, 0, 0x00060000, 0x00071388};
+
+    TEST_ASSERT_TRUE(heartbeat_entry_taken(entries, 4, 1, 0x000501F4));
+    TEST_ASSERT_TRUE(heartbeat_entry_taken(entries, 4, 1, 0x000501F5));
+    TEST_ASSERT_TRUE(heartbeat_entry_taken(entries, 4, 1, 0x0007FFFF));
+    TEST_ASSERT_FALSE(heartbeat_entry_taken(entries, 4, 0, 0x000501F5));
+    TEST_ASSERT_FALSE(heartbeat_entry_taken(entries, 4, 1, 0x000401F4));
+    TEST_ASSERT_FALSE(heartbeat_entry_taken(entries, 4, 1, 0x000601F4));
+    TEST_ASSERT_FALSE(heartbeat_entry_taken(entries, 4, 1, 0x00050000));
+    TEST_ASSERT_FALSE(heartbeat_entry_taken(entries, 3, 1, 0x00071388));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -133,5 +148,6 @@ int main(void)
     RUN_TEST(test_each_heartbeat_restarts_the_time);
     RUN_TEST(test_consumer_ignores_others);
     RUN_TEST(test_consumer_entry_of_0x1016);
+    RUN_TEST(test_a_node_is_monitored_by_one_entry_only);
     return UNITY_END();
 }

@@ -1,34 +1,25 @@
 /* SPDX-License-Identifier: MIT */
-/* A local bus: frames from each member to all others, in order; members come and go. */
+/* A local bus in real time: frames from each member to all others, in order; members come and go. */
 #define _GNU_SOURCE
-#include <stdio.h>
+#include <errno.h>
+#include <poll.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "hub/hub.h"
+#include "hub_thread.h"
 #include "port/linux/can_socket.h"
+#include "port/linux/clock.h"
 #include "unity.h"
 
-static struct hub hub;
 static struct can_socket members[3];
-static char path[64];
-static int pipe_fds[2];
-
-static void turn(void)
-{
-    TEST_ASSERT_TRUE(hub_turn(&hub, pipe_fds[0]));
-}
 
 void setUp(void)
 {
     char reason[128];
-    (void)snprintf(path, sizeof path, "/tmp/hodograph-test-hub-%ld", (long)getpid());
-    TEST_ASSERT_EQUAL(0, pipe(pipe_fds));
-    TEST_ASSERT_EQUAL(0, hub_open(&hub, path));
+    hub_thread_begin((struct hub_options){.is_virtual = false});
     for (int i = 0; i < 3; ++i) {
-        TEST_ASSERT_EQUAL_MESSAGE(0, can_socket_open(&members[i], path, reason, sizeof reason),
-                                  reason);
-        turn();
+        TEST_ASSERT_EQUAL_MESSAGE(
+            0, can_socket_open(&members[i], hub_thread_paths[0], reason, sizeof reason), reason);
     }
 }
 
@@ -37,16 +28,33 @@ void tearDown(void)
     for (int i = 0; i < 3; ++i) {
         can_socket_close(&members[i]);
     }
-    hub_close(&hub);
-    (void)unlink(path);
-    (void)close(pipe_fds[0]);
-    (void)close(pipe_fds[1]);
+    hub_thread_end();
 }
 
-static int received(struct can_socket *member, struct can_msg messages[CAN_SOCKET_BATCH])
+/* Waits until `wanted` frames have come; a negative errno when the bus has ended. */
+static int receive(struct can_socket *member, struct can_msg *messages, int wanted)
 {
+    int count = 0;
+    while (count < wanted) {
+        struct can_msg batch[CAN_SOCKET_BATCH];
+        struct pollfd wait = {.fd = member->fd, .events = POLLIN};
+        int more = 0;
+        TEST_ASSERT_EQUAL(1, poll(&wait, 1, -1));
+        const int got = can_socket_receive(member, batch, &more);
+        if (got < 0) {
+            return got;
+        }
+        memcpy(messages + count, batch, (size_t)got * sizeof batch[0]);
+        count += got;
+    }
+    return count;
+}
+
+static int waiting(struct can_socket *member)
+{
+    struct can_msg batch[CAN_SOCKET_BATCH];
     int more = 0;
-    return can_socket_receive(member, messages, &more);
+    return can_socket_receive(member, batch, &more);
 }
 
 static void test_frames_reach_all_others_in_order(void)
@@ -55,16 +63,15 @@ static void test_frames_reach_all_others_in_order(void)
                               {.id = 0x202, .len = 2, .data = {1, 2}}};
     struct can_msg got[CAN_SOCKET_BATCH];
     TEST_ASSERT_EQUAL(2, can_socket_send_many(&members[0], sent, 2));
-    turn();
     for (int i = 1; i < 3; ++i) {
-        TEST_ASSERT_EQUAL(2, received(&members[i], got));
+        TEST_ASSERT_EQUAL(2, receive(&members[i], got, 2));
         for (int k = 0; k < 2; ++k) {
             TEST_ASSERT_EQUAL(sent[k].id, got[k].id);
             TEST_ASSERT_EQUAL(sent[k].len, got[k].len);
             TEST_ASSERT_EQUAL_MEMORY(sent[k].data, got[k].data, CAN_DATA_MAX);
         }
     }
-    TEST_ASSERT_EQUAL(0, received(&members[0], got));
+    TEST_ASSERT_EQUAL(0, waiting(&members[0]));
 }
 
 static void test_filters_are_those_of_the_socket(void)
@@ -74,10 +81,11 @@ static void test_filters_are_those_of_the_socket(void)
     struct can_msg got[CAN_SOCKET_BATCH];
     TEST_ASSERT_EQUAL(0, can_socket_filter(&members[1], &only, 1));
     TEST_ASSERT_EQUAL(3, can_socket_send_many(&members[0], sent, 3));
-    turn();
-    TEST_ASSERT_EQUAL(2, received(&members[1], got));
+    TEST_ASSERT_EQUAL(3, receive(&members[2], got, 3));
+    TEST_ASSERT_EQUAL(2, receive(&members[1], got, 2));
+    TEST_ASSERT_EQUAL(0x581, got[0].id);
     TEST_ASSERT_EQUAL(0x5FF, got[1].id);
-    TEST_ASSERT_EQUAL(3, received(&members[2], got));
+    TEST_ASSERT_EQUAL(0, waiting(&members[1]));
 }
 
 static void test_one_leaves_and_the_others_go_on(void)
@@ -85,31 +93,88 @@ static void test_one_leaves_and_the_others_go_on(void)
     const struct can_msg sent = {.id = 0x123};
     struct can_msg got[CAN_SOCKET_BATCH];
     can_socket_close(&members[0]);
-    turn();
-    TEST_ASSERT_EQUAL(2, hub.count);
     TEST_ASSERT_EQUAL(0, can_socket_send(&members[2], &sent));
-    turn();
-    TEST_ASSERT_EQUAL(1, received(&members[1], got));
-    TEST_ASSERT_EQUAL(0, hub.lost);
+    TEST_ASSERT_EQUAL(1, receive(&members[1], got, 1));
+    hub_thread_end();
+    TEST_ASSERT_EQUAL(0, hub_thread_hub.lost);
+}
+
+/* One member does not read: the others miss nothing, and what it loses is counted. */
+static void test_what_a_full_member_loses_is_counted(void)
+{
+    enum { BATCHES = 1500 };
+    struct can_msg sent[CAN_SOCKET_BATCH];
+    struct can_msg got[CAN_SOCKET_BATCH];
+    uint64_t taken = 0;
+    int count = 0;
+    memset(sent, 0, sizeof sent);
+    for (int i = 0; i < BATCHES; ++i) {
+        TEST_ASSERT_EQUAL(CAN_SOCKET_BATCH,
+                          can_socket_send_many(&members[0], sent, CAN_SOCKET_BATCH));
+        TEST_ASSERT_EQUAL(CAN_SOCKET_BATCH, receive(&members[2], got, CAN_SOCKET_BATCH));
+    }
+    hub_thread_end();
+    while ((count = waiting(&members[1])) > 0) {
+        taken += (uint64_t)count;
+    }
+    TEST_ASSERT_GREATER_THAN(0, hub_thread_hub.lost);
+    TEST_ASSERT_EQUAL_UINT64((uint64_t)BATCHES * CAN_SOCKET_BATCH, taken + hub_thread_hub.lost);
+}
+
+static void test_buses_are_apart(void)
+{
+    const struct can_msg sent = {.id = 0x123};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    struct can_socket other;
+    char reason[128];
+    TEST_ASSERT_EQUAL(0, can_socket_open(&other, hub_thread_paths[1], reason, sizeof reason));
+    TEST_ASSERT_EQUAL(0, can_socket_send(&members[0], &sent));
+    TEST_ASSERT_EQUAL(1, receive(&members[1], got, 1));
+    TEST_ASSERT_EQUAL(0, waiting(&other));
+    can_socket_close(&other);
 }
 
 static void test_the_end_is_noticed(void)
 {
     struct can_msg got[CAN_SOCKET_BATCH];
-    TEST_ASSERT_EQUAL(1, write(pipe_fds[1], "", 1));
-    TEST_ASSERT_FALSE(hub_turn(&hub, pipe_fds[0]));
-    hub_close(&hub);
-    TEST_ASSERT_LESS_THAN(0, received(&members[1], got));
-    (void)unlink(path);
-    TEST_ASSERT_EQUAL(0, hub_open(&hub, path)); /* for tearDown */
+    hub_thread_end();
+    TEST_ASSERT_EQUAL(-ENETDOWN, receive(&members[1], got, 1));
 }
 
 static void test_nobody_serves(void)
 {
     char reason[128];
     struct can_socket lonely;
-    TEST_ASSERT_LESS_THAN(0, can_socket_open(&lonely, "/tmp/no/such/bus", reason, sizeof reason));
+    TEST_ASSERT_EQUAL(-ENOENT, can_socket_open(&lonely, "/tmp/no/such/bus", reason, sizeof reason));
     TEST_ASSERT_NOT_NULL(strstr(reason, "hodograph-hub"));
+}
+
+static void test_the_path_is_taken(void)
+{
+    static struct hub second;
+    const char *paths[2] = {"/tmp/hodograph-test-hub-free", hub_thread_paths[0]};
+    size_t failed = 0;
+    TEST_ASSERT_EQUAL(-EADDRINUSE, hub_open(&second, paths, 2, (struct hub_options){0}, &failed));
+    TEST_ASSERT_EQUAL_size_t(1, failed);
+    paths[1] = "/tmp/no/such/folder/bus";
+    hub_close(&second);
+    (void)unlink(paths[0]);
+    TEST_ASSERT_EQUAL(-ENOENT, hub_open(&second, paths, 2, (struct hub_options){0}, &failed));
+    hub_close(&second);
+    (void)unlink(paths[0]);
+}
+
+static void test_real_time_is_the_clock_of_the_system(void)
+{
+    TEST_ASSERT_EQUAL(0, clock_join(hub_thread_paths[0], "test"));
+    TEST_ASSERT_FALSE(clock_is_virtual());
+    TEST_ASSERT_EQUAL_UINT32(0, clock_participant());
+    TEST_ASSERT_EQUAL(0, clock_join("vcan0", "test")); /* a network interface has no virtual time */
+    TEST_ASSERT_FALSE(clock_is_virtual());
+    TEST_ASSERT_EQUAL(-ENOENT, clock_join("/tmp/no/such/bus", "test"));
+    const uint64_t before_ns = clock_ns();
+    TEST_ASSERT_EQUAL(0, clock_poll(NULL, 0, 0, 2000000));
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(before_ns + 2000000u, clock_ns());
 }
 
 int main(void)
@@ -118,7 +183,11 @@ int main(void)
     RUN_TEST(test_frames_reach_all_others_in_order);
     RUN_TEST(test_filters_are_those_of_the_socket);
     RUN_TEST(test_one_leaves_and_the_others_go_on);
+    RUN_TEST(test_what_a_full_member_loses_is_counted);
+    RUN_TEST(test_buses_are_apart);
     RUN_TEST(test_the_end_is_noticed);
     RUN_TEST(test_nobody_serves);
+    RUN_TEST(test_the_path_is_taken);
+    RUN_TEST(test_real_time_is_the_clock_of_the_system);
     return UNITY_END();
 }

@@ -90,6 +90,47 @@ static void test_a_rule_acts_on_its_drive_for_its_ticks(void)
     TEST_ASSERT_EQUAL_UINT(1, ended);
 }
 
+/* Each reaches its drive with its value, and what has an end is as before. */
+static void test_every_kind_of_rule(void)
+{
+    const struct drive_node *node = &nodes[1];
+    begin("load at=1 for=2 node=3 volts=-0.5\n"
+          "limit-switch at=1 for=2 node=3 side=positive\n"
+          "limit-switch at=2 for=1 node=3 side=negative\n"
+          "encoder-freeze at=1 for=2 node=3\n"
+          "encoder-jump at=1 for=2 node=3 counts=-40\n"
+          "heartbeat-stop at=1 for=2 node=3\n"
+          "encoder-fault at=1 for=2 node=3\n");
+    frame(0x080, 11, 0);
+    TEST_ASSERT_TRUE(node->axis.influence.load_volts == -0.5);
+    TEST_ASSERT_EQUAL_HEX32(EQUIPMENT_INPUT_POSITIVE, node->forced_inputs);
+    TEST_ASSERT_TRUE(node->axis.influence.encoder_frozen);
+    TEST_ASSERT_TRUE(node->jump_mm == -40 * node->axis.drive.mm_per_count);
+    TEST_ASSERT_TRUE(node->no_heartbeat);
+    TEST_ASSERT_TRUE(node->encoder_failed);
+    frame(0x080, 12, 0);
+    TEST_ASSERT_EQUAL_HEX32(EQUIPMENT_INPUT_POSITIVE | EQUIPMENT_INPUT_NEGATIVE,
+                            node->forced_inputs);
+    frame(0x080, 13, 0);
+    TEST_ASSERT_TRUE(node->axis.influence.load_volts == 0.0);
+    TEST_ASSERT_EQUAL_HEX32(0, node->forced_inputs);
+    TEST_ASSERT_FALSE(node->axis.influence.encoder_frozen);
+    TEST_ASSERT_TRUE(node->jump_mm == 0.0);
+    TEST_ASSERT_TRUE(node->axis.influence.encoder_offset_mm == 0.0);
+    TEST_ASSERT_FALSE(node->no_heartbeat);
+    TEST_ASSERT_FALSE(node->encoder_failed);
+    TEST_ASSERT_EQUAL_UINT(7, begun);
+    TEST_ASSERT_EQUAL_UINT(7, ended);
+}
+
+static void test_a_rule_that_has_no_end(void)
+{
+    begin("fault at=1 node=2 code=0x7305\n");
+    frame(0x080, 11, 0);
+    TEST_ASSERT_EQUAL_HEX16(0x7305, nodes[0].values.error_code);
+    TEST_ASSERT_EQUAL_HEX16(0, nodes[1].values.error_code);
+}
+
 static void test_ms_end_without_frames(void)
 {
     begin("stop at=0 for_ms=50 node=2");
@@ -112,6 +153,8 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_a_rule_acts_on_its_drive_for_its_ticks);
+    RUN_TEST(test_every_kind_of_rule);
+    RUN_TEST(test_a_rule_that_has_no_end);
     RUN_TEST(test_ms_end_without_frames);
     RUN_TEST(test_a_rule_about_another_process);
     return UNITY_END();

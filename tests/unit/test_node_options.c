@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "node/node_options.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -88,6 +89,40 @@ static void test_equipment(void)
     TEST_ASSERT_EQUAL_HEX32(0, equipment_inputs(b, 3.0));
 }
 
+static void test_equipment_that_cannot_be(void)
+{
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_OK,
+                          parse("node=2," FIGURES ",overload_s=0,friction_volts=0", NULL));
+    const struct equipment good = options.axes[0].equipment;
+    TEST_ASSERT_TRUE(equipment_ok(&good));
+    struct equipment bad[6];
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        bad[i] = good;
+    }
+    bad[0].limit_positive_mm = bad[0].limit_negative_mm;
+    bad[1].rated_torque_nm = 0.0;
+    bad[2].rated_current_a = 0.0;
+    bad[3].overload_s = -1e-9;
+    bad[4].friction_volts = -1e-9;
+    bad[5].brake_volts = 0.0;
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        TEST_ASSERT_FALSE(equipment_ok(&bad[i]));
+    }
+}
+
+/* Whatever failed before, and whatever digit they begin with. */
+static void test_whole_numbers(void)
+{
+    refused("node=2," FIGURES ",serial=99999999999999999999999", "'serial=");
+    for (unsigned digit = 0; digit <= 9u; digit++) {
+        char text[300];
+        (void)snprintf(text, sizeof text, "node=2," FIGURES ",serial=%u7", digit);
+        errno = ERANGE;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(NODE_OPTIONS_OK, parse(text, NULL), reason);
+        TEST_ASSERT_EQUAL_UINT32(10u * digit + 7u, options.axes[0].equipment.serial);
+    }
+}
+
 static void test_faults_are_named(void)
 {
     refused("node=2", "'gain_rad_s_v'");
@@ -144,6 +179,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_two_axes_with_defaults_and_without);
     RUN_TEST(test_equipment);
+    RUN_TEST(test_equipment_that_cannot_be);
+    RUN_TEST(test_whole_numbers);
     RUN_TEST(test_faults_are_named);
     RUN_TEST(test_a_node_may_appear_once);
     RUN_TEST(test_options_themselves);

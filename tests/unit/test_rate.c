@@ -178,6 +178,20 @@ static void test_root_above(void)
     TEST_ASSERT_TRUE(qmath_root_above(1u << 30) >= 32768);
 }
 
+/* Next to each square is where the estimate of the lower half is one too large. */
+static void test_root_beside_squares(void)
+{
+    for (uint64_t upper = 0x8000u; upper <= 0xFFFFu; upper++) {
+        const uint64_t lower[] = {0, 1, 0x7FFFu, 0xFFFDu, 0xFFFEu, 0xFFFFu};
+        for (size_t i = 0; i < sizeof lower / sizeof lower[0]; i++) {
+            const uint64_t root = upper << 16 | lower[i];
+            TEST_ASSERT_EQUAL_UINT64(root, qmath_root(root * root));
+            TEST_ASSERT_EQUAL_UINT64(root, qmath_root(root * root + 2u * root));
+            TEST_ASSERT_EQUAL_UINT64(root - 1u, qmath_root(root * root - 1u));
+        }
+    }
+}
+
 static void test_root(void)
 {
     TEST_ASSERT_EQUAL_UINT64(0, qmath_root(0));
@@ -198,5 +212,6 @@ int main(void)
     RUN_TEST(test_bounds_at_the_ends_of_the_format);
     RUN_TEST(test_root_above);
     RUN_TEST(test_root);
+    RUN_TEST(test_root_beside_squares);
     return UNITY_END();
 }

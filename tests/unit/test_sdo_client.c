@@ -147,15 +147,20 @@ static void test_ignores_late_and_foreign_frames(void)
 {
     const uint8_t about_another[8] = {0x43, 0x04, 0x20, 0x00, 1};
     const uint8_t abort_of_another[8] = {0x80, 0x04, 0x20, 0x00, 0, 0, 4, 5};
+    const uint8_t abort_of_0x6000[8] = {0x80, 0x00, 0x60, 0x00, 0, 0, 4, 5};
+    const uint8_t abort_of_none[8] = {0x80, 0x00, 0x00, 0x00, 0, 0, 4, 5};
     struct can_msg foreign;
 
     sdo_client_read_number(&client, TALK_NODE, 0x2003, 0, &frame);
     TEST_ASSERT_EQUAL_INT(0, hear(about_another));
     TEST_ASSERT_EQUAL_INT(0, hear(abort_of_another));
+    TEST_ASSERT_EQUAL_INT(0, hear(abort_of_0x6000));
     cob_frame(&foreign, COB_SDO_ANSWER + TALK_NODE + 1, 8);
     foreign.data[0] = 0x80;
     TEST_ASSERT_EQUAL_INT(0, sdo_client_receive(&client, &foreign, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
+    TEST_ASSERT_EQUAL_INT(0, hear(abort_of_none)); /* of a server that does not know the object */
+    TEST_ASSERT_EQUAL_INT(SDO_CLIENT_REFUSED, client.status);
 }
 
 static void test_wrong_answers_end_the_transfer(void)

@@ -135,6 +135,19 @@ static void test_unknown_commands(void)
     }
 }
 
+/* A segment that belongs to no transfer is refused without naming the object of the one before. */
+static void test_a_stray_segment_names_no_object(void)
+{
+    const uint8_t expected[8] = {0x80, 0, 0, 0, 0x01, 0x00, 0x04, 0x05};
+
+    sdo_talk_ask(&talk, 0x40, 0x2004, 3, 0);
+    sdo_talk_ask(&talk, 0x60, 0, 0, 0);
+    sdo_talk_ask(&talk, 0x70, 0, 0, 0);
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
+    sdo_talk_ask(&talk, 0x60, 0, 0, 0);
+    expect_frame(expected);
+}
+
 static void test_ignores_what_is_not_for_it(void)
 {
     struct can_msg in;
@@ -353,6 +366,7 @@ int main(void)
     RUN_TEST(test_hooks_can_refuse);
     RUN_TEST(test_a_domain_without_hooks_is_out_of_reach);
     RUN_TEST(test_unknown_commands);
+    RUN_TEST(test_a_stray_segment_names_no_object);
     RUN_TEST(test_ignores_what_is_not_for_it);
     RUN_TEST(test_segmented_upload_of_a_string);
     RUN_TEST(test_segmented_upload_of_an_empty_string);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""prove.py [--build DIR] [--jobs N] [--no-mutants] [--contracts] [NAME...]: runs the proofs of tests/proofs.
+"""prove.py [OPTION...] [NAME...]: runs the proofs of tests/proofs, or those named; --help has the options.
 
 A proof is a C file with a first comment that says, line by line, `prover: eva` or `prover: cbmc`, the functions whose
 contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), those that it `shows:`, more `options:`, what stands
@@ -10,6 +10,10 @@ then in each mutant, a copy of the firmware with that mistake, the prover must f
 nothing. What one proof takes for granted another has to show, or argued.txt has it, with the argument and a test;
 --contracts prints that table and runs nothing. The last line is `N passed, N failed`, mutants counted too. Exit status
 1 unless all is as it should be.
+
+A run that ended as it should is kept in the cache (testing/cache.py) under the hash of the proof, the files that it
+includes after its changes, the provers, their options and this program; as long as these are the same it is taken from
+there. --no-stamps runs everything.
 """
 
 from __future__ import annotations
@@ -28,9 +32,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from testing.cache import Stamps, content, digest, tree  # noqa: E402
+
 PROOFS = ROOT / "tests" / "proofs"
 LIMIT_S = 120  # of processor time, for one run of a prover
-PATIENCE = 10  # times that, of wall time: machines may be busy
+PATIENCE = (
+    40  # times that, of wall time: only what waits for nothing gets there, however busy the machine
+)
 MACHDEP = {64: "gcc_x86_64", 32: "gcc_x86_32"}  # Eva's machines by bits of a pointer
 PICOLIBC = "/usr/lib/picolibc/arm-none-eabi/picolibc.specs"  # what the firmware is built with
 PLAIN = (
@@ -206,6 +216,65 @@ class Run:
     bits: int
     mutant: int | None = None
 
+    @property
+    def changes(self) -> list[tuple[str, str, str]]:
+        """What is changed in the copy of the firmware."""
+        proof = self.proof
+        return (
+            proof.instead if self.mutant is None else [*proof.instead, proof.mutants[self.mutant]]
+        )
+
+    @property
+    def work(self) -> Path:
+        """Folder of its own, below that of the proofs."""
+        folder = Path(str(self.bits), self.proof.name)
+        return folder if self.mutant is None else folder / str(self.mutant)
+
+
+def included(proof: Proof, firmware: Path) -> list[Path]:
+    """What the compiler includes for a proof, by its own word: as each of the two provers names itself."""
+    files: set[Path] = set()
+    for names_itself in ("-D__FRAMAC__", "-U__FRAMAC__"):
+        command = ["gcc", "-MM", "-MG", names_itself, f"-I{firmware}", f"-I{PROOFS}"]
+        done = subprocess.run(
+            [*command, str(PROOFS / f"{proof.name}.c")], capture_output=True, text=True, check=False
+        )
+        if done.returncode != 0:
+            raise BadProof(f"{proof.name}: its includes cannot be found: {done.stderr[-500:]}")
+        words = done.stdout.replace("\\\n", " ").split()[1:]
+        files |= {Path(word) for word in words}
+    return sorted(files)
+
+
+def provers_digest(build: Path) -> str:
+    """Of the provers themselves, the compilers that read headers for them, and this program."""
+    versions = [
+        subprocess.run([name, "--version"], capture_output=True, text=True, check=False).stdout
+        for name in ("gcc", "arm-none-eabi-gcc")
+    ]
+    root = build / "provers" / "root"
+    headers = tree(Path(PICOLIBC).parent / "include")
+    return digest([tree(root), libraries(root), headers, content(Path(__file__)), *versions])
+
+
+def libraries(root: Path) -> str:
+    """Of the shared libraries that the provers bring along."""
+    found = sorted(path for path in root.rglob("*.so*") if path.is_file())
+    return digest(word for path in found for word in (path.name, content(path)))
+
+
+def key_of(run_: Run, firmware: Path, provers: str) -> str:
+    """Of all that the verdict of a run depends on."""
+    proof = run_.proof
+    words = [provers, proof.prover, str(run_.bits), str(run_.mutant), *EVA, *PLAIN, str(LIMIT_S)]
+    words += [*proof.assumes, "|", *proof.replaces, "|", *proof.options]
+    for path in included(proof, firmware):
+        name = path.relative_to(firmware) if path.is_relative_to(firmware) else path.name
+        words += [str(name), content(path)]
+    changed = {file for file, _, _ in run_.changes}
+    words += [word for file in sorted(changed) for word in (file, content(firmware / file))]
+    return digest(words)
+
 
 def _report(run_: Run, what: str, good: bool, verdict: Verdict, said: str) -> dict[str, object]:
     proof = run_.proof
@@ -225,20 +294,38 @@ def _report(run_: Run, what: str, good: bool, verdict: Verdict, said: str) -> di
     }
 
 
-def check(run_: Run, build: Path) -> dict[str, object]:
-    """The proof, or one of its mutants; as an entry of the JSON."""
-    proof, bits = run_.proof, run_.bits
-    bin_, work = build / "provers" / "bin", build / "proofs" / str(bits) / proof.name
-    if run_.mutant is None:
-        verdict = run(proof, make_copy(proof.instead, work), bin_, work, bits)
-        good = verdict.proven
-        return _report(run_, "", good, verdict, "proven" if good else "NOT")
-    change = proof.mutants[run_.mutant]
-    work = work / str(run_.mutant)
-    verdict = run(proof, make_copy([*proof.instead, change], work), bin_, work, bits)
-    good = verdict.doubt
-    what = f"mutant: {change[1]} => {change[2]}"
-    return _report(run_, what, good, verdict, "found" if good else "MISSED")
+@dataclass
+class Prover:
+    """Runs proofs, or takes what they gave from the stamps."""
+
+    build: Path
+    stamps: Stamps
+    provers: str  # provers_digest()
+
+    def check(self, run_: Run) -> dict[str, object]:
+        """The proof, or one of its mutants; as an entry of the JSON."""
+        work = self.build / "proofs" / run_.work
+        firmware = make_copy(run_.changes, work)
+        key = key_of(run_, firmware, self.provers)
+        kept = self.stamps.read(key)
+        if kept is not None:
+            return {**kept, "stamp": True}
+        entry = self._prove(run_, firmware, work)
+        if entry["good"] and key_of(run_, firmware, self.provers) == key:
+            self.stamps.write(key, entry)
+        return {**entry, "stamp": False}
+
+    def _prove(self, run_: Run, firmware: Path, work: Path) -> dict[str, object]:
+        proof = run_.proof
+        verdict = run(proof, firmware, self.build / "provers" / "bin", work, run_.bits)
+        if run_.mutant is None:
+            good = verdict.proven
+            return _report(run_, "", good, verdict, "proven" if good else "NOT")
+        _, old, new = proof.mutants[run_.mutant]
+        good = verdict.doubt
+        return _report(
+            run_, f"mutant: {old} => {new}", good, verdict, "found" if good else "MISSED"
+        )
 
 
 def read_argued() -> dict[str, str]:
@@ -274,6 +361,7 @@ def main() -> int:
     parser.add_argument("--build", type=Path, default=ROOT / "build")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--no-mutants", action="store_true", help="only the proofs themselves")
+    parser.add_argument("--no-stamps", action="store_true", help="prove everything now")
     parser.add_argument("--contracts", action="store_true", help="what each takes for granted")
     options = parser.parse_args()
     build = options.build.resolve()
@@ -288,15 +376,22 @@ def main() -> int:
         runs = [Run(proof, bits) for proof in proofs for bits in MACHDEP]
         if not options.no_mutants:
             runs += [Run(proof, 64, i) for proof in proofs for i in range(len(proof.mutants))]
+        stamps = Stamps("proofs", used=not options.no_stamps)
+        prover = Prover(build, stamps, provers_digest(build))
         with ThreadPoolExecutor(options.jobs) as pool:
-            entries = list(pool.map(lambda one: check(one, build), runs))
+            entries = list(pool.map(prover.check, runs))
+        stamps.prune()
     except BadProof as error:
         print(f"prove.py: {error}", file=sys.stderr)
         return 1
     (build / "proofs.json").write_text(json.dumps(entries, indent=1) + "\n")
     bad = sum(not entry["good"] for entry in entries)
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(f"proofs: {len(proofs)}, {cpu.ru_utime + cpu.ru_stime:.0f} s of processor time")
+    taken = sum(bool(entry["stamp"]) for entry in entries)
+    print(
+        f"proofs: {len(proofs)} files, {len(entries) - taken} runs of a prover now, {taken} taken from stamps, "
+        f"{cpu.ru_utime + cpu.ru_stime:.0f} s of processor time"
+    )
     print(f"{len(entries) - bad} passed, {bad} failed")
     return 1 if bad or not entries else 0
 

@@ -11,9 +11,9 @@ $(COUNT_PLUGIN): tools/target/count_plugin.c
 .PHONY: counter
 counter: firmware $(COUNT_PLUGIN)
 
-test pytest bench: counter
+test test-all pytest bench: counter
 
 UPDATE ?=
 .PHONY: count
 count: counter $(VENV)/.editable native ## instructions of the tick on all cores, compared with tests/data/counts.json (UPDATE=1 rewrites it)
-	@$(PY) tools/count.py --build $(BUILD) $(if $(UPDATE),--update)
+	@$(PY) tools/count.py --build $(BUILD) $(stamps_option) $(if $(UPDATE),--update)

@@ -36,6 +36,11 @@ def stored(points_mm: npt.NDArray[np.complex128]) -> bytes:
     return struct.pack("<2f", len(points), FEED_MM_S * PERIOD_S) + points.tobytes() + bytes(512)
 
 
+def polygon() -> bytes:
+    """The alpha's, as the image takes it."""
+    return stored(load_path_file(ALPHA).path.points)
+
+
 def ripple(setpoints: Setpoints) -> float:
     """Greatest |chord feed - feed| / feed, three digits of it."""
     chords_mm = np.hypot(*np.diff(setpoints.astype(float), axis=0).T) * 1e-6
@@ -45,14 +50,13 @@ def ripple(setpoints: Setpoints) -> float:
 
 def compare(build: Path) -> dict[str, Any]:
     """For each core: figures of the other's tick and of ours, and both ripples."""
-    polygon = stored(load_path_file(ALPHA).path.points)
     program = EXAMPLES["alpha"].read_bytes()
     out: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         setpoints = Path(name) / "setpoints"
         for core, kernel in CORES:
             other = Counter(build, TARGETS[core], "taylor")
-            theirs = figures(other.count_words([str(setpoints)], polygon))
+            theirs = figures(other.count_words([str(setpoints)], polygon()))
             # the last step ends at the end of the curve, and is shorter
             theirs["ripple"] = ripple(_read(setpoints)[:-1])
             counter = Counter(build, TARGETS[core])

@@ -81,5 +81,10 @@ def test_a_listener_measures_from_one_question_to_the_next() -> None:
     assert found is not None
     assert found.seconds <= LONGEST_S + 0.1
     assert found.frames_per_s == pytest.approx(1000)
-    listener.feed(frames, 3.0)  # a recording begins anew
+    listener.feed(frames, 21.0)
+    listener.feed(frames, 3.0)  # a recording begins anew: what was heard before does not count
     assert listener.measure() is None
+    listener.feed(frames, 3.1)
+    found = listener.measure()
+    assert found is not None
+    assert found.frames_per_s == pytest.approx(1000)

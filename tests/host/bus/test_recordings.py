@@ -225,8 +225,8 @@ def test_a_name_without_format_and_a_file_that_is_not_there(tmp_path: Path) -> N
         write_recording(tmp_path / "bus.log", frame(0x80, time_us=-1))
 
 
-def test_many_frames_take_seconds(tmp_path: Path) -> None:
-    """300,000 frames within a tenth of what python-can would take; 10^6 took 0.7 s when this was written."""
+def test_many_frames_take_little_time(tmp_path: Path) -> None:
+    """300,000 frames in less processor time than python-can takes to read half of them (measured on a tenth)."""
     rng = np.random.default_rng(5)
     count = 300_000
     frames = np.zeros(count, dtype=RECORD_DTYPE)
@@ -234,7 +234,11 @@ def test_many_frames_take_seconds(tmp_path: Path) -> None:
     frames["length"] = rng.choice([1, 6, 6, 2], count)
     frames["data"] = rng.integers(0, 256, (count, 8)) * (np.arange(8) < frames["length"][:, None])
     frames["time_us"] = START_US + np.cumsum(rng.integers(0, 400, count))
-    begun = time.monotonic()
+    write_recording(tmp_path / "part.log", frames[: count // 10])
+    begun = time.process_time()
+    assert len(list(can.CanutilsLogReader(tmp_path / "part.log"))) == count // 10
+    allowed_s = 5.0 * (time.process_time() - begun)
+    begun = time.process_time()
     write_recording(tmp_path / "bus.log", frames)
     assert np.array_equal(read_recording(tmp_path / "bus.log"), frames)
-    assert time.monotonic() - begun < 6.0
+    assert time.process_time() - begun < allowed_s

@@ -4,10 +4,9 @@
 import os
 import queue
 import struct
-import threading
-import time
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 import pytest
 from canopen.sdo.exceptions import SdoCommunicationError
@@ -19,6 +18,32 @@ from hodograph.bus.sdo.turns import Turns
 from hodograph.errors import BusError
 
 BUS = BusAddress("virtual", f"turns-{os.getpid()}")
+MOST_RETRY_S = 0.002
+
+
+class SteppedClock:
+    """Time passes while somebody sleeps, and not otherwise; `meanwhile` is called then."""
+
+    is_virtual = True
+
+    def __init__(self) -> None:
+        self._now_s = 0.0
+        self.meanwhile: Callable[[], None] = lambda: None
+
+    def now_s(self) -> float:
+        return self._now_s
+
+    def stamp_ns(self) -> int:
+        return round(1e9 * self._now_s)
+
+    def sleep(self, seconds: float) -> None:
+        self._now_s += seconds
+        self.meanwhile()
+
+
+@pytest.fixture
+def clock() -> SteppedClock:
+    return SteppedClock()
 
 
 @pytest.fixture
@@ -28,39 +53,33 @@ def other() -> Iterator[Turns]:
     turns.close()
 
 
-def test_a_turn_that_never_comes_is_a_bus_error(other: Turns) -> None:
-    mine = Turns(BUS, 1)
-    begun = time.monotonic()
+def test_a_turn_that_never_comes_is_a_bus_error(other: Turns, clock: SteppedClock) -> None:
+    mine = Turns(BUS, 1, clock)
     with (
         other.turn(),
         pytest.raises(BusError, match=rf"another hodograph command is using node 1 on {BUS}: "),
         mine.turn(0.1),
     ):
-        pass
-    assert 0.1 <= time.monotonic() - begun < 3.0
+        raise AssertionError("the turn came while another had it")
+    assert 0.1 <= clock.now_s() <= 0.1 + MOST_RETRY_S
     with mine.turn():
         pass
     mine.close()
 
 
-def test_a_turn_is_waited_for(other: Turns) -> None:
-    mine = Turns(BUS, 1)
-    held = threading.Event()
+def test_a_turn_is_waited_for_and_no_longer(other: Turns, clock: SteppedClock) -> None:
+    mine = Turns(BUS, 1, clock)
+    others = ExitStack()
+    others.enter_context(other.turn())
 
-    def hold() -> None:
-        with other.turn():
-            held.set()
-            time.sleep(0.2)
+    def give_back() -> None:
+        if clock.now_s() >= 0.2:
+            others.close()
 
-    thread = threading.Thread(target=hold)
-    thread.start()
-    assert held.wait(10.0)
-    begun = time.monotonic()
-    with mine.turn():
-        waited_s = time.monotonic() - begun
-    thread.join()
+    clock.meanwhile = give_back
+    with mine.turn(30.0):
+        assert 0.2 <= clock.now_s() <= 0.2 + MOST_RETRY_S
     mine.close()
-    assert waited_s > 0.05
 
 
 def test_turns_of_another_node_are_free(other: Turns) -> None:
@@ -70,25 +89,27 @@ def test_turns_of_another_node_are_free(other: Turns) -> None:
     mine.close()
 
 
-def test_whoever_asks_again_and_again_lets_others_in(other: Turns) -> None:
-    done = threading.Event()
+def test_whoever_asks_again_at_once_comes_behind_who_waits(
+    other: Turns, clock: SteppedClock
+) -> None:
+    """The other gives its turn back and asks for the next one while we wait: ours is before it."""
+    mine = Turns(BUS, 1, clock)
+    others, refused = ExitStack(), []
+    others.enter_context(other.turn())
 
     def greedy() -> None:
-        while not done.is_set():
-            with other.turn():
-                time.sleep(0.005)
+        others.close()
+        try:
+            others.enter_context(other.turn(0.0))
+        except BusError:
+            refused.append(clock.now_s())
 
-    thread = threading.Thread(target=greedy)
-    thread.start()
-    mine = Turns(BUS, 1)
-    try:
-        for _ in range(20):
-            with mine.turn(5.0):
-                pass
-    finally:
-        done.set()
-        thread.join()
-        mine.close()
+    clock.meanwhile = greedy
+    with mine.turn(5.0):
+        assert refused == [clock.now_s()], "at the first look after the other had done"
+    with other.turn(0.0):
+        pass
+    mine.close()
 
 
 def test_a_controller_that_another_command_uses(other: Turns) -> None:
@@ -105,23 +126,39 @@ class _LateSdo:
 
     RESPONSE_TIMEOUT = 0.05
 
-    def __init__(self) -> None:
-        self.responses: queue.Queue[bytes] = queue.Queue()
+    def __init__(self, clock: SteppedClock) -> None:
+        self._clock = clock
+        self._answers: list[bytes] = []
+        self.responses = self
         self.asked: list[bytes] = []
+        self.answers_at_once = False
 
     def send_request(self, request: bytearray) -> None:
         self.asked.append(bytes(request))
+        if self.answers_at_once:
+            self.answer(self.asked[-1])
 
     def answer(self, request: bytes) -> None:
-        self.responses.put(b"\x80" + request[1:4] + struct.pack("<L", 0x06020000))
+        self.put(b"\x80" + request[1:4] + struct.pack("<L", 0x06020000))
+
+    def put(self, answer: bytes) -> None:
+        self._answers.append(answer)
+
+    def empty(self) -> bool:
+        return not self._answers
+
+    def get(self, timeout: float) -> bytes:
+        if not self._answers:
+            self._clock.sleep(timeout)
+            raise queue.Empty
+        return self._answers.pop(0)
 
 
 def test_an_answer_to_nobody_that_is_late_is_not_taken_for_another(
-    other: Turns, monkeypatch: pytest.MonkeyPatch
+    other: Turns, clock: SteppedClock
 ) -> None:
-    monkeypatch.setattr("hodograph.bus.sdo.node.LET_PASS_S", 0.05)
-    sdo = _LateSdo()
-    node = Node(BUS, 1, types.SimpleNamespace(sdo=sdo))
+    sdo = _LateSdo(clock)
+    node = Node(BUS, 1, types.SimpleNamespace(sdo=sdo), clock)
     with other.turn():
         pass
     with pytest.raises(BusError, match="stopped answering"), node.turn():
@@ -132,30 +169,26 @@ def test_an_answer_to_nobody_that_is_late_is_not_taken_for_another(
     assert sdo.asked[0] != sdo.asked[1]
     sdo.answer(sdo.asked[0])
     sdo.answer(sdo.asked[1])
-    answered = threading.Timer(0.02, lambda: sdo.answer(sdo.asked[-1]))
-    answered.start()
+    sdo.answers_at_once = True
     with node.turn():
-        assert sdo.responses.empty(), "whatever came before the newest answer is gone"
-    answered.join()
+        assert sdo.empty(), "whatever came before the newest answer is gone"
     with node.turn():
         assert len(sdo.asked) == 3, "and the channel is ours until somebody else has it"
     node.close()
 
 
-def test_an_answer_that_comes_too_late_is_not_taken_for_the_next() -> None:
-    sdo = _LateSdo()
-    node = Node(BUS, 4, types.SimpleNamespace(sdo=sdo))
+def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(clock: SteppedClock) -> None:
+    sdo = _LateSdo(clock)
+    node = Node(BUS, 4, types.SimpleNamespace(sdo=sdo), clock)
     with node.turn():
         pass
     assert not sdo.asked, "nobody had the channel before"
     with pytest.raises(SdoCommunicationError), node.turn():
         raise SdoCommunicationError("No SDO response received")
-    sdo.responses.put(bytes.fromhex("4f02200003000000"))
-    answered = threading.Timer(0.02, lambda: sdo.answer(sdo.asked[-1]))
-    answered.start()
+    sdo.put(bytes.fromhex("4f02200003000000"))
+    sdo.answers_at_once = True
     with node.turn():
-        assert sdo.responses.empty()
-    answered.join()
+        assert sdo.empty()
     node.close()
 
 

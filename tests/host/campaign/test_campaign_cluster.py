@@ -28,8 +28,31 @@ factor_uniform = [0.8, 1.2]
 [vary.gain_rad_s_v]
 values = [60, -1]
 """
-WAIT_S = 60
+HANGS_S = 600
+LOOK_S = 0.01
 COMMAND = [sys.executable, "-m", "hodograph", "campaign"]
+KILLED = """
+import json, os, signal, sys
+from hodograph.campaign.journal import Journal
+from hodograph.cli.main import main
+
+left, cut = int(sys.argv[1]), int(sys.argv[2])
+write = Journal._write
+
+def killing(self, value):
+    global left
+    left -= 1
+    if left == 0:
+        line = json.dumps(value, separators=(",", ":")).encode() + b"\\n"
+        self._stream.write(line[:cut])
+        self._stream.flush()
+        os.kill(os.getpid(), signal.SIGKILL)
+    write(self, value)
+
+Journal._write = killing
+main(sys.argv[3:])
+"""
+"""A campaign that is killed when it has written so many bytes of the line of this number of its journal."""
 DASK = [sys.executable, "-m", "dask"]
 
 
@@ -41,32 +64,38 @@ def campaign(file: Path, folder: Path, *more: str) -> bytes:
 
 @contextmanager
 def under_way(file: Path, folder: Path, *options: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that makes the campaign (on two cores), as soon as its first batch is done."""
+    """A process that makes the campaign (on two cores), when its first batch is done."""
     child = subprocess.Popen(
         [*COMMAND, str(file), "-o", str(folder), *(options or ("--workers", "2"))],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         start_new_session=True,
     )
-    journal, limit = folder / "runs.journal", time.monotonic() + WAIT_S
-    while child.poll() is None and time.monotonic() < limit:
-        if journal.exists() and b'{"runs"' in journal.read_bytes():
-            break
-        time.sleep(0.01)
+    journal = folder / "runs.journal"
+    while not (journal.exists() and b'{"runs"' in journal.read_bytes()):
+        assert child.poll() is None, child.communicate()[1].decode()
+        time.sleep(LOOK_S)
     yield child
     child.kill()
 
 
 def test_killed_and_gone_on_with_on_two_cores(write: Write, tmp_path: Path) -> None:
-    file, folder = write(TEXT), tmp_path / "two"
-    with under_way(file, folder) as child:
-        child.kill()
-        _, told = child.communicate()
-    assert child.returncode == -signal.SIGKILL, told.decode()
-    assert not (folder / "runs.csv").exists()
-    assert campaign(file, folder, "--workers", "1") == campaign(
-        file, tmp_path / "one", "--workers", "1"
-    )
+    """In the middle of it, between two lines of its journal or within one."""
+    file = write(TEXT)
+    whole = campaign(file, tmp_path / "one", "--workers", "1")
+    for line, cut in ((3, 1000), (4, 10_000_000)):
+        folder = tmp_path / f"two-{line}"
+        words = [str(line), str(cut), "campaign", str(file), "-o", str(folder), "--workers", "2"]
+        done = subprocess.run(
+            [sys.executable, "-c", KILLED, *words],
+            start_new_session=True,
+            capture_output=True,
+            timeout=HANGS_S,
+            check=False,
+        )
+        assert done.returncode == -signal.SIGKILL, done.stderr.decode()
+        assert not (folder / "runs.csv").exists()
+        assert campaign(file, folder, "--workers", "1") == whole
 
 
 @contextmanager
@@ -80,9 +109,9 @@ def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     worker += ["--local-directory", str(folder)]
     children = [subprocess.Popen(command, **options) for command in (scheduler, worker, worker)]  # type: ignore[call-overload]
     try:
-        limit = time.monotonic() + WAIT_S
-        while not at.exists() and time.monotonic() < limit:
-            time.sleep(0.05)
+        while not at.exists():
+            assert children[0].poll() is None
+            time.sleep(LOOK_S)
         yield json.loads(at.read_text())["address"], children[-1]
     finally:
         for child in children:
@@ -98,7 +127,7 @@ def test_a_cluster_gives_the_same_table(
         far = campaign(file, tmp_path / "far", "--scheduler", address)
         with under_way(file, tmp_path / "lost", "--scheduler", address) as child:
             worker.kill()
-            _, told = child.communicate(timeout=2 * WAIT_S)
+            _, told = child.communicate(timeout=HANGS_S)
             assert child.returncode == 0, told.decode()
     assert far == campaign(file, tmp_path / "near", "--workers", "1")
     assert (tmp_path / "lost" / "runs.csv").read_bytes() == far
@@ -111,7 +140,7 @@ def test_ctrl_c_is_one_line(write: Write, tmp_path: Path) -> None:
     endless = TEXT.replace("samples = 600", "samples = 50000")
     with under_way(write(endless), tmp_path / "out") as child:
         os.killpg(child.pid, signal.SIGINT)
-        _, told = child.communicate(timeout=WAIT_S)
+        _, told = child.communicate(timeout=HANGS_S)
     assert child.returncode == 130
     assert all(line.startswith("hodograph: ") for line in told.decode().splitlines()), told.decode()
 

@@ -31,6 +31,7 @@ def test_drives_of_the_paper(name: str) -> None:
     assert (drive.gain_rad_s_v, drive.time_constant_s) == PLANT[name[-1]]
     assert (drive.k_pf_rad_mm, drive.k_vf, drive.screw_mm_rad) == (0.8, 0.85, 1.59)
     assert drive.torque_to_volts == 1 / 0.716
+    assert (drive.interpolation, drive.speed, drive.delay_samples) == ("linear", "exact", 0)
     assert drive.volts_limit == 5.0
 
 
@@ -44,7 +45,8 @@ def test_machines_of_the_paper(name: str) -> None:
     assert machine.offset_mm == 0
     assert machine.supervision == Supervision(100, 1, 200)
     for axis in machine.axes:
-        assert (axis.homing, axis.feedforward, axis.scaling) == (Homing(), Feedforward(), Scaling())
+        assert axis.homing == Homing(0, 0.0, 10.0, 1.0, 100.0)
+        assert (axis.feedforward, axis.scaling) == (Feedforward(0.0, 0.0, 0.0), Scaling(0, 0, 0, 0))
         assert (axis.following_window_mm, axis.following_timeout_ms) == (None, 0)
         assert axis.quick_stop_mm_s2 == pytest.approx(
             4294.967
@@ -92,7 +94,7 @@ MISTAKES = [
     ("counts_per_mm = 1000000", "counts_per_mm = 100000", r"counts_per_mm must be the same for all"),
     ("../drives/alpha_x.toml", "../drives/alpha_z.toml", r"drive names .*alpha_z\.toml, which is not there"),
     ("offset_mm = [0, 0]", "offset_mm = [0, inf]", r"offset_mm must be a finite number"),
-    ("[[axis]]", "[axis]", r"not valid TOML|\[\[axis\]\]"),
+    ("[[axis]]", "[axis]", r"not valid TOML: Cannot overwrite a value"),
     ("[work]", "[wrk]", r'did you mean "work"\?'),
     ("[work]", "[supervision]\nmissed_max = -1\n[work]", r"\[supervision\] missed_max must be from 0 to 255"),
     ("[work]", "[supervision]\nanswer_wait_ms = 300\n[work]", r"setpoint_timeout_ms is 200: must be above"),
@@ -156,7 +158,72 @@ def test_equipment_of_a_simulated_drive(tmp_path: Path) -> None:
     assert load_drive(EXAMPLES / "drives" / "alpha_x.toml").equipment.given() == {}
 
 
+def test_servo_of_a_simulated_drive(tmp_path: Path) -> None:
+    text = (EXAMPLES / "drives" / "alpha_x.toml").read_text()
+    file = tmp_path / "drive.toml"
+    text = text.replace("[encoder]\n", '[encoder]\nspeed = "differences"\n')
+    file.write_text(
+        text.replace("[servo]\n", '[servo]\ninterpolation = "cubic"\ndelay_samples = 1\n')
+    )
+    drive = load_drive(file)
+    assert (drive.interpolation, drive.speed, drive.delay_samples) == ("cubic", "differences", 1)
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "least", "greatest", "below", "above"),
+    [
+        ("plant", "gain_rad_s_v", 1e-3, 1e6, 0.99e-3, 1.01e6),
+        ("plant", "time_constant_s", 1e-5, 1e3, 0.99e-5, 1.01e3),
+        ("plant", "screw_mm_rad", 1e-4, 1e3, 0.99e-4, 1.01e3),
+        ("plant", "torque_to_volts", 1e-6, 1e6, 0.99e-6, 1.01e6),
+        ("plant", "volts_limit", 1e-3, 32.767, 0.99e-3, 32.768),
+        ("pdff", "k_pp_rad_s_mm", 0.0, 1e6, -1e-9, 1.01e6),
+        ("pdff", "k_pv_nm_s_rad", 0.0, 1e6, -1e-9, 1.01e6),
+        ("pdff", "k_iv_per_s", 0.0, 1e6, -1e-9, 1.01e6),
+        ("pdff", "k_pf_rad_mm", 0.0, 1e6, -1e-9, 1.01e6),
+        ("pdff", "k_vf", 0.0, 1e3, -1e-9, 1.01e3),
+        ("encoder", "counts_per_rev", 16, 2**26, 15, 2**26 + 1),
+        ("servo", "loop_rate_hz", 1000, 64000, 0, 65000),
+        ("servo", "delay_samples", 0, 1, -1, 2),
+        ("equipment", "overload_s", 0.0, 1e6, -1e-9, 1.01e6),
+        ("equipment", "friction_volts", 0.0, 1e6, -1e-9, 1.01e6),
+        ("equipment", "rated_torque_nm", 1e-9, 1e6, 0.99e-9, 1.01e6),
+    ],
+)
+def test_ranges_of_a_drive_file(
+    tmp_path: Path,
+    section: str,
+    key: str,
+    least: float,
+    greatest: float,
+    below: float,
+    above: float,
+) -> None:
+    file = tmp_path / "drive.toml"
+    lines = (EXAMPLES / "drives" / "alpha_x.toml").read_text() + "\n[equipment]\n"
+    others = re.sub(rf"(?m)^{key} =.*$", "", lines)
+
+    def given(value: float) -> float | None:
+        file.write_text(others.replace(f"[{section}]", f"[{section}]\n{key} = {value!r}"))
+        drive = load_drive(file)
+        if section == "equipment":
+            return drive.equipment.given()[key]
+        return getattr(drive, "encoder_" + key if section == "encoder" else key)
+
+    assert given(least) == least
+    assert given(greatest) == greatest
+    for wrong in (below, above):
+        with pytest.raises(InputError, match=rf"\[{section}\] {key} must be from "):
+            given(wrong)
+
+
 DRIVE_MISTAKES = [
+    ("[servo]", "[servo]\ndelay_samples = 2", r"\[servo\] delay_samples must be from 0 to 1"),
+    (
+        "[encoder]",
+        '[encoder]\nspeed = "exactly"',
+        r'speed cannot be "exactly"; did you mean "exact"',
+    ),
     (
         "[servo]",
         "[equipment]\nhome_from_mm = 1\n[servo]",
@@ -172,7 +239,7 @@ DRIVE_MISTAKES = [
     (
         "gain_rad_s_v = 83.0089",
         "gain = 83.0089",
-        r'unknown key; did you mean "gain_rad_s_v"\?|use one of',
+        r"gain: unknown key; use one of: gain_rad_s_v, time_constant_s",
     ),
     ("volts_limit = 5.0", "volts_limit = 50", r"volts_limit must be from"),
     ("counts_per_rev = 1048576", "counts_per_rev = 1.5", r"counts_per_rev must be a whole number"),

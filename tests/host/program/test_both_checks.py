@@ -17,6 +17,7 @@ from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.native.program import NativeLimits, NativeProgram
 from hodograph.program import ProgramLimits, compile_path, decode, encode
 from hodograph.program.check import check_image
+from hodograph.program.codes import ProgramError
 from hodograph.program.image import with_crc
 from hodograph.spline import from_control_polygon, line
 
@@ -65,6 +66,57 @@ def test_one_number_of_a_segment_moved(segment: int, column: int, by: int, sign:
     image = with_crc(BASE[:place] + np.array([number], "<i8").tobytes() + BASE[place + 8 :])
     python, native = verdicts(image)
     assert python == native
+
+
+SEGMENT, FIRST_SEGMENT, FIRST_PIECE, PIECE = 72, 128, 128 + 72 * decode(BASE).segment_count, 88
+START, X, Y, U0, V2 = 0, 8, 16, 24, 64
+"""Offsets within a segment: docs/protocol.md 1.2."""
+
+
+def with_number(place: int, number: int) -> bytes:
+    """The program with another 64-bit number at an offset."""
+    return with_crc(BASE[:place] + number.to_bytes(8, "little", signed=True) + BASE[place + 8 :])
+
+
+@pytest.mark.parametrize("segment", [0, 2])
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    ("offset", "limit", "code"),
+    [
+        (X, 4096 << 40, ProgramError.POINT_RANGE),
+        (Y, 4096 << 40, ProgramError.POINT_RANGE),
+        (U0, 64 << 44, ProgramError.W_RANGE),
+        (V2, 64 << 44, ProgramError.W_RANGE),
+    ],
+)
+def test_ranges_of_a_segment_end_where_the_format_says(
+    segment: int, sign: int, offset: int, limit: int, code: ProgramError
+) -> None:
+    place = FIRST_SEGMENT + SEGMENT * segment + offset
+    python, native = verdicts(with_number(place, sign * limit))
+    assert python == native == (code, segment)
+    python, native = verdicts(with_number(place, sign * (limit - 1)))
+    assert python == native
+    assert python[0] not in (0, code)
+
+
+def test_arc_lengths_are_from_0_to_2_to_the_62() -> None:
+    place = FIRST_SEGMENT + SEGMENT * 2 + START
+    for number, code in ((-1, -22), (1 << 62, -22), (0, -28), ((1 << 62) - 1, -28)):
+        python, native = verdicts(with_number(place, number))
+        assert python == native
+        assert python[0] == code, number
+
+
+@pytest.mark.parametrize("piece", [2, 5])
+def test_a_piece_that_starts_before_its_predecessor_is_named(piece: int) -> None:
+    start = decode(BASE).pieces[piece - 1].start_q40
+    place = FIRST_PIECE + PIECE * piece + 8
+    python, native = verdicts(with_number(place, start - 1))
+    assert python == native == (ProgramError.BACKWARDS, piece)
+    python, native = verdicts(with_number(place, start))
+    assert python == native
+    assert python[0] == ProgramError.JOIN_LENGTH
 
 
 @example("exponential", 19.0, 1.0, 5, 1000, 0)
@@ -120,7 +172,7 @@ def test_segments_too_short_for_any_feed_are_refused_by_both() -> None:
         compile_path(spline, plan)
     short = (PROGRAMS / "broken_segment_short.hdgp").read_bytes()
     python, native = verdicts(short)
-    assert python == native == (-32, python[1])
+    assert python == native == (-32, 15)
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in PROGRAMS.glob("broken_*.hdgp")))

@@ -25,6 +25,7 @@ from hodograph.program.check import check_image
 from hodograph.program.exact import ExactProgram
 from hodograph.program.exactmath import segment_ways
 from hodograph.program.image import with_crc
+from hodograph.program.inspection import inspect_dict
 from hodograph.spline import PHSpline, from_control_polygon, line
 
 CONTROLLER = ControllerLimits(500.0, 5000.0, 200000.0, 0.02)
@@ -114,6 +115,17 @@ def test_work_offset_moves_everything_and_travel_is_kept() -> None:
     with pytest.raises(PlanError, match=r"travel.* span 1 .* x 1.* mm \(travel 0 … 120\)"):
         compile_program(line(0, 50), plan, ProgramOptions(offset_mm=100 + 20j, limits=narrow))
     compile_program(line(0, 50), plan, ProgramOptions(offset_mm=10 + 20j, limits=narrow))
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_inspection_tells_where_a_program_begins_and_ends(closed: bool) -> None:
+    spline = wavy(9, 2, closed)
+    found = inspect_dict(compiled(spline, offset_mm=100 - 20j))
+    for key, s in (("start_mm", 0.0), ("end_mm", 0.0 if closed else spline.length_mm)):
+        assert complex(*found[key]) == pytest.approx(complex(spline.point(s)) + 100 - 20j, abs=1e-9)
+    assert found["offset_mm"] == [100.0, -20.0]
+    assert found["length_mm"] == pytest.approx(spline.length_mm, abs=1e-9)
+    assert found["peak_feed_mm_s"] == pytest.approx(100.0, rel=1e-6)
 
 
 def test_short_segments_lower_the_feed_under_respect_only() -> None:

@@ -34,6 +34,11 @@ def test_maxima_count_the_settling_time(alpha: Case) -> None:
     assert motion.max_contour_error_um == motion.contour_error_um.max()
     assert motion.max_following_error_um == pytest.approx(abs(motion.following_error_um).max())
     assert motion.max_volts == abs(motion.volts).max()
+    rms = np.sqrt(np.mean(motion.contour_error_um**2))
+    assert motion.rms_contour_error_um == pytest.approx(rms, rel=1e-12)
+    following = 1000.0 * (motion.set_mm - motion.act_mm)
+    assert motion.following_error_um == pytest.approx(following, abs=1e-6)
+    assert np.abs(motion.set_mm - motion.cmd_mm).max() <= 0.5000001e-6  # a count is a nanometre
     settled = motion.contour_error_um[-1]
     assert settled < 0.05
 

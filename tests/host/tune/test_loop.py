@@ -44,6 +44,20 @@ def test_closed_loop_is_that_of_the_simulated_drive(
     assert abs(measured - expected) < 0.02 * max(0.2, abs(expected - 1))
 
 
+def test_offsets_that_invert_the_plant_make_the_loop_follow(drives: Drives) -> None:
+    """Speed and acceleration of the command as volts: what is left is what the loop itself does too late."""
+    for drive in drives:
+        tuned, forward = feedforward_of(drive)
+        volts_m = drive.rated_torque_nm * drive.torque_to_volts / 1000
+        offsets = np.array([forward.torque_permille_s_m, forward.torque_permille_s2_m])
+        rad_s = 2 * np.pi * np.array([2.0, 10.0, 40.0])
+        loop = loop_of(tuned)
+        left = np.abs(loop.closed(rad_s, *(offsets * volts_m / 1000)) - 1)
+        without = np.abs(loop.closed(rad_s) - 1)
+        assert np.all(left < without)
+        assert left[2] < 0.4 * without[2]
+
+
 def test_steps_begin_and_end_where_they_must(drives: Drives) -> None:
     t_s, moved, pushed = loop_of(drives[0]).steps(0.2)
     assert moved[0] == pushed[0] == 0

@@ -76,6 +76,21 @@ def test_derivatives_of_the_point(seed: int) -> None:
             assert found.axis_jerk[axis][i] == pytest.approx(float(jerk), abs=1e-1)
 
 
+@pytest.mark.parametrize("parts", [1, 3])
+def test_cells_know_the_parameters_at_their_ends(parts: int) -> None:
+    cells = cut(random_program(1))
+    cells = cells.divided(np.full(len(cells), parts)) if parts > 1 else cells
+    assert len(cells) > 40
+    every = np.arange(len(cells))
+    for side in (0, 1):
+        arc = np.polynomial.polynomial.polyval(
+            cells.xi[:, side], cells.curve.arc[cells.segment].T, tensor=False
+        )
+        own = cells.arc_length_mm(every, np.full(every.size, float(side)))
+        np.testing.assert_allclose(cells.curve.start_mm[cells.segment] + arc, own, atol=1e-9)
+    assert np.all(cells.xi[:, 1] > cells.xi[:, 0])
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_second_derivatives_stay_within_their_bounds(seed: int) -> None:
     """And the bounds are of use: within a factor of fifty in the middle of all."""

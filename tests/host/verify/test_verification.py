@@ -111,6 +111,8 @@ def test_a_jump_of_the_acceleration_is_found(alpha: Program) -> None:
     found = verify_program(replace(alpha, pieces=replace(pieces, c_q40=c)), limits)
     assert not found.kept
     assert found.excesses[0].quantity == "acceleration_step_mm_s2"
+    # As a jerk over one period it may be 0.1 % of the limit.
+    assert found.excesses[0].limit == pytest.approx(60000.0 * 1e-3 * 1e-3, rel=1e-12)
 
 
 def test_the_volts_move_the_plant_along_the_path(alpha: Program) -> None:

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-import run_tests
+from testing.units import run_unit
+from testing.verdict import Count, read_junit, read_unity
 
 PASSING = "a.c:3:test_x:PASS\n\n-----------------------\n1 Tests 0 Failures 0 Ignored\nOK\n"
 
 
 def test_a_passing_binary() -> None:
-    count = run_tests.read_unity("a", PASSING, 0)
+    count = read_unity("a", PASSING, 0)
     assert (count.passed, count.skipped, count.failures) == (1, 0, [])
 
 
@@ -22,7 +23,7 @@ def test_failed_and_ignored_tests() -> None:
         "a.c:3:test_x:FAIL: Expected 1 Was 2\na.c:5:test_y:IGNORE: later\n"
         "2 Tests 1 Failures 1 Ignored\nFAIL\n"
     )
-    count = run_tests.read_unity("a", output, 1)
+    count = read_unity("a", output, 1)
     assert (count.passed, count.skipped) == (0, 1)
     assert count.failures == ["a.c:3: test_x: Expected 1 Was 2"]
 
@@ -37,11 +38,11 @@ def test_failed_and_ignored_tests() -> None:
     ],
 )
 def test_anything_else_is_one_failure(output: str, status: int) -> None:
-    assert len(run_tests.read_unity("a", output, status).failures) == 1
+    assert len(read_unity("a", output, status).failures) == 1
 
 
 def test_a_binary_that_was_not_built(tmp_path: Path) -> None:
-    assert len(run_tests.run_unit(tmp_path / "none").failures) == 1
+    assert len(run_unit(tmp_path / "none", tmp_path).failures) == 1
 
 
 def test_a_report_of_pytest(tmp_path: Path) -> None:
@@ -52,20 +53,20 @@ def test_a_report_of_pytest(tmp_path: Path) -> None:
         '<testcase classname="m" name="c"><error/></testcase>'
         '<testcase classname="m" name="d"><skipped/></testcase></testsuite></testsuites>'
     )
-    count = run_tests.read_junit(report, "free", 1)
+    count = read_junit(report, "free", 1)
     assert (count.passed, count.skipped, count.failures) == (1, 1, ["m::b", "m::c"])
 
 
 @pytest.mark.parametrize("status", [1, 2, 3, 4, 5, -9, 125])
 def test_pytest_that_ended_badly_without_a_failure(tmp_path: Path, status: int) -> None:
     report = tmp_path / "r.xml"
-    assert len(run_tests.read_junit(report, "free", status).failures) == 1
+    assert len(read_junit(report, "free", status).failures) == 1
     report.write_text("<testsuites><testsuite/></testsuites>")
-    assert len(run_tests.read_junit(report, "free", status).failures) == 1
+    assert len(read_junit(report, "free", status).failures) == 1
 
 
 def test_the_last_line() -> None:
-    count = run_tests.Count(passed=3, skipped=0, failures=["x"])
+    count = Count(passed=3, skipped=0, failures=["x"])
     assert str(count) == "3 passed, 1 failed"
     count.skipped = 2
     assert str(count) == "3 passed, 1 failed, 2 skipped"

@@ -16,8 +16,6 @@ import pytest
 from bench import MakeBench
 from hodograph.bus.sdo.controller import OFF
 
-pytestmark = pytest.mark.bus
-
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT_S = 120.0
 
@@ -57,6 +55,7 @@ def pattern(output: tuple[str, ...]) -> str:
     return "".join(parts)
 
 
+@pytest.mark.bus
 def test_the_page(make_bench: MakeBench, tmp_path: Path) -> None:
     for name in ("candump", "cansend"):
         assert shutil.which(name), (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""No deadline per example: the machine may be shared, and nothing here measures time by examples."""
+"""No deadline per example: the machine may be shared, and no test measures time by examples."""
 
 from hypothesis import settings
 

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: MIT
+"""Virtual time: what a simulation does is a function of its inputs alone, whatever the computer does meanwhile."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench import PAPER_ALPHA, MakeBench
+from commands import run_command, running
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.listening.recorder import Recorder
+from hodograph.bus.listening.recordings.candump import candump_lines
+from hodograph.bus.local_bus import LocalBus
+from hodograph.bus.processes import Process, drive_command, find_program
+from hodograph.bus.sdo.controller import OFF
+from hodograph.config import load_machine
+from hodograph.data import EXAMPLES
+from hodograph.errors import BusError
+from hodograph.faults.run_case import run_case
+from hodograph.faults.scenario import draw, find_scenarios
+
+STOP_S = 1.0
+
+
+def bus_log(scenario: str) -> bytes:
+    """The bus of a machine in which a fault is injected: its run, the fault, the way out, the run again."""
+    (found,) = find_scenarios(EXAMPLES / "faults", [scenario])
+    record = run_case(draw(found, 0), None)
+    assert record.troubles == []
+    assert record.began_us
+    return candump_lines(record.control, "bus")
+
+
+def _children(of: int) -> list[int]:
+    return [int(pid) for pid in Path(f"/proc/{of}/task/{of}/children").read_text().split()]
+
+
+def _descendants(of: int) -> list[int]:
+    found = []
+    for pid in _children(of):
+        with contextlib.suppress(OSError):
+            found += [pid, *_descendants(pid)]
+    return found
+
+
+@contextlib.contextmanager
+def stopping_processes() -> Iterator[list[int]]:
+    """Stops each process of ours once, for a second; gives those that were stopped."""
+    ending = threading.Event()
+    stopped: list[int] = []
+
+    def work() -> None:
+        while not ending.wait(0.1):
+            for pid in set(_descendants(os.getpid())).difference(stopped):
+                with contextlib.suppress(OSError):
+                    os.kill(pid, signal.SIGSTOP)
+                    stopped.append(pid)
+                    ending.wait(STOP_S)
+                    os.kill(pid, signal.SIGCONT)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield stopped
+    finally:
+        ending.set()
+        thread.join()
+
+
+@contextlib.contextmanager
+def busy_processes(count: int) -> Iterator[None]:
+    spin = [sys.executable, "-c", "while True: pass"]
+    children = [subprocess.Popen(spin) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for child in children:
+            child.kill()
+            child.wait()
+
+
+@pytest.mark.parametrize("scenario", ["tpdo1-lost", "kill-host"])
+def test_the_same_bytes_with_any_process_stopped(scenario: str) -> None:
+    plain = bus_log(scenario)
+    assert plain.count(b"\n") > 5000
+    with stopping_processes() as stopped:
+        assert bus_log(scenario) == plain
+    assert len(stopped) >= 3  # hub, injector, drives, controller: those that lived for long enough
+
+
+def test_the_same_bytes_at_any_load() -> None:
+    """Beside four busy processes, and all on one core."""
+    scenario = "drive-fault"
+    plain = bus_log(scenario)
+    with busy_processes(4):
+        assert bus_log(scenario) == plain
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        assert bus_log(scenario) == plain
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+def test_time_stands_still_for_who_computes(make_bench: MakeBench) -> None:
+    bench = make_bench()
+    before_s = bench.clock.now_s()
+    time.sleep(0.05)  # in real time: nobody notices
+    assert bench.clock.now_s() == before_s
+    bench.clock.sleep(0.25)
+    assert bench.clock.now_s() == pytest.approx(before_s + 0.25, abs=1e-6)
+
+
+def test_syncs_come_on_the_tick_when_the_bus_is_free(make_bench: MakeBench) -> None:
+    bench = make_bench()
+    with Recorder(bench.bus) as recorder:
+        bench.clock.sleep(2.0)
+        frames = recorder.so_far()
+    syncs = frames["time_us"][frames["id"] == 0x080]
+    assert abs(syncs.size - 2000) <= 1
+    apart = np.diff(syncs)
+    longest_frame_us = 135  # which may be on the bus already
+    assert np.abs(apart - 1000).max() <= longest_frame_us
+    assert np.median(apart) == 1000
+
+
+def test_a_suspended_drive_is_missed_and_found_again(
+    make_bench: MakeBench, clock: VirtualClock
+) -> None:
+    controller = make_bench().controller
+    controller.enable()
+    clock.suspend("drives")
+    clock.sleep(5.0)
+    assert controller.state() == 6
+    assert "0x8250" in controller.fault_text() or "0x8130" in controller.fault_text()
+    clock.resume("drives")
+    assert run_command(clock, "reset", "--wait", "10").returncode == 0
+    assert controller.state() == OFF
+
+
+def test_a_command_that_is_killed_is_waited_for_no_more(
+    make_bench: MakeBench, clock: VirtualClock
+) -> None:
+    controller = make_bench().controller
+    with running(clock, "status", "--watch") as watch:
+        watch.await_text("off")
+        watch.kill()
+    clock.sleep(1.0)
+    assert controller.state() == OFF
+
+
+def test_a_process_that_ends_before_it_takes_part(clock: VirtualClock) -> None:
+    done = run_command(clock, "status", "--bus", "nonsense:")
+    assert done.returncode == 2
+    assert "write interface:channel" in done.stderr
+
+
+def test_the_end_of_the_hub_is_said(hub: LocalHub, clock: VirtualClock) -> None:
+    machine = load_machine(PAPER_ALPHA)
+    drives = Process("drives", drive_command(machine, hub.address), clock)
+    clock.sleep(0.001)  # they have begun
+    assert hub.child is not None
+    hub.child.terminate()
+    with pytest.raises(BusError, match="the local bus has ended"):
+        clock.sleep(1.0)
+    assert drives.child.wait(60) == 4
+    assert "the bus failed" in drives.text()
+    drives.end()
+
+
+INTERRUPTED = """
+import contextlib, signal, sys
+from hodograph.bus.clock import hub_clock
+
+class Interrupted(Exception):
+    pass
+
+def interrupt(*_):
+    raise Interrupted
+
+clock = hub_clock(sys.argv[1])
+signal.signal(signal.SIGALRM, interrupt)
+for k in range(5000):
+    before_s = clock.now_s()
+    with contextlib.suppress(Interrupted):
+        signal.setitimer(signal.ITIMER_REAL, 1e-6 * (1 + k % 300))
+        while True:
+            clock.sleep(0.0001)
+    assert clock.now_s() >= before_s
+before_s = clock.now_s()
+clock.sleep(1.0)
+assert abs(clock.now_s() - before_s - 1.0) < 1e-6
+"""
+
+
+def test_signals_at_any_instant_of_a_wait(hub: LocalHub) -> None:
+    """As Ctrl-C would end it: time goes on afterwards, and never back. A process of its own, as it may hang."""
+    command = [sys.executable, "-c", INTERRUPTED, hub.address.channel]
+    assert subprocess.run(command, timeout=300, check=False).returncode == 0
+
+
+def test_a_bus_belongs_to_its_thread(hub: LocalHub) -> None:
+    """Rather an error than a wait for ever."""
+    errors: list[BaseException] = []
+    bus = LocalBus(hub.address.channel)
+
+    def receive() -> None:
+        try:
+            bus.recv(1.0)
+        except RuntimeError as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=receive)
+    thread.start()
+    thread.join()
+    bus.shutdown()
+    assert "belongs to the thread" in str(errors[0])
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        ([], 2, "one to four paths"),
+        (["bus"], 2, "needs a '/'"),
+        (["./a", "./b", "./c", "./d", "./e"], 2, "one to four paths"),
+        (["--time", "slow", "./bus"], 2, "real or virtual"),
+        (["--bitrate", "0", "./bus"], 2, "bits per second"),
+        (["--speed", "x", "./bus"], 2, "--speed takes"),
+        (["--what", "./bus"], 2, "unrecognized option"),
+        (["/no/such/folder/bus"], 4, "No such file"),
+        (["./" + "x" * 120], 4, "too long"),
+    ],
+)
+def test_what_the_hub_refuses(tmp_path: Path, words: list[str], status: int, said: str) -> None:
+    done = subprocess.run(
+        [str(find_program("hodograph-hub")), *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == status
+    assert said in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_pace_of_real_time_where_it_is_asked_for() -> None:
+    """--speed 1: virtual time is never ahead of real time."""
+    with LocalHub(speed=1.0) as hub:
+        bus = LocalBus(hub.address.channel)
+        begun_s = time.monotonic()
+        bus.clock.sleep(0.001)  # the pace counts from here
+        paced_s = time.monotonic()
+        bus.clock.sleep(0.3)
+        assert time.monotonic() - paced_s >= 0.29
+        assert begun_s <= paced_s
+        bus.shutdown()

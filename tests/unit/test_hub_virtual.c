@@ -1,0 +1,319 @@
+/* SPDX-License-Identifier: MIT */
+/* A local bus in virtual time, seen by one participant (clock.h) and by others that speak for themselves. */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include "hub/frame_bits.h"
+#include "hub_thread.h"
+#include "port/linux/can_socket.h"
+#include "port/linux/clock.h"
+#include "port/linux/local_connection.h"
+#include "unity.h"
+
+#define BITRATE 500000u
+#define BIT_NS  2000u
+
+/* Another participant, with a member on the first bus. */
+struct other {
+    int fd;
+    int member;
+    uint32_t number;
+    uint32_t grant;
+};
+
+static struct can_socket mine;
+static struct other other;
+
+static int open_connection(uint16_t kind, uint32_t number, const char *name,
+                           struct local_bus_control *welcome)
+{
+    struct local_bus_control hello = {.mark = LOCAL_BUS_MARK,
+                                      .version = LOCAL_BUS_VERSION,
+                                      .kind = kind,
+                                      .flags = LOCAL_BUS_WATCHES,
+                                      .number = number};
+    memcpy(hello.name, name, strlen(name));
+    const int fd = local_connection_open(hub_thread_paths[0], &hello, welcome);
+    TEST_ASSERT_GREATER_OR_EQUAL(0, fd);
+    return fd;
+}
+
+static void say_wait(struct other *who, uint64_t until_ns)
+{
+    const struct local_bus_control wait = {.mark = LOCAL_BUS_MARK,
+                                           .version = LOCAL_BUS_VERSION,
+                                           .kind = LOCAL_BUS_WAIT,
+                                           .flags = LOCAL_BUS_SENT,
+                                           .number = who->grant,
+                                           .time_ns = until_ns};
+    TEST_ASSERT_EQUAL(sizeof wait, send(who->fd, &wait, sizeof wait, 0));
+}
+
+static struct local_bus_control next_message(const struct other *who)
+{
+    struct local_bus_control got;
+    struct pollfd wait = {.fd = who->fd, .events = POLLIN};
+    TEST_ASSERT_EQUAL(1, poll(&wait, 1, -1));
+    TEST_ASSERT_EQUAL(sizeof got, recv(who->fd, &got, sizeof got, 0));
+    return got;
+}
+
+static void send_frame(const struct other *who, uint32_t id, uint8_t length)
+{
+    const struct can_frame frame = {.can_id = id, .can_dlc = length};
+    TEST_ASSERT_EQUAL(sizeof frame, send(who->member, &frame, sizeof frame, 0));
+}
+
+/* One that no test sends: so the other is woken by none of ours. */
+static void want_no_frames(const struct other *who)
+{
+    const struct can_filter none = {0x7FF, 0x7FF};
+    struct local_bus_filters told = {.mark = LOCAL_BUS_MARK, .kind = LOCAL_BUS_FILTER, .count = 1};
+    const size_t size = offsetof(struct local_bus_filters, filters) + sizeof none;
+    told.filters[0] = none;
+    TEST_ASSERT_EQUAL(size, send(who->member, &told, size, 0));
+}
+
+static uint64_t frame_ns(uint32_t id, uint8_t length)
+{
+    const struct can_frame frame = {.can_id = id, .can_dlc = length};
+    return (uint64_t)frame_bits(&frame) * BIT_NS;
+}
+
+void setUp(void)
+{
+    char reason[128];
+    struct local_bus_control welcome;
+    hub_thread_begin((struct hub_options){.is_virtual = true, .bitrate = BITRATE});
+    TEST_ASSERT_EQUAL(0, unsetenv(LOCAL_BUS_NAME_VARIABLE));
+    TEST_ASSERT_EQUAL(0, clock_join(hub_thread_paths[0], "mine"));
+    TEST_ASSERT_TRUE(clock_is_virtual());
+    TEST_ASSERT_EQUAL(0, can_socket_open(&mine, hub_thread_paths[0], reason, sizeof reason));
+    memset(&other, 0, sizeof other);
+    other.fd = open_connection(LOCAL_BUS_HELLO_PARTICIPANT, 0, "other", &welcome);
+    TEST_ASSERT_EQUAL(LOCAL_BUS_VIRTUAL, welcome.flags & LOCAL_BUS_VIRTUAL);
+    other.number = welcome.number;
+    other.member = open_connection(LOCAL_BUS_HELLO_MEMBER, other.number, "", &welcome);
+    want_no_frames(&other);
+}
+
+void tearDown(void)
+{
+    can_socket_close(&mine);
+    clock_leave();
+    (void)close(other.fd);
+    (void)close(other.member);
+    hub_thread_end();
+}
+
+static int receive(struct can_msg messages[CAN_SOCKET_BATCH])
+{
+    int more = 0;
+    return can_socket_receive(&mine, messages, &more);
+}
+
+static void test_time_passes_as_asked_and_not_otherwise(void)
+{
+    const uint64_t begin_ns = clock_ns();
+    TEST_ASSERT_EQUAL_UINT64(VIRTUAL_TIME_BEGIN_NS, begin_ns);
+    (void)usleep(2000);
+    TEST_ASSERT_EQUAL_UINT64(begin_ns, clock_ns());
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(0, clock_poll(NULL, 0, 0, 3600ull * CLOCK_NS_PER_S)); /* an hour at once */
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + 3600ull * CLOCK_NS_PER_S, clock_ns());
+}
+
+static void test_a_frame_takes_its_bits_and_wakes(void)
+{
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const uint64_t begin_ns = clock_ns();
+    send_frame(&other, 0x123, 8);
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL(POLLIN, fds.revents);
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + frame_ns(0x123, 8), clock_ns());
+    TEST_ASSERT_EQUAL(1, receive(got));
+    TEST_ASSERT_EQUAL(0x123, got[0].id);
+}
+
+static void test_the_lowest_identifier_goes_first_and_equal_ones_keep_their_order(void)
+{
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const struct can_msg low = {.id = 0x080, .len = 1};
+    struct can_socket listener;
+    char reason[128];
+    int more = 0;
+    TEST_ASSERT_EQUAL(0, can_socket_open(&listener, hub_thread_paths[0], reason, sizeof reason));
+    send_frame(&other, 0x300, 0);
+    send_frame(&other, 0x001, 0);
+    send_frame(&other, 0x300, 1);
+    TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &low));
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(0, clock_poll(NULL, 0, 0, CLOCK_NS_PER_S) < 0);
+    while (clock_ns() < VIRTUAL_TIME_BEGIN_NS + 10000000u) {
+        TEST_ASSERT_GREATER_OR_EQUAL(0, clock_poll(NULL, 0, 0, 10000000));
+    }
+    TEST_ASSERT_EQUAL(4, can_socket_receive(&listener, got, &more));
+    TEST_ASSERT_EQUAL(0x001, got[0].id);
+    TEST_ASSERT_EQUAL(0x080, got[1].id);
+    TEST_ASSERT_EQUAL(0x300, got[2].id);
+    TEST_ASSERT_EQUAL(0, got[2].len);
+    TEST_ASSERT_EQUAL(0x300, got[3].id);
+    TEST_ASSERT_EQUAL(1, got[3].len);
+    can_socket_close(&listener);
+}
+
+/* So two that answer each other at once leave room for the others. */
+static void test_an_answer_comes_behind_what_waits_already(void)
+{
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const struct can_msg answer = {.id = 0x080, .len = 1};
+    struct can_socket listener;
+    char reason[128];
+    int more = 0;
+    TEST_ASSERT_EQUAL(0, can_socket_open(&listener, hub_thread_paths[0], reason, sizeof reason));
+    send_frame(&other, 0x300, 0);
+    send_frame(&other, 0x301, 0);
+    send_frame(&other, 0x302, 0);
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &answer));
+    while (clock_ns() < VIRTUAL_TIME_BEGIN_NS + 10000000u) {
+        TEST_ASSERT_GREATER_OR_EQUAL(0, clock_poll(NULL, 0, 0, 10000000));
+    }
+    TEST_ASSERT_EQUAL(4, can_socket_receive(&listener, got, &more));
+    TEST_ASSERT_EQUAL(0x300, got[0].id);
+    TEST_ASSERT_EQUAL(0x301, got[1].id);
+    TEST_ASSERT_EQUAL(0x080, got[2].id);
+    TEST_ASSERT_EQUAL(0x302, got[3].id);
+    can_socket_close(&listener);
+}
+
+static void test_filters_and_deferred_frames_do_not_wake(void)
+{
+    const struct can_match wanted[2] = {{0x100, 0x7FF}, {0x200, 0x7FF}};
+    const struct can_match deferred = {0x100, 0x7FF};
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const uint64_t begin_ns = clock_ns();
+    TEST_ASSERT_EQUAL(0, can_socket_filter(&mine, wanted, 2));
+    TEST_ASSERT_EQUAL(0, can_socket_defer(&mine, &deferred, 1));
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(0, clock_poll(&fds, 1, 1, 500000)); /* the hub takes the filters */
+    const uint64_t sent_ns = clock_ns();
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + 500000u, sent_ns);
+    send_frame(&other, 0x555, 0);
+    send_frame(&other, 0x100, 0);
+    send_frame(&other, 0x200, 0);
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL_UINT64(sent_ns + frame_ns(0x100, 0) + frame_ns(0x200, 0), clock_ns());
+    TEST_ASSERT_EQUAL(2, receive(got));
+    TEST_ASSERT_EQUAL(0x100, got[0].id);
+    TEST_ASSERT_EQUAL(0x200, got[1].id);
+}
+
+static void test_what_a_member_sent_before_it_left_goes_out(void)
+{
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    send_frame(&other, 0x123, 0);
+    send_frame(&other, 0x124, 0);
+    say_wait(&other, LOCAL_BUS_NEVER);
+    (void)close(other.member);
+    (void)close(other.fd);
+    other.fd = other.member = -1;
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL(1, receive(got));
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL(1, receive(got));
+    TEST_ASSERT_EQUAL(0x124, got[0].id);
+}
+
+static void test_a_descriptor_of_ones_own_ends_the_wait_at_once(void)
+{
+    struct pollfd fds = {.fd = eventfd(1, 0), .events = POLLIN};
+    const uint64_t begin_ns = clock_ns();
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 0, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL(POLLIN, fds.revents);
+    TEST_ASSERT_EQUAL_UINT64(begin_ns, clock_ns());
+    (void)close(fds.fd);
+    const struct local_bus_control told = next_message(&other);
+    TEST_ASSERT_EQUAL(LOCAL_BUS_INTERRUPTED, told.kind);
+    TEST_ASSERT_EQUAL_STRING("mine", told.name);
+}
+
+static volatile sig_atomic_t alarms;
+
+static void on_alarm(int number)
+{
+    (void)number;
+    alarms++;
+}
+
+static void test_a_signal_ends_the_wait(void)
+{
+    const struct itimerval soon = {.it_value = {.tv_usec = 5000}, .it_interval = {.tv_usec = 5000}};
+    const struct itimerval never = {.it_value = {.tv_usec = 0}};
+    struct sigaction action = {.sa_handler = on_alarm};
+    TEST_ASSERT_EQUAL(0, sigaction(SIGALRM, &action, NULL));
+    TEST_ASSERT_EQUAL(0, setitimer(ITIMER_REAL, &soon, NULL));
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(0, clock_poll(NULL, 0, 0, CLOCK_NEVER)); /* else it would wait for ever */
+    TEST_ASSERT_EQUAL(0, setitimer(ITIMER_REAL, &never, NULL));
+    TEST_ASSERT_GREATER_THAN(0, alarms);
+}
+
+static void test_the_others_are_told_who_leaves(void)
+{
+    say_wait(&other, LOCAL_BUS_NEVER);
+    clock_leave();
+    TEST_ASSERT_FALSE(clock_is_virtual());
+    const struct local_bus_control left = next_message(&other);
+    TEST_ASSERT_EQUAL(LOCAL_BUS_LEFT, left.kind);
+    TEST_ASSERT_EQUAL_STRING("mine", left.name);
+    const struct local_bus_control woken = next_message(&other); /* so that it can act on it */
+    TEST_ASSERT_EQUAL(LOCAL_BUS_GRANT, woken.kind);
+    TEST_ASSERT_EQUAL_UINT64(VIRTUAL_TIME_BEGIN_NS, woken.time_ns);
+}
+
+static void test_the_end_of_the_hub_is_noticed(void)
+{
+    hub_thread_end();
+    TEST_ASSERT_EQUAL(-ENETDOWN, clock_poll(NULL, 0, 0, 1000));
+}
+
+static void test_another_version_is_refused(void)
+{
+    const struct local_bus_control hello = {
+        .mark = LOCAL_BUS_MARK, .version = LOCAL_BUS_VERSION + 1u, .kind = LOCAL_BUS_HELLO_MEMBER};
+    struct local_bus_control welcome;
+    TEST_ASSERT_EQUAL(-EPROTO, local_connection_open(hub_thread_paths[0], &hello, &welcome));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_time_passes_as_asked_and_not_otherwise);
+    RUN_TEST(test_a_frame_takes_its_bits_and_wakes);
+    RUN_TEST(test_the_lowest_identifier_goes_first_and_equal_ones_keep_their_order);
+    RUN_TEST(test_an_answer_comes_behind_what_waits_already);
+    RUN_TEST(test_filters_and_deferred_frames_do_not_wake);
+    RUN_TEST(test_what_a_member_sent_before_it_left_goes_out);
+    RUN_TEST(test_a_descriptor_of_ones_own_ends_the_wait_at_once);
+    RUN_TEST(test_a_signal_ends_the_wait);
+    RUN_TEST(test_the_others_are_told_who_leaves);
+    RUN_TEST(test_the_end_of_the_hub_is_noticed);
+    RUN_TEST(test_another_version_is_refused);
+    return UNITY_END();
+}

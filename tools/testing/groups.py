@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""Runs Python tests in groups, by what they need of the machine.
+
+`free` tests run in parallel; those marked `serial` measure time and run alone; those marked `bus` run alone inside
+tools/with-vcan, which gives all of them one vcan0. Tests marked `long` are chosen only where all are wanted.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from testing import recording
+from testing.reach import Recorded
+from testing.verdict import Count, read_junit
+
+MARKS = {
+    "free": "not bus and not serial",
+    "serial": "serial and not bus",
+    "bus": "bus",
+}
+# pytest-timeout (pyproject.toml) ends a test that hangs. One that it cannot end, since it hangs outside Python or took
+# pytest down with it, is ended after this time, with the whole group.
+LAST_LIMIT_S = 1800.0
+_LOOK_S = 5.0
+
+
+@dataclass
+class Groups:
+    """Runs groups of one tree and keeps what they recorded."""
+
+    root: Path
+    out: Path  # reports and records go here
+    is_long: bool = False
+    last_limit_s: float = LAST_LIMIT_S
+    records: list[Path] = field(default_factory=list)
+
+    def run(self, group: str, files: Sequence[str] = ()) -> Count:
+        """One group: all of its tests, or those of some files."""
+        record = self.out / f"record-{group}"
+        report = self.out / f"pytest-{group}.xml"
+        self.out.mkdir(parents=True, exist_ok=True)
+        report.unlink(missing_ok=True)
+        for old in record.glob("*.jsonl"):
+            old.unlink()
+        self.records.append(record)
+        environment = os.environ | {
+            "HODOGRAPH_RECORD": str(record),
+            "HODOGRAPH_GROUP": group,
+            "PYTHONPATH": os.pathsep.join(
+                [str(self.root / "tools"), *filter(None, [os.environ.get("PYTHONPATH")])]
+            ),
+        }
+        process = subprocess.Popen(
+            self._command(group, report, files),
+            cwd=self.root,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            process_group=0,
+        )
+        hung = self._wait(process, record)
+        count = read_junit(report, group, process.returncode)
+        count.failures += [f"{test}: hung" for test in hung]
+        return count
+
+    def recorded(self) -> Recorded:
+        """What all groups that have run wrote down."""
+        whole = Recorded()
+        for record in self.records:
+            whole.add(recording.read(record))
+        return whole
+
+    def _command(self, group: str, report: Path, files: Sequence[str]) -> list[str]:
+        marks = MARKS[group] if self.is_long else f"({MARKS[group]}) and not long"
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "testing.recording"]
+        command += [f"--junitxml={report}", "-m", marks]
+        if group == "free":
+            workers = min(os.cpu_count() or 1, 8)
+            command += ["-n", str(workers)]
+        if group == "bus":
+            own = ["--own", "--name", f"test-{os.getpid()}"]
+            command = [str(self.root / "tools/with-vcan"), *own, *command]
+        return [*command, *files]
+
+    def _wait(self, process: subprocess.Popen[bytes], record: Path) -> list[str]:
+        """Waits for the end; names of tests because of which the group had to be ended."""
+        try:
+            while True:
+                try:
+                    process.wait(_LOOK_S)
+                    return []
+                except subprocess.TimeoutExpired:
+                    limit = time.time() - self.last_limit_s
+                    hung = [test for test, at in recording.unfinished(record) if at < limit]
+                if hung:
+                    _end(process)
+                    return hung
+        except BaseException:
+            _end(process)
+            raise
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        try:
+            os.killpg(process.pid, number)
+            process.wait(_LOOK_S)
+        except ProcessLookupError:
+            process.wait()
+            return
+        except subprocess.TimeoutExpired:
+            continue
