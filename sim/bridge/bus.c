@@ -8,6 +8,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "port/linux/clock.h"
+
 enum { SEND_TRIES = 200 };
 
 static volatile sig_atomic_t signals;
@@ -16,6 +18,7 @@ static void on_signal(int number)
 {
     (void)number;
     signals++;
+    clock_note_signal();
 }
 
 int bus_catch_signals(void)

@@ -274,6 +274,19 @@ static void test_a_signal_ends_the_wait(void)
     TEST_ASSERT_GREATER_THAN(0, alarms);
 }
 
+static void test_a_signal_before_the_wait_ends_it_too(void)
+{
+    const uint64_t begin_ns = clock_ns();
+    say_wait(&other, LOCAL_BUS_NEVER);
+    clock_note_signal();
+    TEST_ASSERT_EQUAL(0, clock_poll(NULL, 0, 0, CLOCK_NEVER)); /* else it would wait for ever */
+    TEST_ASSERT_EQUAL_UINT64(begin_ns, clock_ns());
+    TEST_ASSERT_EQUAL(LOCAL_BUS_INTERRUPTED, next_message(&other).kind);
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(0, clock_poll(NULL, 0, 0, 1000)); /* once only */
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + 1000u, clock_ns());
+}
+
 static void test_the_others_are_told_who_leaves(void)
 {
     say_wait(&other, LOCAL_BUS_NEVER);
@@ -312,6 +325,7 @@ int main(void)
     RUN_TEST(test_what_a_member_sent_before_it_left_goes_out);
     RUN_TEST(test_a_descriptor_of_ones_own_ends_the_wait_at_once);
     RUN_TEST(test_a_signal_ends_the_wait);
+    RUN_TEST(test_a_signal_before_the_wait_ends_it_too);
     RUN_TEST(test_the_others_are_told_who_leaves);
     RUN_TEST(test_the_end_of_the_hub_is_noticed);
     RUN_TEST(test_another_version_is_refused);

@@ -52,14 +52,20 @@ uint64_t clock_ns(void)
     return self.joined ? self.now_ns : monotonic_ns();
 }
 
-/* A signal that comes between the word that we wait and the wait itself would be missed: it has to end the wait. */
-static void block_signals(void)
+static volatile sig_atomic_t signal_noted;
+
+void clock_note_signal(void)
+{
+    signal_noted = 1;
+}
+
+static void block_signals(sigset_t *before)
 {
     sigset_t ends;
     (void)sigemptyset(&ends);
     (void)sigaddset(&ends, SIGINT);
     (void)sigaddset(&ends, SIGTERM);
-    (void)pthread_sigmask(SIG_BLOCK, &ends, &self.signals);
+    (void)pthread_sigmask(SIG_BLOCK, &ends, before);
 }
 
 int clock_join(const char *bus, const char *name)
@@ -81,7 +87,7 @@ int clock_join(const char *bus, const char *name)
         (void)close(fd);
         return 0;
     }
-    block_signals();
+    block_signals(&self.signals);
     self.fd = fd;
     self.joined = true;
     self.number = welcome.number;
@@ -158,14 +164,29 @@ static int await_grant(const struct pollfd *others, size_t count, bool *interrup
     return granted < 0 ? granted : 0;
 }
 
-static int poll_virtually(struct pollfd *fds, size_t buses, size_t count, uint64_t timeout_ns)
+/* Says that we wait, and once more when a signal came before: the second word is how the hub learns of it. */
+static int begin_wait(uint64_t timeout_ns)
 {
     const uint64_t left_ns = LOCAL_BUS_NEVER - self.now_ns;
+    const bool noted = signal_noted != 0;
+    const int error = say_wait(timeout_ns < left_ns ? self.now_ns + timeout_ns : LOCAL_BUS_NEVER);
+    signal_noted = 0;
+    return noted && error == 0 ? say_wait(0) : error;
+}
+
+/* A signal that comes between the word that we wait and the wait itself would be missed: so they are blocked from here to
+ * ppoll(). */
+static int poll_virtually(struct pollfd *fds, size_t buses, size_t count, uint64_t timeout_ns)
+{
     bool interrupted = false;
-    int error = say_wait(timeout_ns < left_ns ? self.now_ns + timeout_ns : LOCAL_BUS_NEVER);
+    sigset_t before;
+    block_signals(&before);
+    int error = begin_wait(timeout_ns);
     if (error == 0) {
         error = await_grant(fds + buses, count - buses, &interrupted);
     }
+    signal_noted = 0; /* the hub has been told of those that ended the wait */
+    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (error != 0) {
         return error;
     }

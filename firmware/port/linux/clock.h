@@ -4,7 +4,8 @@
  * virtual time (local_bus.h), that.
  *
  * One thread of a process takes part. It sleeps in clock_poll() only: whatever it does between two calls takes no virtual
- * time. Its SIGINT and SIGTERM come while it sleeps there. Users define _GNU_SOURCE first.
+ * time. Its SIGINT and SIGTERM come while it sleeps there; who lets them come at other times notes each of them with
+ * clock_note_signal(). Users define _GNU_SOURCE first.
  */
 #ifndef PORT_LINUX_CLOCK_H
 #define PORT_LINUX_CLOCK_H
@@ -33,6 +34,10 @@ uint32_t clock_participant(void);
 
 /* A member of this process has sent something: the hub looks for it when the process waits. */
 void clock_note_sent(void);
+
+/* A signal has come outside of clock_poll(): the next one ends at once, and the hub tells those who watch. For signal
+ * handlers. */
+void clock_note_signal(void);
 
 /* Monotonic. */
 uint64_t clock_ns(void);
