@@ -111,7 +111,8 @@ def test_reads_and_processes_are_recorded(root: Path) -> None:
     ran = groups(root)
     ran.run("serial", [busy])
     (seconds,) = ran.recorded().seconds[busy].values()
-    assert 0.3 <= ran.recorded().cpu_s[busy] <= seconds - 0.2
+    tick_s = 0.01  # what a kernel counts processor time of children in, at each end
+    assert 0.3 - 2 * tick_s <= ran.recorded().cpu_s[busy] <= seconds - 0.2
 
 
 def test_a_failure_in_any_phase_is_recorded(root: Path) -> None:
