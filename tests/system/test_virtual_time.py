@@ -268,3 +268,28 @@ def test_the_pace_of_real_time_where_it_is_asked_for() -> None:
         assert time.monotonic() - paced_s >= 0.29
         assert begun_s <= paced_s
         bus.shutdown()
+
+
+class _TestSignal(Exception):
+    pass
+
+
+def test_a_signal_that_interrupts_no_call_ends_the_wait(clock: VirtualClock) -> None:
+    """As one does that comes just before the call that waits: the handler of Python is due, but the call goes on."""
+
+    def handler(*_: object) -> None:
+        raise _TestSignal
+
+    def send() -> None:
+        signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)  # not to the thread that waits
+
+    before = signal.signal(signal.SIGUSR1, handler)
+    sender = threading.Timer(0.2, send)
+    try:
+        sender.start()
+        with pytest.raises(_TestSignal):
+            clock.wait(None)
+    finally:
+        sender.join()
+        signal.signal(signal.SIGUSR1, before)
+    clock.sleep(0.001)  # and time goes on

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import select
+import signal
 import socket
 import struct
 import subprocess
@@ -18,6 +19,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from typing import Protocol
 
 from ..errors import BusError
@@ -103,6 +105,7 @@ class VirtualClock:
         self._waiting = False
         self._users = 0
         self._thread = threading.get_ident()
+        self._signals = _signal_pipe().listen()
         self._saying = threading.Lock()
         self._inboxes: list[Inbox] = []
         self._notices: list[tuple[int, str]] = []
@@ -169,6 +172,7 @@ class VirtualClock:
         time for ever: so a message stays in the socket until it has been acted on, and may then be seen twice.
         """
         try:
+            self._await_message()
             data = self._connection.recv(_CONTROL.size, socket.MSG_PEEK)
             if len(data) == _CONTROL.size:
                 self._act_on(data)
@@ -177,6 +181,13 @@ class VirtualClock:
             raise self._gone() from error
         if len(data) != _CONTROL.size:
             raise self._gone()
+
+    def _await_message(self) -> None:
+        """Until there is one, or the handler of a signal raises something."""
+        told = self._signals
+        watched: list[socket.socket | int] = [self._connection] + ([told] if told else [])
+        while self._connection not in select.select(watched, [], [])[0]:
+            _signal_pipe().drain()
 
     def _act_on(self, data: bytes) -> None:
         _, kind, _, number, _, now_ns, name = _CONTROL.unpack(data)
@@ -310,6 +321,39 @@ class VirtualClock:
         if self._users == 0:
             self._connection.close()
             _clocks().pop(self._hub, None)
+
+
+class _SignalPipe:
+    """Readable once a signal has come for this process, for the main thread, which runs the handlers of Python.
+
+    A signal that comes just before a call that blocks would be seen only after it, so after the next grant. But who
+    sent it waits for us to act on it, and time waits for him.
+    """
+
+    def __init__(self) -> None:
+        self._read, self._write = os.pipe()
+        os.set_blocking(self._read, False)
+        os.set_blocking(self._write, False)
+
+    def listen(self) -> int | None:
+        """What to wait for beside other things; None: not in this thread, or somebody else is told of signals."""
+        if threading.current_thread() is not threading.main_thread():
+            return None
+        before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+        if before not in (-1, self._write):
+            signal.set_wakeup_fd(before, warn_on_full_buffer=False)
+            return None
+        return self._read
+
+    def drain(self) -> None:
+        """Empties it; the handlers run next."""
+        with suppress(BlockingIOError):
+            os.read(self._read, 4096)
+
+
+@cache
+def _signal_pipe() -> _SignalPipe:
+    return _SignalPipe()
 
 
 _local = threading.local()
