@@ -39,7 +39,7 @@ def verify(options: Namespace) -> None:
     image = _planned(chain) if options.program is None else _given(options.program)
     program = decode_file(options.program or options.file, image)
     NativeProgram(image).require()
-    found = verify_program(program, chain.file.limits, _drives(machine))
+    found = verify_program(program, chain.limits, _drives(machine))
     drives_see = sampled(image)
     counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
     noise = bus_noise(counts_per_mm, program.period_us)
