@@ -11,7 +11,7 @@ from ..errors import InputError
 POLICIES = ("respect", "report")
 LEAST_RESERVE, GREATEST_RESERVE = 2e-3, 0.9
 
-MACHINE_SHARE = 0.997
+MACHINE_SHARE = 0.998
 """Of the machine's axis limits: what plans use. The rest is for rounding, and for the controller's bounds of what lies
 between the places where it looks (docs/limits.md)."""
 
