@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -15,6 +15,7 @@ from .errors import InputError, PlanError
 from .feed import AxisLimits, ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
 from .feed.idle_limits import idle_limits
 from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
+from .native.program import NativeLimits, NativeProgram
 from .program import (
     Compilation,
     Program,
@@ -96,7 +97,15 @@ def program_limits(machine: Machine) -> ProgramLimits:
         jerk_mm_s3=round(machine.jerk_mm_s3),
         min_q40_mm=(low[0], low[1]),
         max_q40_mm=(high[0], high[1]),
+        axis_velocity_um_s=_of_plane(machine, "velocity_mm_s", 1000),
+        axis_acceleration_um_s2=_of_plane(machine, "acceleration_mm_s2", 1000),
+        axis_jerk_mm_s3=_of_plane(machine, "jerk_mm_s3", 1),
     )
+
+
+def _of_plane(machine: Machine, name: str, units: int) -> tuple[int, int]:
+    x, y = (round(getattr(axis, name) * units) for axis in machine.plane)
+    return x, y
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,8 +234,16 @@ class Chain:
 
     @cached_property
     def image(self) -> bytes:
-        """The program's bytes."""
-        return encode(self.program)
+        """The program's bytes. Raises PlanError: the controller could not prove that it keeps the machine's limits."""
+        image = encode(self.program)
+        fault = NativeProgram(image).check(NativeLimits(**asdict(program_limits(self.machine))))
+        if fault is not None:
+            at_mm = self.program.pieces.start_q40[fault.index] * 2.0**-40
+            raise PlanError(
+                f"{self.file.file}: the controller would refuse the program: {fault.text} (code {fault.code}) in the "
+                f"feed piece at {at_mm:.6g} mm: lower [limits] there, and please report this path"
+            )
+        return image
 
     def notes(self, plan: Plan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""

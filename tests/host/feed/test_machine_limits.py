@@ -13,6 +13,7 @@ from hodograph.chain import Chain
 from hodograph.config import Machine, load_machine, load_path_file
 from hodograph.errors import PlanError
 from hodograph.feed import AxisLimits, Limits
+from hodograph.feed.limits import MACHINE_SHARE
 from hodograph.verify import verify_program
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -89,4 +90,4 @@ def test_the_lower_limit_counts() -> None:
     limits = Limits(axis=path, machine=AxisLimits(velocity_mm_s=(20.0, 20.0)))
     assert limits.source("velocity_mm_s", 0) == "limits"
     assert limits.source("velocity_mm_s", 1) == "machine"
-    assert np.allclose(limits.axes.velocity_mm_s, (10.0, 20.0 * 0.997))
+    assert np.allclose(limits.axes.velocity_mm_s, (10.0, 20.0 * MACHINE_SHARE))
