@@ -15,7 +15,7 @@ from .errors import InputError, PlanError
 from .feed import AxisLimits, ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
 from .feed.idle_limits import idle_limits
 from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
-from .native.program import NativeLimits, NativeProgram
+from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
     Program,
@@ -106,6 +106,11 @@ def program_limits(machine: Machine) -> ProgramLimits:
 def _of_plane(machine: Machine, name: str, units: int) -> tuple[int, int]:
     x, y = (round(getattr(axis, name) * units) for axis in machine.plane)
     return x, y
+
+
+def controller_verdict(image: bytes, machine: Machine) -> NativeFault | None:
+    """What the controller of this machine finds in an image; None: it accepts it. Raises InputError: it is no image."""
+    return NativeProgram(image).check(NativeLimits(**asdict(program_limits(machine))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +241,7 @@ class Chain:
     def image(self) -> bytes:
         """The program's bytes. Raises PlanError: the controller could not prove that it keeps the machine's limits."""
         image = encode(self.program)
-        fault = NativeProgram(image).check(NativeLimits(**asdict(program_limits(self.machine))))
+        fault = controller_verdict(image, self.machine)
         if fault is not None:
             at_mm = self.program.pieces.start_q40[fault.index] * 2.0**-40
             raise PlanError(

@@ -13,7 +13,7 @@ from hodograph.cli.main import main
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 KEYS = {
-    "kept", "duration_s", "length_mm", "samples", "peak", "excesses", "setpoints", "bus_noise",
+    "controller", "kept", "duration_s", "length_mm", "samples", "peak", "excesses", "setpoints", "bus_noise",
 }  # fmt: skip
 PEAK_KEYS = {"value", "at_most", "limit", "ratio", "s_mm", "t_s"}
 
