@@ -10,8 +10,8 @@
 #define PATH_DEGREE   4 /* of sigma and of both parts of w^2 */
 #define ORDERS        5 /* of time, in majorants: jerk'' is the fifth derivative of the point */
 #define MOST_PARTS    32u
-#define MOST_CELLS    20u /* halvings of a cell */
-#define NEWTON_STEPS  5
+#define MOST_HALVINGS 20  /* of a cell */
+#define NEWTON_STEPS  4
 #define CUT_STEPS     30
 #define ROUNDING_BITS 14 /* of each limit, 2^-14 is left for the rounding of numbers here */
 #define AXES          2
@@ -37,6 +37,7 @@ struct path {
     struct real length_mm;
     struct real w[AXES][3];
     struct real sigma[PATH_DEGREE + 1];
+    struct real arc[PATH_DEGREE + 1]; /* (arc length from the start) / xi */
     struct real direction[AXES][PATH_DEGREE + 1]; /* Re w^2, Im w^2 */
     struct real least_sigma;
 };
@@ -58,7 +59,6 @@ struct cell {
 struct check {
     const struct program *program;
     struct real limit[AXES][QUANTITIES]; /* m = 0: none */
-    struct real step_limit[AXES][QUANTITIES];
     struct real per_period; /* 1/s */
     struct motion_at last; /* at the end of the stretch before; at rest before the first */
 };
@@ -151,6 +151,9 @@ static void read_path(struct path *path, const struct program *p, uint32_t i)
     }
     add_product(path->sigma, path->w[0], path->w[0], 1);
     add_product(path->sigma, path->w[1], path->w[1], 1);
+    for (int k = 0; k <= PATH_DEGREE; k++) {
+        path->arc[k] = real_div(path->sigma[k], real_make(k + 1, 0));
+    }
     add_product(path->direction[0], path->w[0], path->w[0], 1);
     add_product(path->direction[0], path->w[1], path->w[1], -1);
     add_product(path->direction[1], path->w[0], path->w[1], 2);
@@ -173,12 +176,8 @@ static void read_path(struct path *path, const struct program *p, uint32_t i)
 static struct real parameter(const struct path *path, struct real s_mm)
 {
     struct real xi = real_div(s_mm, path->length_mm);
-    struct real arc[PATH_DEGREE + 1]; /* s / xi */
-    for (int k = 0; k <= PATH_DEGREE; k++) {
-        arc[k] = real_div(path->sigma[k], real_make(k + 1, 0));
-    }
     for (int step = 0; step < NEWTON_STEPS; step++) {
-        const struct real s = real_mul(horner(arc, PATH_DEGREE, xi), xi);
+        const struct real s = real_mul(horner(path->arc, PATH_DEGREE, xi), xi);
         xi = real_sub(xi,
                       real_div(real_sub(s, s_mm), horner(path->sigma, PATH_DEGREE, xi)));
     }
@@ -261,30 +260,27 @@ static void majorant(struct real *out, const struct real *c, int degree, struct 
     shift(out, degree, half);
 }
 
-/* out = a b up to the power `orders`; out is neither of them. */
-static void times(struct real *out, const struct real *a, const struct real *b, int orders)
+/* Coefficient n of the product a b. */
+static struct real product_at(const struct real *a, const struct real *b, int n)
 {
-    for (int n = 0; n <= orders; n++) {
-        out[n] = zero;
-        for (int k = 0; k <= n; k++) {
-            out[n] = real_add(out[n], real_mul(a[k], b[n - k]));
-        }
+    struct real sum = zero;
+    for (int k = 0; k <= n; k++) {
+        sum = real_add(sum, real_mul(a[k], b[n - k]));
     }
+    return sum;
 }
 
 /* Sum of polynomial[k] inner^k up to the power `orders`; inner has no constant term. */
 static void compose(struct real out[ORDERS + 1], const struct real polynomial[PATH_DEGREE + 1],
                     const struct real inner[ORDERS + 1], int orders)
 {
-    struct real product[ORDERS + 1];
     for (int n = 0; n <= orders; n++) {
         out[n] = zero;
     }
     out[0] = polynomial[PATH_DEGREE];
     for (int k = PATH_DEGREE - 1; k >= 0; k--) {
-        times(product, out, inner, orders);
-        for (int n = 0; n <= orders; n++) {
-            out[n] = product[n];
+        for (int n = orders; n >= 0; n--) { /* from above: it needs those below only */
+            out[n] = product_at(out, inner, n);
         }
         out[0] = real_add(out[0], polynomial[k]);
     }
@@ -340,15 +336,13 @@ static void bend_of(const struct cell *cell, struct motion_at *out)
     }
     for (int axis = 0; axis < AXES; axis++) {
         struct real direction[ORDERS + 1];
-        struct real velocity[ORDERS + 1];
         majorant(polynomial, path->direction[axis], PATH_DEGREE, middle, half);
         compose(direction, polynomial, xi, ORDERS - 1);
-        times(velocity, direction, slope, ORDERS - 1);
         const struct real per_s2 = real_mul(cell->per_s, cell->per_s);
-        out->of[axis][VELOCITY] = real_mul(real_times(velocity[2], 2), cell->per_s);
-        out->of[axis][ACCELERATION] = real_mul(real_times(velocity[3], 6), per_s2);
-        out->of[axis][JERK] =
-            real_mul(real_times(velocity[4], 24), real_mul(per_s2, cell->per_s));
+        out->of[axis][VELOCITY] = real_mul(real_times(product_at(direction, slope, 2), 2), cell->per_s);
+        out->of[axis][ACCELERATION] = real_mul(real_times(product_at(direction, slope, 3), 6), per_s2);
+        out->of[axis][JERK] = real_mul(real_times(product_at(direction, slope, 4), 24),
+                                       real_mul(per_s2, cell->per_s));
     }
 }
 
@@ -468,6 +462,7 @@ static void set_cell(struct cell *cell, const struct way *way, const struct path
  * so on. */
 static int check_step(const struct check *check, const struct motion_at *now)
 {
+    const struct real share = real_div(real_make(LIMIT_CHECK_STEP_PERMILLE, 0), real_make(1000, 0));
     for (int axis = 0; axis < AXES; axis++) {
         struct real step[QUANTITIES];
         for (int k = VELOCITY; k <= ACCELERATION; k++) {
@@ -475,8 +470,8 @@ static int check_step(const struct check *check, const struct motion_at *now)
         }
         const struct real jump = real_mul(step[VELOCITY], check->per_period);
         const struct real jerk = real_mul(real_add(jump, step[ACCELERATION]), check->per_period);
-        if (passes(jump, check->step_limit[axis][ACCELERATION]) ||
-            passes(jerk, check->step_limit[axis][JERK])) {
+        if (passes(jump, real_mul(check->limit[axis][ACCELERATION], share)) ||
+            passes(jerk, real_mul(check->limit[axis][JERK], share))) {
             return PROGRAM_ERR_AXIS_STEP;
         }
     }
@@ -489,23 +484,28 @@ static int check_stretch(struct check *check, const struct way *way, const struc
 {
     struct cell cell;
     struct motion_at now;
-    struct real ends[MOST_CELLS + 1u];
-    uint32_t count = 1;
-    ends[0] = high;
+    const struct real width = real_sub(high, low);
+    uint32_t at = 0; /* the cell from at to at + 1 of 2^halvings */
+    int32_t halvings = 0;
     set_cell(&cell, way, path, low, high);
     motion_at(&cell, real_make(-1, 0), &now);
     int code = check_step(check, &now);
     motion_at(&cell, real_make(1, 0), &check->last);
-    while (code == 0 && count > 0u) {
+    while (code == 0 && (at >> halvings) == 0u) {
         int certain = 0;
-        set_cell(&cell, way, path, low, ends[count - 1u]);
+        const struct real part = real_scale(width, -halvings);
+        const struct real from = real_add(low, real_times(part, (int32_t)at));
+        set_cell(&cell, way, path, from, real_add(from, part));
         code = check_cell(check, &cell, &certain);
         if (code == 0) {
-            count--;
-            low = ends[count];
-        } else if (certain == 0 && count <= MOST_CELLS) {
-            ends[count] = real_scale(real_add(low, ends[count - 1u]), -1);
-            count++;
+            at++;
+            while ((at & 1u) == 0u && halvings > 0) {
+                at >>= 1;
+                halvings--;
+            }
+        } else if (certain == 0 && halvings < MOST_HALVINGS) {
+            at <<= 1;
+            halvings++;
             code = 0;
         }
     }
@@ -569,7 +569,6 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
 static void set_limits(struct check *check, const struct program_limits *limits)
 {
     const struct real kept = real_make((1 << ROUNDING_BITS) - 1, -ROUNDING_BITS);
-    const struct real share = real_div(real_make(LIMIT_CHECK_STEP_PERMILLE, 0), real_make(1000, 0));
     for (int axis = 0; axis < AXES; axis++) {
         struct real *limit = check->limit[axis];
         limit[VELOCITY] = milli(limits->axis_velocity_um_s[axis]);
@@ -577,7 +576,6 @@ static void set_limits(struct check *check, const struct program_limits *limits)
         limit[JERK] = real_make((int64_t)limits->axis_jerk_mm_s3[axis], 0);
         for (int k = 0; k < QUANTITIES; k++) {
             limit[k] = real_mul(limit[k], kept);
-            check->step_limit[axis][k] = real_mul(limit[k], share);
         }
     }
 }

@@ -20,27 +20,41 @@ struct real real_make(int64_t m, int32_t e)
     return out;
 }
 
+/* m 2^e with |m| < 2^32. */
+static struct real from_sum(int64_t m, int32_t e)
+{
+    struct real out = {0, 0};
+    const uint32_t size = (uint32_t)(m < 0 ? -m : m);
+    if (size == 0u) {
+        return out;
+    }
+    const int above = qmath_clz32(size);
+    const int32_t kept = (int32_t)(above == 0 ? size >> 1 : size << (above - 1));
+    out.m = m < 0 ? -kept : kept;
+    out.e = e + 1 - above;
+    return out;
+}
+
 struct real real_add(struct real a, struct real b)
 {
-    if (a.m == 0) {
-        return b;
-    }
-    if (b.m == 0) {
-        return a;
-    }
     const struct real high = a.e >= b.e ? a : b;
     const struct real low = a.e >= b.e ? b : a;
     const int32_t apart = high.e - low.e;
-    if (apart > MANTISSA_BITS) {
-        return high;
+    if (a.m == 0 || b.m == 0) {
+        return a.m == 0 ? b : a;
     }
-    const int64_t unit = (int64_t)1 << MANTISSA_BITS;
-    return real_make(high.m * unit + ((low.m * unit) >> apart), high.e - MANTISSA_BITS);
+    return apart >= MANTISSA_BITS ? high : from_sum((int64_t)high.m + (low.m >> apart), high.e);
 }
 
+/* The product of two normal numbers has 61 or 62 bits. */
 struct real real_mul(struct real a, struct real b)
 {
-    return real_make((int64_t)a.m * b.m, a.e + b.e);
+    const int64_t product = (int64_t)a.m * b.m;
+    const int32_t high = (int32_t)(product >> 32);
+    const int wide = high >= 1 << 29 || high <= -(1 << 29);
+    const int drop = wide != 0 ? MANTISSA_BITS : MANTISSA_BITS - 1;
+    const struct real out = {(int32_t)(product >> drop), a.e + b.e + drop};
+    return product == 0 ? a.m == 0 ? a : b : out;
 }
 
 struct real real_div(struct real a, struct real b)

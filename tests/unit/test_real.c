@@ -76,6 +76,19 @@ static void test_arithmetic(void)
     }
 }
 
+/* Rounding down must not make the mantissa one bit longer. */
+static void test_products_next_to_a_power_of_two(void)
+{
+    for (int32_t k = -3; k <= 3; k++) {
+        for (int32_t i = 1; i <= 8; i++) {
+            const struct real a = real_make(-((1 << 30) + i), 0);
+            const struct real b = real_make(INT32_MAX - 2 * i + k, 0);
+            near(value(a) * value(b), real_mul(a, b), fabs(value(a) * value(b)));
+            near(value(a) * value(a), real_mul(a, a), value(a) * value(a));
+        }
+    }
+}
+
 static void test_terms_far_apart(void)
 {
     const struct real one = real_make(1, 0);
@@ -89,6 +102,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_made_from_any_integer);
     RUN_TEST(test_arithmetic);
+    RUN_TEST(test_products_next_to_a_power_of_two);
     RUN_TEST(test_terms_far_apart);
     return UNITY_END();
 }
