@@ -50,11 +50,12 @@ struct real real_add(struct real a, struct real b)
 struct real real_mul(struct real a, struct real b)
 {
     const int64_t product = (int64_t)a.m * b.m;
-    const int32_t high = (int32_t)(product >> 32);
-    const int wide = high >= 1 << 29 || high <= -(1 << 29);
-    const int drop = wide != 0 ? MANTISSA_BITS : MANTISSA_BITS - 1;
-    const struct real out = {(int32_t)(product >> drop), a.e + b.e + drop};
-    return product == 0 ? a.m == 0 ? a : b : out;
+    const uint64_t size = (uint64_t)(product < 0 ? -product : product);
+    const int32_t drop = MANTISSA_BITS - 1 + (int32_t)(size >> 61);
+    const int32_t kept = (int32_t)(size >> drop);
+    const struct real out = {product < 0 ? -kept : kept, a.e + b.e + drop};
+    const struct real zero = {0, 0};
+    return size == 0u ? zero : out;
 }
 
 struct real real_div(struct real a, struct real b)
