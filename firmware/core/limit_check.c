@@ -10,7 +10,7 @@
 #define PATH_DEGREE   4 /* of sigma and of both parts of w^2 */
 #define ORDERS        5 /* of time, in majorants: jerk'' is the fifth derivative of the point */
 #define MOST_PARTS    32u
-#define MOST_HALVINGS 20  /* of a cell */
+#define MOST_HALVINGS 20 /* of a cell */
 #define NEWTON_STEPS  4
 #define CUT_STEPS     30
 #define ROUNDING_BITS 14 /* of each limit, 2^-14 is left for the rounding of numbers here */
@@ -37,7 +37,7 @@ struct path {
     struct real length_mm;
     struct real w[AXES][3];
     struct real sigma[PATH_DEGREE + 1];
-    struct real arc[PATH_DEGREE + 1]; /* (arc length from the start) / xi */
+    struct real arc[PATH_DEGREE + 1];             /* (arc length from the start) / xi */
     struct real direction[AXES][PATH_DEGREE + 1]; /* Re w^2, Im w^2 */
     struct real least_sigma;
 };
@@ -51,17 +51,27 @@ struct motion_at {
 struct cell {
     const struct way *way;
     const struct path *path;
-    struct real c[WAY_DEGREE + 1]; /* F from the piece's start in powers of x = (u - middle) / half */
-    struct real per_s;             /* d x / d t */
-    struct real offset_mm;         /* start of the piece from the start of the segment */
+    struct real
+        c[WAY_DEGREE + 1]; /* F from the piece's start in powers of x = (u - middle) / half */
+    struct real per_s;     /* d x / d t */
+    struct real offset_mm; /* start of the piece from the start of the segment */
 };
 
 struct check {
     const struct program *program;
     struct real limit[AXES][QUANTITIES]; /* m = 0: none */
-    struct real per_period; /* 1/s */
+    struct real per_period;              /* 1/s */
     struct motion_at last; /* at the end of the stretch before; at rest before the first */
 };
+
+static void set_at_rest(struct motion_at *out)
+{
+    for (int axis = 0; axis < AXES; axis++) {
+        for (int k = 0; k < QUANTITIES; k++) {
+            out->of[axis][k] = zero;
+        }
+    }
+}
 
 static struct real horner(const struct real *c, int degree, struct real x)
 {
@@ -147,7 +157,9 @@ static void read_path(struct path *path, const struct program *p, uint32_t i)
     to_powers(path->w[0], segment.u_q44);
     to_powers(path->w[1], segment.v_q44);
     for (int k = 0; k <= PATH_DEGREE; k++) {
-        path->sigma[k] = path->direction[0][k] = path->direction[1][k] = zero;
+        path->sigma[k] = zero;
+        path->direction[0][k] = zero;
+        path->direction[1][k] = zero;
     }
     add_product(path->sigma, path->w[0], path->w[0], 1);
     add_product(path->sigma, path->w[1], path->w[1], 1);
@@ -178,8 +190,7 @@ static struct real parameter(const struct path *path, struct real s_mm)
     struct real xi = real_div(s_mm, path->length_mm);
     for (int step = 0; step < NEWTON_STEPS; step++) {
         const struct real s = real_mul(horner(path->arc, PATH_DEGREE, xi), xi);
-        xi = real_sub(xi,
-                      real_div(real_sub(s, s_mm), horner(path->sigma, PATH_DEGREE, xi)));
+        xi = real_sub(xi, real_div(real_sub(s, s_mm), horner(path->sigma, PATH_DEGREE, xi)));
     }
     return xi;
 }
@@ -222,12 +233,12 @@ static void motion_at(const struct cell *cell, struct real x, struct motion_at *
     /* conj(w) w' and the imaginary part of conj(w) w'' */
     const struct real re = real_add(real_mul(w[0], w1[0]), real_mul(w[1], w1[1]));
     const struct real im = real_sub(real_mul(w[0], w1[1]), real_mul(w[1], w1[0]));
-    const struct real bend = real_times(
-        real_sub(real_mul(w[0], path->w[1][2]), real_mul(w[1], path->w[0][2])), 2);
+    const struct real bend =
+        real_times(real_sub(real_mul(w[0], path->w[1][2]), real_mul(w[1], path->w[0][2])), 2);
     const struct real per_sigma2 = real_mul(per_sigma, per_sigma);
     const struct real kappa = real_times(real_mul(im, per_sigma2), 2);
-    struct real slope = real_sub(real_times(bend, 2),
-                                 real_times(real_mul(real_mul(im, re), per_sigma), 8));
+    struct real slope =
+        real_sub(real_times(bend, 2), real_times(real_mul(real_mul(im, re), per_sigma), 8));
     slope = real_mul(slope, real_mul(per_sigma2, per_sigma));
     const struct real f2 = real_mul(f[0], f[0]);
     const struct real normal = real_mul(kappa, f2);
@@ -339,8 +350,10 @@ static void bend_of(const struct cell *cell, struct motion_at *out)
         majorant(polynomial, path->direction[axis], PATH_DEGREE, middle, half);
         compose(direction, polynomial, xi, ORDERS - 1);
         const struct real per_s2 = real_mul(cell->per_s, cell->per_s);
-        out->of[axis][VELOCITY] = real_mul(real_times(product_at(direction, slope, 2), 2), cell->per_s);
-        out->of[axis][ACCELERATION] = real_mul(real_times(product_at(direction, slope, 3), 6), per_s2);
+        out->of[axis][VELOCITY] =
+            real_mul(real_times(product_at(direction, slope, 2), 2), cell->per_s);
+        out->of[axis][ACCELERATION] =
+            real_mul(real_times(product_at(direction, slope, 3), 6), per_s2);
         out->of[axis][JERK] = real_mul(real_times(product_at(direction, slope, 4), 24),
                                        real_mul(per_s2, cell->per_s));
     }
@@ -398,8 +411,7 @@ static int judge(const struct check *check, const struct motion_at *peak,
     for (int axis = 0; axis < AXES; axis++) {
         for (int k = 0; k < QUANTITIES; k++) {
             /* M h^2 / 8 with h = 2 / parts */
-            const struct real between =
-                real_scale(rise->of[axis][k], -1 - 2 * (int32_t)parts_log2);
+            const struct real between = real_scale(rise->of[axis][k], -1 - 2 * (int32_t)parts_log2);
             if (passes(real_add(peak->of[axis][k], between), check->limit[axis][k])) {
                 return codes[k];
             }
@@ -412,8 +424,9 @@ static int judge(const struct check *check, const struct motion_at *peak,
 static int check_cell(const struct check *check, const struct cell *cell, int *certain)
 {
     struct motion_at bend;
-    struct motion_at peak = {{{{0, 0}}}};
+    struct motion_at peak;
     int code = 0;
+    set_at_rest(&peak);
     bend_of(cell, &bend);
     for (int axis = 0; axis < AXES; axis++) {
         struct real values[QUANTITIES];
@@ -570,13 +583,11 @@ static void set_limits(struct check *check, const struct program_limits *limits)
 {
     const struct real kept = real_make((1 << ROUNDING_BITS) - 1, -ROUNDING_BITS);
     for (int axis = 0; axis < AXES; axis++) {
-        struct real *limit = check->limit[axis];
-        limit[VELOCITY] = milli(limits->axis_velocity_um_s[axis]);
-        limit[ACCELERATION] = milli(limits->axis_acceleration_um_s2[axis]);
-        limit[JERK] = real_make((int64_t)limits->axis_jerk_mm_s3[axis], 0);
-        for (int k = 0; k < QUANTITIES; k++) {
-            limit[k] = real_mul(limit[k], kept);
-        }
+        const struct real jerk = real_make((int64_t)limits->axis_jerk_mm_s3[axis], 0);
+        check->limit[axis][VELOCITY] = real_mul(milli(limits->axis_velocity_um_s[axis]), kept);
+        check->limit[axis][ACCELERATION] =
+            real_mul(milli(limits->axis_acceleration_um_s2[axis]), kept);
+        check->limit[axis][JERK] = real_mul(jerk, kept);
     }
 }
 
@@ -593,12 +604,13 @@ static int any_limit(const struct check *check)
 
 int limit_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
 {
-    const struct motion_at rest = {{{{0, 0}}}};
+    struct motion_at rest;
     struct check check;
     uint32_t segment = 0;
     int code = 0;
     set_limits(&check, limits);
     check.program = p;
+    set_at_rest(&rest);
     check.last = rest;
     check.per_period = real_div(real_make(1000000, 0), real_make((int64_t)p->header.period_us, 0));
     *index = 0;

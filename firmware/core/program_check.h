@@ -70,7 +70,8 @@ enum program_error {
     PROGRAM_ERR_AXIS_VELOCITY = -70,     /* above the velocity limit of an axis */
     PROGRAM_ERR_AXIS_ACCELERATION = -71, /* above its acceleration limit */
     PROGRAM_ERR_AXIS_JERK = -72,         /* above its jerk limit */
-    PROGRAM_ERR_AXIS_STEP = -73, /* velocity or acceleration jumps at a joint by more than its limits allow */
+    PROGRAM_ERR_AXIS_STEP =
+        -73, /* velocity or acceleration jumps at a joint by more than its limits allow */
 };
 
 /* What this controller allows. */

@@ -25,7 +25,8 @@ static struct program_limits limits_of(int32_t min_counts, int32_t max_counts,
         .counts_per_mm = counts_per_mm,
         .travel_min_counts = {min_counts, min_counts},
         .travel_max_counts = {max_counts, max_counts},
-        .axis = {{.velocity_limit_um_s = 4}, {.acceleration_limit_um_s2 = 5, .jerk_limit_mm_s3 = 6}},
+        .axis = {{.velocity_limit_um_s = 4},
+                 {.acceleration_limit_um_s2 = 5, .jerk_limit_mm_s3 = 6}},
     };
     struct program_limits limits;
     config_limits(&config, &limits);

@@ -112,7 +112,7 @@ static void run_within_axis_limits(const struct program *p, const struct program
         mm[0][0] = (double)point.x_q40_mm / unit;
         mm[0][1] = (double)point.y_q40_mm / unit;
         if (k >= 3u) {
-            keeps_axis_limits(limits, 1e-6 * p->header.period_us, (const double(*)[2])mm);
+            keeps_axis_limits(limits, 1e-6 * p->header.period_us, (const double (*)[2])mm);
         }
     }
 }

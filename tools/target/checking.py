@@ -16,7 +16,7 @@ CORES = ("an386", "microbit")
 
 
 def costs(build: Path) -> dict[str, Any]:
-    """By core and example: instructions of limit_check_all and of program_check, and of the first by segment and piece."""
+    """By core and example: instructions of limit_check_all, also by segment and piece, and of program_check."""
     programs = {name: load_chain(ROOT / f"examples/{name}.toml") for name in NAMES}
     out: dict[str, Any] = {}
     for core in CORES:

@@ -17,7 +17,7 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Strain:
-    """A limit, the peak beside it, the share of the limit that a plan may use, whose limit it is, and where the peak is."""
+    """A limit, the peak beside it and its place, the share of the limit that a plan may use, and whose limit it is."""
 
     name: str
     limit: float
@@ -59,8 +59,8 @@ def _strains(bounds: PathBounds, samples: Samples) -> Iterator[Strain]:
         name = f"cap of {cap.from_mm:g} to {cap.to_mm:g} mm, feed_mm_s"
         yield _strain(samples, np.where(inside, np.abs(samples.feed), 0.0), name, cap.feed_mm_s)
     if limits.centripetal_mm_s2 is not None:
-        values = raised(samples.centripetal)
-        yield _strain(samples, values, "centripetal_mm_s2", limits.centripetal_mm_s2)
+        bend = raised(samples.centripetal)
+        yield _strain(samples, bend, "centripetal_mm_s2", limits.centripetal_mm_s2)
     for name, given, values, share in (
         ("velocity_mm_s", limits.axes.velocity_mm_s, samples.velocity, 1.0),
         ("acceleration_mm_s2", limits.axes.acceleration_mm_s2, samples.acceleration, kept),
@@ -72,10 +72,10 @@ def _strains(bounds: PathBounds, samples: Samples) -> Iterator[Strain]:
             yield _strain(samples, raised(one), f"axis {axis} {name}", limit, share, source)
     axes = zip(per_axis(samples.velocity), per_axis(samples.acceleration), strict=True)
     for k, (plant, (v, a)) in enumerate(zip(bounds.plants or (), axes, strict=False)):
-        values = raised(v + plant.time_constant_s * a) / plant.gain_mm_s_v
-        limit = plant.reach_mm_s / plant.gain_mm_s_v
+        volts = raised(v + plant.time_constant_s * a) / plant.gain_mm_s_v
+        most = plant.reach_mm_s / plant.gain_mm_s_v
         source = limits.source("volts", k)
-        yield _strain(samples, values, f"axis {'xy'[k]} volts", limit, kept, source)
+        yield _strain(samples, volts, f"axis {'xy'[k]} volts", most, kept, source)
 
 
 def _strain(

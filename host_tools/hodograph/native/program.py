@@ -27,7 +27,8 @@ POINT = np.dtype(
 class NativeLimits:
     """What a controller allows: struct program_limits. 0 stands for no limit, but of the travel.
 
-    Those of travel and axes are (x, y), travel in mm * 2^40; period in us, feed in um/s, acceleration in um/s^2, jerk in mm/s^3.
+    Those of travel and axes are (x, y), travel in mm * 2^40; period in us, feed and velocity in um/s, acceleration in
+    um/s^2, jerk in mm/s^3.
     """
 
     period_us: int = 0

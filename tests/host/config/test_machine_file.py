@@ -99,7 +99,7 @@ MISTAKES = [
     ("[work]", "[supervision]\nmissed_max = -1\n[work]", r"\[supervision\] missed_max must be from 0 to 255"),
     ("[work]", "[supervision]\nanswer_wait_ms = 300\n[work]", r"setpoint_timeout_ms is 200: must be above"),
     ("[work]", "[supervision]\nanswer_wait = 3\n[work]", r'did you mean "answer_wait_ms"\?'),
-    ("node = 3\ntravel_mm = [-200, 200]\nvelocity_mm_s = 500\n", "node = 3\ntravel_mm = [-200, 200]\n", r"\[axis 2\] velocity_mm_s is missing: add"),
+    ("velocity_mm_s = 500\nacc", "acc", r"\[axis 2\] velocity_mm_s is missing: add"),
     ("jerk_mm_s3 = 200000\ncounts", "counts", r"\[axis 1\] jerk_mm_s3 is missing: add"),
     ("node = 3", "node = 3\nfollowing_window_mm = 0", r"\[axis 2\] following_window_mm must be from"),
     ("node = 3", "node = 3\nquick_stop_mm_s2 = 5000", r"quick_stop_mm_s2 must be from 1e-06 to 4295.0 \(u32 in counts"),

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The controller's proof of the axis limits (firmware/core/limit_check.h) against dense samples.
 
-The truth beside it is `motion_at` of hodograph.verify at many instants: doubles, no bounds. HODOGRAPH_LIMIT_CASES changes
-the number of mutated images.
+The truth beside it is `motion_at` of hodograph.verify at many instants: doubles, no bounds. HODOGRAPH_LIMIT_CASES
+changes the number of mutated images.
 """
 
 from __future__ import annotations
