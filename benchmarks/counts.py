@@ -5,7 +5,7 @@
 
 Needs `make counter`. The main figures of docs/counts.md: for each core and kernel the median over the examples and the
 most over all programs, plain and with the override in use, of the motion part and of the whole interrupt; the same of
-the usual NURBS interpolator, with the ripple of the feed of both.
+the usual NURBS interpolator, with the ripple of the feed of both; and what the check of a program costs.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
-from target import tables, taylor  # noqa: E402
+from target import checking, tables, taylor  # noqa: E402
 from target.campaign import FLOOR, Campaign  # noqa: E402
 
 
@@ -57,6 +57,7 @@ def main() -> None:
     options = parser.parse_args()
     figures = main_figures(Campaign(options.build).run())
     figures["constant_feed"] = beside(taylor.compare(options.build))
+    figures["check"] = checking.costs(options.build)
     text = json.dumps(figures, indent=2)
     print(text)
     if options.json:

@@ -9,7 +9,7 @@ from hypothesis import settings
 settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
 
-# A shell starts what is in its background with SIGINT ignored, and so are the children of that: tests that send one would
+# A shell starts what is in its background with SIGINT ignored, and its children inherit that: tests that send one would
 # wait for ever.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -138,7 +138,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "chain",
         "bustime",
     },
-    "chain": {"errors", "config", "spline", "feed", "program"},
+    "chain": {"errors", "config", "spline", "feed", "program", "native"},
     "paper": {
         "errors",
         "data",

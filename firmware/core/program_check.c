@@ -2,6 +2,7 @@
 #include "core/program_check.h"
 
 #include "core/crossing_check.h"
+#include "core/limit_check.h"
 #include "core/piece_check.h"
 #include "core/segment_check.h"
 
@@ -68,6 +69,9 @@ int program_check(const struct program *p, const struct program_limits *limits,
     }
     if (fault->code == 0) {
         fault->code = crossing_check_all(p, &fault->index);
+    }
+    if (fault->code == 0) {
+        fault->code = limit_check_all(p, limits, &fault->index);
     }
     return fault->code;
 }

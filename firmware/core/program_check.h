@@ -66,6 +66,12 @@ enum program_error {
     PROGRAM_ERR_JERK = -54,         /* above its jerk limit */
     PROGRAM_ERR_OVERRIDE = -55,     /* override factor not in 1.0 ... 2.0, rate or second rate 0 */
     PROGRAM_ERR_PIECE_RESERVED = -56, /* reserved field of a piece is not 0 */
+    /* axes (core/limit_check.h): index = the piece in which it can happen */
+    PROGRAM_ERR_AXIS_VELOCITY = -70,     /* above the velocity limit of an axis */
+    PROGRAM_ERR_AXIS_ACCELERATION = -71, /* above its acceleration limit */
+    PROGRAM_ERR_AXIS_JERK = -72,         /* above its jerk limit */
+    PROGRAM_ERR_AXIS_STEP =
+        -73, /* velocity or acceleration jumps at a joint by more than its limits allow */
 };
 
 /* What this controller allows. */
@@ -76,6 +82,9 @@ struct program_limits {
     uint32_t jerk_mm_s3;
     int64_t min_q40_mm[2]; /* travel, x and y */
     int64_t max_q40_mm[2];
+    uint32_t axis_velocity_um_s[2]; /* of x and y, at every rate of program time; 0: no limit */
+    uint32_t axis_acceleration_um_s2[2];
+    uint32_t axis_jerk_mm_s3[2];
 };
 
 struct program_fault {

@@ -56,6 +56,10 @@ static const struct text texts[] = {
     {PROGRAM_ERR_JERK, "above its jerk limit"},
     {PROGRAM_ERR_OVERRIDE, "override factor not in 1.0 ... 2.0, rate or second rate 0"},
     {PROGRAM_ERR_PIECE_RESERVED, "reserved field of a piece is not 0"},
+    {PROGRAM_ERR_AXIS_VELOCITY, "above the velocity limit of an axis"},
+    {PROGRAM_ERR_AXIS_ACCELERATION, "above the acceleration limit of an axis"},
+    {PROGRAM_ERR_AXIS_JERK, "above the jerk limit of an axis"},
+    {PROGRAM_ERR_AXIS_STEP, "velocity or acceleration of an axis jumps at a joint"},
 };
 
 const char *program_error_text(int code)

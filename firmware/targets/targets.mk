@@ -31,7 +31,7 @@ $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv
 
 # An image is a main with what it is linked from besides core, canopen, app and the dictionary; the targets that it is
 # for, where not all; kernels, where not the target's; and what tools/check_image.py has to allow.
-IMAGES := setpoints setpoints_float controller isr taylor interrupted
+IMAGES := setpoints setpoints_float controller isr taylor interrupted checker
 setpoints_MAIN := tests/target/setpoints.c
 setpoints_SRC  := tests/target/commands.c tests/target/table.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
 
@@ -54,6 +54,10 @@ taylor_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
 taylor_TARGETS := an385 an386
 taylor_CHECK   := --soft-float
 
+checker_MAIN    := tests/target/checker.c
+checker_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+checker_TARGETS := an386 microbit
+
 controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/port/common/*.c firmware/can/*.c)
 controller_TARGETS := an385 an386 an500 an505 microbit $(BOARDS)
@@ -64,6 +68,9 @@ TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_
 # What the tick runs: loops of fixed length unrolled. Measured: a quarter fewer instructions.
 TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interp.c timebase_step.c timebase_change.c rate.c rate_plan.c rate_search.c rate_window.c qmath.c) \
             firmware/app/machine/motion.c
+
+# In one function with all that it calls, the check of the limits would be longer than a Cortex-M0 can jump, and it needs
+# the most stack of all.
 
 target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
 
@@ -78,6 +85,7 @@ $(BUILD)/firmware/$(1)/obj/%.o: %.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $
 	$$(call say,$(1),$$<)
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) $$(TICK_CFLAGS) -MMD -MP -c -o $$@ $$<
 $(call target_object,$(1),$(TICK_SRC) $(if $(findstring float,$($(1)_KERNELS)),firmware/core/kernel_float.c)): TICK_CFLAGS := -O3
+$(call target_object,$(1),firmware/core/limit_check.c): TICK_CFLAGS := -Os
 $(BUILD)/firmware/$(1)/libhodograph.a: $(call target_object,$(1),$(TARGET_SRC)) $(BUILD)/firmware/$(1)/obj/list
 	@rm -f $$@
 	@$($(1)_CROSS)ar rcs $$@ $$(filter %.o,$$^)

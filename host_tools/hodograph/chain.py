@@ -5,16 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 
 from .config import Drive, Machine, PathFile, load_machine, load_path_file
 from .errors import InputError, PlanError
-from .feed import ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
+from .feed import AxisLimits, ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
 from .feed.idle_limits import idle_limits
 from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
+from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
     Program,
@@ -37,12 +38,23 @@ def controller_limits(machine: Machine) -> ControllerLimits:
     )
 
 
+def axis_limits(machine: Machine) -> AxisLimits:
+    """The limits of the machine's axes x and y. Raises InputError: it has one axis only."""
+    x, y = machine.plane
+    return AxisLimits(
+        velocity_mm_s=(x.velocity_mm_s, y.velocity_mm_s),
+        acceleration_mm_s2=(x.acceleration_mm_s2, y.acceleration_mm_s2),
+        jerk_mm_s3=(x.jerk_mm_s3, y.jerk_mm_s3),
+    )
+
+
 def plants(machine: Machine | None, limits: Limits) -> tuple[Plant, Plant] | None:
-    """The plants of x and y with the volts that `limits` gives them, None when it gives none.
+    """The plants of x and y with the volts that their drives have, or `limits` gives them; None where neither is known.
 
     Raises InputError: volts are limited, and an axis has no drive file, or its friction takes them all.
     """
-    if limits.volts is None:
+    known = machine is not None and all(axis.drive is not None for axis in machine.plane)
+    if limits.volts is None and not known:
         return None
     if machine is None:
         raise InputError(
@@ -52,17 +64,19 @@ def plants(machine: Machine | None, limits: Limits) -> tuple[Plant, Plant] | Non
     return x, y
 
 
-def _plant(drive: Drive, volts: float) -> Plant:
+def _plant(drive: Drive, volts: float | None) -> Plant:
     plant = Plant(
         drive.gain_rad_s_v * drive.screw_mm_rad,
         drive.time_constant_s,
-        min(volts, drive.volts_limit),
+        drive.volts_limit if volts is None else min(volts, drive.volts_limit),
         drive.equipment.friction_volts or 0.0,
+        drive.volts_limit,
     )
     if not plant.reach_mm_s > 0.0:
         raise InputError(
-            f"[limits] volts {volts:g}: friction alone takes {plant.friction_volts:g} V of a drive, "
-            f"which has {drive.volts_limit:g}: give more than that friction, or another drive"
+            f"{'drive file' if volts is None else f'[limits] volts {volts:g}'}: friction alone takes "
+            f"{plant.friction_volts:g} V of a drive, which has {drive.volts_limit:g}: "
+            "give more than that friction, or another drive"
         )
     return plant
 
@@ -83,7 +97,20 @@ def program_limits(machine: Machine) -> ProgramLimits:
         jerk_mm_s3=round(machine.jerk_mm_s3),
         min_q40_mm=(low[0], low[1]),
         max_q40_mm=(high[0], high[1]),
+        axis_velocity_um_s=_of_plane(machine, "velocity_mm_s", 1000),
+        axis_acceleration_um_s2=_of_plane(machine, "acceleration_mm_s2", 1000),
+        axis_jerk_mm_s3=_of_plane(machine, "jerk_mm_s3", 1),
     )
+
+
+def _of_plane(machine: Machine, name: str, units: int) -> tuple[int, int]:
+    x, y = (round(getattr(axis, name) * units) for axis in machine.plane)
+    return x, y
+
+
+def controller_verdict(image: bytes, machine: Machine) -> NativeFault | None:
+    """What the controller of this machine finds in an image; None: it accepts it. Raises InputError: it is no image."""
+    return NativeProgram(image).check(NativeLimits(**asdict(program_limits(machine))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +182,17 @@ class Chain:
         return self._timed_plan[1]
 
     @cached_property
+    def limits(self) -> Limits:
+        """What a plan keeps: the limits of the path file, and those of the machine's axes."""
+        machine = self.machine_or_none
+        if machine is None:
+            return self.file.limits
+        return replace(self.file.limits, machine=axis_limits(machine))
+
+    @cached_property
     def peaks(self) -> dict[str, Peak]:
         """Where every limited quantity of the plan comes nearest to its limit."""
-        plan, machine, limits = self.plan, self.machine_or_none, self.file.limits
+        plan, machine, limits = self.plan, self.machine_or_none, self.limits
         controller = controller_limits(machine) if machine is not None else None
         bounds = gather(self.feed, limits, controller, plants(machine, limits), plan.period_us)
         spline = self.spline_result.spline
@@ -165,7 +200,7 @@ class Chain:
 
     @cached_property
     def _timed_plan(self) -> tuple[Plan, float]:
-        feed, limits, machine = self.feed, self.file.limits, self.machine_or_none
+        feed, limits, machine = self.feed, self.limits, self.machine_or_none
         spline = self.spline_result.spline
         controller = controller_limits(machine) if machine is not None else None
         period_us = machine.period_us if machine is not None else 1000
@@ -204,8 +239,16 @@ class Chain:
 
     @cached_property
     def image(self) -> bytes:
-        """The program's bytes."""
-        return encode(self.program)
+        """The program's bytes. Raises PlanError: the controller could not prove that it keeps the machine's limits."""
+        image = encode(self.program)
+        fault = controller_verdict(image, self.machine)
+        if fault is not None:
+            at_mm = self.program.pieces.start_q40[fault.index] * 2.0**-40
+            raise PlanError(
+                f"{self.file.file}: the controller would refuse the program: {fault.text} (code {fault.code}) in the "
+                f"feed piece at {at_mm:.6g} mm: lower [limits] there, and please report this path"
+            )
+        return image
 
     def notes(self, plan: Plan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""

@@ -182,6 +182,29 @@ def test_a_refused_program_leaves_the_old_one(machine: Machine, image: bytes) ->
     assert machine.sdo[0x2000][2].raw == 2
 
 
+@pytest.mark.parametrize(
+    ("index", "low", "high"),
+    [(0x2030, 50_000, 10**6), (0x2031, 10**5, 10**8), (0x2032, 1000, 10**7)],
+)
+def test_a_program_beyond_the_limits_of_an_axis_is_refused(
+    machine: Machine, image: bytes, index: int, low: int, high: int
+) -> None:
+    """Whatever the host has planned it for: the controller has limits of its own, and proves them."""
+    machine.prepare(image)
+    crc = machine.sdo[0x2000][5].raw
+    machine.command(DISABLE)
+    machine.until(OFF)
+    machine.sdo[index][2].raw = low
+    with pytest.raises(canopen.SdoAbortedError) as refused:
+        machine.upload(image)
+    assert refused.value.code == 0x06090030
+    assert machine.sdo[0x2000][3].raw == {0x2030: -70, 0x2031: -71, 0x2032: -72}[index]
+    assert machine.sdo[0x2000][5].raw == crc
+    machine.sdo[index][2].raw = high
+    machine.upload(image)
+    assert machine.sdo[0x2000][3].raw == 0
+
+
 @pytest.mark.parametrize("after_s", [0.0, 0.0005, 0.1, 0.3, 0.8])
 def test_a_lost_drive_is_a_fault_that_a_reset_clears(
     machine: Machine, image: bytes, after_s: float

@@ -28,7 +28,8 @@ def machine_of(folder: Path, drives: int, period_us: int) -> Path:
     text = text.replace("period_us = 1000", f"period_us = {period_us}")
     head, *axes = text.split("[[axis]]")
     axes += [
-        f'\nname = "a{i}"\nnode = {i + 1}\ntravel_mm = [0, 9]\ndrive = "{EXAMPLES}/drives/alpha_x.toml"\n'
+        f'\nname = "a{i}"\nnode = {i + 1}\ntravel_mm = [0, 9]\nvelocity_mm_s = 500\n'
+        f'acceleration_mm_s2 = 5000\njerk_mm_s3 = 200000\ndrive = "{EXAMPLES}/drives/alpha_x.toml"\n'
         for i in range(3, drives + 1)
     ]
     file = folder / f"machine_{drives}.toml"

@@ -25,6 +25,8 @@ static struct program_limits limits_of(int32_t min_counts, int32_t max_counts,
         .counts_per_mm = counts_per_mm,
         .travel_min_counts = {min_counts, min_counts},
         .travel_max_counts = {max_counts, max_counts},
+        .axis = {{.velocity_limit_um_s = 4},
+                 {.acceleration_limit_um_s2 = 5, .jerk_limit_mm_s3 = 6}},
     };
     struct program_limits limits;
     config_limits(&config, &limits);
@@ -40,6 +42,9 @@ static void test_whole_millimetres_are_exact(void)
     TEST_ASSERT_EQUAL_INT64(3 * Q40, positive.min_q40_mm[0]);
     TEST_ASSERT_EQUAL_UINT32(2000, positive.period_us);
     TEST_ASSERT_EQUAL_UINT32(3, positive.jerk_mm_s3);
+    TEST_ASSERT_EQUAL_UINT32(4, positive.axis_velocity_um_s[0]);
+    TEST_ASSERT_EQUAL_UINT32(5, positive.axis_acceleration_um_s2[1]);
+    TEST_ASSERT_EQUAL_UINT32(6, positive.axis_jerk_mm_s3[1]);
 }
 
 /* 2^40 / 3 = 366503875925.33...: limits never let more through than was asked for. */
@@ -83,6 +88,7 @@ static void test_which_objects_concern_the_drives(void)
     TEST_ASSERT_TRUE(config_concerns_drives(0x2004, 11));
     TEST_ASSERT_TRUE(config_concerns_drives(0x2012, 1));
     TEST_ASSERT_FALSE(config_concerns_drives(0x2018, 1));
+    TEST_ASSERT_FALSE(config_concerns_drives(0x2032, 1));
     TEST_ASSERT_FALSE(config_concerns_drives(0x201A, 6));
     TEST_ASSERT_TRUE(config_concerns_drives(0x201F, 1));
     TEST_ASSERT_TRUE(config_contains(0x2023));

@@ -48,7 +48,7 @@ static void check_file(const char *name, const struct program_limits *limits, in
 
 static void test_golden_programs(void)
 {
-    struct program_limits limits = {0, 0, 0, 0, {0, 0}, {0, 0}};
+    struct program_limits limits = {.period_us = 0};
     char line[256];
     char name[128];
     char word[64];

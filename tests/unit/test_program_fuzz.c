@@ -2,8 +2,10 @@
 /*
  * Seeded mutations of golden programs, with a right CRC so that they reach the checks. Whatever happens, nothing
  * is read beyond the image and nothing is undefined (the sanitizers watch); and what is accepted runs: every kernel, at
- * two periods a tick, without a jump and without leaving the travel limits. HODOGRAPH_FUZZ_CASES changes the number.
+ * two periods a tick, without a jump and without leaving the travel limits; and where the axes have limits, its setpoints
+ * keep them. HODOGRAPH_FUZZ_CASES changes the number.
  */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -76,7 +78,56 @@ static void run_accepted(const struct program *p, const struct program_limits *l
     }
 }
 
-static int try_image(uint8_t *image, uint32_t size)
+/* What a drive sees between setpoints: differences over period, its square and its cube are means of velocity, acceleration
+ * and jerk. Of four points, the last one first. */
+static void keeps_axis_limits(const struct program_limits *limits, double period_s,
+                              const double mm[4][2])
+{
+    const double noise_mm = 1e-9; /* of the kernel, docs/numerics.md section 10 */
+    for (int axis = 0; axis < 2; axis++) {
+        const double one = mm[0][axis] - mm[1][axis];
+        const double two = one - (mm[1][axis] - mm[2][axis]);
+        const double three = two - (mm[1][axis] - 2.0 * mm[2][axis] + mm[3][axis]);
+        const double v = 1e-3 * limits->axis_velocity_um_s[axis] * period_s;
+        const double a = 1e-3 * limits->axis_acceleration_um_s2[axis] * period_s * period_s;
+        const double j = limits->axis_jerk_mm_s3[axis] * period_s * period_s * period_s;
+        TEST_ASSERT_TRUE(fabs(one) <= v * 1.00001 + noise_mm);
+        TEST_ASSERT_TRUE(fabs(two) <= a * 1.01 + 2.0 * noise_mm);
+        TEST_ASSERT_TRUE(fabs(three) <= j * 1.02 + 4.0 * noise_mm);
+    }
+}
+
+static void run_within_axis_limits(const struct program *p, const struct program_limits *limits)
+{
+    static struct interp it;
+    const double unit = 1099511627776.0;
+    const uint64_t period = ((uint64_t)p->header.period_us << 42) / 1000000u;
+    const uint64_t duration = p->header.duration_q32_s << 10;
+    struct interp_point point;
+    double mm[4][2];
+    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, p, INTERP_DOUBLE));
+    for (uint32_t k = 0; k < 1000u && k * period <= duration + 3u * period; k++) {
+        (void)interp_at_q42(&it, k * period, &point);
+        memmove(mm[1], mm[0], 3 * sizeof mm[0]);
+        mm[0][0] = (double)point.x_q40_mm / unit;
+        mm[0][1] = (double)point.y_q40_mm / unit;
+        if (k >= 3u) {
+            keeps_axis_limits(limits, 1e-6 * p->header.period_us, (const double (*)[2])mm);
+        }
+    }
+}
+
+/* Every third image is one for a machine whose axes have limits: none, or nearly what the seeds need. */
+static void set_axis_limits(struct program_limits *limits, uint64_t random)
+{
+    for (int axis = 0; axis < 2 && random % 3u != 0u; axis++) {
+        limits->axis_velocity_um_s[axis] = 100000u + (uint32_t)(random >> 8) % 100000u;
+        limits->axis_acceleration_um_s2[axis] = 2000000u + (uint32_t)(random >> 16) % 3000000u;
+        limits->axis_jerk_mm_s3[axis] = 50000u + (uint32_t)(random >> 24) % 200000u;
+    }
+}
+
+static int try_image(uint8_t *image, uint32_t size, uint64_t random)
 {
     struct program p;
     struct program_fault fault;
@@ -85,9 +136,13 @@ static int try_image(uint8_t *image, uint32_t size)
         limits.min_q40_mm[axis] = -((int64_t)300 << 40);
         limits.max_q40_mm[axis] = (int64_t)300 << 40;
     }
+    set_axis_limits(&limits, random);
     golden_seal(image, size);
     if (program_open(&p, image, size) != 0 || program_check(&p, &limits, &fault) != 0) {
         return 0;
+    }
+    if (limits.axis_jerk_mm_s3[0] != 0u) {
+        run_within_axis_limits(&p, &limits);
     }
     for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
         run_accepted(&p, &limits, (enum interp_kernel)kernel);
@@ -109,7 +164,7 @@ static void test_mutations(void)
         for (uint64_t k = 0; k < changes; k++) {
             mutate(image, size, &random);
         }
-        accepted += try_image(image, size);
+        accepted += try_image(image, size, golden_random(&random));
         free(image);
     }
     TEST_ASSERT_GREATER_THAN_INT(0, accepted);

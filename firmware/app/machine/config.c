@@ -31,6 +31,9 @@ static const struct axis_field axis_fields[] = {
     AXIS_FIELD(0x2021, feed_constant_counts),
     AXIS_FIELD(0x2022, gear_motor_revolutions),
     AXIS_FIELD(0x2023, gear_shaft_revolutions),
+    AXIS_FIELD(0x2030, velocity_limit_um_s),
+    AXIS_FIELD(0x2031, acceleration_limit_um_s2),
+    AXIS_FIELD(0x2032, jerk_limit_mm_s3),
 };
 
 #define AXIS_FIELDS (sizeof axis_fields / sizeof axis_fields[0])
@@ -98,7 +101,7 @@ bool config_concerns_drives(uint16_t index, uint8_t sub)
     if (index == 0x2004) {
         return sub == 1 || sub == 10 || sub == 11;
     }
-    return index < 0x2018 || index > 0x201A;
+    return index < 0x2018 || (index > 0x201A && index < 0x2030);
 }
 
 bool config_contains(uint16_t index)
@@ -139,5 +142,8 @@ void config_limits(const struct config *config, struct program_limits *limits)
             q40_from_counts(config->travel_min_counts[i], config->counts_per_mm, true);
         limits->max_q40_mm[i] =
             q40_from_counts(config->travel_max_counts[i], config->counts_per_mm, false);
+        limits->axis_velocity_um_s[i] = config->axis[i].velocity_limit_um_s;
+        limits->axis_acceleration_um_s2[i] = config->axis[i].acceleration_limit_um_s2;
+        limits->axis_jerk_mm_s3[i] = config->axis[i].jerk_limit_mm_s3;
     }
 }

@@ -38,6 +38,9 @@ struct config_axis {
     uint32_t feed_constant_counts;          /* 0x6092 */
     uint32_t gear_motor_revolutions;        /* 0x6091 sub 1 */
     uint32_t gear_shaft_revolutions;        /* 0x6091 sub 2 */
+    uint32_t velocity_limit_um_s; /* of programs, at every override; 0, here and below: none */
+    uint32_t acceleration_limit_um_s2;
+    uint32_t jerk_limit_mm_s3;
 };
 
 struct config {

@@ -6,10 +6,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..chain import controller_limits, program_limits
+from ..chain import axis_limits, controller_limits, plants, program_limits
 from ..config import Machine
 from ..errors import InputError, RefusedError
-from ..feed import FeedRequest, Limits, plan_feed
+from ..feed import FeedRequest, Limits, plan_path
 from ..program import ProgramOptions, compile_path, encode
 from ..spline import line
 from .sdo.controller import Controller
@@ -31,11 +31,13 @@ def line_image(start_mm: complex, end_mm: complex, machine: Machine) -> bytes:
         ramp_time_s=GOTO_RAMP_S,
         degree=5,
     )
-    plan = plan_feed(
-        spline.length_mm,
+    limits = Limits(machine=axis_limits(machine))
+    plan = plan_path(
+        spline,
         request,
-        Limits(),
+        limits,
         controller_limits(machine),
+        plants(machine, limits),
         period_us=machine.period_us,
     )
     return encode(

@@ -7,10 +7,10 @@ from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
 
-from ..chain import Chain, load_chain
+from ..chain import Chain, controller_verdict, load_chain
 from ..config import PLANE_AXES, Drive, Machine
 from ..errors import InputError, LimitError
-from ..native.program import NativeProgram
+from ..native.program import NativeFault, NativeProgram
 from ..program import compile_program, encode
 from ..program.compiler import ProgramOptions
 from ..verify import (
@@ -39,19 +39,47 @@ def verify(options: Namespace) -> None:
     image = _planned(chain) if options.program is None else _given(options.program)
     program = decode_file(options.program or options.file, image)
     NativeProgram(image).require()
-    found = verify_program(program, chain.file.limits, _drives(machine))
+    fault = None if machine is None else controller_verdict(image, machine)
+    found = verify_program(program, chain.limits, _drives(machine))
     drives_see = sampled(image)
     counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
     noise = bus_noise(counts_per_mm, program.period_us)
     if options.json:
-        print_json(_document(found, drives_see, noise))
+        print_json(_verdict_document(machine, fault) | _document(found, drives_see, noise))
     else:
+        print(_verdict(machine, fault))
         print(_text(found, drives_see, noise))
+    if fault is not None:
+        raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
     if not found.kept:
         beyond = [peak.quantity for peak in found.peaks if not peak.kept]
         raise LimitError(
             f"{options.file}: beyond its limits by more than {100 * TOLERANCE:g} %: {', '.join(beyond)}"
         )
+
+
+def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:
+    """What the controller itself would say of the limits of the machine."""
+    if machine is None:
+        return "controller's check: no machine, so no limits of its axes are proved (use --machine FILE)"
+    if fault is not None:
+        return f"controller's check: refused, {fault.text} (code {fault.code}, piece {fault.index})"
+    x, y = machine.plane
+    limits = ", ".join(
+        f"{axis.name} {number(axis.velocity_mm_s)} mm/s {number(axis.acceleration_mm_s2)} mm/s^2 "
+        f"{number(axis.jerk_mm_s3)} mm/s^3"
+        for axis in (x, y)
+    )
+    return f"controller's check: proved at all times and overrides: {limits}"
+
+
+def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dict[str, object]:
+    if machine is None:
+        return {"controller": None}
+    if fault is None:
+        return {"controller": {"accepted": True, "code": 0, "piece": None, "text": "accepted"}}
+    refusal = {"code": fault.code, "piece": fault.index, "text": fault.text}
+    return {"controller": {"accepted": False} | refusal}
 
 
 def _planned(chain: Chain) -> bytes:

@@ -69,7 +69,11 @@ class Scaling:
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: CANopen node, travel limits in machine coordinates, what its drive is told, and its model.
+    """One axis: CANopen node, travel limits in machine coordinates, limits of its motion, what its drive is told, and
+    its model.
+
+    No program moves the axis beyond its velocity, acceleration and jerk: plans keep them, and the controller proves it
+    before it accepts a program (docs/limits.md).
 
     Without a drive file (`drive` None) the axis can be run, but not simulated. `following_window_mm` None: the drive
     does not supervise its following error.
@@ -79,6 +83,9 @@ class Axis:
     node: int
     travel_min_mm: float
     travel_max_mm: float
+    velocity_mm_s: float
+    acceleration_mm_s2: float
+    jerk_mm_s3: float
     drive: Drive | None
     following_window_mm: float | None
     following_timeout_ms: int
@@ -92,6 +99,9 @@ _AXIS = (
     "name",
     "node",
     "travel_mm",
+    "velocity_mm_s",
+    "acceleration_mm_s2",
+    "jerk_mm_s3",
     "counts_per_mm",
     "drive",
     "following_window_mm",
@@ -152,6 +162,9 @@ def _axis(table: Table, counts_per_mm: int, acceleration_mm_s2: float) -> Axis:
         node=table.integer("node", low=1, high=127),
         travel_min_mm=low,
         travel_max_mm=high,
+        velocity_mm_s=_motion_limit(table, "velocity_mm_s", 0.01, 4000),
+        acceleration_mm_s2=_motion_limit(table, "acceleration_mm_s2", 0.1, 4e6),
+        jerk_mm_s3=_motion_limit(table, "jerk_mm_s3", 1, 4e9),
         drive=drive,
         following_window_mm=window,
         following_timeout_ms=table.integer(
@@ -164,6 +177,15 @@ def _axis(table: Table, counts_per_mm: int, acceleration_mm_s2: float) -> Axis:
         feedforward=_feedforward(table),
         scaling=_scaling(table, drive, counts_per_mm),
     )
+
+
+def _motion_limit(table: Table, key: str, low: float, high: float) -> float:
+    if not table.has(key):
+        raise table.error(
+            key,
+            "is missing: add what the axis may do (velocity_mm_s, acceleration_mm_s2 and jerk_mm_s3)",
+        )
+    return table.number(key, low=low, high=high)
 
 
 def _counted(table: Table, key: str, default: float, counts_per_mm: int) -> float:

@@ -86,10 +86,6 @@ def load_path_file(file: Path) -> PathFile:
     path = _path(root.table("path", _PATH))
     feed = _feed(root.table("feed", _FEED)) if root.has("feed") else None
     limits = _limits(root.table("limits", _LIMITS, required=False))
-    if feed is not None and feed.optimal and not limits.bind:
-        raise root.error(
-            "feed", f'profile "{feed.profile}" has no limit to obey: add one to [limits] at least'
-        )
     return PathFile(
         file=file,
         name=file.stem,

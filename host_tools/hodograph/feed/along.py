@@ -65,7 +65,7 @@ class PathBounds:
         """Whether there are any."""
         limits = self.limits
         some = limits.centripetal_mm_s2 is not None or bool(limits.caps)
-        return some or limits.axis.any or self.plants is not None
+        return some or limits.axes.any or self.plants is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +154,8 @@ def _rough(limits: Limits, samples: Samples) -> NDArray[np.bool_]:
     """Cells that want to be cut."""
     rough = np.zeros(samples.piece.size, dtype=np.bool_)
     for values, both in (
-        (samples.acceleration, limits.axis.acceleration_mm_s2),
-        (samples.jerk, limits.axis.jerk_mm_s3),
+        (samples.acceleration, limits.axes.acceleration_mm_s2),
+        (samples.jerk, limits.axes.jerk_mm_s3),
     ):
         for one, limit in zip(per_axis(values), both or (), strict=False):
             rise = np.abs(np.diff(one, 2, axis=1)).max(axis=1) / 8.0

@@ -9,6 +9,9 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
+_LEAST_GAIN = 0.05
+"""Of a step down in the logarithm of the peak, over that of the feed: less is taken as so much."""
+
 
 def highest(
     feed_mm_s: float,
@@ -25,20 +28,22 @@ def highest(
     close    how near to 0 the excess may stay, and how narrow the bracket, when the search ends
     hair     what first steps go below proportion
 
-    Peaks go about with the feed: first steps in proportion until one obeys, then the secant between the
-    logarithms of feed and excess.
+    Peaks go about with the feed: first steps in proportion until one obeys, longer where the last one has brought less;
+    then the secant between the logarithms of feed and excess.
     """
     high, high_excess = log(feed_mm_s), excess
+    gain = 1.0
     low = low_excess = 0.0
     best: T | None = None
     for _ in range(most_trials):
         if best is None:
-            trial = high - high_excess - hair
+            trial = high - high_excess / gain - hair
         else:
             share = -low_excess / (high_excess - low_excess)
             trial = low + (high - low) * max(0.05, min(0.95, share))
         made, found = attempt(exp(trial))
         if found > 0.0:
+            gain = min(1.0, max(_LEAST_GAIN, (high_excess - found) / (high - trial)))
             high, high_excess = trial, found
             continue
         best, low, low_excess = made, trial, found

@@ -11,13 +11,20 @@ from ..errors import InputError
 POLICIES = ("respect", "report")
 LEAST_RESERVE, GREATEST_RESERVE = 2e-3, 0.9
 
+MACHINE_SHARE = 0.998
+"""Of the machine's axis limits: what plans use. The rest is for rounding, and for the controller's bounds of what lies
+between the places where it looks (docs/limits.md)."""
+
 PerAxis = tuple[float, float]
 """One value for x, one for y."""
 
 
 @dataclass(frozen=True)
 class AxisLimits:
-    """Limits of the motion of each axis, `[limits.axis]`; None: no limit. Raises InputError."""
+    """Limits of the motion of each axis, of a path file ([limits.axis]) or a machine file ([[axis]]); None: no limit.
+
+    Raises InputError.
+    """
 
     velocity_mm_s: PerAxis | None = None
     acceleration_mm_s2: PerAxis | None = None
@@ -32,6 +39,25 @@ class AxisLimits:
     def any(self) -> bool:
         """Whether one of them is given."""
         return any(getattr(self, one.name) is not None for one in fields(self))
+
+    def scaled(self, share: float) -> AxisLimits:
+        """The same limits times `share`."""
+        return AxisLimits(*(_scaled(getattr(self, one.name), share) for one in fields(self)))
+
+    def and_of(self, other: AxisLimits) -> AxisLimits:
+        """What keeps both: the lower of each."""
+        pairs = ((getattr(self, one.name), getattr(other, one.name)) for one in fields(self))
+        return AxisLimits(*(_lower(a, b) for a, b in pairs))
+
+
+def _scaled(both: PerAxis | None, share: float) -> PerAxis | None:
+    return None if both is None else (both[0] * share, both[1] * share)
+
+
+def _lower(a: PerAxis | None, b: PerAxis | None) -> PerAxis | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return min(a[0], b[0]), min(a[1], b[1])
 
 
 @dataclass(frozen=True)
@@ -52,7 +78,7 @@ class FeedCap:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of the path file; None: no limit.
+    """Limits of the path file, and of the machine's axes; None: no limit.
 
     feed_mm_s, acceleration_mm_s2, jerk_mm_s3   of the motion along the path (F', F'', F''')
     centripetal_mm_s2   feed^2 times curvature
@@ -63,8 +89,10 @@ class Limits:
     reserve             share of the axes' accelerations, jerks and volts that plans leave free, so that hold, resume
                         and override keep these limits too (docs/numerics.md section 7)
 
+    machine             of the motion of x and y by the machine file: they always bind
+
     policy "respect": the feed is lowered until the profile obeys; "report": it runs as asked and what
-    exceeds is listed. Profile "optimal" always obeys. Raises InputError.
+    exceeds is listed, but the machine's limits are kept. Profile "optimal" always obeys. Raises InputError.
     """
 
     feed_mm_s: float | None = None
@@ -76,6 +104,7 @@ class Limits:
     axis: AxisLimits = field(default_factory=AxisLimits)
     caps: tuple[FeedCap, ...] = ()
     reserve: float = 0.05
+    machine: AxisLimits = field(default_factory=AxisLimits)
 
     def __post_init__(self) -> None:
         for name in _SCALARS:
@@ -92,7 +121,29 @@ class Limits:
     @property
     def bind(self) -> bool:
         """Whether one of them bounds the motion everywhere; caps alone do not."""
-        return self.axis.any or any(getattr(self, name) is not None for name in _SCALARS)
+        return self.axes.any or any(getattr(self, name) is not None for name in _SCALARS)
+
+    @property
+    def axes(self) -> AxisLimits:
+        """What a plan obeys of x and y: the path file's, and MACHINE_SHARE of the machine's where that is less."""
+        return self.axis.and_of(self.machine.scaled(MACHINE_SHARE))
+
+    @property
+    def axes_whole(self) -> AxisLimits:
+        """What a motion has to keep of x and y: the same, with the whole of the machine's."""
+        return self.axis.and_of(self.machine)
+
+    @property
+    def of_machine(self) -> Limits:
+        """The machine's only."""
+        return Limits(reserve=self.reserve, machine=self.machine)
+
+    def source(self, name: str, axis: int) -> str:
+        """Whose limit of an axis (0: x) binds: "limits" of the path file, "machine", or "drive" (volts)."""
+        if name == "volts":
+            return "drive" if self.volts is None else "limits"
+        own, used = getattr(self.axis, name), getattr(self.axes, name)
+        return "limits" if own is not None and own[axis] == used[axis] else "machine"
 
 
 _SCALARS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "centripetal_mm_s2", "volts")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,12 +40,12 @@ def override_bounds(
     jerk_mm_s3: Real,
     controller: ControllerLimits,
     program: Limits,
-    room: Room | None = None,
+    rooms: Sequence[Room] = (),
 ) -> OverrideBounds:
     """Bounds from the peaks of each piece (M,), such that for every |lambda| <= factor,
     |lambda'| <= rate, |lambda''| <= second rate the controller's limits hold, and at constant
-    lambda <= factor the program's too. `room`, if given, is that along the path; if the plan obeys
-    its limits, they hold for every motion of lambda as the controller's do.
+    lambda <= factor the program's too. `rooms` are those along the path; where the plan obeys the limits of one,
+    they hold for every motion of lambda as the controller's do.
     """
     v, a, j = (np.maximum(p, _TINY) for p in (feed_mm_s, acceleration_mm_s2, jerk_mm_s3))
     factor = np.minimum.reduce(
@@ -57,10 +58,10 @@ def override_bounds(
             np.cbrt(_ratio(program.jerk_mm_s3, j)),
         )
     )
-    binding = room if room is not None and room.bounds.obeyed else None
-    if room is not None:
+    for room in rooms:
         factor = np.minimum(factor, room.factor())
-    if binding is not None:
+    binding = [room for room in rooms if room.bounds.obeyed]
+    if binding:
         factor = np.where(factor < _LEAST_FACTOR, 1.0, factor)
     # Rounded first: the rates then use the room that the stored factor really leaves.
     factor_q24 = np.floor(np.clip(factor * _HAIR, 1.0, GREATEST_FACTOR) * 2.0**24)
@@ -71,16 +72,16 @@ def override_bounds(
 
     def rates(share: float) -> tuple[Real, Real]:
         rate = own_rate
-        if binding is not None:
-            rate = np.minimum(rate, binding.rate(factor, share))
+        for one in binding:
+            rate = np.minimum(rate, one.rate(factor, share))
         rate_q16 = np.floor(np.clip(rate * _HAIR * 2.0**16, 0.0, _U32_MAX))
         second = (room_j - 3.0 * factor * (rate_q16 / 2.0**16) * a) / v
-        if binding is not None:
-            second = np.minimum(second, binding.second(factor, rate_q16 / 2.0**16))
+        for one in binding:
+            second = np.minimum(second, one.second(factor, rate_q16 / 2.0**16))
         return rate_q16, np.floor(np.clip(second * _HAIR * 2.0**8, 0.0, _U32_MAX))
 
     rate_q16, second_q8 = rates(RATE_SHARES[0])
-    for share in RATE_SHARES[1:] if binding is not None else ():
+    for share in RATE_SHARES[1:] if binding else ():
         other = rates(share)
         better = _hold_s(*other) < _hold_s(rate_q16, second_q8)
         rate_q16 = np.where(better, other[0], rate_q16)

@@ -181,6 +181,7 @@ class FeedPlan:
     notes: tuple[str, ...]
     excesses: tuple[Excess, ...]
     path: PathBounds | None = None
+    machine: PathBounds | None = None
 
     @property
     def profile(self) -> str:
@@ -251,7 +252,7 @@ class FeedPlan:
     @cached_property
     def pieces(self) -> FeedPieces:
         """`raw` with the override bounds of each piece."""
-        return with_override(self.raw, self.controller, self.limits, self.path)
+        return with_override(self.raw, self.controller, self.limits, self.path, self.machine)
 
     def pieces_over(
         self, length_q40: int, joints_q40: NDArray[np.int64] | None = None
@@ -264,7 +265,7 @@ class FeedPlan:
         if not self.line.constant_s:
             ramp = replace(ramp, feed_mm_s=float(length / Fraction(ramp.time_s)))
         raw = quantise(timeline(ramp, length), length_q40, self.period_us)
-        return with_override(raw, self.controller, self.limits, self.path)
+        return with_override(raw, self.controller, self.limits, self.path, self.machine)
 
     def slowed(self, caps: Sequence[FeedCap], reason: str) -> FeedPlan:
         """Planned again with the feed nowhere above the least of the caps; `reason` goes to the notes."""
@@ -278,12 +279,12 @@ class FeedPlan:
 
 
 def with_override(
-    raw: Pieces, controller: ControllerLimits, limits: Limits, path: PathBounds | None = None
+    raw: Pieces, controller: ControllerLimits, limits: Limits, *paths: PathBounds | None
 ) -> FeedPieces:
     """Pieces with bounds of the override: of the controller's limits, and of those along a path."""
     peaks = derivative_peaks(raw.duration_q32_s, raw.c_q40)
-    room = Room(path, raw) if path is not None and path.bind else None
-    override = override_bounds(*peaks, controller, limits, room)
+    rooms = [Room(path, raw) for path in paths if path is not None and path.bind]
+    override = override_bounds(*peaks, controller, limits, rooms)
     return FeedPieces(
         raw.duration_q32_s,
         raw.start_q40,

@@ -64,7 +64,7 @@ def plan_again(plan: FeedPlan, feed_mm_s: float, reason: str) -> FeedPlan:
         plan.period_us,
         (Cap(feed_mm_s, reason),),
     )
-    return replace(again, path=plan.path)
+    return replace(again, path=plan.path, machine=plan.machine)
 
 
 def _plan(

@@ -63,7 +63,7 @@ class Room:
     @cached_property
     def axes(self) -> tuple[Axis, Axis]:
         """x and y."""
-        samples, limits = self._samples, self.bounds.limits.axis
+        samples, limits = self._samples, self.bounds.limits.axes
         free = (np.inf, np.inf)
         plants = self.bounds.plants or (None, None)
         out = [

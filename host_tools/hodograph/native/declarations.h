@@ -19,6 +19,7 @@ struct program {
 struct program_limits {
     uint32_t period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
     int64_t min_q40_mm[2], max_q40_mm[2];
+    uint32_t axis_velocity_um_s[2], axis_acceleration_um_s2[2], axis_jerk_mm_s3[2];
 };
 struct program_fault {
     int code;

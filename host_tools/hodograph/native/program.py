@@ -25,9 +25,10 @@ POINT = np.dtype(
 
 @dataclass(frozen=True)
 class NativeLimits:
-    """What a controller allows: struct program_limits. 0 stands for no limit in the first four.
+    """What a controller allows: struct program_limits. 0 stands for no limit, but of the travel.
 
-    Travel limits are (x, y) in mm * 2^40; period in us, feed in um/s, acceleration in um/s^2, jerk in mm/s^3.
+    Those of travel and axes are (x, y), travel in mm * 2^40; period in us, feed and velocity in um/s, acceleration in
+    um/s^2, jerk in mm/s^3.
     """
 
     period_us: int = 0
@@ -36,6 +37,9 @@ class NativeLimits:
     jerk_mm_s3: int = 0
     min_q40_mm: tuple[int, int] = (-(2**52), -(2**52))
     max_q40_mm: tuple[int, int] = (2**52, 2**52)
+    axis_velocity_um_s: tuple[int, int] = (0, 0)
+    axis_acceleration_um_s2: tuple[int, int] = (0, 0)
+    axis_jerk_mm_s3: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True)

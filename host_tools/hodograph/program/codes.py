@@ -58,6 +58,10 @@ class ProgramError(IntEnum):
     JERK = -54
     OVERRIDE = -55
     PIECE_RESERVED = -56
+    AXIS_VELOCITY = -70
+    AXIS_ACCELERATION = -71
+    AXIS_JERK = -72
+    AXIS_STEP = -73
 
     @property
     def text(self) -> str:
@@ -112,4 +116,8 @@ _TEXTS = {
     ProgramError.JERK: "above its jerk limit",
     ProgramError.OVERRIDE: "override factor not in 1.0 ... 2.0, rate or second rate 0",
     ProgramError.PIECE_RESERVED: "reserved field of a piece is not 0",
+    ProgramError.AXIS_VELOCITY: "above the velocity limit of an axis",
+    ProgramError.AXIS_ACCELERATION: "above the acceleration limit of an axis",
+    ProgramError.AXIS_JERK: "above the jerk limit of an axis",
+    ProgramError.AXIS_STEP: "velocity or acceleration of an axis jumps at a joint",
 }

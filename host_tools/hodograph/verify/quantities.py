@@ -37,7 +37,7 @@ def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Qu
     """All that can be limited; volts only with the `drives` of both axes. Raises InputError: limited without."""
     if limits.volts is not None and len(drives) != len(AXES):
         raise InputError("limits: volts needs a machine whose axes x and y have drive files")
-    count = len(cells)
+    count, whole = len(cells), limits.axes_whole
 
     def row(name: str, unit: str, limit: float | None, of: Callable[[Motion], Real]) -> Quantity:
         return Quantity(name, unit, of, None if limit is None else np.full(count, limit))
@@ -52,14 +52,14 @@ def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Qu
         out += [
             row(f"{axis}_{name}", unit, None if both is None else both[k], _of_axis(field, k))
             for name, unit, field, both in (
-                ("velocity_mm_s", "mm/s", "axis_velocity", limits.axis.velocity_mm_s),
+                ("velocity_mm_s", "mm/s", "axis_velocity", whole.velocity_mm_s),
                 (
                     "acceleration_mm_s2",
                     "mm/s^2",
                     "axis_acceleration",
-                    limits.axis.acceleration_mm_s2,
+                    whole.acceleration_mm_s2,
                 ),
-                ("jerk_mm_s3", "mm/s^3", "axis_jerk", limits.axis.jerk_mm_s3),
+                ("jerk_mm_s3", "mm/s^3", "axis_jerk", whole.jerk_mm_s3),
             )
         ]
     for k, (axis, drive) in enumerate(zip(AXES, drives, strict=False)):

@@ -68,7 +68,7 @@ class Verification:
 
 
 def verify_program(program: Program, limits: Limits, drives: Sequence[Drive] = ()) -> Verification:
-    """Looks at every instant of a program that passes `program.check`.
+    """Looks at every instant of a program that passes `program.check`; the machine's limits count where they are lower.
 
     `drives` of x and y turn motion into volts. Raises InputError: volts are limited, and there are no drives.
     """
@@ -136,7 +136,7 @@ def _step(cells: Cells, limits: Limits) -> Peak:
         jump = np.maximum(jump, np.abs(np.append(after, 0.0) - np.insert(before, 0, 0.0)))
     worst = int(jump.argmax())
     cell, u = np.array([min(worst, len(cells) - 1)]), np.array([float(worst == len(cells))])
-    jerks = [limits.jerk_mm_s3, *(limits.axis.jerk_mm_s3 or ())]
+    jerks = [limits.jerk_mm_s3, *(limits.axes_whole.jerk_mm_s3 or ())]
     given = [jerk for jerk in jerks if jerk is not None]
     return Peak(
         "acceleration_step_mm_s2",

@@ -39,7 +39,7 @@ def test_files_without_the_new_keys_ask_for_the_defaults() -> None:
         for (index, sub), value in wanted("paper_alpha").items()
         if dictionary.get_variable(index, sub or 0).default != value
     }
-    assert changed <= {0x2004, 0x2006, 0x2007, 0x2018, 0x201F}
+    assert changed <= {0x2004, 0x2006, 0x2007, 0x2018, 0x201F, 0x2030, 0x2031, 0x2032}
     assert wanted("paper_alpha")[0x2004, 11] == 0
 
 

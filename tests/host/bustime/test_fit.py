@@ -14,6 +14,8 @@ from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.errors import InputError
 
+LIMITS = "velocity_mm_s = 500\nacceleration_mm_s2 = 5000\njerk_mm_s3 = 200000\n"
+
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
 
@@ -67,7 +69,7 @@ def test_refused_with_advice(
 def test_what_feedforward_takes(tmp_path: Path, feedforward: str, drives: int, advice: str) -> None:
     file = Path(machine(tmp_path, 1_000_000, 1000))
     head = file.read_text().split("[[axis]]")[0]
-    axis = f'[[axis]]\nname = "a"\nnode = %d\ntravel_mm = [0, 1]\nfeedforward = {feedforward}\n'
+    axis = f'[[axis]]\nname = "a"\nnode = %d\ntravel_mm = [0, 1]\n{LIMITS}feedforward = {feedforward}\n'
     axis += 'drive = "../drives/alpha_x.toml"\n'
     file.write_text(head + "".join(axis % node for node in range(2, 2 + drives)))
     with pytest.raises(InputError, match=rf"{drives} drives need up to .*: use .*{advice}"):
@@ -77,7 +79,7 @@ def test_what_feedforward_takes(tmp_path: Path, feedforward: str, drives: int, a
 def test_drives_without_a_model_send_no_volts(tmp_path: Path) -> None:
     file = Path(machine(tmp_path, 1_000_000, 1000))
     head = file.read_text().split("[[axis]]")[0]
-    axis = '[[axis]]\nname = "a"\nnode = %d\ntravel_mm = [0, 1]\nfeedforward = {torque_permille_s_m = 1}\n'
+    axis = f'[[axis]]\nname = "a"\nnode = %d\ntravel_mm = [0, 1]\n{LIMITS}feedforward = {{torque_permille_s_m = 1}}\n'
     file.write_text(head + "".join(axis % node for node in (2, 3, 4)))
     require_fit(load_machine(file))
     require_fit(load_machine(EXAMPLES / "machines" / "real_drives.toml"))

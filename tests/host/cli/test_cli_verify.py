@@ -13,7 +13,7 @@ from hodograph.cli.main import main
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 KEYS = {
-    "kept", "duration_s", "length_mm", "samples", "peak", "excesses", "setpoints", "bus_noise",
+    "controller", "kept", "duration_s", "length_mm", "samples", "peak", "excesses", "setpoints", "bus_noise",
 }  # fmt: skip
 PEAK_KEYS = {"value", "at_most", "limit", "ratio", "s_mm", "t_s"}
 
@@ -42,7 +42,7 @@ def test_keys(capsys: pytest.CaptureFixture[str]) -> None:
     for peak in found["peak"].values():
         assert set(peak) == PEAK_KEYS
     assert found["peak"]["jerk_mm_s3"]["limit"] == 50000.0
-    assert found["peak"]["y_jerk_mm_s3"]["ratio"] is None
+    assert found["peak"]["centripetal_mm_s2"]["ratio"] is None
 
 
 def test_beyond_a_limit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -64,7 +64,7 @@ def test_a_little_beyond_is_told_and_kept(
     file = path_file(tmp_path, limits)
     found = document(capsys, 0, str(file))
     assert found["kept"]
-    assert found["excesses"][0]["ratio"] == pytest.approx(1.0005, abs=1e-6)
+    assert found["excesses"][0]["ratio"] == pytest.approx(1.0005, abs=1e-4)  # verify.peaks.GAP
     assert main(["verify", str(file)]) == 0
     told = f"({len(found['excesses'])}, none by more than 0.1 %):"
     assert f"worst place of each stretch {told}" in capsys.readouterr().out

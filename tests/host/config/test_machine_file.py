@@ -99,6 +99,8 @@ MISTAKES = [
     ("[work]", "[supervision]\nmissed_max = -1\n[work]", r"\[supervision\] missed_max must be from 0 to 255"),
     ("[work]", "[supervision]\nanswer_wait_ms = 300\n[work]", r"setpoint_timeout_ms is 200: must be above"),
     ("[work]", "[supervision]\nanswer_wait = 3\n[work]", r'did you mean "answer_wait_ms"\?'),
+    ("velocity_mm_s = 500\nacc", "acc", r"\[axis 2\] velocity_mm_s is missing: add"),
+    ("jerk_mm_s3 = 200000\ncounts", "counts", r"\[axis 1\] jerk_mm_s3 is missing: add"),
     ("node = 3", "node = 3\nfollowing_window_mm = 0", r"\[axis 2\] following_window_mm must be from"),
     ("node = 3", "node = 3\nquick_stop_mm_s2 = 5000", r"quick_stop_mm_s2 must be from 1e-06 to 4295.0 \(u32 in counts"),
     ("node = 3", "node = 3\nhoming = {speed_mm_s = 3}", r"\[axis 2.homing\] method is missing"),
@@ -126,6 +128,7 @@ def test_mistakes(tmp_path: Path, old: str, new: str, message: str) -> None:
 def test_one_to_six_axes(tmp_path: Path, count: int) -> None:
     file = machine_with(tmp_path, "[work]", "[work]")
     text, axis = file.read_text().split("[[axis]]")[0], "[[axis]]\nname = 'a{0}'\nnode = {0}\n"
+    axis += "velocity_mm_s = 500\nacceleration_mm_s2 = 5000\njerk_mm_s3 = 200000\n"
     axis += "travel_mm = [-1, 1]\ndrive = '../drives/alpha_x.toml'\n"
     file.write_text(text + "".join(axis.format(node) for node in range(2, 2 + count)))
     if count == 7:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hodograph.chain import load_chain
 from hodograph.config import load_path_file
 from hodograph.errors import InputError
 from hodograph.feed import AxisLimits, FeedCap
@@ -84,7 +85,7 @@ def test_every_limit(tmp_path: Path) -> None:
 OPTIMAL = "[path]\nclosed = true\nthrough = [[0,0],[1,0],[1,1]]\n[feed]\nprofile = 'optimal'\n"
 
 
-def test_optimal_needs_limits_and_nothing_else(tmp_path: Path) -> None:
+def test_optimal_needs_no_nominal_feed(tmp_path: Path) -> None:
     found = load_path_file(write(tmp_path, OPTIMAL + "[limits]\nvolts = 4\n"))
     assert found.feed.optimal
     assert found.feed.nominal_mm_s == inf
@@ -92,8 +93,10 @@ def test_optimal_needs_limits_and_nothing_else(tmp_path: Path) -> None:
     assert load_path_file(write(tmp_path, capped)).feed.nominal_mm_s == 30.0
     cap = "[[limits.cap]]\nfrom_mm = 0\nto_mm = 1\nfeed_mm_s = 9\n"
     for text in (OPTIMAL, OPTIMAL + cap):
-        with pytest.raises(InputError, match=r'\[feed\] profile "optimal" has no limit to obey'):
-            load_path_file(write(tmp_path, text))
+        with pytest.raises(
+            InputError, match=r'profile "optimal" has no limit to obey: name a machine'
+        ):
+            _ = load_chain(write(tmp_path, text)).plan
 
 
 def test_defaults(tmp_path: Path) -> None:

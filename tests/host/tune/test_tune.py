@@ -169,7 +169,9 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
         .read_text()
         .replace("period_us = 1000 ", "period_us = 2000 ")
     )
-    third = '\n[[axis]]\nname = "z"\nnode = 4\ntravel_mm = [0, 9]\ndrive = "../drives/alpha_x.toml" # z\n'
+    third = '\n[[axis]]\nname = "z"\nnode = 4\ntravel_mm = [0, 9]\n'
+    third += "velocity_mm_s = 500\nacceleration_mm_s2 = 5000\njerk_mm_s3 = 200000\n"
+    third += 'drive = "../drives/alpha_x.toml" # z\n'
     (machines / "given.toml").write_text(text + third)
     output = tmp_path / "tuned.toml"
     arguments = ("tune", str(machines / "given.toml"), "--bandwidth", "60", "-o", str(output))

@@ -65,6 +65,9 @@ def _axis(axis: Axis, counts_per_mm: int) -> Iterator[tuple[int, int]]:
     yield objects.AXIS_NODE, axis.node
     yield objects.TRAVEL_MINIMUM, counts(axis.travel_min_mm)
     yield objects.TRAVEL_MAXIMUM, counts(axis.travel_max_mm)
+    yield objects.AXIS_VELOCITY_LIMIT, round(axis.velocity_mm_s * 1000)
+    yield objects.AXIS_ACCELERATION_LIMIT, round(axis.acceleration_mm_s2 * 1000)
+    yield objects.AXIS_JERK_LIMIT, round(axis.jerk_mm_s3)
     homing, forward, scaling = axis.homing, axis.feedforward, axis.scaling
     yield objects.HOMING_METHOD, homing.method
     yield objects.HOME_OFFSET, counts(homing.offset_mm)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -48,6 +49,7 @@ class Bounds:
     axis_share  the part of the axes' accelerations, jerks and volts that is meant to be used; what is said here
                 of them has the reserve taken off already
     sources  whose the tangential bounds are: feed, acceleration, jerk
+    axis_source  whose those of an axis are, by key and axis: section of a Source
     """
 
     feed_mm_s: float
@@ -61,6 +63,7 @@ class Bounds:
     axis_share: float
     caps: Real
     sources: tuple[Source, Source, Source]
+    axis_source: Callable[[str, int], str]
     notes: tuple[str, ...] = ()
 
     @property
@@ -120,7 +123,7 @@ def gather(
         (Source("limits", "jerk_mm_s3"), limits.jerk_mm_s3),
         *_kept(controller, "jerk_mm_s3"),
     )
-    axis = limits.axis
+    axis = limits.axes
     notes = []
     share = 1.0 - limits.reserve
     bounds = Bounds(
@@ -135,6 +138,7 @@ def gather(
         share,
         np.array([[c.from_mm, c.to_mm, c.feed_mm_s] for c in limits.caps]).reshape(-1, 3),
         (feed_source, acceleration_source, jerk_source),
+        limits.source,
     )
     if bounds.jerk_mm_s3 == inf and max(bounds.jerk) == inf:
         peak = bounds.least_acceleration
@@ -170,12 +174,12 @@ def _kept(controller: ControllerLimits | None, key: str) -> list[tuple[Source, f
 def _held(limits: Limits, controller: ControllerLimits | None) -> list[tuple[Source, float]]:
     """Feeds up to which the reserve of a limit leaves the rates of a hold room that the format knows."""
     given = [
-        (Source("limits", f"axis.{key} of {axis}"), value, limits.reserve, by)
+        (Source(limits.source(key, k), f"axis.{key} of {'xy'[k]}"), value, limits.reserve, by)
         for key, both, by in (
-            ("acceleration_mm_s2", limits.axis.acceleration_mm_s2, _MOST_BY_ACCELERATION),
-            ("jerk_mm_s3", limits.axis.jerk_mm_s3, _MOST_BY_JERK),
+            ("acceleration_mm_s2", limits.axes.acceleration_mm_s2, _MOST_BY_ACCELERATION),
+            ("jerk_mm_s3", limits.axes.jerk_mm_s3, _MOST_BY_JERK),
         )
-        for axis, value in zip("xy", both or (), strict=False)
+        for k, value in enumerate(both or ())
     ]
     if controller is not None:
         for key, by in (

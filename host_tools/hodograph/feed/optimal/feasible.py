@@ -157,15 +157,17 @@ def allowed(spline: PHSpline, bounds: Bounds) -> Iterator[Allowed]:
             ("acceleration_mm_s2", bounds.acceleration[k], two, 2),
             ("jerk_mm_s3", bounds.jerk[k], three, 3),
         ):
-            source = Source(
-                "limits", f"axis.{key} of {'xy'[k]}", bounds.axis_share if power > 1 else 1.0
-            )
+            share = bounds.axis_share if power > 1 else 1.0
+            source = Source(bounds.axis_source(key, k), f"axis.{key} of {'xy'[k]}", share)
             with np.errstate(divide="ignore"):
                 yield _steady(s, source, bound, (bound / vector) ** (1.0 / power), power)
             if power > 1:
                 yield _reached(s, source, bound, float(one.max()), power)
         if bounds.plants is not None:
-            yield _volts(s, bounds.plants[k], bounds.axis_share, "xy"[k], one, two)
+            source = Source(
+                bounds.axis_source("volts", k), f"volts of {'xy'[k]}", bounds.axis_share
+            )
+            yield _volts(s, bounds.plants[k], source, one, two)
 
 
 def _places(spline: PHSpline) -> tuple[Real, NDArray[np.int8]]:
@@ -208,7 +210,7 @@ def _reached(s: Real, source: Source, bound: float, part: float, power: int) -> 
     return Allowed(source, bound / source.share, feed, 2.0 * length / peak, power, 0.0)
 
 
-def _volts(s: Real, plant: Plant, share: float, axis: str, one: Real, two: Real) -> Allowed:
+def _volts(s: Real, plant: Plant, source: Source, one: Real, two: Real) -> Allowed:
     """Reach >= |c1| v + T |c2| v^2 at constant feed v."""
     reach, bend = max(plant.reach_mm_s, 0.0), plant.time_constant_s * two
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -216,6 +218,5 @@ def _volts(s: Real, plant: Plant, share: float, axis: str, one: Real, two: Real)
         feed = np.where(np.isnan(feed), inf, feed)
         slowness = 1.0 / feed
     time_s = float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(s)))
-    given = plant.friction_volts + (plant.volts - plant.friction_volts) / share
-    source = Source("limits", f"volts of {axis}", share)
+    given = plant.friction_volts + (plant.volts - plant.friction_volts) / source.share
     return _Volts(source, given, feed, time_s, 2, plant.friction_volts, plant, one, bend)

@@ -197,7 +197,7 @@ def plan_optimal(
     check_length(spline.length_mm)
     if not limits.bind:
         raise InputError(
-            'feed: profile "optimal" has no limit to obey: add one to [limits] at least'
+            'feed: profile "optimal" has no limit to obey: name a machine, or add one to [limits]'
         )
     bounds = gather(request, limits, controller, plants, period_us)
     check_feasible(spline, bounds, LONGEST_S)

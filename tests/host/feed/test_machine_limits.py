@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""The limits of a machine's axes bind every plan, whatever the path file says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.chain import Chain
+from hodograph.config import Machine, load_machine, load_path_file
+from hodograph.errors import PlanError
+from hodograph.feed import AxisLimits, Limits
+from hodograph.feed.limits import MACHINE_SHARE
+from hodograph.verify import verify_program
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+NEAR = "[[0, 0], [10, 0], [10.000001, 0], [20, 5]]"
+FEEDS = {
+    "quintic": 'profile = "quintic"\nnominal_mm_s = 100\nramp_time_s = 0.1\n',
+    "optimal": 'profile = "optimal"\n',
+}
+QUANTITIES = [
+    f"{axis}_{name}"
+    for axis in "xy"
+    for name in ("velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+]
+
+
+def machine(**limits: float) -> Machine:
+    """That of the alpha, with other limits of its axes."""
+    found = load_machine(EXAMPLES / "machines" / "paper_alpha.toml")
+    return replace(found, axes=tuple(replace(axis, **limits) for axis in found.axes))
+
+
+def chain(folder: Path, points: str, profile: str, policy: str, on: Machine) -> Chain:
+    file = folder / "path.toml"
+    limits = f'[limits]\npolicy = "{policy}"\n'
+    file.write_text(f"[path]\nclosed = false\nthrough = {points}\n[feed]\n{FEEDS[profile]}{limits}")
+    return Chain(load_path_file(file), on)
+
+
+@pytest.mark.parametrize("policy", ["respect", "report"])
+@pytest.mark.parametrize("profile", FEEDS)
+def test_two_points_nearly_equal(tmp_path: Path, profile: str, policy: str) -> None:
+    on = machine()
+    made = chain(tmp_path, NEAR, profile, policy, on)
+    found = verify_program(
+        made.program, Limits(machine=made.limits.machine), [a.drive for a in on.plane if a.drive]
+    )
+    peaks = {peak.quantity: peak for peak in found.peaks}
+    for name in QUANTITIES:
+        assert peaks[name].limit is not None
+        assert peaks[name].at_most <= peaks[name].limit, name
+    assert peaks["x_volts"].value <= 5.0
+    assert peaks["y_volts"].value <= 5.0
+    if profile == "quintic":
+        assert any("machine axis x jerk_mm_s3 = 200000" in note for note in made.notes(made.plan))
+
+
+@pytest.mark.parametrize("name", ["velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3"])
+@pytest.mark.parametrize("profile", FEEDS)
+def test_each_limit_binds(tmp_path: Path, profile: str, name: str) -> None:
+    """A tenth of what the plan would use otherwise: then that is what it uses, nearly in full."""
+    points = "[[0, 0], [10, 3], [20, -4], [35, 5]]"
+    free = chain(tmp_path, points, profile, "respect", machine())
+    peaks = {p.quantity: p for p in verify_program(free.program, free.limits).peaks}
+    limit = 0.1 * max(peaks[f"{axis}_{name}"].value for axis in "xy")
+    made = chain(tmp_path, points, profile, "respect", machine(**{name: limit}))
+    found = {p.quantity: p for p in verify_program(made.program, made.limits).peaks}
+    used = max(found[f"{axis}_{name}"].value for axis in "xy")
+    assert 0.9 * limit < used <= limit
+
+
+def test_a_curve_that_no_feed_can_follow_is_named_with_place_and_curvature(tmp_path: Path) -> None:
+    on = machine(jerk_mm_s3=1.0, acceleration_mm_s2=0.1, velocity_mm_s=0.01)
+    with pytest.raises(
+        PlanError,
+        match=r"obeys .* at [\d.]+ mm, where the curvature is .* 1/mm \(radius .* mm\): raise",
+    ):
+        _ = chain(tmp_path, NEAR, "quintic", "respect", on).plan
+
+
+def test_the_lower_limit_counts() -> None:
+    path = AxisLimits(velocity_mm_s=(10.0, 30.0), jerk_mm_s3=(5.0, 5.0))
+    both = path.and_of(AxisLimits(velocity_mm_s=(20.0, 20.0), acceleration_mm_s2=(1.0, 2.0)))
+    assert both == AxisLimits((10.0, 20.0), (1.0, 2.0), (5.0, 5.0))
+    limits = Limits(axis=path, machine=AxisLimits(velocity_mm_s=(20.0, 20.0)))
+    assert limits.source("velocity_mm_s", 0) == "limits"
+    assert limits.source("velocity_mm_s", 1) == "machine"
+    assert np.allclose(limits.axes.velocity_mm_s, (10.0, 20.0 * MACHINE_SHARE))
