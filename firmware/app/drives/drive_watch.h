@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_watch: heartbeats and emergency messages of the drives. Mainline; takes the port's lock
- * where it touches the machine. */
+/*
+ * drive_watch: heartbeats and emergency messages of the drives, and what they mean for the zero of a homed axis: a drive that
+ * has been silent for as long as its heartbeats may be, also while it was looked for, may have been switched off and on, and
+ * nobody heard its boot-up message. Mainline; takes the port's lock where it touches the machine.
+ */
 #ifndef APP_DRIVES_DRIVE_WATCH_H
 #define APP_DRIVES_DRIVE_WATCH_H
 
@@ -14,6 +17,7 @@
 
 struct drive_watch {
     struct heartbeat_consumer consumers[AXES_MAX];
+    uint32_t silent_us[AXES_MAX]; /* since the last heartbeat, whatever has begun anew since */
     uint8_t count;
 };
 

@@ -55,6 +55,7 @@ static uint16_t step_enable(struct homing *homing, struct machine *machine)
     axis->goal = CIA402_GOAL_ENABLED;
     if (axis_enabled(axis)) {
         axis->control_extra = CIA402_CONTROL_START_HOMING;
+        axis->homed = false; /* from here on the drive may have moved its zero */
         homing_enter(homing, machine, HOMING_MOVE);
     }
     return over(homing, machine, HOMING_SWITCH_US) ? FAULT_NOT_ENABLED : 0u;
