@@ -8,7 +8,7 @@
 #define RECORD_BYTES 16u
 
 static uint8_t parameters[PORT_STORE_BANKS_ALL - PORT_STORE_BANKS][PORT_STORE_PARAMETER_BYTES]
-    __attribute__((aligned(8)));
+    __attribute__((section(".store"), aligned(8)));
 
 static uint8_t *bank_at(unsigned bank)
 {
