@@ -76,8 +76,6 @@ def _configuration_words(status: Status) -> str:
         words.append(f"another one is stored, CRC-32 {found.stored_crc32:08x}")
     elif found.state == "confirmed":
         words.append("stored")
-    if status.program.state == "ready" and found.program_crc32 != found.crc32:
-        words.append("the program was checked under another one and is checked again at its start")
     return "; ".join(words)
 
 

@@ -85,8 +85,8 @@ class LoadedProgram:
 class Configured:
     """What the controller's configuration is and where it is from; CRC-32s as of docs/protocol.md section 3.4.
 
-    `state` and `stored` are words of CONFIGURED and STORED. `program_crc32`: under which configuration the loaded program
-    was checked last; another one than `crc32`: it is checked again before it starts.
+    `state` and `stored` are words of CONFIGURED and STORED. `program_crc32`: under which configuration the loaded
+    program was checked last; another one than `crc32`: it is checked again before it starts.
     """
 
     state: str

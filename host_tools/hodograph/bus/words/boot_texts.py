@@ -97,8 +97,9 @@ class BootTrouble:
 def boot_trouble(
     node: int, place: int, abort_code: int, value: int, expected: int | None = None
 ) -> BootTrouble | None:
-    """The content of 0x2025 with words for it; None when nothing is wrong. `place` is index << 8 + sub; `expected`: what
-    should be there, where that is known.
+    """The content of 0x2025 with words for it; None when nothing is wrong.
+
+    `place` is index << 8 + sub; `expected`: what should be there, where that is known.
     """
     if node == 0:
         return None
