@@ -20,7 +20,8 @@
 struct bank_record {
     uint32_t sequence;
     uint32_t size; /* of the content, bytes */
-    uint32_t tag;  /* a program: CRC-32 of the configuration it was checked against; parameters: CRC-32 of the content */
+    uint32_t
+        tag; /* a program: CRC-32 of the configuration it was checked against; parameters: CRC-32 of the content */
 };
 
 /* Bytes of a bank that are left for the content. */

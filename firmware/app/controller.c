@@ -42,8 +42,7 @@ static void init_values(struct controller *controller, uint8_t port_node)
 
 bool controller_configured(const struct controller *controller)
 {
-    return controller->configured.known &&
-           controller->configured.crc32 == controller->config.crc32;
+    return controller->configured.known && controller->configured.crc32 == controller->config.crc32;
 }
 
 void controller_init(struct controller *controller, uint8_t node)

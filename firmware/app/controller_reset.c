@@ -35,10 +35,9 @@ void controller_reset_values(struct controller *controller)
     controller->values = od_controller_defaults;
     const bool restored =
         parameter_store_restore(&controller->store, &controller->od, 0, LAST_OBJECT);
-    controller->configured =
-        (struct configured){.known = restored && controller->store.confirmed,
-                            .restored = restored,
-                            .crc32 = controller->store.config_crc32};
+    controller->configured = (struct configured){.known = restored && controller->store.confirmed,
+                                                 .restored = restored,
+                                                 .crc32 = controller->store.config_crc32};
     od_controller_set_node(&controller->values, controller->node);
     forget_errors(controller);
 }

@@ -133,7 +133,7 @@ static uint64_t machine_number(const struct controller *controller, const struct
     case 0x202A:
         return controller->boot.facts[entry->sub - 1u].value[entry->index - 0x2027u];
     default:
-        return od_read_axis(&machine->axes[entry->sub - 1u], entry->index);
+        return entry->sub > 0u ? od_read_axis(&machine->axes[entry->sub - 1u], entry->index) : 0u;
     }
 }
 

@@ -41,7 +41,8 @@ static const struct od_entry *next_parameter(const struct od *od, const struct o
 static uint32_t layout_crc(const struct od *od)
 {
     uint32_t crc = 0;
-    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL; p = next_parameter(od, p)) {
+    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL;
+         p = next_parameter(od, p)) {
         uint8_t bytes[4];
         cob_put16(bytes, p->index);
         bytes[2] = p->sub;
@@ -54,7 +55,8 @@ static uint32_t layout_crc(const struct od *od)
 static uint32_t content_bytes(const struct od *od)
 {
     uint32_t bytes = HEADER_BYTES;
-    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL; p = next_parameter(od, p)) {
+    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL;
+         p = next_parameter(od, p)) {
         bytes += p->size;
     }
     return (bytes + ALIGNMENT - 1u) / ALIGNMENT * ALIGNMENT;
@@ -62,7 +64,8 @@ static uint32_t content_bytes(const struct od *od)
 
 static bool values_allowed(const struct od *od, const uint8_t *value)
 {
-    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL; p = next_parameter(od, p)) {
+    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL;
+         p = next_parameter(od, p)) {
         const uint64_t number = cob_get(value, p->size);
         if (od_check_number(od, p, number) != SDO_OK ||
             (config_contains(p->index) && !config_value_allowed(p->index, p->sub, number))) {
@@ -128,7 +131,8 @@ bool parameter_store_restore(const struct parameter_store *store, struct od *od,
         return false;
     }
     const uint8_t *value = port_store_data(store->bank) + HEADER_BYTES;
-    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL; p = next_parameter(od, p)) {
+    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL;
+         p = next_parameter(od, p)) {
         if (p->index >= first && p->index <= last) {
             od_set_number(od, p, cob_get(value, p->size));
         }
@@ -158,7 +162,8 @@ static void put_content(struct writer *writer, const struct od *od, const uint8_
 {
     static const uint8_t zeros[ALIGNMENT] = {0};
     put(writer, header, HEADER_BYTES);
-    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL; p = next_parameter(od, p)) {
+    for (const struct od_entry *p = next_parameter(od, NULL); p != NULL;
+         p = next_parameter(od, p)) {
         uint8_t bytes[NUMBER_MAX];
         cob_put(bytes, od_number(od, p), p->size);
         put(writer, bytes, p->size);
@@ -195,15 +200,15 @@ static bool is_stored(const struct parameter_store *store, const struct od *od,
 
 static unsigned spare_bank(const struct parameter_store *store)
 {
-    const bool first = store->bank == PORT_STORE_PARAMETERS && store->state != PARAMETER_STORE_EMPTY;
+    const bool first =
+        store->bank == PORT_STORE_PARAMETERS && store->state != PARAMETER_STORE_EMPTY;
     return first ? PORT_STORE_PARAMETERS + 1u : PORT_STORE_PARAMETERS;
 }
 
 /* What has been written is read again, as the memory may not have taken it; the record goes last. */
 static int seal(struct parameter_store *store, unsigned bank, uint32_t size, uint32_t crc)
 {
-    const struct bank_record record = {
-        .sequence = store->sequence + 1u, .size = size, .tag = crc};
+    const struct bank_record record = {.sequence = store->sequence + 1u, .size = size, .tag = crc};
     struct bank_record found;
     if (crc32_update(0, port_store_data(bank), size) != crc) {
         return PORT_ERR_STORE;

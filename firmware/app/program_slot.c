@@ -88,9 +88,8 @@ static void adopt(struct program_slot *slot, const struct program *program, unsi
 static int seal(struct program_slot *slot, struct program *program, unsigned bank,
                 const struct config *config)
 {
-    const struct bank_record record = {.sequence = slot->sequence + 1u,
-                                       .size = program->header.image_size,
-                                       .tag = config->crc32};
+    const struct bank_record record = {
+        .sequence = slot->sequence + 1u, .size = program->header.image_size, .tag = config->crc32};
     const int result = program_table_write(bank, program, config->kernel);
     if (result != 0) {
         return result;
@@ -141,8 +140,7 @@ static void recover_bank(struct program_slot *slot, unsigned bank)
     struct bank_record record;
     struct program candidate;
     const struct bank_record best = {.sequence = slot->sequence, .size = 0, .tag = 0};
-    if (bank_record_read(bank, &record) &&
-        (!slot->present || bank_record_newer(&record, &best)) &&
+    if (bank_record_read(bank, &record) && (!slot->present || bank_record_newer(&record, &best)) &&
         program_open(&candidate, port_store_data(bank), record.size) == 0 &&
         candidate.header.image_size == record.size && sound(&candidate)) {
         adopt(slot, &candidate, bank, &record);

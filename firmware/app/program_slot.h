@@ -32,12 +32,12 @@ struct program_slot {
     struct program_fault refused;     /* last refusal; code 0: none */
     int32_t start_counts[PLANE_AXES]; /* first and last setpoint with the present configuration */
     int32_t end_counts[PLANE_AXES];
-    unsigned bank;     /* of the active program */
-    uint32_t sequence; /* of its record */
+    unsigned bank;         /* of the active program */
+    uint32_t sequence;     /* of its record */
     uint32_t config_crc32; /* of the configuration it was last checked against */
     bool present;
     bool receiving;
-    bool checked;    /* since power-on, under config_crc32; only then the next one and the ends hold */
+    bool checked; /* since power-on, under config_crc32; only then the next one and the ends hold */
     bool acceptable; /* within the limits of that configuration */
 };
 

@@ -104,9 +104,9 @@ void port_wake(void);
 
 /* --- Store: two banks for programs, two for parameters, so that what breaks off leaves the other one whole. Mainline --- */
 
-#define PORT_STORE_BANKS           2u /* 0 and 1: programs, as large as there is room for */
-#define PORT_STORE_PARAMETERS      2u /* 2 and 3: parameters, at least PORT_STORE_PARAMETER_BYTES each */
-#define PORT_STORE_BANKS_ALL       4u
+#define PORT_STORE_BANKS      2u /* 0 and 1: programs, as large as there is room for */
+#define PORT_STORE_PARAMETERS 2u /* 2 and 3: parameters, at least PORT_STORE_PARAMETER_BYTES each */
+#define PORT_STORE_BANKS_ALL  4u
 #define PORT_STORE_PARAMETER_BYTES 2048u
 
 uint32_t port_store_size(unsigned bank); /* bytes of a bank; those of a pair are alike */

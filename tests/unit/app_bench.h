@@ -24,7 +24,8 @@ struct app_bench {
     uint32_t starts;          /* NMT start commands seen */
     int32_t targets[2][2048]; /* setpoints sent while a program ran, by axis */
     uint32_t recorded;
-    bool unconfirmed; /* the host does not confirm the configuration; else it does before each command */
+    bool
+        unconfirmed; /* the host does not confirm the configuration; else it does before each command */
 };
 
 /* Controller and drives at power-on; drives stand at the positions. */

@@ -298,9 +298,8 @@ static void test_other_coordinates_lose_it(void)
     for (unsigned i = 0; i < sizeof objects / sizeof objects[0]; ++i) {
         setUp();
         home();
-        TEST_ASSERT_EQUAL_HEX32(SDO_OK,
-                                app_bench_write(&bench, objects[i].index, objects[i].sub,
-                                                objects[i].value, objects[i].size));
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, objects[i].index, objects[i].sub,
+                                                        objects[i].value, objects[i].size));
         app_bench_periods(&bench, 50);
         TEST_ASSERT_EQUAL_INT(objects[i].kept, homed(1));
     }

@@ -143,12 +143,12 @@ static void test_the_crc_covers_the_configuration(void)
         uint32_t value;
         bool counts;
     } objects[] = {
-        {0x1006, 0, 4, 2000, true},  {0x2004, 1, 1, 3, true},     {0x2004, 11, 1, 1, true},
-        {0x2005, 2, 1, 9, true},     {0x2006, 1, 4, 5, true},     {0x2013, 2, 4, 7, true},
-        {0x201A, 1, 4, 7, true},     {0x2023, 1, 4, 7, true},     {0x2041, 1, 4, 7, true},
-        {0x2043, 2, 4, 7, true},     {0x2005, 4, 1, 77, false},   {0x2043, 6, 4, 7, false},
-        {0x2010, 1, 2, 50, false},   {0x2011, 0, 8, 50, false},   {0x2044, 0, 1, 50, false},
-        {0x1017, 0, 2, 200, false},  {0x2045, 1, 1, 1, false},
+        {0x1006, 0, 4, 2000, true}, {0x2004, 1, 1, 3, true},   {0x2004, 11, 1, 1, true},
+        {0x2005, 2, 1, 9, true},    {0x2006, 1, 4, 5, true},   {0x2013, 2, 4, 7, true},
+        {0x201A, 1, 4, 7, true},    {0x2023, 1, 4, 7, true},   {0x2041, 1, 4, 7, true},
+        {0x2043, 2, 4, 7, true},    {0x2005, 4, 1, 77, false}, {0x2043, 6, 4, 7, false},
+        {0x2010, 1, 2, 50, false},  {0x2011, 0, 8, 50, false}, {0x2044, 0, 1, 50, false},
+        {0x1017, 0, 2, 200, false}, {0x2045, 1, 1, 1, false},
     };
     for (unsigned i = 0; i < sizeof objects / sizeof objects[0]; ++i) {
         const uint32_t before = read_u32(0x2040, 1);

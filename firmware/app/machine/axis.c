@@ -19,8 +19,7 @@ void axis_init(struct axis *axis, uint8_t node)
 void axis_forget(struct axis *axis, uint8_t node)
 {
     const bool homed = axis->homed && axis->node == node;
-    const int32_t kept_counts =
-        axis->answers.present ? axis->position_counts : axis->kept_counts;
+    const int32_t kept_counts = axis->answers.present ? axis->position_counts : axis->kept_counts;
     axis_init(axis, node);
     axis->homed = homed;
     axis->kept_counts = kept_counts;

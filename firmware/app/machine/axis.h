@@ -50,8 +50,8 @@ struct axis {
     uint32_t digital_inputs;          /* 0x60FD */
     int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
     bool homed;                       /* its drive has the zero that homing gave it */
-    int32_t kept_counts;              /* where it was when it was seen last before it was to be found again */
-    uint32_t rest_syncs;              /* in Quick stop active: for how long it has been at */
+    int32_t kept_counts; /* where it was when it was seen last before it was to be found again */
+    uint32_t rest_syncs; /* in Quick stop active: for how long it has been at */
     int32_t rest_counts;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };

@@ -100,7 +100,8 @@ struct machine {
     bool
         mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
     bool unhomed_allowed; /* the next start is accepted though axes are not homed */
-    uint8_t unhomed_axes; /* bit i: axis i + 1 has a homing method, and was not homed when this program started */
+    uint8_t
+        unhomed_axes; /* bit i: axis i + 1 has a homing method, and was not homed when this program started */
 };
 
 void machine_init(struct machine *machine, const struct config *config);

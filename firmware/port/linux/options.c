@@ -6,7 +6,8 @@
 #include <string.h>
 
 static const char help[] =
-    "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--store FILE]\n"
+    "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--store "
+    "FILE]\n"
     "                            [--verbose]\n"
     "\n"
     "The Hodograph motion controller as a CANopen node on a SocketCAN bus. All configuration comes "
@@ -19,9 +20,11 @@ static const char help[] =
     "  --pace PACE      real-time (default): one tick every period of the clock.\n"
     "                   fast: while axes move, the next tick as soon as all drives have answered "
     "(simulated drives)\n"
-    "  --store FILE     keep the program and the stored parameters in FILE, as a board keeps them over "
+    "  --store FILE     keep the program and the stored parameters in FILE, as a board keeps them "
+    "over "
     "a loss of power;\n"
-    "                   made where it is missing, some kilobytes on disk; without it both end with the "
+    "                   made where it is missing, some kilobytes on disk; without it both end with "
+    "the "
     "process\n"
     "  --verbose        notes about states on stderr\n"
     "\n"
@@ -79,8 +82,8 @@ static bool takes_value(const char *name)
 
 enum options_result options_parse(struct options *options, int argc, char **argv)
 {
-    *options =
-        (struct options){.bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME, .verbose = false};
+    *options = (struct options){
+        .bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME, .verbose = false};
     for (int i = 1; i < argc; ++i) {
         if (strcmp(argv[i], "--help") == 0) {
             (void)fputs(help, stdout);

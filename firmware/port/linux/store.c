@@ -18,7 +18,7 @@
     ((size_t)PORT_STORE_BANKS * PROGRAM_BYTES +                                                    \
      (size_t)(PORT_STORE_BANKS_ALL - PORT_STORE_BANKS) * PORT_STORE_PARAMETER_BYTES)
 #define RECORD_BYTES 16u
-#define OWNER_ONLY   0600
+#define OWNER_ONLY   (S_IRUSR | S_IWUSR)
 
 static uint8_t *memory;
 
