@@ -77,7 +77,7 @@ struct controller {
 };
 
 /* Everything to its power-on state: stored parameters are restored. `node` is the number of the port, which a stored one
- * (0x2044) replaces. */
+ * (0x2054) replaces. */
 void controller_init(struct controller *controller, uint8_t node);
 
 /* Turns the interrupts on. 0 or PORT_ERR_SYSTEM. */

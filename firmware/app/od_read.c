@@ -86,7 +86,7 @@ static uint64_t boot_number(const struct drive_boot *boot, uint8_t sub)
     }
 }
 
-/* Values of object 0x2040 sub 3. */
+/* Values of object 0x2050 sub 3. */
 enum { NOT_CONFIGURED = 0, CONFIRMED = 1, RESTORED = 2 };
 
 static uint64_t configuration_number(const struct controller *controller, uint8_t sub)
@@ -125,7 +125,7 @@ static uint64_t machine_number(const struct controller *controller, const struct
         return override_number(machine, entry->sub);
     case 0x2025:
         return boot_number(&controller->boot, entry->sub);
-    case 0x2045:
+    case 0x2055:
         return machine->unhomed_axes;
     case 0x2027:
     case 0x2028:
@@ -142,7 +142,7 @@ static bool is_mirror(const struct od_entry *entry)
     if (entry->index == 0x2002) {
         return true;
     }
-    if (entry->index == 0x2045) {
+    if (entry->index == 0x2055) {
         return entry->sub == 2u;
     }
     static const uint16_t records[] = {0x2003, 0x2008, 0x2009, 0x200A, 0x200B, 0x200C, 0x200D,
@@ -161,7 +161,7 @@ static bool read_own(struct controller *controller, const struct od_entry *entry
 {
     if (entry->index == 0x2000 && entry->sub > 1u) {
         od_set_number(&controller->od, entry, od_read_program(controller, entry->sub));
-    } else if (entry->index == 0x2040 && entry->sub > 0u) {
+    } else if (entry->index == 0x2050 && entry->sub > 0u) {
         od_set_number(&controller->od, entry, configuration_number(controller, entry->sub));
     } else if ((entry->index == 0x1010 || entry->index == 0x1011) && entry->sub > 0u) {
         od_set_number(&controller->od, entry, 1); /* CiA 301: it does so on command */

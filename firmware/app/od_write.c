@@ -35,7 +35,7 @@ static uint32_t keep(struct controller *controller, uint16_t index, uint64_t sig
     return result == 0 ? SDO_OK : SDO_ABORT_HARDWARE;
 }
 
-/* Object 0x2040 sub 2: the host expects exactly this configuration. */
+/* Object 0x2050 sub 2: the host expects exactly this configuration. */
 static uint32_t confirm(struct controller *controller, uint64_t crc32)
 {
     if (crc32 != controller->config.crc32) {
@@ -69,7 +69,7 @@ uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_
     if (entry->index == 0x1010 || entry->index == 0x1011) {
         return keep(controller, entry->index, number);
     }
-    if (entry->index == 0x2040) {
+    if (entry->index == 0x2050) {
         return confirm(controller, number);
     }
     if (entry->index == 0x1003) {

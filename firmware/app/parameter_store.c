@@ -15,7 +15,7 @@
 #define CONFIG_AT    4u
 #define CONFIRMED_AT 8u
 #define NUMBER_MAX   8u
-#define NODE_NUMBER  0x2044u
+#define NODE_NUMBER  0x2054u
 #define ALIGNMENT    8u /* port.h: what is written can be read at multiples of it */
 
 static bool is_parameter(const struct od_entry *entry)

@@ -7,7 +7,7 @@
  *     parameter_store_save(&store, &od, crc32, true);
  *
  * Parameters are all objects that can be read and written and that describe the machine, its drives, or this node on the
- * bus: 0x1006, 0x1016, 0x1017, 0x1029, the configuration (app/machine/config.h), the node number 0x2044. A save writes them to
+ * bus: 0x1006, 0x1016, 0x1017, 0x1029, the configuration (app/machine/config.h), the node number 0x2054. A save writes them to
  * the parameter bank that does not hold the newest ones, and the bank's record last (bank_record.h): wherever the power
  * goes, either the old parameters or the new ones are found again, whole. Layout of the content:
  *
@@ -26,7 +26,7 @@
 
 #include "canopen/od.h"
 
-/* Values of object 0x2040 sub 4. */
+/* Values of object 0x2050 sub 4. */
 enum parameter_store_state {
     PARAMETER_STORE_EMPTY = 0,    /* nothing has been stored */
     PARAMETER_STORE_WHOLE = 1,    /* can be restored */

@@ -32,7 +32,7 @@ from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 
 MEASURED = {
-    "controller": {0x2002, 0x2003, 0x2008, 0x2025, 0x2040},  # what it waits for, statistics, CRC
+    "controller": {0x2002, 0x2003, 0x2008, 0x2025, 0x2050},  # what it waits for, statistics, CRC
     "drive": {0x6041, 0x6062, 0x6063, 0x6064, 0x607A, 0x60FD, 0x2101},
 }
 """Objects whose value depends on what happens."""
@@ -45,7 +45,7 @@ NOT_ALL_VALUES = {
         (0x1003, 0),  # takes 0 only
         (0x1010, 1),  # signatures: test_power_on.py
         (0x1011, 1),
-        (0x2040, 2),  # takes the CRC-32 of the configuration only
+        (0x2050, 2),  # takes the CRC-32 of the configuration only
     },
     "drive": {
         (0x1003, 0),

@@ -192,7 +192,7 @@ uint32_t app_bench_write(struct app_bench *bench, uint16_t index, uint8_t sub, u
     return finish_transfer(bench, begun, &out);
 }
 
-/* What 0x2040 sub 2 does, without frames: most tests are about something else. */
+/* What 0x2050 sub 2 does, without frames: most tests are about something else. */
 static void confirm(struct controller *controller)
 {
     controller->configured = (struct configured){.known = true, .crc32 = controller->config.crc32};

@@ -60,7 +60,7 @@ static void test_a_drive_of_another_identity_is_refused(void)
         bench.drives[1].values.identity_object.product_code = 0x402;
         bench.drives[1].values.identity_object.revision_number = 0x10003;
         TEST_ASSERT_EQUAL_HEX32(SDO_OK,
-                                app_bench_write(&bench, (uint16_t)(0x2040u + sub), 2, 0x777, 4));
+                                app_bench_write(&bench, (uint16_t)(0x2050u + sub), 2, 0x777, 4));
         expect_trouble(3, 0x101800u + sub, SDO_OK);
         TEST_ASSERT_EQUAL_UINT32(0, bench.drives[1].write_count);
         const uint32_t found = (uint32_t)app_bench_read(&bench, 0x2025, 4);
@@ -68,7 +68,7 @@ static void test_a_drive_of_another_identity_is_refused(void)
         TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, 1));
         TEST_ASSERT_EQUAL_INT64(MACHINE_DRIVES_MISSING, app_bench_read(&bench, 0x2003, 4));
         TEST_ASSERT_EQUAL_HEX32(SDO_OK,
-                                app_bench_write(&bench, (uint16_t)(0x2040u + sub), 2, found, 4));
+                                app_bench_write(&bench, (uint16_t)(0x2050u + sub), 2, found, 4));
         boot();
         TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
     }
@@ -79,7 +79,7 @@ static void test_a_drive_without_identity_is_not_the_expected_one(void)
 {
     bench.drives[0].lacks[0] = 0x1018;
     boot();
-    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2041, 1, 5, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2051, 1, 5, 4));
     expect_trouble(2, 0x101801, SDO_ABORT_NO_OBJECT);
 }
 

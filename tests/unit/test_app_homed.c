@@ -107,28 +107,28 @@ static void test_a_start_needs_homed_axes(void)
     TEST_ASSERT_FALSE(homed(2));
     switch_on();
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
-    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2045, 2));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2055, 2));
 }
 
 static void test_unhomed_is_for_one_command(void)
 {
     switch_on();
-    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2045, 1, 1, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2055, 1, 1, 1));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
-    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2045, 1));
-    TEST_ASSERT_EQUAL_INT64(1, app_bench_read(&bench, 0x2045, 2));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2055, 1));
+    TEST_ASSERT_EQUAL_INT64(1, app_bench_read(&bench, 0x2055, 2));
     (void)app_bench_until(&bench, MACHINE_READY, 3000);
-    TEST_ASSERT_EQUAL_INT64(1, app_bench_read(&bench, 0x2045, 2));
+    TEST_ASSERT_EQUAL_INT64(1, app_bench_read(&bench, 0x2055, 2));
     expect_not_homed(COMMAND_START);
 }
 
 /* A start that is refused for something else takes it away as well: the next one may be somebody else's. */
 static void test_a_refused_start_ends_the_permission(void)
 {
-    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2045, 1, 1, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2055, 1, 1, 1));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, COMMAND_START));
     TEST_ASSERT_EQUAL_INT64(MACHINE_DRIVES_OFF, app_bench_read(&bench, 0x2003, 4));
-    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2045, 1));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2055, 1));
     switch_on();
     expect_not_homed(COMMAND_START);
 }
@@ -289,7 +289,7 @@ static void test_other_coordinates_lose_it(void)
         bool kept;
     } objects[] = {
         {0x2007, 1, 4, 190000000, true}, {0x201F, 1, 4, 1000000, true},
-        {0x2041, 1, 4, 0, true},         {0x2013, 1, 4, X_COUNTS + 1, false},
+        {0x2051, 1, 4, 0, true},         {0x2013, 1, 4, X_COUNTS + 1, false},
         {0x2012, 1, 1, 35, false},       {0x2020, 1, 4, 65536, false},
         {0x2021, 1, 4, 7000000, false},  {0x2022, 1, 4, 2, false},
         {0x2023, 1, 4, 2, false},        {0x2004, 7, 4, 1000, false},

@@ -51,8 +51,8 @@ static void write(uint16_t index, uint8_t sub, uint64_t value, uint8_t size)
 
 static uint32_t confirm(void)
 {
-    const uint32_t crc = read_u32(0x2040, 1);
-    write(0x2040, 2, crc, 4);
+    const uint32_t crc = read_u32(0x2050, 1);
+    write(0x2050, 2, crc, 4);
     return crc;
 }
 
@@ -91,8 +91,8 @@ static void expect_refusal(unsigned command, enum machine_refusal refusal)
 
 static void expect_state(unsigned state, unsigned stored)
 {
-    TEST_ASSERT_EQUAL_INT64(state, app_bench_read(&bench, 0x2040, 3));
-    TEST_ASSERT_EQUAL_INT64(stored, app_bench_read(&bench, 0x2040, 4));
+    TEST_ASSERT_EQUAL_INT64(state, app_bench_read(&bench, 0x2050, 3));
+    TEST_ASSERT_EQUAL_INT64(stored, app_bench_read(&bench, 0x2050, 4));
 }
 
 /* --- configured --- */
@@ -111,8 +111,8 @@ static void test_nothing_is_switched_on_unconfigured(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_QUICK_STOP));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_DISABLE));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_RESET));
-    const uint32_t crc = read_u32(0x2040, 1);
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, app_bench_write(&bench, 0x2040, 2, crc ^ 1u, 4));
+    const uint32_t crc = read_u32(0x2050, 1);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, app_bench_write(&bench, 0x2050, 2, crc ^ 1u, 4));
     expect_refusal(COMMAND_ENABLE, MACHINE_NOT_CONFIGURED);
     TEST_ASSERT_EQUAL_HEX32(crc, confirm());
     expect_state(STATE_CONFIRMED, PARAMETER_STORE_EMPTY);
@@ -122,14 +122,14 @@ static void test_nothing_is_switched_on_unconfigured(void)
 static void test_each_change_has_to_be_confirmed(void)
 {
     const uint32_t first = configure(FEED_UM_S);
-    TEST_ASSERT_EQUAL_HEX32(first, read_u32(0x2040, 2));
+    TEST_ASSERT_EQUAL_HEX32(first, read_u32(0x2050, 2));
     write(0x2004, 2, OTHER_UM_S, 4);
-    TEST_ASSERT_NOT_EQUAL_HEX32(first, read_u32(0x2040, 1));
-    TEST_ASSERT_EQUAL_HEX32(0, read_u32(0x2040, 2));
+    TEST_ASSERT_NOT_EQUAL_HEX32(first, read_u32(0x2050, 1));
+    TEST_ASSERT_EQUAL_HEX32(0, read_u32(0x2050, 2));
     expect_state(STATE_NONE, PARAMETER_STORE_EMPTY);
     expect_refusal(COMMAND_ENABLE, MACHINE_NOT_CONFIGURED);
     write(0x2004, 2, FEED_UM_S, 4);
-    TEST_ASSERT_EQUAL_HEX32(first, read_u32(0x2040, 2));
+    TEST_ASSERT_EQUAL_HEX32(first, read_u32(0x2050, 2));
     expect_state(STATE_CONFIRMED, PARAMETER_STORE_EMPTY);
 }
 
@@ -145,15 +145,15 @@ static void test_the_crc_covers_the_configuration(void)
     } objects[] = {
         {0x1006, 0, 4, 2000, true}, {0x2004, 1, 1, 3, true},   {0x2004, 11, 1, 1, true},
         {0x2005, 2, 1, 9, true},    {0x2006, 1, 4, 5, true},   {0x2013, 2, 4, 7, true},
-        {0x201A, 1, 4, 7, true},    {0x2023, 1, 4, 7, true},   {0x2041, 1, 4, 7, true},
-        {0x2043, 2, 4, 7, true},    {0x2005, 4, 1, 77, false}, {0x2043, 6, 4, 7, false},
-        {0x2010, 1, 2, 50, false},  {0x2011, 0, 8, 50, false}, {0x2044, 0, 1, 50, false},
-        {0x1017, 0, 2, 200, false}, {0x2045, 1, 1, 1, false},
+        {0x201A, 1, 4, 7, true},    {0x2023, 1, 4, 7, true},   {0x2051, 1, 4, 7, true},
+        {0x2053, 2, 4, 7, true},    {0x2005, 4, 1, 77, false}, {0x2053, 6, 4, 7, false},
+        {0x2010, 1, 2, 50, false},  {0x2011, 0, 8, 50, false}, {0x2054, 0, 1, 50, false},
+        {0x1017, 0, 2, 200, false}, {0x2055, 1, 1, 1, false},
     };
     for (unsigned i = 0; i < sizeof objects / sizeof objects[0]; ++i) {
-        const uint32_t before = read_u32(0x2040, 1);
+        const uint32_t before = read_u32(0x2050, 1);
         write(objects[i].index, objects[i].sub, objects[i].value, objects[i].size);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(objects[i].counts, before != read_u32(0x2040, 1), "CRC");
+        TEST_ASSERT_EQUAL_INT_MESSAGE(objects[i].counts, before != read_u32(0x2050, 1), "CRC");
     }
 }
 
@@ -168,10 +168,10 @@ static void test_a_stored_configuration_is_there_after_power_on(void)
     expect_state(STATE_CONFIRMED, PARAMETER_STORE_WHOLE);
     power_cycle();
     expect_state(STATE_RESTORED, PARAMETER_STORE_WHOLE);
-    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2040, 1));
-    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2040, 2));
-    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2040, 5));
-    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2040, 6));
+    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2050, 1));
+    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2050, 2));
+    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2050, 5));
+    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2050, 6));
     TEST_ASSERT_EQUAL_UINT32(FEED_UM_S, bench.controller.machine.config.feed_limit_um_s);
     TEST_ASSERT_EQUAL_HEX32(0x000401F4, read_u32(0x1016, 3));
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
@@ -208,15 +208,15 @@ static void test_an_unconfirmed_configuration_stays_one(void)
 
 static void test_defaults_hold_after_load_and_power_on(void)
 {
-    const uint32_t defaults = read_u32(0x2040, 1);
+    const uint32_t defaults = read_u32(0x2050, 1);
     const uint32_t crc = configure(FEED_UM_S);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, forget());
     expect_state(STATE_CONFIRMED, PARAMETER_STORE_DEFAULTS);
-    TEST_ASSERT_EQUAL_HEX32_MESSAGE(crc, read_u32(0x2040, 1), "not before the reset");
+    TEST_ASSERT_EQUAL_HEX32_MESSAGE(crc, read_u32(0x2050, 1), "not before the reset");
     power_cycle();
     expect_state(STATE_NONE, PARAMETER_STORE_DEFAULTS);
-    TEST_ASSERT_EQUAL_HEX32(defaults, read_u32(0x2040, 1));
+    TEST_ASSERT_EQUAL_HEX32(defaults, read_u32(0x2050, 1));
     (void)configure(OTHER_UM_S);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());
     power_cycle();
@@ -262,9 +262,9 @@ static void test_a_memory_that_does_not_take_it(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_HARDWARE, save());
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_HARDWARE, forget());
     expect_state(STATE_CONFIRMED, PARAMETER_STORE_WHOLE);
-    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2040, 5));
+    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2050, 5));
     power_cycle();
-    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2040, 2));
+    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2050, 2));
 }
 
 /* --- power lost --- */
@@ -296,7 +296,7 @@ static void cut_saving(bool second_bank)
         TEST_ASSERT_EQUAL_HEX32(done ? SDO_OK : SDO_ABORT_HARDWARE, save());
         power_cycle();
         expect_state(STATE_RESTORED, PARAMETER_STORE_WHOLE);
-        TEST_ASSERT_EQUAL_HEX32(crcs[done ? 1 : 0], read_u32(0x2040, 2));
+        TEST_ASSERT_EQUAL_HEX32(crcs[done ? 1 : 0], read_u32(0x2050, 2));
         TEST_ASSERT_EQUAL_UINT32(done ? OTHER_UM_S : FEED_UM_S, read_u32(0x2004, 2));
         (void)configure(1234); /* and the next one succeeds */
         TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());
@@ -340,7 +340,7 @@ static void test_power_lost_at_each_byte_of_forgetting(void)
         TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_HARDWARE, forget());
         power_cycle();
         expect_state(STATE_RESTORED, PARAMETER_STORE_WHOLE);
-        TEST_ASSERT_EQUAL_HEX32(crcs[0], read_u32(0x2040, 2));
+        TEST_ASSERT_EQUAL_HEX32(crcs[0], read_u32(0x2050, 2));
     }
 }
 
@@ -378,7 +378,7 @@ static uint32_t store_two(void)
 static void expect_nothing_restored(enum parameter_store_state stored)
 {
     expect_state(STATE_NONE, stored);
-    TEST_ASSERT_EQUAL_UINT32(0, read_u32(0x2040, 5));
+    TEST_ASSERT_EQUAL_UINT32(0, read_u32(0x2050, 5));
     TEST_ASSERT_EQUAL_UINT32(od_controller_defaults.configuration.feed_limit_um_s,
                              read_u32(0x2004, 2));
     expect_refusal(COMMAND_ENABLE, MACHINE_NOT_CONFIGURED);
@@ -444,21 +444,21 @@ static void test_two_machines_in_turn(void)
     const uint32_t wide = configure(FEED_UM_S);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
-    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2040, 6));
+    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2050, 6));
     const uint32_t narrow = configure(1);
-    TEST_ASSERT_EQUAL_HEX32_MESSAGE(wide, read_u32(0x2040, 6), "not checked again so far");
+    TEST_ASSERT_EQUAL_HEX32_MESSAGE(wide, read_u32(0x2050, 6), "not checked again so far");
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     expect_refusal(COMMAND_START, MACHINE_OUTSIDE_LIMITS);
-    TEST_ASSERT_EQUAL_HEX32(narrow, read_u32(0x2040, 6));
+    TEST_ASSERT_EQUAL_HEX32(narrow, read_u32(0x2050, 6));
     power_cycle();
-    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2040, 2));
+    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2050, 2));
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     expect_refusal(COMMAND_START, MACHINE_DRIVES_OFF);
-    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2040, 6));
+    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2050, 6));
     TEST_ASSERT_EQUAL_HEX32(narrow, configure(1));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());
     power_cycle();
-    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2040, 6));
+    TEST_ASSERT_EQUAL_HEX32(wide, read_u32(0x2050, 6));
     expect_refusal(COMMAND_START, MACHINE_OUTSIDE_LIMITS);
 }
 
@@ -466,11 +466,11 @@ static void test_two_machines_in_turn(void)
 
 static void test_a_stored_node_number_holds_from_the_next_power_on(void)
 {
-    write(0x2044, 0, 5, 1);
+    write(0x2054, 0, 5, 1);
     TEST_ASSERT_EQUAL_UINT8(1, bench.controller.node);
     power_cycle();
     TEST_ASSERT_EQUAL_UINT8_MESSAGE(1, bench.controller.node, "nobody stored it");
-    write(0x2044, 0, 5, 1);
+    write(0x2054, 0, 5, 1);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());
     power_cycle(); /* from here on the host speaks to node 5 */
     TEST_ASSERT_EQUAL_UINT8(5, bench.controller.node);
@@ -479,11 +479,11 @@ static void test_a_stored_node_number_holds_from_the_next_power_on(void)
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     TEST_ASSERT_EQUAL_HEX32(0x00050000u + DRIVE_CONTROLLER_SILENT_MS,
                             bench.drives[0].values.consumer_heartbeat_time[0]);
-    write(0x2044, 0, 0, 1);
+    write(0x2054, 0, 0, 1);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());
     power_cycle();
     TEST_ASSERT_EQUAL_UINT8(1, bench.controller.node);
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, app_bench_write(&bench, 0x2044, 0, 128, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, app_bench_write(&bench, 0x2054, 0, 128, 1));
 }
 
 static void reset(enum nmt_command command)
@@ -509,10 +509,10 @@ static void test_nmt_resets_restore(void)
     TEST_ASSERT_EQUAL_UINT32(300, read_u32(0x1017, 0));
     TEST_ASSERT_EQUAL_UINT32(1000, read_u32(0x1006, 0));
     TEST_ASSERT_EQUAL_UINT32(OTHER_UM_S, read_u32(0x2004, 2));
-    TEST_ASSERT_NOT_EQUAL_HEX32(other, read_u32(0x2040, 1));
+    TEST_ASSERT_NOT_EQUAL_HEX32(other, read_u32(0x2050, 1));
     expect_state(STATE_NONE, PARAMETER_STORE_WHOLE);
     reset(NMT_RESET_NODE);
-    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2040, 2));
+    TEST_ASSERT_EQUAL_HEX32(crc, read_u32(0x2050, 2));
     expect_state(STATE_RESTORED, PARAMETER_STORE_WHOLE);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, forget());
     reset(NMT_RESET_NODE);

@@ -32,9 +32,9 @@ static const struct axis_field axis_fields[] = {
     AXIS_FIELD(0x2021, feed_constant_counts),
     AXIS_FIELD(0x2022, gear_motor_revolutions),
     AXIS_FIELD(0x2023, gear_shaft_revolutions),
-    AXIS_FIELD(0x2041, expected_vendor),
-    AXIS_FIELD(0x2042, expected_product),
-    AXIS_FIELD(0x2043, expected_revision),
+    AXIS_FIELD(0x2051, expected_vendor),
+    AXIS_FIELD(0x2052, expected_product),
+    AXIS_FIELD(0x2053, expected_revision),
 };
 
 #define AXIS_FIELDS (sizeof axis_fields / sizeof axis_fields[0])

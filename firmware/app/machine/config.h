@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023, 0x2041 ... 0x2043), as
+/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023, 0x2051 ... 0x2053), as
  * one value. */
 #ifndef APP_MACHINE_CONFIG_H
 #define APP_MACHINE_CONFIG_H

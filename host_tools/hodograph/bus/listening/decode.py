@@ -20,8 +20,8 @@ from .recorder import Frames
 SYNC_ID, RPDO1, RPDO2, TPDO1, TPDO2 = 0x080, 0x200, 0x300, 0x180, 0x280
 SDO_REQUEST = 0x600
 SYNC_OVERFLOW = 240
-_UNHOMED_START = bytes([0x2F, 0x45, 0x20, 0x01, 0x01])
-"""Expedited write of 1 to 0x2045 sub 1 (docs/protocol.md section 3.3)."""
+_UNHOMED_START = bytes([0x2F, 0x55, 0x20, 0x01, 0x01])
+"""Expedited write of 1 to 0x2055 sub 1 (docs/protocol.md section 3.3)."""
 _LONGEST_LAG = 250
 """SYNCs by which an answer may be late: a slow host delays drives, but frames keep their order."""
 _LEAD_IN = 200

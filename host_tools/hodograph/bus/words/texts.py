@@ -34,7 +34,7 @@ STATES = {
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
 
 CONFIGURED = {0: "none", 1: "confirmed", 2: "restored"}
-"""Object 0x2040 sub 3: by a host since power-on, or from the controller's store."""
+"""Object 0x2050 sub 3: by a host since power-on, or from the controller's store."""
 STORED = {
     0: "nothing",
     1: "whole",
@@ -42,7 +42,7 @@ STORED = {
     3: "damaged",
     4: "defaults",
 }
-"""Object 0x2040 sub 4."""
+"""Object 0x2050 sub 4."""
 
 REFUSALS = {
     1: "no program is loaded: hodograph upload FILE",
