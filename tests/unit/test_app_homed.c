@@ -178,6 +178,20 @@ static void test_a_homing_that_is_broken_off_costs_the_axis_under_way_only(void)
 
 /* --- what ends it --- */
 
+/* Also from the homing before: the drive may have moved its zero already. */
+static void test_a_homing_that_is_broken_off_loses_the_elder_zero(void)
+{
+    home();
+    bench.drives[0].homing_syncs = 100000;
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_HOME));
+    app_bench_periods(&bench, 200);
+    TEST_ASSERT_EQUAL_INT(HOMING_MOVE, bench.controller.homing.phase);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_STOP));
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1000);
+    boot();
+    TEST_ASSERT_FALSE(homed(1));
+}
+
 static void test_a_drive_that_restarts_loses_it(void)
 {
     home();
@@ -216,7 +230,7 @@ static void away(uint32_t periods)
 static void test_a_drive_that_was_away_loses_it(void)
 {
     home();
-    away(DRIVE_WATCH_HEARTBEAT_MS + 250u);
+    away(DRIVE_WATCH_ZERO_MS + 150u);
     boot();
     TEST_ASSERT_FALSE(homed(1));
 }
@@ -229,7 +243,7 @@ static void test_a_drive_that_was_away_in_boot_loses_it(void)
     (void)app_bench_until(&bench, MACHINE_BOOT, 3000);
     app_bench_periods(&bench, 3000);
     TEST_ASSERT_TRUE_MESSAGE(homed(1), "it has been heard all the time");
-    away(DRIVE_WATCH_HEARTBEAT_MS + 250u);
+    away(DRIVE_WATCH_ZERO_MS + 150u);
     bench.drives[1].dead = false;
     boot();
     TEST_ASSERT_FALSE(homed(1));
@@ -238,7 +252,7 @@ static void test_a_drive_that_was_away_in_boot_loses_it(void)
 static void test_a_short_silence_is_none(void)
 {
     home();
-    away(500);
+    away(300);
     app_bench_periods(&bench, 10);
     boot();
     TEST_ASSERT_TRUE(homed(1));
@@ -247,9 +261,9 @@ static void test_a_short_silence_is_none(void)
 /* The time is the one that 0x1016 has for the drive. */
 static void test_the_silence_that_counts_is_configured(void)
 {
-    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 1, 0x00020190, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x1016, 1, 0x000200C8, 4));
     home();
-    away(550);
+    away(350);
     boot();
     TEST_ASSERT_FALSE(homed(1));
 }
@@ -268,6 +282,15 @@ static void test_a_drive_that_is_found_somewhere_else_loses_it(void)
         boot();
         TEST_ASSERT_FALSE(homed(1));
     }
+}
+
+static void test_a_drive_that_does_not_say_where_it_is_loses_it(void)
+{
+    home();
+    bench.drives[0].lacks[0] = 0x6064;
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, (uint32_t)-190000000, 4));
+    boot();
+    TEST_ASSERT_FALSE(homed(1));
 }
 
 static void test_an_encoder_that_fails_loses_it(void)
@@ -357,6 +380,7 @@ int main(void)
     RUN_TEST(test_a_fault_reset_keeps_it);
     RUN_TEST(test_an_axis_that_is_pushed_while_it_is_heard_keeps_it);
     RUN_TEST(test_a_homing_that_is_broken_off_costs_the_axis_under_way_only);
+    RUN_TEST(test_a_homing_that_is_broken_off_loses_the_elder_zero);
     RUN_TEST(test_a_drive_that_restarts_loses_it);
     RUN_TEST(test_a_drive_that_restarts_while_it_is_configured_loses_it);
     RUN_TEST(test_a_drive_that_was_away_loses_it);
@@ -364,6 +388,7 @@ int main(void)
     RUN_TEST(test_a_short_silence_is_none);
     RUN_TEST(test_the_silence_that_counts_is_configured);
     RUN_TEST(test_a_drive_that_is_found_somewhere_else_loses_it);
+    RUN_TEST(test_a_drive_that_does_not_say_where_it_is_loses_it);
     RUN_TEST(test_an_encoder_that_fails_loses_it);
     RUN_TEST(test_other_coordinates_lose_it);
     RUN_TEST(test_an_axis_that_was_left_out_for_a_while_loses_it);

@@ -34,7 +34,9 @@ void drive_watch_begin(struct drive_watch *watch, const struct config *config,
 static void note_silence(struct drive_watch *watch, struct machine *machine, uint8_t i,
                          uint32_t elapsed_us)
 {
-    const uint32_t limit_us = watch->consumers[i].time_us;
+    const uint32_t time_us = watch->consumers[i].time_us;
+    const uint32_t zero_us = DRIVE_WATCH_ZERO_MS * 1000u;
+    const uint32_t limit_us = time_us < zero_us ? time_us : zero_us;
     if (watch->silent_us[i] <= limit_us) {
         watch->silent_us[i] += elapsed_us;
     }
