@@ -27,7 +27,7 @@ static int prepare(struct controller *controller, int64_t from_q40_mm, struct mo
 }
 
 /* Everything that takes long (program check, reading all pieces) happens before the lock. */
-static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
+static enum machine_refusal prepare_start(struct controller *controller, int64_t from_q40_mm)
 {
     struct program_slot *slot = &controller->slot;
     if (!slot->present) {
@@ -43,15 +43,37 @@ static enum machine_refusal start(struct controller *controller, int64_t from_q4
         return MACHINE_OUTSIDE_LIMITS;
     }
     port_lock();
+    controller->machine.unhomed_allowed = controller->values.start_without_homing.allowed != 0u;
     const enum machine_refusal refusal =
         machine_start(&controller->machine, &prepared, start_counts);
     port_unlock();
     return refusal;
 }
 
+/* What allows a start without homing is for one attempt. */
+static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
+{
+    const enum machine_refusal refusal = prepare_start(controller, from_q40_mm);
+    controller->values.start_without_homing.allowed = 0;
+    if (refusal == MACHINE_ACCEPTED && controller->machine.unhomed_axes != 0u) {
+        port_log(PORT_WARNING, "started without homing, axes (bit 0: the first)",
+                 controller->machine.unhomed_axes);
+    }
+    return refusal;
+}
+
+static bool needs_configuration(enum command command)
+{
+    return command == COMMAND_ENABLE || command == COMMAND_HOME || command == COMMAND_START ||
+           command == COMMAND_START_FROM;
+}
+
 static enum machine_refusal dispatch(struct controller *controller, enum command command)
 {
     struct machine *machine = &controller->machine;
+    if (needs_configuration(command) && !controller_configured(controller)) {
+        return MACHINE_NOT_CONFIGURED;
+    }
     switch (command) {
     case COMMAND_ENABLE:
         return locked(machine, machine_enable);

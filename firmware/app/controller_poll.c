@@ -113,6 +113,12 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
         axis->digital_inputs = facts->value[DRIVE_INPUTS];
         axis->torque_mapped = facts->known[DRIVE_TORQUE_MAPPED];
         axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
+        if (facts->known[DRIVE_POSITION]) {
+            axis_found(axis, (int32_t)facts->value[DRIVE_POSITION],
+                       MACHINE_KEPT_MM * controller->config.counts_per_mm);
+        } else {
+            axis->homed = false;
+        }
     }
     port_unlock();
 }

@@ -7,13 +7,51 @@
 #include "canopen/sdo_abort.h"
 #include "port/port.h"
 
-static uint32_t allow_configuration(struct controller *controller, const struct od_entry *entry,
-                                    uint64_t value)
+#define SIGNATURE_SAVE UINT32_C(0x65766173) /* "save", CiA 301 7.5.2.13 */
+#define SIGNATURE_LOAD UINT32_C(0x64616F6C) /* "load", 7.5.2.14 */
+
+static bool is_configurable(struct controller *controller)
 {
     port_lock();
     const bool possible = machine_configurable(&controller->machine);
     port_unlock();
-    if (!possible) {
+    return possible;
+}
+
+/* Objects 0x1010 and 0x1011. */
+static uint32_t keep(struct controller *controller, uint16_t index, uint64_t signature)
+{
+    const bool save = index == 0x1010u;
+    if (signature != (save ? SIGNATURE_SAVE : SIGNATURE_LOAD)) {
+        return SDO_ABORT_TRANSFER;
+    }
+    if (!is_configurable(controller)) {
+        return SDO_ABORT_STATE;
+    }
+    const int result =
+        save ? parameter_store_save(&controller->store, &controller->od, controller->config.crc32,
+                                    controller_configured(controller))
+             : parameter_store_forget(&controller->store);
+    return result == 0 ? SDO_OK : SDO_ABORT_HARDWARE;
+}
+
+/* Object 0x2050 sub 2: the host expects exactly this configuration. */
+static uint32_t confirm(struct controller *controller, uint64_t crc32)
+{
+    if (crc32 != controller->config.crc32) {
+        return SDO_ABORT_VALUE;
+    }
+    if (!controller_configured(controller)) {
+        controller->configured =
+            (struct configured){.known = true, .restored = false, .crc32 = (uint32_t)crc32};
+    }
+    return SDO_OK;
+}
+
+static uint32_t allow_configuration(struct controller *controller, const struct od_entry *entry,
+                                    uint64_t value)
+{
+    if (!is_configurable(controller)) {
         return SDO_ABORT_STATE;
     }
     return config_value_allowed(entry->index, entry->sub, value) ? SDO_OK : SDO_ABORT_VALUE;
@@ -27,6 +65,12 @@ uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_
     if (entry->index == 0x2001) {
         const enum machine_refusal refusal = commands_execute(controller, (enum command)number);
         return refusal == MACHINE_ACCEPTED ? SDO_OK : SDO_ABORT_STATE;
+    }
+    if (entry->index == 0x1010 || entry->index == 0x1011) {
+        return keep(controller, entry->index, number);
+    }
+    if (entry->index == 0x2050) {
+        return confirm(controller, number);
     }
     if (entry->index == 0x1003) {
         return number == 0u ? SDO_OK : SDO_ABORT_VALUE;
@@ -50,7 +94,6 @@ uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_
 static void reconfigure(struct controller *controller, const struct od_entry *entry)
 {
     config_read(&controller->config, &controller->od);
-    program_slot_stale(&controller->slot);
     port_lock();
     machine_configure(&controller->machine, &controller->config,
                       config_concerns_drives(entry->index, entry->sub));

@@ -102,13 +102,16 @@ void port_unlock(void);
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 
-/* --- Program store: two banks, so that a broken upload leaves the other one whole. Mainline --- */
+/* --- Store: two banks for programs, two for parameters, so that what breaks off leaves the other one whole. Mainline --- */
 
-#define PORT_STORE_BANKS 2u
+#define PORT_STORE_BANKS      2u /* 0 and 1: programs, as large as there is room for */
+#define PORT_STORE_PARAMETERS 2u /* 2 and 3: parameters, at least PORT_STORE_PARAMETER_BYTES each */
+#define PORT_STORE_BANKS_ALL  4u
+#define PORT_STORE_PARAMETER_BYTES 2048u
 
-uint32_t port_store_size(void); /* bytes per bank */
+uint32_t port_store_size(unsigned bank); /* bytes of a bank; those of a pair are alike */
 
-/* Erases a bank; then writes go in ascending order. The one gap that may be left is before the last 16 bytes, which are
+/* Erases a bank, its last 16 bytes first; then writes go in ascending order. The one gap that may be left is before the last 16 bytes, which are
  * written at once. What is written can be read at multiples of 8 bytes, and after the last write. 0 or PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);

@@ -35,7 +35,14 @@ unsigned fake_port_wakes(void);
 void fake_port_fail_send(bool fail);
 void fake_port_fail_store(bool fail);
 
-/* A bank has only so many bytes now. */
+/* From its n-th operation on (the erasing of a bank, or a byte) the store takes nothing more, as when the power has gone;
+ * 0: it takes all. Returns how many operations there were since the last call. */
+uint32_t fake_port_cut_store(uint32_t operation);
+
+/* fake_port_reset, but what is in the store stays, as over a loss of power. */
+void fake_port_keep_store(void);
+
+/* A bank for programs has only so many bytes now. */
 void fake_port_shrink_store(uint32_t bytes);
 
 /* Turns the bits of one byte of the store. */
@@ -43,7 +50,7 @@ void fake_port_spoil_store(unsigned bank, uint32_t offset);
 
 /* The store from now on, instead of memory; NULL: memory again. */
 struct fake_port_store {
-    uint32_t bank_bytes;
+    uint32_t (*size)(unsigned bank);
     int (*erase)(unsigned bank);
     int (*write)(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
     const uint8_t *(*data)(unsigned bank);

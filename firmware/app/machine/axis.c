@@ -16,6 +16,21 @@ void axis_init(struct axis *axis, uint8_t node)
     pdo_begin_setpoint(node, &axis->setpoint);
 }
 
+void axis_forget(struct axis *axis, uint8_t node)
+{
+    const bool homed = axis->homed && axis->node == node;
+    const int32_t kept_counts = axis->answers.present ? axis->position_counts : axis->kept_counts;
+    axis_init(axis, node);
+    axis->homed = homed;
+    axis->kept_counts = kept_counts;
+}
+
+void axis_found(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts)
+{
+    axis->homed = axis->homed && distance(axis->kept_counts, position_counts) <= tolerance_counts;
+    axis->kept_counts = position_counts;
+}
+
 void axis_command(struct axis *axis, enum cia402_goal goal)
 {
     axis->goal = goal;

@@ -49,13 +49,22 @@ struct axis {
     bool velocity_mapped;             /* its RPDO2 takes a velocity offset */
     uint32_t digital_inputs;          /* 0x60FD */
     int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
-    bool homed;                       /* since it was found */
-    uint32_t rest_syncs;              /* in Quick stop active: for how long it has been at */
+    bool homed;                       /* its drive has the zero that homing gave it */
+    int32_t kept_counts; /* where it was when it was seen last before it was to be found again */
+    uint32_t rest_syncs; /* in Quick stop active: for how long it has been at */
     int32_t rest_counts;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
 void axis_init(struct axis *axis, uint8_t node);
+
+/* Forgets the drive, which is to be found and configured anew. Whether it is homed stays, when the node is the same:
+ * that ends only by what ends it (axis_found, boot-up, silence). Under the lock. */
+void axis_forget(struct axis *axis, uint8_t node);
+
+/* The drive has been found again and says where it is: one that is more than `tolerance_counts` from where it was seen
+ * last does not have its zero any more. Under the lock. */
+void axis_found(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts);
 
 /* A new goal, which ends homing: by_itself and control_extra are cleared. Under the lock. */
 void axis_command(struct axis *axis, enum cia402_goal goal);

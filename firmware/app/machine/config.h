@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023), as one
- * value. */
+/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023, 0x2051 ... 0x2053), as
+ * one value. */
 #ifndef APP_MACHINE_CONFIG_H
 #define APP_MACHINE_CONFIG_H
 
@@ -41,6 +41,9 @@ struct config_axis {
     uint32_t velocity_limit_um_s; /* of programs, at every override; 0, here and below: none */
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
+    uint32_t expected_vendor;               /* 0x1018 subs 1 ... 3 of the drive; 0: any */
+    uint32_t expected_product;
+    uint32_t expected_revision;
 };
 
 struct config {
@@ -61,6 +64,7 @@ struct config {
     uint8_t kernel;      /* enum interp_kernel */
     uint8_t missed_max;  /* so many answers in a row may be missed */
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
+    uint32_t crc32;      /* of the objects; docs/protocol.md section 3.4 */
 };
 
 /* Copies the present values out of the dictionary. Mainline. */
@@ -77,6 +81,10 @@ bool config_concerns_drives(uint16_t index, uint8_t sub);
 
 /* True for all objects above. Pure. */
 bool config_contains(uint16_t index);
+
+/* Whether positions of an axis mean the same in both: the zero that homing found under one still holds under the
+ * other. Pure. */
+bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis);
 
 /* The limits in the form that program_check takes; travel is rounded inwards. Mainline. */
 void config_limits(const struct config *config, struct program_limits *limits);

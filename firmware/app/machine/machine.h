@@ -62,6 +62,8 @@ enum machine_refusal {
     MACHINE_DRIVES_ON = 9,        /* homing wants them off */
     MACHINE_NO_HOMING_MODE = 10,  /* an axis shall be homed whose drive has no homing mode */
     MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */
+    MACHINE_NOT_CONFIGURED = 12,  /* neither configured since power-on nor restored */
+    MACHINE_NOT_HOMED = 13,       /* an axis with a homing method has no zero */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
@@ -70,6 +72,9 @@ enum machine_refusal {
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
 #define MACHINE_ANSWER_TICKS 5000u /* time for configured drives to answer a SYNC */
 #define MACHINE_UNSENT_MAX   3u    /* so many ticks in a row the port may refuse frames */
+
+/* A drive found again is taken for one that kept its zero only when it stands so near to where it was seen last. */
+#define MACHINE_KEPT_MM 1u
 
 /* Drives that are not simulated are never waited for: what is later than this is missed. */
 #define MACHINE_REAL_WAIT_MAX_MS 5u
@@ -94,6 +99,9 @@ struct machine {
     bool boot_due;       /* the mainline shall find and configure the drives (anew) */
     bool
         mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
+    bool unhomed_allowed; /* the next start is accepted though axes are not homed */
+    uint8_t
+        unhomed_axes; /* bit i: axis i + 1 has a homing method, and was not homed when this program started */
 };
 
 void machine_init(struct machine *machine, const struct config *config);
@@ -113,6 +121,8 @@ enum machine_refusal machine_hold(struct machine *machine);
 enum machine_refusal machine_resume(struct machine *machine);
 /* Out of FAULT by way of BOOT; refused while something still brakes. */
 enum machine_refusal machine_reset(struct machine *machine);
+/* Axes with a homing method (0x2012) that are not homed: bit i for axis i + 1. Pure. */
+uint8_t machine_unhomed(const struct machine *machine);
 /* Starts a prepared motion whose first setpoint is at start_counts: copied, if the axes are
  * enabled, stand still and are within the configured tolerance. */
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
@@ -137,7 +147,7 @@ bool machine_moving(const struct machine *machine);
 
 /* New configuration, where machine_configurable. When it concerns the drives: to BOOT. */
 void machine_configure(struct machine *machine, const struct config *config, bool drives);
-/* Forgets the drives; the mainline has to find and configure them. Under the lock. */
+/* Forgets the drives, but not which of them are homed; the mainline has to find and configure them. Under the lock. */
 void machine_enter_boot(struct machine *machine);
 /* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF as soon as
  * each has answered a SYNC; when one does not, they are configured and started anew. */

@@ -7,9 +7,11 @@ from .drive_states import state_of_statusword as drive_state
 from .fault_texts import detail_text, fault_text, fault_words
 
 __all__ = [
+    "CONFIGURED",
     "PROGRAM_STATES",
     "REFUSALS",
     "STATES",
+    "STORED",
     "detail_text",
     "drive_state",
     "fault_text",
@@ -31,6 +33,17 @@ STATES = {
 }
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
 
+CONFIGURED = {0: "none", 1: "confirmed", 2: "restored"}
+"""Object 0x2050 sub 3: by a host since power-on, or from the controller's store."""
+STORED = {
+    0: "nothing",
+    1: "whole",
+    2: "of another firmware",
+    3: "damaged",
+    4: "defaults",
+}
+"""Object 0x2050 sub 4."""
+
 REFUSALS = {
     1: "no program is loaded: hodograph upload FILE",
     2: "the axes are away from the program's start: hodograph goto FILE",
@@ -43,5 +56,8 @@ REFUSALS = {
     9: "the drives are on, homing wants them off: hodograph stop --off",
     10: "a drive that shall be homed has no homing mode: set method = 0 in its [axis.homing] of the machine file",
     11: "no axis has a homing method: add it to the machine file",
+    12: "it has no configuration since its power-on: hodograph configure FILE (upload, goto and run do it as well); "
+    "with --store it is there after the next power-on too",
+    13: "axes with a homing method are not homed since their drive's power-on: hodograph home, or --unhomed on purpose",
 }
 """Object 0x2003 sub 4, and the remedy."""
