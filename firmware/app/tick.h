@@ -16,6 +16,7 @@ struct tick {
     struct sync_producer sync;
     struct offsets offsets;
     bool refused; /* the port took not all frames of this tick */
+    bool setpoint_refused; /* and a setpoint was among them */
 };
 
 void tick_init(struct tick *tick, struct machine *machine);

@@ -70,6 +70,16 @@ uint32_t port_time_ns(void)
     return bus.time_ns;
 }
 
+void port_tick_urgent(bool urgent)
+{
+    (void)urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return PORT_TIMING_KEPT;
+}
+
 void port_tick_await(uint32_t guard_us, bool hurry)
 {
     (void)guard_us;

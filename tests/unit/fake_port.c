@@ -11,6 +11,8 @@ static struct {
     struct port_handlers handlers;
     struct can_match filters[PORT_FILTERS];
     size_t filter_count;
+    struct can_match refused;
+    uint32_t refusals;
     uint64_t now_ns;
     uint32_t period_us;
     uint32_t awaited_us;
@@ -19,6 +21,8 @@ static struct {
     bool locked;
     bool fail_send;
     bool fail_store;
+    bool urgent;
+    enum port_timing timing;
     uint32_t missing; /* bytes of a bank */
     unsigned wakes;
     uint32_t sent_head;
@@ -88,6 +92,22 @@ bool fake_port_hurry(void)
 bool fake_port_ready(void)
 {
     return self.ready;
+}
+
+bool fake_port_urgent(void)
+{
+    return self.urgent;
+}
+
+void fake_port_set_timing(enum port_timing timing)
+{
+    self.timing = timing;
+}
+
+void fake_port_refuse(const struct can_match *refused, uint32_t times)
+{
+    self.refused = *refused;
+    self.refusals = times;
 }
 
 unsigned fake_port_wakes(void)
@@ -163,6 +183,10 @@ int port_can_send(const struct can_msg *message)
     if (self.fail_send) {
         return PORT_ERR_FULL;
     }
+    if (self.refusals > 0u && can_match_any(&self.refused, 1, message)) {
+        self.refusals--;
+        return PORT_ERR_FULL;
+    }
     TEST_ASSERT_TRUE_MESSAGE(self.sent_head - self.sent_tail < SENT_MAX, "nobody takes the frames");
     TEST_ASSERT_TRUE(message->id <= CAN_ID_MAX && message->len <= CAN_DATA_MAX);
     self.sent[self.sent_head++ % SENT_MAX] = *message;
@@ -195,6 +219,16 @@ void port_tick_await(uint32_t guard_us, bool hurry)
 {
     self.awaited_us = guard_us;
     self.hurry = hurry;
+}
+
+void port_tick_urgent(bool urgent)
+{
+    self.urgent = urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return self.timing;
 }
 
 void port_tick_ready(void)

@@ -54,6 +54,7 @@ RUNNING = Status(
     motion=PathPosition(45.0, 100.0, 0.5),
     override=Override(150, 120.0, True),
     axes=(AXIS, replace(AXIS, node=3, homed=False, inputs_on=())),
+    timing="kept",
     statistics=Statistics(5000, 500, 2, 130, 12_345, 3, 0),
 )
 

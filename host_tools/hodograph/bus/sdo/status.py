@@ -12,7 +12,7 @@ from typing import Any
 
 from ..words.boot_texts import BootTrouble, boot_trouble
 from ..words.drive_states import inputs_on, state_of_number
-from ..words.texts import REFUSALS, STATES, detail_text, fault_words
+from ..words.texts import REFUSALS, STATES, TIMINGS, detail_text, fault_words
 from .controller import Controller
 from .objects import (
     ACTUAL,
@@ -31,6 +31,7 @@ from .objects import (
     OVERRIDE,
     STATUSWORD,
     TARGET,
+    TIMING,
 )
 from .upload import program_fault_text
 
@@ -124,7 +125,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Status:
-    """Everything that the controller tells, at one instant or nearly so."""
+    """Everything that the controller tells, at one instant or nearly so. `timing` is one of TIMINGS."""
 
     bus: str
     node: int
@@ -136,6 +137,7 @@ class Status:
     motion: PathPosition
     override: Override
     axes: tuple[AxisStatus, ...]
+    timing: str
     statistics: Statistics
 
     def json(self) -> dict[str, Any]:
@@ -157,6 +159,7 @@ def snapshot(controller: Controller) -> Status:
         fault = _fault(controller)
         trouble = _boot_trouble(controller) if state == BOOT else None
         statistics = Statistics(**controller.statistics())
+        timing = controller.read(TIMING)
     with controller.turn():
         counts_per_mm = controller.read(CONFIGURATION, 7)
         axis_count = controller.read(CONFIGURATION, 1)
@@ -172,6 +175,7 @@ def snapshot(controller: Controller) -> Status:
         motion=PathPosition(motion[0] * _Q40, motion[1] / 1000, motion[2] * _Q32),
         override=Override(override[0], 100 * override[1] * _Q30, bool(override[2])),
         axes=axes,
+        timing=TIMINGS.get(timing, str(timing)),
         statistics=statistics,
     )
 

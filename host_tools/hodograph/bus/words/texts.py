@@ -10,6 +10,7 @@ __all__ = [
     "PROGRAM_STATES",
     "REFUSALS",
     "STATES",
+    "TIMINGS",
     "detail_text",
     "drive_state",
     "fault_text",
@@ -29,6 +30,8 @@ STATES = {
     9: "homing",
     10: "quick stop",
 }
+TIMINGS = {0: "kept", 1: "not permitted", 2: "not permitted, accepted"}
+"""Object 0x2040: whether the computer that runs the controller lets ticks come in time."""
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
 
 REFUSALS = {
@@ -43,5 +46,7 @@ REFUSALS = {
     9: "the drives are on, homing wants them off: hodograph stop --off",
     10: "a drive that shall be homed has no homing mode: set method = 0 in its [axis.homing] of the machine file",
     11: "no axis has a homing method: add it to the machine file",
+    16: "the drives are real and this computer does not permit real-time priority: run the controller with "
+    "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }
 """Object 0x2003 sub 4, and the remedy."""
