@@ -240,7 +240,8 @@ def test_the_controller_sends_sync_with_its_counter(hub: LocalHub, controller: L
     counters = syncs["data"][:, 0].astype(int)
     begins_us = syncs["time_us"] - exact_bits(syncs)
     assert syncs.size == 500
-    assert (np.diff(begins_us) == 1000).all()
+    # an NMT command to a drive that is looked for has the higher priority: 68 us when both are due at once
+    assert (np.abs(begins_us - begins_us[0] - 1000 * np.arange(500)) <= 68).all()
     assert (syncs["length"] == 1).all()
     assert set(np.diff(counters) % 240) == {1}
     assert set(counters) == set(range(1, 241))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A clumsy or hostile second node: nothing that it does to a machine ends in a state that says all is well when it is not,
-or that only a restart gets it out of.
+"""A clumsy or hostile second node: nothing that it does to a machine ends in a state that says all is well when it is
+not, or that only a restart gets it out of.
 """
 
 from __future__ import annotations
@@ -8,16 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
+from canopen_bench import Hand, hand, object_bytes, program
+from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
 
 from bench import Bench, MakeAlpha, MakeBench
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
-from hodograph.bus.sdo.controller import FAULT_STATE, OFF, READY, RUNNING
+from hodograph.bus.sdo import node
+from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, RUNNING
 from hodograph.bus.sdo.objects import FAULT
 from hodograph.cli.main import main
-from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
 
 DRIVE = 2
 AWAY = 0xFF08
@@ -92,9 +94,7 @@ def test_a_drive_stopped_by_nmt(moving: Moving, other: Neighbour, seconds: float
 
 @pytest.mark.parametrize("node", [0, DRIVE])
 @pytest.mark.parametrize("command", [PRE_OPERATIONAL, RESET_NODE, 0x82])
-def test_nmt_to_drives_in_motion(
-    moving: Moving, other: Neighbour, command: int, node: int
-) -> None:
+def test_nmt_to_drives_in_motion(moving: Moving, other: Neighbour, command: int, node: int) -> None:
     bench, path = moving(2.0)
     other.nmt(command, node)
     assert settled(bench)[0] == FAULT_STATE
@@ -119,9 +119,7 @@ CONTROLWORD, TARGET = 0x60400010, 0x607A0020
 @pytest.mark.parametrize(
     "entries", [(POSITION, STATUSWORD), (INPUTS, STATUSWORD), (STATUSWORD, INPUTS), (STATUSWORD,)]
 )
-def test_tpdo1_mapped_otherwise(
-    moving: Moving, other: Neighbour, entries: tuple[int, ...]
-) -> None:
+def test_tpdo1_mapped_otherwise(moving: Moving, other: Neighbour, entries: tuple[int, ...]) -> None:
     """What comes under its identifier is no statusword any more, or no position; the reset writes the mapping anew."""
     bench, path = moving(2.0)
     remap(other, 0x1800, entries, 0x40000180 + DRIVE)
@@ -189,3 +187,57 @@ def test_another_heartbeat_with_the_number_of_the_controller(
         bench.clock.sleep(0.05)
     assert settled(bench)[:1] in ((READY,), (FAULT_STATE,))
     runs_again(path)
+
+
+def asked_by_hand(other: Hand, request: bytes) -> int:
+    """The abort code of the answer that names this object; 0: it is no abort."""
+    other.send(request)
+    while (answer := other.answer())[1:4] != request[1:4]:
+        pass
+    return int.from_bytes(answer[4:8], "little") if answer[0] == 0x80 else 0
+
+
+BUSY = 0x08000021
+
+
+def test_a_second_client_beside_an_upload(make_bench: MakeBench, hub: LocalHub) -> None:
+    """Another computer, which knows nothing of the turns taken on this one, asks in the middle of a block download: it
+    is refused each time, the upload goes on and is whole.
+    """
+    bench, image = make_bench(), program("alpha_quintic")
+    refused: list[int] = []
+    requests = (
+        b"\x40" + object_bytes(0x2002, 0),
+        b"\x2f" + object_bytes(0x2001, 0) + b"\x02",
+        b"\xc6" + object_bytes(0x2000, 1) + b"\0\1",
+    )
+    with hand(hub, 1) as stranger:
+
+        def progress(sent: int) -> None:
+            if sent % 700 < 7 and (sent // 7) % 127 + 1 not in (0x40, 0x2F, 0x46):
+                refused.extend(asked_by_hand(stranger, request) for request in requests)
+                stranger.send(b"\x80" + object_bytes(0x2002, 0) + b"\0\0\4\5")
+
+        bench.controller.upload(image, progress)
+    assert len(refused) >= 12
+    assert set(refused) == {BUSY}
+    assert bench.controller.program_crc() == int.from_bytes(image[12:16], "little")
+
+
+def test_a_command_beside_another_computers_upload(
+    make_bench: MakeBench,
+    hub: LocalHub,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is patient for a while, then says who is in the way; a client that is gone is forgotten."""
+    bench = make_bench()
+    with hand(hub, 1) as stranger:
+        assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
+        began_s = bench.clock.now_s()
+        assert bench.controller.state() in (BOOT, OFF)
+        assert 1.5 < bench.clock.now_s() - began_s < 2.5  # the server's time-out
+        monkeypatch.setattr(node, "BUSY_S", 1.0)
+        assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
+        assert main(["status"]) == 4
+        assert "another SDO client" in capsys.readouterr().err

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from neighbour import real_drives, runs_again, settled
 
 from bench import PAPER_ALPHA, Bench, MakeAlpha, MakeBench
 from hodograph.bus.clock import VirtualClock
@@ -14,7 +15,6 @@ from hodograph.bus.sdo.controller import FAULT_STATE, READY, RUNNING
 from hodograph.bus.sdo.objects import FAULT, TIMING
 from hodograph.cli.main import main
 from hodograph.config import load_machine
-from neighbour import real_drives, runs_again, settled
 
 SYNC_GAP = 0xFF09
 

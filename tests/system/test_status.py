@@ -42,6 +42,7 @@ KEYS = {
     "motion",
     "override",
     "axes",
+    "timing",
     "statistics",
     "bus_load",
 }

@@ -223,7 +223,7 @@ static void test_a_stall_is_no_time_for_the_mainline(void)
 /* Nobody has to wait for it where drives are real. */
 static void test_no_tick_is_put_off_for_real_drives(void)
 {
-    schedule_begin(&schedule, 0, PERIOD, false);
+    schedule_begin(&schedule, 0, 1000000u, false);
     (void)schedule_overdue(&schedule, 0, 1);
     TEST_ASSERT_TRUE(schedule_overdue(&schedule, SCHEDULE_TURN_NS + 1u, 1));
     schedule.urgent = true;

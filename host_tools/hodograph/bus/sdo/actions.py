@@ -69,8 +69,9 @@ def quick_stop(controller: Controller, wait_s: float = BOOT_S) -> None:
 
 
 def configure_anew(controller: Controller, wait_s: float = BOOT_S) -> None:
-    """Finds the drives and writes their whole configuration, without a fault: what another node may have told them is
-    gone then. Drives at standstill are switched off. Raises RefusedError while axes move, BusError when drives are missing.
+    """Finds the drives and writes their whole configuration, without a fault: what another node has told them is gone.
+
+    Drives at standstill are switched off. Raises RefusedError while axes move, BusError when drives are missing.
     """
     controller.require_standing()
     if controller.state() == READY:

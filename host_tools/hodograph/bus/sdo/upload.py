@@ -28,8 +28,7 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
     """
     patience, node.sdo.RESPONSE_TIMEOUT = node.sdo.RESPONSE_TIMEOUT, 5.0
     try:
-        with node.turn():
-            _block_download(node, image, progress)
+        node.patiently(PROGRAM, 1, lambda: _block_download(node, image, progress))
     except SdoAbortedError as error:
         raise _refusal(node, error) from error
     except (SdoCommunicationError, RuntimeError) as error:
@@ -43,6 +42,7 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
 
 def _block_download(node: Node, image: bytes, progress: Progress | None) -> None:
     stream = node.sdo.open(PROGRAM, 1, "wb", buffering=0, size=len(image), block_transfer=True)
+    node.transfer_begun()
     try:
         while stream.pos < len(image):
             stream.write(image[stream.pos : stream.pos + 7])

@@ -265,7 +265,12 @@ def fault_text(code: int) -> str:
     return fault_words(code).text
 
 
-_COUNTS = {0x8250: "positions missed in a row", 0xFF07: "ticks in a row", 0xFF08: "counts apart", 0xFF09: "us"}
+_COUNTS = {
+    0x8250: "positions missed in a row",
+    0xFF07: "ticks in a row",
+    0xFF08: "counts apart",
+    0xFF09: "us",
+}
 _PLAIN = (0x6100, 0xFF10)
 
 
