@@ -111,17 +111,14 @@ static int go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
     }
 }
 
-/* Objects have indices from here on. */
-#define FIRST_OBJECT 0x1000u
-
-/* A request by all its bits: most segments that have such a first byte do not look like one. */
-static bool is_sound_initiate(const uint8_t *data)
+/* A request by all its bits, for an object that there is: few segments that have such a first byte look like one. */
+static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t first = data[0];
     const bool expedited = (first & 0xF3u) == 0x23u || first == 0x22u;
     const bool known = expedited || first == 0x20u || first == 0x21u || first == 0x40u ||
                        first == 0xA0u || first == 0xA4u || (first & 0xF9u) == 0xC0u;
-    return known && cob_get(data + 1, 2) >= FIRST_OBJECT;
+    return known && od_find(s->od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
 }
 
 /* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if its
@@ -130,8 +127,8 @@ static bool is_strange(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t sequence = data[0] & (uint8_t)~SDO_LAST_IN_BLOCK;
     const bool doubled = sequence == s->sequence && sequence != 0u;
-    const bool next = sequence == s->heard + 1u;
-    return !next && !doubled && is_sound_initiate(data);
+    const bool next = sequence == s->heard + 1u || sequence == s->heard + 2u; /* one may be lost */
+    return !next && !doubled && is_sound_initiate(s, data);
 }
 
 static bool same_object(const struct sdo_server *s, const uint8_t *data)

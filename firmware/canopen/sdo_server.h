@@ -11,8 +11,8 @@
  * begin again, with the same object: it has lost an answer. One that is in the middle aborts first; one that is gone is
  * forgotten after the timeout. An abort counts when it names the object of the transfer, or none (index 0).
  *
- * Within a block each frame is a segment by its number. One that looks like a request and whose number is not the next
- * one is refused as such. A stranger's frame whose number is just the next one is taken, and then the true one shows: the same
+ * Within a block each frame is a segment by its number. One that is a request for an object that there is, by all its bits, and
+ * whose number is not one of the next two, is refused as such. A stranger's frame whose number is just the next one is taken, and then the true one shows: the same
  * number with other bytes ends the transfer, and where even that is missed, the CRC.
  *
  * Loss within a block: segments after a gap are ignored and the answer at the block's end names the

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from canopen_bench import Hand, hand, object_bytes, program
+from canopen_bench import BUSY, Hand, hand, object_bytes, program
 from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
 
 from bench import Bench, MakeAlpha, MakeBench
@@ -197,9 +197,6 @@ def asked_by_hand(other: Hand, request: bytes) -> int:
     return int.from_bytes(answer[4:8], "little") if answer[0] == 0x80 else 0
 
 
-BUSY = 0x08000021
-
-
 def test_a_second_client_beside_an_upload(make_bench: MakeBench, hub: LocalHub) -> None:
     """Another computer, which knows nothing of the turns taken on this one, asks in the middle of a block download: it
     is refused each time, the upload goes on and is whole.
@@ -241,3 +238,38 @@ def test_a_command_beside_another_computers_upload(
         assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
         assert main(["status"]) == 4
         assert "another SDO client" in capsys.readouterr().err
+
+
+FRAME_BITS_LEAST = 111
+"""Of a frame of eight bytes, without stuff bits; at 1 Mbit/s as many microseconds."""
+
+
+def flood(other: Neighbour, identifier: int, seconds: float) -> None:
+    """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
+    for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
+        other.send(identifier, b"\xaa" * 8)
+
+
+@pytest.mark.parametrize("identifier", [0x7FF, 0x6FF])
+def test_a_bus_that_is_full_of_what_matters_less(
+    moving: Moving, other: Neighbour, identifier: int
+) -> None:
+    """All that matters has right of way: the program runs to its end at a load of 100 %."""
+    bench, path = moving(1.0)
+    flood(other, identifier, 0.15)
+    bench.clock.sleep(0.15)
+    assert settled(bench) == (READY, 0, 0)
+    runs_again(path)
+
+
+@pytest.mark.parametrize("seconds", [0.0005, 0.002, 0.05, 0.15])
+def test_a_bus_that_is_full_of_what_matters_more(
+    moving: Moving, other: Neighbour, seconds: float
+) -> None:
+    """Nothing else gets through: setpoints wait, and answers. Simulated drives wait too."""
+    bench, path = moving(1.0)
+    flood(other, 0x001, seconds)
+    bench.clock.sleep(seconds)
+    state, code, _ = settled(bench)
+    assert (state, code) in ((READY, 0), (FAULT_STATE, LOST))
+    runs_again(path)

@@ -316,13 +316,13 @@ static void test_a_second_client_is_refused(void)
     sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
     sdo_talk_segment(&talk, 0x00, data, 7);
     for (unsigned i = 0; i < sizeof asks; ++i) {
-        TEST_ASSERT_TRUE(sdo_talk_ask(&talk, asks[i], 0x2003, 7, 1));
+        TEST_ASSERT_TRUE(sdo_talk_ask(&talk, asks[i], 0x2003, 0, 1));
         TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_LOCAL, sdo_talk_abort_code(&talk));
         TEST_ASSERT_TRUE(sdo_talk_busy(&talk));
         TEST_ASSERT_EQUAL_HEX16(0x2003, cob_get(talk.answer.data + 1, 2));
-        TEST_ASSERT_EQUAL_UINT8(7, talk.answer.data[3]);
+        TEST_ASSERT_EQUAL_UINT8(0, talk.answer.data[3]);
     }
-    TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2003, 7, SDO_ABORT_TIMEOUT));
+    TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2003, 0, SDO_ABORT_TIMEOUT));
     TEST_ASSERT_EQUAL_INT(0, talk.small.aborted);
     sdo_talk_segment(&talk, 0x11, data, 7);
     TEST_ASSERT_EQUAL_HEX8(0x30, talk.answer.data[0]);

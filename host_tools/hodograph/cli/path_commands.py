@@ -213,13 +213,18 @@ def simulate_(options: Namespace) -> None:
         print_rows(motion_rows(motion))
 
 
+def volts_words(motion: Motion) -> str:
+    """The greatest voltage of a run, for people."""
+    return "not told by the drives" if motion.max_volts is None else f"{motion.max_volts:.3f} V"
+
+
 def motion_rows(motion: Motion) -> list[tuple[str, str]]:
     """A run's results for people."""
     return [
         ("ticks", f"{motion.ticks} of {motion.period_us} us, kernel {motion.kernel}"),
         ("greatest contour error", f"{motion.max_contour_error_um:.3f} um"),
         ("greatest following error", f"{motion.max_following_error_um:.1f} um"),
-        ("greatest voltage", f"{motion.max_volts:.3f} V"),
+        ("greatest voltage", volts_words(motion)),
         ("setpoints SHA-256", motion.setpoints_sha256),
         ("encoders SHA-256", motion.encoders_sha256),
     ]
