@@ -7,16 +7,57 @@
 #include "canopen/sdo_abort.h"
 #include "port/port.h"
 
-static uint32_t allow_configuration(struct controller *controller, const struct od_entry *entry,
-                                    uint64_t value)
+/* Test and use in one critical section: a fault may come between any two. False: not possible now. */
+static bool apply(struct controller *controller, const struct config *config, bool drives)
+{
+    port_lock();
+    const bool possible = machine_configurable(&controller->machine);
+    if (possible) {
+        machine_configure(&controller->machine, config, drives);
+        port_tick_period(config->period_us);
+    }
+    port_unlock();
+    return possible;
+}
+
+static bool configurable(const struct controller *controller)
 {
     port_lock();
     const bool possible = machine_configurable(&controller->machine);
     port_unlock();
-    if (!possible) {
+    return possible;
+}
+
+/* The dictionary has the new value while the configuration is read from it, and the old one again when it is refused. */
+static uint32_t reconfigure(struct controller *controller, const struct od_entry *entry,
+                            uint64_t value)
+{
+    const uint64_t before = od_number(&controller->od, entry);
+    struct config config;
+    od_set_number(&controller->od, entry, value);
+    config_read(&config, &controller->od);
+    if (!apply(controller, &config, config_concerns_drives(entry->index, entry->sub))) {
+        od_set_number(&controller->od, entry, before);
         return SDO_ABORT_STATE;
     }
-    return config_value_allowed(entry->index, entry->sub, value) ? SDO_OK : SDO_ABORT_VALUE;
+    controller->config = config;
+    program_slot_stale(&controller->slot);
+    return SDO_OK;
+}
+
+/* Writing the value that is there changes nothing. */
+static uint32_t configure(struct controller *controller, const struct od_entry *entry,
+                          uint64_t value)
+{
+    uint8_t present[8] = {0};
+    cob_put(present, od_number(&controller->od, entry), entry->size);
+    if (!configurable(controller)) {
+        return SDO_ABORT_STATE;
+    }
+    if (!config_value_allowed(entry->index, entry->sub, value)) {
+        return SDO_ABORT_VALUE;
+    }
+    return cob_get(present, entry->size) == value ? SDO_OK : reconfigure(controller, entry, value);
 }
 
 uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_t *value,
@@ -39,23 +80,9 @@ uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_
                    : SDO_OK;
     }
     if (config_contains(entry->index)) {
-        uint8_t present[8] = {0};
-        cob_put(present, od_number(&controller->od, entry), entry->size);
-        controller->same_value = cob_get(present, entry->size) == number;
-        return allow_configuration(controller, entry, number);
+        return configure(controller, entry, number);
     }
     return SDO_OK;
-}
-
-static void reconfigure(struct controller *controller, const struct od_entry *entry)
-{
-    config_read(&controller->config, &controller->od);
-    program_slot_stale(&controller->slot);
-    port_lock();
-    machine_configure(&controller->machine, &controller->config,
-                      config_concerns_drives(entry->index, entry->sub));
-    port_tick_period(controller->config.period_us);
-    port_unlock();
 }
 
 void od_written_hook(void *context, const struct od_entry *entry)
@@ -70,7 +97,5 @@ void od_written_hook(void *context, const struct od_entry *entry)
                           controller->values.consumer_heartbeat_time);
     } else if (entry->index == 0x1003) {
         emcy_producer_forget(&controller->emcy);
-    } else if (config_contains(entry->index) && !controller->same_value) {
-        reconfigure(controller, entry);
     }
 }

@@ -32,6 +32,8 @@ static struct {
     const struct fake_port_store *store;
     void (*wait_hook)(void *context);
     void *wait_context;
+    void (*unlock_hook)(void *context);
+    void *unlock_context;
 } self;
 
 void fake_port_reset(void)
@@ -140,6 +142,12 @@ void fake_port_use_store(const struct fake_port_store *store)
     self.store = store;
 }
 
+void fake_port_on_unlock(void (*hook)(void *context), void *context)
+{
+    self.unlock_hook = hook;
+    self.unlock_context = context;
+}
+
 void fake_port_on_wait(void (*hook)(void *context), void *context)
 {
     self.wait_hook = hook;
@@ -246,6 +254,11 @@ void port_unlock(void)
 {
     TEST_ASSERT_TRUE_MESSAGE(self.locked, "unlocked twice");
     self.locked = false;
+    if (self.unlock_hook != NULL) {
+        void (*hook)(void *context) = self.unlock_hook;
+        self.unlock_hook = NULL;
+        hook(self.unlock_context);
+    }
 }
 
 void port_wait(uint32_t timeout_us)

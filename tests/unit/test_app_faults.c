@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/commands.h"
+#include "app/od_write.h"
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 
@@ -762,6 +763,27 @@ static void test_simulated_drives_need_none(void)
     TEST_ASSERT_FALSE(fake_port_urgent());
 }
 
+static void fails_now(void *context)
+{
+    (void)context;
+    machine_raise(machine(), EMCY_GENERIC, 2, 0);
+}
+
+/* A fault between the test whether the configuration may change and the change: it does not. */
+static void test_a_fault_in_the_middle_of_a_write(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    const int64_t before = app_bench_read(&bench, 0x2005, 1);
+    const uint8_t value = 9;
+    const struct od_entry *entry = od_find(&bench.controller.od, 0x2005, 1);
+    fake_port_on_unlock(fails_now, NULL);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, od_write_hook(&bench.controller, entry, &value, 1));
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, machine()->state);
+    TEST_ASSERT_EQUAL_INT(before, app_bench_read(&bench, 0x2005, 1));
+    TEST_ASSERT_EQUAL_UINT8(before, bench.controller.config.node[0]);
+    TEST_ASSERT_EQUAL_UINT8(before, machine()->config.node[0]);
+}
+
 /* --- Reset --- */
 
 /* A statusword that says Fault, for ever, and no EMCY with it: the mapping may be another one. */
@@ -957,5 +979,6 @@ int main(void)
     RUN_TEST(test_simulated_drives_need_none);
     RUN_TEST(test_a_reset_configures_a_drive_that_speaks_nonsense);
     RUN_TEST(test_reset_when_off_configures_anew);
+    RUN_TEST(test_a_fault_in_the_middle_of_a_write);
     return UNITY_END();
 }

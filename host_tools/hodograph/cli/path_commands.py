@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..feed import Plan
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.image import MAGIC
+from ..program.memory import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from ..simulate import Motion, simulate, write_trace
 from .output import note, number, print_json, print_rows, progress, write_file
 
@@ -139,6 +140,7 @@ def compile_(options: Namespace) -> None:
     print_notes(chain, chain.compilation.plan)
     output = options.output or Path(chain.file.name + ".hdgp")
     write_file(output, image)
+    _warn_of_size(image, chain.machine.kernel)
     program = chain.program
     if options.json:
         print_json({"file": str(output), "bytes": len(image)} | inspect_dict(program))
@@ -147,6 +149,15 @@ def compile_(options: Namespace) -> None:
         f"{output}: {len(image)} bytes, {program.segment_count} segments, {program.piece_count} feed "
         f"pieces, {program.ticks} ticks of {program.period_us} us"
     )
+
+
+def _warn_of_size(image: bytes, kernel: str) -> None:
+    needed = memory_bytes(image, *RECORD_BYTES[kernel])
+    if needed > LARGEST_BANK:
+        note(
+            f"takes {needed} bytes of a controller with what is prepared from it, more than the {LARGEST_BANK} of the "
+            "largest one: split the path"
+        )
 
 
 def read_image(file: Path) -> bytes | None:
