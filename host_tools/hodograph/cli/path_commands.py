@@ -14,10 +14,11 @@ from ..chain import Chain, load_chain
 from ..errors import InputError
 from ..feed import Plan
 from ..program import Program, decode, inspect_dict, inspect_text
+from ..program.check import check
 from ..program.image import MAGIC
 from ..program.memory import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from ..simulate import Motion, simulate, write_trace
-from .output import note, number, print_json, print_rows, progress, write_file
+from .output import json_text, note, number, print_json, print_rows, progress, write_file
 
 
 def spline(options: Namespace) -> None:
@@ -189,10 +190,24 @@ def inspect(options: Namespace) -> None:
         program = load_chain(options.file, options.machine).program
     else:
         program = decode_file(options.file, image)
-    if options.json:
-        print_json(inspect_dict(program))
-    else:
-        print(inspect_text(program, full=options.full))
+    try:
+        with np.errstate(divide="raise", invalid="raise", over="raise"):
+            found = inspect_dict(program)
+            text = json_text(found) if options.json else inspect_text(program, full=options.full)
+    except (ArithmeticError, ValueError) as error:
+        raise InputError(f"{options.file}: {_unsound(program)}") from error
+    print(text)
+
+
+def _unsound(program: Program) -> str:
+    """Why nothing can be computed from an image."""
+    try:
+        fault = check(program)
+    except (ArithmeticError, ValueError):
+        fault = None
+    if fault is None:
+        return "a number in the program image is out of range"
+    return f"no program: {fault.code.text} ({fault.code.name}, code {fault.code}, {fault.place})"
 
 
 def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) -> Motion:

@@ -46,7 +46,8 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
 
 def require_room(node: Node, image: bytes) -> None:
     """Raises RefusedError when no bank of this controller can hold the program with its records."""
-    from ...program.memory import HEADER_SIZE, memory_bytes
+    from ...program.image import HEADER_SIZE
+    from ...program.memory import memory_bytes
 
     if len(image) < HEADER_SIZE:
         return
