@@ -811,7 +811,6 @@ static void test_reset_when_off_configures_anew(void)
     TEST_ASSERT_EQUAL_UINT32(starts + BENCH_DRIVES, bench.starts);
 }
 
-
 static void test_a_reset_while_the_cause_persists_gives_the_fault_again(void)
 {
     run_some(100);

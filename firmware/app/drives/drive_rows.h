@@ -20,7 +20,7 @@ enum drive_when {
     WHEN_NO_VELOCITY, /* as WHEN_NO_TORQUE */
     WHEN_HOMING,      /* homing is asked for, and the drive has the mode */
     WHEN_WINDOW,      /* a following error window is set */
-    WHEN_ENCODER, /* the encoder's increments, gear, feed constant are set */
+    WHEN_ENCODER,     /* the encoder's increments, gear, feed constant are set */
     WHEN_GEAR,
     WHEN_FEED,
 };

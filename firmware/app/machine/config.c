@@ -72,8 +72,7 @@ static void read_window(struct config *config, uint8_t axis)
     const bool set = own->following_window_counts != UINT32_MAX;
     const uint32_t timeout_us = own->following_timeout_ms * 1000u;
     config->apart_counts[axis] = set ? own->following_window_counts : lag_counts(config);
-    config->apart_syncs[axis] =
-        (set ? timeout_us / config->period_us : 0u) + CONFIG_APART_SYNCS;
+    config->apart_syncs[axis] = (set ? timeout_us / config->period_us : 0u) + CONFIG_APART_SYNCS;
 }
 
 void config_read(struct config *config, const struct od *od)

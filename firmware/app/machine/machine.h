@@ -62,7 +62,7 @@ enum machine_refusal {
     MACHINE_DRIVES_ON = 9,        /* homing wants them off */
     MACHINE_NO_HOMING_MODE = 10,  /* an axis shall be homed whose drive has no homing mode */
     MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */
-    MACHINE_NOT_IN_TIME = 16, /* drives are real, and the port cannot keep ticks in time */
+    MACHINE_NOT_IN_TIME = 16,     /* drives are real, and the port cannot keep ticks in time */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
@@ -94,11 +94,13 @@ struct machine {
     uint32_t sync_us;          /* time of the last SYNC */
     uint32_t unsent_ticks;     /* in a row with a frame that the port refused */
     uint32_t sync_left_us;     /* time of the last SYNC that has left */
-    uint32_t arriving_ticks;   /* since the settling time of a motion was over, with an axis away from its target */
-    bool sync_sent;            /* the last SYNC has left */
-    bool sync_now;             /* and that of this tick */
-    bool setpoints_sent;       /* and all setpoints after it */
-    bool withheld; /* this tick makes no new setpoint: its SYNC, or a setpoint before it, has not left */
+    uint32_t
+        arriving_ticks; /* since the settling time of a motion was over, with an axis away from its target */
+    bool sync_sent;      /* the last SYNC has left */
+    bool sync_now;       /* and that of this tick */
+    bool setpoints_sent; /* and all setpoints after it */
+    bool
+        withheld; /* this tick makes no new setpoint: its SYNC, or a setpoint before it, has not left */
     bool simulated;      /* every drive is a simulated one: the port may let ticks wait for them */
     bool configured;     /* drives are configured; BOOT then waits for their first answers */
     uint8_t silent_node; /* BOOT again because this one was started and did not answer; 0: none */

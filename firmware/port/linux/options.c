@@ -6,7 +6,8 @@
 #include <string.h>
 
 static const char help[] =
-    "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--no-realtime]\n"
+    "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] "
+    "[--no-realtime]\n"
     "                            [--verbose]\n"
     "\n"
     "The Hodograph motion controller as a CANopen node on a SocketCAN bus. All configuration comes "

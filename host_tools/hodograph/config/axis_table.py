@@ -72,7 +72,7 @@ class Axis:
     """One axis: CANopen node, travel limits in machine coordinates, what its drive is told, and its model.
 
     Without a drive file (`drive` None) the axis can be run, but not simulated. `following_window_mm` None: the drive
-    does not supervise its following error.
+    keeps its own, and the controller looks for an axis that does not follow at all.
     """
 
     name: str
