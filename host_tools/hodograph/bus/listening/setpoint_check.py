@@ -15,8 +15,8 @@ turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greate
               holds for each axis, so it is checked too while only one of the plane's drives follows.
 
 Where a SYNC passed without a setpoint the drive stood at its target, and the next setpoint is the step of one period:
-that is what the drive makes of it. One garbled statusword in a row does not hide a drive that follows. Axes beyond the plane hold their position: they are checked for speed and acceleration
-one by one.
+that is what the drive makes of it. One garbled statusword in a row does not hide a drive that follows. Axes beyond the
+plane hold their position: they are checked for speed and acceleration one by one.
 """
 
 from __future__ import annotations
