@@ -68,6 +68,28 @@ static bool needs_configuration(enum command command)
            command == COMMAND_START_FROM;
 }
 
+/* Real drives take no late SYNCs: they are not switched on where the operating system may make them late. */
+static bool too_late_for_real_drives(const struct controller *controller)
+{
+    port_lock();
+    const bool real = controller->machine.state == MACHINE_OFF && !controller->machine.simulated;
+    port_unlock();
+    return real && port_timing() == PORT_TIMING_REFUSED;
+}
+
+static enum machine_refusal enable(struct controller *controller)
+{
+    return too_late_for_real_drives(controller) ? MACHINE_NOT_IN_TIME
+                                                : locked(&controller->machine, machine_enable);
+}
+
+static enum machine_refusal home(struct controller *controller)
+{
+    return too_late_for_real_drives(controller)
+               ? MACHINE_NOT_IN_TIME
+               : homing_begin(&controller->homing, &controller->machine, controller->boot.facts);
+}
+
 static enum machine_refusal dispatch(struct controller *controller, enum command command)
 {
     struct machine *machine = &controller->machine;
@@ -76,7 +98,7 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     }
     switch (command) {
     case COMMAND_ENABLE:
-        return locked(machine, machine_enable);
+        return enable(controller);
     case COMMAND_START:
         return start(controller, 0);
     case COMMAND_START_FROM:
@@ -88,7 +110,7 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     case COMMAND_DISABLE:
         return locked(machine, machine_disable);
     case COMMAND_HOME:
-        return homing_begin(&controller->homing, machine, controller->boot.facts);
+        return home(controller);
     case COMMAND_RESET:
         return locked(machine, machine_reset);
     case COMMAND_QUICK_STOP:

@@ -73,7 +73,6 @@ struct controller {
     enum machine_refusal refusal; /* of the last command */
     uint8_t node;
     bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
-    bool same_value;            /* the write under way changes nothing */
 };
 
 /* Everything to its power-on state: stored parameters are restored. `node` is the number of the port, which a stored one

@@ -123,6 +123,10 @@ static uint64_t machine_number(const struct controller *controller, const struct
         return motion_number(&machine->motion, entry->sub);
     case 0x2010:
         return override_number(machine, entry->sub);
+    case 0x2040:
+        return (uint64_t)port_timing();
+    case 0x2041:
+        return program_slot_memory(controller->config.kernel, entry->sub);
     case 0x2025:
         return boot_number(&controller->boot, entry->sub);
     case 0x2055:
@@ -139,15 +143,15 @@ static uint64_t machine_number(const struct controller *controller, const struct
 
 static bool is_mirror(const struct od_entry *entry)
 {
-    if (entry->index == 0x2002) {
+    if (entry->index == 0x2002 || entry->index == 0x2040) {
         return true;
     }
     if (entry->index == 0x2055) {
         return entry->sub == 2u;
     }
-    static const uint16_t records[] = {0x2003, 0x2008, 0x2009, 0x200A, 0x200B, 0x200C, 0x200D,
-                                       0x200E, 0x2010, 0x2017, 0x201B, 0x201C, 0x2024, 0x2025,
-                                       0x2026, 0x2027, 0x2028, 0x2029, 0x202A, 0x202B, 0x202C};
+    static const uint16_t records[] = {
+        0x2003, 0x2008, 0x2009, 0x200A, 0x200B, 0x200C, 0x200D, 0x200E, 0x2010, 0x2017, 0x201B,
+        0x201C, 0x2024, 0x2025, 0x2026, 0x2027, 0x2028, 0x2029, 0x202A, 0x202B, 0x202C, 0x2041};
     for (size_t i = 0; i < sizeof records / sizeof records[0]; ++i) {
         if (records[i] == entry->index) {
             return entry->sub > 0u;

@@ -10,7 +10,20 @@
 #define SIGNATURE_SAVE UINT32_C(0x65766173) /* "save", CiA 301 7.5.2.13 */
 #define SIGNATURE_LOAD UINT32_C(0x64616F6C) /* "load", 7.5.2.14 */
 
-static bool is_configurable(struct controller *controller)
+/* Test and use in one critical section: a fault may come between any two. False: not possible now. */
+static bool apply(struct controller *controller, const struct config *config, bool drives)
+{
+    port_lock();
+    const bool possible = machine_configurable(&controller->machine);
+    if (possible) {
+        machine_configure(&controller->machine, config, drives);
+        port_tick_period(config->period_us);
+    }
+    port_unlock();
+    return possible;
+}
+
+static bool configurable(const struct controller *controller)
 {
     port_lock();
     const bool possible = machine_configurable(&controller->machine);
@@ -25,7 +38,7 @@ static uint32_t keep(struct controller *controller, uint16_t index, uint64_t sig
     if (signature != (save ? SIGNATURE_SAVE : SIGNATURE_LOAD)) {
         return SDO_ABORT_TRANSFER;
     }
-    if (!is_configurable(controller)) {
+    if (!configurable(controller)) {
         return SDO_ABORT_STATE;
     }
     const int result =
@@ -48,13 +61,35 @@ static uint32_t confirm(struct controller *controller, uint64_t crc32)
     return SDO_OK;
 }
 
-static uint32_t allow_configuration(struct controller *controller, const struct od_entry *entry,
-                                    uint64_t value)
+/* The dictionary has the new value while the configuration is read from it, and the old one again when it is refused. */
+static uint32_t reconfigure(struct controller *controller, const struct od_entry *entry,
+                            uint64_t value)
 {
-    if (!is_configurable(controller)) {
+    const uint64_t before = od_number(&controller->od, entry);
+    struct config config;
+    od_set_number(&controller->od, entry, value);
+    config_read(&config, &controller->od);
+    if (!apply(controller, &config, config_concerns_drives(entry->index, entry->sub))) {
+        od_set_number(&controller->od, entry, before);
         return SDO_ABORT_STATE;
     }
-    return config_value_allowed(entry->index, entry->sub, value) ? SDO_OK : SDO_ABORT_VALUE;
+    controller->config = config;
+    return SDO_OK;
+}
+
+/* Writing the value that is there changes nothing. */
+static uint32_t configure(struct controller *controller, const struct od_entry *entry,
+                          uint64_t value)
+{
+    uint8_t present[8] = {0};
+    cob_put(present, od_number(&controller->od, entry), entry->size);
+    if (!configurable(controller)) {
+        return SDO_ABORT_STATE;
+    }
+    if (!config_value_allowed(entry->index, entry->sub, value)) {
+        return SDO_ABORT_VALUE;
+    }
+    return cob_get(present, entry->size) == value ? SDO_OK : reconfigure(controller, entry, value);
 }
 
 uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_t *value,
@@ -83,22 +118,9 @@ uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_
                    : SDO_OK;
     }
     if (config_contains(entry->index)) {
-        uint8_t present[8] = {0};
-        cob_put(present, od_number(&controller->od, entry), entry->size);
-        controller->same_value = cob_get(present, entry->size) == number;
-        return allow_configuration(controller, entry, number);
+        return configure(controller, entry, number);
     }
     return SDO_OK;
-}
-
-static void reconfigure(struct controller *controller, const struct od_entry *entry)
-{
-    config_read(&controller->config, &controller->od);
-    port_lock();
-    machine_configure(&controller->machine, &controller->config,
-                      config_concerns_drives(entry->index, entry->sub));
-    port_tick_period(controller->config.period_us);
-    port_unlock();
 }
 
 void od_written_hook(void *context, const struct od_entry *entry)
@@ -113,7 +135,5 @@ void od_written_hook(void *context, const struct od_entry *entry)
                           controller->values.consumer_heartbeat_time);
     } else if (entry->index == 0x1003) {
         emcy_producer_forget(&controller->emcy);
-    } else if (config_contains(entry->index) && !controller->same_value) {
-        reconfigure(controller, entry);
     }
 }

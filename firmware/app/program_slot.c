@@ -7,6 +7,7 @@
 #include "app/program_table.h"
 #include "core/counts.h"
 #include "core/interp.h"
+#include "core/prepared.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)
@@ -25,6 +26,19 @@ enum program_slot_state program_slot_state(const struct program_slot *slot)
 static unsigned spare_bank(const struct program_slot *slot)
 {
     return 1u - slot->bank;
+}
+
+uint64_t program_slot_memory(uint32_t kernel, uint8_t number)
+{
+    const struct kernel *made_for = kernel_find(kernel);
+    switch (number) {
+    case 1:
+        return program_record_room();
+    case 2:
+        return made_for != NULL ? prepared_segment_size(made_for) : 0u;
+    default:
+        return made_for != NULL ? prepared_piece_size(made_for) : 0u;
+    }
 }
 
 int program_slot_begin(struct program_slot *slot, uint32_t size)

@@ -47,6 +47,9 @@ void program_slot_init(struct program_slot *slot);
  * upload. Costs a whole check of each program it looks at. */
 void program_slot_recover(struct program_slot *slot);
 
+/* Object 0x2041: 1 bytes of a bank for image and records; 2, 3 bytes of the record of a segment, a piece, for a kernel. */
+uint64_t program_slot_memory(uint32_t kernel, uint8_t number);
+
 enum program_slot_state program_slot_state(const struct program_slot *slot);
 
 /* An upload: begin, write in order, then finish or abandon. 0 or PORT_ERR_STORE; finish: 0 or the

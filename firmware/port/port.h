@@ -92,6 +92,18 @@ void port_tick_period(uint32_t period_us);
 void port_tick_await(uint32_t guard_us, bool hurry);
 void port_tick_ready(void);
 
+/* Whether ticks have to come in time because drives are real: then none is put off for a mainline that starves. At first
+ * they have not. Boards, on which ticks are interrupts, ignore it. Mainline. */
+void port_tick_urgent(bool urgent);
+
+/* How well ticks come in time. Boards: PORT_TIMING_KEPT. Any context. */
+enum port_timing {
+    PORT_TIMING_KEPT = 0,     /* by an interrupt, a real-time thread, or virtual time */
+    PORT_TIMING_REFUSED = 1,  /* the machine does not permit it: real drives must not be enabled */
+    PORT_TIMING_ACCEPTED = 2, /* the same, and the user has said that it is fine */
+};
+enum port_timing port_timing(void);
+
 /* --- Mainline --- */
 
 /* Critical section: holds off both interrupts. Short, not nested, mainline only. */

@@ -44,6 +44,7 @@ KEYS = {
     "override",
     "unhomed_nodes",
     "axes",
+    "timing",
     "statistics",
     "bus_load",
 }

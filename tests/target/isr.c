@@ -70,6 +70,16 @@ uint32_t port_time_ns(void)
     return bus.time_ns;
 }
 
+void port_tick_urgent(bool urgent)
+{
+    (void)urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return PORT_TIMING_KEPT;
+}
+
 void port_tick_await(uint32_t guard_us, bool hurry)
 {
     (void)guard_us;
@@ -210,6 +220,10 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel)
     config.node[0] = 2;
     config.node[1] = 3;
     config.missed_max = 1;
+    for (unsigned i = 0; i < DRIVES; ++i) { /* compared, and never outside */
+        config.apart_counts[i] = UINT32_MAX;
+        config.apart_syncs[i] = CONFIG_APART_SYNCS;
+    }
     if (motion_begin(&prepared, &program, &config) < 0) {
         return STATUS_PROGRAM;
     }

@@ -11,6 +11,8 @@ static struct {
     struct port_handlers handlers;
     struct can_match filters[PORT_FILTERS];
     size_t filter_count;
+    struct can_match refused;
+    uint32_t refusals;
     uint64_t now_ns;
     uint32_t period_us;
     uint32_t awaited_us;
@@ -22,6 +24,9 @@ static struct {
     uint32_t missing; /* bytes of a bank for a program */
     uint32_t operations;
     uint32_t power_off_at;
+    bool urgent;
+    enum port_timing timing;
+    uint32_t missing; /* bytes of a bank */
     unsigned wakes;
     uint32_t sent_head;
     uint32_t sent_tail;
@@ -30,6 +35,8 @@ static struct {
     const struct fake_port_store *store;
     void (*wait_hook)(void *context);
     void *wait_context;
+    void (*unlock_hook)(void *context);
+    void *unlock_context;
 } self;
 
 void fake_port_reset(void)
@@ -92,6 +99,22 @@ bool fake_port_ready(void)
     return self.ready;
 }
 
+bool fake_port_urgent(void)
+{
+    return self.urgent;
+}
+
+void fake_port_set_timing(enum port_timing timing)
+{
+    self.timing = timing;
+}
+
+void fake_port_refuse(const struct can_match *refused, uint32_t times)
+{
+    self.refused = *refused;
+    self.refusals = times;
+}
+
 unsigned fake_port_wakes(void)
 {
     return self.wakes;
@@ -140,6 +163,12 @@ void fake_port_use_store(const struct fake_port_store *store)
     self.store = store;
 }
 
+void fake_port_on_unlock(void (*hook)(void *context), void *context)
+{
+    self.unlock_hook = hook;
+    self.unlock_context = context;
+}
+
 void fake_port_on_wait(void (*hook)(void *context), void *context)
 {
     self.wait_hook = hook;
@@ -183,6 +212,10 @@ int port_can_send(const struct can_msg *message)
     if (self.fail_send) {
         return PORT_ERR_FULL;
     }
+    if (self.refusals > 0u && can_match_any(&self.refused, 1, message)) {
+        self.refusals--;
+        return PORT_ERR_FULL;
+    }
     TEST_ASSERT_TRUE_MESSAGE(self.sent_head - self.sent_tail < SENT_MAX, "nobody takes the frames");
     TEST_ASSERT_TRUE(message->id <= CAN_ID_MAX && message->len <= CAN_DATA_MAX);
     self.sent[self.sent_head++ % SENT_MAX] = *message;
@@ -217,6 +250,16 @@ void port_tick_await(uint32_t guard_us, bool hurry)
     self.hurry = hurry;
 }
 
+void port_tick_urgent(bool urgent)
+{
+    self.urgent = urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return self.timing;
+}
+
 void port_tick_ready(void)
 {
     self.ready = true;
@@ -232,6 +275,11 @@ void port_unlock(void)
 {
     TEST_ASSERT_TRUE_MESSAGE(self.locked, "unlocked twice");
     self.locked = false;
+    if (self.unlock_hook != NULL) {
+        void (*hook)(void *context) = self.unlock_hook;
+        self.unlock_hook = NULL;
+        hook(self.unlock_context);
+    }
 }
 
 void port_wait(uint32_t timeout_us)

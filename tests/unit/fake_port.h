@@ -28,8 +28,15 @@ void fake_port_receive(const struct can_msg *message);
 uint32_t fake_port_period_us(void);
 uint32_t fake_port_awaited_us(void); /* port_tick_await of the last tick; 0: not called */
 bool fake_port_hurry(void);          /* and in a hurry */
+bool fake_port_urgent(void);         /* port_tick_urgent, last */
 bool fake_port_ready(void);          /* port_tick_ready since the last tick */
 unsigned fake_port_wakes(void);
+
+/* What port_timing() says from now on. */
+void fake_port_set_timing(enum port_timing timing);
+
+/* So many of the next frames that pass this filter are refused. */
+void fake_port_refuse(const struct can_match *refused, uint32_t times);
 
 /* From now on port_can_send, or port_store_write, fails. */
 void fake_port_fail_send(bool fail);
@@ -56,6 +63,9 @@ struct fake_port_store {
     const uint8_t *(*data)(unsigned bank);
 };
 void fake_port_use_store(const struct fake_port_store *store);
+
+/* Called once, after the next critical section: an interrupt between two of them. */
+void fake_port_on_unlock(void (*hook)(void *context), void *context);
 
 /* Called by port_wait; may be NULL. */
 void fake_port_on_wait(void (*hook)(void *context), void *context);

@@ -148,7 +148,8 @@ static void test_settings_of_an_axis_reach_its_drive_only(void)
     TEST_ASSERT_EQUAL_UINT32(777, values->homing_speeds[1]);
     TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x608F01, NULL));
     TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x609800, NULL));
-    TEST_ASSERT_EQUAL_UINT32(1, fake_drive_written(drive(0), 0x606500, NULL));
+    TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x606500, NULL));
+    TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x606600, NULL));
 }
 
 static void test_feedforward_changes_the_mapping(void)

@@ -13,6 +13,8 @@
 #define port_tick_period    board_tick_period
 #define port_tick_await     board_tick_await
 #define port_tick_ready     board_tick_ready
+#define port_tick_urgent    board_tick_urgent
+#define port_timing         board_timing
 #define port_lock           board_lock
 #define port_unlock         board_unlock
 #define port_wait           board_wait

@@ -62,7 +62,6 @@ static bool concerns(const struct drive_plan *plan, enum drive_when when)
         return !plan->facts->known[DRIVE_TORQUE_MAPPED];
     case WHEN_NO_VELOCITY:
         return !plan->facts->known[DRIVE_VELOCITY_MAPPED];
-    case WHEN_NO_WINDOW:
         return !configured(plan, WHEN_WINDOW);
     default:
         return configured(plan, when);

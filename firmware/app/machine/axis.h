@@ -37,6 +37,10 @@ struct axis {
     int32_t position_counts;
     int32_t target_counts;      /* to be sent in this tick */
     int32_t target_sent_counts; /* sent in the last one */
+    int32_t latched_counts;     /* target that the last SYNC made the drive take over */
+    int32_t expected_counts;    /* where the drive should have been at the last SYNC */
+    uint32_t away_syncs; /* answers in a row that told a position outside the window around that */
+    bool away;           /* for longer than the configuration permits */
     struct can_msg
         setpoint; /* RPDO1 as axis_setpoint made it last: kept, so that only changes are written */
     enum cia402_goal goal;
@@ -86,6 +90,17 @@ static inline void axis_sent(struct axis *axis)
     axis->target_sent_counts = axis->target_counts;
 }
 
+/* A SYNC has left: the drive takes over the target that it was sent last, and should be at the one before. Timer. */
+static inline void axis_synced(struct axis *axis)
+{
+    axis->expected_counts = axis->latched_counts;
+    axis->latched_counts = axis->target_sent_counts;
+}
+
+/* Compares the answer to the last SYNC with the position expected then, while the drive is to follow its target. Away: more
+ * than window_counts apart in more than syncs_max answers in a row. Timer, before axis_synced. */
+void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max);
+
 /* All pure, under the lock. */
 bool axis_gone(const struct axis *axis, uint32_t now_us); /* lost for long */
 bool axis_in_fault(const struct axis *axis);              /* Fault, or on the way there */
@@ -94,10 +109,10 @@ static inline bool axis_enabled(const struct axis *axis) /* Operation enabled */
 {
     return axis->state == CIA402_OPERATION_ENABLED;
 }
-/* Enabled, answers, its statusword tells no trouble. */
+/* Enabled, answers, is where it should be, its statusword tells no trouble. */
 static inline bool axis_well(const struct axis *axis)
 {
-    return axis->fit && !axis->answers.lost;
+    return axis->fit && !axis->answers.lost && !axis->away;
 }
 bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its target */
 
@@ -106,6 +121,9 @@ bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its targe
 bool axis_left(const struct axis *axis);
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
+
+/* Distance between the position and where it should have been at the same SYNC. */
+uint32_t axis_apart(const struct axis *axis);
 
 /* Distance of both target and position from a place, whichever is larger. */
 uint32_t axis_distance(const struct axis *axis, int32_t place_counts);

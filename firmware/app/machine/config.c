@@ -100,6 +100,26 @@ static uint32_t crc_of(const struct od *od, uint8_t axis_count)
     return crc;
 }
 
+/* feed * time * scale, in 32-bit steps that hold the largest result at UINT32_MAX. */
+static uint32_t lag_counts(const struct config *config)
+{
+    const uint64_t lag_nm = (uint64_t)config->feed_limit_um_s * CONFIG_LAG_MS; /* um/s * ms */
+    if (lag_nm == 0u || lag_nm > UINT32_MAX) {
+        return UINT32_MAX;
+    }
+    const uint64_t counts = qmath_div_u64(lag_nm * config->counts_per_mm, 1000000u);
+    return counts < UINT32_MAX ? (uint32_t)counts : UINT32_MAX;
+}
+
+static void read_window(struct config *config, uint8_t axis)
+{
+    const struct config_axis *own = &config->axis[axis];
+    const bool set = own->following_window_counts != UINT32_MAX;
+    const uint32_t timeout_us = own->following_timeout_ms * 1000u;
+    config->apart_counts[axis] = set ? own->following_window_counts : lag_counts(config);
+    config->apart_syncs[axis] = (set ? timeout_us / config->period_us : 0u) + CONFIG_APART_SYNCS;
+}
+
 void config_read(struct config *config, const struct od *od)
 {
     config->period_us = (uint32_t)number(od, 0x1006, 0);
@@ -121,6 +141,7 @@ void config_read(struct config *config, const struct od *od)
         config->travel_min_counts[i] = (int32_t)number(od, 0x2006, sub);
         config->travel_max_counts[i] = (int32_t)number(od, 0x2007, sub);
         read_axis(&config->axis[i], od, sub);
+        read_window(config, i);
     }
     config->crc32 = crc_of(od, config->axis_count);
 }

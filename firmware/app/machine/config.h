@@ -20,6 +20,12 @@
 #define CONFIG_TORQUE_FEEDFORWARD   1u
 #define CONFIG_VELOCITY_FEEDFORWARD 2u
 
+/* A position loop without feedforward lags behind by the way of so long a time, at the most (a gain of 50 / s). */
+#define CONFIG_LAG_MS 20u
+
+/* So many SYNCs more than the drive's own time, so that a drive that notices tells of it first. */
+#define CONFIG_APART_SYNCS 5u
+
 /* What belongs to one axis beside node and travel. Every field has 32 bits, so that tables can name
  * one by its offset. */
 struct config_axis {
@@ -31,7 +37,7 @@ struct config_axis {
     uint32_t velocity_permille;             /* 0 ... 2000, of the setpoint's velocity */
     int32_t torque_per_acceleration_q16;    /* per mille of the rated torque for 1 m/s^2 */
     int32_t torque_per_velocity_q16;        /* the same for 1 m/s */
-    uint32_t following_window_counts;       /* 0x6065; UINT32_MAX: off */
+    uint32_t following_window_counts;       /* 0x6065; UINT32_MAX: the drive's own stays */
     uint32_t following_timeout_ms;          /* 0x6066 */
     uint32_t quick_stop_counts_s2;          /* 0x6085 */
     uint32_t encoder_increments;            /* 0x608F; 0, here and below: the drive keeps its own */
@@ -65,6 +71,10 @@ struct config {
     uint8_t missed_max;  /* so many answers in a row may be missed */
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
     uint32_t crc32;      /* of the objects; docs/protocol.md section 3.4 */
+    /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following window
+     * and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit (without one: UINT32_MAX). */
+    uint32_t apart_counts[AXES_MAX];
+    uint32_t apart_syncs[AXES_MAX];
 };
 
 /* Copies the present values out of the dictionary. Mainline. */

@@ -23,6 +23,7 @@ void machine_init(struct machine *machine, const struct config *config)
     memset(machine, 0, sizeof *machine);
     machine->config = *config;
     machine->override_percent = 100;
+    machine->setpoints_sent = true;
     machine_enter_boot(machine);
 }
 

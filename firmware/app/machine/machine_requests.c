@@ -184,6 +184,7 @@ enum machine_refusal machine_start(struct machine *machine, const struct motion 
         machine->unhomed_axes = machine_unhomed(machine);
         motion_override(&machine->motion, machine->override_percent);
         machine->ticks_left = MACHINE_SETTLE_TICKS;
+        machine->arriving_ticks = 0;
         statistics_restart(&machine->statistics);
         machine->state = MACHINE_RUNNING;
     }

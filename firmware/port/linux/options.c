@@ -7,7 +7,7 @@
 
 static const char help[] =
     "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--store "
-    "FILE]\n"
+    "FILE] [--no-realtime]\n"
     "                            [--verbose]\n"
     "\n"
     "The Hodograph motion controller as a CANopen node on a SocketCAN bus. All configuration comes "
@@ -26,6 +26,9 @@ static const char help[] =
     "                   made where it is missing, some kilobytes on disk; without it both end with "
     "the "
     "process\n"
+    "  --no-realtime    enables real drives although the machine does not permit SCHED_FIFO and "
+    "locked memory:\n"
+    "                   ticks may come late, and a late SYNC is a fault\n"
     "  --verbose        notes about states on stderr\n"
     "\n"
     "exit status: 0 ended as asked, 1 the machine failed (a line says how), 2 wrong usage, 4 bus "
@@ -82,8 +85,7 @@ static bool takes_value(const char *name)
 
 enum options_result options_parse(struct options *options, int argc, char **argv)
 {
-    *options = (struct options){
-        .bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME, .verbose = false};
+    *options = (struct options){.bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME};
     for (int i = 1; i < argc; ++i) {
         if (strcmp(argv[i], "--help") == 0) {
             (void)fputs(help, stdout);
@@ -91,6 +93,8 @@ enum options_result options_parse(struct options *options, int argc, char **argv
         }
         if (strcmp(argv[i], "--verbose") == 0) {
             options->verbose = true;
+        } else if (strcmp(argv[i], "--no-realtime") == 0) {
+            options->no_realtime = true;
         } else if (!takes_value(argv[i])) {
             return wrong("unknown argument", argv[i]);
         } else if (i + 1 >= argc) {

@@ -17,6 +17,7 @@ struct options {
     uint8_t node;      /* 1 ... 127 */
     enum options_pace pace;
     bool verbose;
+    bool no_realtime; /* real drives may be enabled without real-time permission */
 };
 
 enum options_result {

@@ -180,6 +180,14 @@ void port_wake(void)
     }
 }
 
+enum port_timing port_timing(void)
+{
+    if (interrupts_keep_time()) {
+        return PORT_TIMING_KEPT;
+    }
+    return self.options.no_realtime ? PORT_TIMING_ACCEPTED : PORT_TIMING_REFUSED;
+}
+
 void port_log(enum port_level level, const char *text, int32_t value)
 {
     if (level == PORT_WARNING || self.options.verbose) {

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +163,7 @@ def _motion(
     first = first_tick(ticks.targets[plane], setpoints) if found is None else found
     count = program.ticks + settling_ticks(machine.period_us)
     reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
-    return analyse(
+    motion = analyse(
         image,
         ticks.targets[plane][first : first + count],
         ticks.actual[plane][reached],
@@ -171,6 +171,7 @@ def _motion(
         kernel=kernel,
         counts_per_mm=machine.counts_per_mm,
     )
+    return motion if ticks.volts_mv is not None else replace(motion, max_volts=None)
 
 
 def program_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int | None:

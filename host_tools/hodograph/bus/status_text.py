@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from .listening.load import BusLoad
 from .sdo.status import AxisStatus, LoadedProgram, Override, Statistics, Status
+from .words.texts import TIMINGS
 
 Row = tuple[str, str]
 
@@ -32,8 +33,16 @@ def status_rows(
             rows.append(("", f"error: {axis.error} (0x{axis.error_code:04X})"))
             rows.append(("", f"remedy: {axis.remedy}"))
     rows += [] if load is None else _load_rows(load)
+    rows += _timing_rows(status.timing)
     rows += _statistics_rows(status.statistics)
     return rows
+
+
+def _timing_rows(timing: str) -> list[Row]:
+    if timing == TIMINGS[0]:
+        return []
+    word = "refused" if timing == TIMINGS[1] else "enabled at your own risk (--no-realtime)"
+    return [("real time", f"not permitted by the controller's computer: real drives are {word}")]
 
 
 def _trouble_rows(status: Status) -> list[Row]:

@@ -92,9 +92,12 @@ def reset(options: Namespace) -> None:
     address = parse_address(options.bus)
     to = target(options)
     with reached(address, to.node, to.bitrate, options.wait) as controller:
-        had_fault = actions.reset(controller, options.timeout or actions.BOOT_S)
+        wait_s = options.timeout or actions.BOOT_S
+        had_fault = actions.reset(controller, wait_s)
+        if not had_fault:
+            actions.configure_anew(controller, wait_s)
     if not had_fault:
-        note("no fault was present")
+        note("no fault was present: the drives have been configured anew")
     print("ready to be started")
 
 

@@ -85,7 +85,7 @@ class Axis:
     before it accepts a program (docs/limits.md).
 
     Without a drive file (`drive` None) the axis can be run, but not simulated. `following_window_mm` None: the drive
-    does not supervise its following error.
+    keeps its own, and the controller looks for an axis that does not follow at all.
     """
 
     name: str

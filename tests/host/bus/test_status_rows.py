@@ -58,6 +58,7 @@ RUNNING = Status(
     override=Override(150, 120.0, True),
     unhomed_nodes=(),
     axes=(AXIS, replace(AXIS, node=3, homed=False, inputs_on=())),
+    timing="kept",
     statistics=Statistics(5000, 500, 2, 130, 12_345, 3, 0),
 )
 

@@ -185,8 +185,7 @@ class Controller(Node):
     def command(self, command: int) -> None:
         """Gives a command; raises RefusedError with the controller's reason."""
         try:
-            with self.turn():
-                self.sdo[COMMAND].raw = command
+            self.patiently(COMMAND, None, lambda: self._give(command))
         except SdoAbortedError as error:
             reason = self.read(FAULT, 4)
             text = REFUSALS.get(reason, str(error))
@@ -195,6 +194,9 @@ class Controller(Node):
             raise CommandRefusedError(f"{self.who()} refused: {text}", reason) from error
         except SdoCommunicationError as error:
             raise BusError(f"{self.who()} stopped answering a command") from error
+
+    def _give(self, command: int) -> None:
+        self.sdo[COMMAND].raw = command
 
     def wait_for(
         self, states: tuple[int, ...], wait_s: float, tick: Callable[[], None] | None = None

@@ -17,6 +17,7 @@ from ..words.texts import (
     REFUSALS,
     STATES,
     STORED,
+    TIMINGS,
     detail_text,
     fault_words,
 )
@@ -39,6 +40,7 @@ from .objects import (
     OVERRIDE,
     STATUSWORD,
     TARGET,
+    TIMING,
     UNHOMED_START,
 )
 from .upload import program_fault_text
@@ -149,7 +151,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Status:
-    """Everything that the controller tells, at one instant or nearly so.
+    """Everything that the controller tells, at one instant or nearly so. `timing` is one of TIMINGS.
 
     `unhomed_nodes`: drives that should have been homed, and were not, when the present or last program was started.
     """
@@ -166,6 +168,7 @@ class Status:
     override: Override
     unhomed_nodes: tuple[int, ...]
     axes: tuple[AxisStatus, ...]
+    timing: str
     statistics: Statistics
 
     def json(self) -> dict[str, Any]:
@@ -190,6 +193,7 @@ def snapshot(controller: Controller) -> Status:
         configured = _configured(controller)
         unhomed = controller.read(UNHOMED_START, 2)
         statistics = Statistics(**controller.statistics())
+        timing = controller.read(TIMING)
     with controller.turn():
         counts_per_mm = controller.read(CONFIGURATION, 7)
         axis_count = controller.read(CONFIGURATION, 1)
@@ -207,6 +211,7 @@ def snapshot(controller: Controller) -> Status:
         override=Override(override[0], 100 * override[1] * _Q30, bool(override[2])),
         unhomed_nodes=tuple(axis.node for i, axis in enumerate(axes) if unhomed >> i & 1),
         axes=axes,
+        timing=TIMINGS.get(timing, str(timing)),
         statistics=statistics,
     )
 

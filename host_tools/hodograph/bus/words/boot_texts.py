@@ -42,6 +42,7 @@ _OBJECTS = {
     0x6007: ("reaction to lost communication", "see the drive's manual"),
     0x605A: ("quick stop reaction", "see the drive's manual"),
     0x605E: ("fault reaction", "see the drive's manual"),
+    0x6040: ("controlword", "see the drive's manual"),
     0x6060: (
         "mode of operation",
         "the drive takes no cyclic synchronous position mode: see its manual",

@@ -12,6 +12,7 @@ __all__ = [
     "REFUSALS",
     "STATES",
     "STORED",
+    "TIMINGS",
     "detail_text",
     "drive_state",
     "fault_text",
@@ -31,6 +32,8 @@ STATES = {
     9: "homing",
     10: "quick stop",
 }
+TIMINGS = {0: "kept", 1: "not permitted", 2: "not permitted, accepted"}
+"""Object 0x2040: whether the computer that runs the controller lets ticks come in time."""
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
 
 CONFIGURED = {0: "none", 1: "confirmed", 2: "restored"}
@@ -59,5 +62,7 @@ REFUSALS = {
     12: "it has no configuration since its power-on: hodograph configure FILE (upload, goto and run do it as well); "
     "with --store it is there after the next power-on too",
     13: "axes with a homing method are not homed since their drive's power-on: hodograph home, or --unhomed on purpose",
+    16: "the drives are real and this computer does not permit real-time priority: run the controller with "
+    "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }
 """Object 0x2003 sub 4, and the remedy."""
