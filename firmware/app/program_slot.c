@@ -33,7 +33,7 @@ uint64_t program_slot_memory(uint32_t kernel, uint8_t number)
     const struct kernel *made_for = kernel_find(kernel);
     switch (number) {
     case 1:
-        return program_record_room();
+        return bank_record_room(0);
     case 2:
         return made_for != NULL ? prepared_segment_size(made_for) : 0u;
     default:

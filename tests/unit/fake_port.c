@@ -26,7 +26,6 @@ static struct {
     uint32_t power_off_at;
     bool urgent;
     enum port_timing timing;
-    uint32_t missing; /* bytes of a bank */
     unsigned wakes;
     uint32_t sent_head;
     uint32_t sent_tail;

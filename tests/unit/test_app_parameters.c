@@ -111,6 +111,7 @@ static void test_nothing_is_switched_on_unconfigured(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_QUICK_STOP));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_DISABLE));
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_RESET));
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     const uint32_t crc = read_u32(0x2050, 1);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, app_bench_write(&bench, 0x2050, 2, crc ^ 1u, 4));
     expect_refusal(COMMAND_ENABLE, MACHINE_NOT_CONFIGURED);

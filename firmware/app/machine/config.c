@@ -165,7 +165,9 @@ bool config_concerns_drives(uint16_t index, uint8_t sub)
     if (index == 0x2004) {
         return sub == 1 || sub == 10 || sub == 11;
     }
-    return index < 0x2018 || (index > 0x201A && index < 0x2030);
+    const bool is_feedforward = index >= 0x2018 && index <= 0x201A;
+    const bool is_limit = index >= 0x2030 && index <= 0x2032;
+    return !is_feedforward && !is_limit;
 }
 
 bool config_contains(uint16_t index)
