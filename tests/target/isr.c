@@ -46,6 +46,7 @@ static struct {
     struct can_msg frames[FRAMES];
     uint32_t count;
     uint32_t time_ns;
+    uint32_t time_us; /* wraps by itself, as port.h has it */
 } bus;
 static struct {
     uint32_t took[BATCH];
@@ -170,12 +171,13 @@ static void period(void)
 {
     const uint32_t period_us = machine.config.period_us;
     bus.time_ns += period_us * 1000u;
+    bus.time_us += period_us;
     if (machine_on_path(&machine)) {
-        timed_isr(bus.time_ns / 1000u);
+        timed_isr(bus.time_us);
     } else {
-        tick_run(&tick, bus.time_ns / 1000u, 0);
+        tick_run(&tick, bus.time_us, 0);
     }
-    drives_answer(bus.time_ns / 1000u);
+    drives_answer(bus.time_us);
 }
 
 static bool wait_for(enum machine_state state)
