@@ -27,7 +27,7 @@ static int prepare(struct controller *controller, int64_t from_q40_mm, struct mo
 }
 
 /* Everything that takes long (program check, reading all pieces) happens before the lock. */
-static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
+static enum machine_refusal prepare_start(struct controller *controller, int64_t from_q40_mm)
 {
     struct program_slot *slot = &controller->slot;
     if (!slot->present) {
@@ -43,18 +43,62 @@ static enum machine_refusal start(struct controller *controller, int64_t from_q4
         return MACHINE_OUTSIDE_LIMITS;
     }
     port_lock();
+    controller->machine.unhomed_allowed = controller->values.start_without_homing.allowed != 0u;
     const enum machine_refusal refusal =
         machine_start(&controller->machine, &prepared, start_counts);
     port_unlock();
     return refusal;
 }
 
+/* What allows a start without homing is for one attempt. */
+static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
+{
+    const enum machine_refusal refusal = prepare_start(controller, from_q40_mm);
+    controller->values.start_without_homing.allowed = 0;
+    if (refusal == MACHINE_ACCEPTED && controller->machine.unhomed_axes != 0u) {
+        port_log(PORT_WARNING, "started without homing, axes (bit 0: the first)",
+                 controller->machine.unhomed_axes);
+    }
+    return refusal;
+}
+
+static bool needs_configuration(enum command command)
+{
+    return command == COMMAND_ENABLE || command == COMMAND_HOME || command == COMMAND_START ||
+           command == COMMAND_START_FROM;
+}
+
+/* Real drives take no late SYNCs: they are not switched on where the operating system may make them late. */
+static bool too_late_for_real_drives(const struct controller *controller)
+{
+    port_lock();
+    const bool real = controller->machine.state == MACHINE_OFF && !controller->machine.simulated;
+    port_unlock();
+    return real && port_timing() == PORT_TIMING_REFUSED;
+}
+
+static enum machine_refusal enable(struct controller *controller)
+{
+    return too_late_for_real_drives(controller) ? MACHINE_NOT_IN_TIME
+                                                : locked(&controller->machine, machine_enable);
+}
+
+static enum machine_refusal home(struct controller *controller)
+{
+    return too_late_for_real_drives(controller)
+               ? MACHINE_NOT_IN_TIME
+               : homing_begin(&controller->homing, &controller->machine, controller->boot.facts);
+}
+
 static enum machine_refusal dispatch(struct controller *controller, enum command command)
 {
     struct machine *machine = &controller->machine;
+    if (needs_configuration(command) && !controller_configured(controller)) {
+        return MACHINE_NOT_CONFIGURED;
+    }
     switch (command) {
     case COMMAND_ENABLE:
-        return locked(machine, machine_enable);
+        return enable(controller);
     case COMMAND_START:
         return start(controller, 0);
     case COMMAND_START_FROM:
@@ -66,7 +110,7 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     case COMMAND_DISABLE:
         return locked(machine, machine_disable);
     case COMMAND_HOME:
-        return homing_begin(&controller->homing, machine, controller->boot.facts);
+        return home(controller);
     case COMMAND_RESET:
         return locked(machine, machine_reset);
     case COMMAND_QUICK_STOP:

@@ -27,17 +27,28 @@ static const struct od_hooks od_hooks = {
     .domain_read = od_program_read,
 };
 
-static void init_values(struct controller *controller)
+/* The node number is itself a parameter that is restored; a new one holds from the next power-on. */
+static void init_values(struct controller *controller, uint8_t port_node)
 {
-    controller_reset_values(controller);
     od_init(&controller->od, &od_controller_table, &controller->values, &od_hooks, controller);
+    parameter_store_find(&controller->store, &controller->od);
+    controller->node = port_node;
+    controller_reset_values(controller);
+    if (controller->values.node_number != 0u) {
+        controller->node = controller->values.node_number;
+        controller_reset_values(controller);
+    }
+}
+
+bool controller_configured(const struct controller *controller)
+{
+    return controller->configured.known && controller->configured.crc32 == controller->config.crc32;
 }
 
 void controller_init(struct controller *controller, uint8_t node)
 {
     memset(controller, 0, sizeof *controller);
-    controller->node = node;
-    init_values(controller);
+    init_values(controller, node);
     config_read(&controller->config, &controller->od);
     machine_init(&controller->machine, &controller->config);
     tick_init(&controller->tick, &controller->machine);
@@ -49,9 +60,10 @@ void controller_init(struct controller *controller, uint8_t node)
     homing_init(&controller->homing);
     drive_watch_begin(&controller->watch, &controller->config,
                       controller->values.consumer_heartbeat_time);
-    sdo_server_init(&controller->server, &controller->od, node, SDO_TIMEOUT_US, SDO_BLOCK_SEGMENTS);
-    nmt_slave_init(&controller->nmt, node, &controller_reset_hooks, controller);
-    heartbeat_producer_init(&controller->heartbeat, node);
+    sdo_server_init(&controller->server, &controller->od, controller->node, SDO_TIMEOUT_US,
+                    SDO_BLOCK_SEGMENTS);
+    nmt_slave_init(&controller->nmt, controller->node, &controller_reset_hooks, controller);
+    heartbeat_producer_init(&controller->heartbeat, controller->node);
 }
 
 /* TPDO3, or what looks like one. */
@@ -63,9 +75,22 @@ static void take_inputs(struct machine *machine, int node, uint32_t inputs)
     }
 }
 
+/* A drive that boots has lost its zero; said here, since a frame that the queue has no room for is lost. */
+static void take_boot_up(struct machine *machine, const struct can_msg *message)
+{
+    const bool boot_up = (message->id & ~NODE_ID_MAX) == COB_HEARTBEAT && message->len == 1u &&
+                         (message->data[0] & 0x7Fu) == (uint8_t)NMT_INITIALISING;
+    struct axis *axis =
+        boot_up ? machine_axis(machine, (uint8_t)(message->id & NODE_ID_MAX)) : NULL;
+    if (axis != NULL) {
+        axis->homed = false;
+    }
+}
+
 static void receive_other(struct controller *controller, const struct can_msg *message)
 {
     uint32_t inputs;
+    take_boot_up(&controller->machine, message);
     const int node = pdo_decode_inputs(message, &inputs);
     if (node != 0) {
         take_inputs(&controller->machine, node, inputs);

@@ -21,6 +21,7 @@
 #include "app/drives/homing.h"
 #include "app/frame_queue.h"
 #include "app/machine/machine.h"
+#include "app/parameter_store.h"
 #include "app/program_slot.h"
 #include "app/tick.h"
 #include "canopen/emcy.h"
@@ -37,6 +38,13 @@
  * a host that stalled, is no silence of theirs. */
 #define CONTROLLER_ELAPSED_MAX_US 20000u
 
+/* The configuration that holds: one that the host has confirmed, or one restored from the store. */
+struct configured {
+    bool known;
+    bool restored;
+    uint32_t crc32;
+};
+
 struct controller {
     /* shared with the interrupts, under the port's lock */
     struct machine machine;
@@ -44,6 +52,8 @@ struct controller {
     struct frame_queue queue;
     /* mainline only */
     struct config config; /* the same values as machine.config */
+    struct configured configured;
+    struct parameter_store store;
     struct program_slot slot;
     struct drive_boot boot;
     struct drive_watch watch;
@@ -63,10 +73,10 @@ struct controller {
     enum machine_refusal refusal; /* of the last command */
     uint8_t node;
     bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
-    bool same_value;            /* the write under way changes nothing */
 };
 
-/* Everything to its power-on state. */
+/* Everything to its power-on state: stored parameters are restored. `node` is the number of the port, which a stored one
+ * (0x2054) replaces. */
 void controller_init(struct controller *controller, uint8_t node);
 
 /* Turns the interrupts on. 0 or PORT_ERR_SYSTEM. */
@@ -78,6 +88,9 @@ void controller_poll(struct controller *controller);
 /* Ends in bounded time: stops along the path if running, switches the drives off, leaves them
  * pre-operational. True when all of that succeeded. Interrupts are still on afterwards. */
 bool controller_shut_down(struct controller *controller);
+
+/* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
+bool controller_configured(const struct controller *controller);
 
 /* Part of the round: tells of faults (EMCY), states and limits. */
 void controller_report(struct controller *controller);

@@ -113,6 +113,12 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
         axis->digital_inputs = facts->value[DRIVE_INPUTS];
         axis->torque_mapped = facts->known[DRIVE_TORQUE_MAPPED];
         axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
+        if (facts->known[DRIVE_POSITION]) {
+            axis_found(axis, (int32_t)facts->value[DRIVE_POSITION],
+                       MACHINE_KEPT_MM * controller->config.counts_per_mm);
+        } else {
+            axis->homed = false;
+        }
     }
     port_unlock();
 }
@@ -128,6 +134,7 @@ static void note_silence(struct controller *controller)
 static void poll_boot(struct controller *controller, uint32_t elapsed_us)
 {
     if (boot_requested(&controller->machine)) {
+        port_tick_urgent(false);
         drive_boot_begin(&controller->boot, &controller->config);
         drive_watch_begin(&controller->watch, &controller->config,
                           controller->values.consumer_heartbeat_time);
@@ -140,6 +147,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
         due = drive_boot_process(&controller->boot, 0, &out);
     }
     if (drive_boot_finished(&controller->boot)) {
+        port_tick_urgent(!controller->boot.simulated);
         port_lock();
         if (!controller->machine.boot_due) {
             machine_drives_configured(&controller->machine, controller->boot.simulated);

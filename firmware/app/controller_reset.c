@@ -7,11 +7,12 @@
 
 #define FIRST_MANUFACTURER_OBJECT 0x2000u
 
+#define LAST_OBJECT 0xFFFFu
+
 /* The whole configuration anew from the objects; the drives have to hear of it. */
 static void take_configuration(struct controller *controller)
 {
     config_read(&controller->config, &controller->od);
-    program_slot_stale(&controller->slot);
     port_lock();
     machine_configure(&controller->machine, &controller->config, true);
     machine_override(&controller->machine, controller->values.override.percent);
@@ -32,6 +33,11 @@ static void forget_errors(struct controller *controller)
 void controller_reset_values(struct controller *controller)
 {
     controller->values = od_controller_defaults;
+    const bool restored =
+        parameter_store_restore(&controller->store, &controller->od, 0, LAST_OBJECT);
+    controller->configured = (struct configured){.known = restored && controller->store.confirmed,
+                                                 .restored = restored,
+                                                 .crc32 = controller->store.config_crc32};
     od_controller_set_node(&controller->values, controller->node);
     forget_errors(controller);
 }
@@ -54,6 +60,8 @@ static void reset_communication(void *self)
                    (const uint8_t *)&od_controller_defaults + entry->offset, entry->size);
         }
     }
+    (void)parameter_store_restore(&controller->store, &controller->od, 0,
+                                  FIRST_MANUFACTURER_OBJECT - 1u);
     od_controller_set_node(&controller->values, controller->node);
     forget_errors(controller);
     take_configuration(controller);

@@ -3,10 +3,11 @@
 
 #include <string.h>
 
-#include "app/program_record.h"
+#include "app/bank_record.h"
 #include "app/program_table.h"
 #include "core/counts.h"
 #include "core/interp.h"
+#include "core/prepared.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)
@@ -27,9 +28,22 @@ static unsigned spare_bank(const struct program_slot *slot)
     return 1u - slot->bank;
 }
 
+uint64_t program_slot_memory(uint32_t kernel, uint8_t number)
+{
+    const struct kernel *made_for = kernel_find(kernel);
+    switch (number) {
+    case 1:
+        return bank_record_room(0);
+    case 2:
+        return made_for != NULL ? prepared_segment_size(made_for) : 0u;
+    default:
+        return made_for != NULL ? prepared_piece_size(made_for) : 0u;
+    }
+}
+
 int program_slot_begin(struct program_slot *slot, uint32_t size)
 {
-    if (size > program_record_room() || port_store_erase(spare_bank(slot)) != 0) {
+    if (size > bank_record_room(spare_bank(slot)) || port_store_erase(spare_bank(slot)) != 0) {
         return PORT_ERR_STORE;
     }
     slot->receiving = true;
@@ -75,11 +89,12 @@ static void find_ends(struct program_slot *slot, const struct config *config)
 }
 
 static void adopt(struct program_slot *slot, const struct program *program, unsigned bank,
-                  uint32_t sequence)
+                  const struct bank_record *record)
 {
     slot->program = *program;
     slot->bank = bank;
-    slot->sequence = sequence;
+    slot->sequence = record->sequence;
+    slot->config_crc32 = record->tag;
     slot->present = true;
 }
 
@@ -87,16 +102,16 @@ static void adopt(struct program_slot *slot, const struct program *program, unsi
 static int seal(struct program_slot *slot, struct program *program, unsigned bank,
                 const struct config *config)
 {
-    const struct program_record record = {.sequence = slot->sequence + 1u,
-                                          .image_size = program->header.image_size};
+    const struct bank_record record = {
+        .sequence = slot->sequence + 1u, .size = program->header.image_size, .tag = config->crc32};
     const int result = program_table_write(bank, program, config->kernel);
     if (result != 0) {
         return result;
     }
-    if (program_record_write(bank, &record) != 0) {
+    if (bank_record_write(bank, &record) != 0) {
         return PROGRAM_ERR_STORE;
     }
-    adopt(slot, program, bank, record.sequence);
+    adopt(slot, program, bank, &record);
     return 0;
 }
 
@@ -136,14 +151,13 @@ static bool sound(const struct program *program)
 
 static void recover_bank(struct program_slot *slot, unsigned bank)
 {
-    struct program_record record;
+    struct bank_record record;
     struct program candidate;
-    const struct program_record best = {.sequence = slot->sequence, .image_size = 0};
-    if (program_record_read(bank, &record) &&
-        (!slot->present || program_record_newer(&record, &best)) &&
-        program_open(&candidate, port_store_data(bank), record.image_size) == 0 &&
-        candidate.header.image_size == record.image_size && sound(&candidate)) {
-        adopt(slot, &candidate, bank, record.sequence);
+    const struct bank_record best = {.sequence = slot->sequence, .size = 0, .tag = 0};
+    if (bank_record_read(bank, &record) && (!slot->present || bank_record_newer(&record, &best)) &&
+        program_open(&candidate, port_store_data(bank), record.size) == 0 &&
+        candidate.header.image_size == record.size && sound(&candidate)) {
+        adopt(slot, &candidate, bank, &record);
     }
 }
 
@@ -152,11 +166,6 @@ void program_slot_recover(struct program_slot *slot)
     for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
         recover_bank(slot, bank);
     }
-    slot->checked = false;
-}
-
-void program_slot_stale(struct program_slot *slot)
-{
     slot->checked = false;
 }
 
@@ -181,7 +190,7 @@ static int prepare(struct program_slot *slot, const struct config *config)
 
 void program_slot_refresh(struct program_slot *slot, const struct config *config)
 {
-    if (!slot->present || slot->checked) {
+    if (!slot->present || (slot->checked && slot->config_crc32 == config->crc32)) {
         return;
     }
     struct program_fault fault = {.code = 0, .index = 0};
@@ -193,5 +202,6 @@ void program_slot_refresh(struct program_slot *slot, const struct config *config
         slot->refused = fault;
     }
     find_ends(slot, config);
+    slot->config_crc32 = config->crc32;
     slot->checked = true;
 }

@@ -4,7 +4,9 @@
  *
  * An upload goes to the spare bank of the port's store; only a complete image that passes every
  * check takes over, so a broken or refused one leaves the active program as it was. What has taken over carries a record
- * (program_record.h), by which it is found again after a loss of power at any moment: it, or its predecessor.
+ * (bank_record.h), by which it is found again after a loss of power at any moment: it, or its predecessor.
+ * A program is bound to the configuration it was checked against, by that one's CRC-32, which the record keeps: under another
+ * configuration, and once after each power-on, it is checked again before it counts.
  * Mainline.
  * Nobody may run the program while an upload ends (see machine_moving).
  */
@@ -30,12 +32,13 @@ struct program_slot {
     struct program_fault refused;     /* last refusal; code 0: none */
     int32_t start_counts[PLANE_AXES]; /* first and last setpoint with the present configuration */
     int32_t end_counts[PLANE_AXES];
-    unsigned bank;     /* of the active program */
-    uint32_t sequence; /* of its record */
+    unsigned bank;         /* of the active program */
+    uint32_t sequence;     /* of its record */
+    uint32_t config_crc32; /* of the configuration it was last checked against */
     bool present;
     bool receiving;
-    bool checked;    /* the three below hold for the present configuration */
-    bool acceptable; /* within the limits now configured */
+    bool checked; /* since power-on, under config_crc32; only then the next one and the ends hold */
+    bool acceptable; /* within the limits of that configuration */
 };
 
 void program_slot_init(struct program_slot *slot);
@@ -43,6 +46,9 @@ void program_slot_init(struct program_slot *slot);
 /* The newest whole program of the store, if there is one, becomes the active one: after power-on, before the first
  * upload. Costs a whole check of each program it looks at. */
 void program_slot_recover(struct program_slot *slot);
+
+/* Object 0x2041: 1 bytes of a bank for image and records; 2, 3 bytes of the record of a segment, a piece, for a kernel. */
+uint64_t program_slot_memory(uint32_t kernel, uint8_t number);
 
 enum program_slot_state program_slot_state(const struct program_slot *slot);
 
@@ -54,11 +60,8 @@ int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config);
 void program_slot_abandon(struct program_slot *slot);
 
-/* The configuration has changed: the next refresh checks anew. */
-void program_slot_stale(struct program_slot *slot);
-
-/* Brings start, end, `acceptable` and the prepared records up to date; costs a whole check when stale, and a copy of the
- * program in the other bank when the kernel is another one. */
+/* Brings start, end, `acceptable` and the prepared records up to date; costs a whole check when the configuration is
+ * another one, and a copy of the program in the other bank when the kernel is another one. */
 void program_slot_refresh(struct program_slot *slot, const struct config *config);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "app/program_record.h"
+#include "app/bank_record.h"
 #include "core/prepared.h"
 #include "core/program_check.h"
 #include "port/port.h"
@@ -35,9 +35,9 @@ static struct place behind(unsigned bank, const struct program *program)
     return (struct place){.bank = bank, .offset = program->header.image_size};
 }
 
-static bool fits(const struct program *program, const struct kernel *made_for)
+static bool fits(unsigned bank, const struct program *program, const struct kernel *made_for)
 {
-    return program->header.image_size + prepared_size(program, made_for) <= program_record_room();
+    return program->header.image_size + prepared_size(program, made_for) <= bank_record_room(bank);
 }
 
 static void attach(unsigned bank, struct program *program, const struct kernel *made_for)
@@ -52,7 +52,7 @@ int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
     if (made_for == NULL) {
         return PROGRAM_ERR_KERNEL;
     }
-    if (!fits(program, made_for)) {
+    if (!fits(bank, program, made_for)) {
         return PROGRAM_ERR_ROOM;
     }
     if (prepared_make(program, made_for, put_records, &place) != 0) {
@@ -72,7 +72,7 @@ bool program_table_find(unsigned bank, struct program *program, uint32_t kernel)
     if (program->prepared_for == made_for) {
         return true;
     }
-    if (!fits(program, made_for) ||
+    if (!fits(bank, program, made_for) ||
         prepared_make(program, made_for, compare_records, &place) != 0) {
         return false;
     }

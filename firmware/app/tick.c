@@ -11,6 +11,7 @@ void tick_init(struct tick *tick, struct machine *machine)
 {
     tick->machine = machine;
     tick->refused = false;
+    tick->setpoint_refused = false;
     offsets_init(&tick->offsets);
     sync_producer_init(&tick->sync, SYNC_COUNTER_OVERFLOW);
 }
@@ -66,6 +67,8 @@ static void send_setpoints(struct tick *tick, const struct feedforward_offset *o
         }
         if (send(tick, &axis->setpoint)) {
             axis_sent(axis);
+        } else {
+            tick->setpoint_refused = true;
         }
     }
 }
@@ -111,11 +114,15 @@ void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns)
     struct machine *machine = tick->machine;
     const uint32_t started_ns = port_time_ns();
     tick->refused = false;
+    tick->setpoint_refused = false;
     const bool sync_sent = send_sync(tick);
+    machine_note_sync(machine, now_us, sync_sent);
     machine_supervise(machine, now_us);
     machine_step(machine);
     send_process_data(tick);
-    machine_note_sent(machine, sync_sent, !tick->refused);
+    machine_note_sent(machine, (struct machine_sent){.sync = sync_sent,
+                                                     .setpoints = !tick->setpoint_refused,
+                                                     .all = !tick->refused});
     if (machine_awaits_drives(machine)) {
         port_tick_await(guard_us(machine), machine_busy(machine));
     }

@@ -15,7 +15,8 @@ struct tick {
     struct machine *machine;
     struct sync_producer sync;
     struct offsets offsets;
-    bool refused; /* the port took not all frames of this tick */
+    bool refused;          /* the port took not all frames of this tick */
+    bool setpoint_refused; /* and a setpoint was among them */
 };
 
 void tick_init(struct tick *tick, struct machine *machine);

@@ -139,6 +139,9 @@ uint32_t od_read(struct od *od, const struct od_entry *entry, uint8_t *out, uint
  * tells the written hook. Nothing changes when the result is not SDO_OK. Not for a DOMAIN. */
 uint32_t od_write(struct od *od, const struct od_entry *entry, const uint8_t *value, uint32_t size);
 
+/* Whether a number may be in a field, by type and range: SDO_OK or an abort code. No access check, no hooks. Pure. */
+uint32_t od_check_number(const struct od *od, const struct od_entry *entry, uint64_t value);
+
 /* The raw number in a field, without access check or hook; for PDO and internal use. Numbers only.
  * Any context. */
 uint64_t od_number(const struct od *od, const struct od_entry *entry);

@@ -78,6 +78,11 @@ static uint32_t check_range(const struct od_table *table, const struct od_entry 
     return SDO_OK;
 }
 
+uint32_t od_check_number(const struct od *od, const struct od_entry *entry, uint64_t value)
+{
+    return check_range(od->table, entry, value);
+}
+
 static uint32_t check_write(struct od *od, const struct od_entry *entry, const uint8_t *value,
                             uint32_t size)
 {

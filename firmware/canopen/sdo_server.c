@@ -111,19 +111,87 @@ static int go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
     }
 }
 
+/* A request by all its bits, for an object that there is: few segments that have such a first byte look like one. */
+static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
+{
+    const uint8_t first = data[0];
+    const bool expedited = (first & 0xF3u) == 0x23u || first == 0x22u;
+    const bool known = expedited || first == 0x20u || first == 0x21u || first == 0x40u ||
+                       first == 0xA0u || first == 0xA4u || (first & 0xF9u) == 0xC0u;
+    return known && od_find(s->od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
+}
+
+/* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if its
+ * bytes are those of a request.) */
+static bool is_strange(const struct sdo_server *s, const uint8_t *data)
+{
+    const uint8_t sequence = data[0] & (uint8_t)~SDO_LAST_IN_BLOCK;
+    const bool doubled = sequence == s->sequence && sequence != 0u;
+    const bool next = sequence == s->heard + 1u || sequence == s->heard + 2u; /* one may be lost */
+    return !next && !doubled && is_sound_initiate(s, data);
+}
+
+static bool same_object(const struct sdo_server *s, const uint8_t *data)
+{
+    return cob_get(data + 1, 2) == s->index && data[3] == s->sub;
+}
+
+/* The client of this transfer has lost the answer to its first request. */
+static bool begins_again(const struct sdo_server *s, const uint8_t *data)
+{
+    return same_object(s, data) && s->moved == 0 && s->held == 0;
+}
+
+/* The same within a block, where a segment may look like it. */
+static bool restarts(const struct sdo_server *s, const uint8_t *data)
+{
+    return begins_again(s, data) && is_strange(s, data);
+}
+
+static int refuse_stranger(const struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    sdo_server_frame(s, SDO_ABORT_COMMAND_BYTE, out);
+    memcpy(out->data + 1, data + 1, 3);
+    cob_put(out->data + 4, SDO_ABORT_LOCAL, 4);
+    return 1;
+}
+
+static bool from_stranger(const struct sdo_server *s, const uint8_t *data)
+{
+    if (s->state == SDO_SERVER_IDLE || begins_again(s, data)) {
+        return false;
+    }
+    if (data[0] == SDO_ABORT_COMMAND_BYTE) {
+        return false;
+    }
+    return s->state == SDO_SERVER_BLOCK_DOWNLOAD ? is_strange(s, data) : is_initiate(data);
+}
+
+/* A stranger that gives up its own transfer does not end this one. */
+static void take_abort(struct sdo_server *s, const uint8_t *data)
+{
+    const bool named = cob_get(data + 1, 2) != 0u;
+    if (s->state == SDO_SERVER_IDLE || !named || same_object(s, data)) {
+        sdo_server_drop(s);
+        s->heard = 0;
+    }
+}
+
 int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out)
 {
     if (!sdo_server_wants(server, in)) {
         return 0;
     }
+    if (from_stranger(server, in->data)) {
+        return refuse_stranger(server, in->data, out);
+    }
     server->silence_us = 0;
     /* A whole byte: within a block, 0x81 ... 0xFF are last segments. */
     if (in->data[0] == SDO_ABORT_COMMAND_BYTE) {
-        sdo_server_drop(server);
-        server->heard = 0;
+        take_abort(server, in->data);
         return 0;
     }
-    if (server->state == SDO_SERVER_BLOCK_DOWNLOAD) {
+    if (server->state == SDO_SERVER_BLOCK_DOWNLOAD && !restarts(server, in->data)) {
         return sdo_server_block_download_segment(server, in->data, out);
     }
     if (server->state == SDO_SERVER_IDLE && sdo_server_block_download_straggler(server, in->data)) {

@@ -6,9 +6,14 @@
  * one piece at the end, so an aborted transfer changes nothing; DOMAIN data goes to the od hooks as
  * it comes.
  *
- * One transfer at a time. A new initiate request drops the old transfer (its DOMAIN hooks are told)
- * and starts the new one, so a client that lost its answer can simply begin again; only between the
- * segments of a block download is each frame a segment, and the client has to abort first.
+ * One transfer at a time, of one client. While it is under way an initiate request is refused with SDO_ABORT_LOCAL and
+ * its own object, and the transfer goes on: it comes from somebody else. Only a client that has moved nothing yet may
+ * begin again, with the same object: it has lost an answer. One that is in the middle aborts first; one that is gone is
+ * forgotten after the timeout. An abort counts when it names the object of the transfer, or none (index 0).
+ *
+ * Within a block each frame is a segment by its number. One that is a request for an object that there is, by all its bits, and
+ * whose number is not one of the next two, is refused as such. A stranger's frame whose number is just the next one is taken, and then the true one shows: the same
+ * number with other bytes ends the transfer, and where even that is missed, the CRC.
  *
  * Loss within a block: segments after a gap are ignored and the answer at the block's end names the
  * last good one, from where the client repeats. When the block's last segment itself is lost, the

@@ -63,6 +63,12 @@ int sdo_server_block_download_segment(struct sdo_server *s, const uint8_t *data,
     bool in_order = sequence == s->sequence + 1;
     bool block_ends = last || sequence == s->block_limit;
 
+    if (sequence != 0 && sequence == s->sequence) {
+        /* Doubled on the bus, or one of the two is somebody else's. */
+        return memcmp(s->last, data + 1, SDO_SEGMENT_BYTES) == 0
+                   ? 0
+                   : sdo_server_fail(s, SDO_ABORT_SEQUENCE, out);
+    }
     s->heard = block_ends ? 0 : sequence;
     if (sequence == 0 || sequence > s->block_limit) {
         return sdo_server_fail(s, SDO_ABORT_SEQUENCE, out);

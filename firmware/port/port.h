@@ -92,6 +92,18 @@ void port_tick_period(uint32_t period_us);
 void port_tick_await(uint32_t guard_us, bool hurry);
 void port_tick_ready(void);
 
+/* Whether ticks have to come in time because drives are real: then none is put off for a mainline that starves. At first
+ * they have not. Boards, on which ticks are interrupts, ignore it. Mainline. */
+void port_tick_urgent(bool urgent);
+
+/* How well ticks come in time. Boards: PORT_TIMING_KEPT. Any context. */
+enum port_timing {
+    PORT_TIMING_KEPT = 0,     /* by an interrupt, a real-time thread, or virtual time */
+    PORT_TIMING_REFUSED = 1,  /* the machine does not permit it: real drives must not be enabled */
+    PORT_TIMING_ACCEPTED = 2, /* the same, and the user has said that it is fine */
+};
+enum port_timing port_timing(void);
+
 /* --- Mainline --- */
 
 /* Critical section: holds off both interrupts. Short, not nested, mainline only. */
@@ -102,13 +114,16 @@ void port_unlock(void);
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 
-/* --- Program store: two banks, so that a broken upload leaves the other one whole. Mainline --- */
+/* --- Store: two banks for programs, two for parameters, so that what breaks off leaves the other one whole. Mainline --- */
 
-#define PORT_STORE_BANKS 2u
+#define PORT_STORE_BANKS      2u /* 0 and 1: programs, as large as there is room for */
+#define PORT_STORE_PARAMETERS 2u /* 2 and 3: parameters, at least PORT_STORE_PARAMETER_BYTES each */
+#define PORT_STORE_BANKS_ALL  4u
+#define PORT_STORE_PARAMETER_BYTES 2048u
 
-uint32_t port_store_size(void); /* bytes per bank */
+uint32_t port_store_size(unsigned bank); /* bytes of a bank; those of a pair are alike */
 
-/* Erases a bank; then writes go in ascending order. The one gap that may be left is before the last 16 bytes, which are
+/* Erases a bank, its last 16 bytes first; then writes go in ascending order. The one gap that may be left is before the last 16 bytes, which are
  * written at once. What is written can be read at multiples of 8 bytes, and after the last write. 0 or PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);

@@ -14,6 +14,7 @@ void drive_node_od_fill(struct drive_node *node)
     struct od_drive *v = &node->values;
     const struct drive_config *c = &node->axis.config;
     od_drive_set_node(v, node->id);
+    v->identity_object.vendor_id = node->equipment.vendor;
     v->identity_object.serial_number = node->equipment.serial;
     v->position_encoder_resolution[0] = c->encoder_counts_per_rev;
     if (node->axis.drive.counts_per_mm == (double)c->counts_per_mm) {

@@ -13,6 +13,7 @@ void equipment_init(struct equipment *e, const struct drive_config *config)
     e->friction_volts = 0.0;
     e->brake_volts = config->plant.volts_limit;
     e->serial = 0;
+    e->vendor = 0;
 }
 
 const char equipment_rule[] =

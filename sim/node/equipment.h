@@ -31,6 +31,7 @@ struct equipment {
     double friction_volts;    /* Coulomb friction, as the voltage that overcomes it; 0 or more */
     double brake_volts;       /* of the holding brake, as friction; more than 0 */
     uint32_t serial;          /* 0x1018 sub 4 */
+    uint32_t vendor;          /* 0x1018 sub 1; not 0: a controller takes it for a real drive */
 };
 
 /* No switches, no friction; rated torque half of what the voltage limit gives, 5 A, 10 s of

@@ -46,6 +46,7 @@ static const struct key keys[] = {
     {"friction_volts", AT(equipment.friction_volts), KEY_NUMBER, false},
     {"brake_volts", AT(equipment.brake_volts), KEY_NUMBER, false},
     {"serial", AT(equipment.serial), KEY_U32, false},
+    {"vendor", AT(equipment.vendor), KEY_U32, false},
 };
 
 enum { KEYS = sizeof keys / sizeof keys[0] };

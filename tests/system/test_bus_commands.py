@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from canopen.sdo.exceptions import SdoCommunicationError
+from canopen_bench import program
 
 from bench import EXAMPLES, MakeAlpha, MakeBench
 from commands import Command, running
@@ -20,9 +22,11 @@ from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import END_S
 from hodograph.bus.sdo.controller import OFF, READY, RUNNING, Controller, connect
 from hodograph.bus.sdo.node import LET_PASS_S
+from hodograph.bus.sdo.objects import PROGRAM_MEMORY
 from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.errors import BusError, RefusedError
+from hodograph.program.memory import LARGEST_BANK, RECORD_BYTES
 
 ALPHA = EXAMPLES / "alpha.toml"
 LIMIT_S = 60.0
@@ -237,3 +241,50 @@ def test_dead_drives_are_a_clear_error(make_bench: MakeBench, slow_run: Start) -
     assert "is in fault" in child.err.splitlines()[-1]
     with pytest.raises(BusError, match="hodograph-drive ended by itself"):
         bench.rig.check()
+
+
+def test_a_program_that_no_bank_can_hold_is_refused_before_it_is_sent(
+    controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not after the last of its bytes."""
+    image = bytearray(program("alpha_quintic"))
+    image[24:28] = (2**20).to_bytes(4, "little")  # pieces: 208 MB of records
+    sent: list[int] = []
+    with pytest.raises(RefusedError, match=r"takes 218.* with what is prepared from it"):
+        controller.upload(bytes(image), sent.append)
+    assert sent == []
+
+
+def test_the_sizes_of_records_are_those_of_the_controller(controller: Controller) -> None:
+    found = tuple(controller.read(PROGRAM_MEMORY, sub) for sub in (1, 2, 3))
+    assert found == (LARGEST_BANK, *RECORD_BYTES["fixed"])
+
+
+def test_nothing_is_said_of_the_old_program_that_is_not_known(
+    controller: Controller, clock: VirtualClock
+) -> None:
+    """The controller is gone in the middle of an upload: nobody knows what it has."""
+    image = program("alpha_quintic")
+
+    def progress(sent: int) -> None:
+        if sent > len(image) // 2:
+            clock.suspend("controller-1")
+
+    with pytest.raises(BusError, match="is not known"):
+        controller.upload(image, progress)
+    clock.resume("controller-1")
+
+
+def test_what_is_known_of_the_old_program_is_said(
+    controller: Controller, clock: VirtualClock
+) -> None:
+    """It comes back in time to be asked."""
+    controller.upload(program("line_tiny"))
+    image = program("alpha_quintic")
+
+    def progress(sent: int) -> None:
+        if sent > len(image) // 2:
+            raise SdoCommunicationError("made up")
+
+    with pytest.raises(BusError, match="the old program is unharmed"):
+        controller.upload(image, progress)

@@ -32,7 +32,8 @@ from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 
 MEASURED = {
-    "controller": {0x2002, 0x2003, 0x2008, 0x2025},  # state, what it waits for at boot, statistics
+    # state, what it waits for at boot, statistics, memory, CRC
+    "controller": {0x2002, 0x2003, 0x2008, 0x2025, 0x2041, 0x2050},
     "drive": {0x6041, 0x6062, 0x6063, 0x6064, 0x607A, 0x60FD, 0x2101},
 }
 """Objects whose value depends on what happens."""
@@ -41,7 +42,12 @@ OF_THE_AXIS = {(0x1006, 0), (0x1018, 4), (0x6075, 0), (0x6076, 0), (0x608F, 1), 
 PDO_OBJECTS = range(0x1400, 0x1C00)
 """Their rules depend on one another: test_canopen_pdo.py."""
 NOT_ALL_VALUES = {
-    "controller": {(0x1003, 0)},  # takes 0 only
+    "controller": {
+        (0x1003, 0),  # takes 0 only
+        (0x1010, 1),  # signatures: test_power_on.py
+        (0x1011, 1),
+        (0x2050, 2),  # takes the CRC-32 of the configuration only
+    },
     "drive": {
         (0x1003, 0),
         (0x1019, 0),  # only while 0x1006 is 0

@@ -88,6 +88,7 @@ class Machine:
         self.sdo[0x2004][2].raw = 500_000
         self.sdo[0x2004][3].raw = 5_000_000
         self.sdo[0x2004][4].raw = 200_000
+        self.sdo[0x2050][2].raw = self.sdo[0x2050][1].raw
         self.until(OFF)
         self.upload(image)
 

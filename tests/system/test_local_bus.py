@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from hodograph.bus.processes import find_program
 from lateness import Lateness
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -73,3 +75,32 @@ def test_a_bus_that_nobody_serves_is_said(tmp_path: Path) -> None:
     done = subprocess.run(words, capture_output=True, text=True, timeout=HANGS_S, check=False)
     assert done.returncode == 4
     assert "start hodograph-hub" in done.stderr
+
+
+@pytest.mark.parametrize("time", ["real", "virtual"])
+def test_a_bus_that_ends_under_a_machine_is_said(tmp_path: Path, time: str) -> None:
+    """Status 4 and one line: it is no error of ours, and no thread prints a traceback."""
+    bus, machine = tmp_path / "bus", str(EXAMPLES / "machines" / "paper_alpha.toml")
+    hub = subprocess.Popen([find_program("hodograph-hub"), "--time", time, bus])
+    words = [sys.executable, "-m", "hodograph", "rig", machine, "--bus", f"local:{bus}"]
+    try:
+        await_bus(bus)
+        with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as rig:
+            assert rig.stderr is not None
+            assert "are on local:" in rig.stderr.readline()
+            hub.kill()
+            said = rig.stderr.read()
+            assert rig.wait(HANGS_S) == 4, said
+    finally:
+        hub.kill()
+        hub.wait()
+    assert " bus" in said
+    assert "Traceback" not in said
+    assert "internal error" not in said
+
+
+def await_bus(path: Path) -> None:
+    """Until somebody serves it."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
+        while probe.connect_ex(str(path)) != 0:
+            pass

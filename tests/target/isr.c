@@ -46,6 +46,7 @@ static struct {
     struct can_msg frames[FRAMES];
     uint32_t count;
     uint32_t time_ns;
+    uint32_t time_us; /* wraps by itself, as port.h has it */
 } bus;
 static struct {
     uint32_t took[BATCH];
@@ -68,6 +69,16 @@ int port_can_send(const struct can_msg *message)
 uint32_t port_time_ns(void)
 {
     return bus.time_ns;
+}
+
+void port_tick_urgent(bool urgent)
+{
+    (void)urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return PORT_TIMING_KEPT;
 }
 
 void port_tick_await(uint32_t guard_us, bool hurry)
@@ -160,12 +171,13 @@ static void period(void)
 {
     const uint32_t period_us = machine.config.period_us;
     bus.time_ns += period_us * 1000u;
+    bus.time_us += period_us;
     if (machine_on_path(&machine)) {
-        timed_isr(bus.time_ns / 1000u);
+        timed_isr(bus.time_us);
     } else {
-        tick_run(&tick, bus.time_ns / 1000u, 0);
+        tick_run(&tick, bus.time_us, 0);
     }
-    drives_answer(bus.time_ns / 1000u);
+    drives_answer(bus.time_us);
 }
 
 static bool wait_for(enum machine_state state)
@@ -210,6 +222,10 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel)
     config.node[0] = 2;
     config.node[1] = 3;
     config.missed_max = 1;
+    for (unsigned i = 0; i < DRIVES; ++i) { /* compared, and never outside */
+        config.apart_counts[i] = UINT32_MAX;
+        config.apart_syncs[i] = CONFIG_APART_SYNCS;
+    }
     if (motion_begin(&prepared, &program, &config) < 0) {
         return STATUS_PROGRAM;
     }

@@ -24,10 +24,15 @@ struct app_bench {
     uint32_t starts;          /* NMT start commands seen */
     int32_t targets[2][2048]; /* setpoints sent while a program ran, by axis */
     uint32_t recorded;
+    bool
+        unconfirmed; /* the host does not confirm the configuration; else it does before each command */
 };
 
 /* Controller and drives at power-on; drives stand at the positions. */
 void app_bench_init(struct app_bench *bench, int32_t x_counts, int32_t y_counts);
+
+/* The power of the controller goes off and on; drives, the store and the recorded counts stay. */
+void app_bench_power_cycle(struct app_bench *bench);
 
 /* One period: tick, answers, mainline. */
 void app_bench_period(struct app_bench *bench);

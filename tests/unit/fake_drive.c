@@ -25,6 +25,9 @@ static uint32_t read_hook(void *context, const struct od_entry *entry)
         drive->values.modes_of_operation_display =
             drive->mode_stuck != 0 ? drive->mode_stuck : drive->values.modes_of_operation;
     }
+    if (entry->index == 0x6064) {
+        drive->values.position_actual_value = drive->position_counts;
+    }
     return lacks(drive, entry->index) ? SDO_ABORT_NO_OBJECT : SDO_OK;
 }
 

@@ -11,6 +11,8 @@ static struct {
     struct port_handlers handlers;
     struct can_match filters[PORT_FILTERS];
     size_t filter_count;
+    struct can_match refused;
+    uint32_t refusals;
     uint64_t now_ns;
     uint32_t period_us;
     uint32_t awaited_us;
@@ -19,15 +21,21 @@ static struct {
     bool locked;
     bool fail_send;
     bool fail_store;
-    uint32_t missing; /* bytes of a bank */
+    uint32_t missing; /* bytes of a bank for a program */
+    uint32_t operations;
+    uint32_t power_off_at;
+    bool urgent;
+    enum port_timing timing;
     unsigned wakes;
     uint32_t sent_head;
     uint32_t sent_tail;
     struct can_msg sent[SENT_MAX];
-    uint8_t banks[PORT_STORE_BANKS][FAKE_PORT_BANK_BYTES] __attribute__((aligned(8)));
+    uint8_t banks[PORT_STORE_BANKS_ALL][FAKE_PORT_BANK_BYTES] __attribute__((aligned(8)));
     const struct fake_port_store *store;
     void (*wait_hook)(void *context);
     void *wait_context;
+    void (*unlock_hook)(void *context);
+    void *unlock_context;
 } self;
 
 void fake_port_reset(void)
@@ -90,6 +98,22 @@ bool fake_port_ready(void)
     return self.ready;
 }
 
+bool fake_port_urgent(void)
+{
+    return self.urgent;
+}
+
+void fake_port_set_timing(enum port_timing timing)
+{
+    self.timing = timing;
+}
+
+void fake_port_refuse(const struct can_match *refused, uint32_t times)
+{
+    self.refused = *refused;
+    self.refusals = times;
+}
+
 unsigned fake_port_wakes(void)
 {
     return self.wakes;
@@ -105,6 +129,16 @@ void fake_port_shrink_store(uint32_t bytes)
     self.missing = FAKE_PORT_BANK_BYTES - bytes;
 }
 
+void fake_port_keep_store(void)
+{
+    static uint8_t kept[PORT_STORE_BANKS_ALL][FAKE_PORT_BANK_BYTES];
+    const struct fake_port_store *store = self.store;
+    memcpy(kept, self.banks, sizeof kept);
+    fake_port_reset();
+    memcpy(self.banks, kept, sizeof kept);
+    self.store = store;
+}
+
 void fake_port_fail_store(bool fail)
 {
     self.fail_store = fail;
@@ -115,9 +149,23 @@ void fake_port_spoil_store(unsigned bank, uint32_t offset)
     self.banks[bank][offset] ^= 0xFFu;
 }
 
+uint32_t fake_port_cut_store(uint32_t operation)
+{
+    const uint32_t done = self.operations;
+    self.operations = 0;
+    self.power_off_at = operation;
+    return done;
+}
+
 void fake_port_use_store(const struct fake_port_store *store)
 {
     self.store = store;
+}
+
+void fake_port_on_unlock(void (*hook)(void *context), void *context)
+{
+    self.unlock_hook = hook;
+    self.unlock_context = context;
 }
 
 void fake_port_on_wait(void (*hook)(void *context), void *context)
@@ -163,6 +211,10 @@ int port_can_send(const struct can_msg *message)
     if (self.fail_send) {
         return PORT_ERR_FULL;
     }
+    if (self.refusals > 0u && can_match_any(&self.refused, 1, message)) {
+        self.refusals--;
+        return PORT_ERR_FULL;
+    }
     TEST_ASSERT_TRUE_MESSAGE(self.sent_head - self.sent_tail < SENT_MAX, "nobody takes the frames");
     TEST_ASSERT_TRUE(message->id <= CAN_ID_MAX && message->len <= CAN_DATA_MAX);
     self.sent[self.sent_head++ % SENT_MAX] = *message;
@@ -197,6 +249,16 @@ void port_tick_await(uint32_t guard_us, bool hurry)
     self.hurry = hurry;
 }
 
+void port_tick_urgent(bool urgent)
+{
+    self.urgent = urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return self.timing;
+}
+
 void port_tick_ready(void)
 {
     self.ready = true;
@@ -212,6 +274,11 @@ void port_unlock(void)
 {
     TEST_ASSERT_TRUE_MESSAGE(self.locked, "unlocked twice");
     self.locked = false;
+    if (self.unlock_hook != NULL) {
+        void (*hook)(void *context) = self.unlock_hook;
+        self.unlock_hook = NULL;
+        hook(self.unlock_context);
+    }
 }
 
 void port_wait(uint32_t timeout_us)
@@ -228,31 +295,55 @@ void port_wake(void)
     self.wakes++;
 }
 
-uint32_t port_store_size(void)
+/* Bytes that a bank of the memory has when nothing is missing. */
+static uint32_t whole_size(unsigned bank)
 {
-    return self.store != NULL ? self.store->bank_bytes : FAKE_PORT_BANK_BYTES - self.missing;
+    return bank < PORT_STORE_BANKS ? FAKE_PORT_BANK_BYTES : PORT_STORE_PARAMETER_BYTES;
+}
+
+uint32_t port_store_size(unsigned bank)
+{
+    if (self.store != NULL) {
+        return self.store->size(bank);
+    }
+    return bank < PORT_STORE_BANKS ? FAKE_PORT_BANK_BYTES - self.missing : whole_size(bank);
+}
+
+/* One operation of the store: the erasing of a bank, or a byte. */
+static bool power_is_gone(void)
+{
+    self.operations++;
+    return self.power_off_at != 0u && self.operations >= self.power_off_at;
 }
 
 int port_store_erase(unsigned bank)
 {
-    TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS);
+    TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS_ALL);
     if (self.store != NULL) {
         return self.store->erase(bank);
     }
-    memset(self.banks[bank], 0xFF, FAKE_PORT_BANK_BYTES);
+    if (self.fail_store || power_is_gone()) {
+        return PORT_ERR_STORE;
+    }
+    memset(self.banks[bank], 0xFF, whole_size(bank));
     return 0;
 }
 
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
 {
-    TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS);
+    TEST_ASSERT_TRUE(bank < PORT_STORE_BANKS_ALL);
     if (self.store != NULL) {
         return self.store->write(bank, offset, data, size);
     }
-    if (self.fail_store || offset > FAKE_PORT_BANK_BYTES || size > FAKE_PORT_BANK_BYTES - offset) {
+    if (self.fail_store || offset > whole_size(bank) || size > whole_size(bank) - offset) {
         return PORT_ERR_STORE;
     }
-    memcpy(&self.banks[bank][offset], data, size);
+    for (uint32_t i = 0; i < size; ++i) {
+        if (power_is_gone()) {
+            return PORT_ERR_STORE;
+        }
+        self.banks[bank][offset + i] = data[i];
+    }
     return 0;
 }
 

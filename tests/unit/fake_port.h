@@ -28,14 +28,28 @@ void fake_port_receive(const struct can_msg *message);
 uint32_t fake_port_period_us(void);
 uint32_t fake_port_awaited_us(void); /* port_tick_await of the last tick; 0: not called */
 bool fake_port_hurry(void);          /* and in a hurry */
+bool fake_port_urgent(void);         /* port_tick_urgent, last */
 bool fake_port_ready(void);          /* port_tick_ready since the last tick */
 unsigned fake_port_wakes(void);
+
+/* What port_timing() says from now on. */
+void fake_port_set_timing(enum port_timing timing);
+
+/* So many of the next frames that pass this filter are refused. */
+void fake_port_refuse(const struct can_match *refused, uint32_t times);
 
 /* From now on port_can_send, or port_store_write, fails. */
 void fake_port_fail_send(bool fail);
 void fake_port_fail_store(bool fail);
 
-/* A bank has only so many bytes now. */
+/* From its n-th operation on (the erasing of a bank, or a byte) the store takes nothing more, as when the power has gone;
+ * 0: it takes all. Returns how many operations there were since the last call. */
+uint32_t fake_port_cut_store(uint32_t operation);
+
+/* fake_port_reset, but what is in the store stays, as over a loss of power. */
+void fake_port_keep_store(void);
+
+/* A bank for programs has only so many bytes now. */
 void fake_port_shrink_store(uint32_t bytes);
 
 /* Turns the bits of one byte of the store. */
@@ -43,12 +57,15 @@ void fake_port_spoil_store(unsigned bank, uint32_t offset);
 
 /* The store from now on, instead of memory; NULL: memory again. */
 struct fake_port_store {
-    uint32_t bank_bytes;
+    uint32_t (*size)(unsigned bank);
     int (*erase)(unsigned bank);
     int (*write)(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
     const uint8_t *(*data)(unsigned bank);
 };
 void fake_port_use_store(const struct fake_port_store *store);
+
+/* Called once, after the next critical section: an interrupt between two of them. */
+void fake_port_on_unlock(void (*hook)(void *context), void *context);
 
 /* Called by port_wait; may be NULL. */
 void fake_port_on_wait(void (*hook)(void *context), void *context);

@@ -142,7 +142,7 @@ static const struct row {
     {"off",
      off,
      MACHINE_OFF,
-     {TO(MACHINE_ENABLING), 4, STAYS, STAYS, STAYS, 8, 8, 4, STAYS, NOT_TESTED, 1, 1}},
+     {TO(MACHINE_ENABLING), 4, STAYS, STAYS, TO(MACHINE_BOOT), 8, 8, 4, STAYS, NOT_TESTED, 1, 1}},
     {"enabling",
      enabling,
      MACHINE_ENABLING,

@@ -51,6 +51,38 @@ static void expect_writes(const struct fake_write *expected, uint32_t count)
     }
 }
 
+/* Vendor, product and revision, each by itself: nothing has been written to the drive that is not the expected one. */
+static void test_a_drive_of_another_identity_is_refused(void)
+{
+    for (uint8_t sub = 1; sub <= 3u; ++sub) {
+        setUp();
+        bench.drives[1].values.identity_object.vendor_id = 0x29C;
+        bench.drives[1].values.identity_object.product_code = 0x402;
+        bench.drives[1].values.identity_object.revision_number = 0x10003;
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK,
+                                app_bench_write(&bench, (uint16_t)(0x2050u + sub), 2, 0x777, 4));
+        expect_trouble(3, 0x101800u + sub, SDO_OK);
+        TEST_ASSERT_EQUAL_UINT32(0, bench.drives[1].write_count);
+        const uint32_t found = (uint32_t)app_bench_read(&bench, 0x2025, 4);
+        TEST_ASSERT_EQUAL_HEX32(app_bench_read(&bench, (uint16_t)(0x2026u + sub), 2), found);
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, 1));
+        TEST_ASSERT_EQUAL_INT64(MACHINE_DRIVES_MISSING, app_bench_read(&bench, 0x2003, 4));
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK,
+                                app_bench_write(&bench, (uint16_t)(0x2050u + sub), 2, found, 4));
+        boot();
+        TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
+    }
+}
+
+/* It says nothing of itself, but something is expected. */
+static void test_a_drive_without_identity_is_not_the_expected_one(void)
+{
+    bench.drives[0].lacks[0] = 0x1018;
+    boot();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2051, 1, 5, 4));
+    expect_trouble(2, 0x101801, SDO_ABORT_NO_OBJECT);
+}
+
 static void test_a_pdo_is_disabled_mapped_and_enabled(void)
 {
     static const struct fake_write rpdo1[] = {
@@ -116,7 +148,8 @@ static void test_settings_of_an_axis_reach_its_drive_only(void)
     TEST_ASSERT_EQUAL_UINT32(777, values->homing_speeds[1]);
     TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x608F01, NULL));
     TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x609800, NULL));
-    TEST_ASSERT_EQUAL_UINT32(1, fake_drive_written(drive(0), 0x606500, NULL));
+    TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x606500, NULL));
+    TEST_ASSERT_EQUAL_UINT32(0, fake_drive_written(drive(0), 0x606600, NULL));
 }
 
 static void test_feedforward_changes_the_mapping(void)
@@ -318,6 +351,8 @@ static void test_what_a_drive_says_of_itself_is_kept(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_a_drive_of_another_identity_is_refused);
+    RUN_TEST(test_a_drive_without_identity_is_not_the_expected_one);
     RUN_TEST(test_a_pdo_is_disabled_mapped_and_enabled);
     RUN_TEST(test_times_heartbeats_and_reactions);
     RUN_TEST(test_settings_of_an_axis_reach_its_drive_only);

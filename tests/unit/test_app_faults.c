@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/commands.h"
+#include "app/od_write.h"
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 
@@ -642,7 +643,173 @@ static void test_a_frame_now_and_then_is_counted_only(void)
     TEST_ASSERT_EQUAL_INT(30, app_bench_read(&bench, 0x2008, 7));
 }
 
+/* Periods in which some frames are refused: no drive may get, from SYNC to SYNC, a step that the program does not have. */
+static void refuse_some(uint16_t id, uint16_t mask, uint32_t times)
+{
+    const struct can_match frames = {id, mask};
+    run_some(250);
+    int32_t before = drive(0)->position_counts;
+    const uint32_t tick = machine()->statistics.program_tick;
+    fake_port_refuse(&frames, times);
+    for (unsigned i = 0; i < 10; ++i) {
+        app_bench_period(&bench);
+        const int32_t now = drive(0)->position_counts;
+        TEST_ASSERT_TRUE(now >= before && (uint32_t)(now - before) <= STEP_COUNTS);
+        before = now;
+    }
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    TEST_ASSERT_EQUAL_UINT32(times, machine()->statistics.frames_not_sent);
+    TEST_ASSERT_EQUAL_UINT32(10u - times, machine()->statistics.program_tick - tick);
+    (void)app_bench_until(&bench, MACHINE_READY, 1000);
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, drive(0)->position_counts);
+}
+
+static void test_program_time_waits_for_a_setpoint_that_does_not_leave(void)
+{
+    refuse_some(COB_RPDO1 + 2, CAN_ID_MAX, MACHINE_UNSENT_MAX);
+}
+
+static void test_program_time_waits_for_a_setpoint_of_another_axis(void)
+{
+    refuse_some(COB_RPDO1 + 3, CAN_ID_MAX, MACHINE_UNSENT_MAX);
+}
+
+static void test_program_time_waits_for_a_sync_that_does_not_leave(void)
+{
+    refuse_some(COB_SYNC, CAN_ID_MAX, MACHINE_UNSENT_MAX);
+}
+
+/* --- Position and setpoint --- */
+
+static void test_a_drive_that_does_not_follow_without_a_word(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x201D, 1, 30000, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x201E, 1, 10, 2));
+    run_some(250);
+    drive(0)->deaf = 1000; /* 15000 counts a tick: out of the window with the third */
+    app_bench_periods(&bench, 3u + 10u + CONFIG_APART_SYNCS);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    app_bench_periods(&bench, 4);
+    expect_fault(FAULT_AWAY, 2);
+    TEST_ASSERT_TRUE(app_bench_read(&bench, 0x2003, 3) > 30000);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
+    drive(0)->deaf = 0;
+    drive(0)->following = false; /* what it hears then is no step of the path */
+    until_phase(MACHINE_FAULT_OFF, 1000);
+    recover();
+}
+
+/* Without a window nothing is said on the way: but the program has not been run. */
+static void test_ready_means_at_the_target(void)
+{
+    run_some(450);
+    drive(1)->position_counts += 12000; /* more than the tolerance of 10000 */
+    drive(1)->latched_counts += 12000;
+    drive(1)->target_counts += 12000;
+    drive(1)->deaf = 10000;
+    (void)app_bench_until(&bench, MACHINE_FAULT, 60 + MACHINE_SETTLE_TICKS + MACHINE_ARRIVE_TICKS);
+    expect_fault(FAULT_AWAY, 3);
+    TEST_ASSERT_EQUAL_INT(12000, app_bench_read(&bench, 0x2003, 3));
+}
+
+static void test_an_axis_that_arrives_late_is_waited_for(void)
+{
+    run_some(450);
+    drive(1)->position_counts += 12000;
+    drive(1)->latched_counts += 12000;
+    drive(1)->target_counts += 12000;
+    drive(1)->deaf = 1000;
+    const uint32_t took = app_bench_until(&bench, MACHINE_READY, 1100);
+    TEST_ASSERT_TRUE(took > 950u);
+}
+
+/* --- Time --- */
+
+static void test_a_gap_of_syncs_with_real_drives_is_a_fault(void)
+{
+    real_drives(5);
+    run_some(250);
+    fake_port_advance_us(1000);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    const int32_t target = drive(0)->target_counts;
+    fake_port_advance_us(1200);
+    app_bench_period(&bench);
+    expect_fault(FAULT_SYNC_GAP, 0);
+    TEST_ASSERT_EQUAL_INT(2200, app_bench_read(&bench, 0x2003, 3));
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_QUICK, machine()->fault_phase);
+    TEST_ASSERT_EQUAL_INT32_MESSAGE(target, drive(0)->target_counts, "no setpoint after the gap");
+    until_phase(MACHINE_FAULT_OFF, 100);
+    recover();
+}
+
+static void test_real_drives_need_a_port_that_keeps_time(void)
+{
+    real_drives(5);
+    fake_port_set_timing(PORT_TIMING_REFUSED);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_TRUE(fake_port_urgent());
+    TEST_ASSERT_EQUAL_INT(PORT_TIMING_REFUSED, app_bench_read(&bench, 0x2040, 0));
+    refused(COMMAND_ENABLE, MACHINE_NOT_IN_TIME);
+    refused(COMMAND_HOME, MACHINE_NOT_IN_TIME);
+    fake_port_set_timing(PORT_TIMING_ACCEPTED);
+    switch_on();
+}
+
+static void test_simulated_drives_need_none(void)
+{
+    fake_port_set_timing(PORT_TIMING_REFUSED);
+    switch_on();
+    TEST_ASSERT_FALSE(fake_port_urgent());
+}
+
+static void fails_now(void *context)
+{
+    (void)context;
+    machine_raise(machine(), EMCY_GENERIC, 2, 0);
+}
+
+/* A fault between the test whether the configuration may change and the change: it does not. */
+static void test_a_fault_in_the_middle_of_a_write(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    const int64_t before = app_bench_read(&bench, 0x2005, 1);
+    const uint8_t value = 9;
+    const struct od_entry *entry = od_find(&bench.controller.od, 0x2005, 1);
+    fake_port_on_unlock(fails_now, NULL);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, od_write_hook(&bench.controller, entry, &value, 1));
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, machine()->state);
+    TEST_ASSERT_EQUAL_INT(before, app_bench_read(&bench, 0x2005, 1));
+    TEST_ASSERT_EQUAL_UINT8(before, bench.controller.config.node[0]);
+    TEST_ASSERT_EQUAL_UINT8(before, machine()->config.node[0]);
+}
+
 /* --- Reset --- */
+
+/* A statusword that says Fault, for ever, and no EMCY with it: the mapping may be another one. */
+static void test_a_reset_configures_a_drive_that_speaks_nonsense(void)
+{
+    run_some(100);
+    drive(1)->stuck = true;
+    app_bench_periods(&bench, 2);
+    until_phase(MACHINE_FAULT_OFF, 10);
+    command(COMMAND_RESET);
+    (void)app_bench_until(&bench, MACHINE_BOOT, MACHINE_RESET_TICKS + 5u);
+    drive(1)->stuck = false;
+    (void)cia402_device_control(&drive(1)->state, 0);
+    (void)cia402_device_control(&drive(1)->state, CIA402_FAULT_RESET);
+    (void)app_bench_until(&bench, MACHINE_OFF, 3000);
+}
+
+static void test_reset_when_off_configures_anew(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    const uint32_t starts = bench.starts;
+    command(COMMAND_RESET);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, machine()->state);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_UINT32(starts + BENCH_DRIVES, bench.starts);
+}
 
 static void test_a_reset_while_the_cause_persists_gives_the_fault_again(void)
 {
@@ -800,5 +967,17 @@ int main(void)
     RUN_TEST(test_a_node_has_one_entry_in_1016);
     RUN_TEST(test_heartbeat_time_is_object_1016);
     RUN_TEST(test_an_error_that_was_cleared_is_not_the_cause_of_a_later_fault);
+    RUN_TEST(test_program_time_waits_for_a_setpoint_that_does_not_leave);
+    RUN_TEST(test_program_time_waits_for_a_setpoint_of_another_axis);
+    RUN_TEST(test_program_time_waits_for_a_sync_that_does_not_leave);
+    RUN_TEST(test_a_drive_that_does_not_follow_without_a_word);
+    RUN_TEST(test_ready_means_at_the_target);
+    RUN_TEST(test_an_axis_that_arrives_late_is_waited_for);
+    RUN_TEST(test_a_gap_of_syncs_with_real_drives_is_a_fault);
+    RUN_TEST(test_real_drives_need_a_port_that_keeps_time);
+    RUN_TEST(test_simulated_drives_need_none);
+    RUN_TEST(test_a_reset_configures_a_drive_that_speaks_nonsense);
+    RUN_TEST(test_reset_when_off_configures_anew);
+    RUN_TEST(test_a_fault_in_the_middle_of_a_write);
     return UNITY_END();
 }

@@ -17,6 +17,7 @@ static const struct config config = {
     .counts_per_mm = 1000000,
     .travel_min_counts = {-100000000, -100000000},
     .travel_max_counts = {100000000, 100000000},
+    .crc32 = 1,
 };
 static struct program_slot slot;
 static uint8_t image[APP_IMAGE_SIZE];
@@ -121,8 +122,8 @@ static void test_a_new_configuration_is_applied_to_the_old_program(void)
     other.travel_max_counts[0] = 100000;
     other.travel_max_counts[1] = 100000;
     program_slot_refresh(&slot, &other);
-    TEST_ASSERT_TRUE_MESSAGE(slot.acceptable, "nobody said that it is stale");
-    program_slot_stale(&slot);
+    TEST_ASSERT_TRUE_MESSAGE(slot.acceptable, "its CRC says that it is the same");
+    other.crc32 = 2;
     program_slot_refresh(&slot, &other);
     TEST_ASSERT_FALSE(slot.acceptable);
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_JERK, slot.refused.code);
@@ -136,14 +137,13 @@ static void test_the_records_are_those_of_the_kernel(void)
     const unsigned bank = slot.bank;
     TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.prepared_for);
     other.kernel = 1;
-    program_slot_stale(&slot);
+    other.crc32 = 2;
     program_slot_refresh(&slot, &other);
     TEST_ASSERT_TRUE(slot.acceptable);
     TEST_ASSERT_EQUAL_PTR(kernel_find(1), slot.program.prepared_for);
     TEST_ASSERT_EQUAL_UINT(1u - bank, slot.bank);
     expect_active(image);
     fake_port_fail_store(true);
-    program_slot_stale(&slot);
     program_slot_refresh(&slot, &config);
     TEST_ASSERT_FALSE(slot.acceptable);
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_STORE, slot.refused.code);

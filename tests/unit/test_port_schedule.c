@@ -220,6 +220,16 @@ static void test_a_stall_is_no_time_for_the_mainline(void)
     TEST_ASSERT_FALSE(put_off(now_ns + 8u * (uint64_t)MS, 1, 0));
 }
 
+/* Nobody has to wait for it where drives are real. */
+static void test_no_tick_is_put_off_for_real_drives(void)
+{
+    schedule_begin(&schedule, 0, 1000000u, false);
+    (void)schedule_overdue(&schedule, 0, 1);
+    TEST_ASSERT_TRUE(schedule_overdue(&schedule, SCHEDULE_TURN_NS + 1u, 1));
+    schedule.urgent = true;
+    TEST_ASSERT_FALSE(schedule_overdue(&schedule, SCHEDULE_TURN_NS + 1u, 1));
+}
+
 static void test_a_mainline_that_is_stuck_is_left(void)
 {
     unsigned yields = 0;
@@ -287,6 +297,7 @@ int main(void)
     RUN_TEST(test_after_its_turn_the_mainline_is_not_waited_for);
     RUN_TEST(test_a_stall_is_no_time_for_the_mainline);
     RUN_TEST(test_a_mainline_that_is_stuck_is_left);
+    RUN_TEST(test_no_tick_is_put_off_for_real_drives);
     RUN_TEST(test_lock_step_in_a_hurry_is_due_when_all_are_ready);
     RUN_TEST(test_lock_step_without_hurry_goes_by_the_clock);
     return UNITY_END();

@@ -288,6 +288,57 @@ static void test_a_request_after_an_abort_is_heard(void)
     TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 2, image, 7)); /* the client itself broke off */
 }
 
+/* Somebody else's requests, whose first bytes are numbers of segments too. */
+static void test_a_second_client_inside_a_block(void)
+{
+    static const uint8_t asks[] = {0x20, 0x21, 0x23, 0x2F, 0x40, 0xA0, 0xA4, 0xC0, 0xC6};
+    uint8_t sequence = 1;
+    sdo_server_init(&talk.server, &talk.small.od, TALK_NODE, TALK_TIMEOUT_US, 127);
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0xC6, 0x2005, 0, 100));
+    for (unsigned i = 0; i < sizeof asks; ++i) {
+        sdo_talk_segment(&talk, sequence, image + 7u * (sequence - 1u), 7);
+        sequence++;
+        TEST_ASSERT_TRUE(sdo_talk_ask(&talk, asks[i], 0x2003, 0, 1));
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_LOCAL, sdo_talk_abort_code(&talk));
+        TEST_ASSERT_TRUE(sdo_talk_busy(&talk));
+        TEST_ASSERT_EQUAL_UINT8(0, talk.answer.data[3]);
+    }
+    for (; sequence <= 15; ++sequence) {
+        const uint32_t at = 7u * (sequence - 1u);
+        sdo_talk_segment(&talk, (uint8_t)(sequence | (sequence == 15 ? 0x80u : 0u)), image + at,
+                         at + 7 <= 100 ? 7 : 100 - at);
+    }
+    finish(100, crc16_update(0, image, 100));
+    TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
+    TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, 100);
+}
+
+/* The one request whose number is the next one in the block: the transfer does not survive it, and nobody takes the value. */
+static void test_a_second_client_that_hits_the_next_number(void)
+{
+    const uint8_t request[7] = {0x03, 0x20, 0x00, 1, 2, 3, 4};
+    sdo_server_init(&talk.server, &talk.small.od, TALK_NODE, TALK_TIMEOUT_US, 127);
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0xC6, 0x2005, 0, 300));
+    for (uint8_t sequence = 1; sequence < 0x23; ++sequence) {
+        sdo_talk_segment(&talk, sequence, image, 7);
+    }
+    TEST_ASSERT_FALSE(sdo_talk_segment(&talk, 0x23, request, 7));
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 0x23, image, 7));
+    expect_abort(SDO_ABORT_SEQUENCE);
+    TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
+    TEST_ASSERT_EQUAL_INT(0, talk.small.ended);
+}
+
+static void test_a_segment_doubled_on_the_bus_is_taken_once(void)
+{
+    initiate(14);
+    sdo_talk_segment(&talk, 1, image, 7);
+    TEST_ASSERT_FALSE(sdo_talk_segment(&talk, 1, image, 7));
+    sdo_talk_segment(&talk, 0x82, image + 7, 7);
+    finish(14, crc16_update(0, image, 14));
+    TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
+}
+
 static void test_abort_by_the_client_inside_a_block(void)
 {
     initiate(100);
@@ -475,6 +526,9 @@ int main(void)
     RUN_TEST(test_the_rest_of_a_block_after_an_abort_is_no_request);
     RUN_TEST(test_a_request_after_an_abort_is_heard);
     RUN_TEST(test_abort_by_the_client_inside_a_block);
+    RUN_TEST(test_a_second_client_inside_a_block);
+    RUN_TEST(test_a_second_client_that_hits_the_next_number);
+    RUN_TEST(test_a_segment_doubled_on_the_bus_is_taken_once);
     RUN_TEST(test_a_pause_inside_a_block_is_no_loss);
     RUN_TEST(test_no_early_answer_before_the_first_segment);
     RUN_TEST(test_silence_inside_a_block);

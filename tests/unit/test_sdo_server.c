@@ -307,12 +307,45 @@ static void test_an_abort_midway_is_told_to_the_domain(void)
     expect_abort(SDO_ABORT_COMMAND);
 }
 
-static void test_a_new_initiate_replaces_the_old_transfer(void)
+/* Whoever asks while a transfer is under way is told so, with the object that it asked for; the transfer goes on. */
+static void test_a_second_client_is_refused(void)
 {
+    static const uint8_t asks[] = {0x20, 0x21, 0x23, 0x2F, 0x40, 0xA0, 0xA4, 0xC0, 0xC6};
     const uint8_t data[7] = {0};
 
     sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
     sdo_talk_segment(&talk, 0x00, data, 7);
+    for (unsigned i = 0; i < sizeof asks; ++i) {
+        TEST_ASSERT_TRUE(sdo_talk_ask(&talk, asks[i], 0x2003, 0, 1));
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_LOCAL, sdo_talk_abort_code(&talk));
+        TEST_ASSERT_TRUE(sdo_talk_busy(&talk));
+        TEST_ASSERT_EQUAL_HEX16(0x2003, cob_get(talk.answer.data + 1, 2));
+        TEST_ASSERT_EQUAL_UINT8(0, talk.answer.data[3]);
+    }
+    TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2003, 0, SDO_ABORT_TIMEOUT));
+    TEST_ASSERT_EQUAL_INT(0, talk.small.aborted);
+    sdo_talk_segment(&talk, 0x11, data, 7);
+    TEST_ASSERT_EQUAL_HEX8(0x30, talk.answer.data[0]);
+    TEST_ASSERT_EQUAL_UINT32(14, talk.small.domain_size);
+    TEST_ASSERT_EQUAL_INT(1, talk.small.ended);
+}
+
+/* A second client's attempts do not keep a transfer alive whose client is gone. */
+static void test_a_transfer_that_is_left_times_out_all_the_same(void)
+{
+    sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
+    sdo_talk_segment(&talk, 0x00, (const uint8_t[7]){0}, 7);
+    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    sdo_talk_ask(&talk, 0x40, 0x2003, 0, 0);
+    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, 1, &talk.answer));
+    expect_abort(SDO_ABORT_TIMEOUT);
+}
+
+static void test_a_lost_answer_to_the_first_request_is_asked_for_again(void)
+{
+    const uint8_t data[7] = {0};
+
+    sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
     sdo_talk_ask(&talk, 0x21, 0x2005, 0, 7);
     TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
     sdo_talk_segment(&talk, 0x01, data, 7);
@@ -378,7 +411,9 @@ int main(void)
     RUN_TEST(test_segmented_download_of_a_domain);
     RUN_TEST(test_domain_refused_at_the_end);
     RUN_TEST(test_an_abort_midway_is_told_to_the_domain);
-    RUN_TEST(test_a_new_initiate_replaces_the_old_transfer);
+    RUN_TEST(test_a_second_client_is_refused);
+    RUN_TEST(test_a_transfer_that_is_left_times_out_all_the_same);
+    RUN_TEST(test_a_lost_answer_to_the_first_request_is_asked_for_again);
     RUN_TEST(test_timeout);
     RUN_TEST(test_each_frame_restarts_the_timeout);
     RUN_TEST(test_reset_is_silent);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/parameter_store.h"
 #include "app/program_slot.h"
 #include "core/crc32.h"
 #include "core/interp.h"
@@ -12,6 +13,7 @@
 #include "fake_port.h"
 #include "flash_model.h"
 #include "golden.h"
+#include "od_controller.h"
 #include "port/stm32g4/flash.h"
 #include "stm32g4_chip.h"
 #include "unity.h"
@@ -56,7 +58,7 @@ static int write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t s
 }
 
 static const struct fake_port_store store = {
-    .bank_bytes = FLASH_STORE_BYTES, .erase = erase, .write = write, .data = flash_store_data};
+    .size = flash_store_size, .erase = erase, .write = write, .data = flash_store_data};
 
 void setUp(void)
 {
@@ -132,7 +134,7 @@ static void test_a_bank_takes_pieces_of_any_size(void)
     for (uint32_t i = 0; i < sizeof data; ++i) {
         data[i] = (uint8_t)golden_random(&random);
     }
-    for (unsigned bank = 0; bank < FLASH_STORE_BANKS; ++bank) {
+    for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
         TEST_ASSERT_TRUE(flash_store_erase(bank));
         for (uint32_t at = 0; at < sizeof data;) {
             uint32_t size = (uint32_t)(golden_random(&random) % 900u);
@@ -144,7 +146,7 @@ static void test_a_bank_takes_pieces_of_any_size(void)
     TEST_ASSERT_EQUAL_INT(0, memcmp(data, flash_store_data(0), sizeof data));
     TEST_ASSERT_EQUAL_INT(0, memcmp(data, flash_store_data(1), sizeof data));
     for (uint32_t page = 0; page < FLASH_PAGES; ++page) {
-        TEST_ASSERT_EQUAL_UINT(1, flash_model_erased(page));
+        TEST_ASSERT_EQUAL_UINT(page < 126u ? 1 : 0, flash_model_erased(page));
     }
 }
 
@@ -152,9 +154,13 @@ static void test_erasing_takes_one_page_only(void)
 {
     TEST_ASSERT_TRUE(flash_store_erase(0));
     TEST_ASSERT_TRUE(flash_store_erase(1));
-    TEST_ASSERT_EQUAL_UINT32(2, flash_model_operations());
-    TEST_ASSERT_EQUAL_UINT(1, flash_model_erased(63));
-    TEST_ASSERT_EQUAL_UINT(1, flash_model_erased(127));
+    TEST_ASSERT_TRUE(flash_store_erase(2));
+    TEST_ASSERT_TRUE(flash_store_erase(3));
+    TEST_ASSERT_EQUAL_UINT32(4, flash_model_operations());
+    TEST_ASSERT_EQUAL_UINT(1, flash_model_erased(62));
+    for (uint32_t page = 125; page < FLASH_PAGES; ++page) {
+        TEST_ASSERT_EQUAL_UINT(1, flash_model_erased(page));
+    }
 }
 
 static void test_a_gap_may_lead_into_the_last_page_only(void)
@@ -174,7 +180,8 @@ static void test_a_gap_may_lead_into_the_last_page_only(void)
 static void test_what_the_store_refuses(void)
 {
     static const uint8_t data[16] = {0};
-    TEST_ASSERT_FALSE(flash_store_erase(2));
+    TEST_ASSERT_EQUAL_UINT32(0, flash_store_size(FLASH_STORE_BANKS));
+    TEST_ASSERT_FALSE(flash_store_erase(FLASH_STORE_BANKS));
     TEST_ASSERT_FALSE(flash_store_write(0, 0, data, 8));
     TEST_ASSERT_TRUE(flash_store_erase(0));
     TEST_ASSERT_FALSE_MESSAGE(flash_store_write(1, 0, data, 8), "not the bank that was erased");
@@ -354,6 +361,103 @@ static void test_power_lost_again_and_again(void)
     free_images();
 }
 
+/* --- parameters --- */
+
+enum { ELDER_UM_S = 1000, OLD_UM_S = 2000, NEW_UM_S = 3000 };
+
+static struct od_controller values;
+static struct od od;
+static struct parameter_store parameters;
+
+static int save(uint32_t feed_um_s)
+{
+    values.configuration.feed_limit_um_s = feed_um_s;
+    return parameter_store_save(&parameters, &od, feed_um_s, true);
+}
+
+/* The feed limit that is there after power-on. */
+static uint32_t restored_um_s(void)
+{
+    chip_power_on();
+    values = od_controller_defaults;
+    parameter_store_find(&parameters, &od);
+    TEST_ASSERT_EQUAL_INT(PARAMETER_STORE_WHOLE, parameters.state);
+    TEST_ASSERT_TRUE(parameter_store_restore(&parameters, &od, 0, 0xFFFF));
+    TEST_ASSERT_EQUAL_UINT32(parameters.config_crc32, values.configuration.feed_limit_um_s);
+    return values.configuration.feed_limit_um_s;
+}
+
+static void prepare_parameters(void)
+{
+    flash_model_new();
+    chip_power_on();
+    values = od_controller_defaults;
+    od_init(&od, &od_controller_table, &values, NULL, NULL);
+    parameter_store_find(&parameters, &od);
+    TEST_ASSERT_EQUAL_INT(PARAMETER_STORE_EMPTY, parameters.state);
+    TEST_ASSERT_EQUAL_INT(0, save(ELDER_UM_S));
+    TEST_ASSERT_EQUAL_INT(0, save(OLD_UM_S));
+    TEST_ASSERT_EQUAL_UINT32(OLD_UM_S, restored_um_s());
+    flash_model_save();
+}
+
+/* True: the power held out. */
+static bool save_until(uint32_t operation, enum flash_model_remains remains, uint32_t seed)
+{
+    flash_model_cut(flash_model_operations() + operation, remains, seed, &power);
+    if (setjmp(power) == 0) {
+        TEST_ASSERT_EQUAL_INT(0, save(NEW_UM_S));
+        flash_model_cut(UINT32_MAX, FLASH_MODEL_AFTER, 0, NULL);
+        return true;
+    }
+    return false;
+}
+
+static void cut_save_at(uint32_t operation, uint32_t last, enum flash_model_remains remains)
+{
+    flash_model_restore();
+    (void)restored_um_s();
+    TEST_ASSERT_FALSE(save_until(operation, remains, operation));
+    const uint32_t found = restored_um_s();
+    if (operation < last || remains == FLASH_MODEL_BEFORE) {
+        TEST_ASSERT_EQUAL_UINT32(OLD_UM_S, found);
+    } else if (remains == FLASH_MODEL_AFTER) {
+        TEST_ASSERT_EQUAL_UINT32(NEW_UM_S, found);
+    }
+    TEST_ASSERT_EQUAL_INT(0, save(NEW_UM_S));
+    TEST_ASSERT_EQUAL_UINT32(NEW_UM_S, restored_um_s());
+}
+
+static void test_power_lost_at_any_operation_leaves_whole_parameters(void)
+{
+    prepare_parameters();
+    const uint32_t before = flash_model_operations();
+    TEST_ASSERT_TRUE(save_until(100000, FLASH_MODEL_AFTER, 0));
+    const uint32_t operations = flash_model_operations() - before;
+    TEST_ASSERT_EQUAL_UINT32(77, operations); /* a page; 74 double words, 2 of the record */
+    for (uint32_t operation = 0; operation < operations; ++operation) {
+        for (int remains = 0; remains < FLASH_MODEL_REMAINS; ++remains) {
+            cut_save_at(operation, operations - 1u, (enum flash_model_remains)remains);
+        }
+    }
+}
+
+/* The programs have nothing to do with it. */
+static void test_parameters_leave_the_programs_alone(void)
+{
+    load_images();
+    prepare();
+    od_init(&od, &od_controller_table, &values, NULL, NULL);
+    parameter_store_find(&parameters, &od);
+    TEST_ASSERT_EQUAL_INT(0, save(OLD_UM_S));
+    TEST_ASSERT_EQUAL_INT(0, save(NEW_UM_S));
+    upload(NEW);
+    boot();
+    TEST_ASSERT_TRUE(is_active(NEW));
+    TEST_ASSERT_EQUAL_UINT32(NEW_UM_S, restored_um_s());
+    free_images();
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -367,5 +471,7 @@ int main(void)
     RUN_TEST(test_what_the_store_refuses);
     RUN_TEST(test_power_lost_at_any_operation_leaves_a_whole_program);
     RUN_TEST(test_power_lost_again_and_again);
+    RUN_TEST(test_power_lost_at_any_operation_leaves_whole_parameters);
+    RUN_TEST(test_parameters_leave_the_programs_alone);
     return UNITY_END();
 }

@@ -13,6 +13,8 @@
 #define port_tick_period    board_tick_period
 #define port_tick_await     board_tick_await
 #define port_tick_ready     board_tick_ready
+#define port_tick_urgent    board_tick_urgent
+#define port_timing         board_timing
 #define port_lock           board_lock
 #define port_unlock         board_unlock
 #define port_wait           board_wait
@@ -232,13 +234,14 @@ static void test_a_spoiled_word_of_the_code_is_the_end_at_any_time(void)
 static void test_the_store_is_the_flash(void)
 {
     static const uint8_t data[8] = {1, 2, 3, 4, 5, 6, 7, 8};
-    TEST_ASSERT_EQUAL_UINT32(128u * 1024u, port_store_size());
+    TEST_ASSERT_EQUAL_UINT32(126u * 1024u, port_store_size(0));
+    TEST_ASSERT_EQUAL_UINT32(PORT_STORE_PARAMETER_BYTES, port_store_size(PORT_STORE_PARAMETERS));
     TEST_ASSERT_EQUAL_INT(0, port_store_erase(1));
     TEST_ASSERT_EQUAL_INT(0, port_store_write(1, 0, data, 8));
-    TEST_ASSERT_EQUAL_PTR(flash_model_memory(0x08060000u), port_store_data(1));
+    TEST_ASSERT_EQUAL_PTR(flash_model_memory(0x0805F800u), port_store_data(1));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(data, port_store_data(1), 8);
     TEST_ASSERT_EQUAL_INT(PORT_ERR_STORE, port_store_write(0, 0, data, 8));
-    TEST_ASSERT_EQUAL_INT(PORT_ERR_STORE, port_store_erase(2));
+    TEST_ASSERT_EQUAL_INT(PORT_ERR_STORE, port_store_erase(PORT_STORE_BANKS_ALL));
 }
 
 static void test_trouble_on_the_bus_is_told_once_a_second(void)

@@ -29,6 +29,12 @@ static bool configured(const struct drive_plan *plan, enum drive_when when)
         return axis->homing_method != 0 && drive_supports(plan->facts, CIA402_MODE_HOMING);
     case WHEN_WINDOW:
         return axis->following_window_counts != UINT32_MAX;
+    case WHEN_VENDOR:
+        return axis->expected_vendor != 0u;
+    case WHEN_PRODUCT:
+        return axis->expected_product != 0u;
+    case WHEN_REVISION:
+        return axis->expected_revision != 0u;
     case WHEN_ENCODER:
         return axis->encoder_increments != 0u;
     case WHEN_GEAR:
@@ -56,7 +62,6 @@ static bool concerns(const struct drive_plan *plan, enum drive_when when)
         return !plan->facts->known[DRIVE_TORQUE_MAPPED];
     case WHEN_NO_VELOCITY:
         return !plan->facts->known[DRIVE_VELOCITY_MAPPED];
-    case WHEN_NO_WINDOW:
         return !configured(plan, WHEN_WINDOW);
     default:
         return configured(plan, when);

@@ -73,16 +73,23 @@ const struct drive_pdo drive_pdos[] = {
 
 /* When, what, object, sub-index, bytes, value. */
 const struct drive_row drive_rows[] = {
+    /* STOPPED it would not answer; no process data while parameters change */
+    {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
     /* what is it? */
     {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_DRIVE},
     {WHEN_ALWAYS, ROW_LEARN, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
     {WHEN_ALWAYS, ROW_LEARN, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},
     {WHEN_ALWAYS, ROW_LEARN, 0x1018, 3, 4, FROM_ROW, DRIVE_REVISION},
     {WHEN_ALWAYS, ROW_LEARN, 0x1018, 4, 4, FROM_ROW, DRIVE_SERIAL},
+    {WHEN_VENDOR, ROW_EXPECT, 0x1018, 1, 4, FROM_AXIS, FIELD(expected_vendor)},
+    {WHEN_PRODUCT, ROW_EXPECT, 0x1018, 2, 4, FROM_AXIS, FIELD(expected_product)},
+    {WHEN_REVISION, ROW_EXPECT, 0x1018, 3, 4, FROM_AXIS, FIELD(expected_revision)},
     {WHEN_ALWAYS, ROW_LEARN, 0x6502, 0, 4, FROM_ROW, DRIVE_MODES},
     {WHEN_ALWAYS, ROW_NEED_BITS, 0x6502, 0, 4, FROM_ROW, CIA402_SUPPORTS(CIA402_MODE_CSP)},
     {WHEN_ALWAYS, ROW_LEARN, 0x60FD, 0, 4, FROM_ROW, DRIVE_INPUTS},
-    {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
+    {WHEN_HOMING, ROW_LEARN, 0x6064, 0, 4, FROM_ROW, DRIVE_POSITION},
+    /* a drive that was left enabled, and whose PDOs are not ours: it stops, and goes off */
+    {WHEN_ALWAYS, ROW_TRY, 0x6040, 0, 2, FROM_ROW, CIA402_QUICK_STOP},
     /* SYNC; its counter may change only while the period is 0 (CiA 301, 0x1019) */
     {WHEN_ALWAYS, ROW_MAY, 0x1005, 0, 4, FROM_ROW, COB_SYNC},
     {WHEN_ALWAYS, ROW_TRY, 0x1006, 0, 4, FROM_ROW, 0},
@@ -124,7 +131,6 @@ const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_MAY, 0x605E, 0, 2, FROM_ROW, QUICK_STOP_OFF},
     {WHEN_WINDOW, ROW_MUST, 0x6065, 0, 4, FROM_AXIS, FIELD(following_window_counts)},
     {WHEN_WINDOW, ROW_MAY, 0x6066, 0, 2, FROM_AXIS, FIELD(following_timeout_ms)},
-    {WHEN_NO_WINDOW, ROW_MAY, 0x6065, 0, 4, FROM_ROW, UINT32_MAX},
     /* homing: a zero that the drive finds by itself */
     {WHEN_HOMING, ROW_MUST, 0x6098, 0, 1, FROM_AXIS, FIELD(homing_method)},
     {WHEN_HOMING, ROW_MAY, 0x6099, 1, 4, FROM_AXIS, FIELD(homing_speed_towards_counts_s)},

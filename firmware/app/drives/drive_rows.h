@@ -20,7 +20,9 @@ enum drive_when {
     WHEN_NO_VELOCITY, /* as WHEN_NO_TORQUE */
     WHEN_HOMING,      /* homing is asked for, and the drive has the mode */
     WHEN_WINDOW,      /* a following error window is set */
-    WHEN_NO_WINDOW,
+    WHEN_VENDOR, /* the drive's identity is known from the machine file: vendor, product, revision */
+    WHEN_PRODUCT,
+    WHEN_REVISION,
     WHEN_ENCODER, /* the encoder's increments, gear, feed constant are set */
     WHEN_GEAR,
     WHEN_FEED,

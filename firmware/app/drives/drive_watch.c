@@ -4,6 +4,7 @@
 #include <stddef.h>
 
 #include "canopen/cia402.h"
+#include "canopen/cob.h"
 #include "canopen/emcy.h"
 #include "port/port.h"
 
@@ -27,6 +28,31 @@ void drive_watch_begin(struct drive_watch *watch, const struct config *config,
         const uint8_t node = config->node[i];
         heartbeat_consumer_init(&watch->consumers[i], node, (uint16_t)time_of(node, entries));
     }
+}
+
+/* The zero of a drive counts as kept only while there is no gap in which it could have restarted. */
+static void note_silence(struct drive_watch *watch, struct machine *machine, uint8_t i,
+                         uint32_t elapsed_us)
+{
+    const uint32_t time_us = watch->consumers[i].time_us;
+    const uint32_t zero_us = DRIVE_WATCH_ZERO_MS * 1000u;
+    const uint32_t limit_us = time_us < zero_us ? time_us : zero_us;
+    if (watch->silent_us[i] <= limit_us) {
+        watch->silent_us[i] += elapsed_us;
+    }
+    if (watch->silent_us[i] > limit_us) {
+        port_lock();
+        struct axis *axis = machine_axis(machine, watch->consumers[i].node);
+        if (axis != NULL) {
+            axis->homed = false;
+        }
+        port_unlock();
+    }
+}
+
+static bool is_heartbeat(const struct heartbeat_consumer *consumer, const struct can_msg *in)
+{
+    return in->id == COB_HEARTBEAT + consumer->node && in->len == 1u;
 }
 
 /* Drives that are off may come and go: they are found again. With power on it is a fault. */
@@ -78,6 +104,9 @@ void drive_watch_receive(struct drive_watch *watch, struct machine *machine,
     }
     for (uint8_t i = 0; i < watch->count; ++i) {
         struct heartbeat_consumer *consumer = &watch->consumers[i];
+        if (is_heartbeat(consumer, in)) {
+            watch->silent_us[i] = 0;
+        }
         take_event(machine, consumer, heartbeat_consumer_receive(consumer, in));
     }
 }
@@ -86,6 +115,7 @@ void drive_watch_process(struct drive_watch *watch, struct machine *machine, uin
 {
     for (uint8_t i = 0; i < watch->count; ++i) {
         struct heartbeat_consumer *consumer = &watch->consumers[i];
+        note_silence(watch, machine, i, elapsed_us);
         take_event(machine, consumer, heartbeat_consumer_process(consumer, elapsed_us));
     }
 }

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_watch: heartbeats and emergency messages of the drives. Mainline; takes the port's lock
- * where it touches the machine. */
+/*
+ * drive_watch: heartbeats and emergency messages of the drives, and what they mean for the zero of a homed axis: a drive that
+ * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody heard its boot-up
+ * message. Mainline; takes the port's lock where it touches the machine.
+ */
 #ifndef APP_DRIVES_DRIVE_WATCH_H
 #define APP_DRIVES_DRIVE_WATCH_H
 
@@ -12,8 +15,13 @@
 /* Consumer time of a drive that has no entry in 0x1016; the drives send ten times as often. */
 #define DRIVE_WATCH_HEARTBEAT_MS 1000u
 
+/* So long a silence is enough for a drive to have been off and on again without anybody hearing its boot-up message; its
+ * heartbeats come five times as often. */
+#define DRIVE_WATCH_ZERO_MS 500u
+
 struct drive_watch {
     struct heartbeat_consumer consumers[AXES_MAX];
+    uint32_t silent_us[AXES_MAX]; /* since the last heartbeat, whatever has begun anew since */
     uint8_t count;
 };
 

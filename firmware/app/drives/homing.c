@@ -57,7 +57,7 @@ enum machine_refusal homing_begin(struct homing *homing, struct machine *machine
     if (refusal == MACHINE_ACCEPTED) {
         homing_init(homing);
         homing->axis = next_axis(machine, 0);
-        homing_enter(homing, machine, HOMING_MODE);
+        homing_enter(homing, machine, HOMING_OFF);
     }
     port_unlock();
     return refusal;
@@ -91,7 +91,7 @@ static void mode_done(struct homing *homing, struct machine *machine)
     } else {
         homing->axis = next_axis(machine, (uint8_t)(homing->axis + 1u));
         if (homing->axis < machine->config.axis_count) {
-            homing_enter(homing, machine, HOMING_MODE);
+            homing_enter(homing, machine, HOMING_OFF);
         } else {
             homing->phase = HOMING_IDLE;
             machine_end_homing(machine);

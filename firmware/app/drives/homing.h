@@ -3,7 +3,7 @@
  * homing: command 10: each axis with a homing method (0x2012) is homed by its drive, one after the other, from OFF to
  * OFF:
  *
- *     mode 6 -> enable -> controlword bit 4, until the drive has its zero -> disable -> mode 8 -> next axis
+ *     off -> mode 6 -> enable -> controlword bit 4, until the drive has its zero -> disable -> mode 8 -> next axis
  *
  * Methods, speeds and offset have been written when the drive was found (CiA 402-2, homing mode). The machine is in HOMING
  * meanwhile; when it leaves that state by itself (stop, quick stop, a fault) homing is over: before the drives are enabled
@@ -34,6 +34,7 @@
 
 enum homing_phase {
     HOMING_IDLE,
+    HOMING_OFF,    /* until the drive is off: it may just have been told */
     HOMING_MODE,   /* 0x6060 = 6, until 0x6061 says so */
     HOMING_ENABLE, /* to Operation enabled */
     HOMING_MOVE,   /* the drive seeks its zero */

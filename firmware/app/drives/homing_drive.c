@@ -55,15 +55,17 @@ static uint16_t step_enable(struct homing *homing, struct machine *machine)
     axis->goal = CIA402_GOAL_ENABLED;
     if (axis_enabled(axis)) {
         axis->control_extra = CIA402_CONTROL_START_HOMING;
+        axis->homed = false; /* from here on the drive may have moved its zero */
         homing_enter(homing, machine, HOMING_MOVE);
     }
     return over(homing, machine, HOMING_SWITCH_US) ? FAULT_NOT_ENABLED : 0u;
 }
 
-static uint16_t step_disable(struct homing *homing, struct machine *machine)
+/* Until the drive is off; then to the phase `next`. */
+static uint16_t step_off(struct homing *homing, struct machine *machine, enum homing_phase next)
 {
     if (cia402_master_reached(CIA402_GOAL_OFF, machine->axes[homing->axis].statusword)) {
-        homing_enter(homing, machine, HOMING_MODE_BACK);
+        homing_enter(homing, machine, next);
     }
     return over(homing, machine, HOMING_SWITCH_US) ? FAULT_HOMING_LATE : 0u;
 }
@@ -75,7 +77,9 @@ uint16_t homing_drive_step(struct homing *homing, struct machine *machine)
         return step_enable(homing, machine);
     case HOMING_MOVE:
         return judge_move(homing, machine);
+    case HOMING_OFF:
+        return step_off(homing, machine, HOMING_MODE);
     default:
-        return step_disable(homing, machine);
+        return step_off(homing, machine, HOMING_MODE_BACK);
     }
 }

@@ -8,7 +8,7 @@
 /* The next phase, which begins now. */
 void homing_enter(struct homing *homing, const struct machine *machine, enum homing_phase phase);
 
-/* In the phases ENABLE, MOVE and DISABLE: what the statusword of the drive leads to. A fault code, or 0. */
+/* In the phases OFF, ENABLE, MOVE and DISABLE: what the statusword of the drive leads to. A fault code, or 0. */
 uint16_t homing_drive_step(struct homing *homing, struct machine *machine);
 
 #endif

@@ -16,11 +16,28 @@ void axis_init(struct axis *axis, uint8_t node)
     pdo_begin_setpoint(node, &axis->setpoint);
 }
 
+void axis_forget(struct axis *axis, uint8_t node)
+{
+    const bool homed = axis->homed && axis->node == node;
+    const int32_t kept_counts = axis->answers.present ? axis->position_counts : axis->kept_counts;
+    axis_init(axis, node);
+    axis->homed = homed;
+    axis->kept_counts = kept_counts;
+}
+
+void axis_found(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts)
+{
+    axis->homed = axis->homed && distance(axis->kept_counts, position_counts) <= tolerance_counts;
+    axis->kept_counts = position_counts;
+}
+
 void axis_command(struct axis *axis, enum cia402_goal goal)
 {
     axis->goal = goal;
     axis->control_extra = 0;
     axis->by_itself = false;
+    axis->away_syncs = 0;
+    axis->away = false;
 }
 
 static void take_status(struct axis *axis, uint16_t statusword)
@@ -68,6 +85,19 @@ static void count_rest(struct axis *axis, uint32_t tolerance_counts)
         axis->rest_counts = axis->position_counts;
     } else if (axis->rest_syncs < AXIS_STANDSTILL_SYNCS) {
         axis->rest_syncs++;
+    }
+}
+
+void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max)
+{
+    const bool follows = axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis->by_itself;
+    if (!follows || axis_apart(axis) <= window_counts) {
+        axis->away_syncs = 0;
+        axis->away = false;
+    } else if (axis->away_syncs < syncs_max) {
+        axis->away_syncs++;
+    } else {
+        axis->away = true;
     }
 }
 
@@ -161,6 +191,11 @@ bool axis_reached(const struct axis *axis)
 bool axis_still(const struct axis *axis)
 {
     return axis->still_syncs >= AXIS_STANDSTILL_SYNCS;
+}
+
+uint32_t axis_apart(const struct axis *axis)
+{
+    return distance(axis->position_counts, axis->expected_counts);
 }
 
 uint32_t axis_distance(const struct axis *axis, int32_t place_counts)

@@ -37,6 +37,10 @@ struct axis {
     int32_t position_counts;
     int32_t target_counts;      /* to be sent in this tick */
     int32_t target_sent_counts; /* sent in the last one */
+    int32_t latched_counts;     /* target that the last SYNC made the drive take over */
+    int32_t expected_counts;    /* where the drive should have been at the last SYNC */
+    uint32_t away_syncs; /* answers in a row that told a position outside the window around that */
+    bool away;           /* for longer than the configuration permits */
     struct can_msg
         setpoint; /* RPDO1 as axis_setpoint made it last: kept, so that only changes are written */
     enum cia402_goal goal;
@@ -49,13 +53,22 @@ struct axis {
     bool velocity_mapped;             /* its RPDO2 takes a velocity offset */
     uint32_t digital_inputs;          /* 0x60FD */
     int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
-    bool homed;                       /* since it was found */
-    uint32_t rest_syncs;              /* in Quick stop active: for how long it has been at */
+    bool homed;                       /* its drive has the zero that homing gave it */
+    int32_t kept_counts; /* where it was when it was seen last before it was to be found again */
+    uint32_t rest_syncs; /* in Quick stop active: for how long it has been at */
     int32_t rest_counts;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
 void axis_init(struct axis *axis, uint8_t node);
+
+/* Forgets the drive, which is to be found and configured anew. Whether it is homed stays, when the node is the same:
+ * that ends only by what ends it (axis_found, boot-up, silence). Under the lock. */
+void axis_forget(struct axis *axis, uint8_t node);
+
+/* The drive has been found again and says where it is: one that is more than `tolerance_counts` from where it was seen
+ * last does not have its zero any more. Under the lock. */
+void axis_found(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts);
 
 /* A new goal, which ends homing: by_itself and control_extra are cleared. Under the lock. */
 void axis_command(struct axis *axis, enum cia402_goal goal);
@@ -77,6 +90,17 @@ static inline void axis_sent(struct axis *axis)
     axis->target_sent_counts = axis->target_counts;
 }
 
+/* A SYNC has left: the drive takes over the target that it was sent last, and should be at the one before. Timer. */
+static inline void axis_synced(struct axis *axis)
+{
+    axis->expected_counts = axis->latched_counts;
+    axis->latched_counts = axis->target_sent_counts;
+}
+
+/* Compares the answer to the last SYNC with the position expected then, while the drive is to follow its target. Away: more
+ * than window_counts apart in more than syncs_max answers in a row. Timer, before axis_synced. */
+void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max);
+
 /* All pure, under the lock. */
 bool axis_gone(const struct axis *axis, uint32_t now_us); /* lost for long */
 bool axis_in_fault(const struct axis *axis);              /* Fault, or on the way there */
@@ -85,10 +109,10 @@ static inline bool axis_enabled(const struct axis *axis) /* Operation enabled */
 {
     return axis->state == CIA402_OPERATION_ENABLED;
 }
-/* Enabled, answers, its statusword tells no trouble. */
+/* Enabled, answers, is where it should be, its statusword tells no trouble. */
 static inline bool axis_well(const struct axis *axis)
 {
-    return axis->fit && !axis->answers.lost;
+    return axis->fit && !axis->answers.lost && !axis->away;
 }
 bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its target */
 
@@ -97,6 +121,9 @@ bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its targe
 bool axis_left(const struct axis *axis);
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
+
+/* Distance between the position and where it should have been at the same SYNC. */
+uint32_t axis_apart(const struct axis *axis);
 
 /* Distance of both target and position from a place, whichever is larger. */
 uint32_t axis_distance(const struct axis *axis, int32_t place_counts);

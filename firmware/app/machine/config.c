@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "canopen/cob.h"
+#include "core/crc32.h"
 #include "core/kernel.h"
 #include "core/qmath.h"
 
@@ -34,6 +35,9 @@ static const struct axis_field axis_fields[] = {
     AXIS_FIELD(0x2030, velocity_limit_um_s),
     AXIS_FIELD(0x2031, acceleration_limit_um_s2),
     AXIS_FIELD(0x2032, jerk_limit_mm_s3),
+    AXIS_FIELD(0x2051, expected_vendor),
+    AXIS_FIELD(0x2052, expected_product),
+    AXIS_FIELD(0x2053, expected_revision),
 };
 
 #define AXIS_FIELDS (sizeof axis_fields / sizeof axis_fields[0])
@@ -58,6 +62,64 @@ static void read_axis(struct config_axis *axis, const struct od *od, uint8_t sub
     }
 }
 
+static bool is_axis_field(uint16_t index)
+{
+    for (size_t i = 0; i < AXIS_FIELDS; ++i) {
+        if (axis_fields[i].index == index) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool is_by_axis(uint16_t index)
+{
+    return (index >= 0x2005 && index <= 0x2007) || is_axis_field(index);
+}
+
+/* What axes beyond the last one hold is left over from another machine and means nothing. */
+static bool counts(const struct od_entry *entry, uint8_t axis_count)
+{
+    return (entry->access & OD_WRITE) != 0u && config_contains(entry->index) &&
+           !(is_by_axis(entry->index) && entry->sub > axis_count);
+}
+
+static uint32_t crc_of(const struct od *od, uint8_t axis_count)
+{
+    uint32_t crc = 0;
+    for (uint16_t i = 0; i < od->table->entry_count; ++i) {
+        const struct od_entry *entry = &od->table->entries[i];
+        if (counts(entry, axis_count)) {
+            uint8_t bytes[3u + 8u];
+            cob_put16(bytes, entry->index);
+            bytes[2] = entry->sub;
+            cob_put(bytes + 3, od_number(od, entry), entry->size);
+            crc = crc32_update(crc, bytes, 3u + entry->size);
+        }
+    }
+    return crc;
+}
+
+/* feed * time * scale, in 32-bit steps that hold the largest result at UINT32_MAX. */
+static uint32_t lag_counts(const struct config *config)
+{
+    const uint64_t lag_nm = (uint64_t)config->feed_limit_um_s * CONFIG_LAG_MS; /* um/s * ms */
+    if (lag_nm == 0u || lag_nm > UINT32_MAX) {
+        return UINT32_MAX;
+    }
+    const uint64_t counts = qmath_div_u64(lag_nm * config->counts_per_mm, 1000000u);
+    return counts < UINT32_MAX ? (uint32_t)counts : UINT32_MAX;
+}
+
+static void read_window(struct config *config, uint8_t axis)
+{
+    const struct config_axis *own = &config->axis[axis];
+    const bool set = own->following_window_counts != UINT32_MAX;
+    const uint32_t timeout_us = own->following_timeout_ms * 1000u;
+    config->apart_counts[axis] = set ? own->following_window_counts : lag_counts(config);
+    config->apart_syncs[axis] = (set ? timeout_us / config->period_us : 0u) + CONFIG_APART_SYNCS;
+}
+
 void config_read(struct config *config, const struct od *od)
 {
     config->period_us = (uint32_t)number(od, 0x1006, 0);
@@ -79,7 +141,9 @@ void config_read(struct config *config, const struct od *od)
         config->travel_min_counts[i] = (int32_t)number(od, 0x2006, sub);
         config->travel_max_counts[i] = (int32_t)number(od, 0x2007, sub);
         read_axis(&config->axis[i], od, sub);
+        read_window(config, i);
     }
+    config->crc32 = crc_of(od, config->axis_count);
 }
 
 bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value)
@@ -101,17 +165,27 @@ bool config_concerns_drives(uint16_t index, uint8_t sub)
     if (index == 0x2004) {
         return sub == 1 || sub == 10 || sub == 11;
     }
-    return index < 0x2018 || (index > 0x201A && index < 0x2030);
+    const bool is_feedforward = index >= 0x2018 && index <= 0x201A;
+    const bool is_limit = index >= 0x2030 && index <= 0x2032;
+    return !is_feedforward && !is_limit;
 }
 
 bool config_contains(uint16_t index)
 {
-    for (size_t i = 0; i < AXIS_FIELDS; ++i) {
-        if (axis_fields[i].index == index) {
-            return true;
-        }
-    }
-    return index == 0x1006 || (index >= 0x2004 && index <= 0x2007);
+    return index == 0x1006 || index == 0x2004 || is_by_axis(index);
+}
+
+bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis)
+{
+    const struct config_axis *a = &first->axis[axis];
+    const struct config_axis *b = &second->axis[axis];
+    return first->node[axis] == second->node[axis] &&
+           first->counts_per_mm == second->counts_per_mm && a->homing_method == b->homing_method &&
+           a->home_offset_counts == b->home_offset_counts &&
+           a->encoder_increments == b->encoder_increments &&
+           a->feed_constant_counts == b->feed_constant_counts &&
+           a->gear_motor_revolutions == b->gear_motor_revolutions &&
+           a->gear_shaft_revolutions == b->gear_shaft_revolutions;
 }
 
 /* magnitude * 2^40 / counts_per_mm; rest < counts_per_mm <= 2^23 keeps the shift inside. */

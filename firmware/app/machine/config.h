@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023), as one
- * value. */
+/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023, 0x2051 ... 0x2053), as
+ * one value. */
 #ifndef APP_MACHINE_CONFIG_H
 #define APP_MACHINE_CONFIG_H
 
@@ -20,6 +20,12 @@
 #define CONFIG_TORQUE_FEEDFORWARD   1u
 #define CONFIG_VELOCITY_FEEDFORWARD 2u
 
+/* A position loop without feedforward lags behind by the way of so long a time, at the most (a gain of 50 / s). */
+#define CONFIG_LAG_MS 20u
+
+/* So many SYNCs more than the drive's own time, so that a drive that notices tells of it first. */
+#define CONFIG_APART_SYNCS 5u
+
 /* What belongs to one axis beside node and travel. Every field has 32 bits, so that tables can name
  * one by its offset. */
 struct config_axis {
@@ -31,7 +37,7 @@ struct config_axis {
     uint32_t velocity_permille;             /* 0 ... 2000, of the setpoint's velocity */
     int32_t torque_per_acceleration_q16;    /* per mille of the rated torque for 1 m/s^2 */
     int32_t torque_per_velocity_q16;        /* the same for 1 m/s */
-    uint32_t following_window_counts;       /* 0x6065; UINT32_MAX: off */
+    uint32_t following_window_counts;       /* 0x6065; UINT32_MAX: the drive's own stays */
     uint32_t following_timeout_ms;          /* 0x6066 */
     uint32_t quick_stop_counts_s2;          /* 0x6085 */
     uint32_t encoder_increments;            /* 0x608F; 0, here and below: the drive keeps its own */
@@ -41,6 +47,9 @@ struct config_axis {
     uint32_t velocity_limit_um_s; /* of programs, at every override; 0, here and below: none */
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
+    uint32_t expected_vendor;               /* 0x1018 subs 1 ... 3 of the drive; 0: any */
+    uint32_t expected_product;
+    uint32_t expected_revision;
 };
 
 struct config {
@@ -61,6 +70,11 @@ struct config {
     uint8_t kernel;      /* enum interp_kernel */
     uint8_t missed_max;  /* so many answers in a row may be missed */
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
+    uint32_t crc32;      /* of the objects; docs/protocol.md section 3.4 */
+    /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following window
+     * and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit (without one: UINT32_MAX). */
+    uint32_t apart_counts[AXES_MAX];
+    uint32_t apart_syncs[AXES_MAX];
 };
 
 /* Copies the present values out of the dictionary. Mainline. */
@@ -77,6 +91,10 @@ bool config_concerns_drives(uint16_t index, uint8_t sub);
 
 /* True for all objects above. Pure. */
 bool config_contains(uint16_t index);
+
+/* Whether positions of an axis mean the same in both: the zero that homing found under one still holds under the
+ * other. Pure. */
+bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis);
 
 /* The limits in the form that program_check takes; travel is rounded inwards. Mainline. */
 void config_limits(const struct config *config, struct program_limits *limits);

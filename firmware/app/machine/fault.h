@@ -17,6 +17,8 @@
 #define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
 #define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
 #define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
+#define FAULT_AWAY     (EMCY_MANUFACTURER | 0x08u) /* position and setpoint apart; counts */
+#define FAULT_SYNC_GAP (EMCY_MANUFACTURER | 0x09u) /* no SYNC for too long, real drives; us */
 
 /* Homing. */
 #define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */

@@ -9,7 +9,7 @@
 void machine_enter_boot(struct machine *machine)
 {
     for (uint8_t i = 0; i < AXES_MAX; ++i) {
-        axis_init(&machine->axes[i], machine->config.node[i]);
+        axis_forget(&machine->axes[i], machine->config.node[i]);
     }
     machine->state = MACHINE_BOOT;
     machine->configured = false;
@@ -23,6 +23,7 @@ void machine_init(struct machine *machine, const struct config *config)
     memset(machine, 0, sizeof *machine);
     machine->config = *config;
     machine->override_percent = 100;
+    machine->setpoints_sent = true;
     machine_enter_boot(machine);
 }
 
@@ -54,6 +55,10 @@ void machine_configure(struct machine *machine, const struct config *config, boo
 {
     for (uint8_t i = machine->config.axis_count; i < config->axis_count; ++i) {
         axis_init(&machine->axes[i], config->node[i]);
+    }
+    for (uint8_t i = 0; i < config->axis_count; ++i) {
+        struct axis *axis = &machine->axes[i];
+        axis->homed = axis->homed && config_same_zero(&machine->config, config, i);
     }
     machine->config = *config;
     if (drives && machine->state != MACHINE_FAULT) {

@@ -62,6 +62,9 @@ enum machine_refusal {
     MACHINE_DRIVES_ON = 9,        /* homing wants them off */
     MACHINE_NO_HOMING_MODE = 10,  /* an axis shall be homed whose drive has no homing mode */
     MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */
+    MACHINE_NOT_CONFIGURED = 12,  /* neither configured since power-on nor restored */
+    MACHINE_NOT_HOMED = 13,       /* an axis with a homing method has no zero */
+    MACHINE_NOT_IN_TIME = 16,     /* drives are real, and the port cannot keep ticks in time */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
@@ -70,6 +73,14 @@ enum machine_refusal {
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
 #define MACHINE_ANSWER_TICKS 5000u /* time for configured drives to answer a SYNC */
 #define MACHINE_UNSENT_MAX   3u    /* so many ticks in a row the port may refuse frames */
+#define MACHINE_ARRIVE_TICKS 2000u /* time for the axes to reach their targets after settling */
+
+/* Real drives do not wait for a SYNC that is late by more than a period: they extrapolate, or stop. What is added is
+ * the jitter of a SYNC. */
+#define MACHINE_GAP_US(period_us) (2u * (period_us) + (period_us) / 8u)
+
+/* A drive found again is taken for one that kept its zero only when it stands so near to where it was seen last. */
+#define MACHINE_KEPT_MM 1u
 
 /* Drives that are not simulated are never waited for: what is later than this is missed. */
 #define MACHINE_REAL_WAIT_MAX_MS 5u
@@ -87,13 +98,23 @@ struct machine {
     uint32_t override_percent; /* wanted, object 0x2010 sub 1; for every program */
     uint32_t sync_us;          /* time of the last SYNC */
     uint32_t unsent_ticks;     /* in a row with a frame that the port refused */
-    bool sync_sent;            /* the last SYNC has left */
+    uint32_t sync_left_us;     /* time of the last SYNC that has left */
+    uint32_t
+        arriving_ticks; /* since the settling time of a motion was over, with an axis away from its target */
+    bool sync_sent;      /* the last SYNC has left */
+    bool sync_now;       /* and that of this tick */
+    bool setpoints_sent; /* and all setpoints after it */
+    bool
+        withheld; /* this tick makes no new setpoint: its SYNC, or a setpoint before it, has not left */
     bool simulated;      /* every drive is a simulated one: the port may let ticks wait for them */
     bool configured;     /* drives are configured; BOOT then waits for their first answers */
     uint8_t silent_node; /* BOOT again because this one was started and did not answer; 0: none */
     bool boot_due;       /* the mainline shall find and configure the drives (anew) */
     bool
         mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
+    bool unhomed_allowed; /* the next start is accepted though axes are not homed */
+    uint8_t
+        unhomed_axes; /* bit i: axis i + 1 has a homing method, and was not homed when this program started */
 };
 
 void machine_init(struct machine *machine, const struct config *config);
@@ -111,8 +132,11 @@ enum machine_refusal machine_quick_stop(struct machine *machine);
 /* Feed hold and its end; accepted as well when there is nothing to change. */
 enum machine_refusal machine_hold(struct machine *machine);
 enum machine_refusal machine_resume(struct machine *machine);
-/* Out of FAULT by way of BOOT; refused while something still brakes. */
+/* Out of FAULT by way of BOOT; refused while something still brakes. From OFF to BOOT too: the drives are found and configured
+ * anew. Else without effect. */
 enum machine_refusal machine_reset(struct machine *machine);
+/* Axes with a homing method (0x2012) that are not homed: bit i for axis i + 1. Pure. */
+uint8_t machine_unhomed(const struct machine *machine);
 /* Starts a prepared motion whose first setpoint is at start_counts: copied, if the axes are
  * enabled, stand still and are within the configured tolerance. */
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
@@ -137,7 +161,7 @@ bool machine_moving(const struct machine *machine);
 
 /* New configuration, where machine_configurable. When it concerns the drives: to BOOT. */
 void machine_configure(struct machine *machine, const struct config *config, bool drives);
-/* Forgets the drives; the mainline has to find and configure them. Under the lock. */
+/* Forgets the drives, but not which of them are homed; the mainline has to find and configure them. Under the lock. */
 void machine_enter_boot(struct machine *machine);
 /* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF as soon as
  * each has answered a SYNC; when one does not, they are configured and started anew. */
@@ -159,9 +183,18 @@ void machine_switch_off(struct machine *machine);
 
 /* The SYNC before this tick is over: counts missing answers, watches the drives. */
 void machine_supervise(struct machine *machine, uint32_t now_us);
-/* Whether SYNC, and every frame, of this tick left. More than MACHINE_UNSENT_MAX ticks in a row with a refused frame are
- * a fault when drives are on. */
-void machine_note_sent(struct machine *machine, bool sync, bool all);
+/* First in a tick: whether its SYNC has left. Without it, or where a setpoint of the tick before did not leave, program time
+ * stands still: a drive never gets a step larger than the program's. With real drives that follow, a longer time than
+ * MACHINE_GAP_US since the SYNC before is a fault, and a quick stop: they have not followed the path meanwhile. */
+void machine_note_sync(struct machine *machine, uint32_t now_us, bool sent);
+/* What has left in a tick. */
+struct machine_sent {
+    bool sync;
+    bool setpoints; /* every one */
+    bool all;       /* offsets too */
+};
+/* Last in a tick. More than MACHINE_UNSENT_MAX ticks in a row with a refused frame are a fault when drives are on. */
+void machine_note_sent(struct machine *machine, struct machine_sent sent);
 /* Moves on by one tick: states, goals and targets of the axes. */
 void machine_step(struct machine *machine);
 /* Counts ticks_left down; true when there are none left. */

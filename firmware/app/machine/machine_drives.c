@@ -28,6 +28,17 @@ const struct axis *machine_not_stopped(const struct machine *machine)
     return NULL;
 }
 
+const struct axis *machine_not_arrived(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const struct axis *axis = &machine->axes[i];
+        if (axis_apart(axis) > machine->config.start_tolerance_counts) {
+            return axis;
+        }
+    }
+    return NULL;
+}
+
 const struct axis *machine_straggler(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {

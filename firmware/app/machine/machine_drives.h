@@ -14,6 +14,9 @@ bool machine_obeyed(const struct machine *machine);
 /* The first drive that still moves by its own power, or NULL. */
 const struct axis *machine_not_stopped(const struct machine *machine);
 
+/* The first axis that is further from its target than the start tolerance, or NULL. */
+const struct axis *machine_not_arrived(const struct machine *machine);
+
 /* The first drive that answers but is not yet where it shall be, or NULL. */
 const struct axis *machine_straggler(const struct machine *machine);
 

@@ -7,6 +7,9 @@
 
 enum machine_refusal machine_reset(struct machine *machine)
 {
+    if (machine->state == MACHINE_OFF) { /* nobody knows what somebody else has told the drives */
+        machine_enter_boot(machine);
+    }
     if (machine->state != MACHINE_FAULT || machine->fault_phase == MACHINE_FAULT_RESETTING) {
         return MACHINE_ACCEPTED;
     }
@@ -26,7 +29,14 @@ static void step_not_reset(struct machine *machine, const struct axis *axis)
     machine_switch_off(machine);
 }
 
-/* A drive that does not answer at all is left to BOOT, which looks for it and tells what is wrong. */
+/* In Fault, says its statusword, and so did its EMCY: a statusword alone may come from a mapping that is not ours. */
+static bool stays_in_fault(const struct axis *axis)
+{
+    return axis_in_fault(axis) && axis->error_code != EMCY_NO_ERROR;
+}
+
+/* A drive that does not answer at all, or not what it was asked, is left to BOOT, which looks for it, configures it anew and
+ * tells what is wrong. */
 static void step_resetting(struct machine *machine)
 {
     const struct axis *late = machine_straggler(machine);
@@ -37,7 +47,7 @@ static void step_resetting(struct machine *machine)
     if (unsent) {
         machine_set_fault(machine, FAULT_NOT_SENT, 0, machine->unsent_ticks);
         machine_switch_off(machine);
-    } else if (late != NULL) {
+    } else if (late != NULL && stays_in_fault(late)) {
         step_not_reset(machine, late);
     } else {
         machine_set_fault(machine, EMCY_NO_ERROR, 0, 0);

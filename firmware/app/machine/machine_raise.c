@@ -4,6 +4,8 @@
 
 #include "app/machine/machine_drives.h"
 
+#define EMCY_CLASS 0xFF00u
+
 void machine_set_fault(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail)
 {
     machine->fault = (struct fault){.code = code, .node = node, .detail = detail};
@@ -54,6 +56,9 @@ void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code
         return;
     }
     axis->error_code = code;
+    if ((code & EMCY_CLASS) == EMCY_POSITION_SENSOR) { /* an encoder that fails loses count */
+        axis->homed = false;
+    }
     const struct fault *fault = &machine->fault;
     if (fault->node == node && code != EMCY_NO_ERROR && fault_is_vague(fault->code)) {
         machine_set_fault(machine, code, node, fault->detail);

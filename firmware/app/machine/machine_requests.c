@@ -135,6 +135,16 @@ void machine_override(struct machine *machine, uint32_t percent)
     }
 }
 
+uint8_t machine_unhomed(const struct machine *machine)
+{
+    uint8_t axes = 0;
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const bool wanted = machine->config.axis[i].homing_method != 0;
+        axes |= (uint8_t)(wanted && !machine->axes[i].homed ? 1u << i : 0u);
+    }
+    return axes;
+}
+
 static enum machine_refusal start_refusal(const struct machine *machine,
                                           const int32_t start_counts[PLANE_AXES])
 {
@@ -147,6 +157,9 @@ static enum machine_refusal start_refusal(const struct machine *machine,
     }
     if (machine->config.axis_count < PLANE_AXES) {
         return MACHINE_DRIVES_MISSING;
+    }
+    if (!machine->unhomed_allowed && machine_unhomed(machine) != 0u) {
+        return MACHINE_NOT_HOMED;
     }
     const uint32_t tolerance_counts = machine->config.start_tolerance_counts;
     for (uint8_t i = 0; i < PLANE_AXES; ++i) {
@@ -168,8 +181,10 @@ enum machine_refusal machine_start(struct machine *machine, const struct motion 
     const enum machine_refusal refusal = start_refusal(machine, start_counts);
     if (refusal == MACHINE_ACCEPTED) {
         machine->motion = *prepared;
+        machine->unhomed_axes = machine_unhomed(machine);
         motion_override(&machine->motion, machine->override_percent);
         machine->ticks_left = MACHINE_SETTLE_TICKS;
+        machine->arriving_ticks = 0;
         statistics_restart(&machine->statistics);
         machine->state = MACHINE_RUNNING;
     }

@@ -3,19 +3,25 @@
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"
+#include "app/machine/machine_raise.h"
 
 static uint16_t trouble_of(const struct axis *axis)
 {
     if (axis_in_fault(axis)) {
         return EMCY_GENERIC;
     }
-    return axis_dropped_out(axis) ? FAULT_DROPPED_OUT : status_watch_trouble(&axis->watch);
+    if (axis_dropped_out(axis)) {
+        return FAULT_DROPPED_OUT;
+    }
+    const uint16_t trouble = status_watch_trouble(&axis->watch);
+    return trouble == EMCY_NO_ERROR && axis->away ? FAULT_AWAY : trouble;
 }
 
 /* With power off drives may come and go: they are found again. */
 static void supervise_axis(struct machine *machine, const struct axis *axis, uint32_t now_us)
 {
     const uint16_t trouble = trouble_of(axis);
+    const uint32_t detail = trouble == FAULT_AWAY ? axis_apart(axis) : axis->statusword;
     if (machine->state == MACHINE_OFF && axis->answers.lost) {
         if (axis_gone(axis, now_us)) {
             machine_enter_boot(machine);
@@ -23,7 +29,7 @@ static void supervise_axis(struct machine *machine, const struct axis *axis, uin
     } else if (axis->answers.lost) {
         machine_raise(machine, EMCY_RPDO_TIMEOUT, axis->node, axis->answers.absent_in_row);
     } else if (trouble != EMCY_NO_ERROR) {
-        machine_raise(machine, machine_code_of(axis, trouble), axis->node, axis->statusword);
+        machine_raise(machine, machine_code_of(axis, trouble), axis->node, detail);
     }
 }
 
@@ -49,8 +55,14 @@ static bool close_sync(struct machine *machine, uint32_t now_us)
     bool well = true;
     for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
+        if (sent && axis->answers.count != 0u) {
+            axis_compare(axis, machine->config.apart_counts[i], machine->config.apart_syncs[i]);
+        }
         if (!sent || !answers_close_answered(&axis->answers)) {
             close_unanswered(machine, &axis->answers, now_us);
+        }
+        if (machine->sync_now) {
+            axis_synced(axis);
         }
         well = well && axis_well(axis);
     }
@@ -71,10 +83,26 @@ void machine_supervise(struct machine *machine, uint32_t now_us)
     }
 }
 
-void machine_note_sent(struct machine *machine, bool sync, bool all)
+/* The drives' clock is the SYNC, so what they should have reached counts from those that left. */
+void machine_note_sync(struct machine *machine, uint32_t now_us, bool sent)
 {
-    machine->sync_sent = sync;
-    if (all) {
+    const uint32_t gap_us = now_us - machine->sync_left_us;
+    const bool follow = machine_on_path(machine) || machine->state == MACHINE_READY;
+    machine->sync_now = sent;
+    machine->withheld = !sent || !machine->setpoints_sent;
+    if (sent) {
+        machine->sync_left_us = now_us;
+    }
+    if (follow && !machine->simulated && gap_us > MACHINE_GAP_US(machine->config.period_us)) {
+        machine_raise_quick(machine, FAULT_SYNC_GAP, 0, gap_us);
+    }
+}
+
+void machine_note_sent(struct machine *machine, struct machine_sent sent)
+{
+    machine->sync_sent = sent.sync;
+    machine->setpoints_sent = sent.setpoints;
+    if (sent.all) {
         machine->unsent_ticks = 0;
     } else if (machine->unsent_ticks < UINT32_MAX) {
         machine->unsent_ticks++;

@@ -15,6 +15,19 @@ static uint8_t silent_node(const struct machine *machine)
     return machine->axes[i].node;
 }
 
+/* A drive that is in Fault from the beginning. */
+static void raise_found(struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const struct axis *axis = &machine->axes[i];
+        if (axis_in_fault(axis)) {
+            machine_raise(machine, machine_code_of(axis, EMCY_GENERIC), axis->node,
+                          axis->statusword);
+            return;
+        }
+    }
+}
+
 /* While they were being configured nobody waited for their answers. Where none comes the start may have been lost. */
 static void step_boot(struct machine *machine)
 {
@@ -34,6 +47,7 @@ static void step_boot(struct machine *machine)
     }
     machine->silent_node = 0;
     machine->state = MACHINE_OFF;
+    raise_found(machine);
 }
 
 static void step_enabling(struct machine *machine)
@@ -61,15 +75,29 @@ static void next_targets(struct machine *machine)
     machine->statistics.program_tick = machine->motion.setpoints - 1u;
 }
 
+/* A drive that has stopped by itself without a word is no reason to say that the program has been run. */
+static void step_arriving(struct machine *machine)
+{
+    const struct axis *away = machine_not_arrived(machine);
+    if (away == NULL) {
+        machine->state = MACHINE_READY;
+    } else if (++machine->arriving_ticks > MACHINE_ARRIVE_TICKS) {
+        machine_raise(machine, FAULT_AWAY, away->node, axis_apart(away));
+    }
+}
+
 static void step_motion(struct machine *machine)
 {
+    if (machine->withheld) {
+        return;
+    }
     if (!motion_over(&machine->motion)) {
         next_targets(machine);
         if (machine->state == MACHINE_HOLDING && motion_held(&machine->motion)) {
             machine->state = MACHINE_HELD;
         }
     } else if (machine_time_is_up(machine)) {
-        machine->state = MACHINE_READY;
+        step_arriving(machine);
     }
 }
 
@@ -77,6 +105,8 @@ static void step_braking(struct machine *machine)
 {
     if (!machine_obeyed(machine)) {
         machine_fault_quick(machine);
+    } else if (machine->withheld) {
+        return;
     } else if (!motion_over(&machine->motion)) {
         next_targets(machine);
     } else if (machine_time_is_up(machine)) {

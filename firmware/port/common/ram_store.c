@@ -5,26 +5,36 @@
 
 #include "port/port.h"
 
+#define RECORD_BYTES 16u
+
+static uint8_t parameters[PORT_STORE_BANKS_ALL - PORT_STORE_BANKS][PORT_STORE_PARAMETER_BYTES]
+    __attribute__((section(".store"), aligned(8)));
+
 static uint8_t *bank_at(unsigned bank)
 {
-    return ram_store.memory + (size_t)bank * ram_store.bank_bytes;
+    return bank < PORT_STORE_BANKS ? ram_store.memory + (size_t)bank * ram_store.bank_bytes
+                                   : parameters[bank - PORT_STORE_PARAMETERS];
 }
 
-uint32_t port_store_size(void)
+uint32_t port_store_size(unsigned bank)
 {
-    return ram_store.bank_bytes;
+    return bank < PORT_STORE_BANKS ? ram_store.bank_bytes : PORT_STORE_PARAMETER_BYTES;
 }
 
-/* Nothing needs erasing before it is written; and on a host, pages that were never written cost nothing. */
+/* Only what makes the rest count has to go; and on a host, pages that were never written cost nothing. */
 int port_store_erase(unsigned bank)
 {
-    return bank < PORT_STORE_BANKS ? 0 : PORT_ERR_STORE;
+    if (bank >= PORT_STORE_BANKS_ALL) {
+        return PORT_ERR_STORE;
+    }
+    memset(bank_at(bank) + port_store_size(bank) - RECORD_BYTES, 0xFF, RECORD_BYTES);
+    return 0;
 }
 
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
 {
-    if (bank >= PORT_STORE_BANKS || offset > ram_store.bank_bytes ||
-        size > ram_store.bank_bytes - offset) {
+    if (bank >= PORT_STORE_BANKS_ALL || offset > port_store_size(bank) ||
+        size > port_store_size(bank) - offset) {
         return PORT_ERR_STORE;
     }
     memcpy(bank_at(bank) + offset, data, size);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * ram_store: the program store of port.h in memory, lost with the power. For hosts, emulated boards, and the first day of a new
- * port; what a board keeps is in two banks of flash (port/stm32g4/flash_store.h).
+ * ram_store: the store of port.h in memory, lost with the power. For emulated boards, and the first day of a new
+ * port; what a board keeps is in flash (port/stm32g4/flash_store.h).
  *
- * The port defines `ram_store`:
+ * The parameter banks (4 KB in section .store) are here; those for programs belong to the port, which defines `ram_store`:
  *
  *     static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES] __attribute__((section(".store"), aligned(8)));
  *     const struct ram_store ram_store = {banks[0], sizeof banks[0]};

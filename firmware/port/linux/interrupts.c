@@ -26,6 +26,7 @@ static struct {
     struct schedule schedule;
     uint64_t now_ns; /* of the present interrupt */
     bool lock_step;
+    bool real_time; /* ticks come in time, as far as the machine permits */
     clockid_t mainline_clock;
     uint32_t mainline_turns; /* atomic too */
 } self;
@@ -43,6 +44,13 @@ void port_unlock(void)
 void port_tick_period(uint32_t period_us)
 {
     self.schedule.period_ns = (uint64_t)period_us * 1000u;
+}
+
+void port_tick_urgent(bool urgent)
+{
+    port_lock();
+    self.schedule.urgent = urgent;
+    port_unlock();
 }
 
 void port_tick_await(uint32_t guard_us, bool hurry)
@@ -197,11 +205,14 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
     }
     schedule_begin(&self.schedule, self.now_ns, (uint64_t)period_us * 1000u, self.lock_step);
     self.running = true;
+    self.real_time = true;
     if (clock_is_virtual()) {
         return 0;
     }
-    const int error = self.lock_step ? interrupts_thread_batch(&self.thread, run)
-                                     : interrupts_thread_real_time(&self.thread, run);
+    self.real_time = !self.lock_step;
+    const int error = self.lock_step
+                          ? interrupts_thread_batch(&self.thread, run)
+                          : interrupts_thread_real_time(&self.thread, run, &self.real_time);
     self.started = error == 0;
     return error == 0 ? 0 : PORT_ERR_SYSTEM;
 }
@@ -214,6 +225,11 @@ void interrupts_end(void)
         (void)pthread_join(self.thread, NULL);
         self.started = false;
     }
+}
+
+bool interrupts_keep_time(void)
+{
+    return self.real_time;
 }
 
 int interrupts_error(void)

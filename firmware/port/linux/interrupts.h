@@ -41,4 +41,8 @@ void interrupts_end(void);
  * else 0. */
 int interrupts_error(void);
 
+/* Whether the machine lets ticks come in time: a real-time thread with locked memory, or virtual time. From
+ * interrupts_start on. */
+bool interrupts_keep_time(void);
+
 #endif

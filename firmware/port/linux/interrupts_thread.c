@@ -24,15 +24,18 @@ static int create(pthread_t *thread, void *(*run)(void *unused), int policy, int
     return error;
 }
 
-int interrupts_thread_real_time(pthread_t *thread, void *(*run)(void *unused))
+int interrupts_thread_real_time(pthread_t *thread, void *(*run)(void *unused), bool *permitted)
 {
+    *permitted = true;
     if (mlockall(MCL_CURRENT) != 0) {
+        *permitted = false;
         port_log(PORT_NOTE, "memory is not locked, page faults can delay ticks: errno", errno);
     }
     const int error = create(thread, run, SCHED_FIFO, PRIORITY);
     if (error != EPERM) {
         return error;
     }
+    *permitted = false;
     port_log(PORT_NOTE, "no permission for SCHED_FIFO, ticks come as the scheduler likes: errno",
              error);
     return create(thread, run, SCHED_OTHER, 0);

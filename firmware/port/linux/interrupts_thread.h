@@ -5,10 +5,11 @@
 #define PORT_LINUX_INTERRUPTS_THREAD_H
 
 #include <pthread.h>
+#include <stdbool.h>
 
 /* Starts `run` under SCHED_FIFO, with memory locked; where that is not permitted says so once and starts it as an
  * ordinary thread. 0 or an errno. */
-int interrupts_thread_real_time(pthread_t *thread, void *(*run)(void *unused));
+int interrupts_thread_real_time(pthread_t *thread, void *(*run)(void *unused), bool *permitted);
 
 /* Starts `run` under SCHED_BATCH: it does not interrupt the simulated drives when the first of them has answered, but is
  * woken once for all answers. 0 or an errno. */

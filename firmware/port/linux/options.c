@@ -6,7 +6,9 @@
 #include <string.h>
 
 static const char help[] =
-    "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--verbose]\n"
+    "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--store "
+    "FILE] [--no-realtime]\n"
+    "                            [--verbose]\n"
     "\n"
     "The Hodograph motion controller as a CANopen node on a SocketCAN bus. All configuration comes "
     "over the bus\n"
@@ -18,6 +20,15 @@ static const char help[] =
     "  --pace PACE      real-time (default): one tick every period of the clock.\n"
     "                   fast: while axes move, the next tick as soon as all drives have answered "
     "(simulated drives)\n"
+    "  --store FILE     keep the program and the stored parameters in FILE, as a board keeps them "
+    "over "
+    "a loss of power;\n"
+    "                   made where it is missing, some kilobytes on disk; without it both end with "
+    "the "
+    "process\n"
+    "  --no-realtime    enables real drives although the machine does not permit SCHED_FIFO and "
+    "locked memory:\n"
+    "                   ticks may come late, and a late SYNC is a fault\n"
     "  --verbose        notes about states on stderr\n"
     "\n"
     "exit status: 0 ended as asked, 1 the machine failed (a line says how), 2 wrong usage, 4 bus "
@@ -59,18 +70,22 @@ static enum options_result set_valued(struct options *options, const char *name,
         options->bus = value;
         return OPTIONS_OK;
     }
+    if (strcmp(name, "--store") == 0) {
+        options->store = value;
+        return OPTIONS_OK;
+    }
     return strcmp(name, "--node") == 0 ? set_node(options, value) : set_pace(options, value);
 }
 
 static bool takes_value(const char *name)
 {
-    return strcmp(name, "--bus") == 0 || strcmp(name, "--node") == 0 || strcmp(name, "--pace") == 0;
+    return strcmp(name, "--bus") == 0 || strcmp(name, "--node") == 0 ||
+           strcmp(name, "--pace") == 0 || strcmp(name, "--store") == 0;
 }
 
 enum options_result options_parse(struct options *options, int argc, char **argv)
 {
-    *options =
-        (struct options){.bus = NULL, .node = 1, .pace = OPTIONS_REAL_TIME, .verbose = false};
+    *options = (struct options){.bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME};
     for (int i = 1; i < argc; ++i) {
         if (strcmp(argv[i], "--help") == 0) {
             (void)fputs(help, stdout);
@@ -78,6 +93,8 @@ enum options_result options_parse(struct options *options, int argc, char **argv
         }
         if (strcmp(argv[i], "--verbose") == 0) {
             options->verbose = true;
+        } else if (strcmp(argv[i], "--no-realtime") == 0) {
+            options->no_realtime = true;
         } else if (!takes_value(argv[i])) {
             return wrong("unknown argument", argv[i]);
         } else if (i + 1 >= argc) {

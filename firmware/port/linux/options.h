@@ -12,10 +12,12 @@ enum options_pace {
 };
 
 struct options {
-    const char *bus; /* CAN interface, points into argv */
-    uint8_t node;    /* 1 ... 127 */
+    const char *bus;   /* CAN interface, points into argv */
+    const char *store; /* file of the program store, points into argv; NULL: memory only */
+    uint8_t node;      /* 1 ... 127 */
     enum options_pace pace;
     bool verbose;
+    bool no_realtime; /* real drives may be enabled without real-time permission */
 };
 
 enum options_result {

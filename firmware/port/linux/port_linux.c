@@ -15,6 +15,7 @@
 #include "port/linux/clock.h"
 #include "port/linux/interrupts.h"
 #include "port/linux/options.h"
+#include "port/linux/store.h"
 
 enum exit_status { EXIT_MACHINE = 1, EXIT_USAGE = 2, EXIT_BUS = 4 };
 
@@ -66,6 +67,9 @@ int port_begin(int argc, char **argv)
     }
     if (parsed != OPTIONS_OK) {
         return EXIT_USAGE;
+    }
+    if (store_open(self.options.store) != 0) {
+        return EXIT_MACHINE;
     }
     const int status = open_bus();
     if (status != 0) {
@@ -174,6 +178,14 @@ void port_wake(void)
     if (!clock_is_virtual() && write(self.wake_fd, &one, sizeof one) < 0) {
         return; /* the counter is full of wakes already */
     }
+}
+
+enum port_timing port_timing(void)
+{
+    if (interrupts_keep_time()) {
+        return PORT_TIMING_KEPT;
+    }
+    return self.options.no_realtime ? PORT_TIMING_ACCEPTED : PORT_TIMING_REFUSED;
 }
 
 void port_log(enum port_level level, const char *text, int32_t value)

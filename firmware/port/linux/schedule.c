@@ -25,6 +25,7 @@ void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_
     schedule->awaiting = false;
     schedule->hurry = false;
     schedule->lock_step = lock_step;
+    schedule->urgent = false;
     memset(&schedule->mainline, 0, sizeof schedule->mainline);
     schedule->mainline.turn_ns = now_ns;
     schedule->mainline.tick_ns = SCHEDULE_YIELD_NS;
@@ -94,7 +95,7 @@ bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t turns
         mainline->judged_ns = 0;
         mainline->left_ns = SCHEDULE_YIELDS_NS;
     }
-    return now_ns - mainline->turn_ns > SCHEDULE_TURN_NS;
+    return !schedule->urgent && now_ns - mainline->turn_ns > SCHEDULE_TURN_NS;
 }
 
 static bool has_its_share(struct schedule_mainline *mainline, uint64_t now_ns, uint64_t had_ns)

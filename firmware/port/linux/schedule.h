@@ -21,7 +21,7 @@
  * nobody waits for their answers) may take all of it. So the mainline is watched: when it has not gone to sleep for
  * SCHEDULE_TURN_NS, and has had less than an eighth of the processor since, ticks are put off, each by SCHEDULE_YIELD_NS
  * at most, until it has had its turn. A mainline that computes for long does not delay ticks, as it has the processor;
- * one that is stuck somewhere does so for SCHEDULE_YIELDS_NS, no longer.
+ * one that is stuck somewhere does so for SCHEDULE_YIELDS_NS, no longer. Where drives are real (`urgent`) none is put off.
  */
 #ifndef PORT_LINUX_SCHEDULE_H
 #define PORT_LINUX_SCHEDULE_H
@@ -61,6 +61,7 @@ struct schedule {
     bool awaiting;        /* somebody is waited for, since the present tick */
     bool hurry;           /* its other wish */
     bool lock_step;       /* whether ticks may be faster than the clock */
+    bool urgent;          /* none is put off for the mainline: drives are real */
     struct schedule_mainline mainline;
 };
 

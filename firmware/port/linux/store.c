@@ -1,9 +1,114 @@
 /* SPDX-License-Identifier: MIT */
-/* The program store is memory of the process. */
-#include "port/common/ram_store.h"
+#define _GNU_SOURCE
+#include "port/linux/store.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include "port/port.h"
 
-#define BANK_BYTES (64u * 1024u * 1024u)
+#define PROGRAM_BYTES (64u * 1024u * 1024u)
+#define STORE_BYTES                                                                                \
+    ((size_t)PORT_STORE_BANKS * PROGRAM_BYTES +                                                    \
+     (size_t)(PORT_STORE_BANKS_ALL - PORT_STORE_BANKS) * PORT_STORE_PARAMETER_BYTES)
+#define RECORD_BYTES 16u
+#define OWNER_ONLY   (S_IRUSR | S_IWUSR)
 
-static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES] __attribute__((aligned(8)));
-const struct ram_store ram_store = {.memory = banks[0], .bank_bytes = sizeof banks[0]};
+static uint8_t *memory;
+
+static int failed(const char *file, const char *why)
+{
+    (void)fprintf(stderr, "hodograph-controller: --store %s: %s\n", file, why);
+    return PORT_ERR_SYSTEM;
+}
+
+/* A new file is a hole, which costs no room on the disk until it is written. */
+static const char *prepare(int fd)
+{
+    struct stat found;
+    if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+        return "another controller uses this file";
+    }
+    if (fstat(fd, &found) != 0) {
+        return strerror(errno);
+    }
+    if (found.st_size != 0 && (size_t)found.st_size != STORE_BYTES) {
+        return "is no store of this controller: name another file";
+    }
+    return ftruncate(fd, (off_t)STORE_BYTES) == 0 ? NULL : strerror(errno);
+}
+
+static bool map(int flags, int fd)
+{
+    void *found = mmap(NULL, STORE_BYTES, PROT_READ | PROT_WRITE, flags, fd, 0);
+    memory = found == MAP_FAILED ? NULL : found;
+    return memory != NULL;
+}
+
+/* The descriptor stays open: the lock on the file goes with it. */
+int store_open(const char *file)
+{
+    if (file == NULL) {
+        return map(MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1)
+                   ? 0
+                   : failed("(memory)", strerror(errno));
+    }
+    const int fd = open(file, O_RDWR | O_CREAT | O_CLOEXEC, OWNER_ONLY);
+    if (fd < 0) {
+        return failed(file, strerror(errno));
+    }
+    const char *why = prepare(fd);
+    if (why == NULL && !map(MAP_SHARED, fd)) {
+        why = strerror(errno);
+    }
+    if (why != NULL) {
+        (void)close(fd);
+        return failed(file, why);
+    }
+    return 0;
+}
+
+static uint8_t *bank_at(unsigned bank)
+{
+    const size_t programs = (size_t)PROGRAM_BYTES;
+    return bank < PORT_STORE_BANKS
+               ? memory + bank * programs
+               : memory + PORT_STORE_BANKS * programs +
+                     (size_t)(bank - PORT_STORE_PARAMETERS) * PORT_STORE_PARAMETER_BYTES;
+}
+
+uint32_t port_store_size(unsigned bank)
+{
+    return bank < PORT_STORE_BANKS ? PROGRAM_BYTES : PORT_STORE_PARAMETER_BYTES;
+}
+
+/* Only what makes the rest count has to go. */
+int port_store_erase(unsigned bank)
+{
+    if (bank >= PORT_STORE_BANKS_ALL) {
+        return PORT_ERR_STORE;
+    }
+    memset(bank_at(bank) + port_store_size(bank) - RECORD_BYTES, 0xFF, RECORD_BYTES);
+    return 0;
+}
+
+int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
+{
+    if (bank >= PORT_STORE_BANKS_ALL || offset > port_store_size(bank) ||
+        size > port_store_size(bank) - offset) {
+        return PORT_ERR_STORE;
+    }
+    memcpy(bank_at(bank) + offset, data, size);
+    return 0;
+}
+
+const uint8_t *port_store_data(unsigned bank)
+{
+    return bank_at(bank);
+}

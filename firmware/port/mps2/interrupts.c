@@ -47,6 +47,16 @@ void port_tick_await(uint32_t guard_us, bool hurry)
     self.wish = (struct link_wish){.guard_us = guard_us, .awaiting = true, .hurry = hurry};
 }
 
+void port_tick_urgent(bool urgent)
+{
+    (void)urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return PORT_TIMING_KEPT;
+}
+
 void port_tick_ready(void)
 {
     self.wish.awaiting = false;

@@ -6,8 +6,7 @@
 #include "port/stm32g4/flash.h"
 #include "port/stm32g4/reg_flash.h"
 
-#define LAST_PAGE_AT (FLASH_STORE_BYTES - FLASH_PAGE_BYTES)
-#define BANK_PAGES   (FLASH_STORE_BYTES / FLASH_PAGE_BYTES)
+#define PROGRAM_BANKS 2u
 
 static struct {
     bool open; /* bank has been erased and takes writes */
@@ -16,14 +15,31 @@ static struct {
     uint8_t waiting[FLASH_WRITE_BYTES];
 } self;
 
+/* In the second flash bank. */
 static uint32_t start_of(unsigned bank)
 {
-    return bank * FLASH_STORE_BYTES;
+    return bank <= PROGRAM_BANKS ? bank * FLASH_STORE_BYTES
+                                 : PROGRAM_BANKS * FLASH_STORE_BYTES +
+                                       (bank - PROGRAM_BANKS) * FLASH_STORE_PARAMETER_BYTES;
+}
+
+static uint32_t last_page_at(unsigned bank)
+{
+    return flash_store_size(bank) - FLASH_PAGE_BYTES;
+}
+
+uint32_t flash_store_size(unsigned bank)
+{
+    if (bank >= FLASH_STORE_BANKS) {
+        return 0;
+    }
+    return bank < PROGRAM_BANKS ? FLASH_STORE_BYTES : FLASH_STORE_PARAMETER_BYTES;
 }
 
 bool flash_store_erase(unsigned bank)
 {
-    self.open = bank < FLASH_STORE_BANKS && flash_erase_page((bank + 1u) * BANK_PAGES - 1u);
+    self.open = bank < FLASH_STORE_BANKS &&
+                flash_erase_page((start_of(bank) + last_page_at(bank)) / FLASH_PAGE_BYTES);
     self.bank = bank;
     self.end = 0;
     return self.open;
@@ -32,7 +48,7 @@ bool flash_store_erase(unsigned bank)
 /* The last page has been erased first of all. */
 static bool prepare_page(uint32_t offset)
 {
-    return offset % FLASH_PAGE_BYTES != 0u || offset == LAST_PAGE_AT ||
+    return offset % FLASH_PAGE_BYTES != 0u || offset == last_page_at(self.bank) ||
            flash_erase_page((start_of(self.bank) + offset) / FLASH_PAGE_BYTES);
 }
 
@@ -49,7 +65,7 @@ static bool program_waiting(void)
 /* Only into the last page, as the pages between have not been erased. */
 static bool skip_to(uint32_t offset)
 {
-    if (offset < LAST_PAGE_AT || offset % FLASH_WRITE_BYTES != 0u) {
+    if (offset < last_page_at(self.bank) || offset % FLASH_WRITE_BYTES != 0u) {
         return false;
     }
     if (self.end % FLASH_WRITE_BYTES != 0u && !program_waiting()) {
@@ -68,8 +84,8 @@ static bool write_byte(uint8_t byte)
 
 static bool fits(unsigned bank, uint32_t offset, uint32_t size)
 {
-    return self.open && bank == self.bank && offset >= self.end && offset <= FLASH_STORE_BYTES &&
-           size <= FLASH_STORE_BYTES - offset;
+    return self.open && bank == self.bank && offset >= self.end &&
+           offset <= flash_store_size(bank) && size <= flash_store_size(bank) - offset;
 }
 
 bool flash_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)

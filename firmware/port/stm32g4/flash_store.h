@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * flash_store: the two banks of port.h's program store, each one half (128 KB) of the chip's second flash bank.
+ * flash_store: the banks of port.h's store in the chip's second flash bank: 126 KB each for two programs, then a page (2 KB)
+ * each for two sets of parameters.
  *
- * Both lie there because the firmware runs from the first: erasing a page of the bank one runs from stops
+ * All lie there because the firmware runs from the first: erasing a page of the bank one runs from stops
  * the core for 22 ms, which is 22 ticks.
  *
- * Erasing a bank erases its last page only, which holds what makes the rest count (app/program_record.h); every other page is
+ * Erasing a bank erases its last page only, which holds what makes the rest count (app/bank_record.h); every other page is
  * erased when the first write reaches it. So no call takes longer than a page and what is written takes. A bank that is
  * broken off anywhere needs no repair: the next erase begins anew.
  *
@@ -18,11 +19,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define FLASH_STORE_BANKS 2u
-#define FLASH_STORE_BYTES 0x20000u /* a bank */
+#define FLASH_STORE_BANKS           4u       /* 0 and 1: programs, 2 and 3: parameters */
+#define FLASH_STORE_BYTES           0x1F800u /* a bank for a program */
+#define FLASH_STORE_PARAMETER_BYTES 0x800u   /* a bank for parameters */
 
 /* Like the functions of port.h; false: outside the bank, out of order, or the memory did not take it. The one bank that was
  * erased last can be written. */
+uint32_t flash_store_size(unsigned bank); /* 0: there is no such bank */
 bool flash_store_erase(unsigned bank);
 bool flash_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 const uint8_t *flash_store_data(unsigned bank);

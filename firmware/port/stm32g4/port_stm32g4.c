@@ -135,6 +135,16 @@ void port_tick_await(uint32_t guard_us, bool hurry)
     (void)hurry;
 }
 
+void port_tick_urgent(bool urgent)
+{
+    (void)urgent;
+}
+
+enum port_timing port_timing(void)
+{
+    return PORT_TIMING_KEPT;
+}
+
 void port_tick_ready(void)
 {
 }

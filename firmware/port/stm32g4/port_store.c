@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The program store of port.h: the two banks of flash_store, with the watchdog fed between. */
+/* The store of port.h: the banks of flash_store, with the watchdog fed between. */
 #include "port/port.h"
 #include "port/stm32g4/flash_store.h"
 #include "port/stm32g4/irq.h"
 #include "port/stm32g4/watchdog.h"
 
-uint32_t port_store_size(void)
+uint32_t port_store_size(unsigned bank)
 {
-    return FLASH_STORE_BYTES;
+    return flash_store_size(bank);
 }
 
 /* The mainline may be in the store for a second or two without a wait between. */

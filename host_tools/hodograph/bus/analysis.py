@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ..config import PLANE_AXES, Machine
 from ..errors import RunError
 from ..native import NativeProgram
 from ..simulate import Motion, analyse, settling_ticks
-from .listening.decode import RPDO1, SYNC_ID, Ticks, decode_ticks
+from .listening.decode import RPDO1, SYNC_ID, Ticks, decode_ticks, unhomed_starts
 from .listening.frames import Frames
 from .listening.setpoint_check import require_no_jump, step_limits
 
@@ -29,7 +29,7 @@ class BusRun:
     """A recorded run: the motion, and how the bus did. `frames` counts all that were recorded.
 
     `bus` is the file's name when it was read from one; then the deadline misses are not known. `wall_s` is by the clock
-    of the bus.
+    of the bus. `unhomed_starts`: how many starts in the recording were allowed without homing.
     """
 
     motion: Motion
@@ -39,6 +39,7 @@ class BusRun:
     frames: int
     wall_s: float
     load: RecordedLoad
+    unhomed_starts: int
 
     def summary(self) -> dict[str, object]:
         """The keys that tools may rely on in `hodograph run --json` and `hodograph replay --json`."""
@@ -48,6 +49,7 @@ class BusRun:
             "pace": self.pace,
             "frames": self.frames,
             "bus_load": self.load.summary(),
+            "unhomed_starts": self.unhomed_starts,
         }
 
 
@@ -88,6 +90,7 @@ def replay(frames: Frames, name: str, image: bytes, machine: Machine, kernel: st
         frames=int(frames.size),
         wall_s=wall_s,
         load=load,
+        unhomed_starts=unhomed_starts(frames, machine.node),
     )
 
 
@@ -160,7 +163,7 @@ def _motion(
     first = first_tick(ticks.targets[plane], setpoints) if found is None else found
     count = program.ticks + settling_ticks(machine.period_us)
     reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
-    return analyse(
+    motion = analyse(
         image,
         ticks.targets[plane][first : first + count],
         ticks.actual[plane][reached],
@@ -168,6 +171,7 @@ def _motion(
         kernel=kernel,
         counts_per_mm=machine.counts_per_mm,
     )
+    return motion if ticks.volts_mv is not None else replace(motion, max_volts=None)
 
 
 def program_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int | None:

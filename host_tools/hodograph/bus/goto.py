@@ -64,11 +64,13 @@ def goto(
     machine: Machine,
     end_counts: tuple[int, int],
     tick: Callable[[], None] | None = None,
+    *,
+    unhomed: bool = False,
 ) -> float:
     """Moves from the present setpoint to a point in counts; returns the way in mm, at standstill.
 
-    The drives have to be on (state ready). Each move replaces the program that is loaded. Raises RefusedError when
-    the feed override is 0, with which nothing would move.
+    The drives have to be on (state ready). Each move replaces the program that is loaded. `unhomed`: also when axes
+    with a homing method are not homed. Raises RefusedError when the feed override is 0, with which nothing would move.
     """
     for axis, counts in zip(machine.plane, end_counts, strict=True):
         at_mm = counts / machine.counts_per_mm
@@ -89,7 +91,7 @@ def goto(
         )
     for a, b in moves:
         controller.upload(line_image(a, b, machine))
-        controller.start()
+        controller.start(unhomed=unhomed)
         controller.wait_for((READY,), math.inf, tick)
         way_mm += abs(b - a)
     return way_mm

@@ -16,6 +16,7 @@ from ..simulate import settling_ticks
 from .address import BusAddress, check_raw, is_virtual
 from .analysis import REACHED_AFTER, BusRun, analyse_recording, first_tick, measured_pace
 from .goto import goto
+from .listening.decode import unhomed_starts
 from .listening.recorder import Recorder
 from .listening.recordings import write_recording
 from .processes import Rig
@@ -108,8 +109,11 @@ def run_program(
     kernel: str,
     progress: Progress | None = None,
     record: Path | None = None,
+    *,
+    unhomed: bool = False,
 ) -> BusRun:
     """Runs a program image from wherever the axes stand, and analyses the recording, which is kept in `record`.
+    `unhomed`: also when axes with a homing method are not homed.
 
     Raises RefusedError, BusError, and RunError when the recording is incomplete, a setpoint jumps, or the setpoints are
     not those that the same kernel gives here.
@@ -120,12 +124,13 @@ def run_program(
     controller.configure(machine, kernel)
     controller.override(100)
     controller.enable()
-    goto(controller, machine, (int(setpoints[0, 0]), int(setpoints[0, 1])))
+    start_counts = int(setpoints[0, 0]), int(setpoints[0, 1])
+    goto(controller, machine, start_counts, unhomed=unhomed)
     controller.upload(image)
     with Recorder(controller.address) as recorder:
         _await_syncs(controller, _REST_TICKS)
         begun_s = controller.clock.now_s()
-        controller.start()
+        controller.start(unhomed=unhomed)
         _follow(at, progress)
         took_s = controller.clock.now_s() - begun_s
         behind = settling_ticks(machine.period_us) + REACHED_AFTER + _MARGIN_TICKS
@@ -148,6 +153,7 @@ def run_program(
         frames=int(frames.size),
         wall_s=took_s,
         load=load,
+        unhomed_starts=unhomed_starts(frames, machine.node),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from .listening.load import BusLoad
 from .sdo.status import AxisStatus, LoadedProgram, Override, Statistics, Status
+from .words.texts import TIMINGS
 
 Row = tuple[str, str]
 
@@ -17,10 +18,14 @@ def status_rows(
     """Everything, a line each; `names` are those of the axes."""
     rows = [("controller", f"node {status.node} on {status.bus}: {status.state}")]
     rows += _trouble_rows(status)
+    rows.append(("configuration", _configuration_words(status)))
     rows.append(("program", _program_words(status.program)))
     rows.append(("position", _position_words(status)))
     rows.append(("feed", f"{status.motion.feed_mm_s:.3f} mm/s"))
     rows.append(("override", _override_words(status.override)))
+    if status.unhomed_nodes:
+        nodes = ", ".join(map(str, status.unhomed_nodes))
+        rows.append(("not homed", f"node {nodes} when this program was started (--unhomed)"))
     for i, axis in enumerate(status.axes):
         name = names[i] if i < len(names) else str(i + 1)
         rows.append((f"axis {name}", _axis_words(axis)))
@@ -28,8 +33,16 @@ def status_rows(
             rows.append(("", f"error: {axis.error} (0x{axis.error_code:04X})"))
             rows.append(("", f"remedy: {axis.remedy}"))
     rows += [] if load is None else _load_rows(load)
+    rows += _timing_rows(status.timing)
     rows += _statistics_rows(status.statistics)
     return rows
+
+
+def _timing_rows(timing: str) -> list[Row]:
+    if timing == TIMINGS[0]:
+        return []
+    word = "refused" if timing == TIMINGS[1] else "enabled at your own risk (--no-realtime)"
+    return [("real time", f"not permitted by the controller's computer: real drives are {word}")]
 
 
 def _trouble_rows(status: Status) -> list[Row]:
@@ -48,6 +61,31 @@ def _trouble_rows(status: Status) -> list[Row]:
     if status.last_refusal is not None:
         rows.append(("last refusal", status.last_refusal))
     return rows
+
+
+_CONFIGURED = {
+    "none": "none since power-on: hodograph configure FILE, and --store to keep it over a loss of power",
+    "confirmed": "given by the host, CRC-32 {crc32:08x}",
+    "restored": "restored after power-on, CRC-32 {crc32:08x}",
+}
+_STORED = {
+    "nothing": "nothing is stored",
+    "of another firmware": "what is stored is of another firmware: hodograph configure FILE --store",
+    "damaged": "what is stored is damaged: hodograph configure FILE --store",
+    "defaults": "the defaults are stored",
+}
+
+
+def _configuration_words(status: Status) -> str:
+    found = status.configuration
+    words = [_CONFIGURED[found.state].format(crc32=found.crc32)]
+    if found.stored in _STORED:
+        words.append(_STORED[found.stored])
+    elif found.state != "none" and found.stored_crc32 != found.crc32:
+        words.append(f"another one is stored, CRC-32 {found.stored_crc32:08x}")
+    elif found.state == "confirmed":
+        words.append("stored")
+    return "; ".join(words)
 
 
 def _program_words(program: LoadedProgram) -> str:
@@ -77,9 +115,15 @@ def _axis_words(axis: AxisStatus) -> str:
     inputs = f", {' and '.join(axis.inputs_on)} on" if axis.inputs_on else ""
     return (
         f"node {axis.node}: {axis.state}, at {axis.actual_mm:.6f} mm, target {axis.target_mm:.6f} mm, "
-        f"following error {axis.following_error_um:.3f} um, {'' if axis.homed else 'not '}homed, "
+        f"following error {axis.following_error_um:.3f} um, {_homed_words(axis)}, "
         f"{axis.missed_tpdos} TPDOs missed{inputs}"
     )
+
+
+def _homed_words(axis: AxisStatus) -> str:
+    if axis.homed:
+        return "homed"
+    return "not homed (a start needs it: hodograph home)" if axis.homing_method else "not homed"
 
 
 def _load_rows(load: BusLoad) -> list[Row]:

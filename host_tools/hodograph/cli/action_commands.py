@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands about the drives: home, quick-stop, reset. Light on imports, as bus_commands."""
+"""Commands about configuration and drives: configure, home, quick-stop, reset. Light on imports, as bus_commands."""
 
 from __future__ import annotations
 
@@ -9,9 +9,52 @@ from argparse import Namespace
 from ..bus.address import parse_address
 from ..bus.sdo import actions
 from ..bus.sdo.objects import BOOT, OFF, READY
+from ..errors import InputError
 from .bus_commands import reached, stopping
 from .output import note
 from .targets import target
+
+
+def configure(options: Namespace) -> None:
+    """hodograph configure."""
+    _check_configure(options)
+    address = parse_address(options.bus)
+    machine = None
+    if options.file is not None:
+        from ..bustime import require_fit
+        from .motion_commands import machine_of
+
+        machine = machine_of(options.file, options.machine)
+        require_fit(machine)
+    to = target(options) if machine is None else machine
+    node = options.node or to.node
+    with reached(address, node, to.bitrate, options.wait) as controller:
+        done = []
+        if machine is not None:
+            controller.configure(machine, options.kernel or machine.kernel)
+            done.append(f"configured, CRC-32 {controller.configuration_crc():08x}")
+        if options.forget:
+            controller.restore_defaults()
+            done.append("nothing is stored any more")
+        if options.set_node is not None:
+            controller.set_node_number(options.set_node)
+        if options.store or options.set_node is not None:
+            controller.store()
+            done.append("stored")
+    if options.set_node is not None:
+        number = options.set_node or "the board's own"
+        done.append(f"the node number is {number} after the next power-on")
+    print("; ".join(done))
+
+
+def _check_configure(options: Namespace) -> None:
+    wanted = (options.file is not None, options.store, options.set_node is not None)
+    if options.forget and any(wanted):
+        raise InputError(
+            "--forget: stands alone, since FILE, --store and --set-node store or change what it forgets"
+        )
+    if not options.forget and not any(wanted):
+        raise InputError("configure: nothing to do: give a FILE, --store, --forget or --set-node")
 
 
 def home(options: Namespace) -> None:
@@ -49,10 +92,13 @@ def reset(options: Namespace) -> None:
     address = parse_address(options.bus)
     to = target(options)
     with reached(address, to.node, to.bitrate, options.wait) as controller:
-        had_fault = actions.reset(controller, options.timeout or actions.BOOT_S)
+        wait_s = options.timeout or actions.BOOT_S
+        had_fault = actions.reset(controller, wait_s)
+        if not had_fault:
+            actions.configure_anew(controller, wait_s)
     if not had_fault:
-        note("no fault was present")
+        note("no fault was present: the drives have been configured anew")
     print("ready to be started")
 
 
-COMMANDS = {"home": home, "quick-stop": quick_stop, "reset": reset}
+COMMANDS = {"configure": configure, "home": home, "quick-stop": quick_stop, "reset": reset}

@@ -55,7 +55,7 @@ def start(options: Namespace) -> None:
             actions.reset(controller)
         with stopping(controller):
             controller.enable()
-            controller.start(from_mm=options.from_mm)
+            controller.start(from_mm=options.from_mm, unhomed=options.unhomed)
             if options.follow:
                 controller.wait_for((READY,), math.inf, Follower(controller, note))
     print("done" if options.follow else "running")

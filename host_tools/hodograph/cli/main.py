@@ -28,7 +28,7 @@ _MODULES = {
     "status": "status_command",
     "record": "record_command",
     "replay": "replay_command",
-    **dict.fromkeys(("home", "quick-stop", "reset"), "action_commands"),
+    **dict.fromkeys(("configure", "home", "quick-stop", "reset"), "action_commands"),
     "campaign": "campaign_command",
     "dbc": "dbc_command",
     "tune": "tune_command",

@@ -81,7 +81,8 @@ def goto(options: Namespace) -> None:
         controller.configure(machine, options.kernel or machine.kernel)
         with stopping(controller):
             controller.enable()
-            way_mm = goto_point(controller, machine, end, Follower(controller, note))
+            follower = Follower(controller, note)
+            way_mm = goto_point(controller, machine, end, follower, unhomed=options.unhomed)
         if image is not None:
             controller.upload(image)
     place = ", ".join(f"{counts / machine.counts_per_mm:g}" for counts in end)
@@ -153,7 +154,9 @@ def _run_one(chain: Chain, address: BusAddress, options: Namespace) -> BusRun:
         if options.controller is not None and at.pace is None:
             note("--controller has no effect where one is running already")
         kernel = options.kernel or machine.kernel
-        return run_program(at, machine, chain.image, kernel, bar, options.record)
+        return run_program(
+            at, machine, chain.image, kernel, bar, options.record, unhomed=options.unhomed
+        )
 
 
 def _print_runs(chains: list[Chain], runs: list[BusRun], as_json: bool) -> None:
@@ -176,6 +179,7 @@ def print_run(title: str, result: BusRun) -> None:
     misses = (
         [] if result.deadline_misses is None else [("deadline misses", str(result.deadline_misses))]
     )
+    unhomed = [("homing", "waived (--unhomed)")] if result.unhomed_starts else []
     print(title)
     print_rows(
         [
@@ -184,6 +188,7 @@ def print_run(title: str, result: BusRun) -> None:
                 ("bus", f"{result.bus}, pace {result.pace}, {result.frames} frames"),
                 ("time", f"{result.wall_s:.2f} s for {nominal_s:.2f} s of motion"),
                 *misses,
+                *unhomed,
                 ("bus load", result.load.text()),
                 *motion_rows(motion),
             ]

@@ -22,9 +22,14 @@ def note(text: str) -> None:
     print(f"hodograph: {text}", file=sys.stderr)
 
 
+def json_text(value: object) -> str:
+    """A JSON document in one line. Raises ValueError for NaN and infinities."""
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
 def print_json(value: object) -> None:
     """The one JSON document of a command. NaN and infinities are a bug, so they raise."""
-    sys.stdout.write(json.dumps(value, allow_nan=False, ensure_ascii=False) + "\n")
+    sys.stdout.write(json_text(value) + "\n")
 
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:

@@ -14,9 +14,11 @@ from ..chain import Chain, load_chain
 from ..errors import InputError
 from ..feed import Plan
 from ..program import Program, decode, inspect_dict, inspect_text
+from ..program.check import check
 from ..program.image import MAGIC
+from ..program.memory import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from ..simulate import Motion, simulate, write_trace
-from .output import note, number, print_json, print_rows, progress, write_file
+from .output import json_text, note, number, print_json, print_rows, progress, write_file
 
 
 def spline(options: Namespace) -> None:
@@ -139,6 +141,7 @@ def compile_(options: Namespace) -> None:
     print_notes(chain, chain.compilation.plan)
     output = options.output or Path(chain.file.name + ".hdgp")
     write_file(output, image)
+    _warn_of_size(image, chain.machine.kernel)
     program = chain.program
     if options.json:
         print_json({"file": str(output), "bytes": len(image)} | inspect_dict(program))
@@ -147,6 +150,15 @@ def compile_(options: Namespace) -> None:
         f"{output}: {len(image)} bytes, {program.segment_count} segments, {program.piece_count} feed "
         f"pieces, {program.ticks} ticks of {program.period_us} us"
     )
+
+
+def _warn_of_size(image: bytes, kernel: str) -> None:
+    needed = memory_bytes(image, *RECORD_BYTES[kernel])
+    if needed > LARGEST_BANK:
+        note(
+            f"takes {needed} bytes of a controller with what is prepared from it, more than the {LARGEST_BANK} of the "
+            "largest one: split the path"
+        )
 
 
 def read_image(file: Path) -> bytes | None:
@@ -178,10 +190,24 @@ def inspect(options: Namespace) -> None:
         program = load_chain(options.file, options.machine).program
     else:
         program = decode_file(options.file, image)
-    if options.json:
-        print_json(inspect_dict(program))
-    else:
-        print(inspect_text(program, full=options.full))
+    try:
+        with np.errstate(divide="raise", invalid="raise", over="raise"):
+            found = inspect_dict(program)
+            text = json_text(found) if options.json else inspect_text(program, full=options.full)
+    except (ArithmeticError, ValueError) as error:
+        raise InputError(f"{options.file}: {_unsound(program)}") from error
+    print(text)
+
+
+def _unsound(program: Program) -> str:
+    """Why nothing can be computed from an image."""
+    try:
+        fault = check(program)
+    except (ArithmeticError, ValueError):
+        fault = None
+    if fault is None:
+        return "a number in the program image is out of range"
+    return f"no program: {fault.code.text} ({fault.code.name}, code {fault.code}, {fault.place})"
 
 
 def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) -> Motion:
@@ -213,13 +239,18 @@ def simulate_(options: Namespace) -> None:
         print_rows(motion_rows(motion))
 
 
+def volts_words(motion: Motion) -> str:
+    """The greatest voltage of a run, for people."""
+    return "not told by the drives" if motion.max_volts is None else f"{motion.max_volts:.3f} V"
+
+
 def motion_rows(motion: Motion) -> list[tuple[str, str]]:
     """A run's results for people."""
     return [
         ("ticks", f"{motion.ticks} of {motion.period_us} us, kernel {motion.kernel}"),
         ("greatest contour error", f"{motion.max_contour_error_um:.3f} um"),
         ("greatest following error", f"{motion.max_following_error_um:.1f} um"),
-        ("greatest voltage", f"{motion.max_volts:.3f} V"),
+        ("greatest voltage", volts_words(motion)),
         ("setpoints SHA-256", motion.setpoints_sha256),
         ("encoders SHA-256", motion.encoders_sha256),
     ]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..bus.address import BusAddress, check_raw, parse_address
 from ..bus.clock import REAL_CLOCK, Clock, VirtualClock
+from ..bus.listening.decode import unhomed_starts
 from ..bus.listening.frames import Frames
 from ..bus.listening.recorder import Recorder
 from ..bus.listening.recordings import RecordingWriter, check_suffix
@@ -64,6 +65,7 @@ class _Recording:
     def __init__(self, address: BusAddress, options: Namespace, machine: Machine | None) -> None:
         self._options = options
         self._watch = SetpointWatch(None if machine is None else machine.nodes)
+        self.unhomed_starts = 0
         self._worst: dict[tuple[str, tuple[int, ...]], Step] = {}
         self._writer = RecordingWriter(options.file, address.name)
         self._virtual: VirtualClock | None = None
@@ -109,6 +111,7 @@ class _Recording:
         self._look(self._watch.close())
 
     def _keep(self, frames: Frames) -> None:
+        self.unhomed_starts += unhomed_starts(frames)
         self._writer.write(frames)
         self._look(self._watch.feed(frames))
 
@@ -166,9 +169,19 @@ def _print(options: Namespace, recording: _Recording, found: list[Jump] | None) 
     frames, seconds = recording.frame_count, recording.seconds
     if options.json:
         told = None if found is None else [str(jump) for jump in found]
-        print_json({"file": str(options.file), "frames": frames, "seconds": seconds, "jumps": told})
+        print_json(
+            {
+                "file": str(options.file),
+                "frames": frames,
+                "seconds": seconds,
+                "jumps": told,
+                "unhomed_starts": recording.unhomed_starts,
+            }
+        )
     else:
         print(f"{options.file}: {frames} frames in {seconds:.1f} s")
+    if recording.unhomed_starts:
+        note(f"{options.file}: starts that were allowed without homing: {recording.unhomed_starts}")
 
 
 COMMANDS = {"record": record}

@@ -35,6 +35,13 @@ def positive(text: str) -> float:
     return value
 
 
+def node_or_own(text: str) -> int:
+    """A node number, or 0."""
+    if not text.isdigit() or int(text) > 127:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a node number from 1 to 127, or 0')
+    return int(text)
+
+
 def percentage(text: str) -> int:
     """A feed override."""
     if not text.isdigit() or int(text) > 200:

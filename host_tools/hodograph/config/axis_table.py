@@ -68,6 +68,15 @@ class Scaling:
 
 
 @dataclass(frozen=True)
+class Identity:
+    """What the drive has to say of itself in 0x1018 subs 1 to 3; 0: anything."""
+
+    vendor: int = 0
+    product: int = 0
+    revision: int = 0
+
+
+@dataclass(frozen=True)
 class Axis:
     """One axis: CANopen node, travel limits in machine coordinates, limits of its motion, what its drive is told, and
     its model.
@@ -76,7 +85,7 @@ class Axis:
     before it accepts a program (docs/limits.md).
 
     Without a drive file (`drive` None) the axis can be run, but not simulated. `following_window_mm` None: the drive
-    does not supervise its following error.
+    keeps its own, and the controller looks for an axis that does not follow at all.
     """
 
     name: str
@@ -93,6 +102,7 @@ class Axis:
     homing: Homing
     feedforward: Feedforward
     scaling: Scaling
+    identity: Identity
 
 
 _AXIS = (
@@ -110,9 +120,11 @@ _AXIS = (
     "homing",
     "feedforward",
     "scaling",
+    "identity",
 )
 _HOMING = ("method", "offset_mm", "speed_mm_s", "slow_mm_s", "acceleration_mm_s2")
 _FEEDFORWARD = ("velocity", "torque_permille_s2_m", "torque_permille_s_m")
+_IDENTITY = ("vendor", "product", "revision")
 _SCALING = (
     "encoder_increments_per_rev",
     "feed_counts_per_rev",
@@ -176,6 +188,7 @@ def _axis(table: Table, counts_per_mm: int, acceleration_mm_s2: float) -> Axis:
         homing=_homing(table, counts_per_mm, reach),
         feedforward=_feedforward(table),
         scaling=_scaling(table, drive, counts_per_mm),
+        identity=_identity(table),
     )
 
 
@@ -230,6 +243,12 @@ def _feedforward(axis: Table) -> Feedforward:
         torque_permille_s2_m=table.number("torque_permille_s2_m", 0.0, low=-32767, high=32767),
         torque_permille_s_m=table.number("torque_permille_s_m", 0.0, low=-32767, high=32767),
     )
+
+
+def _identity(axis: Table) -> Identity:
+    table = axis.table("identity", _IDENTITY, required=False)
+    given = {key: table.integer(key, low=1, high=U32_MAX) for key in _IDENTITY if table.has(key)}
+    return Identity(**given)
 
 
 def _scaling(axis: Table, drive: Drive | None, counts_per_mm: int) -> Scaling:

@@ -96,7 +96,7 @@ class Guard:
 
 def _host_name(header: str | None) -> str | None:
     """The name of a Host header without the port: with forwarding that need not be ours."""
-    if not header:
+    if not header or "@" in header or "/" in header:  # no browser sends user information, or a path
         return None
     try:
         return urlsplit(f"//{header}").hostname

@@ -20,6 +20,8 @@ from .security import HEADERS, Guard
 
 _MOST_REQUEST = 4096
 _HELLO_S = 10.0
+REQUEST_S = 10.0
+"""For a whole request to come, of a new connection and between two: aiohttp counts its keep-alive time from there."""
 _WRONG_TOKEN_S = 0.5
 _BEAT_S = 10.0
 _POLICY, _TOKEN_NEEDED = 1008, 4401
@@ -61,7 +63,10 @@ class Server:
                 headers=HEADERS,
                 text="This name is not one of the monitor's machine: use the printed address.\n",
             )
-        return await handler(request)
+        try:
+            return await handler(request)
+        except ConnectionError:  # the browser has left in the middle
+            return web.Response(status=400, headers=HEADERS)
 
     async def _page(self, request: web.Request) -> web.Response:
         name = request.match_info["name"] or "index.html"

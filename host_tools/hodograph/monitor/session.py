@@ -19,7 +19,7 @@ from .hub import Hub
 from .link import Link
 from .pump import Layout, Pump
 from .security import Guard, is_loopback
-from .server import Server
+from .server import REQUEST_S, Server
 from .source import Source, open_source
 from .usage import Usage
 
@@ -83,7 +83,9 @@ class Session:
         server = Server(
             Guard(self._place.host, self._place.token), hub, self._greeting(), _obey(link, pump)
         )
-        runner = web.AppRunner(server.app, access_log=None, shutdown_timeout=2.0)
+        runner = web.AppRunner(
+            server.app, access_log=None, shutdown_timeout=2.0, keepalive_timeout=REQUEST_S
+        )
         await runner.setup()
         usage = Usage()
         try:

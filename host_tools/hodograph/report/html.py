@@ -143,7 +143,7 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
             "kernel": motion.kernel,
             "greatest contour error, µm": f"{motion.max_contour_error_um:.3f}",
             "greatest following error, µm": f"{motion.max_following_error_um:.1f}",
-            "greatest voltage, V": f"{motion.max_volts:.3f}",
+            "greatest voltage, V": "–" if motion.max_volts is None else f"{motion.max_volts:.3f}",
             "bus": run.bus if run is not None else "none (simulated)",
             "pace": run.pace if run is not None else "–",
             "deadline misses": _misses(run),

@@ -105,7 +105,7 @@ def drive_figure(chain: Chain, motion: Motion) -> bytes:
         following.plot(motion.t_s, motion.following_error_um[:, i], color=color, label=axis.name)
         volts.plot(motion.t_s, motion.volts[:, i], color=color, label=axis.name)
     limits = [axis.drive.volts_limit for axis in chain.machine.plane if axis.drive is not None]
-    if limits and motion.max_volts > 0.5 * (limit := min(limits)):
+    if limits and (motion.max_volts or 0.0) > 0.5 * (limit := min(limits)):
         for sign in (-1, 1):
             volts.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
     following.set_ylabel("setpoint - position, µm")

@@ -28,7 +28,8 @@ class Motion:
 
     `rows` has `native.ROW` records: the program's ticks, then the settling time; it is empty when the run
     did not keep them. Hashes are over i32 little-endian x, y of the program's ticks. The following error
-    is that of one axis, setpoint less position; the contour error is the distance from the exact curve.
+    is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
+    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not tell their volts.
     """
 
     kernel: str
@@ -41,7 +42,7 @@ class Motion:
     max_contour_error_um: float
     rms_contour_error_um: float
     max_following_error_um: float
-    max_volts: float
+    max_volts: float | None
 
     def summary(self) -> dict[str, object]:
         """The keys that tools may rely on in `--json` output."""
@@ -137,12 +138,12 @@ class Tally:
             return
         behind = np.abs(rows["set_counts"].astype(np.int64) - rows["act_counts"])
         self._following_counts = max(self._following_counts, int(behind.max()))
-        contour_um = rows["contour_error_um"]
-        self._contour_um = max(self._contour_um, float(contour_um.max()))
+        self._contour_um = max(self._contour_um, float(rows["contour_error_um"].max()))
+        contour_um = counted["contour_error_um"]
         self._contour_um2 += math.fsum(
             (contour_um * contour_um).tolist()
         )  # the same on every processor
-        self._rows += rows.size
+        self._rows += counted.size
         self._volts_mv = max(self._volts_mv, int(np.abs(rows["volts_mv"].astype(np.int32)).max()))
 
     def motion(

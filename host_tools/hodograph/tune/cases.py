@@ -107,7 +107,8 @@ def outcome(
         keep_rows=False,
     )
     limit = min(drive.volts_limit for drive in drives)
-    return Outcome(motion.max_contour_error_um, motion.max_volts, motion.max_volts > limit - _MV)
+    volts = motion.max_volts or 0.0  # a simulation tells them
+    return Outcome(motion.max_contour_error_um, volts, volts > limit - _MV)
 
 
 def outcomes(

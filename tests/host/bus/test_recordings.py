@@ -186,6 +186,10 @@ HEADER = (
             "line 4 is not as ASC has it: the line is cut",
         ),
         (HEADER + "   0.000100 1  18Z  Rx   d 2 27 06\n", "line 4 is not as ASC has it"),
+        (
+            HEADER + "   0.000100 1  12345678901234567890x  Rx   d 2 27 06\n",
+            "line 4 is not as ASC has it: an identifier of 0x12345678901234567890, above",
+        ),
         ("date yesterday at noon\n", "line 1 is not as ASC has it"),
         ("something else\n", "no ASC file"),
         ("\xff\xfe\x80", "line 1 is not as ASC has it"),

@@ -12,6 +12,7 @@ from typing import Any
 from hodograph.bus.listening.load import BusLoad, ClassLoad
 from hodograph.bus.sdo.status import (
     AxisStatus,
+    Configured,
     Fault,
     LoadedProgram,
     Override,
@@ -36,6 +37,7 @@ AXIS = AxisStatus(
     digital_inputs=4,
     inputs_on=("home switch",),
     homed=True,
+    homing_method=37,
     error_code=0,
     error=None,
     remedy=None,
@@ -50,10 +52,13 @@ RUNNING = Status(
     fault=None,
     boot_trouble=None,
     last_refusal=None,
+    configuration=Configured("confirmed", 0xA1, "whole", 0xA1, 0xA1),
     program=LoadedProgram("ready", None, 0, 0, 0xABCD, 6600, 8, 67, 1101, 1.1, 99.9, 0, 0, 1, 2),
     motion=PathPosition(45.0, 100.0, 0.5),
     override=Override(150, 120.0, True),
+    unhomed_nodes=(),
     axes=(AXIS, replace(AXIS, node=3, homed=False, inputs_on=())),
+    timing="kept",
     statistics=Statistics(5000, 500, 2, 130, 12_345, 3, 0),
 )
 

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -283,3 +284,32 @@ def test_every_command_takes_node_and_bit_rate_from_a_machine_file(
     assert status == 4
     assert "node 77" in line
     assert opened == [500_000]
+
+
+SEALED = {
+    "period": (16, 4, 0),
+    "coefficient of a segment": (152, 8, 2**62),
+    "least coefficient": (176, 8, 2**63),
+    "duration of a piece": (-88, 8, 0),
+}
+"""What is put into an image, which then gets the right CRC: place (from the end where negative), bytes, value."""
+
+
+@pytest.mark.parametrize("name", SEALED)
+@pytest.mark.parametrize("more", [(), ("--json",), ("--full",)])
+def test_numbers_that_no_program_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, more: tuple[str, ...]
+) -> None:
+    """Whoever sealed the image: this is input, no error of ours."""
+    file = tmp_path / "program.hdgp"
+    assert main(["compile", path_file(tmp_path), "-o", str(file)]) == 0
+    capsys.readouterr()
+    image = bytearray(file.read_bytes())
+    at, size, value = SEALED[name]
+    at %= len(image)
+    image[at : at + size] = value.to_bytes(size, "little")
+    image[12:16] = zlib.crc32(image[16:]).to_bytes(4, "little")
+    file.write_bytes(image)
+    status, line = failed(capsys, "inspect", str(file), *more)
+    assert status == 2
+    assert str(file) in line

@@ -68,6 +68,9 @@ def test_loopback(host: str, loopback: bool) -> None:
         ("", False),
         ("[::1", False),
         ("localhost@evil.example", False),
+        ("evil.example@localhost", False),
+        ("user:word@127.0.0.1:8402", False),
+        ("127.0.0.1:8402/x", False),
     ],
 )
 def test_hosts_of_a_loopback_server(header: str | None, known: bool) -> None:

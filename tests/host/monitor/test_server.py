@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import struct
 from collections.abc import Awaitable, Callable
+from socket import SO_LINGER, SOL_SOCKET
 from typing import Any
 
 import aiohttp
@@ -253,3 +255,73 @@ def test_commands_are_the_controllers() -> None:
         read_command({"name": name})(controller)
     read_command({"name": "override", "percent": 150})(controller)
     assert controller.told == [1, 2, 3, 4, 5, 6, 7, 9, 10, ("override", 150)]
+
+
+def test_half_a_request_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor one that comes a byte at a time: the session serves with this time-out."""
+
+    async def scenario(server: TestServer) -> None:
+        streams = [await asyncio.open_connection(server.host, server.port) for _ in range(20)]
+        for _, writer in streams:
+            writer.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX:")
+        while not all(reader.at_eof() for reader, _ in streams):
+            for _, writer in streams:
+                writer.write(b"x")
+            await asyncio.sleep(0.05)
+        for _, writer in streams:
+            writer.close()
+
+    async def whole() -> None:
+        served = Server(Guard("127.0.0.1", TOKEN), Hub(asyncio.get_running_loop()), {}, nobody)
+        server = TestServer(served.app)
+        await server.start_server(keepalive_timeout=0.2)
+        try:
+            await scenario(server)
+        finally:
+            await server.close()
+
+    asyncio.run(whole())
+
+
+async def nobody(request: dict[str, Any]) -> str:
+    raise AssertionError(request)
+
+
+def test_a_browser_that_leaves_in_the_middle(caplog: pytest.LogCaptureFixture) -> None:
+    """With a reset, while the page or messages are on their way: nobody is told, least of all in tracebacks."""
+    case = Case()
+
+    def leave(writer: asyncio.StreamWriter) -> None:
+        taken = writer.get_extra_info("socket")
+        taken.setsockopt(SOL_SOCKET, SO_LINGER, struct.pack("ii", 1, 0))
+        writer.transport.abort()
+
+    async def scenario(browser: Browser) -> None:
+        host, port = browser.host, browser.port
+        handshake = (
+            f"GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nOrigin: http://{host}:{port}\r\n"
+            "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+        ).encode()
+        hello = json.dumps({"type": "hello"}).encode()
+        masked = bytes([0x81, 0x80 | len(hello), 0, 0, 0, 0]) + hello
+        ping = json.dumps({"type": "ping", "at": 1}).encode()
+        pings = (bytes([0x81, 0x80 | len(ping), 0, 0, 0, 0]) + ping) * 200
+        requests = (
+            handshake,
+            handshake + masked,
+            handshake + masked + pings,
+            b"GET /page.js HTTP/1.1\r\n" + f"Host: {host}:{port}\r\n\r\n".encode(),
+        )
+        for request in requests * 5:
+            for turns in (0, 1, 3, 10):
+                _, writer = await asyncio.open_connection(host, port)
+                writer.write(request)
+                for _ in range(turns):
+                    await asyncio.sleep(0)
+                    case.hub.publish({"type": "fill", "text": "x" * 100_000})
+                leave(writer)
+        await asyncio.sleep(0.2)
+
+    case.run(scenario)
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []

@@ -18,7 +18,10 @@ from ...errors import RunError
 from .recorder import Frames
 
 SYNC_ID, RPDO1, RPDO2, TPDO1, TPDO2 = 0x080, 0x200, 0x300, 0x180, 0x280
+SDO_REQUEST = 0x600
 SYNC_OVERFLOW = 240
+_UNHOMED_START = bytes([0x2F, 0x55, 0x20, 0x01, 0x01])
+"""Expedited write of 1 to 0x2055 sub 1 (docs/protocol.md section 3.3)."""
 _LONGEST_LAG = 250
 """SYNCs by which an answer may be late: a slow host delays drives, but frames keep their order."""
 _LEAD_IN = 200
@@ -44,6 +47,15 @@ class Ticks:
     def count(self) -> int:
         """Number of SYNCs."""
         return int(self.targets.shape[0])
+
+
+def unhomed_starts(frames: Frames, controller_node: int | None = None) -> int:
+    """How many starts were allowed although axes were not homed, as written to a controller; None: to any."""
+    low = SDO_REQUEST if controller_node is None else SDO_REQUEST + controller_node
+    high = SDO_REQUEST + 0x7F if controller_node is None else low
+    asked = (frames["id"] >= low) & (frames["id"] <= high)
+    wanted = np.frombuffer(_UNHOMED_START, dtype=np.uint8)
+    return int(np.all(frames["data"][asked][:, : wanted.size] == wanted, axis=1).sum())
 
 
 def decode_ticks(frames: Frames, nodes: Sequence[int]) -> Ticks:

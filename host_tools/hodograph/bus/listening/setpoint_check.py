@@ -14,11 +14,9 @@ acceleration  | |d_k| - |d_(k-1)| | <= a T^2: the second difference of arc lengt
 turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greatest normal acceleration n is known. It
               holds for each axis, so it is checked too while only one of the plane's drives follows.
 
-Where SYNCs passed without a setpoint a step is spread over them: a mean over n periods. Two such means that meet are
-(n + m) / 2 periods apart, so that much more acceleration and turn is allowed between them; where the axes' means differ
-in length, there is no chord of the path, and the length of the step is left out. One garbled statusword in a row does
-not hide a drive that follows. Axes beyond the plane hold their position: they are checked for speed and acceleration
-one by one.
+Where a SYNC passed without a setpoint the drive stood at its target, and the next setpoint is the step of one period:
+that is what the drive makes of it. One garbled statusword in a row does not hide a drive that follows. Axes beyond the
+plane hold their position: they are checked for speed and acceleration one by one.
 """
 
 from __future__ import annotations
@@ -66,23 +64,22 @@ class StepLimits:
 
 @dataclass(frozen=True)
 class Step:
-    """A step by one rule: what was found, what of it is rounding and the bow of the path, periods that it is apart."""
+    """A step by one rule: what was found, what of it is rounding and the bow of the path."""
 
     sync: int
     axes: tuple[int, ...]
     rule: str
     found_counts: float
     aside_counts: float
-    apart: float
 
     @property
     def needed(self) -> float:
         """The least limit that allows it."""
-        return (self.found_counts - self.aside_counts) / self.apart
+        return self.found_counts - self.aside_counts
 
     def jump(self, limits: StepLimits) -> Jump:
         """What is said of it where it breaks the limit."""
-        allowed = limits.of(self.rule) * self.apart + self.aside_counts
+        allowed = limits.of(self.rule) + self.aside_counts
         return Jump(self.sync, self.axes, self.rule, self.found_counts, allowed)
 
 
@@ -185,19 +182,18 @@ def _integers(data: NDArray[np.uint8]) -> Float:
 
 @dataclass(frozen=True)
 class _Steps:
-    """Rows by SYNC, columns by axis: counts per period; whether the drive followed; periods that it is spread over."""
+    """Rows by SYNC, columns by axis: counts; whether the drive followed."""
 
     counts: Float
     followed: Bool
-    periods: Float
 
     def of(self, axes: tuple[int, ...]) -> _Steps:
-        return _Steps(self.counts[:, axes], self.followed[:, axes], self.periods[:, axes])
+        return _Steps(self.counts[:, axes], self.followed[:, axes])
 
 
 def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _Steps:
     shape = (sync_at.size, len(nodes))
-    steps = _Steps(np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.ones(shape))
+    steps = _Steps(np.zeros(shape), np.zeros(shape, dtype=np.bool_))
     for axis, node in enumerate(nodes):
         at, control, target = _setpoints(frames[sync_at[0] :], node)
         at += sync_at[0]
@@ -206,17 +202,14 @@ def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _
         sync = np.searchsorted(sync_at, at) - 1
         commanded = _commanded(control)
         follows = commanded & _enabled(frames, node, at)
-        periods = np.maximum(np.diff(sync), 1)
         valid = follows[1:] & commanded[:-1]
         # Two setpoints for one SYNC: the larger step counts.
         steps.followed[sync[1:][valid], axis] = True
-        step = np.where(valid, np.diff(target) / periods, 0.0)
+        step = np.where(valid, np.diff(target), 0.0)
         larger = np.argsort(np.abs(step), kind="stable")
         steps.counts[sync[1:][larger], axis] = step[larger]
-        for i in np.flatnonzero(valid & (periods > 1)):
-            span = slice(sync[i] + 1, sync[i + 1] + 1)
-            steps.counts[span, axis], steps.followed[span, axis] = step[i], True
-            steps.periods[span, axis] = periods[i]
+        for i in np.flatnonzero(valid & (np.diff(sync) > 1)):
+            steps.followed[sync[i] + 1 : sync[i + 1], axis] = True  # it stands
         if valid[0] and follows[0]:  # begun in motion, perhaps: as fast as it goes on
             steps.followed[sync[0], axis], steps.counts[sync[0], axis] = True, step[0]
     return steps
@@ -250,17 +243,15 @@ class _Measured:
     axes: tuple[int, ...]
     value: Float
     aside: Float
-    apart: Float
     checked: Bool
     followed: Bool
 
     def step(self, row: int) -> Step:
         names = tuple(axis + 1 for axis, f in zip(self.axes, self.followed[row], strict=True) if f)
-        of_row = float(self.value[row]), float(self.aside[row]), float(self.apart[row])
-        return Step(row + 1, names, self.rule, *of_row)
+        return Step(row + 1, names, self.rule, float(self.value[row]), float(self.aside[row]))
 
     def beyond(self, limit: float) -> list[Step]:
-        over = self.checked & (self.value > limit * self.apart + self.aside)
+        over = self.checked & (self.value > limit + self.aside)
         return [self.step(int(row)) for row in np.flatnonzero(over)]
 
     def worst(self, syncs: range) -> Step | None:
@@ -269,7 +260,7 @@ class _Measured:
         wanted[max(0, syncs.stop - 1) :] = False
         if not wanted.any():
             return None
-        needed = np.where(wanted, (self.value - self.aside) / self.apart, -np.inf)
+        needed = np.where(wanted, self.value - self.aside, -np.inf)
         return self.step(int(np.argmax(needed)))
 
 
@@ -289,22 +280,19 @@ def _rules(steps: _Steps, axes: tuple[int, ...]) -> list[_Measured]:
     both = followed[1:] & followed[:-1]
     now, before = steps.counts[1:], np.where(both, steps.counts[:-1], 0.0)
     length, length_before = np.linalg.norm(now, axis=1), np.linalg.norm(before, axis=1)
-    periods = np.max(steps.periods, axis=1)
-    apart = (periods[1:] + periods[:-1]) / 2
-    alike = np.all(steps.periods == periods[:, np.newaxis], axis=1)
-    whole = np.all(followed[1:], axis=1) & alike[1:] & alike[:-1]
+    whole = np.all(followed[1:], axis=1)
     turned = np.minimum(_turn(now, before, length, length_before), _LARGEST_TURN)
     bow = (length + length_before) * turned**2 / 24
     change = np.linalg.norm(now - before, axis=1)
     ones, some = np.ones_like(length), np.any(followed[1:], axis=1)
     once, twice = _ROUNDING_COUNTS * ones, 2 * _ROUNDING_COUNTS * ones
     return [
-        _Measured(SPEED, axes, length, once, ones, some, followed[1:]),
+        _Measured(SPEED, axes, length, once, some, followed[1:]),
         _Measured(
-            *(ACCELERATION, axes, np.abs(length - length_before), twice + bow, apart),
+            *(ACCELERATION, axes, np.abs(length - length_before), twice + bow),
             *(whole, followed[1:]),
         ),
-        _Measured(TURN, axes, change, twice, apart, some, followed[1:]),
+        _Measured(TURN, axes, change, twice, some, followed[1:]),
     ]
 
 

@@ -68,6 +68,19 @@ def quick_stop(controller: Controller, wait_s: float = BOOT_S) -> None:
     controller.wait_for((OFF, BOOT), wait_s)
 
 
+def configure_anew(controller: Controller, wait_s: float = BOOT_S) -> None:
+    """Finds the drives and writes their whole configuration, without a fault: what another node has told them is gone.
+
+    Drives at standstill are switched off. Raises RefusedError while axes move, BusError when drives are missing.
+    """
+    controller.require_standing()
+    if controller.state() == READY:
+        controller.command(DISABLE)
+        controller.wait_for((OFF, BOOT), BOOT_S)
+    controller.command(RESET)
+    controller.wait_for((OFF,), wait_s)
+
+
 def reset(controller: Controller, wait_s: float = BOOT_S) -> bool:
     """Resets the present fault; false when there is none. Returns when the drives are configured again.
 

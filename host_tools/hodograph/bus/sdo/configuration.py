@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ...names import KERNELS
@@ -11,6 +13,8 @@ from . import objects
 from .objects import CONFIGURATION, Object
 
 if TYPE_CHECKING:
+    from canopen import ObjectDictionary
+
     from ...config import Axis, Machine
     from .node import Node
 
@@ -38,6 +42,19 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
     for sub, axis in enumerate(machine.axes, start=1):
         wanted += [((index, sub), value) for index, value in _axis(axis, counts)]
     return wanted
+
+
+def configuration_crc32(wanted: Sequence[tuple[Object, int]], dictionary: ObjectDictionary) -> int:
+    """The CRC-32 that a controller with this configuration has in 0x2050 sub 1 (docs/protocol.md section 3.4).
+
+    `dictionary`: the controller's, which says how many bytes a value has.
+    """
+    crc = 0
+    for (index, sub), value in sorted(wanted, key=lambda entry: (entry[0][0], entry[0][1] or 0)):
+        variable = dictionary.get_variable(index, sub or 0)
+        assert variable is not None, f"0x{index:04X} sub {sub}"
+        crc = zlib.crc32(struct.pack("<HB", index, sub or 0) + variable.encode_raw(value), crc)
+    return crc
 
 
 def configured_limits(controller: Node) -> tuple[float, float, int, int]:
@@ -85,3 +102,6 @@ def _axis(axis: Axis, counts_per_mm: int) -> Iterator[tuple[int, int]]:
     yield objects.FEED_CONSTANT, scaling.feed_counts_per_rev
     yield objects.GEAR_MOTOR, scaling.gear_motor_revolutions
     yield objects.GEAR_SHAFT, scaling.gear_shaft_revolutions
+    yield objects.EXPECTED_VENDOR, axis.identity.vendor
+    yield objects.EXPECTED_PRODUCT, axis.identity.product
+    yield objects.EXPECTED_REVISION, axis.identity.revision

@@ -17,26 +17,32 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from ...data import CONTROLLER_EDS
 from ...errors import BusError, RefusedError, RunError, one_line
 from ..address import BusAddress
+from ..words.boot_texts import BootTrouble, boot_trouble
 from ..words.texts import PROGRAM_STATES, REFUSALS, STATES, detail_text, fault_text, fault_words
-from .configuration import configuration
+from .configuration import configuration, configuration_crc32
 from .network import open_network
-from .node import Node
+from .node import IDENTITY_OBJECT, Node
 from .objects import (
     AXIS_NODE,
     BOOT,
+    BOOT_TROUBLE,
     BUSY,
     COMMAND,
     CONFIGURATION,
+    CONFIGURATION_STATE,
     DISABLE,
     ENABLE,
     ENABLING,
+    EXPECTED_VENDOR,
     FAULT,
     FAULT_STATE,
     HELD,
     HOLD,
     HOLDING,
     HOMING,
+    LOAD,
     MOVING,
+    NODE_NUMBER,
     OFF,
     ON_PATH,
     OVERRIDE,
@@ -44,15 +50,20 @@ from .objects import (
     READY,
     REFUSED_MOVING,
     RESET,
+    RESTORE_DEFAULTS,
     RESUME,
     RUNNING,
+    SAVE,
     START,
     START_FROM,
     START_POSITION,
     STATE,
     STATISTICS,
     STOP,
+    STORE,
     TARGET,
+    UNHOMED_START,
+    Object,
 )
 from .upload import Progress, upload
 
@@ -86,15 +97,22 @@ class Controller(Node):
     # -- configuration ------------------------------------------------------------------------
 
     def configure(self, machine: Machine, kernel: str) -> bool:
-        """Brings the controller's configuration to that of the machine file.
+        """Brings the controller's configuration to that of the machine file, and confirms it.
 
         Writes only what differs; switches the drives off for that when they stand still. Returns whether anything
         was written. Raises RefusedError while moving.
         """
         wanted = configuration(machine, kernel)
-        different = [(key, value) for key, value in wanted if self.read(*key) != value]
-        if not different:
+        crc32 = configuration_crc32(wanted, self.sdo.od)
+        if self.configuration_crc() == crc32:
             return False
+        different = [(key, value) for key, value in wanted if self.read(*key) != value]
+        if different:
+            self._write_configuration(different)
+        self._confirm(crc32)
+        return bool(different)
+
+    def _write_configuration(self, different: list[tuple[Object, int]]) -> None:
         state = self.state()
         if state in (*BUSY, ENABLING):
             raise RefusedError(
@@ -105,7 +123,45 @@ class Controller(Node):
             self.wait_for((OFF, BOOT), 5.0)
         for key, value in different:
             self.write(*key, value)
-        return True
+
+    def _confirm(self, crc32: int) -> None:
+        try:
+            self.write(CONFIGURATION_STATE, 2, crc32)
+        except RefusedError as error:
+            raise RefusedError(
+                f"{self.who()} does not hold the configuration that it was given: another command has changed it "
+                "meanwhile (give this one again), or host tools and controller are of different versions (rebuild both)"
+            ) from error
+
+    def configuration_crc(self) -> int | None:
+        """CRC-32 of the configuration that was confirmed, or restored after power-on; None: there is none."""
+        return self.read(CONFIGURATION_STATE, 2) if self.read(CONFIGURATION_STATE, 3) else None
+
+    def store(self) -> None:
+        """Stores all parameters, so that they hold after a loss of power too (0x1010)."""
+        self._keep(STORE, SAVE, "stored")
+
+    def restore_defaults(self) -> None:
+        """Forgets the stored parameters: from the next power-on on the defaults hold (0x1011)."""
+        self._keep(RESTORE_DEFAULTS, LOAD, "forgotten")
+
+    def _keep(self, index: int, signature: int, done: str) -> None:
+        state = self.state()
+        if state not in (BOOT, OFF, FAULT_STATE):
+            raise RefusedError(
+                f"{self.who()} is {STATES.get(state, state)}: parameters are {done} with the drives off only: "
+                "hodograph stop --off first"
+            )
+        try:
+            self.write(index, 1, signature)
+        except RefusedError as error:
+            raise RefusedError(
+                f"{error}: the memory of the controller did not take it, what was stored before stays"
+            ) from error
+
+    def set_node_number(self, number: int) -> None:
+        """Node number from the next power-on on, 0: the board's own; holds only when it is stored."""
+        self.write(NODE_NUMBER, None, number)
 
     # -- programs -----------------------------------------------------------------------------
 
@@ -129,8 +185,7 @@ class Controller(Node):
     def command(self, command: int) -> None:
         """Gives a command; raises RefusedError with the controller's reason."""
         try:
-            with self.turn():
-                self.sdo[COMMAND].raw = command
+            self.patiently(COMMAND, None, lambda: self._give(command))
         except SdoAbortedError as error:
             reason = self.read(FAULT, 4)
             text = REFUSALS.get(reason, str(error))
@@ -139,6 +194,9 @@ class Controller(Node):
             raise CommandRefusedError(f"{self.who()} refused: {text}", reason) from error
         except SdoCommunicationError as error:
             raise BusError(f"{self.who()} stopped answering a command") from error
+
+    def _give(self, command: int) -> None:
+        self.sdo[COMMAND].raw = command
 
     def wait_for(
         self, states: tuple[int, ...], wait_s: float, tick: Callable[[], None] | None = None
@@ -165,10 +223,23 @@ class Controller(Node):
             self.clock.sleep(POLL_S)
 
     def _waiting_for(self, state: int) -> str:
+        if state == BOOT and (trouble := self.boot_trouble()) is not None:
+            return f"{trouble.text}: {trouble.remedy}"
         if state in (BOOT, ENABLING):
             nodes = [self.read(AXIS_NODE, i + 1) for i in range(self.read(CONFIGURATION, 1))]
             return f"are the drives (nodes {', '.join(map(str, nodes))}) on the bus?"
         return _GOES_ON.get(state, "see hodograph status")
+
+    def boot_trouble(self) -> BootTrouble | None:
+        """What keeps the drives from being found and configured; None: nothing, or nobody knows."""
+        node, place, abort_code, value = (self.read(BOOT_TROUBLE, sub) for sub in (1, 2, 3, 4))
+        expected = None
+        if place >> 8 == IDENTITY_OBJECT and abort_code == 0:
+            axes = range(1, self.read(CONFIGURATION, 1) + 1)
+            nodes = {self.read(AXIS_NODE, axis): axis for axis in axes}
+            if node in nodes:
+                expected = self.read(EXPECTED_VENDOR - 1 + (place & 0xFF), nodes[node])
+        return boot_trouble(node, place, abort_code, value, expected)
 
     def fault_text(self) -> str:
         """The present fault in words."""
@@ -199,15 +270,20 @@ class Controller(Node):
             self.command(ENABLE)
         self.wait_for((READY,), 10.0)
 
-    def start(self, wait_s: float = 10.0, from_mm: float | None = None) -> None:
+    def start(
+        self, wait_s: float = 10.0, from_mm: float | None = None, *, unhomed: bool = False
+    ) -> None:
         """Starts the program, waiting as long as the axes are said to be still moving.
 
-        `from_mm`: from rest at this arc length of the path, where the axes must stand.
+        `from_mm`: from rest at this arc length of the path, where the axes must stand. `unhomed`: also when axes with a
+        homing method are not homed.
         """
         if from_mm is not None:
             self.write(START_POSITION, None, round(from_mm * 2**40))
         deadline = self.clock.now_s() + wait_s
         while True:
+            if unhomed:
+                self.write(UNHOMED_START, 1, 1)  # for one attempt
             try:
                 self.command(START if from_mm is None else START_FROM)
                 return

@@ -9,7 +9,7 @@ import queue
 import struct
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import can
@@ -68,6 +68,9 @@ class Network(canopen.Network):
         self._frames = bus
         self.clock: Clock = bus.clock if isinstance(bus, LocalBus) else REAL_CLOCK
         if not self.clock.is_virtual:
+            # The end of a bus is told to whoever sends or waits; its thread would print a traceback besides.
+            listeners: list[Any] = self.listeners
+            listeners.insert(0, _Ended())
             self.connect()
 
     def add_node(self, node: Any, *arguments: Any, **options: Any) -> Any:
@@ -119,6 +122,16 @@ class Network(canopen.Network):
             self.bus.socket.send(frame)
 
 
+class _Ended(can.Listener):
+    """Hears that the bus has ended, and leaves it to those who notice themselves."""
+
+    def on_message_received(self, msg: can.Message) -> None:
+        """See can.Listener."""
+
+    def on_error(self, exc: Exception) -> None:
+        """See can.Listener."""
+
+
 def _filters(node: int) -> list[dict[str, Any]]:
     return [
         {"can_id": base + node, "can_mask": 0x7FF, "extended": False}
@@ -150,5 +163,10 @@ def open_network(address: BusAddress, node: int, bitrate: int) -> Iterator[Netwo
     network = Network(bus)
     try:
         yield network
+    except can.CanError as error:
+        raise BusError(f"{address}: {one_line(error)}: did it go down?") from error
     finally:
-        network.disconnect()
+        with suppress(
+            can.CanError
+        ):  # what its thread found: whoever waited for an answer has an error of its own
+            network.disconnect()

@@ -27,11 +27,41 @@ IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))
 NOWHERE = 0x5000
 """The first of the 4096 indices that no EDS uses."""
 LET_PASS_S = 1.0
+ABORT, ABORT_BUSY = 0x80, 0x08000021
+"""Command byte of an abort; the code by which a server that has a transfer under way refuses another client."""
+BUSY_S = 5.0
+"""Patience with that: a client that is gone is forgotten after two seconds."""
+_BUSY_LOOK_S = 0.05
+_NOBODY = b"\xff\xff\xff"
+"""No object that anybody asks for."""
 _T = TypeVar("_T")
 
 
 class _SilentError(BusError):
     """No answer to the question that lets other answers pass."""
+
+
+class _Answers:
+    """canopen's queue of answers, less the refusals that are meant for another client of the same server."""
+
+    def __init__(self, queued: Any) -> None:
+        self._queued = queued
+        self.asked = b""
+        """Index and sub-index, as in a frame, of what we ask; empty: not known."""
+
+    def put(self, answer: bytes) -> None:
+        refusal = answer[0] == ABORT and answer[4:8] == ABORT_BUSY.to_bytes(4, "little")
+        if not (refusal and self.asked and answer[1:4] != self.asked):
+            self._queued.put(answer)
+
+    def get(self, block: bool = True, timeout: float | None = None) -> Any:
+        return self._queued.get(timeout=timeout) if block else self._queued.get(block=False)
+
+    def empty(self) -> bool:
+        """True, always: what came before a request is no answer to it, and is thrown away here."""
+        while not self._queued.empty():
+            self._queued.get(block=False)
+        return True
 
 
 class Node:
@@ -53,6 +83,7 @@ class Node:
         self._identified = False
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
+        self._answers = self.sdo.responses = _Answers(self.sdo.responses)
 
     def close(self) -> None:
         """Gives back what was opened for taking turns."""
@@ -76,6 +107,9 @@ class Node:
             raise
         except (can.CanError, OSError) as error:
             raise BusError(f"{self.address}: cannot send: {one_line(error)}") from error
+        except (KeyboardInterrupt, SystemExit):  # between a request and its answer, perhaps
+            self._under_way = True
+            raise
 
     def _let_pass(self) -> None:
         """Throws away answers that nobody waits for: all that come before the answer to a question only we ask.
@@ -83,16 +117,54 @@ class Node:
         The question is for an object that does not exist, another one for everybody and each time, so the answer is an
         abort that names it. Until it has come nothing else may be asked: it would be taken for the answer to that.
         """
-        nowhere = self._nowhere()
-        self.sdo.send_request(bytearray(b"\x40" + nowhere + bytes(4)))
-        deadline = self.clock.now_s() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+        nowhere = self._answers.asked = self._nowhere()
+        request = bytearray(b"\x40" + nowhere + bytes(4))
+        self.sdo.send_request(request)
+        begun_s = self.clock.now_s()
+        deadline = begun_s + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
         with suppress(queue.Empty):
             while (left := deadline - self.clock.now_s()) > 0:
                 answer = self.sdo.responses.get(timeout=left)
-                if answer[1:4] == nowhere:
+                if answer[1:4] != nowhere:
+                    continue
+                if int.from_bytes(answer[4:8], "little") != ABORT_BUSY:
                     self._under_way = False
                     return
+                if self.clock.now_s() - begun_s > BUSY_S:
+                    raise self._busy()
+                self.clock.sleep(_BUSY_LOOK_S)
+                self.sdo.send_request(request)
+                deadline = self.clock.now_s() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
         raise _SilentError(f"{self.who()} stopped answering: is its process or its power gone?")
+
+    def _busy(self) -> BusError:
+        return BusError(
+            f"{self.who()} is in the middle of a transfer with another SDO client (a program on another computer?): "
+            "try again when that is done"
+        )
+
+    def patiently(self, index: int, sub: int | None, action: Callable[[], _T]) -> _T:
+        """What an action on one object gives that takes a turn by itself; while the server has a transfer of another
+        client under way it is tried again for a while, then a BusError says so.
+        """
+        limit_s = self.clock.now_s() + BUSY_S
+        while True:
+            try:
+                with self.turn():
+                    self._answers.asked = _frame_bytes(index, sub)
+                    return action()
+            except SdoAbortedError as error:
+                if error.code != ABORT_BUSY:
+                    raise
+                if self.clock.now_s() > limit_s:
+                    raise self._busy() from error
+            finally:
+                self._answers.asked = b""
+            self.clock.sleep(_BUSY_LOOK_S)
+
+    def transfer_begun(self) -> None:
+        """Inside `patiently`: the server has taken our first request, so whom it refuses from now on is another."""
+        self._answers.asked = _NOBODY
 
     def _nowhere(self) -> bytes:
         """Another one each time, and for everybody; in virtual time the same in each run."""
@@ -121,8 +193,7 @@ class Node:
 
     def _guarded(self, action: Callable[[], _T], index: int, sub: int | None) -> _T:
         try:
-            with self.turn():
-                return action()
+            return self.patiently(index, sub, action)
         except SdoAbortedError as error:
             raise RefusedError(
                 f"{self.who()} refused object {_name(index, sub)}: {error}"
@@ -194,6 +265,11 @@ class Node:
 def _nowhere(number: int) -> bytes:
     """One of a million objects that no EDS has, as three bytes of an SDO: index and sub-index."""
     return struct.pack("<HB", NOWHERE | (number & 0xFFF), number >> 16 & 0xFF)
+
+
+def _frame_bytes(index: int, sub: int | None) -> bytes:
+    """As in a frame."""
+    return struct.pack("<HB", index, sub or 0)
 
 
 def _name(index: int, sub: int | None) -> str:

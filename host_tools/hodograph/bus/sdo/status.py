@@ -10,27 +10,38 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..words.boot_texts import BootTrouble, boot_trouble
+from ..words.boot_texts import BootTrouble
 from ..words.drive_states import inputs_on, state_of_number
-from ..words.texts import REFUSALS, STATES, detail_text, fault_words
+from ..words.texts import (
+    CONFIGURED,
+    REFUSALS,
+    STATES,
+    STORED,
+    TIMINGS,
+    detail_text,
+    fault_words,
+)
 from .controller import Controller
 from .objects import (
     ACTUAL,
     AXIS_NODE,
     BOOT,
-    BOOT_TROUBLE,
     CONFIGURATION,
+    CONFIGURATION_STATE,
     DIGITAL_INPUTS,
     DRIVE_ERROR,
     DRIVE_STATE,
     FAULT,
     FOLLOWING_ERROR,
     HOMED,
+    HOMING_METHOD,
     MISSED_TPDOS,
     MOTION,
     OVERRIDE,
     STATUSWORD,
     TARGET,
+    TIMING,
+    UNHOMED_START,
 )
 from .upload import program_fault_text
 
@@ -73,6 +84,21 @@ class LoadedProgram:
 
 
 @dataclass(frozen=True)
+class Configured:
+    """What the controller's configuration is and where it is from; CRC-32s as of docs/protocol.md section 3.4.
+
+    `state` and `stored` are words of CONFIGURED and STORED. `program_crc32`: under which configuration the loaded
+    program was checked last; another one than `crc32`: it is checked again before it starts.
+    """
+
+    state: str
+    crc32: int
+    stored: str
+    stored_crc32: int
+    program_crc32: int
+
+
+@dataclass(frozen=True)
 class PathPosition:
     """Where on the path the setpoint is."""
 
@@ -104,6 +130,7 @@ class AxisStatus:
     digital_inputs: int
     inputs_on: tuple[str, ...]
     homed: bool
+    homing_method: int
     error_code: int
     error: str | None
     remedy: str | None
@@ -124,7 +151,10 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Status:
-    """Everything that the controller tells, at one instant or nearly so."""
+    """Everything that the controller tells, at one instant or nearly so. `timing` is one of TIMINGS.
+
+    `unhomed_nodes`: drives that should have been homed, and were not, when the present or last program was started.
+    """
 
     bus: str
     node: int
@@ -132,10 +162,13 @@ class Status:
     fault: Fault | None
     boot_trouble: BootTrouble | None
     last_refusal: str | None
+    configuration: Configured
     program: LoadedProgram
     motion: PathPosition
     override: Override
+    unhomed_nodes: tuple[int, ...]
     axes: tuple[AxisStatus, ...]
+    timing: str
     statistics: Statistics
 
     def json(self) -> dict[str, Any]:
@@ -144,6 +177,7 @@ class Status:
         found["axes"] = [
             axis | {"inputs_on": list(axis["inputs_on"])} for axis in asdict(self)["axes"]
         ]
+        found["unhomed_nodes"] = list(self.unhomed_nodes)
         return found
 
 
@@ -155,8 +189,11 @@ def snapshot(controller: Controller) -> Status:
         override = [controller.read(OVERRIDE, sub) for sub in (1, 2, 3)]
         refusal = controller.read(FAULT, 4)
         fault = _fault(controller)
-        trouble = _boot_trouble(controller) if state == BOOT else None
+        trouble = controller.boot_trouble() if state == BOOT else None
+        configured = _configured(controller)
+        unhomed = controller.read(UNHOMED_START, 2)
         statistics = Statistics(**controller.statistics())
+        timing = controller.read(TIMING)
     with controller.turn():
         counts_per_mm = controller.read(CONFIGURATION, 7)
         axis_count = controller.read(CONFIGURATION, 1)
@@ -168,10 +205,13 @@ def snapshot(controller: Controller) -> Status:
         fault=fault,
         boot_trouble=trouble,
         last_refusal=REFUSALS.get(refusal),
+        configuration=configured,
         program=loaded_program(controller),
         motion=PathPosition(motion[0] * _Q40, motion[1] / 1000, motion[2] * _Q32),
         override=Override(override[0], 100 * override[1] * _Q30, bool(override[2])),
+        unhomed_nodes=tuple(axis.node for i, axis in enumerate(axes) if unhomed >> i & 1),
         axes=axes,
+        timing=TIMINGS.get(timing, str(timing)),
         statistics=statistics,
     )
 
@@ -190,8 +230,11 @@ def _fault(controller: Controller) -> Fault | None:
     return Fault(code, words.text, words.remedy, node, detail, detail_text(code, detail))
 
 
-def _boot_trouble(controller: Controller) -> BootTrouble | None:
-    return boot_trouble(*(controller.read(BOOT_TROUBLE, sub) for sub in (1, 2, 3, 4)))
+def _configured(controller: Controller) -> Configured:
+    crc32, state, stored, stored_crc32, program_crc32 = (
+        controller.read(CONFIGURATION_STATE, sub) for sub in (1, 3, 4, 5, 6)
+    )
+    return Configured(CONFIGURED[state], crc32, STORED[stored], stored_crc32, program_crc32)
 
 
 def loaded_program(controller: Controller) -> LoadedProgram:
@@ -222,6 +265,7 @@ def _axis(controller: Controller, i: int, counts_per_mm: int) -> AxisStatus:
         digital_inputs=inputs,
         inputs_on=inputs_on(inputs),
         homed=bool(controller.read(HOMED, i)),
+        homing_method=controller.read(HOMING_METHOD, i),
         error_code=error,
         error=words.text if words else None,
         remedy=words.remedy if words else None,

@@ -10,13 +10,16 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from ...errors import BusError, RefusedError, one_line
 from ..words.texts import STATES
 from .node import Node
-from .objects import PROGRAM, STATE
+from .objects import PROGRAM, PROGRAM_MEMORY, STATE
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
 _GAP_S = 0.01
 """Between two blocks the bus is left to heartbeats, over which SDO has right of way. A tick of a bus as full as
 `require_fit` allows leaves room for one or two frames.
 """
+
+_FATE_S = 1.0
+"""Patience with a controller after an upload that broke off."""
 
 Progress = Callable[[int], None]
 
@@ -26,23 +29,57 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
 
     `progress` is called with the number of bytes sent so far.
     """
+    require_room(node, image)
+    before = _active(node)
     patience, node.sdo.RESPONSE_TIMEOUT = node.sdo.RESPONSE_TIMEOUT, 5.0
     try:
-        with node.turn():
-            _block_download(node, image, progress)
+        node.patiently(PROGRAM, 1, lambda: _block_download(node, image, progress))
     except SdoAbortedError as error:
-        raise _refusal(node, error) from error
+        raise _refusal(node, error, before) from error
     except (SdoCommunicationError, RuntimeError) as error:
         raise BusError(
-            f"upload to {node.who()} broke off: {one_line(error)}: the old program is unharmed; "
-            "upload again"
+            f"upload to {node.who()} broke off: {one_line(error)}: {_fate(node, before)}; upload again"
         ) from error
     finally:
         node.sdo.RESPONSE_TIMEOUT = patience
 
 
+def require_room(node: Node, image: bytes) -> None:
+    """Raises RefusedError when no bank of this controller can hold the program with its records."""
+    from ...program.image import HEADER_SIZE
+    from ...program.memory import memory_bytes
+
+    if len(image) < HEADER_SIZE:
+        return
+    bank, segment, piece = (node.read(PROGRAM_MEMORY, sub) for sub in (1, 2, 3))
+    needed = memory_bytes(image, segment, piece)
+    if needed > bank:
+        raise RefusedError(
+            f"{node.who()} has {bank} bytes for a program, this one takes {needed} with what is prepared from it: "
+            "split the path, or use a controller with more memory; the old program stays"
+        )
+
+
+def _active(node: Node) -> tuple[int, int]:
+    """State and CRC-32 of the active program."""
+    return node.read(PROGRAM, 2), node.read(PROGRAM, 5)
+
+
+def _fate(node: Node, before: tuple[int, int]) -> str:
+    """What is known of the old program."""
+    node.sdo.RESPONSE_TIMEOUT = _FATE_S
+    try:
+        now = _active(node)
+    except (BusError, RefusedError):
+        return "whether the old program is still there is not known (hodograph status tells)"
+    if now[1] != before[1]:
+        return "the controller has another program now"
+    return "the old program is unharmed" if before[1] else "there is no program yet"
+
+
 def _block_download(node: Node, image: bytes, progress: Progress | None) -> None:
     stream = node.sdo.open(PROGRAM, 1, "wb", buffering=0, size=len(image), block_transfer=True)
+    node.transfer_begun()
     try:
         while stream.pos < len(image):
             stream.write(image[stream.pos : stream.pos + 7])
@@ -58,14 +95,16 @@ def _block_download(node: Node, image: bytes, progress: Progress | None) -> None
     stream.close()
 
 
-def _refusal(node: Node, error: SdoAbortedError) -> RefusedError | BusError:
+def _refusal(
+    node: Node, error: SdoAbortedError, before: tuple[int, int]
+) -> RefusedError | BusError:
     if error.code == ABORT_STATE:
         return RefusedError(
             f"{node.who()} takes no program now ({STATES.get(node.read(STATE), '?')}): "
             "wait until the axes stand, or hodograph stop"
         )
     if error.code != ABORT_VALUE_RANGE:
-        return BusError(f"upload to {node.who()} failed: {error}: the old program stays")
+        return BusError(f"upload to {node.who()} failed: {error}: {_fate(node, before)}")
     code, index = node.read(PROGRAM, 3), node.read(PROGRAM, 4)
     return RefusedError(
         f"{node.who()} refused the program: {program_fault_text(code, index)}; "

@@ -32,13 +32,17 @@ _OBJECTS = {
         "the drive takes no heartbeat of the controller: see its manual",
     ),
     0x1017: ("heartbeat producer", "the drive must send heartbeats: see its manual"),
-    0x1018: ("identity", "this is another device than before: correct the node numbers"),
+    0x1018: (
+        "identity",
+        "another device than the machine file names in [axis.identity]: correct cabling, node numbers or machine file",
+    ),
     0x1019: ("SYNC counter", "the drive must accept a SYNC with counter"),
     0x1029: ("error behaviour", "see the drive's manual"),
     0x2005: ("axis node", "correct the node numbers in the machine file"),
     0x6007: ("reaction to lost communication", "see the drive's manual"),
     0x605A: ("quick stop reaction", "see the drive's manual"),
     0x605E: ("fault reaction", "see the drive's manual"),
+    0x6040: ("controlword", "see the drive's manual"),
     0x6060: (
         "mode of operation",
         "the drive takes no cyclic synchronous position mode: see its manual",
@@ -47,6 +51,7 @@ _OBJECTS = {
         "mode of operation",
         "the drive stays in another mode: switch its local operation off",
     ),
+    0x6064: ("position", "see the drive's manual"),
     0x6065: ("following error window", "correct following_error_mm in the machine file"),
     0x6066: ("following error time-out", "correct the time-out in the machine file"),
     0x607C: ("home offset", "correct the home offset in the machine file"),
@@ -90,8 +95,13 @@ class BootTrouble:
     remedy: str
 
 
-def boot_trouble(node: int, place: int, abort_code: int, value: int) -> BootTrouble | None:
-    """The content of 0x2025 with words for it; None when nothing is wrong. `place` is index << 8 + sub."""
+def boot_trouble(
+    node: int, place: int, abort_code: int, value: int, expected: int | None = None
+) -> BootTrouble | None:
+    """The content of 0x2025 with words for it; None when nothing is wrong.
+
+    `place` is index << 8 + sub; `expected`: what should be there, where that is known.
+    """
     if node == 0:
         return None
     index, sub = place >> 8, place & 0xFF
@@ -104,7 +114,8 @@ def boot_trouble(node: int, place: int, abort_code: int, value: int) -> BootTrou
     elif index == 0x2005:
         text = f"axis {sub} has node {node}, which another axis or the controller has too"
     elif abort_code == 0:
-        text = f"the drive at node {node} has 0x{value:X} in {where}, which was not expected"
+        wanted = "which was not expected" if expected is None else f"expected is 0x{expected:X}"
+        text = f"the drive at node {node} has 0x{value:X} in {where}, {wanted}"
     else:
         text = f"the drive at node {node} refused {where}: {abort_words(abort_code)}"
     return BootTrouble(node, index, sub, abort_code, value, text, remedy)

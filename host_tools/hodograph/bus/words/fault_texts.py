@@ -134,6 +134,15 @@ _SINGLE = {
         "the bus takes no frames from the controller",
         "check CAN cable and termination: is any other node powered? look at the bus load",
     ),
+    0xFF08: (
+        "the axis is not where its setpoints are, and its drive does not say why",
+        "look for a jammed axis; another node may have changed the drive's PDOs: look with candump; "
+        "a drive that lags behind by design needs following_window_mm in the machine file",
+    ),
+    0xFF09: (
+        "SYNC stayed away for longer than real drives can bridge: the axes left the path",
+        "give the controller real-time priority (docs/cli.md, status) and an idle processor; home if in doubt",
+    ),
     0xFF10: (
         "the drive did not take the mode for homing, or the one for motion after it",
         "has the drive a homing mode (0x6502)? switch its local operation off",
@@ -256,7 +265,12 @@ def fault_text(code: int) -> str:
     return fault_words(code).text
 
 
-_COUNTS = {0x8250: "positions missed in a row", 0xFF07: "ticks in a row"}
+_COUNTS = {
+    0x8250: "positions missed in a row",
+    0xFF07: "ticks in a row",
+    0xFF08: "counts apart",
+    0xFF09: "us",
+}
 _PLAIN = (0x6100, 0xFF10)
 
 

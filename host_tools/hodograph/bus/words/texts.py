@@ -7,9 +7,12 @@ from .drive_states import state_of_statusword as drive_state
 from .fault_texts import detail_text, fault_text, fault_words
 
 __all__ = [
+    "CONFIGURED",
     "PROGRAM_STATES",
     "REFUSALS",
     "STATES",
+    "STORED",
+    "TIMINGS",
     "detail_text",
     "drive_state",
     "fault_text",
@@ -29,7 +32,20 @@ STATES = {
     9: "homing",
     10: "quick stop",
 }
+TIMINGS = {0: "kept", 1: "not permitted", 2: "not permitted, accepted"}
+"""Object 0x2040: whether the computer that runs the controller lets ticks come in time."""
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
+
+CONFIGURED = {0: "none", 1: "confirmed", 2: "restored"}
+"""Object 0x2050 sub 3: by a host since power-on, or from the controller's store."""
+STORED = {
+    0: "nothing",
+    1: "whole",
+    2: "of another firmware",
+    3: "damaged",
+    4: "defaults",
+}
+"""Object 0x2050 sub 4."""
 
 REFUSALS = {
     1: "no program is loaded: hodograph upload FILE",
@@ -43,5 +59,10 @@ REFUSALS = {
     9: "the drives are on, homing wants them off: hodograph stop --off",
     10: "a drive that shall be homed has no homing mode: set method = 0 in its [axis.homing] of the machine file",
     11: "no axis has a homing method: add it to the machine file",
+    12: "it has no configuration since its power-on: hodograph configure FILE (upload, goto and run do it as well); "
+    "with --store it is there after the next power-on too",
+    13: "axes with a homing method are not homed since their drive's power-on: hodograph home, or --unhomed on purpose",
+    16: "the drives are real and this computer does not permit real-time priority: run the controller with "
+    "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }
 """Object 0x2003 sub 4, and the remedy."""

@@ -28,6 +28,7 @@ def _goto(command: Command) -> None:
     goto.add_argument(
         "--to", type=finite, nargs=2, metavar=("X", "Y"), help="move there instead (machine mm)"
     )
+    options.unhomed(goto)
     options.machine(goto)
     options.bus(goto)
     options.kernel(goto)
@@ -36,6 +37,7 @@ def _goto(command: Command) -> None:
 def _run(command: Command) -> None:
     run = command("run", "run paths on the bus, record and analyse")
     options.file(run, many=True)
+    options.unhomed(run)
     options.machine(run)
     options.bus(run)
     options.kernel(run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..values import finite, node_number, percentage, seconds
+from ..values import finite, node_number, node_or_own, percentage, seconds
 from . import options
 from .options import Command
 
@@ -21,6 +21,7 @@ def _start(command: Command) -> None:
         help="from rest at this arc length, where the axes must stand",
     )
     start.add_argument("--follow", action="store_true", help="return when the axes stand again")
+    options.unhomed(start)
     options.bus(start)
     options.node(start)
 
@@ -60,6 +61,38 @@ def _home(command: Command) -> None:
     options.timeout(home, "what the controller allows")
 
 
+def _configure(command: Command) -> None:
+    configure = command(
+        "configure", "bring the controller's configuration to a machine file, keep it, or forget it"
+    )
+    configure.add_argument(
+        "file",
+        metavar="FILE",
+        type=Path,
+        nargs="?",
+        help="machine file, or a path file that names one",
+    )
+    configure.add_argument(
+        "--store",
+        action="store_true",
+        help="keep the parameters over a loss of power, until they are stored again",
+    )
+    configure.add_argument(
+        "--forget",
+        action="store_true",
+        help="forget what is stored: after the next power-on the controller has no configuration",
+    )
+    configure.add_argument(
+        "--set-node",
+        type=node_or_own,
+        metavar="N",
+        help="node number of the controller after the next power-on, stored with all parameters; 0: the board's own",
+    )
+    options.bus(configure)
+    options.kernel(configure)
+    options.node(configure)
+
+
 def _quick_stop(command: Command) -> None:
     for name, text in (
         ("quick-stop", "all drives brake by their own ramps at once, off the path, and switch off"),
@@ -96,4 +129,4 @@ def _status(command: Command) -> None:
     )
 
 
-ALL = (_start, _stop, _hold, _home, _quick_stop, _override, _status)
+ALL = (_start, _stop, _hold, _home, _configure, _quick_stop, _override, _status)

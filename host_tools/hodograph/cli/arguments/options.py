@@ -59,6 +59,15 @@ def node(parser: argparse.ArgumentParser, why: str = "for node number and bit ra
     parser.add_argument("--machine", type=Path, metavar="FILE", help=why)
 
 
+def unhomed(parser: argparse.ArgumentParser) -> None:
+    """--unhomed."""
+    parser.add_argument(
+        "--unhomed",
+        action="store_true",
+        help="move although axes with a homing method are not homed since their drive's power-on",
+    )
+
+
 def file(parser: argparse.ArgumentParser, *, many: bool = False, what: str = "path file") -> None:
     """FILE."""
     if many:

@@ -19,6 +19,8 @@ from ....errors import InputError, one_line
 from ..frames import RECORD_DTYPE, Frames
 from .channels import chosen_channel
 
+_FURTHEST_S = 1e11
+"""More than three thousand years from 1970."""
 _OLDEST_S = 631_152_000
 """Python-can writes no start time into a BLF before 1990."""
 
@@ -92,6 +94,11 @@ class _Columns:
             raise ValueError("a frame of CAN FD; classic frames only")
         flags = message.is_remote_frame * REMOTE
         flags |= ERROR if message.is_error_frame else message.is_extended_id * EXTENDED
+        longest = 0x1FFF_FFFF if message.is_extended_id or message.is_error_frame else 0x7FF
+        if not 0 <= message.arbitration_id <= longest:
+            raise ValueError(f"an identifier of {message.arbitration_id:#x}, above {longest:#x}")
+        if not abs(message.timestamp) <= _FURTHEST_S:
+            raise ValueError(f"a time of {message.timestamp:g} s")
         size = min(message.dlc, 8)
         if len(message.data) != size and not flags & (REMOTE | ERROR):
             raise ValueError(f"{len(message.data)} of {size} data bytes")

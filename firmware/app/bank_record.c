@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/bank_record.h"
+
+#include "canopen/cob.h"
+#include "core/crc32.h"
+#include "port/port.h"
+
+/* Where the CRC begins: so that neither erased memory nor a record of another form passes. */
+#define SEED        UINT32_C(0x52444748)
+#define CRC_AT      12u
+#define HALF_CIRCLE UINT32_C(0x80000000)
+
+uint32_t bank_record_room(unsigned bank)
+{
+    return port_store_size(bank) - BANK_RECORD_SIZE;
+}
+
+bool bank_record_read(unsigned bank, struct bank_record *record)
+{
+    const uint8_t *bytes = port_store_data(bank) + bank_record_room(bank);
+    record->sequence = cob_get32(bytes);
+    record->size = cob_get32(bytes + 4);
+    record->tag = cob_get32(bytes + 8);
+    return cob_get32(bytes + CRC_AT) == crc32_update(SEED, bytes, CRC_AT) &&
+           record->size <= bank_record_room(bank);
+}
+
+int bank_record_write(unsigned bank, const struct bank_record *record)
+{
+    uint8_t bytes[BANK_RECORD_SIZE];
+    cob_put32(bytes, record->sequence);
+    cob_put32(bytes + 4, record->size);
+    cob_put32(bytes + 8, record->tag);
+    cob_put32(bytes + CRC_AT, crc32_update(SEED, bytes, CRC_AT));
+    return port_store_write(bank, bank_record_room(bank), bytes, BANK_RECORD_SIZE);
+}
+
+bool bank_record_newer(const struct bank_record *first, const struct bank_record *second)
+{
+    const uint32_t ahead = first->sequence - second->sequence;
+    return ahead != 0u && ahead < HALF_CIRCLE;
+}

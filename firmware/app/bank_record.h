@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * bank_record: the mark at the end of a bank of the store that says: what is in here is whole. Programs and
+ * parameters have it alike.
+ *
+ *     sequence u32 | size u32 | tag u32 | CRC-32 of the twelve bytes before u32
+ *
+ * little-endian, in the last BANK_RECORD_SIZE bytes. It is written last, when the content has passed every check, so
+ * that a bank without a valid record never counts, wherever the power went. Of two valid ones the later sequence
+ * (modulo 2^32) is the newer content. Mainline.
+ */
+#ifndef APP_BANK_RECORD_H
+#define APP_BANK_RECORD_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define BANK_RECORD_SIZE 16u
+
+struct bank_record {
+    uint32_t sequence;
+    uint32_t size; /* of the content, bytes */
+    uint32_t
+        tag; /* a program: CRC-32 of the configuration it was checked against; parameters: CRC-32 of the content */
+};
+
+/* Bytes of a bank that are left for the content. */
+uint32_t bank_record_room(unsigned bank);
+
+/* False when the bank has no valid record. */
+bool bank_record_read(unsigned bank, struct bank_record *record);
+
+/* Once after each erase, after everything else. 0 or PORT_ERR_STORE. */
+int bank_record_write(unsigned bank, const struct bank_record *record);
+
+/* Whether the first was written after the second. Pure. */
+bool bank_record_newer(const struct bank_record *first, const struct bank_record *second);
+
+#endif

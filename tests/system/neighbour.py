@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""A second node on the bus that speaks out of turn, drives that say they are real, and how a machine is afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+import can
+
+from bench import Bench
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.local_bus import LocalBus
+from hodograph.bus.processes import Process, controller_command, drive_command, virtual_clock
+from hodograph.bus.sdo.controller import FAULT_STATE, OFF, READY, connect
+from hodograph.bus.sdo.objects import FAULT
+from hodograph.cli.main import main
+from hodograph.config import Machine
+
+START, STOP, PRE_OPERATIONAL, RESET_NODE = 0x01, 0x02, 0x80, 0x81
+LIMIT_S = 20.0
+
+
+class Neighbour:
+    """A node that sends what it likes, in the time of the test."""
+
+    def __init__(self, channel: str) -> None:
+        self._bus = LocalBus(channel)
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """One frame."""
+        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def nmt(self, command: int, node: int) -> None:
+        """An NMT command; node 0: to all."""
+        self.send(0, bytes([command, node]))
+
+    def write(self, node: int, index: int, sub: int, value: int, size: int) -> None:
+        """An SDO download of up to four bytes; nobody looks at the answer."""
+        head = bytes([0x23 | (4 - size) << 2]) + index.to_bytes(2, "little") + bytes([sub])
+        self.send(0x600 + node, head + value.to_bytes(size, "little").ljust(4, b"\0"))
+
+    def close(self) -> None:
+        self._bus.shutdown()
+
+
+@contextmanager
+def neighbour(hub: LocalHub) -> Iterator[Neighbour]:
+    """A second node on the bus."""
+    made = Neighbour(hub.address.channel)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+@contextmanager
+def real_drives(
+    hub: LocalHub, machine: Machine, *, vendor: int = 0x123, controller: tuple[str, ...] = ()
+) -> Iterator[Bench]:
+    """A machine whose drives name a vendor, as real ones do: configured, drives off. The processes are `drives` and
+    `controller-1`; `controller` are more words of its command line.
+    """
+    clock = virtual_clock(hub.address)
+    assert clock is not None
+    words = [
+        f"{word},vendor={vendor}" if word.startswith("node=") else word
+        for word in drive_command(machine, hub.address)
+    ]
+    with ExitStack() as stack:
+        stack.callback(clock.release)
+        commands = (
+            ("drives", words),
+            ("controller-1", [*controller_command(machine, hub.address, "real-time"), *controller]),
+        )
+        for name, command in commands:
+            stack.callback(Process(name, command, clock).end)
+        node = stack.enter_context(connect(hub.address, machine.node, machine.bitrate))
+        node.require(5.0)
+        node.configure(machine, "fixed")
+        node.wait_for((OFF,), 10.0)
+        yield Bench(machine, None, node, hub.address)  # type: ignore[arg-type]
+
+
+def settled(bench: Bench, limit_s: float = LIMIT_S) -> tuple[int, int, int]:
+    """Lets time pass until the controller is ready, off or in fault; then state, fault code and node."""
+    end_s = bench.clock.now_s() + limit_s
+    while (state := bench.controller.state()) not in (READY, OFF, FAULT_STATE):
+        assert bench.clock.now_s() < end_s, f"still in state {state}"
+        bench.clock.sleep(0.01)
+    return state, bench.controller.read(FAULT, 1), bench.controller.read(FAULT, 2)
+
+
+def runs_again(path: str, reset: Callable[[], int] = lambda: main(["reset"])) -> None:
+    """The way out that the documentation names, and the program as if nothing had been."""
+    assert reset() == 0
+    assert main(["goto", path]) == 0
+    assert main(["start", "--follow"]) == 0

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: MIT
+"""A clumsy or hostile second node: nothing that it does to a machine ends in a state that says all is well when it is
+not, or that only a restart gets it out of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from canopen_bench import BUSY, Hand, hand, object_bytes
+from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
+
+from bench import EXAMPLES, Bench, MakeAlpha, MakeBench
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.listening.recorder import Recorder
+from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
+from hodograph.bus.sdo import node
+from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, RUNNING
+from hodograph.bus.sdo.objects import FAULT
+from hodograph.chain import load_chain
+from hodograph.cli.main import main
+
+DRIVE = 2
+AWAY = 0xFF08
+LOST = 0x8250
+OFF_BIT = 0x80000000
+
+
+@pytest.fixture
+def other(hub: LocalHub, clock: VirtualClock) -> Iterator[Neighbour]:
+    with neighbour(hub) as made:
+        yield made
+
+
+Moving = Callable[[float], tuple[Bench, str]]
+
+
+@pytest.fixture
+def moving(make_bench: MakeBench, alpha_at: MakeAlpha) -> Iterator[Moving]:
+    """A machine so many seconds into a program of ten; in the end no setpoint may have jumped."""
+    recorders: list[tuple[Bench, Recorder]] = []
+
+    def begin(seconds: float) -> tuple[Bench, str]:
+        bench, path = make_bench(), str(alpha_at(10))
+        recorders.append((bench, Recorder(bench.bus)))
+        assert main(["goto", path]) == 0
+        assert main(["start"]) == 0
+        bench.clock.sleep(seconds)
+        assert bench.controller.state() == RUNNING
+        return bench, path
+
+    yield begin
+    for bench, recorder in recorders:
+        frames = recorder.so_far()
+        recorder.stop()
+        assert find_jumps(frames, bench.machine.nodes, step_limits(bench.machine)) == []
+
+
+@pytest.mark.parametrize("seconds", [0.05, 2.0, 9.9])
+def test_setpoints_switched_off_at_a_drive(
+    moving: Moving, other: Neighbour, seconds: float
+) -> None:
+    """0x1400 sub 1: it hears no setpoints any more, says nothing, and stands."""
+    bench, path = moving(seconds)
+    other.write(DRIVE, 0x1400, 1, OFF_BIT | 0x202, 4)
+    assert settled(bench) == (FAULT_STATE, AWAY, DRIVE)
+    assert bench.controller.read(FAULT, 3) > 5000
+    runs_again(path)
+
+
+def test_setpoints_switched_off_at_a_drive_that_stands(
+    make_bench: MakeBench, alpha_at: MakeAlpha, other: Neighbour
+) -> None:
+    """What is wrong shows in the next motion; and `reset` finds it without one."""
+    bench, path = make_bench(), str(alpha_at(50))
+    assert main(["goto", path]) == 0
+    other.write(DRIVE, 0x1400, 1, OFF_BIT | 0x202, 4)
+    assert main(["reset"]) == 0
+    assert bench.controller.state() == OFF
+    assert main(["goto", path]) == 0
+    assert main(["start", "--follow"]) == 0
+
+
+@pytest.mark.parametrize("seconds", [0.05, 2.0, 9.9])
+def test_a_drive_stopped_by_nmt(moving: Moving, other: Neighbour, seconds: float) -> None:
+    """STOPPED, it answers no SDO: it is made pre-operational before it is asked anything."""
+    bench, path = moving(seconds)
+    other.nmt(STOP, DRIVE)
+    state, code, _ = settled(bench)
+    assert (state, code) == (FAULT_STATE, LOST)
+    runs_again(path)
+
+
+@pytest.mark.parametrize("node", [0, DRIVE])
+@pytest.mark.parametrize("command", [PRE_OPERATIONAL, RESET_NODE, 0x82])
+def test_nmt_to_drives_in_motion(moving: Moving, other: Neighbour, command: int, node: int) -> None:
+    bench, path = moving(2.0)
+    other.nmt(command, node)
+    assert settled(bench)[0] == FAULT_STATE
+    runs_again(path)
+
+
+def remap(other: Neighbour, communication: int, entries: tuple[int, ...], cob: int) -> None:
+    """A PDO with another mapping, as CiA 301 prescribes it."""
+    mapping = communication + 0x200
+    other.write(DRIVE, communication, 1, OFF_BIT | cob, 4)
+    other.write(DRIVE, mapping, 0, 0, 1)
+    for sub, entry in enumerate(entries, start=1):
+        other.write(DRIVE, mapping, sub, entry, 4)
+    other.write(DRIVE, mapping, 0, len(entries), 1)
+    other.write(DRIVE, communication, 1, cob, 4)
+
+
+STATUSWORD, POSITION, MODE, INPUTS = 0x60410010, 0x60640020, 0x60610008, 0x60FD0020
+CONTROLWORD, TARGET = 0x60400010, 0x607A0020
+
+
+@pytest.mark.parametrize(
+    "entries", [(POSITION, STATUSWORD), (INPUTS, STATUSWORD), (STATUSWORD, INPUTS), (STATUSWORD,)]
+)
+def test_tpdo1_mapped_otherwise(moving: Moving, other: Neighbour, entries: tuple[int, ...]) -> None:
+    """What comes under its identifier is no statusword any more, or no position; the reset writes the mapping anew."""
+    bench, path = moving(2.0)
+    remap(other, 0x1800, entries, 0x40000180 + DRIVE)
+    assert settled(bench)[0] == FAULT_STATE
+    runs_again(path)
+
+
+def test_rpdo1_with_its_objects_swapped(moving: Moving, other: Neighbour) -> None:
+    """Target and controlword change places: what the drive takes for a controlword is half a position."""
+    bench, path = moving(2.0)
+    remap(other, 0x1400, (TARGET, CONTROLWORD), 0x200 + DRIVE)
+    assert settled(bench)[0] == FAULT_STATE
+    runs_again(path)
+
+
+def test_tpdo1_switched_off(moving: Moving, other: Neighbour) -> None:
+    bench, path = moving(2.0)
+    other.write(DRIVE, 0x1800, 1, OFF_BIT | 0x40000180 + DRIVE, 4)
+    assert settled(bench) == (FAULT_STATE, LOST, DRIVE)
+    runs_again(path)
+
+
+@pytest.mark.parametrize("kind", [0, 2, 10, 240, 254, 255])
+def test_transmission_types_of_tpdo1(moving: Moving, other: Neighbour, kind: int) -> None:
+    """A drive that answers not every SYNC is a drive that is lost; one that answers more often does no harm."""
+    bench, path = moving(2.0)
+    other.write(DRIVE, 0x1800, 1, OFF_BIT | 0x40000180 + DRIVE, 4)
+    other.write(DRIVE, 0x1800, 2, kind, 1)
+    other.write(DRIVE, 0x1800, 1, 0x40000180 + DRIVE, 4)
+    state, code, _ = settled(bench)
+    assert state == READY or (state, code) == (FAULT_STATE, LOST)
+    runs_again(path)
+
+
+@pytest.mark.parametrize("period_ms", [0, 1001, 65535])
+def test_the_controllers_heartbeat_cannot_be_switched_off(
+    moving: Moving, other: Neighbour, period_ms: int
+) -> None:
+    """The drives watch it: they stop by themselves when it stays away for two seconds."""
+    bench, _ = moving(1.0)
+    other.write(1, 0x1017, 0, period_ms, 2)
+    bench.clock.sleep(0.1)
+    assert bench.controller.read(0x1017) == 100
+    assert settled(bench) == (READY, 0, 0)
+
+
+def test_another_heartbeat_with_the_number_of_a_drive(moving: Moving, other: Neighbour) -> None:
+    """Two that say they are node 2: a boot-up message of one is a restart."""
+    bench, path = moving(1.0)
+    for _ in range(20):
+        other.send(0x700 + DRIVE, b"\x05")
+        bench.clock.sleep(0.05)
+    assert bench.controller.state() == RUNNING
+    other.send(0x700 + DRIVE, b"\x00")
+    assert settled(bench)[:2] == (FAULT_STATE, 0xFF03)
+    runs_again(path)
+
+
+def test_another_heartbeat_with_the_number_of_the_controller(
+    moving: Moving, other: Neighbour
+) -> None:
+    bench, path = moving(1.0)
+    for state in (0x00, 0x04, 0x7F, 0x05):
+        other.send(0x701, bytes([state]))
+        bench.clock.sleep(0.05)
+    assert settled(bench)[:1] in ((READY,), (FAULT_STATE,))
+    runs_again(path)
+
+
+def asked_by_hand(other: Hand, request: bytes) -> int:
+    """The abort code of the answer that names this object; 0: it is no abort."""
+    other.send(request)
+    while (answer := other.answer())[1:4] != request[1:4]:
+        pass
+    return int.from_bytes(answer[4:8], "little") if answer[0] == 0x80 else 0
+
+
+def test_a_second_client_beside_an_upload(make_bench: MakeBench, hub: LocalHub) -> None:
+    """Another computer, which knows nothing of the turns taken on this one, asks in the middle of a block download: it
+    is refused each time, the upload goes on and is whole.
+    """
+    bench, image = make_bench(), load_chain(EXAMPLES / "alpha.toml").image
+    refused: list[int] = []
+    requests = (
+        b"\x40" + object_bytes(0x2002, 0),
+        b"\x2f" + object_bytes(0x2001, 0) + b"\x02",
+        b"\xc6" + object_bytes(0x2000, 1) + b"\0\1",
+    )
+    with hand(hub, 1) as stranger:
+
+        def progress(sent: int) -> None:
+            if sent % 700 < 7 and (sent // 7) % 127 + 1 not in (0x40, 0x2F, 0x46):
+                refused.extend(asked_by_hand(stranger, request) for request in requests)
+                stranger.send(b"\x80" + object_bytes(0x2002, 0) + b"\0\0\4\5")
+
+        bench.controller.upload(image, progress)
+    assert len(refused) >= 12
+    assert set(refused) == {BUSY}
+    assert bench.controller.program_crc() == int.from_bytes(image[12:16], "little")
+
+
+def test_a_command_beside_another_computers_upload(
+    make_bench: MakeBench,
+    hub: LocalHub,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is patient for a while, then says who is in the way; a client that is gone is forgotten."""
+    bench = make_bench()
+    with hand(hub, 1) as stranger:
+        assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
+        began_s = bench.clock.now_s()
+        assert bench.controller.state() in (BOOT, OFF)
+        assert 1.5 < bench.clock.now_s() - began_s < 2.5  # the server's time-out
+        monkeypatch.setattr(node, "BUSY_S", 1.0)
+        assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
+        assert main(["status"]) == 4
+        assert "another SDO client" in capsys.readouterr().err
+
+
+FRAME_BITS_LEAST = 111
+"""Of a frame of eight bytes, without stuff bits; at 1 Mbit/s as many microseconds."""
+
+
+def flood(other: Neighbour, identifier: int, seconds: float) -> None:
+    """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
+    for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
+        other.send(identifier, b"\xaa" * 8)
+
+
+@pytest.mark.parametrize("identifier", [0x7FF, 0x6FF])
+def test_a_bus_that_is_full_of_what_matters_less(
+    moving: Moving, other: Neighbour, identifier: int
+) -> None:
+    """All that matters has right of way: the program runs to its end at a load of 100 %."""
+    bench, path = moving(1.0)
+    flood(other, identifier, 0.15)
+    bench.clock.sleep(0.15)
+    assert settled(bench) == (READY, 0, 0)
+    runs_again(path)
+
+
+@pytest.mark.parametrize("seconds", [0.0005, 0.002, 0.05])
+def test_a_bus_that_is_full_of_what_matters_more(
+    moving: Moving, other: Neighbour, seconds: float
+) -> None:
+    """Nothing else gets through: setpoints wait, and answers. Simulated drives wait too."""
+    bench, path = moving(1.0)
+    flood(other, 0x001, seconds)
+    bench.clock.sleep(seconds)
+    state, code, _ = settled(bench)
+    assert (state, code) in ((READY, 0), (FAULT_STATE, LOST))
+    runs_again(path)
