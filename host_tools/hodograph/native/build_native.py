@@ -23,6 +23,7 @@ HEADERS = (
     "plant/drive.h",
     "rig/contour.h",
     "rig/rig.h",
+    "rig/stop_search.h",
     "rig/axis_run.h",
 )
 LIBRARIES = ("sim", "core")

@@ -137,6 +137,30 @@ void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64
 void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
 enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_FAULT, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };
 
+/* rig/stop_search.h */
+struct stop_row {
+    double s_mm, tangent[2], curvature, slope, feed_mm_s;
+};
+struct stop_cap {
+    double from_mm, to_mm, feed_mm_s;
+};
+struct stop_limits {
+    double feed, acceleration, jerk, centripetal;
+    double axis_velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
+    const struct stop_cap *caps;
+    uint32_t cap_count;
+};
+struct stop_found {
+    uint8_t codes[3];
+    double worst_s, mean_s;
+};
+#define STOP_ROWS ...
+void stop_rows(const struct program *p, const struct stop_limits *limits, struct stop_row *rows);
+void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
+               struct stop_limits *used);
+void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
+                 struct stop_found *found);
+
 /* rig/axis_run.h */
 struct axis_run {
     double rated_torque_nm, friction_volts;

@@ -58,7 +58,7 @@ def check_image(image: bytes, limits: ProgramLimits | None = None) -> Fault | No
     return _check(decode(image), limits, reserved_fields(image))
 
 
-_CLEAN = ReservedFields(flags=True, axes=True, name=True, pieces=None)
+_CLEAN = ReservedFields(flags=True, axes=True, name=True, pieces=None, stops=None)
 
 
 def _check(

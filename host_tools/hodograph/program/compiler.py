@@ -20,6 +20,7 @@ from .geometry import quantise
 from .image import NAME_SIZE, Program
 from .limits import ProgramLimits
 from .neighbours import LEAST_FEED_MM_S, brief_pairs
+from .stops import no_stops
 
 Int = NDArray[np.int64]
 
@@ -102,6 +103,7 @@ def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL)
         u_q44=geometry.u_q44,
         v_q44=geometry.v_q44,
         pieces=pieces,
+        stops=no_stops(len(pieces)),
     )
     fault = check(program, options.limits)
     if fault is not None:
