@@ -4,6 +4,7 @@
 #include "core/crossing_check.h"
 #include "core/piece_check.h"
 #include "core/segment_check.h"
+#include "core/stop_check.h"
 
 #define NAME_FROM 80u
 #define NAME_SIZE 32u
@@ -67,6 +68,9 @@ int program_check(const struct program *p, const struct program_limits *limits,
     }
     if (fault->code == 0) {
         fault->code = crossing_check_all(p, &fault->index);
+    }
+    if (fault->code == 0) {
+        fault->code = stop_check_all(p, limits, &fault->index);
     }
     return fault->code;
 }

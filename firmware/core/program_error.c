@@ -55,6 +55,11 @@ static const struct text texts[] = {
     {PROGRAM_ERR_ACCELERATION, "above its acceleration limit"},
     {PROGRAM_ERR_JERK, "above its jerk limit"},
     {PROGRAM_ERR_OVERRIDE, "override factor not in 1.0 ... 2.0, rate or second rate 0"},
+    {PROGRAM_ERR_STOP_ENTRY, "some codes of a stop are 0 and some are not, or a reserved field is not 0"},
+    {PROGRAM_ERR_STOP_NUMBERS, "a brake would be above the limits of the controller"},
+    {PROGRAM_ERR_STOP_BOUND, "a stop can take longer than its bound"},
+    {PROGRAM_ERR_STOP_LONG, "a fault stop can take longer than the controller allows"},
+    {PROGRAM_ERR_STOP_WORST, "the worst stops of the header are not those of the table"},
     {PROGRAM_ERR_PIECE_RESERVED, "reserved field of a piece is not 0"},
 };
 

@@ -18,6 +18,7 @@ PACKAGE = Path(__file__).resolve().parent
 ROOT = PACKAGE.parents[2]
 HEADERS = (
     "core/program_check.h",
+    "core/stop_check.h",
     "core/interp.h",
     "core/timebase.h",
     "plant/drive.h",

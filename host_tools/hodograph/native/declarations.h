@@ -19,6 +19,7 @@ struct program {
 struct program_limits {
     uint32_t period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
     int64_t min_q40_mm[2], max_q40_mm[2];
+    uint32_t stop_time_ms;
 };
 struct program_fault {
     int code;
@@ -29,6 +30,17 @@ uint32_t program_ticks(const struct program *p);
 int program_check(const struct program *p, const struct program_limits *limits,
                   struct program_fault *fault);
 const char *program_error_text(int code);
+
+/* core/stop_check.h */
+enum program_stop_kind { PROGRAM_STOP_HOLD, PROGRAM_STOP_FAULT };
+struct stop_bound {
+    uint32_t time_us, way_um;
+};
+struct stop_walk {
+    ...;
+};
+void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);
+struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece);
 
 /* core/interp.h */
 enum interp_kernel { INTERP_FIXED, INTERP_FLOAT, INTERP_DOUBLE };

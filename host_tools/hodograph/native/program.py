@@ -25,7 +25,7 @@ POINT = np.dtype(
 
 @dataclass(frozen=True)
 class NativeLimits:
-    """What a controller allows: struct program_limits. 0 stands for no limit in the first four.
+    """What a controller allows: struct program_limits. 0 stands for no limit, but for the travel.
 
     Travel limits are (x, y) in mm * 2^40; period in us, feed in um/s, acceleration in um/s^2, jerk in mm/s^3.
     """
@@ -36,6 +36,7 @@ class NativeLimits:
     jerk_mm_s3: int = 0
     min_q40_mm: tuple[int, int] = (-(2**52), -(2**52))
     max_q40_mm: tuple[int, int] = (2**52, 2**52)
+    stop_time_ms: int = 0
 
 
 @dataclass(frozen=True)

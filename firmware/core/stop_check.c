@@ -1,0 +1,325 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/stop_check.h"
+
+#include "core/feed_bounds.h"
+#include "core/qmath.h"
+
+#define NO_BOUND UINT32_MAX
+
+/* What is beyond these counts as no bound: 2^14 mm/s, 2^24 mm/s^2; so no product below passes 2^63. */
+#define MOST_SPEED_UM  ((uint64_t)1 << 24)
+#define MOST_CHANGE_UM ((uint64_t)1 << 34)
+#define MOST_TIME_US   ((uint64_t)1 << 32)
+
+/* --- Numbers of the table, as floor of their exact values --- */
+
+static const uint32_t eighth_q16[8] = {65536u, 71468u,  77935u,  84990u,
+                                       92681u, 101070u, 110217u, 120193u};
+
+/* Decelerations in 2^-24 mm/s^2, jerks in 2^-18 mm/s^3; below 2^48. */
+static uint64_t number(uint32_t code)
+{
+    return (uint64_t)eighth_q16[code & 7u] << (code >> 3);
+}
+
+static uint64_t lesser(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+static uint64_t greater(uint64_t a, uint64_t b)
+{
+    return a > b ? a : b;
+}
+
+/* a / b, up; b > 0 */
+static uint64_t over(uint64_t a, uint64_t b)
+{
+    return qmath_div_u64(a + b - 1u, b);
+}
+
+/* Time in us in which a jerk (2^-18 mm/s^3) makes an acceleration (um/s^2, up to 2^34): a 2^18 1000 / j. */
+static uint64_t jerk_time_us(uint64_t change_um, uint64_t jerk_q18)
+{
+    return over(change_um * 1000u, greater(jerk_q18 >> 18, 1u));
+}
+
+/* --- What a piece asks of a brake --- */
+
+/* Motion of a piece at any rate that its override bounds allow. */
+struct extent {
+    uint64_t speed_um;  /* greatest, um/s, */
+    uint64_t rising_um; /* and acceleration at a constant rate, um/s^2, */
+    uint64_t slope_um;  /* and what a changing rate adds to it, */
+    uint64_t cut_us;    /* and the time in which such a change is taken back */
+    int settled;        /* a brake fits at every instant, as far as deceleration goes */
+};
+
+/* a 1000 / 2^bits, up; a < 2^52 */
+static uint64_t thousands(int64_t a, int bits)
+{
+    return a <= 0 ? 0u : (((uint64_t)a * 1000u) >> bits) + 1u;
+}
+
+/* value (um, up to 2^34) times the factor of the override, up. */
+static uint64_t scaled(uint64_t value, uint32_t factor_q24)
+{
+    return ((value * (factor_q24 >> 8)) >> 16) + (value >> 16) + 1u;
+}
+
+/* v >= f^3 a^2 / (2 j) and what a tick changes, all at the lowest speed and the strongest deceleration. */
+static int settled(const struct program *p, uint64_t speed_um, uint64_t falling_um,
+                   uint32_t factor_q24, uint64_t jerk_q18)
+{
+    uint64_t fall = scaled(scaled(falling_um, factor_q24), factor_q24);
+    uint64_t time_us = jerk_time_us(fall, jerk_q18);
+    if (falling_um == 0u) {
+        return 1;
+    }
+    if (time_us >= (uint64_t)1 << 28 || fall > MOST_CHANGE_UM) {
+        return 0;
+    }
+    time_us = time_us / 2u + 2u * p->header.period_us;
+    return speed_um > over(fall * time_us, 1000000u);
+}
+
+static uint64_t held(int64_t value, int bits, uint64_t most)
+{
+    return value >= (int64_t)1 << 52 ? most + 1u : lesser(thousands(value, bits), most + 1u);
+}
+
+static void piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
+                         struct extent *out)
+{
+    struct program_piece c;
+    int64_t low[2];
+    int64_t high[2];
+    program_piece_get(p, piece, &c);
+    feed_bounds_range(&c, FEED_VELOCITY, &low[0], &high[0]);
+    feed_bounds_range(&c, FEED_ACCELERATION, &low[1], &high[1]);
+    uint64_t speed = held(high[0], 24, MOST_SPEED_UM);
+    out->speed_um = scaled(speed, c.override_factor_q24);
+    out->rising_um = held(high[1], 24, MOST_CHANGE_UM);
+    out->rising_um = scaled(scaled(out->rising_um, c.override_factor_q24), c.override_factor_q24);
+    out->slope_um = ((uint64_t)c.override_rate_q16_per_s * lesser(out->speed_um, MOST_SPEED_UM) >> 16) + 1u;
+    /* rate 2^-16 over second 2^-8: 10^6 / 2^8 = 15625 / 4 */
+    out->cut_us =
+        over((uint64_t)c.override_rate_q16_per_s * 15625u, (uint64_t)c.override_second_q8_per_s2 * 4u);
+    uint64_t slow = low[0] <= 0 ? 0u : (uint64_t)low[0] >> 24 << 10;
+    uint64_t least = low[0] <= 0 ? 0u : lesser(slow - slow / 32u, MOST_SPEED_UM);
+    out->settled = settled(p, least, held(-low[1], 24, MOST_CHANGE_UM), c.override_factor_q24, jerk_up_q18);
+}
+
+/* --- The brake --- */
+
+/* The S-curve from speed v and acceleration a to rest in continuous time; any deceleration up to the number gives a bound,
+ * and the root one that is near the least. */
+static struct stop_bound curve(uint64_t speed_um, uint64_t rising_um, const struct program_stop *stop)
+{
+    const struct stop_bound none = {NO_BOUND, NO_BOUND};
+    uint64_t down = lesser(number(stop->jerk_down) >> 18, (uint64_t)1 << 29);
+    uint64_t up = lesser(number(stop->jerk_up) >> 18, (uint64_t)1 << 29);
+    down = greater(down, 1u);
+    up = greater(up, 1u);
+    uint64_t lead_us = over(rising_um * 1000u, down);
+    if (speed_um > MOST_SPEED_UM || rising_um > MOST_CHANGE_UM || lead_us >= (uint64_t)1 << 28) {
+        return none;
+    }
+    uint64_t peak_um = speed_um + over(rising_um * lead_us, 2000000u); /* of the speed */
+    if (peak_um > 2u * MOST_SPEED_UM) {
+        return none;
+    }
+    uint64_t mean = greater(qmath_div_u64(2u * down * up, down + up), 1u); /* mm/s^3 */
+    uint64_t most = number(stop->deceleration) * 125u >> 21;               /* um/s^2 */
+    uint64_t depth = greater(lesser(qmath_root(peak_um * mean * 1000u), most), 1u);
+    uint64_t first_us = over(depth * 1000u, down);
+    uint64_t last_us = over(depth * 1000u, up);
+    uint64_t even_us = over(peak_um * 1000000u, depth);
+    uint64_t time_us = lead_us + even_us + (first_us + last_us) / 2u + 1u;
+    if (time_us >= MOST_TIME_US) {
+        return none;
+    }
+    /* the way is the speed times the centre of the deceleration in time */
+    uint64_t centre_us = lead_us + (time_us - lead_us) / 2u + 1u;
+    centre_us += first_us > last_us ? qmath_div_u64(first_us - last_us, 6u) + 1u : 0u;
+    uint64_t way_um = over(peak_um * centre_us, 1000000u);
+    struct stop_bound out = {(uint32_t)time_us, (uint32_t)lesser(way_um, NO_BOUND)};
+    return out;
+}
+
+static struct stop_bound sum(struct stop_bound a, uint64_t time_us, uint64_t way_um)
+{
+    struct stop_bound out = {
+        (uint32_t)lesser(a.time_us + time_us, NO_BOUND),
+        (uint32_t)lesser(a.way_um + way_um, NO_BOUND),
+    };
+    return out;
+}
+
+static struct stop_bound most_of(struct stop_bound a, struct stop_bound b)
+{
+    struct stop_bound out = {a.time_us > b.time_us ? a.time_us : b.time_us,
+                             a.way_um > b.way_um ? a.way_um : b.way_um};
+    return out;
+}
+
+/* The bound with the numbers of a piece, for a brake that begins in it. */
+static struct stop_bound brake_bound(const struct program *p, const struct extent *extent,
+                                     const struct program_stop *stop, enum program_stop_kind kind)
+{
+    uint64_t slope = extent->slope_um;
+    uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
+    if (kind == PROGRAM_STOP_HOLD) { /* a rising rate is cut first, until it adds little */
+        uint64_t little = number(stop->deceleration) * 125u >> 23;
+        more_us += slope > little ? extent->cut_us : 0u;
+        slope = lesser(slope, little);
+    }
+    /* half a tick more of the first part */
+    uint64_t rising = lesser(extent->rising_um + slope, MOST_CHANGE_UM + 1u);
+    uint64_t speed = lesser(extent->speed_um + over(rising * p->header.period_us, 2000000u),
+                            MOST_SPEED_UM + 1u);
+    struct stop_bound out = curve(speed, rising, stop);
+    return sum(out, more_us, over(speed * lesser(more_us, MOST_TIME_US), 1000000u));
+}
+
+static uint64_t micro(uint64_t q, int bits, uint64_t most)
+{
+    return q >= (uint64_t)1 << 43 ? most : over(q * 1000000u, (uint64_t)1 << bits);
+}
+
+/* The plan goes on to the end of the piece and into the next. */
+static struct stop_bound waited(const struct program *p, uint32_t piece, struct stop_bound next)
+{
+    int64_t from = program_piece_start(p, piece);
+    int64_t to = piece + 1u < p->header.piece_count ? program_piece_start(p, piece + 1u)
+                                                    : p->header.length_q40_mm;
+    uint64_t way_um = to <= from ? 0u : ((uint64_t)(to - from) >> 30) + 1u; /* below 2^-30 mm < um */
+    return sum(next, micro(program_piece_duration(p, piece), 32, NO_BOUND), way_um);
+}
+
+/* --- The walk --- */
+
+void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind)
+{
+    const struct stop_bound rest = {0, 0};
+    walk->program = p;
+    walk->kind = kind;
+    /* periods in 2^-32 s, up: 2^32 / 10^6 < 4295 */
+    walk->window_q32_s = (uint64_t)STOP_WINDOW_TICKS * p->header.period_us * 4295u;
+    walk->next = rest;
+    walk->count = 0;
+}
+
+static void remember(struct stop_walk *walk, struct stop_bound own, uint64_t duration_q32_s)
+{
+    for (int k = STOP_WINDOW - 1; k > 0; k--) {
+        walk->own[k] = walk->own[k - 1];
+        walk->duration_q32_s[k] = walk->duration_q32_s[k - 1];
+    }
+    walk->own[0] = own;
+    walk->duration_q32_s[0] = duration_q32_s;
+    walk->count += walk->count < STOP_WINDOW ? 1u : 0u;
+}
+
+struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece)
+{
+    const struct program *p = walk->program;
+    struct program_stop stop;
+    struct extent extent;
+    struct stop_bound own = {0, 0};
+    program_stop_get(p, piece, walk->kind, &stop);
+    if (stop.deceleration != 0u) {
+        piece_extent(p, piece, number(stop.jerk_up), &extent);
+        own = brake_bound(p, &extent, &stop, walk->kind);
+    }
+    if (stop.deceleration == 0u || !extent.settled) {
+        own = most_of(own, waited(p, piece, walk->next));
+    }
+    struct stop_bound out = own;
+    uint64_t ahead = 0;
+    for (uint32_t k = 0; k < walk->count && ahead < walk->window_q32_s; k++) {
+        out = most_of(out, walk->own[k]);
+        ahead += walk->duration_q32_s[k];
+    }
+    remember(walk, own, program_piece_duration(p, piece));
+    walk->next = out;
+    return out;
+}
+
+/* --- The check --- */
+
+/* No number above the limits; a limit of 0 is none. */
+static int within_limits(const struct program_stop *stop, const struct program_limits *limits)
+{
+    uint64_t jerk = (uint64_t)limits->jerk_mm_s3 << 18;
+    /* 2^-24 mm/s^2 against um/s^2 = 10^-3 mm/s^2 */
+    int fits = limits->acceleration_um_s2 == 0u ||
+               number(stop->deceleration) * 125u >> 21 <= limits->acceleration_um_s2;
+    return fits && (jerk == 0u || (number(stop->jerk_down) <= jerk && number(stop->jerk_up) <= jerk));
+}
+
+static int check_entry(const struct program_stop *stop, const struct program_limits *limits)
+{
+    int some = stop->jerk_down != 0u || stop->deceleration != 0u || stop->jerk_up != 0u;
+    int all = stop->jerk_down != 0u && stop->deceleration != 0u && stop->jerk_up != 0u;
+    if (stop->reserved != 0u || some != all) {
+        return PROGRAM_ERR_STOP_ENTRY;
+    }
+    return !all || within_limits(stop, limits) ? 0 : PROGRAM_ERR_STOP_NUMBERS;
+}
+
+static int check_entries(const struct program *p, const struct program_limits *limits, uint32_t *index)
+{
+    for (*index = 0; *index < p->header.piece_count; (*index)++) {
+        for (int kind = PROGRAM_STOP_HOLD; kind <= PROGRAM_STOP_FAULT; kind++) {
+            struct program_stop stop;
+            program_stop_get(p, *index, (enum program_stop_kind)kind, &stop);
+            int code = check_entry(&stop, limits);
+            if (code != 0) {
+                return code;
+            }
+        }
+    }
+    return 0;
+}
+
+/* The bounds of a kind, and the header's worst. most_us: of a bound, 0: any. */
+static int check_kind(const struct program *p, enum program_stop_kind kind,
+                      const struct stop_bound *said, uint32_t most_ms, uint32_t *index)
+{
+    struct stop_walk walk;
+    uint32_t longest_us = 0;
+    uint32_t longest_um = 0;
+    stop_walk_begin(&walk, p, kind);
+    for (uint32_t i = p->header.piece_count; i > 0u; i--) {
+        struct program_stop stop;
+        struct stop_bound bound = stop_walk_back(&walk, i - 1u);
+        program_stop_get(p, i - 1u, kind, &stop);
+        *index = i - 1u;
+        if (stop.bound_us < bound.time_us) {
+            return PROGRAM_ERR_STOP_BOUND;
+        }
+        if (most_ms != 0u && stop.bound_us > (uint64_t)most_ms * 1000u) {
+            return PROGRAM_ERR_STOP_LONG;
+        }
+        longest_us = stop.bound_us > longest_us ? stop.bound_us : longest_us;
+        longest_um = bound.way_um > longest_um ? bound.way_um : longest_um;
+    }
+    *index = 0;
+    return said->time_us == longest_us && said->way_um >= longest_um ? 0 : PROGRAM_ERR_STOP_WORST;
+}
+
+int stop_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
+{
+    const struct program_header *h = &p->header;
+    const struct stop_bound hold = {h->hold_worst_us, h->hold_worst_um};
+    const struct stop_bound fault = {h->fault_worst_us, h->fault_worst_um};
+    int code = check_entries(p, limits, index);
+    if (code == 0) {
+        code = check_kind(p, PROGRAM_STOP_HOLD, &hold, 0u, index);
+    }
+    if (code == 0) {
+        code = check_kind(p, PROGRAM_STOP_FAULT, &fault, limits->stop_time_ms, index);
+    }
+    return code;
+}
