@@ -42,8 +42,7 @@ static int check_header(const struct program *p, const struct program_limits *li
     if (code != 0) {
         return code;
     }
-    if ((h->flags & ~PROGRAM_FLAG_CLOSED) != 0 || !bytes_are_zero(p->image + 76, 4) ||
-        !bytes_are_zero(p->image + 112, 16)) {
+    if ((h->flags & ~PROGRAM_FLAG_CLOSED) != 0 || !bytes_are_zero(p->image + 76, 4)) {
         return PROGRAM_ERR_FLAGS;
     }
     if (h->axis_count != 2) {
