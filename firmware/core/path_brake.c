@@ -11,7 +11,7 @@
 
 /* --- Numbers of the stop table (docs/protocol.md 1.4) --- */
 
-/* 2^16 2^(i/8), rounded down. */
+/* About 2^16 2^(i/8): what the codes are defined by. */
 static const uint32_t mantissa[8] = {65536u, 71468u,  77935u,  84990u,
                                      92681u, 101070u, 110217u, 120193u};
 
@@ -97,8 +97,7 @@ static int first_guess(struct ticks *ticks, const struct path_state *from,
     }
     const int64_t first_q16 = from->acceleration_q56 < 0 ? (int64_t)used_q16 - (int64_t)lead_q16
                                                          : (int64_t)used_q16 + (int64_t)lead_q16;
-    const uint64_t last_q16 =
-        qmath_product_unsigned((uint32_t)used_q16, (uint32_t)ratio_q16) >> 16;
+    const uint64_t last_q16 = qmath_product_unsigned((uint32_t)used_q16, (uint32_t)ratio_q16) >> 16;
     if (qmath_magnitude(first_q16) > (int64_t)MOST_Q16 || last_q16 > MOST_Q16 ||
         (first_q16 < 0 && peak_q16 < most_q16)) {
         return 0;
@@ -235,6 +234,7 @@ int64_t path_brake_way_q40_mm(const struct path_brake *brake)
     const int64_t peak = brake->up_q56 * n3; /* a sixth of it */
     const int64_t even_from = brake->at.speed_q56 + 3 * (down - 2 * peak) * n1;
     const int64_t even_to = 3 * peak * n3;
-    return (brake->at.speed_q56 >> FINE_BITS) * n1 + ((2 * down - 3 * peak) >> FINE_BITS) * n1 * n1 +
+    return (brake->at.speed_q56 >> FINE_BITS) * n1 +
+           ((2 * down - 3 * peak) >> FINE_BITS) * n1 * n1 +
            ((even_from + even_to) >> (FINE_BITS + 1)) * n2 + (peak >> FINE_BITS) * n3 * n3;
 }

@@ -19,7 +19,7 @@
 
 #include "core/program.h"
 
-#define PATH_BRAKE_MOST_TICKS 4095u               /* of each of the three parts */
+#define PATH_BRAKE_MOST_TICKS 4095u              /* of each of the three parts */
 #define PATH_BRAKE_MOST_SPEED ((int64_t)1 << 61) /* 32 mm a tick */
 #define PATH_BRAKE_NO_SPEED   ((int64_t)1 << 16) /* 2^-40 mm a tick: below it the path rests */
 
