@@ -101,7 +101,7 @@ static void piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_
     out->speed_um = scaled(speed, c.override_factor_q24);
     out->rising_um = held(high[1], 24, MOST_CHANGE_UM);
     out->rising_um = scaled(scaled(out->rising_um, c.override_factor_q24), c.override_factor_q24);
-    out->slope_um = ((uint64_t)c.override_rate_q16_per_s * lesser(out->speed_um, MOST_SPEED_UM) >> 16) + 1u;
+    out->slope_um = ((uint64_t)c.override_rate_q16_per_s * lesser(speed, MOST_SPEED_UM) >> 16) + 1u;
     /* rate 2^-16 over second 2^-8: 10^6 / 2^8 = 15625 / 4 */
     out->cut_us =
         over((uint64_t)c.override_rate_q16_per_s * 15625u, (uint64_t)c.override_second_q8_per_s2 * 4u);

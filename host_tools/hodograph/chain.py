@@ -22,6 +22,7 @@ from .program import (
     ProgramOptions,
     compile_path,
     encode,
+    StopTerms,
     fit_plan,
 )
 from .spline import SplineResult, from_control_polygon, through_points
@@ -49,6 +50,19 @@ def plants(machine: Machine | None, limits: Limits) -> tuple[Plant, Plant] | Non
             '[limits] volts needs a machine: add [machine] file = "..." or use --machine FILE'
         )
     x, y = (_plant(drive, limits.volts) for drive in machine.models(machine.plane))
+    return x, y
+
+
+def drive_plants(machine: Machine) -> tuple[Plant, Plant] | None:
+    """The plants of x and y with all the volts of their drives, None when one of them has no drive file, or no volts
+    left beside its friction.
+    """
+    known = [axis.drive for axis in machine.plane if axis.drive is not None]
+    if len(known) < len(machine.plane) or any(
+        drive.volts_limit <= (drive.equipment.friction_volts or 0.0) for drive in known
+    ):
+        return None
+    x, y = (_plant(drive, drive.volts_limit) for drive in known)
     return x, y
 
 
@@ -83,6 +97,7 @@ def program_limits(machine: Machine) -> ProgramLimits:
         jerk_mm_s3=round(machine.jerk_mm_s3),
         min_q40_mm=(low[0], low[1]),
         max_q40_mm=(high[0], high[1]),
+        stop_time_ms=machine.stop_time_ms,
     )
 
 
@@ -194,8 +209,24 @@ class Chain:
             return compile_path(
                 spline,
                 plan,
-                ProgramOptions(self.file.name, machine.offset_mm, limits, machine.period_us),
+                ProgramOptions(
+                    self.file.name,
+                    machine.offset_mm,
+                    limits,
+                    machine.period_us,
+                    self._stop_terms,
+                ),
             )
+
+    @property
+    def _stop_terms(self) -> StopTerms:
+        """What the stops of the program keep beside the limits of its plan."""
+        machine, limits = self.machine, self.file.limits
+        return StopTerms(
+            plants=plants(machine, limits),
+            drives=drive_plants(machine),
+            stop_time_ms=machine.stop_time_ms,
+        )
 
     @property
     def program(self) -> Program:

@@ -11,6 +11,11 @@
 #define STEP_S        0.002 /* between two looks at a brake */
 #define GREATEST_CODE 255
 #define NEVER_S       1e6
+#define LONGEST_SHARE 0.1
+#define FEWER         56  /* codes below the greatest: a brake with less than a 128th of a limit is none */
+#define NO_BRAKE_S    10.0
+#define WAIT_BETTER   0.8   /* of the mean time: rather none than such a brake; */
+#define WAIT_AS_GOOD  1.001 /* or such a one that could also take much longer */
 #define NEAR          1.05 /* so near to the least time without limits no other start is tried */
 
 /* What is looked at: one over the limits, less the margin; 0: none. */
@@ -37,6 +42,8 @@ struct piece {
     uint32_t row[MOST_INSTANTS]; /* of the path, before it */
     uint32_t count;
     double step_s;
+    double left_s;        /* of the program, behind the piece */
+    struct state fastest; /* of all rates: greatest speed and acceleration */
     double factor, rate; /* bounds of the override */
     uint32_t suspect;    /* the instant at which a limit was broken last */
 };
@@ -44,11 +51,14 @@ struct piece {
 struct search {
     const struct stop_row *rows;
     uint32_t row_count;
-    struct inverse inverse;
+    struct inverse inverse;     /* at the rate 1, */
+    struct inverse at_any_rate; /* and at others */
+    uint32_t rise_is_cut;
     uint32_t period_us;
     double period_s;
     double length_mm;
-    int most[3]; /* greatest codes */
+    double deceleration; /* greatest */
+    int most[3];         /* greatest codes */
 };
 
 /* --- The path --- */
@@ -247,8 +257,8 @@ static struct state moved(const struct state *from, double j, double t)
 }
 
 /* 1 while the brake keeps the limits all the way. */
-static int brake_keeps(const struct search *search, const struct brake *brake,
-                       const struct state *from, uint32_t row)
+static int brake_keeps(const struct search *search, const struct inverse *inverse,
+                       const struct brake *brake, const struct state *from, uint32_t row)
 {
     struct state begin = *from;
     for (int phase = 0; phase < 3; phase++) {
@@ -260,7 +270,7 @@ static int brake_keeps(const struct search *search, const struct brake *brake,
             while (row + 2u < search->row_count && search->rows[row + 1u].s_mm <= at.s) {
                 row++;
             }
-            if (strain(&search->inverse, &search->rows[row], &at, brake->jerk[phase]) > 1.0) {
+            if (strain(inverse, &search->rows[row], &at, brake->jerk[phase]) > 1.0) {
                 return 0;
             }
         }
@@ -299,7 +309,7 @@ static double piece_powers(const struct program_piece *from, double c[8])
 }
 
 static void piece_look(const struct search *search, const struct program *p, uint32_t i,
-                       struct piece *piece)
+                       double left_s, struct piece *piece)
 {
     struct program_piece from;
     double c[8];
@@ -309,6 +319,8 @@ static void piece_look(const struct search *search, const struct program *p, uin
     piece->count = (uint32_t)parts + 1u;
     piece->step_s = seconds / parts;
     piece->suspect = 0;
+    piece->left_s = left_s;
+    piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
     piece->rate = ldexp((double)from.override_rate_q16_per_s, -16);
     for (uint32_t k = 0; k < piece->count; k++) {
@@ -318,19 +330,16 @@ static void piece_look(const struct search *search, const struct program *p, uin
         at->v = greater(piece_value(c, u, 1) / seconds, 0.0);
         at->a = piece_value(c, u, 2) / (seconds * seconds);
         piece->row[k] = row_at(search, at->s);
+        piece->fastest.v = greater(piece->fastest.v, at->v);
+        piece->fastest.a = greater(piece->fastest.a, at->a);
     }
+    double slope = piece->rate * piece->fastest.v;
+    double little = search->rise_is_cut ? 0.25 * search->deceleration : HUGE_VAL;
+    piece->fastest.v *= piece->factor;
+    piece->fastest.a = piece->fastest.a * piece->factor * piece->factor + fmin(slope, little);
 }
 
 /* --- The search --- */
-
-/* Whether a brake from this state keeps the limits, or does not fit (the plan goes on then). */
-static int start_keeps(const struct search *search, const struct state *from, uint32_t row,
-                       const struct path_brake_numbers *numbers)
-{
-    struct brake brake;
-    return !brake_plan(&brake, from->v, from->a, numbers, search->period_s) ||
-           brake_keeps(search, &brake, from, row);
-}
 
 static void numbers_of(const struct search *search, const int codes[3],
                        struct path_brake_numbers *numbers)
@@ -346,6 +355,8 @@ static void numbers_of(const struct search *search, const int codes[3],
 /* Times to rest from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
 struct times {
     double mean_s, worst_s, first_s;
+    double longest_s; /* brake at any rate */
+    double cost_s;    /* the mean, and a share of the longest */
     struct brake brakes[MOST_INSTANTS]; /* total_s NEVER_S: the plan goes on */
 };
 
@@ -353,6 +364,7 @@ struct times {
 static void times_of(const struct search *search, const struct piece *piece,
                      const struct path_brake_numbers *numbers, double after_s, struct times *times)
 {
+    struct brake longest;
     double sum = 0.0;
     times->first_s = after_s;
     times->worst_s = 0.0;
@@ -360,14 +372,20 @@ static void times_of(const struct search *search, const struct piece *piece,
         struct brake *brake = &times->brakes[i - 1u];
         const struct state *at = &piece->at[i - 1u];
         double wait = times->first_s + (i == piece->count ? 0.0 : piece->step_s);
-        if (!brake_plan(brake, at->v, at->a, numbers, search->period_s)) {
-            brake->total_s = NEVER_S;
-        }
-        times->first_s = brake->total_s < wait ? brake->total_s : wait;
+        double left = piece->left_s + piece->step_s * (piece->count - i);
+        /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not counted,
+         * or the worst numbers would be the best. */
+        int planned = brake_plan(brake, at->v, at->a, numbers, search->period_s);
+        int fits = planned && brake->total_s < left;
+        brake->total_s = fits ? brake->total_s : NEVER_S;
+        times->first_s = fits ? brake->total_s : planned ? left : wait;
         times->worst_s = greater(times->worst_s, times->first_s);
         sum += times->first_s;
     }
     times->mean_s = sum / piece->count;
+    int fits = brake_plan(&longest, piece->fastest.v, piece->fastest.a, numbers, search->period_s);
+    times->longest_s = fits ? longest.total_s : NO_BRAKE_S;
+    times->cost_s = times->mean_s + LONGEST_SHARE * times->longest_s;
 }
 
 /* Whether these brakes keep the limits; the instant that broke one last is looked at first. */
@@ -376,7 +394,7 @@ static int all_keep(const struct search *search, struct piece *piece, const stru
     for (uint32_t n = 0; n < piece->count; n++) {
         uint32_t i = (n + piece->suspect) % piece->count;
         if (times->brakes[i].total_s < NEVER_S &&
-            !brake_keeps(search, &times->brakes[i], &piece->at[i], piece->row[i])) {
+            !brake_keeps(search, &search->inverse, &times->brakes[i], &piece->at[i], piece->row[i])) {
             piece->suspect = i;
             return 0;
         }
@@ -384,22 +402,37 @@ static int all_keep(const struct search *search, struct piece *piece, const stru
     return 1;
 }
 
+/* Whether a brake from this state, which is inside the limits itself, keeps them or does not fit. */
+static int state_keeps(const struct search *search, const struct state *from, uint32_t row,
+                       const struct path_brake_numbers *numbers)
+{
+    struct brake brake;
+    return strain(&search->at_any_rate, &search->rows[row], from, 0.0) > 1.0 ||
+           !brake_plan(&brake, from->v, from->a, numbers, search->period_s) ||
+           brake_keeps(search, &search->at_any_rate, &brake, from, row);
+}
+
 /* The same limits at other rates of program time, also while the rate changes. */
 static int other_rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
 {
     static const double rates[] = {1.0, 0.9, 0.75, 0.5, 0.25, 0.1};
+    const size_t count = sizeof rates / sizeof rates[0];
     struct path_brake_numbers numbers;
     numbers_of(search, codes, &numbers);
+    double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers.deceleration_q56, -56) /
+                                              (search->period_s * search->period_s)
+                                        : HUGE_VAL;
     for (uint32_t i = 0; i < piece->count; i++) {
-        for (size_t r = 0; r < sizeof rates / sizeof rates[0] + 1u; r++) {
-            double rate = r == 0 ? piece->factor : rates[r - 1u];
+        for (size_t r = 0; r <= count; r++) {
+            double rate = r == count ? piece->factor : rates[r];
             for (int slope = -1; slope <= 1; slope++) {
                 struct state from = piece->at[i];
-                from.a = slope * piece->rate * from.v + rate * rate * from.a;
+                double change = piece->rate * from.v;
+                from.a = rate * rate * from.a +
+                         (slope < 0 ? -change : slope > 0 ? fmin(change, little) : 0.0);
                 from.v *= rate;
-                int rising = slope > 0 && rate >= piece->factor;
-                if (!rising && strain(&search->inverse, &search->rows[piece->row[i]], &from, 0.0) <= 1.0 &&
-                    !start_keeps(search, &from, piece->row[i], &numbers)) {
+                int possible = slope <= 0 || rate < piece->factor;
+                if (possible && !state_keeps(search, &from, piece->row[i], &numbers)) {
                     return 0;
                 }
             }
@@ -411,7 +444,7 @@ static int other_rates_keep(const struct search *search, const struct piece *pie
 static int within(const struct search *search, const int codes[3])
 {
     for (int k = 0; k < 3; k++) {
-        if (codes[k] < 1 || codes[k] > search->most[k]) {
+        if (codes[k] < 1 || codes[k] < search->most[k] - FEWER || codes[k] > search->most[k]) {
             return 0;
         }
     }
@@ -420,7 +453,7 @@ static int within(const struct search *search, const int codes[3])
 
 struct choice {
     int codes[3];
-    double mean_s, worst_s, first_s;
+    double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
 /* Takes the codes when they are better; `strict`: at all rates. */
@@ -434,11 +467,13 @@ static int better(const struct search *search, struct piece *piece, const int co
     }
     numbers_of(search, codes, &numbers);
     times_of(search, piece, &numbers, after_s, &times);
-    if (times.mean_s >= best->mean_s || !all_keep(search, piece, &times) ||
+    if (times.cost_s >= best->cost_s || !all_keep(search, piece, &times) ||
         (strict && !other_rates_keep(search, piece, codes))) {
         return 0;
     }
     memcpy(best->codes, codes, sizeof best->codes);
+    best->cost_s = times.cost_s;
+    best->longest_s = times.longest_s;
     best->mean_s = times.mean_s;
     best->worst_s = times.worst_s;
     best->first_s = times.first_s;
@@ -478,7 +513,7 @@ static int lowered(const struct search *search, struct piece *piece, const int s
         for (int k = 0; k < 3; k++) {
             codes[k] = start[k] - down;
         }
-        best->mean_s = NEVER_S * 2.0;
+        best->cost_s = NEVER_S;
         if (!within(search, codes)) {
             return 0;
         }
@@ -502,31 +537,31 @@ static void scan(const struct search *search, struct piece *piece, double after_
     }
 }
 
-/* Mean time with the greatest codes, whatever limits they break. */
+/* Cost of the greatest codes, whatever limits they break. */
 static double least_time(const struct search *search, const struct piece *piece, double after_s)
 {
     struct path_brake_numbers numbers;
     struct times times;
     numbers_of(search, search->most, &numbers);
     times_of(search, piece, &numbers, after_s, &times);
-    return times.mean_s;
+    return times.cost_s;
 }
 
 static void search_piece(const struct search *search, struct piece *piece, const int warm[3],
                          double after_s, struct choice *best)
 {
-    const struct choice none = {{0, 0, 0}, NEVER_S, NEVER_S, NEVER_S};
+    const struct choice none = {{0, 0, 0}, NEVER_S, NEVER_S, NEVER_S, NEVER_S, NEVER_S};
     struct choice rough = none;
     (void)better(search, piece, search->most, after_s, 0, &rough);
     (void)better(search, piece, warm, after_s, 0, &rough);
-    if (rough.mean_s < NEVER_S) {
+    if (rough.cost_s < NEVER_S) {
         climb(search, piece, after_s, 0, 4, &rough);
     }
-    if (rough.mean_s > NEAR * least_time(search, piece, after_s)) {
+    if (rough.cost_s > NEAR * least_time(search, piece, after_s)) {
         scan(search, piece, after_s, &rough);
     }
     *best = none;
-    if (rough.mean_s >= NEVER_S && !lowered(search, piece, search->most, after_s, &rough)) {
+    if (rough.cost_s >= NEVER_S && !lowered(search, piece, search->most, after_s, &rough)) {
         return;
     }
     climb(search, piece, after_s, 0, 8, &rough);
@@ -563,7 +598,13 @@ static void begin(struct search *search, const struct program *p, const struct s
     search->period_us = p->header.period_us;
     search->period_s = 1e-6 * p->header.period_us;
     search->length_mm = ldexp((double)p->header.length_q40_mm, -40);
+    search->rise_is_cut = limits->rise_is_cut;
+    search->deceleration = limits->acceleration;
     invert(&search->inverse, limits);
+    search->at_any_rate = search->inverse;
+    for (int k = 0; k < 2 && limits->reach_at_pace != 0u; k++) {
+        search->at_any_rate.reach[k] = 0.0;
+    }
     for (int k = 0; k < 3; k++) {
         double limit = k == 1 ? limits->acceleration : limits->jerk;
         search->most[k] = 0;
@@ -574,30 +615,42 @@ static void begin(struct search *search, const struct program *p, const struct s
     }
 }
 
+/* A piece without a brake: the plan goes on into the next. */
+static void wait_for_next(const struct piece *piece, double after_s, struct choice *out)
+{
+    double seconds = piece->step_s * (piece->count - 1u);
+    memset(out, 0, sizeof *out);
+    out->first_s = out->worst_s = after_s + seconds;
+    out->mean_s = after_s + 0.5 * seconds;
+}
+
 void stop_search(const struct program *p, const struct stop_limits *limits,
                  const struct stop_row *rows, struct stop_found *found)
 {
     struct search search;
     struct piece piece;
-    begin(&search, p, limits, rows);
     double after_s = 0.0;
+    double left_s = 0.0;
+    begin(&search, p, limits, rows);
     int warm[3] = {search.most[0], search.most[1], search.most[2]};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
-        piece_look(&search, p, i - 1u, &piece);
+        struct choice none;
+        piece_look(&search, p, i - 1u, left_s, &piece);
         search_piece(&search, &piece, warm, after_s, &best);
+        wait_for_next(&piece, after_s, &none);
+        if (none.mean_s < WAIT_BETTER * best.mean_s ||
+            (none.mean_s < WAIT_AS_GOOD * best.mean_s && best.longest_s > 2.0 * none.worst_s)) {
+            best = none;
+        }
         for (int k = 0; k < 3; k++) {
             found[i - 1u].codes[k] = (uint8_t)best.codes[k];
             warm[k] = best.codes[k] > 0 ? best.codes[k] : warm[k];
         }
-        if (best.codes[1] == 0) {
-            double seconds = piece.step_s * (piece.count - 1u);
-            best.first_s = best.worst_s = after_s + seconds;
-            best.mean_s = after_s + 0.5 * seconds;
-        }
-        after_s = best.first_s;
         found[i - 1u].worst_s = best.worst_s;
         found[i - 1u].mean_s = best.mean_s;
+        after_s = best.first_s;
+        left_s += piece.step_s * (piece.count - 1u);
     }
 }
 

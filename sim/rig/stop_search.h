@@ -46,6 +46,8 @@ struct stop_limits {
     double time_constant[2]; /* s */
     const struct stop_cap *caps;
     uint32_t cap_count;
+    uint32_t reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
+    uint32_t rise_is_cut;   /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
 };
 
 /* What was found for a piece. Codes of 0: no numbers keep the limits from all of its instants. */

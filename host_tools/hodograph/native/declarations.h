@@ -180,7 +180,7 @@ struct stop_limits {
     double feed, acceleration, jerk, centripetal;
     double axis_velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
     const struct stop_cap *caps;
-    uint32_t cap_count;
+    uint32_t cap_count, reach_at_pace, rise_is_cut;
 };
 struct stop_found {
     uint8_t codes[3];

@@ -23,6 +23,8 @@ class StopLimits:
     feed, acceleration, jerk   along the path; the numbers of a brake never exceed the last two
     reach                      of |velocity + time_constant * acceleration| of the axis
     caps                       (from_mm, to_mm, feed_mm_s) each
+    reach_at_pace              `reach` counts at the rate 1 only
+    rise_is_cut                a brake begins when a rising rate adds a quarter of its deceleration at most
     """
 
     feed: float = inf
@@ -35,19 +37,24 @@ class StopLimits:
     reach: tuple[float, float] = FREE
     time_constant: tuple[float, float] = (0.0, 0.0)
     caps: tuple[tuple[float, float, float], ...] = ()
+    reach_at_pace: bool = False
+    rise_is_cut: bool = False
 
     def raised(self, used: StopLimits) -> StopLimits:
-        """The greater of each limit and of what is used of it with the margin of the search; caps and constants stay."""
+        """The greater of each limit and of what is used of it with the margin of the search. Caps, constants and what
+        the numbers never exceed stay.
+        """
 
         def greater(limit: Any, use: Any) -> Any:
             if isinstance(limit, tuple):
-                return tuple(map(greater, limit, use))
+                return tuple(greater(*pair) for pair in zip(limit, use, strict=True))
             return max(limit, use * _MARGIN)
 
-        names = [one.name for one in fields(self) if one.name not in ("caps", "time_constant")]
-        return replace(self, **{name: greater(getattr(self, name), getattr(used, name)) for name in names})
+        values = {name: greater(getattr(self, name), getattr(used, name)) for name in _RAISED}
+        return replace(self, **values)
 
 
+_RAISED = ("feed", "centripetal", "axis_velocity", "axis_acceleration", "axis_jerk", "reach")
 _MARGIN = 1.0 / (1.0 - 0.001) + 1e-6
 
 
@@ -64,9 +71,8 @@ class StopSearch:
         given = self._given(limits)
         found = ffi.new("struct stop_limits *")
         lib.stop_used(self._program.pointer, given[0], self._rows(given), found)
-        names = [one.name for one in fields(limits) if one.name not in ("caps", "time_constant")]
-        values = {}
-        for name in names:
+        values: dict[str, Any] = {}
+        for name in _RAISED:
             value = getattr(found, name)
             values[name] = float(value) if isinstance(value, float) else (value[0], value[1])
         return StopLimits(**values)

@@ -58,6 +58,11 @@ class ProgramError(IntEnum):
     JERK = -54
     OVERRIDE = -55
     PIECE_RESERVED = -56
+    STOP_ENTRY = -60
+    STOP_NUMBERS = -61
+    STOP_BOUND = -62
+    STOP_LONG = -63
+    STOP_WORST = -64
 
     @property
     def text(self) -> str:
@@ -112,4 +117,9 @@ _TEXTS = {
     ProgramError.JERK: "above its jerk limit",
     ProgramError.OVERRIDE: "override factor not in 1.0 ... 2.0, rate or second rate 0",
     ProgramError.PIECE_RESERVED: "reserved field of a piece is not 0",
+    ProgramError.STOP_ENTRY: "some codes of a stop are 0 and some are not, or a reserved field is not 0",
+    ProgramError.STOP_NUMBERS: "a brake would be above the limits of the controller",
+    ProgramError.STOP_BOUND: "a stop can take longer than its bound",
+    ProgramError.STOP_LONG: "a fault stop can take longer than the controller allows",
+    ProgramError.STOP_WORST: "the worst stops of the header are not those of the table",
 }

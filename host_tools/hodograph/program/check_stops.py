@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""Rules of docs/protocol.md 1.4: what a stop can take beside what the table says; docs/numerics.md section 7.
+
+In floating point and without what the controller's integers (firmware/core/stop_check.c) round up: a bound that
+the controller accepts is never below the one computed here, and above it by some 20 us at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..feed.pieces import derivative_bounds
+from .codes import ProgramError
+from .image import Program
+from .limits import ProgramLimits
+from .stops import DECELERATION, FAULT, HOLD, JERK_DOWN, JERK_UP, numbers
+
+Real = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+STOP_TICKS = 6
+"""Ticks of a stop that are not in the continuous curve."""
+WINDOW_TICKS = 6
+"""Periods of program time in which the piece whose numbers count may still change,"""
+WINDOW = 8
+"""and how many pieces may begin in them."""
+LITTLE = 0.25
+"""Share of the deceleration that a rising rate of program time may add when a hold's brake begins."""
+_HAIR = 1e-9
+_MOST_US = 2.0**32 - 1.0
+
+
+def stop_fault(
+    program: Program, limits: ProgramLimits | None, reserved: Bool | None = None
+) -> tuple[ProgramError, int] | None:
+    """The first rule broken, in the order of the controller: entries from the first piece on, then the bounds of
+    holds and those of fault stops, each from the last piece on.
+    """
+    entries = list(_entry_faults(program, limits, reserved))
+    if entries:
+        index, _, code = min(entries)
+        return code, index
+    return _bound_fault(program, HOLD, 0) or _bound_fault(
+        program, FAULT, 0 if limits is None else limits.stop_time_ms
+    )
+
+
+def _entry_faults(
+    program: Program, limits: ProgramLimits | None, reserved: Bool | None
+) -> Iterator[tuple[int, int, ProgramError]]:
+    codes = program.stops.codes
+    some, whole = (codes > 0).any(axis=2), (codes > 0).all(axis=2)
+    broken = some != whole
+    if reserved is not None:
+        broken = broken | reserved[:, None]
+    above = np.zeros_like(broken)
+    if limits is not None:
+        own = numbers(codes)
+        most = np.array([limits.jerk_mm_s3, limits.acceleration_um_s2 * 1e-3, limits.jerk_mm_s3])
+        # The controller compares whole um/s^2, rounded down.
+        own[..., DECELERATION] = np.floor(own[..., DECELERATION] * 1e3) / 1e3
+        above = ((own > most * (1.0 + 1e-12)) & (most > 0.0)).any(axis=2) & whole
+    for rank, (mask, code) in enumerate(
+        ((broken, ProgramError.STOP_ENTRY), (above, ProgramError.STOP_NUMBERS))
+    ):
+        if mask.any():
+            piece, kind = np.argwhere(mask)[0]
+            yield int(piece), 2 * int(kind) + rank, code
+
+
+def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramError, int] | None:
+    least_us, least_um = bounds(program, kind)
+    said = program.stops.bound_us[:, kind].astype(np.float64)
+    brief = said < np.minimum(least_us, _MOST_US) - _HAIR
+    too_long = (said > most_ms * 1000.0) & (most_ms > 0)
+    hits = np.flatnonzero(brief | too_long)
+    if hits.size:
+        index = int(hits[-1])
+        return (ProgramError.STOP_BOUND if brief[index] else ProgramError.STOP_LONG), index
+    worst_us, worst_um = program.stops.worst_us[kind], program.stops.worst_um[kind]
+    if worst_us != int(said.max()) or worst_um < min(float(least_um.max()), _MOST_US) - _HAIR:
+        return ProgramError.STOP_WORST, 0
+    return None
+
+
+def bounds(program: Program, kind: int) -> tuple[Real, Real]:
+    """Least bounds (M,) of time in us and of the way in um, from the command to rest."""
+    own_s, own_mm, waits = _own(program, kind)
+    duration = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    way = np.maximum(np.diff(start), 0.0)
+    window_s = WINDOW_TICKS * program.period_us * 1e-6
+    count = duration.size
+    out_s, out_mm = np.zeros(count + 1), np.zeros(count + 1)
+    for i in range(count - 1, -1, -1):
+        if waits[i]:
+            own_s[i] = max(own_s[i], duration[i] + out_s[i + 1])
+            own_mm[i] = max(own_mm[i], way[i] + out_mm[i + 1])
+        last, ahead = i + 1, 0.0
+        while last < min(count, i + 1 + WINDOW) and ahead < window_s:
+            ahead += duration[last]
+            last += 1
+        out_s[i], out_mm[i] = own_s[i:last].max(), own_mm[i:last].max()
+    return out_s[:-1] * 1e6, out_mm[:-1] * 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class _Extent:
+    """Greatest speed, rise of it at a constant rate and by a changing one, time to take that back; (M,) each."""
+
+    speed: Real
+    rising: Real
+    slope: Real
+    cut_s: Real
+
+
+def _own(program: Program, kind: int) -> tuple[Real, Real, Bool]:
+    """Time in s and way in mm (M,) of a brake that begins in each piece, 0 where none may, and whether it may wait."""
+    pieces, codes = program.pieces, program.stops.codes[:, kind]
+    period_s = program.period_us * 1e-6
+    feed, acceleration, _ = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)
+    factor = pieces.override_factor_q24 * 2.0**-24
+    speed = np.maximum(feed.max(axis=1), 0.0)
+    slope = pieces.override_rate_q16_per_s * 2.0**-16 * speed
+    speed = speed * factor
+    cut_s = pieces.override_rate_q16_per_s * 2.0**-16 / (pieces.override_second_q8_per_s2 * 2.0**-8)
+    rising = np.maximum(acceleration.max(axis=1), 0.0) * factor**2
+    given = codes[:, DECELERATION] > 0
+    number = np.where(given[:, None], numbers(codes), 1.0)
+    more_s = np.full(speed.size, STOP_TICKS * period_s)
+    if kind == HOLD:
+        little = LITTLE * number[:, DECELERATION]
+        more_s = np.where(slope > little, more_s + cut_s, more_s)
+        slope = np.minimum(slope, little)
+    rising = rising + slope
+    speed = speed + 0.5 * rising * period_s
+    time_s, way_mm = _curve(speed, rising, number)
+    time_s, way_mm = time_s + more_s, way_mm + speed * more_s
+    falling = np.maximum(-acceleration.min(axis=1), 0.0) * factor**2
+    settle_s = 0.5 * falling / number[:, JERK_UP] + 2.0 * period_s
+    settled = (falling == 0.0) | (np.maximum(feed.min(axis=1), 0.0) >= falling * settle_s)
+    return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), ~(given & settled)
+
+
+def _curve(speed: Real, rising: Real, number: Real) -> tuple[Real, Real]:
+    """Time and way of the S-curve to rest, in continuous time."""
+    down, most, up = number[:, JERK_DOWN], number[:, DECELERATION], number[:, JERK_UP]
+    lead_s = rising / down
+    peak = speed + 0.5 * rising * lead_s
+    depth = np.minimum(np.sqrt(peak * 2.0 * down * up / (down + up)), most)
+    first_s, last_s = depth / down, depth / up
+    even_s = peak / np.maximum(depth, 1e-300)
+    curve_s = even_s + 0.5 * (first_s + last_s)
+    centre_s = lead_s + 0.5 * curve_s + np.maximum(first_s - last_s, 0.0) / 6.0
+    return lead_s + curve_s, peak * centre_s
