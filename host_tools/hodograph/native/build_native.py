@@ -20,7 +20,7 @@ HEADERS = (
     "core/program_check.h",
     "core/stop_check.h",
     "core/interp.h",
-    "core/timebase.h",
+    "core/feed_override.h",
     "plant/drive.h",
     "rig/contour.h",
     "rig/rig.h",

@@ -52,21 +52,23 @@ struct interp {
 };
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
 
-/* core/rate.h, core/timebase.h */
-struct rate {
-    int64_t rate_q57, slope_q56;
-};
-struct timebase {
-    struct rate now;
+/* core/feed_override.h */
+struct feed_override {
     ...;
 };
-void timebase_begin(struct timebase *tb, const struct program *p, uint32_t period_us);
-void timebase_hold(struct timebase *tb);
-void timebase_resume(struct timebase *tb);
-void timebase_override(struct timebase *tb, uint32_t percent);
-void timebase_stop(struct timebase *tb);
-uint64_t timebase_step_q42(struct timebase *tb);
-int timebase_state(const struct timebase *tb);
+void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us, uint64_t time_q42_s);
+void feed_override_hold(struct feed_override *f);
+void feed_override_resume(struct feed_override *f);
+void feed_override_set(struct feed_override *f, uint32_t percent);
+void feed_override_stop(struct feed_override *f);
+void feed_override_fault_stop(struct feed_override *f);
+int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
+int feed_override_state(const struct feed_override *f);
+int feed_override_late(const struct feed_override *f);
+uint64_t feed_override_time_q42(const struct feed_override *f);
+int64_t feed_override_feed_q32(const struct feed_override *f);
+uint32_t feed_override_rate_q30(const struct feed_override *f);
+uint32_t feed_override_bound_us(const struct feed_override *f, int kind);
 
 /* plant/drive.h */
 struct drive_plant {
@@ -142,6 +144,24 @@ struct feedforward_gains {
 void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
 void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts);
 int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count);
+enum rig_order_kind {
+    RIG_ORDER_HOLD,
+    RIG_ORDER_RESUME,
+    RIG_ORDER_OVERRIDE,
+    RIG_ORDER_STOP,
+    RIG_ORDER_FAULT_STOP,
+    ...
+};
+struct rig_order {
+    enum rig_order_kind kind;
+    uint32_t tick, percent;
+};
+struct rig_stop {
+    uint32_t tick, rest_tick, bound_us;
+    int64_t from_q40_mm, rest_q40_mm;
+};
+int rig_orders(struct rig *rig, const struct rig_order *orders, uint32_t count);
+void rig_stop_get(const struct rig *rig, struct rig_stop *stop);
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
 int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
