@@ -135,20 +135,27 @@ static int64_t unscaled_above(int64_t b, int64_t scale, int order, int exponent)
     return qmath_lesser(above + 1, FEED_NO_BOUND_Q24);
 }
 
-void feed_bounds_range(const struct program_piece *piece, enum feed_derivative derivative,
-                       int64_t *low_q24, int64_t *high_q24)
+void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
+                       int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS])
 {
     int order = (int)derivative;
     int e = program_piece_exponent(piece->duration_q32_s);
-    int64_t b[8];
+    int64_t b[FEED_PARTS][8];
     int degree = 0;
-    int64_t scale = bernstein_of(piece, order, b, &degree);
-    int64_t low = b[0];
-    int64_t high = b[0];
-    for (int k = 1; k <= degree; k++) {
-        low = qmath_lesser(low, b[k]);
-        high = qmath_greater(high, b[k]);
+    int64_t scale = bernstein_of(piece, order, b[0], &degree);
+    for (int apart = FEED_PARTS / 2; apart > 0; apart /= 2) {
+        for (int i = 0; i < FEED_PARTS; i += 2 * apart) {
+            bernstein_halve(b[i], b[i + apart], degree);
+        }
     }
-    *high_q24 = qmath_greater(unscaled_above(high, scale, order, e), -FEED_NO_BOUND_Q24);
-    *low_q24 = qmath_greater(-unscaled_above(-low, scale, order, e), -FEED_NO_BOUND_Q24);
+    for (int i = 0; i < FEED_PARTS; i++) {
+        int64_t low = b[i][0];
+        int64_t high = b[i][0];
+        for (int k = 1; k <= degree; k++) {
+            low = qmath_lesser(low, b[i][k]);
+            high = qmath_greater(high, b[i][k]);
+        }
+        high_q24[i] = qmath_greater(unscaled_above(high, scale, order, e), -FEED_NO_BOUND_Q24);
+        low_q24[i] = qmath_greater(-unscaled_above(-low, scale, order, e), -FEED_NO_BOUND_Q24);
+    }
 }

@@ -52,7 +52,8 @@ struct extent {
     uint64_t rising_um; /* and acceleration at a constant rate, um/s^2, */
     uint64_t slope_um;  /* and what a changing rate adds to it, */
     uint64_t cut_us;    /* and the time in which such a change is taken back */
-    int settled;        /* a brake fits at every instant, as far as deceleration goes */
+    uint32_t waits;     /* eighths of the piece, one after the other, in which no brake may fit, at most, */
+    uint32_t last;      /* and so many before its end */
 };
 
 /* a 1000 / 2^bits, up; a < 2^52 */
@@ -79,7 +80,7 @@ static int settled(const struct program *p, uint64_t speed_um, uint64_t falling_
     if (time_us >= (uint64_t)1 << 28 || fall > MOST_CHANGE_UM) {
         return 0;
     }
-    time_us = time_us / 2u + 2u * p->header.period_us;
+    time_us = time_us / 2u + p->header.period_us;
     return speed_um > over(fall * time_us, 1000000u);
 }
 
@@ -88,26 +89,51 @@ static uint64_t held(int64_t value, int bits, uint64_t most)
     return value >= (int64_t)1 << 52 ? most + 1u : lesser(thousands(value, bits), most + 1u);
 }
 
+static void extent_waits(struct extent *out, const struct program *p, const struct program_piece *c,
+                         const int64_t low[2][FEED_PARTS], uint64_t jerk_up_q18)
+{
+    uint32_t run = 0;
+    out->waits = 0;
+    for (int i = 0; i < FEED_PARTS; i++) {
+        uint64_t least = low[0][i] <= 0 ? 0u
+                                        : lesser((uint64_t)low[0][i], MOST_SPEED_UM << 14) * 1000u >> 24;
+        uint64_t falling = held(-low[1][i], 24, MOST_CHANGE_UM);
+        run = settled(p, least, falling, c->override_factor_q24, jerk_up_q18) ? 0u : run + 1u;
+        out->waits = run > out->waits ? run : out->waits;
+    }
+    out->last = run;
+}
+
+/* Greatest slope of the rate, 2^-16 /s: it rises from 0 and falls to 0 again within a change of the rate by the factor at
+ * most, by the second at most. */
+static uint64_t greatest_slope_q16(const struct program_piece *c)
+{
+    uint64_t square_q32 = (uint64_t)c->override_factor_q24 * c->override_second_q8_per_s2;
+    return lesser(c->override_rate_q16_per_s, qmath_root(square_q32) + 1u);
+}
+
 static void piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
                          struct extent *out)
 {
     struct program_piece c;
-    int64_t low[2];
-    int64_t high[2];
+    int64_t low[2][FEED_PARTS];
+    int64_t high[2][FEED_PARTS];
     program_piece_get(p, piece, &c);
-    feed_bounds_range(&c, FEED_VELOCITY, &low[0], &high[0]);
-    feed_bounds_range(&c, FEED_ACCELERATION, &low[1], &high[1]);
-    uint64_t speed = held(high[0], 24, MOST_SPEED_UM);
+    feed_bounds_parts(&c, FEED_VELOCITY, low[0], high[0]);
+    feed_bounds_parts(&c, FEED_ACCELERATION, low[1], high[1]);
+    for (int i = 1; i < FEED_PARTS; i++) {
+        high[0][0] = qmath_greater(high[0][0], high[0][i]);
+        high[1][0] = qmath_greater(high[1][0], high[1][i]);
+    }
+    uint64_t speed = held(high[0][0], 24, MOST_SPEED_UM);
     out->speed_um = scaled(speed, c.override_factor_q24);
-    out->rising_um = held(high[1], 24, MOST_CHANGE_UM);
+    out->rising_um = held(high[1][0], 24, MOST_CHANGE_UM);
     out->rising_um = scaled(scaled(out->rising_um, c.override_factor_q24), c.override_factor_q24);
-    out->slope_um = ((uint64_t)c.override_rate_q16_per_s * lesser(speed, MOST_SPEED_UM) >> 16) + 1u;
-    /* rate 2^-16 over second 2^-8: 10^6 / 2^8 = 15625 / 4 */
-    out->cut_us =
-        over((uint64_t)c.override_rate_q16_per_s * 15625u, (uint64_t)c.override_second_q8_per_s2 * 4u);
-    uint64_t slow = low[0] <= 0 ? 0u : (uint64_t)low[0] >> 24 << 10;
-    uint64_t least = low[0] <= 0 ? 0u : lesser(slow - slow / 32u, MOST_SPEED_UM);
-    out->settled = settled(p, least, held(-low[1], 24, MOST_CHANGE_UM), c.override_factor_q24, jerk_up_q18);
+    uint64_t slope_q16 = greatest_slope_q16(&c);
+    out->slope_um = (slope_q16 * lesser(speed, MOST_SPEED_UM) >> 16) + 1u;
+    /* slope 2^-16 over second 2^-8: 10^6 / 2^8 = 15625 / 4 */
+    out->cut_us = over(slope_q16 * 15625u, (uint64_t)c.override_second_q8_per_s2 * 4u);
+    extent_waits(out, p, &c, (const int64_t(*)[FEED_PARTS])low, jerk_up_q18);
 }
 
 /* --- The brake --- */
@@ -163,8 +189,20 @@ static struct stop_bound most_of(struct stop_bound a, struct stop_bound b)
     return out;
 }
 
+/* q / 2^bits in millionths, up, where that is below 2^32; else `most`. */
+static uint64_t micro(uint64_t q, int bits, uint64_t most)
+{
+    return q >= (uint64_t)1 << 43 ? most : over(q * 1000000u, (uint64_t)1 << bits);
+}
+
+/* Time of so many eighths of a piece. */
+static uint64_t eighths_us(const struct program *p, uint32_t piece, uint32_t count)
+{
+    return micro(program_piece_duration(p, piece) * count, 35, NO_BOUND);
+}
+
 /* The bound with the numbers of a piece, for a brake that begins in it. */
-static struct stop_bound brake_bound(const struct program *p, const struct extent *extent,
+static struct stop_bound brake_bound(const struct program *p, uint32_t piece, const struct extent *extent,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
     uint64_t slope = extent->slope_um;
@@ -174,6 +212,7 @@ static struct stop_bound brake_bound(const struct program *p, const struct exten
         more_us += slope > little ? extent->cut_us : 0u;
         slope = lesser(slope, little);
     }
+    more_us += eighths_us(p, piece, extent->waits);
     /* half a tick more of the first part */
     uint64_t rising = lesser(extent->rising_um + slope, MOST_CHANGE_UM + 1u);
     uint64_t speed = lesser(extent->speed_um + over(rising * p->header.period_us, 2000000u),
@@ -182,19 +221,15 @@ static struct stop_bound brake_bound(const struct program *p, const struct exten
     return sum(out, more_us, over(speed * lesser(more_us, MOST_TIME_US), 1000000u));
 }
 
-static uint64_t micro(uint64_t q, int bits, uint64_t most)
-{
-    return q >= (uint64_t)1 << 43 ? most : over(q * 1000000u, (uint64_t)1 << bits);
-}
-
-/* The plan goes on to the end of the piece and into the next. */
-static struct stop_bound waited(const struct program *p, uint32_t piece, struct stop_bound next)
+/* The plan goes on through the last eighths of the piece and into the next. */
+static struct stop_bound waited(const struct program *p, uint32_t piece, uint32_t eighths,
+                                struct stop_bound next)
 {
     int64_t from = program_piece_start(p, piece);
     int64_t to = piece + 1u < p->header.piece_count ? program_piece_start(p, piece + 1u)
                                                     : p->header.length_q40_mm;
     uint64_t way_um = to <= from ? 0u : ((uint64_t)(to - from) >> 30) + 1u; /* below 2^-30 mm < um */
-    return sum(next, micro(program_piece_duration(p, piece), 32, NO_BOUND), way_um);
+    return sum(next, eighths_us(p, piece, eighths), way_um);
 }
 
 /* --- The walk --- */
@@ -225,15 +260,15 @@ struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece)
 {
     const struct program *p = walk->program;
     struct program_stop stop;
-    struct extent extent;
+    struct extent extent = {.last = FEED_PARTS};
     struct stop_bound own = {0, 0};
     program_stop_get(p, piece, walk->kind, &stop);
     if (stop.deceleration != 0u) {
         piece_extent(p, piece, number(stop.jerk_up), &extent);
-        own = brake_bound(p, &extent, &stop, walk->kind);
+        own = brake_bound(p, piece, &extent, &stop, walk->kind);
     }
-    if (stop.deceleration == 0u || !extent.settled) {
-        own = most_of(own, waited(p, piece, walk->next));
+    if (extent.last != 0u) {
+        own = most_of(own, waited(p, piece, extent.last, walk->next));
     }
     struct stop_bound out = own;
     uint64_t ahead = 0;

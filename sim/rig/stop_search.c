@@ -44,7 +44,7 @@ struct piece {
     double step_s;
     double left_s;        /* of the program, behind the piece */
     struct state fastest; /* of all rates: greatest speed and acceleration */
-    double factor, rate; /* bounds of the override */
+    double factor, rate; /* greatest rate of program time, and greatest slope of it */
     uint32_t suspect;    /* the instant at which a limit was broken last */
 };
 
@@ -322,7 +322,8 @@ static void piece_look(const struct search *search, const struct program *p, uin
     piece->left_s = left_s;
     piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
-    piece->rate = ldexp((double)from.override_rate_q16_per_s, -16);
+    piece->rate = fmin(ldexp((double)from.override_rate_q16_per_s, -16),
+                       sqrt(piece->factor * ldexp((double)from.override_second_q8_per_s2, -8)));
     for (uint32_t k = 0; k < piece->count; k++) {
         double u = (double)k / parts;
         struct state *at = &piece->at[k];

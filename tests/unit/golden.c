@@ -37,7 +37,7 @@ void golden_seal(uint8_t *image, uint32_t size)
 struct program_limits golden_no_limits(void)
 {
     const int64_t far = (int64_t)1 << 52;
-    struct program_limits limits = {0, 0, 0, 0, {-far, -far}, {far, far}};
+    struct program_limits limits = {0, 0, 0, 0, {-far, -far}, {far, far}, 0};
     return limits;
 }
 

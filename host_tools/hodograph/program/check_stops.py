@@ -8,12 +8,11 @@ the controller accepts is never below the one computed here, and above it by som
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed.pieces import derivative_bounds
+from ..feed.pieces import part_bounds
 from .codes import ProgramError
 from .image import Program
 from .limits import ProgramLimits
@@ -28,6 +27,8 @@ WINDOW_TICKS = 6
 """Periods of program time in which the piece whose numbers count may still change,"""
 WINDOW = 8
 """and how many pieces may begin in them."""
+HALVINGS = 3
+"""Each eighth of a piece is looked at for itself."""
 LITTLE = 0.25
 """Share of the deceleration that a rising rate of program time may add when a hold's brake begins."""
 _HAIR = 1e-9
@@ -97,8 +98,8 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     count = duration.size
     out_s, out_mm = np.zeros(count + 1), np.zeros(count + 1)
     for i in range(count - 1, -1, -1):
-        if waits[i]:
-            own_s[i] = max(own_s[i], duration[i] + out_s[i + 1])
+        if waits[i] > 0.0:
+            own_s[i] = max(own_s[i], waits[i] * duration[i] + out_s[i + 1])
             own_mm[i] = max(own_mm[i], way[i] + out_mm[i + 1])
         last, ahead = i + 1, 0.0
         while last < min(count, i + 1 + WINDOW) and ahead < window_s:
@@ -108,27 +109,23 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     return out_s[:-1] * 1e6, out_mm[:-1] * 1e3
 
 
-@dataclass(frozen=True, eq=False)
-class _Extent:
-    """Greatest speed, rise of it at a constant rate and by a changing one, time to take that back; (M,) each."""
-
-    speed: Real
-    rising: Real
-    slope: Real
-    cut_s: Real
-
-
-def _own(program: Program, kind: int) -> tuple[Real, Real, Bool]:
-    """Time in s and way in mm (M,) of a brake that begins in each piece, 0 where none may, and whether it may wait."""
+def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
+    """Time in s and way in mm (M,) of a stop that brakes in the piece in which it was asked for, 0 where none may, and
+    the share of the piece, up to its end, from which it may go on into the next.
+    """
     pieces, codes = program.pieces, program.stops.codes[:, kind]
     period_s = program.period_us * 1e-6
-    feed, acceleration, _ = derivative_bounds(pieces.duration_q32_s, pieces.c_q40)
+    feed, acceleration = (
+        part_bounds(pieces.duration_q32_s, pieces.c_q40, order, HALVINGS) for order in (1, 2)
+    )
     factor = pieces.override_factor_q24 * 2.0**-24
-    speed = np.maximum(feed.max(axis=1), 0.0)
-    slope = pieces.override_rate_q16_per_s * 2.0**-16 * speed
+    speed = np.maximum(feed.max(axis=(1, 2)), 0.0)
+    second = pieces.override_second_q8_per_s2 * 2.0**-8
+    # It rises from 0 and falls to 0 again within a change of the rate by the factor at most.
+    steepest = np.minimum(pieces.override_rate_q16_per_s * 2.0**-16, np.sqrt(factor * second))
+    slope, cut_s = steepest * speed, steepest / second
     speed = speed * factor
-    cut_s = pieces.override_rate_q16_per_s * 2.0**-16 / (pieces.override_second_q8_per_s2 * 2.0**-8)
-    rising = np.maximum(acceleration.max(axis=1), 0.0) * factor**2
+    rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0) * factor**2
     given = codes[:, DECELERATION] > 0
     number = np.where(given[:, None], numbers(codes), 1.0)
     more_s = np.full(speed.size, STOP_TICKS * period_s)
@@ -136,14 +133,32 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Bool]:
         little = LITTLE * number[:, DECELERATION]
         more_s = np.where(slope > little, more_s + cut_s, more_s)
         slope = np.minimum(slope, little)
+    settled = _settled(program, feed.min(axis=2), acceleration.min(axis=2), number[:, JERK_UP])
+    longest, last = _runs(~settled)
+    more_s = more_s + longest * np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
     rising = rising + slope
     speed = speed + 0.5 * rising * period_s
     time_s, way_mm = _curve(speed, rising, number)
     time_s, way_mm = time_s + more_s, way_mm + speed * more_s
-    falling = np.maximum(-acceleration.min(axis=1), 0.0) * factor**2
-    settle_s = 0.5 * falling / number[:, JERK_UP] + 2.0 * period_s
-    settled = (falling == 0.0) | (np.maximum(feed.min(axis=1), 0.0) >= falling * settle_s)
-    return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), ~(given & settled)
+    return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)
+
+
+def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) -> Bool:
+    """Whether a brake fits everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
+    factor = (program.pieces.override_factor_q24 * 2.0**-24)[:, None]
+    falling = np.maximum(-acceleration, 0.0) * factor**2
+    settle_s = 0.5 * falling / jerk_up[:, None] + 1e-6 * program.period_us
+    return np.asarray((falling == 0.0) | (np.maximum(feed, 0.0) >= falling * settle_s))
+
+
+def _runs(mask: Bool) -> tuple[Real, Real]:
+    """Longest runs in each row, and those at the ends of the rows, as shares of the row."""
+    run = np.zeros(mask.shape[0])
+    longest = run
+    for column in mask.T:
+        run = np.where(column, run + 1.0, 0.0)
+        longest = np.maximum(longest, run)
+    return longest / mask.shape[1], run / mask.shape[1]
 
 
 def _curve(speed: Real, rising: Real, number: Real) -> tuple[Real, Real]:

@@ -43,10 +43,10 @@ def plan_stops(program: Program, plan: Plan, terms: StopTerms) -> Program:
     codes = np.zeros((program.piece_count, 2, 3), dtype=np.uint8)
     for kind, limits in ((HOLD, hold_limits(plan, terms)), (FAULT, fault_limits(plan, terms))):
         codes[:, kind] = search.codes(limits.raised(search.used(limits)))[0]
-    return _checked(_bounded(replace(program, stops=replace(program.stops, codes=codes))), terms)
+    return _checked(with_bounds(replace(program, stops=replace(program.stops, codes=codes))), terms)
 
 
-def _bounded(program: Program) -> Program:
+def with_bounds(program: Program) -> Program:
     """The program with the bounds that its numbers have."""
     image = NativeProgram(encode(program))
     (hold_us, hold_um), (fault_us, fault_um) = (stop_bounds(image, kind) for kind in (HOLD, FAULT))
