@@ -53,8 +53,9 @@ struct axis {
     uint32_t digital_inputs;          /* 0x60FD */
     int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
     bool homed;                       /* since it was found */
-    uint32_t rest_syncs;              /* in Quick stop active: for how long it has been at */
+    uint32_t rest_syncs;              /* with power on: for how long it has been, in this state, at */
     int32_t rest_counts;
+    enum cia402_state rest_state;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
