@@ -14,8 +14,8 @@ static void put_u32(uint8_t *at, uint32_t value)
     }
 }
 
-static void write_bounds(const struct program *p, uint8_t *image, uint8_t *table,
-                         enum program_stop_kind kind)
+static struct stop_bound write_bounds(const struct program *p, uint8_t *image, uint8_t *table,
+                                      enum program_stop_kind kind)
 {
     struct stop_walk walk;
     struct stop_bound worst = {0, 0};
@@ -28,6 +28,24 @@ static void write_bounds(const struct program *p, uint8_t *image, uint8_t *table
     }
     put_u32(image + 112u + 8u * (uint32_t)kind, worst.time_us);
     put_u32(image + 116u + 8u * (uint32_t)kind, worst.way_um);
+    return worst;
+}
+
+void stop_table_fill(struct program *p, uint8_t *image, const uint8_t codes[6])
+{
+    const uint32_t count = p->header.piece_count;
+    uint8_t *table = image + PROGRAM_HEADER_SIZE +
+                     (size_t)p->header.segment_count * PROGRAM_SEGMENT_SIZE +
+                     (size_t)count * PROGRAM_PIECE_SIZE;
+    for (uint32_t i = 0; i < count; i++) {
+        memcpy(table + (size_t)i * PROGRAM_STOP_SIZE, codes, 6);
+    }
+    const struct stop_bound hold = write_bounds(p, image, table, PROGRAM_STOP_HOLD);
+    const struct stop_bound fault = write_bounds(p, image, table, PROGRAM_STOP_FAULT);
+    p->header.hold_worst_us = hold.time_us;
+    p->header.hold_worst_um = hold.way_um;
+    p->header.fault_worst_us = fault.time_us;
+    p->header.fault_worst_um = fault.way_um;
 }
 
 void stop_table_write(uint8_t *image, uint32_t size, const uint8_t codes[6])
@@ -35,12 +53,6 @@ void stop_table_write(uint8_t *image, uint32_t size, const uint8_t codes[6])
     struct program p;
     golden_seal(image, size);
     TEST_ASSERT_EQUAL_INT(0, program_open(&p, image, size));
-    uint8_t *table = image + PROGRAM_HEADER_SIZE + p.header.segment_count * PROGRAM_SEGMENT_SIZE +
-                     p.header.piece_count * PROGRAM_PIECE_SIZE;
-    for (uint32_t i = 0; i < p.header.piece_count; i++) {
-        memcpy(table + i * PROGRAM_STOP_SIZE, codes, 6);
-    }
-    write_bounds(&p, image, table, PROGRAM_STOP_HOLD);
-    write_bounds(&p, image, table, PROGRAM_STOP_FAULT);
+    stop_table_fill(&p, image, codes);
     golden_seal(image, size);
 }
