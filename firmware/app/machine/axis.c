@@ -13,6 +13,7 @@ void axis_init(struct axis *axis, uint8_t node)
     memset(axis, 0, sizeof *axis);
     axis->node = node;
     axis->goal = CIA402_GOAL_OFF;
+    axis->rest_syncs = AXIS_REST_SYNCS; /* nobody has seen it move */
     pdo_begin_setpoint(node, &axis->setpoint);
 }
 
@@ -61,9 +62,7 @@ static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
 
 static void count_rest(struct axis *axis, uint32_t tolerance_counts)
 {
-    const bool stays = axis->state == CIA402_QUICK_STOP_ACTIVE &&
-                       distance(axis->rest_counts, axis->position_counts) <= tolerance_counts;
-    if (!stays) {
+    if (distance(axis->rest_counts, axis->position_counts) > tolerance_counts) {
         axis->rest_syncs = 0;
         axis->rest_counts = axis->position_counts;
     } else if (axis->rest_syncs < AXIS_STANDSTILL_SYNCS) {
@@ -141,6 +140,11 @@ static bool moves_in(enum cia402_state state)
            state == CIA402_FAULT_REACTION_ACTIVE;
 }
 
+bool axis_moves(const struct axis *axis)
+{
+    return moves_in(axis->state) && axis->rest_syncs < AXIS_REST_SYNCS;
+}
+
 /* A statusword that means nothing, once, does not make a moving drive a stopped one. */
 bool axis_left(const struct axis *axis)
 {
@@ -148,7 +152,7 @@ bool axis_left(const struct axis *axis)
         return axis->answers.lost;
     }
     return axis->answers.lost || !moves_in(axis->state) ||
-           axis->rest_syncs >= AXIS_STANDSTILL_SYNCS;
+           (axis->state == CIA402_QUICK_STOP_ACTIVE && axis->rest_syncs >= AXIS_STANDSTILL_SYNCS);
 }
 
 bool axis_reached(const struct axis *axis)

@@ -19,6 +19,9 @@
 
 #define AXIS_STANDSTILL_SYNCS 250u
 
+/* A drive with power on moves until it has been in one place for so long. */
+#define AXIS_REST_SYNCS 50u
+
 /* With power off a drive that is lost may still come back by itself within this time. */
 #define AXIS_GONE_US 1000000u
 
@@ -95,6 +98,7 @@ bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its targe
 /* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and has
  * been in one place for AXIS_STANDSTILL_SYNCS. */
 bool axis_left(const struct axis *axis);
+bool axis_moves(const struct axis *axis); /* power is on, and its position has changed lately */
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
 

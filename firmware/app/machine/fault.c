@@ -24,6 +24,8 @@ const char *fault_text(uint16_t code)
         return "drive did not end its quick stop in time, statusword";
     case FAULT_NOT_SENT:
         return "the bus takes no frames of the controller, ticks in a row";
+    case FAULT_STOP_LATE:
+        return "stop along the path took longer than its bound and a fifth, setpoint";
     default:
         return emcy_text(code);
     }

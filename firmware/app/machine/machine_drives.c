@@ -18,6 +18,16 @@ bool machine_obeyed(const struct machine *machine)
     return machine->unsent_ticks <= MACHINE_UNSENT_MAX;
 }
 
+bool machine_any_moves(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (axis_moves(&machine->axes[i])) {
+            return true;
+        }
+    }
+    return false;
+}
+
 const struct axis *machine_not_stopped(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
