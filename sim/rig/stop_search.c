@@ -6,10 +6,13 @@
 
 #include "core/path_brake.h"
 
-#define MOST_INSTANTS 65
-#define INSTANT_S     0.004 /* between two instants of a piece at most, where it is not longer than MOST_INSTANTS of them */
+#define MOST_INSTANTS 129   /* of a piece; */
+#define INSTANT_S     0.004 /* between two of them at most, where these are enough, */
+#define CLOSE_S       0.0005 /* and in the last look at what was found */
 #define STEP_S        0.002 /* between two looks at a brake */
 #define GREATEST_CODE 255
+#define BESIDE        1e-6
+#define LEAST_MM_S    1e-4 /* slower is rest */
 #define NEVER_S       1e6
 #define LONGEST_SHARE 0.1
 #define FEWER         56  /* codes below the greatest: a brake with less than a 128th of a limit is none */
@@ -46,6 +49,7 @@ struct piece {
     struct state fastest; /* of all rates: greatest speed and acceleration */
     double factor, rate; /* greatest rate of program time, and greatest slope of it */
     uint32_t suspect;    /* the instant at which a limit was broken last */
+    struct piece *close; /* the same piece with more instants */
 };
 
 struct search {
@@ -309,13 +313,13 @@ static double piece_powers(const struct program_piece *from, double c[8])
 }
 
 static void piece_look(const struct search *search, const struct program *p, uint32_t i,
-                       double left_s, struct piece *piece)
+                       double left_s, double step_s, struct piece *piece)
 {
     struct program_piece from;
     double c[8];
     program_piece_get(p, i, &from);
     double seconds = piece_powers(&from, c);
-    double parts = fmin(greater(ceil(seconds / INSTANT_S), 2.0), MOST_INSTANTS - 1);
+    double parts = fmin(greater(ceil(seconds / step_s), 2.0), MOST_INSTANTS - 1);
     piece->count = (uint32_t)parts + 1u;
     piece->step_s = seconds / parts;
     piece->suspect = 0;
@@ -403,18 +407,28 @@ static int all_keep(const struct search *search, struct piece *piece, const stru
     return 1;
 }
 
-/* Whether a brake from this state, which is inside the limits itself, keeps them or does not fit. */
-static int state_keeps(const struct search *search, const struct state *from, uint32_t row,
-                       const struct path_brake_numbers *numbers)
+/* Whether the state has so little speed left, for its deceleration, that no brake need fit: the plan may go on. */
+static int may_wait(const struct search *search, const struct state *at,
+                    const struct path_brake_numbers *numbers)
+{
+    double period_s = search->period_s;
+    double up = ldexp((double)numbers->jerk_up_q56, -56) / (period_s * period_s * period_s);
+    return at->v < LEAST_MM_S || (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - at->a * period_s);
+}
+
+/* Whether a brake fits and keeps the limits, or need not fit. */
+static int state_keeps(const struct search *search, const struct inverse *inverse, const struct state *at,
+                       uint32_t row, const struct path_brake_numbers *numbers)
 {
     struct brake brake;
-    return strain(&search->at_any_rate, &search->rows[row], from, 0.0) > 1.0 ||
-           !brake_plan(&brake, from->v, from->a, numbers, search->period_s) ||
-           brake_keeps(search, &search->at_any_rate, &brake, from, row);
+    if (!brake_plan(&brake, at->v, at->a, numbers, search->period_s)) {
+        return may_wait(search, at, numbers);
+    }
+    return brake_keeps(search, inverse, &brake, at, row);
 }
 
 /* The same limits at other rates of program time, also while the rate changes. */
-static int other_rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
+static int rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
 {
     static const double rates[] = {1.0, 0.9, 0.75, 0.5, 0.25, 0.1};
     const size_t count = sizeof rates / sizeof rates[0];
@@ -433,10 +447,26 @@ static int other_rates_keep(const struct search *search, const struct piece *pie
                          (slope < 0 ? -change : slope > 0 ? fmin(change, little) : 0.0);
                 from.v *= rate;
                 int possible = slope <= 0 || rate < piece->factor;
-                if (possible && !state_keeps(search, &from, piece->row[i], &numbers)) {
+                possible = possible && strain(&search->at_any_rate, &search->rows[piece->row[i]],
+                                              &from, 0.0) <= 1.0;
+                if (possible &&
+                    !state_keeps(search, &search->at_any_rate, &from, piece->row[i], &numbers)) {
                     return 0;
                 }
             }
+        }
+    }
+    return 1;
+}
+
+/* The same at the rate 1 from instants close to each other. */
+static int close_keep(const struct search *search, const struct piece *close, const int codes[3])
+{
+    struct path_brake_numbers numbers;
+    numbers_of(search, codes, &numbers);
+    for (uint32_t i = 0; i < close->count; i++) {
+        if (!state_keeps(search, &search->inverse, &close->at[i], close->row[i], &numbers)) {
+            return 0;
         }
     }
     return 1;
@@ -457,7 +487,12 @@ struct choice {
     double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
-/* Takes the codes when they are better; `strict`: at all rates. */
+static int strictly(const struct search *search, const struct piece *piece, const int codes[3])
+{
+    return close_keep(search, piece->close, codes) && rates_keep(search, piece, codes);
+}
+
+/* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
 static int better(const struct search *search, struct piece *piece, const int codes[3],
                   double after_s, int strict, struct choice *best)
 {
@@ -469,7 +504,7 @@ static int better(const struct search *search, struct piece *piece, const int co
     numbers_of(search, codes, &numbers);
     times_of(search, piece, &numbers, after_s, &times);
     if (times.cost_s >= best->cost_s || !all_keep(search, piece, &times) ||
-        (strict && !other_rates_keep(search, piece, codes))) {
+        (strict && !strictly(search, piece, codes))) {
         return 0;
     }
     memcpy(best->codes, codes, sizeof best->codes);
@@ -566,7 +601,7 @@ static void search_piece(const struct search *search, struct piece *piece, const
         return;
     }
     climb(search, piece, after_s, 0, 8, &rough);
-    if (other_rates_keep(search, piece, rough.codes)) {
+    if (strictly(search, piece, rough.codes)) {
         *best = rough;
     } else if (lowered(search, piece, rough.codes, after_s, best)) {
         climb(search, piece, after_s, 1, 4, best);
@@ -630,6 +665,7 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
 {
     struct search search;
     struct piece piece;
+    struct piece close;
     double after_s = 0.0;
     double left_s = 0.0;
     begin(&search, p, limits, rows);
@@ -637,7 +673,9 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
         struct choice none;
-        piece_look(&search, p, i - 1u, left_s, &piece);
+        piece_look(&search, p, i - 1u, left_s, INSTANT_S, &piece);
+        piece_look(&search, p, i - 1u, left_s, CLOSE_S, &close);
+        piece.close = &close;
         search_piece(&search, &piece, warm, after_s, &best);
         wait_for_next(&piece, after_s, &none);
         if (none.mean_s < WAIT_BETTER * best.mean_s ||
@@ -673,7 +711,7 @@ void stop_used(const struct program *p, const struct stop_limits *limits, const 
         double seconds = piece_powers(&from, c);
         int parts = (int)fmin(greater(ceil(seconds / INSTANT_S), 4.0), 256.0);
         for (int k = 0; k <= parts; k++) {
-            double u = (double)k / parts;
+            double u = BESIDE + (1.0 - 2.0 * BESIDE) * k / parts; /* jerks jump at joints */
             struct state at = {piece_value(c, u, 0), piece_value(c, u, 1) / seconds,
                                piece_value(c, u, 2) / (seconds * seconds)};
             double j = piece_value(c, u, 3) / (seconds * seconds * seconds);

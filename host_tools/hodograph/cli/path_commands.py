@@ -15,7 +15,9 @@ from ..errors import InputError
 from ..feed import Plan
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.image import MAGIC
-from ..simulate import Motion, simulate, write_trace
+from ..program.stops import stops_dict, stops_text
+from ..native import NativeProgram
+from ..simulate import Motion, StoppedRun, simulate, simulate_stop, write_trace
 from .output import note, number, print_json, print_rows, progress, write_file
 
 
@@ -100,6 +102,9 @@ def feed(options: Namespace) -> None:
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
     }
+    stops = None if chain.machine_or_none is None else chain.program
+    if stops is not None:
+        result["stops"] = stops_dict(stops.stops, stops.piece_starts_mm)
     if options.at is not None:
         t = _within("--at", options.at, plan.duration_s, "s")
         result["arc_length_mm"] = np.atleast_1d(plan.arc_length(t)).tolist()
@@ -120,6 +125,9 @@ def feed(options: Namespace) -> None:
             ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
         ]
     )
+    if stops is not None:
+        for line in stops_text(stops.stops, stops.piece_starts_mm):
+            print(line)
     print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
     for name, peak in chain.peaks.items():
         print(
@@ -147,6 +155,8 @@ def compile_(options: Namespace) -> None:
         f"{output}: {len(image)} bytes, {program.segment_count} segments, {program.piece_count} feed "
         f"pieces, {program.ticks} ticks of {program.period_us} us"
     )
+    for line in stops_text(program.stops, program.piece_starts_mm):
+        print(line)
 
 
 def read_image(file: Path) -> bytes | None:
@@ -205,12 +215,56 @@ def simulate_(options: Namespace) -> None:
     chain = load_chain(options.file, options.machine)
     motion = simulate_chain(chain, options.kernel, keep_rows=options.trace is not None)
     print_notes(chain, chain.compilation.plan)
+    stops = [
+        _stopped(chain, options.kernel, kind, at_s)
+        for kind, times in (
+            ("hold", options.hold_at),
+            ("stop", options.stop_at),
+            ("fault", options.fault_at),
+        )
+        for at_s in times
+    ]
     if options.trace is not None:
         write_trace(motion, options.trace)
+        for stop in stops:
+            name = f"{options.trace.stem}.{stop.kind}-{stop.at_s:g}{options.trace.suffix}"
+            write_trace(stop.motion, options.trace.with_name(name))
     if options.json:
-        print_json(motion.summary())
-    else:
-        print_rows(motion_rows(motion))
+        print_json(motion.summary() | {"stops": [stop.summary() for stop in stops]})
+        return
+    print_rows(motion_rows(motion))
+    if stops:
+        _print_stops(stops)
+
+
+def _stopped(chain: Chain, kernel: str | None, kind: str, at_s: float) -> StoppedRun:
+    machine = chain.machine
+    return simulate_stop(
+        NativeProgram(chain.image),
+        machine.models(machine.plane),
+        kind,
+        at_s,
+        kernel=kernel or machine.kernel,
+        counts_per_mm=machine.counts_per_mm,
+        feedforward=machine.plane_feedforward,
+    )
+
+
+def _print_stops(stops: list[StoppedRun]) -> None:
+    print(
+        f"{'stop':<10} {'at s':>9} {'rest after s':>12} {'bound s':>9} {'way mm':>9} {'mm/s^2':>9} {'mm/s^3':>9} "
+        f"{'contour um':>10}"
+    )
+    for stop in stops:
+        most = {
+            unit: max(value for name, value in stop.peak.items() if name.endswith(unit))
+            for unit in ("acceleration_mm_s2", "jerk_mm_s3")
+        }
+        print(
+            f"{stop.kind:<10} {stop.at_s:9.6g} {stop.rest_after_s:12.6g} {stop.bound_s:9.4g} "
+            f"{stop.distance_mm:9.6g} {most['acceleration_mm_s2']:9.6g} {most['jerk_mm_s3']:9.6g} "
+            f"{stop.peak['contour_error_um']:10.4g}"
+        )
 
 
 def motion_rows(motion: Motion) -> list[tuple[str, str]]:

@@ -97,6 +97,11 @@ class Program:
         """Arc length of the path."""
         return self.length_q40 * 2.0**-40
 
+    @property
+    def piece_starts_mm(self) -> NDArray[np.float64]:
+        """Arc length (M,) at the start of each piece."""
+        return np.ldexp(self.pieces.start_q40.astype(np.float64), -40)
+
     def tick_times_q42_s(self) -> NDArray[np.uint64]:
         """Program time (ticks,) of each setpoint in 2^-42 s: min(floor(k period + 1/2), duration)."""
         k = np.arange(self.ticks, dtype=np.uint64)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,18 +79,6 @@ class Stops:
             int(self.bound_us[:, kind].argmax()),
         )
 
-    def joined(self, others: Sequence[Stops]) -> Stops:
-        """This table, then those of others."""
-        parts = (self, *others)
-        return Stops(
-            np.concatenate([one.codes for one in parts]),
-            np.concatenate([one.bound_us for one in parts]),
-            *(
-                (max(getattr(one, name)[HOLD] for one in parts), max(getattr(one, name)[FAULT] for one in parts))
-                for name in ("worst_us", "worst_um")
-            ),
-        )
-
 
 def no_stops(count: int) -> Stops:
     """A table without any brake, which no controller accepts: what a program has before its stops are planned."""
@@ -114,3 +102,13 @@ def stops_dict(stops: Stops, start_mm: Real) -> dict[str, Any]:
             "piece": worst.piece,
         }
     return out
+
+
+def stops_text(stops: Stops, start_mm: Real) -> Iterator[str]:
+    """The same for reading: one line for each kind."""
+    for kind, name in enumerate(("hold, stop", "fault stop")):
+        worst = stops.worst(kind)
+        yield (
+            f"{name:<10} at most {worst.time_s:.4g} s and {worst.way_mm:.4g} mm to rest, "
+            f"longest from arc length {start_mm[worst.piece]:.6g} mm (piece {worst.piece})"
+        )
