@@ -138,20 +138,35 @@ static void piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_
 
 /* --- The brake --- */
 
-/* The S-curve from speed v and acceleration a to rest in continuous time; any deceleration up to the number gives a bound,
- * and the root one that is near the least. */
-static struct stop_bound curve(uint64_t speed_um, uint64_t rising_um, const struct program_stop *stop)
+/* From where it begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate adds.
+ * A rate that still rises is below the greatest by what it goes up while its slope is taken back, in cut_us at least, by
+ * the second: so of the slope only that adds to the speed which the brake's jerk takes longer for. */
+struct start {
+    uint64_t speed_um, rising_um, slope_um, cut_us;
+};
+
+/* The S-curve to rest in continuous time; any deceleration up to the number gives a bound, and the root one that is near the
+ * least. */
+static struct stop_bound curve(const struct start *from, const struct program_stop *stop)
 {
     const struct stop_bound none = {NO_BOUND, NO_BOUND};
     uint64_t down = lesser(number(stop->jerk_down) >> 18, (uint64_t)1 << 29);
     uint64_t up = lesser(number(stop->jerk_up) >> 18, (uint64_t)1 << 29);
     down = greater(down, 1u);
     up = greater(up, 1u);
-    uint64_t lead_us = over(rising_um * 1000u, down);
-    if (speed_um > MOST_SPEED_UM || rising_um > MOST_CHANGE_UM || lead_us >= (uint64_t)1 << 28) {
+    if (from->speed_um > MOST_SPEED_UM || from->rising_um + from->slope_um > MOST_CHANGE_UM) {
         return none;
     }
-    uint64_t peak_um = speed_um + over(rising_um * lead_us, 2000000u); /* of the speed */
+    uint64_t even_lead_us = over(from->rising_um * 1000u, down);
+    uint64_t slope_lead_us = over(from->slope_um * 1000u, down);
+    uint64_t lead_us = even_lead_us + slope_lead_us;
+    if (lead_us >= (uint64_t)1 << 28) {
+        return none;
+    }
+    uint64_t peak_um = from->speed_um + over(from->rising_um * (even_lead_us + 2u * slope_lead_us), 2000000u);
+    if (slope_lead_us > from->cut_us) {
+        peak_um += over(from->slope_um * (slope_lead_us - from->cut_us), 2000000u);
+    }
     if (peak_um > 2u * MOST_SPEED_UM) {
         return none;
     }
@@ -205,20 +220,23 @@ static uint64_t eighths_us(const struct program *p, uint32_t piece, uint32_t cou
 static struct stop_bound brake_bound(const struct program *p, uint32_t piece, const struct extent *extent,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
-    uint64_t slope = extent->slope_um;
+    struct start from = {extent->speed_um, extent->rising_um, extent->slope_um, extent->cut_us};
     uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
-    if (kind == PROGRAM_STOP_HOLD) { /* a rising rate is cut first, until it adds little */
-        uint64_t little = number(stop->deceleration) * 125u >> 23;
-        more_us += slope > little ? extent->cut_us : 0u;
-        slope = lesser(slope, little);
+    uint64_t little = number(stop->deceleration) * 125u >> 23;
+    if (kind == PROGRAM_STOP_HOLD && from.slope_um > little) { /* a rising rate is cut first, until it adds little */
+        more_us += from.cut_us;
+        from.cut_us = from.slope_um > MOST_CHANGE_UM || from.cut_us >= (uint64_t)1 << 28
+                          ? 0u
+                          : qmath_div_u64(from.cut_us * little, from.slope_um);
+        from.slope_um = little;
     }
     more_us += eighths_us(p, piece, extent->waits);
     /* half a tick more of the first part */
-    uint64_t rising = lesser(extent->rising_um + slope, MOST_CHANGE_UM + 1u);
-    uint64_t speed = lesser(extent->speed_um + over(rising * p->header.period_us, 2000000u),
-                            MOST_SPEED_UM + 1u);
-    struct stop_bound out = curve(speed, rising, stop);
-    return sum(out, more_us, over(speed * lesser(more_us, MOST_TIME_US), 1000000u));
+    uint64_t half_um = over(lesser(from.rising_um + from.slope_um, MOST_CHANGE_UM) * p->header.period_us,
+                            2000000u);
+    from.speed_um = lesser(from.speed_um + half_um, MOST_SPEED_UM + 1u);
+    struct stop_bound out = curve(&from, stop);
+    return sum(out, more_us, over(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
 }
 
 /* The plan goes on through the last eighths of the piece and into the next. */
