@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/feed_override.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "core/qmath.h"
 
 enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 
-#define TICK_Q30       ((int64_t)1 << 30)
-#define SPARE_TICKS    2                  /* of the deadline: rounding */
-#define SEARCH_STEPS   2                  /* in a tick at rest */
-#define NEAR_Q40_MM    ((int64_t)1 << 25) /* what path_brake_way_q40_mm may be wrong by */
-#define MOST_FEED_Q32  ((int64_t)1 << 45)
-#define MS_Q40         1099511628u        /* 2^40 / 1000 */
+#define TICK_Q30      ((int64_t)1 << 30)
+#define SPARE_TICKS   2                  /* of the deadline: rounding */
+#define SEARCH_STEPS  2                  /* in a tick at rest */
+#define NEAR_Q40_MM   ((int64_t)1 << 25) /* what path_brake_way_q40_mm may be wrong by */
+#define MOST_FEED_Q32 ((int64_t)1 << 45)
+#define MS_Q40        1099511628u /* 2^40 / 1000 */
 
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)
@@ -131,8 +132,7 @@ static int plan_state(const struct feed_override *f, const struct interp *it,
     if (qmath_magnitude(feed) >= MOST_FEED_Q32) {
         return 0;
     }
-    const int64_t bend_q40 =
-        interp_acceleration_q40(it, time->record, timebase_time_q42(time));
+    const int64_t bend_q40 = interp_acceleration_q40(it, time->record, timebase_time_q42(time));
     const int64_t even = qmath_mul_unsigned(qmath_mul_unsigned(bend_q40, pace), pace);
     const int64_t at_rate_1 = qmath_mul_unsigned(feed * 65536, MS_Q40);
     const int64_t turned = qmath_mul_wide(at_rate_1, (int32_t)(time->now.slope_q56 >> 26)) * 4;
@@ -225,29 +225,23 @@ static int leave_plan(struct feed_override *f, const struct path_state *state, i
     return 1;
 }
 
-/* A stop has been asked for, and the plan is still what goes on. */
-static int stop_tick(struct feed_override *f, struct interp *it)
+/* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. */
+static void begin_stop(struct feed_override *f, const struct interp *it)
 {
     struct path_state state;
-    int64_t turned_q56;
+    int64_t turned_q56 = 0;
     const struct timebase *time = &f->time;
-    if (time->now.rate_q57 == 0 && time->now.slope_q56 == 0 && time->started != 0) {
+    if (time->started == 0) {
+        return;
+    }
+    const int known = plan_state(f, it, &state, &turned_q56);
+    const int rests = (time->now.rate_q57 | time->now.slope_q56) == 0;
+    if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
         come_to_rest(f, 1);
-        return INTERP_OK;
+    } else if (!known || !leave_plan(f, &state, turned_q56)) {
+        f->left_q30 -= (int64_t)timebase_rate_q30(time);
+        timebase_rise_no_more(&f->time);
     }
-    if (time->started != 0 && plan_state(f, it, &state, &turned_q56)) {
-        if (state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0) {
-            come_to_rest(f, 1);
-            return INTERP_OK;
-        }
-        if (leave_plan(f, &state, turned_q56)) {
-            f->left_q30 -= TICK_Q30;
-            return brake_tick(f, it);
-        }
-    }
-    f->left_q30 -= (int64_t)timebase_rate_q30(time);
-    timebase_rise_no_more(&f->time);
-    return plan_tick(f, it);
 }
 
 /* A fault stop's own brake takes the place of one that would take longer. */
@@ -263,38 +257,44 @@ static void replace_brake(struct feed_override *f)
 }
 
 /* On from the place of rest when that is known, and wanted. */
-static int rest_tick(struct feed_override *f, struct interp *it)
+static void look_for_place(struct feed_override *f, struct interp *it)
 {
     for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
-        f->found = interp_search_step(it, &f->place) ? 1u : 0u;
-        if (f->found != 0) {
-            const uint64_t end_q32_s =
-                f->place.piece != NULL ? f->place.piece->end_q32_s : it->own_piece.end_q32_s;
+        if (interp_search_step(it, &f->place)) {
+            const struct prepared_piece *piece =
+                f->place.piece != NULL ? f->place.piece : &it->own_piece;
+            f->found = 1;
             timebase_go_from(&f->time, f->place.time_q42_s, f->place.piece_index, f->place.piece,
-                             end_q32_s);
+                             piece->end_q32_s);
         }
     }
     if (f->found != 0 && f->state == FEED_RUNNING) {
         f->phase = PHASE_PLAN;
-        return plan_tick(f, it);
     }
-    return INTERP_OK;
+}
+
+/* Where the next setpoint comes from. */
+static void decide(struct feed_override *f, struct interp *it)
+{
+    if (f->phase == PHASE_REST) {
+        look_for_place(f, it);
+    } else if (f->phase == PHASE_BRAKE) {
+        if (f->replace != 0) {
+            replace_brake(f);
+        }
+    } else if (comes_to_rest(f)) {
+        begin_stop(f, it);
+    }
 }
 
 int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out)
 {
     int result = INTERP_OK;
+    decide(f, it);
     if (f->phase == PHASE_BRAKE) {
         f->left_q30 -= TICK_Q30;
-        if (f->replace != 0) {
-            replace_brake(f);
-        }
         result = brake_tick(f, it);
-    } else if (f->phase == PHASE_REST) {
-        result = rest_tick(f, it);
-    } else if (comes_to_rest(f)) {
-        result = stop_tick(f, it);
-    } else {
+    } else if (f->phase == PHASE_PLAN) {
         result = plan_tick(f, it);
     }
     if (result >= 0) {

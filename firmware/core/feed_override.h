@@ -43,9 +43,9 @@ struct feed_override {
     uint32_t state;             /* enum feed_state: what is wanted, and whether it is reached */
     uint32_t phase;             /* where setpoints come from */
     uint32_t kind;              /* enum program_stop_kind of the stop asked for */
-    uint32_t replace;           /* 1: a fault stop, which has not taken the place of the brake yet */
-    uint32_t found;             /* 1: `place` is */
-    int64_t left_q30;           /* ticks at rate 1 until the deadline */
+    uint32_t replace; /* 1: a fault stop, which has not taken the place of the brake yet */
+    uint32_t found;   /* 1: `place` is */
+    int64_t left_q30; /* ticks at rate 1 until the deadline */
 };
 
 /* For a checked program at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.

@@ -51,16 +51,6 @@ struct ticks {
     uint32_t first, second, last;
 };
 
-/* a / b with this many bits behind the point, held at 2^60; a >= 0, b > 0. Right to 2^-20 of it and a unit. */
-static uint64_t quotient(int64_t a, int64_t b, int bits)
-{
-    const int room = qmath_clz64((uint64_t)a | 1u);
-    const int up = room < bits ? room : bits;
-    const uint64_t divisor = (uint64_t)b >> (bits - up);
-    const uint64_t q = divisor == 0 ? UINT64_MAX : qmath_div_u64((uint64_t)a << up, divisor);
-    return q < (uint64_t)MOST_Q56 ? q : (uint64_t)MOST_Q56;
-}
-
 static uint32_t whole_ticks(uint64_t ticks_q16)
 {
     const uint32_t whole = (uint32_t)((ticks_q16 + 0xFFFFu) >> 16);
@@ -72,7 +62,7 @@ static uint32_t whole_ticks(uint64_t ticks_q16)
 static uint64_t peak_time_q16(const struct path_state *from, const struct path_brake_numbers *n,
                               uint32_t lead_q16, uint64_t ratio_q16)
 {
-    const uint64_t sum_q32 = quotient(2 * from->speed_q56, n->jerk_down_q56, 32) +
+    const uint64_t sum_q32 = qmath_ratio(2 * from->speed_q56, n->jerk_down_q56, 32) +
                              qmath_product_unsigned(lead_q16, lead_q16);
     const int up = qmath_clz64(sum_q32 | 1u);
     const uint64_t square = qmath_div_u64(sum_q32 << up, ratio_q16 + 65536u);
@@ -84,9 +74,9 @@ static int first_guess(struct ticks *ticks, const struct path_state *from,
                        const struct path_brake_numbers *n)
 {
     const uint64_t lead_q16 =
-        quotient(qmath_magnitude(from->acceleration_q56), n->jerk_down_q56, 16);
-    const uint64_t ratio_q16 = quotient(n->jerk_down_q56, n->jerk_up_q56, 16);
-    const uint64_t most_q16 = quotient(n->deceleration_q56, n->jerk_down_q56, 16);
+        qmath_ratio(qmath_magnitude(from->acceleration_q56), n->jerk_down_q56, 16);
+    const uint64_t ratio_q16 = qmath_ratio(n->jerk_down_q56, n->jerk_up_q56, 16);
+    const uint64_t most_q16 = qmath_ratio(n->deceleration_q56, n->jerk_down_q56, 16);
     if (lead_q16 > MOST_Q16 || ratio_q16 >> 32 != 0) {
         return 0;
     }
@@ -123,7 +113,7 @@ static int add_even(struct ticks *ticks, const struct path_state *from,
                     const struct path_brake_numbers *n)
 {
     const int64_t left = twice_speed(from, ticks->first);
-    const uint64_t needed = quotient(left, n->deceleration_q56, 0); /* n1 + 2 n2 + n3 */
+    const uint64_t needed = qmath_ratio(left, n->deceleration_q56, 0); /* n1 + 2 n2 + n3 */
     const uint32_t jerks = ticks->first + ticks->last;
     if (needed > 2u * PATH_BRAKE_MOST_TICKS) {
         return 0;

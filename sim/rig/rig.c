@@ -162,8 +162,7 @@ static void rig_order(struct rig *rig, const struct rig_order *order)
 
 static int rig_point_next(struct rig *rig, struct interp_point *point)
 {
-    while (rig->next_order < rig->order_count &&
-           rig->orders[rig->next_order].tick <= rig->tick) {
+    while (rig->next_order < rig->order_count && rig->orders[rig->next_order].tick <= rig->tick) {
         rig_order(rig, &rig->orders[rig->next_order++]);
     }
     if (feed_override_next(&rig->feed, &rig->interp, point) != 0) {

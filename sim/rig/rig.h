@@ -56,9 +56,9 @@ struct rig_order {
 
 /* The last hold, stop or fault stop. */
 struct rig_stop {
-    uint32_t tick;      /* of the order, */
-    uint32_t rest_tick; /* and the first setpoint at rest; UINT32_MAX: there was none yet */
-    uint32_t bound_us;  /* what the stop table says, where it was ordered */
+    uint32_t tick;       /* of the order, */
+    uint32_t rest_tick;  /* and the first setpoint at rest; UINT32_MAX: there was none yet */
+    uint32_t bound_us;   /* what the stop table says, where it was ordered */
     int64_t from_q40_mm; /* arc length of the last setpoint before the order, */
     int64_t rest_q40_mm; /* and at rest */
 };

@@ -477,7 +477,13 @@ static void test_quick_stop_without_end_is_a_fault(void)
     app_bench_periods(&bench, 20);
     expect_fault(FAULT_NOT_STOPPED, 3);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_OFF, machine()->fault_phase);
-    expect_off();
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, drive(0)->state.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, drive(1)->state.state);
+    TEST_ASSERT_EQUAL_HEX16(CIA402_QUICK_STOP, machine()->axes[1].controlword);
+    drive(1)->position_counts += 2 * (int32_t)bench.controller.config.start_tolerance_counts;
+    app_bench_periods(&bench, 2);
+    refused(COMMAND_RESET, MACHINE_MOVING);
+    app_bench_periods(&bench, AXIS_REST_SYNCS);
     recover();
 }
 

@@ -53,8 +53,9 @@ struct axis {
     uint32_t digital_inputs;          /* 0x60FD */
     int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
     bool homed;                       /* since it was found */
-    uint32_t rest_syncs;              /* in Quick stop active: for how long it has been at */
+    uint32_t rest_syncs; /* with power on: for how long it has been, in this state, at */
     int32_t rest_counts;
+    enum cia402_state rest_state;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
@@ -98,7 +99,7 @@ bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its targe
 /* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and has
  * been in one place for AXIS_STANDSTILL_SYNCS. */
 bool axis_left(const struct axis *axis);
-bool axis_moves(const struct axis *axis); /* power is on, and its position has changed lately */
+bool axis_moves(const struct axis *axis);   /* power is on, and its position has changed lately */
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
 

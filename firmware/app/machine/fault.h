@@ -16,8 +16,9 @@
 #define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 gone: controlword not obeyed */
 #define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
 #define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
-#define FAULT_NOT_SENT  (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
-#define FAULT_STOP_LATE (EMCY_MANUFACTURER | 0x08u) /* a stop along the path beyond its deadline; setpoint */
+#define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
+#define FAULT_STOP_LATE                                                                            \
+    (EMCY_MANUFACTURER | 0x08u) /* a stop along the path beyond its deadline; setpoint */
 
 /* Homing. */
 #define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */

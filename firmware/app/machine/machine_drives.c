@@ -21,7 +21,8 @@ bool machine_obeyed(const struct machine *machine)
 bool machine_any_moves(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (axis_moves(&machine->axes[i])) {
+        const struct axis *axis = &machine->axes[i];
+        if (!axis->answers.lost && axis_moves(axis)) {
             return true;
         }
     }
