@@ -55,7 +55,7 @@ class StopLimits:
 
 
 _RAISED = ("feed", "centripetal", "axis_velocity", "axis_acceleration", "axis_jerk", "reach")
-_MARGIN = 1.0 / (1.0 - 0.001) + 1e-6
+_MARGIN = 1.0 / (1.0 - 0.003) + 1e-6
 
 
 class StopSearch:
