@@ -152,7 +152,7 @@ static int plan_tick(struct feed_override *f, struct interp *it)
     const int result = it->piece != NULL
                            ? interp_at_piece(it, f->time.record, time_q42_s, &f->point)
                            : interp_at_q42(it, time_q42_s, &f->point);
-    if (timebase_state(&f->time) == TIMEBASE_ENDED) {
+    if (result == INTERP_END) {
         f->state = FEED_ENDED;
     }
     return result;
@@ -273,8 +273,7 @@ static void look_for_place(struct feed_override *f, struct interp *it)
     }
 }
 
-/* Where the next setpoint comes from. */
-static void decide(struct feed_override *f, struct interp *it)
+void feed_override_decide(struct feed_override *f, struct interp *it)
 {
     if (f->phase == PHASE_REST) {
         look_for_place(f, it);
@@ -282,7 +281,7 @@ static void decide(struct feed_override *f, struct interp *it)
         if (f->replace != 0) {
             replace_brake(f);
         }
-    } else if (comes_to_rest(f)) {
+    } else {
         begin_stop(f, it);
     }
 }
@@ -290,7 +289,9 @@ static void decide(struct feed_override *f, struct interp *it)
 int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out)
 {
     int result = INTERP_OK;
-    decide(f, it);
+    if (f->phase != PHASE_PLAN || comes_to_rest(f)) {
+        feed_override_decide(f, it);
+    }
     if (f->phase == PHASE_BRAKE) {
         f->left_q30 -= TICK_Q30;
         result = brake_tick(f, it);

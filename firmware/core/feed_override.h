@@ -76,6 +76,10 @@ void feed_override_fault_stop(struct feed_override *f);
  * same point again. Returns 0 or a negative INTERP_ERR_..., then *out is unchanged. Bounded time, tick context. */
 int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
 
+/* Part of feed_override_next, where anything but the plan is wanted: what this tick does about it. By itself, so that the
+ * longest path of a tick in which only the plan goes on can be counted without it. */
+void feed_override_decide(struct feed_override *f, struct interp *it);
+
 /* --- What is so at the last setpoint --- */
 
 enum feed_state feed_override_state(const struct feed_override *f);

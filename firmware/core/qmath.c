@@ -55,6 +55,11 @@ uint64_t qmath_div_u64(uint64_t a, uint64_t b)
     return q + (a - q * b >= b ? 1u : 0u);
 }
 
+uint64_t qmath_div_up_u64(uint64_t a, uint64_t b)
+{
+    return qmath_div_u64(a + b - 1u, b);
+}
+
 uint64_t qmath_ratio(int64_t a, int64_t b, int bits)
 {
     const uint64_t most = (uint64_t)1 << 60;

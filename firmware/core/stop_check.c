@@ -32,29 +32,13 @@ static uint64_t greater(uint64_t a, uint64_t b)
     return a > b ? a : b;
 }
 
-/* a / b, up; b > 0 */
-static uint64_t over(uint64_t a, uint64_t b)
-{
-    return qmath_div_u64(a + b - 1u, b);
-}
-
 /* Time in us in which a jerk (2^-18 mm/s^3) makes an acceleration (um/s^2, up to 2^34): a 2^18 1000 / j. */
 static uint64_t jerk_time_us(uint64_t change_um, uint64_t jerk_q18)
 {
-    return over(change_um * 1000u, greater(jerk_q18 >> 18, 1u));
+    return qmath_div_up_u64(change_um * 1000u, greater(jerk_q18 >> 18, 1u));
 }
 
 /* --- What a piece asks of a brake --- */
-
-/* Motion of a piece at any rate that its override bounds allow. */
-struct extent {
-    uint64_t speed_um;  /* greatest, um/s, */
-    uint64_t rising_um; /* and acceleration at a constant rate, um/s^2, */
-    uint64_t slope_um;  /* and what a changing rate adds to it, */
-    uint64_t cut_us;    /* and the time in which such a change is taken back */
-    uint32_t waits;     /* eighths of the piece, one after the other, in which no brake may fit, at most, */
-    uint32_t last;      /* and so many before its end */
-};
 
 /* a 1000 / 2^bits, up; a < 2^52 */
 static uint64_t thousands(int64_t a, int bits)
@@ -81,7 +65,7 @@ static int settled(const struct program *p, uint64_t speed_um, uint64_t falling_
         return 0;
     }
     time_us = time_us / 2u + p->header.period_us;
-    return speed_um > over(fall * time_us, 1000000u);
+    return speed_um > qmath_div_up_u64(fall * time_us, 1000000u);
 }
 
 static uint64_t held(int64_t value, int bits, uint64_t most)
@@ -89,14 +73,15 @@ static uint64_t held(int64_t value, int bits, uint64_t most)
     return value >= (int64_t)1 << 52 ? most + 1u : lesser(thousands(value, bits), most + 1u);
 }
 
-static void extent_waits(struct extent *out, const struct program *p, const struct program_piece *c,
-                         const int64_t low[2][FEED_PARTS], uint64_t jerk_up_q18)
+static void extent_waits(struct stop_extent *out, const struct program *p,
+                         const struct program_piece *c, const int64_t low[2][FEED_PARTS],
+                         uint64_t jerk_up_q18)
 {
     uint32_t run = 0;
     out->waits = 0;
     for (int i = 0; i < FEED_PARTS; i++) {
-        uint64_t least = low[0][i] <= 0 ? 0u
-                                        : lesser((uint64_t)low[0][i], MOST_SPEED_UM << 14) * 1000u >> 24;
+        uint64_t least =
+            low[0][i] <= 0 ? 0u : lesser((uint64_t)low[0][i], MOST_SPEED_UM << 14) * 1000u >> 24;
         uint64_t falling = held(-low[1][i], 24, MOST_CHANGE_UM);
         run = settled(p, least, falling, c->override_factor_q24, jerk_up_q18) ? 0u : run + 1u;
         out->waits = run > out->waits ? run : out->waits;
@@ -112,42 +97,40 @@ static uint64_t greatest_slope_q16(const struct program_piece *c)
     return lesser(c->override_rate_q16_per_s, qmath_root(square_q32) + 1u);
 }
 
-static void piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
-                         struct extent *out)
+/* Lower bounds of the eighths; gives the upper one of all. */
+static int64_t parts_below(const struct program_piece *c, enum feed_derivative what,
+                           int64_t low[FEED_PARTS])
+{
+    int64_t high[FEED_PARTS];
+    feed_bounds_parts(c, what, low, high);
+    for (int i = 1; i < FEED_PARTS; i++) {
+        high[0] = qmath_greater(high[0], high[i]);
+    }
+    return high[0];
+}
+
+void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
+                       struct stop_extent *out)
 {
     struct program_piece c;
     int64_t low[2][FEED_PARTS];
-    int64_t high[2][FEED_PARTS];
     program_piece_get(p, piece, &c);
-    feed_bounds_parts(&c, FEED_VELOCITY, low[0], high[0]);
-    feed_bounds_parts(&c, FEED_ACCELERATION, low[1], high[1]);
-    for (int i = 1; i < FEED_PARTS; i++) {
-        high[0][0] = qmath_greater(high[0][0], high[0][i]);
-        high[1][0] = qmath_greater(high[1][0], high[1][i]);
-    }
-    uint64_t speed = held(high[0][0], 24, MOST_SPEED_UM);
+    uint64_t speed = held(parts_below(&c, FEED_VELOCITY, low[0]), 24, MOST_SPEED_UM);
     out->speed_um = scaled(speed, c.override_factor_q24);
-    out->rising_um = held(high[1][0], 24, MOST_CHANGE_UM);
+    out->rising_um = held(parts_below(&c, FEED_ACCELERATION, low[1]), 24, MOST_CHANGE_UM);
     out->rising_um = scaled(scaled(out->rising_um, c.override_factor_q24), c.override_factor_q24);
     uint64_t slope_q16 = greatest_slope_q16(&c);
     out->slope_um = (slope_q16 * lesser(speed, MOST_SPEED_UM) >> 16) + 1u;
     /* slope 2^-16 over second 2^-8: 10^6 / 2^8 = 15625 / 4 */
-    out->cut_us = over(slope_q16 * 15625u, (uint64_t)c.override_second_q8_per_s2 * 4u);
-    extent_waits(out, p, &c, (const int64_t(*)[FEED_PARTS])low, jerk_up_q18);
+    out->cut_us = qmath_div_up_u64(slope_q16 * 15625u, (uint64_t)c.override_second_q8_per_s2 * 4u);
+    extent_waits(out, p, &c, (const int64_t (*)[FEED_PARTS])low, jerk_up_q18);
 }
 
 /* --- The brake --- */
 
-/* From where it begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate adds.
- * A rate that still rises is below the greatest by what it goes up while its slope is taken back, in cut_us at least, by
- * the second: so of the slope only that adds to the speed which the brake's jerk takes longer for. */
-struct start {
-    uint64_t speed_um, rising_um, slope_um, cut_us;
-};
-
 /* The S-curve to rest in continuous time; any deceleration up to the number gives a bound, and the root one that is near the
  * least. */
-static struct stop_bound curve(const struct start *from, const struct program_stop *stop)
+struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop)
 {
     const struct stop_bound none = {NO_BOUND, NO_BOUND};
     uint64_t down = lesser(number(stop->jerk_down) >> 18, (uint64_t)1 << 29);
@@ -157,15 +140,15 @@ static struct stop_bound curve(const struct start *from, const struct program_st
     if (from->speed_um > MOST_SPEED_UM || from->rising_um + from->slope_um > MOST_CHANGE_UM) {
         return none;
     }
-    uint64_t even_lead_us = over(from->rising_um * 1000u, down);
-    uint64_t slope_lead_us = over(from->slope_um * 1000u, down);
+    uint64_t even_lead_us = qmath_div_up_u64(from->rising_um * 1000u, down);
+    uint64_t slope_lead_us = qmath_div_up_u64(from->slope_um * 1000u, down);
     uint64_t lead_us = even_lead_us + slope_lead_us;
     if (lead_us >= (uint64_t)1 << 28) {
         return none;
     }
-    uint64_t peak_um = from->speed_um + over(from->rising_um * (even_lead_us + 2u * slope_lead_us), 2000000u);
+    uint64_t peak_um = from->speed_um + qmath_div_up_u64(from->rising_um * (even_lead_us + 2u * slope_lead_us), 2000000u);
     if (slope_lead_us > from->cut_us) {
-        peak_um += over(from->slope_um * (slope_lead_us - from->cut_us), 2000000u);
+        peak_um += qmath_div_up_u64(from->slope_um * (slope_lead_us - from->cut_us), 2000000u);
     }
     if (peak_um > 2u * MOST_SPEED_UM) {
         return none;
@@ -173,9 +156,9 @@ static struct stop_bound curve(const struct start *from, const struct program_st
     uint64_t mean = greater(qmath_div_u64(2u * down * up, down + up), 1u); /* mm/s^3 */
     uint64_t most = number(stop->deceleration) * 125u >> 21;               /* um/s^2 */
     uint64_t depth = greater(lesser(qmath_root(peak_um * mean * 1000u), most), 1u);
-    uint64_t first_us = over(depth * 1000u, down);
-    uint64_t last_us = over(depth * 1000u, up);
-    uint64_t even_us = over(peak_um * 1000000u, depth);
+    uint64_t first_us = qmath_div_up_u64(depth * 1000u, down);
+    uint64_t last_us = qmath_div_up_u64(depth * 1000u, up);
+    uint64_t even_us = qmath_div_up_u64(peak_um * 1000000u, depth);
     uint64_t time_us = lead_us + even_us + (first_us + last_us) / 2u + 1u;
     if (time_us >= MOST_TIME_US) {
         return none;
@@ -183,7 +166,7 @@ static struct stop_bound curve(const struct start *from, const struct program_st
     /* the way is the speed times the centre of the deceleration in time */
     uint64_t centre_us = lead_us + (time_us - lead_us) / 2u + 1u;
     centre_us += first_us > last_us ? qmath_div_u64(first_us - last_us, 6u) + 1u : 0u;
-    uint64_t way_um = over(peak_um * centre_us, 1000000u);
+    uint64_t way_um = qmath_div_up_u64(peak_um * centre_us, 1000000u);
     struct stop_bound out = {(uint32_t)time_us, (uint32_t)lesser(way_um, NO_BOUND)};
     return out;
 }
@@ -207,7 +190,7 @@ static struct stop_bound most_of(struct stop_bound a, struct stop_bound b)
 /* q / 2^bits in millionths, up, where that is below 2^32; else `most`. */
 static uint64_t micro(uint64_t q, int bits, uint64_t most)
 {
-    return q >= (uint64_t)1 << 43 ? most : over(q * 1000000u, (uint64_t)1 << bits);
+    return q >= (uint64_t)1 << 43 ? most : qmath_div_up_u64(q * 1000000u, (uint64_t)1 << bits);
 }
 
 /* Time of so many eighths of a piece. */
@@ -217,10 +200,11 @@ static uint64_t eighths_us(const struct program *p, uint32_t piece, uint32_t cou
 }
 
 /* The bound with the numbers of a piece, for a brake that begins in it. */
-static struct stop_bound brake_bound(const struct program *p, uint32_t piece, const struct extent *extent,
+static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
+                                     const struct stop_extent *extent,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
-    struct start from = {extent->speed_um, extent->rising_um, extent->slope_um, extent->cut_us};
+    struct stop_start from = {extent->speed_um, extent->rising_um, extent->slope_um, extent->cut_us};
     uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
     uint64_t little = number(stop->deceleration) * 125u >> 23;
     if (kind == PROGRAM_STOP_HOLD && from.slope_um > little) { /* a rising rate is cut first, until it adds little */
@@ -232,11 +216,11 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece, co
     }
     more_us += eighths_us(p, piece, extent->waits);
     /* half a tick more of the first part */
-    uint64_t half_um = over(lesser(from.rising_um + from.slope_um, MOST_CHANGE_UM) * p->header.period_us,
+    uint64_t half_um = qmath_div_up_u64(lesser(from.rising_um + from.slope_um, MOST_CHANGE_UM) * p->header.period_us,
                             2000000u);
     from.speed_um = lesser(from.speed_um + half_um, MOST_SPEED_UM + 1u);
-    struct stop_bound out = curve(&from, stop);
-    return sum(out, more_us, over(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
+    struct stop_bound out = stop_curve(&from, stop);
+    return sum(out, more_us, qmath_div_up_u64(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
 }
 
 /* The plan goes on through the last eighths of the piece and into the next. */
@@ -246,7 +230,8 @@ static struct stop_bound waited(const struct program *p, uint32_t piece, uint32_
     int64_t from = program_piece_start(p, piece);
     int64_t to = piece + 1u < p->header.piece_count ? program_piece_start(p, piece + 1u)
                                                     : p->header.length_q40_mm;
-    uint64_t way_um = to <= from ? 0u : ((uint64_t)(to - from) >> 30) + 1u; /* below 2^-30 mm < um */
+    uint64_t way_um =
+        to <= from ? 0u : ((uint64_t)(to - from) >> 30) + 1u; /* below 2^-30 mm < um */
     return sum(next, eighths_us(p, piece, eighths), way_um);
 }
 
@@ -278,11 +263,11 @@ struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece)
 {
     const struct program *p = walk->program;
     struct program_stop stop;
-    struct extent extent = {.last = FEED_PARTS};
+    struct stop_extent extent = {.last = FEED_PARTS};
     struct stop_bound own = {0, 0};
     program_stop_get(p, piece, walk->kind, &stop);
     if (stop.deceleration != 0u) {
-        piece_extent(p, piece, number(stop.jerk_up), &extent);
+        stop_piece_extent(p, piece, number(stop.jerk_up), &extent);
         own = brake_bound(p, piece, &extent, &stop, walk->kind);
     }
     if (extent.last != 0u) {
@@ -308,7 +293,8 @@ static int within_limits(const struct program_stop *stop, const struct program_l
     /* 2^-24 mm/s^2 against um/s^2 = 10^-3 mm/s^2 */
     int fits = limits->acceleration_um_s2 == 0u ||
                number(stop->deceleration) * 125u >> 21 <= limits->acceleration_um_s2;
-    return fits && (jerk == 0u || (number(stop->jerk_down) <= jerk && number(stop->jerk_up) <= jerk));
+    return fits &&
+           (jerk == 0u || (number(stop->jerk_down) <= jerk && number(stop->jerk_up) <= jerk));
 }
 
 static int check_entry(const struct program_stop *stop, const struct program_limits *limits)
@@ -321,7 +307,8 @@ static int check_entry(const struct program_stop *stop, const struct program_lim
     return !all || within_limits(stop, limits) ? 0 : PROGRAM_ERR_STOP_NUMBERS;
 }
 
-static int check_entries(const struct program *p, const struct program_limits *limits, uint32_t *index)
+static int check_entries(const struct program *p, const struct program_limits *limits,
+                         uint32_t *index)
 {
     for (*index = 0; *index < p->header.piece_count; (*index)++) {
         for (int kind = PROGRAM_STOP_HOLD; kind <= PROGRAM_STOP_FAULT; kind++) {

@@ -20,7 +20,8 @@
 #define STOP_TICKS 6u
 /* Time in which the piece whose numbers count may still change, in periods of program time: three ticks at 200 %. */
 #define STOP_WINDOW_TICKS 6u
-#define STOP_WINDOW       8 /* pieces that begin in it, at most (docs/protocol.md 1.3: no two last less than two periods) */
+#define STOP_WINDOW                                                                                \
+    8 /* pieces that begin in it, at most (docs/protocol.md 1.3: no two last less than two periods) */
 
 /* From the command to rest, held at UINT32_MAX. */
 struct stop_bound {
@@ -33,11 +34,35 @@ struct stop_walk {
     const struct program *program;
     enum program_stop_kind kind;
     uint64_t window_q32_s;
-    struct stop_bound own[STOP_WINDOW];     /* of the pieces behind, the nearest first, */
-    uint64_t duration_q32_s[STOP_WINDOW];   /* and their durations */
-    struct stop_bound next;                 /* bound of the piece behind */
+    struct stop_bound own[STOP_WINDOW];   /* of the pieces behind, the nearest first, */
+    uint64_t duration_q32_s[STOP_WINDOW]; /* and their durations */
+    struct stop_bound next;               /* bound of the piece behind */
     uint32_t count;
 };
+
+/* Motion of a piece at any rate that its override bounds allow. */
+struct stop_extent {
+    uint64_t speed_um;  /* greatest, um/s, */
+    uint64_t rising_um; /* and acceleration at a constant rate, um/s^2, */
+    uint64_t slope_um;  /* and what a changing rate adds to it, */
+    uint64_t cut_us;    /* and the time in which such a change is taken back */
+    uint32_t
+        waits; /* eighths of the piece, one after the other, in which no brake may fit, at most, */
+    uint32_t last; /* and so many before its end */
+};
+
+void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
+                       struct stop_extent *out);
+
+/* Where a brake begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate adds.
+ * A rate that still rises is below the greatest by what it goes up while its slope is taken back, in cut_us at least: so of
+ * the slope only that adds to the speed which the brake's jerk takes longer for. um, s; us. */
+struct stop_start {
+    uint64_t speed_um, rising_um, slope_um, cut_us;
+};
+
+/* The brake of the table alone: its continuous curve. */
+struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop);
 
 /* Begins behind the last piece of a program whose pieces and segments have passed their checks. */
 void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);

@@ -62,7 +62,7 @@ TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
 
 # What the tick runs: loops of fixed length unrolled. Measured: a quarter fewer instructions.
-TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interp.c timebase_step.c timebase_change.c rate.c rate_plan.c rate_search.c rate_window.c qmath.c) \
+TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interp.c feed_override.c timebase_step.c timebase_change.c rate.c rate_plan.c rate_search.c rate_window.c qmath.c) \
             firmware/app/machine/motion.c
 
 target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
