@@ -128,21 +128,28 @@ void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up
 
 /* --- The brake --- */
 
-/* The S-curve from speed v and acceleration a to rest in continuous time; any deceleration up to the number gives a bound,
- * and the root one that is near the least. */
-struct stop_bound stop_curve(uint64_t speed_um, uint64_t rising_um, const struct program_stop *stop)
+/* The S-curve to rest in continuous time; any deceleration up to the number gives a bound, and the root one that is near the
+ * least. */
+struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop)
 {
     const struct stop_bound none = {NO_BOUND, NO_BOUND};
     uint64_t down = lesser(number(stop->jerk_down) >> 18, (uint64_t)1 << 29);
     uint64_t up = lesser(number(stop->jerk_up) >> 18, (uint64_t)1 << 29);
     down = greater(down, 1u);
     up = greater(up, 1u);
-    uint64_t lead_us = qmath_div_up_u64(rising_um * 1000u, down);
-    if (speed_um > MOST_SPEED_UM || rising_um > MOST_CHANGE_UM || lead_us >= (uint64_t)1 << 28) {
+    if (from->speed_um > MOST_SPEED_UM || from->rising_um + from->slope_um > MOST_CHANGE_UM) {
         return none;
     }
-    uint64_t peak_um =
-        speed_um + qmath_div_up_u64(rising_um * lead_us, 2000000u); /* of the speed */
+    uint64_t even_lead_us = qmath_div_up_u64(from->rising_um * 1000u, down);
+    uint64_t slope_lead_us = qmath_div_up_u64(from->slope_um * 1000u, down);
+    uint64_t lead_us = even_lead_us + slope_lead_us;
+    if (lead_us >= (uint64_t)1 << 28) {
+        return none;
+    }
+    uint64_t peak_um = from->speed_um + qmath_div_up_u64(from->rising_um * (even_lead_us + 2u * slope_lead_us), 2000000u);
+    if (slope_lead_us > from->cut_us) {
+        peak_um += qmath_div_up_u64(from->slope_um * (slope_lead_us - from->cut_us), 2000000u);
+    }
     if (peak_um > 2u * MOST_SPEED_UM) {
         return none;
     }
@@ -197,21 +204,23 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
                                      const struct stop_extent *extent,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
-    uint64_t slope = extent->slope_um;
+    struct stop_start from = {extent->speed_um, extent->rising_um, extent->slope_um, extent->cut_us};
     uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
-    if (kind == PROGRAM_STOP_HOLD) { /* a rising rate is cut first, until it adds little */
-        uint64_t little = number(stop->deceleration) * 125u >> 23;
-        more_us += slope > little ? extent->cut_us : 0u;
-        slope = lesser(slope, little);
+    uint64_t little = number(stop->deceleration) * 125u >> 23;
+    if (kind == PROGRAM_STOP_HOLD && from.slope_um > little) { /* a rising rate is cut first, until it adds little */
+        more_us += from.cut_us;
+        from.cut_us = from.slope_um > MOST_CHANGE_UM || from.cut_us >= (uint64_t)1 << 28
+                          ? 0u
+                          : qmath_div_u64(from.cut_us * little, from.slope_um);
+        from.slope_um = little;
     }
     more_us += eighths_us(p, piece, extent->waits);
     /* half a tick more of the first part */
-    uint64_t rising = lesser(extent->rising_um + slope, MOST_CHANGE_UM + 1u);
-    uint64_t speed =
-        lesser(extent->speed_um + qmath_div_up_u64(rising * p->header.period_us, 2000000u),
-               MOST_SPEED_UM + 1u);
-    struct stop_bound out = stop_curve(speed, rising, stop);
-    return sum(out, more_us, qmath_div_up_u64(speed * lesser(more_us, MOST_TIME_US), 1000000u));
+    uint64_t half_um = qmath_div_up_u64(lesser(from.rising_um + from.slope_um, MOST_CHANGE_UM) * p->header.period_us,
+                            2000000u);
+    from.speed_um = lesser(from.speed_um + half_um, MOST_SPEED_UM + 1u);
+    struct stop_bound out = stop_curve(&from, stop);
+    return sum(out, more_us, qmath_div_up_u64(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
 }
 
 /* The plan goes on through the last eighths of the piece and into the next. */

@@ -54,9 +54,15 @@ struct stop_extent {
 void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
                        struct stop_extent *out);
 
-/* The brake of the table alone, from a speed (um/s) and a rising acceleration (um/s^2): its continuous curve. */
-struct stop_bound stop_curve(uint64_t speed_um, uint64_t rising_um,
-                             const struct program_stop *stop);
+/* Where a brake begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate adds.
+ * A rate that still rises is below the greatest by what it goes up while its slope is taken back, in cut_us at least: so of
+ * the slope only that adds to the speed which the brake's jerk takes longer for. um, s; us. */
+struct stop_start {
+    uint64_t speed_um, rising_um, slope_um, cut_us;
+};
+
+/* The brake of the table alone: its continuous curve. */
+struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop);
 
 /* Begins behind the last piece of a program whose pieces and segments have passed their checks. */
 void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);

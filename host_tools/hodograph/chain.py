@@ -214,12 +214,12 @@ class Chain:
                     machine.offset_mm,
                     limits,
                     machine.period_us,
-                    self._stop_terms,
+                    self.stop_terms,
                 ),
             )
 
     @property
-    def _stop_terms(self) -> StopTerms:
+    def stop_terms(self) -> StopTerms:
         """What the stops of the program keep beside the limits of its plan."""
         machine, limits = self.machine, self.file.limits
         return StopTerms(

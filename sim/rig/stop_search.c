@@ -430,7 +430,7 @@ static int state_keeps(const struct search *search, const struct inverse *invers
 /* The same limits at other rates of program time, also while the rate changes. */
 static int rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
 {
-    static const double rates[] = {1.0, 0.9, 0.75, 0.5, 0.25, 0.1};
+    static const double rates[] = {1.0, 0.99, 0.97, 0.93, 0.85, 0.7, 0.5, 0.25, 0.1};
     const size_t count = sizeof rates / sizeof rates[0];
     struct path_brake_numbers numbers;
     numbers_of(search, codes, &numbers);
@@ -438,8 +438,11 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
                                               (search->period_s * search->period_s)
                                         : HUGE_VAL;
     for (uint32_t i = 0; i < piece->count; i++) {
-        for (size_t r = 0; r <= count; r++) {
-            double rate = r == count ? piece->factor : rates[r];
+        for (size_t r = 0; r < 2 * count; r++) {
+            double rate = r < count ? rates[r] : piece->factor * rates[r - count];
+            if (r >= count && rate <= 1.0) {
+                break;
+            }
             for (int slope = -1; slope <= 1; slope++) {
                 struct state from = piece->at[i];
                 double change = piece->rate * from.v;

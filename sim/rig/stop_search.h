@@ -15,7 +15,7 @@
 #include "core/program.h"
 
 #define STOP_ROWS   33u   /* of the path, for each segment */
-#define STOP_MARGIN 0.001 /* share of each limit */
+#define STOP_MARGIN 0.003 /* share of each limit */
 
 /* The path at an arc length, ascending; two rows with one arc length where segments meet. */
 struct stop_row {

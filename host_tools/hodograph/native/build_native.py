@@ -25,6 +25,7 @@ HEADERS = (
     "rig/contour.h",
     "rig/rig.h",
     "rig/stop_search.h",
+    "rig/stop_trial.h",
     "rig/axis_run.h",
 )
 LIBRARIES = ("sim", "core")

@@ -202,6 +202,26 @@ void stop_used(const struct program *p, const struct stop_limits *limits, const 
 void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
                  struct stop_found *found);
 
+/* rig/stop_trial.h */
+struct stop_use {
+    double velocity, acceleration, jerk, path_acceleration, path_jerk;
+};
+struct stop_case {
+    uint64_t seed;
+    uint32_t tick;
+};
+struct stop_trial {
+    uint64_t seed;
+    uint32_t trials, kernel;
+    struct stop_limits hold, fault;
+    struct stop_use of_hold, of_fault;
+    double of_bound[2], longest_s[2];
+    uint32_t measured[2], late, failures;
+    struct stop_case most, longest, failed;
+};
+int stop_trial_run(const struct program *p, struct stop_trial *trial);
+int stop_trial_again(const struct program *p, struct stop_trial *trial, uint32_t tick);
+
 /* rig/axis_run.h */
 struct axis_run {
     double rated_torque_nm, friction_volts;

@@ -55,7 +55,7 @@ class StopLimits:
 
 
 _RAISED = ("feed", "centripetal", "axis_velocity", "axis_acceleration", "axis_jerk", "reach")
-_MARGIN = 1.0 / (1.0 - 0.001) + 1e-6
+_MARGIN = 1.0 / (1.0 - 0.003) + 1e-6
 
 
 class StopSearch:
@@ -68,7 +68,7 @@ class StopSearch:
     def used(self, limits: StopLimits) -> StopLimits:
         """What the program itself uses at the rate 1: the greatest value of each quantity that is limited."""
         ffi, lib = library()
-        given = self._given(limits)
+        given = limits_struct(limits)
         found = ffi.new("struct stop_limits *")
         lib.stop_used(self._program.pointer, given[0], self._rows(given), found)
         values: dict[str, Any] = {}
@@ -80,7 +80,7 @@ class StopSearch:
     def codes(self, limits: StopLimits) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
         """Codes (M, 3), and times (M, 2) to rest, the longest and the mean of the instants looked at."""
         ffi, lib = library()
-        given = self._given(limits)
+        given = limits_struct(limits)
         found = ffi.new("struct stop_found[]", self._count)
         lib.stop_search(self._program.pointer, given[0], self._rows(given), found)
         table = np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
@@ -92,13 +92,14 @@ class StopSearch:
         lib.stop_rows(self._program.pointer, given[0], rows)
         return rows
 
-    def _given(self, limits: StopLimits) -> tuple[Any, Any]:
-        """The struct and what it points to."""
-        ffi, _ = library()
-        caps = ffi.new("struct stop_cap[]", [tuple(cap) for cap in limits.caps])
-        own = ffi.new("struct stop_limits *")
-        for one in fields(limits):
-            if one.name != "caps":
-                setattr(own, one.name, getattr(limits, one.name))
-        own.caps, own.cap_count = caps, len(limits.caps)
-        return own, caps
+
+def limits_struct(limits: StopLimits) -> tuple[Any, Any]:
+    """The struct stop_limits and what it points to, which must be kept as long."""
+    ffi, _ = library()
+    caps = ffi.new("struct stop_cap[]", [tuple(cap) for cap in limits.caps])
+    own = ffi.new("struct stop_limits *")
+    for one in fields(limits):
+        if one.name != "caps":
+            setattr(own, one.name, getattr(limits, one.name))
+    own.caps, own.cap_count = caps, len(limits.caps)
+    return own, caps

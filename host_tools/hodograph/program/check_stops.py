@@ -132,13 +132,16 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
     if kind == HOLD:
         little = LITTLE * number[:, DECELERATION]
         more_s = np.where(slope > little, more_s + cut_s, more_s)
+        cut_s = np.where(slope > little, cut_s * little / np.maximum(slope, 1e-300), cut_s)
         slope = np.minimum(slope, little)
     settled = _settled(program, feed.min(axis=2), acceleration.min(axis=2), number[:, JERK_UP])
     longest, last = _runs(~settled)
     more_s = more_s + longest * np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
-    rising = rising + slope
-    speed = speed + 0.5 * rising * period_s
-    time_s, way_mm = _curve(speed, rising, number)
+    speed = speed + 0.5 * (rising + slope) * period_s
+    lead_s, slope_s = rising / number[:, JERK_DOWN], slope / number[:, JERK_DOWN]
+    # A rate that still rises is below the greatest by what it goes up while its slope is taken back.
+    peak = speed + rising * (0.5 * lead_s + slope_s) + 0.5 * slope * np.maximum(slope_s - cut_s, 0.0)
+    time_s, way_mm = _curve(peak, lead_s + slope_s, number)
     time_s, way_mm = time_s + more_s, way_mm + speed * more_s
     return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)
 
@@ -161,11 +164,9 @@ def _runs(mask: Bool) -> tuple[Real, Real]:
     return longest / mask.shape[1], run / mask.shape[1]
 
 
-def _curve(speed: Real, rising: Real, number: Real) -> tuple[Real, Real]:
-    """Time and way of the S-curve to rest, in continuous time."""
+def _curve(peak: Real, lead_s: Real, number: Real) -> tuple[Real, Real]:
+    """Time and way of the S-curve to rest in continuous time, from `peak` of the speed, to which `lead_s` leads."""
     down, most, up = number[:, JERK_DOWN], number[:, DECELERATION], number[:, JERK_UP]
-    lead_s = rising / down
-    peak = speed + 0.5 * rising * lead_s
     depth = np.minimum(np.sqrt(peak * 2.0 * down * up / (down + up)), most)
     first_s, last_s = depth / down, depth / up
     even_s = peak / np.maximum(depth, 1e-300)

@@ -168,7 +168,7 @@ def with_crc(image: bytes) -> bytes:
 
 
 def decode(image: bytes) -> Program:
-    """The program in an image. Raises InputError, with the code of docs/protocol.md 1.4, for what
+    """The program in an image. Raises InputError, with the code of docs/protocol.md 1.5, for what
     `program_open` of the controller refuses (sizes, magic, version, CRC, counts); the rest is for `check`.
     """
     fault = open_fault(image)
