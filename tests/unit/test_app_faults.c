@@ -30,6 +30,8 @@ void tearDown(void)
     for (unsigned i = 0; i < BENCH_DRIVES; ++i) {
         TEST_ASSERT_TRUE_MESSAGE(bench.drives[i].worst_step_counts <= STEP_COUNTS,
                                  "a setpoint jumped");
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, bench.drives[i].cut_moving,
+                                         "power was taken from a moving drive");
         TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, bench.drives[i].quick_stop_moved,
                                          "a target moved in a quick stop");
     }
