@@ -53,7 +53,16 @@ struct interp {
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
 
 /* core/feed_override.h */
+struct rate {
+    int64_t rate_q57, slope_q56;
+};
+struct timebase {
+    struct rate now;
+    ...;
+};
 struct feed_override {
+    struct timebase time;
+    uint32_t phase;
     ...;
 };
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us, uint64_t time_q42_s);

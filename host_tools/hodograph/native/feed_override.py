@@ -22,6 +22,15 @@ class State(IntEnum):
 
 
 @dataclass(frozen=True)
+class PlanStep:
+    """Where a setpoint of the plan is from: program time, its rate, the slope of that per second."""
+
+    time_s: float
+    rate: float
+    slope_per_s: float
+
+
+@dataclass(frozen=True)
 class Step:
     """A tick: arc length and point of the setpoint (mm), feed along the path (mm/s), rate of program time."""
 
@@ -40,6 +49,7 @@ class FeedOverride:
         ffi, self._lib = library()
         program.require()
         self._program = program  # keeps the image alive
+        self._period_s = 1e-6 * program.period_us
         self._interp = ffi.new("struct interp *")
         self._point = ffi.new("struct interp_point *")
         self._feed = ffi.new("struct feed_override *")
@@ -57,6 +67,15 @@ class FeedOverride:
             self._lib.feed_override_feed_q32(self._feed) * 2.0**-32,
             self._lib.feed_override_rate_q30(self._feed) * 2.0**-30,
         )
+
+    @property
+    def plan(self) -> PlanStep | None:
+        """Of the last step; None in a brake and at rest."""
+        if self._feed.phase != 0:
+            return None
+        now = self._feed.time.now
+        slope_per_s = now.slope_q56 * 2.0**-56 / self._period_s
+        return PlanStep(self.time_s, now.rate_q57 * 2.0**-57, slope_per_s)
 
     @property
     def state(self) -> State:

@@ -134,6 +134,10 @@ _SINGLE = {
         "the bus takes no frames from the controller",
         "check CAN cable and termination: is any other node powered? look at the bus load",
     ),
+    0xFF08: (
+        "a stop along the path took longer than the program says",
+        "compile the program again; if it comes again, report a bug",
+    ),
     0xFF10: (
         "the drive did not take the mode for homing, or the one for motion after it",
         "has the drive a homing mode (0x6502)? switch its local operation off",
@@ -256,7 +260,7 @@ def fault_text(code: int) -> str:
     return fault_words(code).text
 
 
-_COUNTS = {0x8250: "positions missed in a row", 0xFF07: "ticks in a row"}
+_COUNTS = {0x8250: "positions missed in a row", 0xFF07: "ticks in a row", 0xFF08: "setpoint"}
 _PLAIN = (0x6100, 0xFF10)
 
 
