@@ -31,10 +31,20 @@ static int comes_to_rest(const struct feed_override *f)
     return f->state == FEED_HOLDING || f->state == FEED_STOPPING;
 }
 
-/* The bound of the present piece and a fifth, as ticks. */
+/* Time left of the program at rate 1, us; held at 4 s. */
+static uint32_t left_us(const struct feed_override *f)
+{
+    const uint64_t left_q42 = f->time.duration_q42_s - f->time.time_q42_s;
+    return left_q42 >> 44 != 0 ? 4000000u : (uint32_t)((left_q42 >> 12) * 15625u >> 24);
+}
+
+/* The bound of the present piece and a fifth, as ticks. Near the end of the program, whose end a brake may not fit before,
+ * what is left of it counts if that is more. */
 static int64_t deadline_q30(const struct feed_override *f)
 {
-    const uint32_t bound_us = feed_override_bound_us(f, (enum program_stop_kind)f->kind);
+    uint32_t bound_us = feed_override_bound_us(f, (enum program_stop_kind)f->kind);
+    const uint32_t end_us = left_us(f);
+    bound_us = end_us > bound_us && end_us / 2u < bound_us ? end_us : bound_us;
     const uint64_t time_us = qmath_product_unsigned(bound_us, 6u);
     const uint64_t ticks_q8 = qmath_div_u64(time_us << 8, 5u * f->time.period_us);
     return ((int64_t)ticks_q8 << 22) + SPARE_TICKS * TICK_Q30;
@@ -62,6 +72,7 @@ void feed_override_hold(struct feed_override *f)
 void feed_override_resume(struct feed_override *f)
 {
     if (f->state == FEED_HOLDING || f->state == FEED_HELD) {
+        timebase_resume(&f->time);
         f->state = FEED_RUNNING;
     }
 }
@@ -239,8 +250,9 @@ static void begin_stop(struct feed_override *f, const struct interp *it)
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
         come_to_rest(f, 1);
     } else if (!known || !leave_plan(f, &state, turned_q56)) {
-        f->left_q30 -= (int64_t)timebase_rate_q30(time);
-        timebase_rise_no_more(&f->time);
+        f->left_q30 -= qmath_lesser(timebase_rate_q30(time), TICK_Q30);
+        timebase_hold(
+            &f->time); /* at a low rate that is at rest before the place of the next brake */
     }
 }
 

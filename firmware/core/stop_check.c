@@ -146,7 +146,9 @@ struct stop_bound stop_curve(const struct stop_start *from, const struct program
     if (lead_us >= (uint64_t)1 << 28) {
         return none;
     }
-    uint64_t peak_um = from->speed_um + qmath_div_up_u64(from->rising_um * (even_lead_us + 2u * slope_lead_us), 2000000u);
+    uint64_t peak_um =
+        from->speed_um +
+        qmath_div_up_u64(from->rising_um * (even_lead_us + 2u * slope_lead_us), 2000000u);
     if (slope_lead_us > from->cut_us) {
         peak_um += qmath_div_up_u64(from->slope_um * (slope_lead_us - from->cut_us), 2000000u);
     }
@@ -204,10 +206,12 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
                                      const struct stop_extent *extent,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
-    struct stop_start from = {extent->speed_um, extent->rising_um, extent->slope_um, extent->cut_us};
+    struct stop_start from = {extent->speed_um, extent->rising_um, extent->slope_um,
+                              extent->cut_us};
     uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
     uint64_t little = number(stop->deceleration) * 125u >> 23;
-    if (kind == PROGRAM_STOP_HOLD && from.slope_um > little) { /* a rising rate is cut first, until it adds little */
+    if (kind == PROGRAM_STOP_HOLD &&
+        from.slope_um > little) { /* a rising rate is cut first, until it adds little */
         more_us += from.cut_us;
         from.cut_us = from.slope_um > MOST_CHANGE_UM || from.cut_us >= (uint64_t)1 << 28
                           ? 0u
@@ -216,11 +220,12 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
     }
     more_us += eighths_us(p, piece, extent->waits);
     /* half a tick more of the first part */
-    uint64_t half_um = qmath_div_up_u64(lesser(from.rising_um + from.slope_um, MOST_CHANGE_UM) * p->header.period_us,
-                            2000000u);
+    uint64_t half_um = qmath_div_up_u64(
+        lesser(from.rising_um + from.slope_um, MOST_CHANGE_UM) * p->header.period_us, 2000000u);
     from.speed_um = lesser(from.speed_um + half_um, MOST_SPEED_UM + 1u);
     struct stop_bound out = stop_curve(&from, stop);
-    return sum(out, more_us, qmath_div_up_u64(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
+    return sum(out, more_us,
+               qmath_div_up_u64(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
 }
 
 /* The plan goes on through the last eighths of the piece and into the next. */

@@ -6,20 +6,20 @@
 
 #include "core/path_brake.h"
 
-#define MOST_INSTANTS 129   /* of a piece; */
-#define INSTANT_S     0.004 /* between two of them at most, where these are enough, */
+#define MOST_INSTANTS 129    /* of a piece; */
+#define INSTANT_S     0.004  /* between two of them at most, where these are enough, */
 #define CLOSE_S       0.0005 /* and in the last look at what was found */
-#define STEP_S        0.002 /* between two looks at a brake */
+#define STEP_S        0.002  /* between two looks at a brake */
 #define GREATEST_CODE 255
 #define BESIDE        1e-6
 #define LEAST_MM_S    1e-4 /* slower is rest */
 #define NEVER_S       1e6
 #define LONGEST_SHARE 0.1
-#define FEWER         56  /* codes below the greatest: a brake with less than a 128th of a limit is none */
-#define NO_BRAKE_S    10.0
-#define WAIT_BETTER   0.8   /* of the mean time: rather none than such a brake; */
-#define WAIT_AS_GOOD  1.001 /* or such a one that could also take much longer */
-#define NEAR          1.05 /* so near to the least time without limits no other start is tried */
+#define FEWER 56 /* codes below the greatest: a brake with less than a 128th of a limit is none */
+#define NO_BRAKE_S   10.0
+#define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
+#define WAIT_AS_GOOD 1.001 /* or such a one that could also take much longer */
+#define NEAR         1.05  /* so near to the least time without limits no other start is tried */
 
 /* What is looked at: one over the limits, less the margin; 0: none. */
 struct inverse {
@@ -47,9 +47,9 @@ struct piece {
     double step_s;
     double left_s;        /* of the program, behind the piece */
     struct state fastest; /* of all rates: greatest speed and acceleration */
-    double factor, rate; /* greatest rate of program time, and greatest slope of it */
-    uint32_t suspect;    /* the instant at which a limit was broken last */
-    struct piece *close; /* the same piece with more instants */
+    double factor, rate;  /* greatest rate of program time, and greatest slope of it */
+    uint32_t suspect;     /* the instant at which a limit was broken last */
+    struct piece *close;  /* the same piece with more instants */
 };
 
 struct search {
@@ -140,8 +140,9 @@ void stop_rows(const struct program *p, const struct stop_limits *limits, struct
         for (uint32_t k = 0; k < STOP_ROWS; k++) {
             struct stop_row *row = &rows[i * STOP_ROWS + k];
             double xi = (double)k / (STOP_ROWS - 1u);
-            segment_row((const double(*)[2])w, xi, row);
-            row->s_mm = ldexp((double)segment.start_q40_mm, -40) + way_to((const double(*)[2])w, xi);
+            segment_row((const double (*)[2])w, xi, row);
+            row->s_mm =
+                ldexp((double)segment.start_q40_mm, -40) + way_to((const double (*)[2])w, xi);
             row->feed_mm_s = feed_here(limits, row);
         }
     }
@@ -228,8 +229,8 @@ static double strain(const struct inverse *inverse, const struct stop_row *low,
 /* --- The brake --- */
 
 /* The one that the controller would take; 0 where none fits. */
-static int brake_plan(struct brake *brake, double v, double a, const struct path_brake_numbers *numbers,
-                      double period_s)
+static int brake_plan(struct brake *brake, double v, double a,
+                      const struct path_brake_numbers *numbers, double period_s)
 {
     const struct path_state from = {
         .speed_q56 = (int64_t)ldexp(v * period_s, 56),
@@ -360,8 +361,8 @@ static void numbers_of(const struct search *search, const int codes[3],
 /* Times to rest from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
 struct times {
     double mean_s, worst_s, first_s;
-    double longest_s; /* brake at any rate */
-    double cost_s;    /* the mean, and a share of the longest */
+    double longest_s;                   /* brake at any rate */
+    double cost_s;                      /* the mean, and a share of the longest */
     struct brake brakes[MOST_INSTANTS]; /* total_s NEVER_S: the plan goes on */
 };
 
@@ -399,7 +400,8 @@ static int all_keep(const struct search *search, struct piece *piece, const stru
     for (uint32_t n = 0; n < piece->count; n++) {
         uint32_t i = (n + piece->suspect) % piece->count;
         if (times->brakes[i].total_s < NEVER_S &&
-            !brake_keeps(search, &search->inverse, &times->brakes[i], &piece->at[i], piece->row[i])) {
+            !brake_keeps(search, &search->inverse, &times->brakes[i], &piece->at[i],
+                         piece->row[i])) {
             piece->suspect = i;
             return 0;
         }
@@ -413,12 +415,14 @@ static int may_wait(const struct search *search, const struct state *at,
 {
     double period_s = search->period_s;
     double up = ldexp((double)numbers->jerk_up_q56, -56) / (period_s * period_s * period_s);
-    return at->v < LEAST_MM_S || (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - at->a * period_s);
+    return at->v < LEAST_MM_S ||
+           (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - at->a * period_s);
 }
 
 /* Whether a brake fits and keeps the limits, or need not fit. */
-static int state_keeps(const struct search *search, const struct inverse *inverse, const struct state *at,
-                       uint32_t row, const struct path_brake_numbers *numbers)
+static int state_keeps(const struct search *search, const struct inverse *inverse,
+                       const struct state *at, uint32_t row,
+                       const struct path_brake_numbers *numbers)
 {
     struct brake brake;
     if (!brake_plan(&brake, at->v, at->a, numbers, search->period_s)) {
@@ -446,8 +450,9 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
             for (int slope = -1; slope <= 1; slope++) {
                 struct state from = piece->at[i];
                 double change = piece->rate * from.v;
-                from.a = rate * rate * from.a +
-                         (slope < 0 ? -change : slope > 0 ? fmin(change, little) : 0.0);
+                from.a = rate * rate * from.a + (slope < 0   ? -change
+                                                 : slope > 0 ? fmin(change, little)
+                                                             : 0.0);
                 from.v *= rate;
                 int possible = slope <= 0 || rate < piece->factor;
                 possible = possible && strain(&search->at_any_rate, &search->rows[piece->row[i]],
@@ -522,9 +527,9 @@ static int better(const struct search *search, struct piece *piece, const int co
 static void climb(const struct search *search, struct piece *piece, double after_s, int strict,
                   int first, struct choice *best)
 {
-    static const int8_t ways[][3] = {{1, 1, 1},  {0, 1, 0},  {0, 0, 1},  {1, 0, 0},  {0, 1, 1}, {1, 1, 0},
-                                     {1, 0, 1},  {1, -1, 0}, {-1, 1, 0}, {0, 1, -1}, {0, -1, 1},
-                                     {1, 0, -1}, {-1, 0, 1}};
+    static const int8_t ways[][3] = {{1, 1, 1},  {0, 1, 0},  {0, 0, 1},  {1, 0, 0},  {0, 1, 1},
+                                     {1, 1, 0},  {1, 0, 1},  {1, -1, 0}, {-1, 1, 0}, {0, 1, -1},
+                                     {0, -1, 1}, {1, 0, -1}, {-1, 0, 1}};
     for (int step = first; step >= 1; step /= 2) {
         for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
             int codes[3];
@@ -544,8 +549,8 @@ static void climb(const struct search *search, struct piece *piece, double after
 }
 
 /* Lowers all codes until the limits are kept at all rates; 0: they never are. */
-static int lowered(const struct search *search, struct piece *piece, const int start[3], double after_s,
-                   struct choice *best)
+static int lowered(const struct search *search, struct piece *piece, const int start[3],
+                   double after_s, struct choice *best)
 {
     for (int down = 0; down <= GREATEST_CODE; down += down < 32 ? 2 : 8) {
         int codes[3];
@@ -564,7 +569,8 @@ static int lowered(const struct search *search, struct piece *piece, const int s
 }
 
 /* Starting points all over the codes. */
-static void scan(const struct search *search, struct piece *piece, double after_s, struct choice *best)
+static void scan(const struct search *search, struct piece *piece, double after_s,
+                 struct choice *best)
 {
     for (int a = 0; a <= 48; a += 6) {
         for (int j1 = 0; j1 <= 32; j1 += 8) {
@@ -648,7 +654,8 @@ static void begin(struct search *search, const struct program *p, const struct s
         double limit = k == 1 ? limits->acceleration : limits->jerk;
         search->most[k] = 0;
         for (int c = 1; c <= GREATEST_CODE; c++) {
-            double value = floor(65536.0 * pow(2.0, (c & 7) / 8.0)) * ldexp(1.0, (c >> 3) - (k == 1 ? 24 : 18));
+            double value = floor(65536.0 * pow(2.0, (c & 7) / 8.0)) *
+                           ldexp(1.0, (c >> 3) - (k == 1 ? 24 : 18));
             search->most[k] = value <= limit ? c : search->most[k];
         }
     }
@@ -701,8 +708,8 @@ static void most_of(double *most, double value)
     *most = greater(*most, fabs(value));
 }
 
-void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
-               struct stop_limits *used)
+void stop_used(const struct program *p, const struct stop_limits *limits,
+               const struct stop_row *rows, struct stop_limits *used)
 {
     struct search search;
     begin(&search, p, limits, rows);
@@ -729,7 +736,8 @@ void stop_used(const struct program *p, const struct stop_limits *limits, const 
                 most_of(&used->axis_velocity[axis], axes.velocity[axis]);
                 most_of(&used->axis_acceleration[axis], axes.acceleration[axis]);
                 most_of(&used->axis_jerk[axis], axes.jerk[axis]);
-                most_of(&used->reach[axis], axes.velocity[axis] + limits->time_constant[axis] * axes.acceleration[axis]);
+                most_of(&used->reach[axis], axes.velocity[axis] + limits->time_constant[axis] *
+                                                                      axes.acceleration[axis]);
             }
         }
     }

@@ -21,9 +21,9 @@
 struct stop_row {
     double s_mm;
     double tangent[2];
-    double curvature;    /* 1/mm */
-    double slope;        /* of the curvature, 1/mm^2 */
-    double feed_mm_s;    /* greatest feed here: caps and centripetal acceleration */
+    double curvature; /* 1/mm */
+    double slope;     /* of the curvature, 1/mm^2 */
+    double feed_mm_s; /* greatest feed here: caps and centripetal acceleration */
 };
 
 /* A greatest feed on a stretch of the path. */
@@ -42,12 +42,14 @@ struct stop_limits {
     double axis_velocity[2];
     double axis_acceleration[2];
     double axis_jerk[2];
-    double reach[2];         /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
+    double reach[2]; /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
     double time_constant[2]; /* s */
     const struct stop_cap *caps;
     uint32_t cap_count;
-    uint32_t reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
-    uint32_t rise_is_cut;   /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
+    uint32_t
+        reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
+    uint32_t
+        rise_is_cut; /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
 };
 
 /* What was found for a piece. Codes of 0: no numbers keep the limits from all of its instants. */
@@ -62,8 +64,8 @@ void stop_rows(const struct program *p, const struct stop_limits *limits, struct
 
 /* How far the program itself uses the limits at the rate 1: greatest value of each, limit by limit, in `used`
  * (same fields; caps and time constants as in limits). */
-void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
-               struct stop_limits *used);
+void stop_used(const struct program *p, const struct stop_limits *limits,
+               const struct stop_row *rows, struct stop_limits *used);
 
 /* Searches piece_count results. Linear; about 0.5 ms a piece. */
 void stop_search(const struct program *p, const struct stop_limits *limits,

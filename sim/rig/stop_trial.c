@@ -19,9 +19,9 @@ struct course {
     struct interp interp;
     double points[HISTORY + 1u][3]; /* the newest first */
     uint32_t count;
-    uint32_t brake_ticks;   /* of the brake so far; 0: none */
-    double begun_with;      /* acceleration along the path when it began */
-    int machine;            /* 1: a fault stop: the machine's limits count */
+    uint32_t brake_ticks; /* of the brake so far; 0: none */
+    double begun_with;    /* acceleration along the path when it began */
+    int machine;          /* 1: a fault stop: the machine's limits count */
 };
 
 static uint64_t next_random(uint64_t *state)
@@ -55,8 +55,8 @@ static void differences(const struct course *course, int axis, double period_s, 
     out[2] = (p[0] - 3.0 * (p[1] - p[2]) - p[3]) / (period_s * period_s * period_s);
 }
 
-static void look_at_axes(const struct course *course, double period_s, const struct stop_limits *limits,
-                         struct stop_use *use)
+static void look_at_axes(const struct course *course, double period_s,
+                         const struct stop_limits *limits, struct stop_use *use)
 {
     for (int axis = 0; axis < 2; axis++) {
         double d[3];
@@ -239,7 +239,8 @@ static void clear(struct stop_trial *trial)
 }
 
 /* A trial, and what it is remembered for. */
-static void remembered(const struct course *from, struct stop_trial *trial, uint64_t seed, uint32_t tick)
+static void remembered(const struct course *from, struct stop_trial *trial, uint64_t seed,
+                       uint32_t tick)
 {
     const struct stop_case this = {seed, tick};
     const double most = greatest(trial);

@@ -30,19 +30,21 @@ struct stop_case {
 struct stop_trial {
     uint64_t seed;
     uint32_t trials;
-    uint32_t kernel;            /* enum interp_kernel */
-    struct stop_limits hold;    /* program's limits: for everything but fault stops, those along the path for brakes only */
-    struct stop_limits fault;   /* machine's */
-    struct stop_use of_hold;    /* found: in brakes of hold and stop and in all other motion, */
-    struct stop_use of_fault;   /* and in fault stops */
-    double of_bound[2];         /* greatest time to rest over the bound, by enum program_stop_kind */
+    uint32_t kernel; /* enum interp_kernel */
+    struct stop_limits
+        hold; /* program's limits: for everything but fault stops, those along the path for brakes only */
+    struct stop_limits fault; /* machine's */
+    struct stop_use of_hold;  /* found: in brakes of hold and stop and in all other motion, */
+    struct stop_use of_fault; /* and in fault stops */
+    double of_bound[2];       /* greatest time to rest over the bound, by enum program_stop_kind */
     double longest_s[2];
-    uint32_t measured[2]; /* stops whose time was compared: those that were asked for while the program ran */
-    uint32_t late;        /* stops past their deadline */
-    uint32_t failures;    /* of the interpolator, and stops that did not end */
-    struct stop_case most;     /* of the trial with the greatest share of a limit, */
-    struct stop_case longest;  /* of a bound, */
-    struct stop_case failed;   /* and of the last that failed */
+    uint32_t measured
+        [2]; /* stops whose time was compared: those that were asked for while the program ran */
+    uint32_t late;            /* stops past their deadline */
+    uint32_t failures;        /* of the interpolator, and stops that did not end */
+    struct stop_case most;    /* of the trial with the greatest share of a limit, */
+    struct stop_case longest; /* of a bound, */
+    struct stop_case failed;  /* and of the last that failed */
 };
 
 /* Spreads the trials over the program's ticks; the inputs are seed ... fault, the rest is set. Returns 0 or an error of the

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..bustime import require_fit
 from ..chain import Chain, load_chain
-from ..errors import InputError
+from ..errors import HodographError, InputError
 from ..feed import Plan
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.image import MAGIC
@@ -102,7 +102,7 @@ def feed(options: Namespace) -> None:
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
     }
-    stops = None if chain.machine_or_none is None else chain.program
+    stops = _program_of(chain)
     if stops is not None:
         result["stops"] = stops_dict(stops.stops, stops.piece_starts_mm)
     if options.at is not None:
@@ -137,6 +137,17 @@ def feed(options: Namespace) -> None:
         print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
         for at, s, v in zip(options.at, plan.arc_length(t), plan.feed(t), strict=True):
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
+
+
+def _program_of(chain: Chain) -> Program | None:
+    """The program, for what `feed` says of stops; None without a machine, or where `compile` would refuse it."""
+    if chain.machine_or_none is None:
+        return None
+    try:
+        return chain.program
+    except HodographError as error:
+        note(f"no program: {error}")
+        return None
 
 
 def compile_(options: Namespace) -> None:
