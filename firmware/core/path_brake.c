@@ -28,7 +28,8 @@ static int period_exponent(uint32_t period_us)
 static int64_t decoded(uint32_t code, uint32_t unit, int shift)
 {
     const uint64_t product = qmath_product_unsigned(mantissa[code & 7u], unit);
-    return qmath_lesser(qmath_shift_clamp((int64_t)product, shift + (int)(code >> 3)), MOST_Q56);
+    const int up = shift + (int)(code >> 3); /* of less than 2^48 */
+    return up > 12 ? MOST_Q56 : qmath_shift((int64_t)product, up);
 }
 
 int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_stop *stop,
@@ -48,7 +49,9 @@ int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_s
 /* --- Plan --- */
 
 struct ticks {
-    uint32_t first, second, last;
+    uint32_t first;
+    uint32_t second;
+    uint32_t last;
 };
 
 static uint32_t whole_ticks(uint64_t ticks_q16)

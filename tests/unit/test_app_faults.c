@@ -576,6 +576,7 @@ static void test_homing_is_from_off_to_off(void)
     drive(0)->latched_counts = drive(0)->target_counts = 77;
     app_bench_periods(&bench, 2);
     TEST_ASSERT_EQUAL_INT32(drive(0)->position_counts, machine()->axes[0].target_counts);
+    app_bench_periods(&bench, 2);
     port_lock();
     machine_end_homing(machine());
     port_unlock();
