@@ -73,7 +73,7 @@ static uint64_t peak_time_q16(const struct path_state *from, const struct path_b
 }
 
 /* About as many ticks as the continuous brake takes; 0 where it takes too many, or would have to turn round. */
-static int first_guess(struct ticks *ticks, const struct path_state *from,
+static int guess_ticks(struct ticks *ticks, const struct path_state *from,
                        const struct path_brake_numbers *n)
 {
     const uint64_t lead_q16 =
@@ -168,7 +168,7 @@ int path_brake_plan(struct path_brake *brake, const struct path_state *from,
 {
     struct path_brake found;
     struct ticks ticks;
-    if (!in_range(from) || !first_guess(&ticks, from, numbers) ||
+    if (!in_range(from) || !guess_ticks(&ticks, from, numbers) ||
         !add_even(&ticks, from, numbers)) {
         return 0;
     }
