@@ -20,9 +20,9 @@ from .program import (
     Program,
     ProgramLimits,
     ProgramOptions,
+    StopTerms,
     compile_path,
     encode,
-    StopTerms,
     fit_plan,
 )
 from .spline import SplineResult, from_control_polygon, through_points

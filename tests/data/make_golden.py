@@ -192,9 +192,7 @@ def shortened(p: Program) -> Program:
     slow = compile_program(fine, plan, ProgramOptions(name="broken"))
     fast = plan_feed(slow.length_mm, FeedRequest("minimax", 200.0, 0.1), None, CONTROLLER)
     whole = fast.pieces_over(slow.length_q40)
-    return replace(
-        slow, pieces=whole, stops=no_stops(len(whole)), duration_q32_s=whole.total_q32_s
-    )
+    return replace(slow, pieces=whole, stops=no_stops(len(whole)), duration_q32_s=whole.total_q32_s)
 
 
 def uneven() -> Program:

@@ -13,10 +13,10 @@ from ..bustime import require_fit
 from ..chain import Chain, load_chain
 from ..errors import HodographError, InputError
 from ..feed import Plan
+from ..native import NativeProgram
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.image import MAGIC
 from ..program.stops import stops_dict, stops_text
-from ..native import NativeProgram
 from ..simulate import Motion, StoppedRun, simulate, simulate_stop, write_trace
 from .output import note, number, print_json, print_rows, progress, write_file
 

@@ -47,7 +47,10 @@ def run_trials(
     tick: int | None = None,
     kernel: str = "fixed",
 ) -> StopTrials:
-    """Spreads `trials` over the program; with `tick` only the one with this seed and first tick. Raises InputError: a program that is refused, no such kernel."""
+    """Spreads `trials` over the program; with `tick` only the one with this seed and first tick.
+
+    Raises InputError: a program that is refused, no such kernel.
+    """
     ffi, lib = library()
     program.require()
     trial = ffi.new("struct stop_trial *")

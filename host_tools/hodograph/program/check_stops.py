@@ -140,7 +140,9 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
     speed = speed + 0.5 * (rising + slope) * period_s
     lead_s, slope_s = rising / number[:, JERK_DOWN], slope / number[:, JERK_DOWN]
     # A rate that still rises is below the greatest by what it goes up while its slope is taken back.
-    peak = speed + rising * (0.5 * lead_s + slope_s) + 0.5 * slope * np.maximum(slope_s - cut_s, 0.0)
+    peak = (
+        speed + rising * (0.5 * lead_s + slope_s) + 0.5 * slope * np.maximum(slope_s - cut_s, 0.0)
+    )
     time_s, way_mm = _curve(peak, lead_s + slope_s, number)
     time_s, way_mm = time_s + more_s, way_mm + speed * more_s
     return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)

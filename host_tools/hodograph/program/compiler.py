@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil
 
 import numpy as np
@@ -56,7 +56,7 @@ class ProgramOptions:
     offset_mm: complex = 0j
     limits: ProgramLimits | None = None
     period_us: int | None = None
-    stops: StopTerms = StopTerms()
+    stops: StopTerms = field(default_factory=StopTerms)
 
 
 _USUAL = ProgramOptions()
@@ -71,8 +71,8 @@ def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL)
     """Compiles `plan` along `spline`, shifted by the work offset into machine coordinates.
 
     Under policy "respect" the feed is lowered where two neighbouring segments would pass within one tick at
-    200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, a fault stop longer than it
-    may be, and whatever `check` finds).
+    200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, a fault stop longer than
+    it may be, and whatever `check` finds).
     """
     name, offset_mm, period_us = options.name, options.offset_mm, options.period_us
     if period_us is not None and period_us != plan.period_us:

@@ -5,7 +5,7 @@ section 7.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
@@ -32,7 +32,7 @@ class StopTerms:
 
     plants: Plants | None = None
     drives: Plants | None = None
-    axis: AxisLimits = AxisLimits()
+    axis: AxisLimits = field(default_factory=AxisLimits)
     stop_time_ms: int = 0
 
 
@@ -110,9 +110,7 @@ def _least(limit: float | None, other: float) -> float:
     return other if limit is None else min(limit, other)
 
 
-def _both(
-    limit: tuple[float, float] | None, other: tuple[float, float]
-) -> tuple[float, float]:
+def _both(limit: tuple[float, float] | None, other: tuple[float, float]) -> tuple[float, float]:
     return other if limit is None else (min(limit[0], other[0]), min(limit[1], other[1]))
 
 

@@ -29,7 +29,7 @@ _UNITS = np.array([2.0**-18, 2.0**-24, 2.0**-18])
 
 
 def mantissas(codes: ArrayLike) -> NDArray[np.uint64]:
-    """The integers that codes (any shape) stand for: decelerations in 2^-24 mm/s^2, jerks in 2^-18 mm/s^3; code 0: 0."""
+    """What codes (any shape) stand for: decelerations in 2^-24 mm/s^2, jerks in 2^-18 mm/s^3; code 0: 0."""
     c = np.asarray(codes, dtype=np.uint64)
     return np.where(c > 0, _EIGHTHS[c & np.uint64(7)] << (c >> np.uint64(3)), np.uint64(0))
 
@@ -83,7 +83,10 @@ class Stops:
 def no_stops(count: int) -> Stops:
     """A table without any brake, which no controller accepts: what a program has before its stops are planned."""
     return Stops(
-        np.zeros((count, 2, 3), dtype=np.uint8), np.zeros((count, 2), dtype=np.uint32), (0, 0), (0, 0)
+        np.zeros((count, 2, 3), dtype=np.uint8),
+        np.zeros((count, 2), dtype=np.uint32),
+        (0, 0),
+        (0, 0),
     )
 
 

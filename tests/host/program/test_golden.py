@@ -20,7 +20,9 @@ GOOD = [row[0] for row in ROWS if row[1] == "OK"]
 
 def limits() -> ProgramLimits:
     numbers = [int(v) for v in re.findall(r"(?<= )-?\d+\b", LINES[0])]
-    return ProgramLimits(*numbers[:4], (numbers[4], numbers[5]), (numbers[6], numbers[7]), numbers[8])
+    return ProgramLimits(
+        *numbers[:4], (numbers[4], numbers[5]), (numbers[6], numbers[7]), numbers[8]
+    )
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])

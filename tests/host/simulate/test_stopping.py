@@ -59,9 +59,7 @@ def test_until_the_stop_the_run_is_the_undisturbed_one() -> None:
     whole = simulate(chain.image, drives)
     found = simulate_stop(NativeProgram(chain.image), drives, "fault", 0.3)
     assert np.array_equal(found.motion.rows["set_counts"][:300], whole.rows["set_counts"][:300])
-    assert not np.array_equal(
-        found.motion.rows["set_counts"][:310], whole.rows["set_counts"][:310]
-    )
+    assert not np.array_equal(found.motion.rows["set_counts"][:310], whole.rows["set_counts"][:310])
     rest = found.motion.rows["set_counts"][found.motion.ticks - 1 :]
     assert np.all(rest == rest[0])
 
@@ -110,9 +108,7 @@ def random_file(folder: Path, seed: int) -> Path:
     profile = ("optimal", "quintic", "exponential", "minimax")[int(rng.integers(4))]
     feed = f'profile = "{profile}"\n'
     if profile != "optimal":
-        feed += (
-            f"nominal_mm_s = {rng.uniform(20, 200):.3f}\nramp_time_s = {rng.uniform(0.05, 0.3):.3f}\n"
-        )
+        feed += f"nominal_mm_s = {rng.uniform(20, 200):.3f}\nramp_time_s = {rng.uniform(0.05, 0.3):.3f}\n"
     limits = f"acceleration_mm_s2 = {rng.uniform(800, 3000):.1f}\njerk_mm_s3 = {rng.uniform(2e4, 1e5):.1f}\n"
     axis = f"acceleration_mm_s2 = {rng.uniform(800, 3000):.1f}\njerk_mm_s3 = {rng.uniform(2e4, 1e5):.1f}\n"
     if rng.integers(2):
