@@ -115,7 +115,8 @@ def decode(image: bytes) -> Program:
     count = int.from_bytes(image[20:24], "little")
     pieces_at = 128 + 72 * count
     words = np.frombuffer(image, "<i8", 9 * count, 128).reshape(count, 9)
-    rows = np.frombuffer(image, "<i8", (len(image) - pieces_at) // 8, pieces_at).reshape(-1, 11)
+    piece_count = int.from_bytes(image[24:28], "little")
+    rows = np.frombuffer(image, "<i8", 11 * piece_count, pieces_at).reshape(-1, 11)
     segments = [
         Segment(int(r[0]), int(r[1]), int(r[2]), tuple(int(v) for v in r[3:])) for r in words
     ]

@@ -26,14 +26,24 @@ COUNTS = ROOT / "tests/data/counts.json"
 DOCUMENT = ROOT / "docs/wcet.md"
 ENTRY = "tick"  # of setpoints.elf: motion_step and the call of it
 # What a tick does not call while nothing changes the rate; its first one, and all after the end, are plain too.
-NOT_PLAIN = {"plain": ("timebase_change",), "override": ()}
+NOT_PLAIN = {
+    "plain": (
+        "timebase_change",
+        "feed_override_decide",
+        "path_brake_step",
+        "interp_at_arc_length",
+    ),
+    "override": ("feed_override_decide", "path_brake_step", "interp_at_arc_length"),
+}
+# Beside them, and not in the table: the tick in which a brake is planned, which has no goal yet.
+STOP: tuple[str, ...] = ()
 
 
 def motion_part(build: Path, target: str, kernel: str, kind: str = "override") -> Longest:
     """Ready to be asked for functions of setpoints.elf with this kernel; `kind` is of NOT_PLAIN."""
     others = [f"kernel_{k}_segment_at" for k in emulator.KERNELS if k != kernel]
     rules = ROOT / "firmware/targets/loops.toml"
-    bounds = Bounds.read(rules, *others, *NOT_PLAIN[kind])
+    bounds = Bounds.read(rules, *others, *NOT_PLAIN.get(kind, STOP))
     return Longest(Image(build / "firmware" / target / "setpoints.elf"), bounds)
 
 
@@ -97,6 +107,9 @@ def main() -> int:
     parser.add_argument("target", nargs="?", choices=emulator.TARGETS, default="an386")
     parser.add_argument("kernel", nargs="?", choices=emulator.KERNELS, default="float")
     parser.add_argument("--plain", action="store_true", help="of a tick in which no rate changes")
+    parser.add_argument(
+        "--stop", action="store_true", help="of any tick, also one that plans a brake"
+    )
     parser.add_argument("--update", action="store_true", help="the tables of docs/wcet.md")
     parser.add_argument("--build", type=Path, default=Path("build"))
     options = parser.parse_args()
@@ -104,7 +117,7 @@ def main() -> int:
         if options.update:
             update(options.build)
         else:
-            kind = "plain" if options.plain else "override"
+            kind = "stop" if options.stop else "plain" if options.plain else "override"
             show(motion_part(options.build, options.target, options.kernel, kind))
     except LongestError as error:
         print(f"longest_path: {error}", file=sys.stderr)

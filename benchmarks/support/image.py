@@ -83,6 +83,7 @@ def encode(
     body = b"".join(struct.pack("<9q", s.start, s.x, s.y, *s.w) for s in segments)
     for p in pieces:
         body += struct.pack("<Q8q4I", p.duration, p.start, *p.c, 1 << 24, 1 << 16, 1 << 8, 0)
+    body += bytes(16 * len(pieces))  # no stops
     size = 128 + len(body)
     length = segments[-1].next_start()[2]
     duration = sum(p.duration for p in pieces)
@@ -105,7 +106,7 @@ def encode(
         b"",
     )
     tail += body
-    return struct.pack("<4s2HII", b"HDGP", 1, 128, size, zlib.crc32(tail)) + tail
+    return struct.pack("<4s2HII", b"HDGP", 2, 128, size, zlib.crc32(tail)) + tail
 
 
 def exponent(duration: int) -> int:

@@ -61,14 +61,14 @@ static uint64_t motion_number(const struct motion *motion, uint8_t sub)
 
 static uint64_t override_number(const struct machine *machine, uint8_t sub)
 {
-    const struct timebase *timebase = &machine->motion.timebase;
+    const struct feed_override *feed = &machine->motion.feed;
     switch (sub) {
     case 1:
         return machine->override_percent;
     case 2:
-        return machine_on_path(machine) ? timebase_rate_q30(timebase) : 0u;
+        return machine_on_path(machine) ? feed_override_rate_q30(feed) : 0u;
     default:
-        return machine_on_path(machine) && timebase_saturated(timebase) ? 1u : 0u;
+        return machine_on_path(machine) && feed_override_saturated(feed) ? 1u : 0u;
     }
 }
 

@@ -5,7 +5,7 @@
 
 #include "port/port.h"
 
-#define STOP_TIME_US 5000000u
+#define STOP_TIME_US 5000000u /* along the path, at most */
 #define OFF_TIME_US  1000000u
 
 static bool at_rest(const struct machine *machine)
@@ -27,16 +27,23 @@ static bool switched_off(const struct machine *machine)
     return true;
 }
 
-/* Goes on with the mainline until it is so or the time is over. */
+static bool reached_now(struct controller *controller, bool (*reached)(const struct machine *))
+{
+    port_lock();
+    const bool done = reached(&controller->machine);
+    port_unlock();
+    return done;
+}
+
+/* Goes on with the mainline until it is so or the time is over, or, where that counts, somebody insists. */
 static bool wait_until(struct controller *controller, bool (*reached)(const struct machine *),
-                       uint32_t time_us)
+                       uint32_t time_us, bool until_insisted)
 {
     const uint32_t began_us = port_time_us();
     for (;;) {
-        port_lock();
-        const bool done = reached(&controller->machine);
-        port_unlock();
-        if (done || port_time_us() - began_us > time_us) {
+        const bool done = reached_now(controller, reached);
+        const bool insisted = until_insisted && port_stop_insisted();
+        if (done || insisted || port_time_us() - began_us > time_us) {
             return done;
         }
         port_wait(CONTROLLER_POLL_US);
@@ -53,19 +60,29 @@ static void leave_pre_operational(const struct controller *controller)
     }
 }
 
-bool controller_shut_down(struct controller *controller)
+/* As long as the machine itself gives its quick stops, which then end in one way or another. */
+static uint32_t quick_time_us(const struct controller *controller)
+{
+    return (MACHINE_QUICK_TICKS + AXIS_STANDSTILL_SYNCS) * controller->config.period_us;
+}
+
+/* Where the path is not left in time, or somebody insists, the drives stop by their own ramps. */
+static bool come_to_rest(struct controller *controller)
 {
     (void)commands_execute(controller, COMMAND_STOP);
-    const bool stopped = wait_until(controller, at_rest, STOP_TIME_US);
-    if (!stopped) {
-        port_lock();
-        machine_raise(&controller->machine, EMCY_SOFTWARE, controller->node, 0);
-        machine_switch_off(&controller->machine);
-        port_unlock();
-    } else {
-        (void)commands_execute(controller, COMMAND_DISABLE);
+    if (wait_until(controller, at_rest, STOP_TIME_US, true)) {
+        return true;
     }
-    const bool off = wait_until(controller, switched_off, OFF_TIME_US);
+    (void)commands_execute(controller, COMMAND_QUICK_STOP);
+    return wait_until(controller, at_rest, quick_time_us(controller), false);
+}
+
+bool controller_shut_down(struct controller *controller)
+{
+    const bool stopped = come_to_rest(controller);
+    (void)commands_execute(controller, COMMAND_DISABLE);
+    (void)wait_until(controller, at_rest, quick_time_us(controller), false);
+    const bool off = wait_until(controller, switched_off, OFF_TIME_US, false);
     leave_pre_operational(controller);
     return stopped && off;
 }

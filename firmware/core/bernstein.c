@@ -37,8 +37,7 @@ static int64_t half_sum(int64_t a, int64_t b)
     return (a >> 1) + (b >> 1) + (a & b & 1);
 }
 
-/* de Casteljau at 1/2: b becomes the left half, right gets the other. */
-static void halve(int64_t *b, int64_t *right, int degree)
+void bernstein_halve(int64_t *b, int64_t *right, int degree)
 {
     for (int step = 0; step <= degree; step++) {
         right[degree - step] = b[degree];
@@ -76,7 +75,7 @@ int bernstein_within(const int64_t *b, int degree, int64_t low, int64_t high)
             present[degree] < low || present[degree] > high) {
             return 0;
         }
-        halve(present, stack[top + 1], degree);
+        bernstein_halve(present, stack[top + 1], degree);
         depth[top]++;
         depth[top + 1] = depth[top];
         top++;

@@ -6,6 +6,10 @@
 #include "core/bernstein.h"
 #include "core/qmath.h"
 
+/* What the rounding of powers of tau and of the coefficients' lower bits can take from a Bernstein coefficient, in q36:
+ * 4 bits dropped and 3 units a power, times the binomials, over the scale. */
+#define COEFFICIENT_ROUNDING 64
+
 /* tau at the end of the piece in q64; exactly 1 is 0. */
 static uint64_t end_tau_q64(const struct program_piece *piece)
 {
@@ -120,4 +124,38 @@ int feed_bounds_within(const struct program_piece *piece, enum feed_derivative d
     int64_t scale = bernstein_of(piece, order, b, &degree);
     return bernstein_within(b, degree, scaled_bound(low_q24, scale, order, e),
                             scaled_bound(high_q24, scale, order, e));
+}
+
+/* One of the scaled Bernstein coefficients (q36, tau) in 2^-24 physical units, not below; a unit more than rounding takes. */
+static int64_t unscaled_above(int64_t b, int64_t scale, int order, int exponent)
+{
+    int64_t size = (int64_t)qmath_div_u64((uint64_t)qmath_magnitude(b), (uint64_t)scale);
+    int64_t above = (b < 0 ? -size : size + 1) + COEFFICIENT_ROUNDING;
+    above = qmath_shift_clamp(above, -12 - order * exponent);
+    return qmath_lesser(above + 1, FEED_NO_BOUND_Q24);
+}
+
+void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
+                       int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS])
+{
+    int order = (int)derivative;
+    int e = program_piece_exponent(piece->duration_q32_s);
+    int64_t b[FEED_PARTS][8];
+    int degree = 0;
+    int64_t scale = bernstein_of(piece, order, b[0], &degree);
+    for (int apart = FEED_PARTS / 2; apart > 0; apart /= 2) {
+        for (int i = 0; i < FEED_PARTS; i += 2 * apart) {
+            bernstein_halve(b[i], b[i + apart], degree);
+        }
+    }
+    for (int i = 0; i < FEED_PARTS; i++) {
+        int64_t low = b[i][0];
+        int64_t high = b[i][0];
+        for (int k = 1; k <= degree; k++) {
+            low = qmath_lesser(low, b[i][k]);
+            high = qmath_greater(high, b[i][k]);
+        }
+        high_q24[i] = qmath_greater(unscaled_above(high, scale, order, e), -FEED_NO_BOUND_Q24);
+        low_q24[i] = qmath_greater(-unscaled_above(-low, scale, order, e), -FEED_NO_BOUND_Q24);
+    }
 }

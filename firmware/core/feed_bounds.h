@@ -33,6 +33,13 @@ enum feed_derivative { FEED_VELOCITY = 1, FEED_ACCELERATION = 2, FEED_JERK = 3 }
 int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24, int64_t high_q24);
 
+#define FEED_PARTS 8
+
+/* Bounds of that derivative over each eighth of the piece (in time), their Bernstein coefficients' least and greatest in
+ * 2^-24 units, rounded outwards and held at +-FEED_NO_BOUND_Q24. */
+void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
+                       int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
+
 /* The way a piece may go behind its start or beyond its end: 2^-14 mm. The exponential ramp begins with a step back of
  * some 2e-8 of feed times ramp time (docs/numerics.md section 9). */
 #define FEED_WAY_SLACK_Q36 ((int64_t)1 << 22)

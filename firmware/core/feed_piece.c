@@ -57,6 +57,17 @@ void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_poi
     out->feed_q32_mm_s = qmath_product(slope >> f->feed_drop, f->feed_factor);
 }
 
+/* The derivative of the slope, less three bits so that a coefficient times 6 fits. */
+int64_t feed_piece_acceleration(const struct feed_piece *f, uint64_t t_q42_s)
+{
+    const int32_t tau_q31 = (int32_t)(scaled_time(t_q42_s, f->exponent) >> 33);
+    int32_t sum = 0;
+    for (int k = 6; k > 0; k--) {
+        sum = 2 * qmath_mul_hi(sum, tau_q31) + (int32_t)(qmath_product(f->slope[k], k) >> 3);
+    }
+    return qmath_shift_clamp(sum, f->slope_shift - 1 - 2 * f->exponent);
+}
+
 void feed_piece_make(void *piece, const struct program_piece *from)
 {
     feed_piece_set(piece, from);
@@ -65,4 +76,9 @@ void feed_piece_make(void *piece, const struct program_piece *from)
 void feed_piece_point(const void *piece, uint64_t t_q42_s, struct feed_point *out)
 {
     feed_piece_at(piece, t_q42_s, out);
+}
+
+int64_t feed_piece_bend(const void *piece, uint64_t t_q42_s)
+{
+    return feed_piece_acceleration(piece, t_q42_s);
 }

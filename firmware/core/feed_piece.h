@@ -32,8 +32,13 @@ void feed_piece_set(struct feed_piece *f, const struct program_piece *piece);
  * coefficients. Seven wide products and eight narrow ones, no division. */
 void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_point *out);
 
-/* The same two for struct kernel: `piece` is a struct feed_piece. */
+/* F'' at local time t, in 2^-40 mm/s^2, held within +-(2^62 - 1): for the begin of a brake (core/feed_override). Within
+ * 2^-27 of the greatest F' of the coefficients, divided by the time scale of the piece. */
+int64_t feed_piece_acceleration(const struct feed_piece *f, uint64_t t_q42_s);
+
+/* The same for struct kernel: `piece` is a struct feed_piece. */
 void feed_piece_make(void *piece, const struct program_piece *from);
 void feed_piece_point(const void *piece, uint64_t t_q42_s, struct feed_point *out);
+int64_t feed_piece_bend(const void *piece, uint64_t t_q42_s);
 
 #endif

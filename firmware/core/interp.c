@@ -204,6 +204,21 @@ static int beyond(const struct interp *it, uint64_t time_q42_s, struct interp_po
     return INTERP_END;
 }
 
+/* Arc length inside the path. */
+static int evaluate_path(struct interp *it, int64_t arc_length_q40_mm, uint32_t most,
+                         struct interp_point *out)
+{
+    if (find_segment(it, arc_length_q40_mm, most) != INTERP_OK) {
+        return INTERP_ERR_JUMP;
+    }
+    int64_t point[2];
+    it->kernel->segment_at(&present_segment(it)->path, arc_length_q40_mm, point);
+    out->arc_length_q40_mm = arc_length_q40_mm;
+    out->x_q40_mm = point[0];
+    out->y_q40_mm = point[1];
+    return INTERP_OK;
+}
+
 int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out)
 {
@@ -212,14 +227,9 @@ int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint6
     }
     struct feed_point f;
     evaluate_feed(it, piece, time_q42_s, &f);
-    if (find_segment(it, f.arc_length_q40_mm, MOST_ENDS) != INTERP_OK) {
+    if (evaluate_path(it, f.arc_length_q40_mm, MOST_ENDS, out) != INTERP_OK) {
         return INTERP_ERR_JUMP;
     }
-    int64_t point[2];
-    it->kernel->segment_at(&present_segment(it)->path, f.arc_length_q40_mm, point);
-    out->arc_length_q40_mm = f.arc_length_q40_mm;
-    out->x_q40_mm = point[0];
-    out->y_q40_mm = point[1];
     out->feed_q32_mm_s = f.feed_q32_mm_s;
     return INTERP_OK;
 }
@@ -231,6 +241,80 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
         return INTERP_ERR_JUMP;
     }
     return interp_at_piece(it, present_piece(it), time_q42_s, out);
+}
+
+int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out)
+{
+    const int64_t inside = qmath_lesser(qmath_greater(arc_length_q40_mm, 0), it->length_q40_mm);
+    const int result = evaluate_path(it, inside, INTERP_MOST_SEGMENTS, out);
+    if (result == INTERP_OK) {
+        out->feed_q32_mm_s = 0;
+    }
+    return result;
+}
+
+int64_t interp_acceleration_q40(const struct interp *it, const struct prepared_piece *piece,
+                                uint64_t time_q42_s)
+{
+    const struct prepared_piece *own = piece != NULL ? piece : present_piece(it);
+    return it->kernel->piece_acceleration(&own->feed, time_q42_s - (own->start_q32_s << FINE_BITS));
+}
+
+void interp_search_begin(struct interp_search *search, const struct prepared_piece *piece,
+                         uint32_t index, int64_t arc_length_q40_mm)
+{
+    search->arc_length_q40_mm = arc_length_q40_mm;
+    search->time_q42_s = 0;
+    search->piece = piece;
+    search->piece_index = index;
+    search->bisecting = 0;
+}
+
+static const struct prepared_piece *searched_piece(const struct interp *it,
+                                                   const struct interp_search *search)
+{
+    return search->piece != NULL ? search->piece : &it->own_piece;
+}
+
+static void search_next_piece(struct interp *it, struct interp_search *search)
+{
+    search->piece_index++;
+    if (search->piece != NULL) {
+        search->piece = prepared_piece_next(search->piece, it->kernel);
+    } else {
+        load_piece(it, search->piece_index, it->own_piece.end_q32_s);
+    }
+}
+
+int interp_search_step(struct interp *it, struct interp_search *search)
+{
+    const struct program *p = it->program;
+    const struct prepared_piece *piece = searched_piece(it, search);
+    const uint64_t start_q42_s = piece->start_q32_s << FINE_BITS;
+    if (search->bisecting == 0) {
+        const uint32_t next = search->piece_index + 1u;
+        if (next < p->header.piece_count &&
+            program_piece_start(p, next) <= search->arc_length_q40_mm) {
+            search_next_piece(it, search);
+        } else {
+            search->low_q42_s = start_q42_s;
+            search->high_q42_s = (piece->end_q32_s << FINE_BITS) - 1u;
+            search->bisecting = 1;
+        }
+        return 0;
+    }
+    if (search->low_q42_s < search->high_q42_s) {
+        struct feed_point f;
+        const uint64_t middle = search->low_q42_s + (search->high_q42_s - search->low_q42_s) / 2u;
+        evaluate_feed(it, piece, middle, &f);
+        if (f.arc_length_q40_mm >= search->arc_length_q40_mm) {
+            search->high_q42_s = middle;
+        } else {
+            search->low_q42_s = middle + 1u;
+        }
+    }
+    search->time_q42_s = search->low_q42_s;
+    return search->low_q42_s == search->high_q42_s;
 }
 
 int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)

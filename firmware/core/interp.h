@@ -28,6 +28,9 @@ enum interp_result {
     INTERP_ERR_JUMP = -3, /* time is before the cursor, or more than two ends ahead: seek first */
 };
 
+/* Segment ends that a tick may cross by arc length. */
+#define INTERP_MOST_SEGMENTS 8u
+
 /* Unrounded output of a tick, the same units for all kernels. */
 struct interp_point {
     int64_t arc_length_q40_mm;
@@ -66,6 +69,35 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
  * this time and is not the last; it must not begin behind it. */
 int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out);
+
+/* The point at an arc length, for whoever knows that without a time (core/feed_override); held inside the path. Of *out
+ * feed_q32_mm_s is 0. Crosses at most INTERP_MOST_SEGMENTS segment ends either way, else INTERP_ERR_JUMP. Tick context;
+ * bounded time. */
+int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out);
+
+/* F'' in 2^-40 mm/s^2 at a time of the piece given, which interp_at_piece has just evaluated; of a program without
+ * records: NULL, for the piece of interp_at_q42. Tick context. */
+int64_t interp_acceleration_q40(const struct interp *it, const struct prepared_piece *piece,
+                                uint64_t time_q42_s);
+
+/* Where the program is at an arc length, found step by step: the least time at which F has come to it. */
+struct interp_search {
+    int64_t arc_length_q40_mm;
+    uint64_t time_q42_s;                /* when it is found */
+    const struct prepared_piece *piece; /* that it lies in; NULL of a program without records */
+    uint32_t piece_index;
+    uint32_t bisecting; /* the piece is known; the time is between these two, from its start: */
+    uint64_t low_q42_s;
+    uint64_t high_q42_s;
+};
+
+/* Looks from piece `index` on (its record, or NULL), which begins at or before the arc length. */
+void interp_search_begin(struct interp_search *search, const struct prepared_piece *piece,
+                         uint32_t index, int64_t arc_length_q40_mm);
+
+/* One step: goes on by a piece, or halves the time. 1 when it is found, else 0. A program without records: the cursor of
+ * pieces moves with it. Some 60 steps and one for each piece on the way. Tick context; bounded time. */
+int interp_search_step(struct interp *it, struct interp_search *search);
 
 /* The same at a time in 2^-32 s, for tools. A tick uses the finer one: at 100 mm/s, 2^-33 s of
  * rounding is 1e-8 mm, some 50 mm/s^3 in the third difference at 1 kHz. */

@@ -31,6 +31,8 @@ struct kernel {
     void (*segment_set)(void *segment, const struct ph_segment *from);
     /* At local time t, 0 <= t < duration. */
     void (*piece_at)(const void *piece, uint64_t t_q42_s, struct feed_point *out);
+    /* F'' there, in 2^-40 mm/s^2. */
+    int64_t (*piece_acceleration)(const void *piece, uint64_t t_q42_s);
     /* At an arc length of this segment (from the start of the program). */
     void (*segment_at)(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2]);
 };

@@ -56,6 +56,16 @@ void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_
     out->feed_q32_mm_s = round_scaled(slope * k->per_s, 4294967296.0);
 }
 
+int64_t kernel_double_piece_acceleration(const struct kernel_double_piece *k, uint64_t t_q42_s)
+{
+    const double tau = (double)t_q42_s * k->tau_per_q42;
+    double sum = 0.0;
+    for (int i = 6; i > 0; i--) {
+        sum = sum * tau + (double)(i * (i + 1)) * k->c_mm[i];
+    }
+    return round_scaled(sum * k->per_s * k->per_s, Q40);
+}
+
 /* Cubic with z(0) = 0, z(1) = 1 and the slopes of the inverse of s(z) there; numerics.md
  * section 12. */
 static void set_inverse(double g[4], double half, double sigma_middle, double sigma_end)
@@ -136,6 +146,11 @@ static void piece_at(const void *piece, uint64_t t_q42_s, struct feed_point *out
     kernel_double_piece_at(piece, t_q42_s, out);
 }
 
+static int64_t piece_acceleration(const void *piece, uint64_t t_q42_s)
+{
+    return kernel_double_piece_acceleration(piece, t_q42_s);
+}
+
 static void set_segment(void *segment, const struct ph_segment *from)
 {
     kernel_double_segment_set(segment, from);
@@ -152,5 +167,6 @@ const struct kernel kernel_double = {
     .piece_set = set_piece,
     .segment_set = set_segment,
     .piece_at = piece_at,
+    .piece_acceleration = piece_acceleration,
     .segment_at = segment_at,
 };

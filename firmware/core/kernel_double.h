@@ -24,6 +24,8 @@ struct kernel_double_segment {
 };
 
 void kernel_double_piece_set(struct kernel_double_piece *k, const struct program_piece *piece);
+/* F'' in 2^-40 mm/s^2, held within 2^62. */
+int64_t kernel_double_piece_acceleration(const struct kernel_double_piece *k, uint64_t t_q42_s);
 void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_s,
                             struct feed_point *out);
 

@@ -167,5 +167,6 @@ const struct kernel kernel_fixed = {
     .piece_set = feed_piece_make,
     .segment_set = set_segment,
     .piece_at = feed_piece_point,
+    .piece_acceleration = feed_piece_bend,
     .segment_at = segment_at,
 };

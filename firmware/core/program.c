@@ -50,6 +50,10 @@ static void read_header(struct program_header *h, const uint8_t *b)
     h->jerk_limit_mm_s3 = read_u32(b + 72);
     memcpy(h->name, b + 80, 32);
     h->name[32] = '\0';
+    h->hold_worst_us = read_u32(b + 112);
+    h->hold_worst_um = read_u32(b + 116);
+    h->fault_worst_us = read_u32(b + 120);
+    h->fault_worst_um = read_u32(b + 124);
 }
 
 /* Counts that cannot fit are refused before they are multiplied, so nothing wraps. */
@@ -59,7 +63,7 @@ static int check_size(const struct program_header *h, uint32_t size)
         return PROGRAM_ERR_SIZE;
     }
     uint64_t need = PROGRAM_HEADER_SIZE + (uint64_t)h->segment_count * PROGRAM_SEGMENT_SIZE +
-                    (uint64_t)h->piece_count * PROGRAM_PIECE_SIZE;
+                    (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE);
     if (need != h->image_size) {
         return PROGRAM_ERR_SIZE;
     }
@@ -100,6 +104,23 @@ static const uint8_t *piece_bytes(const struct program *p, uint32_t i)
     return segment_bytes(p, p->header.segment_count) + (size_t)i * PROGRAM_PIECE_SIZE;
 }
 
+static const uint8_t *stop_bytes(const struct program *p, uint32_t i)
+{
+    return piece_bytes(p, p->header.piece_count) + (size_t)i * PROGRAM_STOP_SIZE;
+}
+
+void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kind kind,
+                      struct program_stop *out)
+{
+    const uint8_t *b = stop_bytes(p, i);
+    const uint8_t *codes = kind == PROGRAM_STOP_FAULT ? b + 3 : b;
+    out->jerk_down = codes[0];
+    out->deceleration = codes[1];
+    out->jerk_up = codes[2];
+    out->reserved = (uint16_t)read_u16(b + 6);
+    out->bound_us = read_u32(kind == PROGRAM_STOP_FAULT ? b + 12 : b + 8);
+}
+
 int64_t program_segment_start(const struct program *p, uint32_t i)
 {
     return read_i64(segment_bytes(p, i));
@@ -108,6 +129,11 @@ int64_t program_segment_start(const struct program *p, uint32_t i)
 uint64_t program_piece_duration(const struct program *p, uint32_t i)
 {
     return read_u64(piece_bytes(p, i));
+}
+
+int64_t program_piece_start(const struct program *p, uint32_t i)
+{
+    return read_i64(piece_bytes(p, i) + 8);
 }
 
 void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,

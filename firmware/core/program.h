@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The uploaded program image: reading its header, segments and feed pieces.
+ * The uploaded program image: reading its header, segments, feed pieces and stops.
  *
  * The format is docs/protocol.md section 1: little-endian scaled integers at any alignment. The
  * image is never copied; it must stay unchanged as long as a struct program or a struct interp
@@ -20,7 +20,8 @@ struct kernel; /* core/kernel.h */
 #define PROGRAM_HEADER_SIZE  128u
 #define PROGRAM_SEGMENT_SIZE 72u
 #define PROGRAM_PIECE_SIZE   88u
-#define PROGRAM_VERSION      1u
+#define PROGRAM_STOP_SIZE    16u
+#define PROGRAM_VERSION      2u
 #define PROGRAM_FLAG_CLOSED  1u
 
 /* Header of the image, protocol.md 1.1; field names carry the units. */
@@ -40,7 +41,11 @@ struct program_header {
     uint32_t feed_limit_um_s;
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
-    char name[33]; /* UTF-8, always terminated */
+    char name[33];          /* UTF-8, always terminated */
+    uint32_t hold_worst_us; /* longest stop of each kind, and the longest way of one */
+    uint32_t hold_worst_um;
+    uint32_t fault_worst_us;
+    uint32_t fault_worst_um;
 };
 
 /* A PH segment, protocol.md 1.2. w = u + iv in Bernstein form, mm^(1/2). */
@@ -63,6 +68,21 @@ struct program_piece {
     uint32_t reserved;
 };
 
+enum program_stop_kind {
+    PROGRAM_STOP_HOLD = 0,  /* feed hold and stop: inside the program's limits */
+    PROGRAM_STOP_FAULT = 1, /* fault stop: inside the machine's */
+};
+
+/* What a brake along the path may use that begins in a piece, protocol.md 1.4: codes, decoded by core/path_brake. All of
+ * them 0: no brake may begin in this piece. */
+struct program_stop {
+    uint8_t jerk_down;
+    uint8_t deceleration;
+    uint8_t jerk_up;
+    uint16_t reserved;
+    uint32_t bound_us; /* from the command, given in this piece, to rest: at most */
+};
+
 struct program {
     const uint8_t *image;
     uint32_t size;
@@ -81,9 +101,14 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size);
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
 void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out);
 
-/* Only the start (arc length) of a segment, only the duration of a piece: cheaper. */
+/* The stop of a kind that is asked for in piece i, which must be below the count. Constant time. */
+void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kind kind,
+                      struct program_stop *out);
+
+/* Only the start (arc length) of a segment, only the duration or the start of a piece: cheaper. */
 int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
+int64_t program_piece_start(const struct program *p, uint32_t i);
 
 /* Only its override bounds, fields as in struct program_piece. */
 void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,

@@ -5,6 +5,7 @@
 #include "core/limit_check.h"
 #include "core/piece_check.h"
 #include "core/segment_check.h"
+#include "core/stop_check.h"
 
 #define NAME_FROM 80u
 #define NAME_SIZE 32u
@@ -43,8 +44,7 @@ static int check_header(const struct program *p, const struct program_limits *li
     if (code != 0) {
         return code;
     }
-    if ((h->flags & ~PROGRAM_FLAG_CLOSED) != 0 || !bytes_are_zero(p->image + 76, 4) ||
-        !bytes_are_zero(p->image + 112, 16)) {
+    if ((h->flags & ~PROGRAM_FLAG_CLOSED) != 0 || !bytes_are_zero(p->image + 76, 4)) {
         return PROGRAM_ERR_FLAGS;
     }
     if (h->axis_count != 2) {
@@ -72,6 +72,9 @@ int program_check(const struct program *p, const struct program_limits *limits,
     }
     if (fault->code == 0) {
         fault->code = limit_check_all(p, limits, &fault->index);
+    }
+    if (fault->code == 0) {
+        fault->code = stop_check_all(p, limits, &fault->index);
     }
     return fault->code;
 }

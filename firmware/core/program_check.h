@@ -72,6 +72,13 @@ enum program_error {
     PROGRAM_ERR_AXIS_JERK = -72,         /* above its jerk limit */
     PROGRAM_ERR_AXIS_STEP =
         -73, /* velocity or acceleration jumps at a joint by more than its limits allow */
+    /* stops: index = the piece */
+    PROGRAM_ERR_STOP_ENTRY =
+        -60, /* some codes of a stop are 0 and some are not, or a reserved field is not 0 */
+    PROGRAM_ERR_STOP_NUMBERS = -61, /* a brake would be above the limits of the controller */
+    PROGRAM_ERR_STOP_BOUND = -62,   /* a stop can take longer than its bound */
+    PROGRAM_ERR_STOP_LONG = -63,    /* a fault stop can take longer than the controller allows */
+    PROGRAM_ERR_STOP_WORST = -64,   /* the worst stops of the header are not those of the table */
 };
 
 /* What this controller allows. */
@@ -85,6 +92,7 @@ struct program_limits {
     uint32_t axis_velocity_um_s[2]; /* of x and y, at every rate of program time; 0: no limit */
     uint32_t axis_acceleration_um_s2[2];
     uint32_t axis_jerk_mm_s3[2];
+    uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
 };
 
 struct program_fault {

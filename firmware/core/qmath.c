@@ -55,6 +55,21 @@ uint64_t qmath_div_u64(uint64_t a, uint64_t b)
     return q + (a - q * b >= b ? 1u : 0u);
 }
 
+uint64_t qmath_div_up_u64(uint64_t a, uint64_t b)
+{
+    return qmath_div_u64(a + b - 1u, b);
+}
+
+uint64_t qmath_ratio(int64_t a, int64_t b, int bits)
+{
+    const uint64_t most = (uint64_t)1 << 60;
+    const int room = qmath_clz64((uint64_t)a | 1u);
+    const int up = room < bits ? room : bits;
+    const uint64_t divisor = (uint64_t)b >> (bits - up);
+    const uint64_t q = divisor == 0 ? most : qmath_div_u64((uint64_t)a << up, divisor);
+    return q < most ? q : most;
+}
+
 int64_t qmath_shift_clamp(int64_t a, int shift)
 {
     const int64_t limit = ((int64_t)1 << 62) - 1;

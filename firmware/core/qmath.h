@@ -174,6 +174,13 @@ static inline int32_t qmath_clamp32(int64_t a)
 /* floor(a / b), b not 0: for targets without a 64-bit division. At most four 32-bit divisions, no loop. */
 uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 
+/* The same, rounded up; a + b below 2^64. */
+uint64_t qmath_div_up_u64(uint64_t a, uint64_t b);
+
+/* a / b with so many bits (0 ... 32) behind the point, held at 2^60; a >= 0, b > 0. Right to a unit, and to 2^-20 of it where
+ * b is at least 2^-10 of a and has 52 bits. */
+uint64_t qmath_ratio(int64_t a, int64_t b, int bits);
+
 /* floor of the square root: 16 rounds of additions and a 32-bit division. */
 uint64_t qmath_root(uint64_t a);
 

@@ -63,6 +63,24 @@ void timebase_begin(struct timebase *tb, const struct program *p, uint32_t perio
     timebase_begin_at(tb, p, period_us, 0);
 }
 
+void timebase_go_from(struct timebase *tb, uint64_t time_q42_s, uint32_t piece,
+                      const struct prepared_piece *record, uint64_t piece_end_q32_s)
+{
+    tb->time_q42_s = time_q42_s;
+    tb->rest = 0;
+    tb->fine = 0;
+    tb->started = 1;
+    tb->piece = piece;
+    tb->record = record;
+    tb->piece_end_q42_s = timebase_end_q42_s(tb, piece_end_q32_s << TIMEBASE_FINE);
+    tb->steady = 0;
+    tb->saturated = 0;
+    tb->even_q62_s = 0;
+    tb->now.rate_q57 = 0;
+    tb->now.slope_q56 = 0;
+    rate_plan_reset(&tb->plan);
+}
+
 static void set_state(struct timebase *tb, enum timebase_state state)
 {
     tb->state = state;

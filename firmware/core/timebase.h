@@ -89,6 +89,11 @@ void timebase_stop(struct timebase *tb);
 
 /* --- Tick --- */
 
+/* From rest again, at a time in this piece (its record, or NULL): the rate rises from there to the override. The fields
+ * are those of a struct interp_search. */
+void timebase_go_from(struct timebase *tb, uint64_t time_q42_s, uint32_t piece,
+                      const struct prepared_piece *record, uint64_t piece_end_q32_s);
+
 /* Goes to the next setpoint and gives its program time in 2^-32 s, rounded to nearest; the first
  * call after begin gives the time begun at. After the end it stays at the duration, after a stop
  * where the stop ended. Bounded time, tick context. */

@@ -48,6 +48,9 @@ int port_end(void);
  * such a wish. */
 bool port_stop_requested(void);
 
+/* True when it has been asked for a second time: not along the path any more, but as quickly as the drives can. */
+bool port_stop_insisted(void);
+
 /* CANopen node number of this controller, 1 ... 127, from the command line or the board's straps.
  */
 uint8_t port_node_id(void);

@@ -21,6 +21,7 @@ from .program import (
     Program,
     ProgramLimits,
     ProgramOptions,
+    StopTerms,
     compile_path,
     encode,
     fit_plan,
@@ -64,6 +65,19 @@ def plants(machine: Machine | None, limits: Limits) -> tuple[Plant, Plant] | Non
     return x, y
 
 
+def drive_plants(machine: Machine) -> tuple[Plant, Plant] | None:
+    """The plants of x and y with all the volts of their drives, None when one of them has no drive file, or no volts
+    left beside its friction.
+    """
+    known = [axis.drive for axis in machine.plane if axis.drive is not None]
+    if len(known) < len(machine.plane) or any(
+        drive.volts_limit <= (drive.equipment.friction_volts or 0.0) for drive in known
+    ):
+        return None
+    x, y = (_plant(drive, drive.volts_limit) for drive in known)
+    return x, y
+
+
 def _plant(drive: Drive, volts: float | None) -> Plant:
     plant = Plant(
         drive.gain_rad_s_v * drive.screw_mm_rad,
@@ -97,6 +111,7 @@ def program_limits(machine: Machine) -> ProgramLimits:
         jerk_mm_s3=round(machine.jerk_mm_s3),
         min_q40_mm=(low[0], low[1]),
         max_q40_mm=(high[0], high[1]),
+        stop_time_ms=machine.stop_time_ms,
         axis_velocity_um_s=_of_plane(machine, "velocity_mm_s", 1000),
         axis_acceleration_um_s2=_of_plane(machine, "acceleration_mm_s2", 1000),
         axis_jerk_mm_s3=_of_plane(machine, "jerk_mm_s3", 1),
@@ -229,8 +244,24 @@ class Chain:
             return compile_path(
                 spline,
                 plan,
-                ProgramOptions(self.file.name, machine.offset_mm, limits, machine.period_us),
+                ProgramOptions(
+                    self.file.name,
+                    machine.offset_mm,
+                    limits,
+                    machine.period_us,
+                    self.stop_terms,
+                ),
             )
+
+    @property
+    def stop_terms(self) -> StopTerms:
+        """What the stops of the program keep beside the limits of its plan."""
+        machine, limits = self.machine, self.file.limits
+        return StopTerms(
+            plants=plants(machine, limits),
+            drives=drive_plants(machine),
+            stop_time_ms=machine.stop_time_ms,
+        )
 
     @property
     def program(self) -> Program:

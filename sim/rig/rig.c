@@ -64,7 +64,12 @@ int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel
         rig->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
         influence_none(&rig->influences[axis], &drives[axis]);
     }
-    timebase_begin(&rig->timebase, program, program->header.period_us);
+    feed_override_begin(&rig->feed, program, program->header.period_us, 0);
+    rig->orders = NULL;
+    rig->order_count = 0;
+    rig->next_order = 0;
+    rig->last_q40_mm = 0;
+    rig->stop = (struct rig_stop){UINT32_MAX, UINT32_MAX, 0, 0, 0};
     contour_begin(&rig->contour, program, segments);
     return 0;
 }
@@ -99,15 +104,86 @@ int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count)
     return 0;
 }
 
+int rig_orders(struct rig *rig, const struct rig_order *orders, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const bool late = i > 0 && orders[i].tick < orders[i - 1].tick;
+        if ((int)orders[i].kind < 0 || orders[i].kind >= RIG_ORDER_KINDS || late) {
+            return RIG_ERR_FAULT;
+        }
+    }
+    rig->orders = orders;
+    rig->order_count = count;
+    return 0;
+}
+
+void rig_stop_get(const struct rig *rig, struct rig_stop *stop)
+{
+    *stop = rig->stop;
+}
+
+static bool rig_at_rest(const struct rig *rig)
+{
+    const enum feed_state state = feed_override_state(&rig->feed);
+    return state == FEED_HELD || state == FEED_STOPPED || state == FEED_ENDED;
+}
+
+static void rig_order_stop(struct rig *rig, enum program_stop_kind kind)
+{
+    rig->stop.tick = rig->tick;
+    rig->stop.rest_tick = UINT32_MAX;
+    rig->stop.bound_us = feed_override_bound_us(&rig->feed, kind);
+    rig->stop.from_q40_mm = rig->last_q40_mm;
+}
+
+static void rig_order(struct rig *rig, const struct rig_order *order)
+{
+    switch (order->kind) {
+    case RIG_ORDER_HOLD:
+        rig_order_stop(rig, PROGRAM_STOP_HOLD);
+        feed_override_hold(&rig->feed);
+        break;
+    case RIG_ORDER_STOP:
+        rig_order_stop(rig, PROGRAM_STOP_HOLD);
+        feed_override_stop(&rig->feed);
+        break;
+    case RIG_ORDER_FAULT_STOP:
+        rig_order_stop(rig, PROGRAM_STOP_FAULT);
+        feed_override_fault_stop(&rig->feed);
+        break;
+    case RIG_ORDER_RESUME:
+        feed_override_resume(&rig->feed);
+        break;
+    default:
+        feed_override_set(&rig->feed, order->percent);
+        break;
+    }
+}
+
+static int rig_point_next(struct rig *rig, struct interp_point *point)
+{
+    while (rig->next_order < rig->order_count && rig->orders[rig->next_order].tick <= rig->tick) {
+        rig_order(rig, &rig->orders[rig->next_order++]);
+    }
+    if (feed_override_next(&rig->feed, &rig->interp, point) != 0) {
+        return RIG_ERR_INTERP;
+    }
+    rig->last_q40_mm = point->arc_length_q40_mm;
+    if (rig->stop.tick != UINT32_MAX && rig->stop.rest_tick == UINT32_MAX && rig_at_rest(rig)) {
+        rig->stop.rest_tick = rig->tick;
+        rig->stop.rest_q40_mm = point->arc_length_q40_mm;
+    }
+    return 0;
+}
+
 static int rig_command(struct rig *rig, struct rig_row *row)
 {
     struct interp_point point;
-    (void)timebase_step(&rig->timebase);
-    if (interp_at_q42(&rig->interp, timebase_time_q42(&rig->timebase), &point) < 0) {
+    if (rig_point_next(rig, &point) != 0) {
         return RIG_ERR_INTERP;
     }
     row->arc_length_q40_mm = point.arc_length_q40_mm;
-    row->feed_q32_mm_s = point.feed_q32_mm_s;
+    row->feed_q32_mm_s = feed_override_feed_q32(&rig->feed);
     row->cmd_q40_mm[0] = point.x_q40_mm;
     row->cmd_q40_mm[1] = point.y_q40_mm;
     row->set_counts[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);

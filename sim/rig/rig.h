@@ -6,7 +6,7 @@
  * Timing (docs/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
  * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC
  * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
- * repeat its end point (settling).
+ * repeat its end point (settling), those behind a stop its place of rest.
  *
  * Use: rig_begin, then rig_run as often as wanted. No heap: the caller lends the segment array, and
  * the program, its image and the segments must outlive the rig. Main loop only.
@@ -17,10 +17,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "core/feed_override.h"
 #include "core/feedforward.h"
 #include "core/interp.h"
 #include "core/program.h"
-#include "core/timebase.h"
 #include "plant/drive.h"
 #include "plant/influence.h"
 #include "rig/contour.h"
@@ -29,7 +29,7 @@
 /* One tick; 64 bytes without holes. Python maps it as a numpy record. */
 struct rig_row {
     int64_t arc_length_q40_mm;
-    int64_t feed_q32_mm_s;
+    int64_t feed_q32_mm_s; /* along the path */
     int64_t cmd_q40_mm[2]; /* unrounded, from the kernel */
     double contour_error_um;
     int32_t set_counts[2];
@@ -38,11 +38,36 @@ struct rig_row {
     uint32_t tick;
 };
 
+enum rig_order_kind {
+    RIG_ORDER_HOLD,
+    RIG_ORDER_RESUME,
+    RIG_ORDER_OVERRIDE, /* percent */
+    RIG_ORDER_STOP,
+    RIG_ORDER_FAULT_STOP,
+    RIG_ORDER_KINDS
+};
+
+/* A command that takes effect from setpoint `tick` on, which is the first that may differ for it. */
+struct rig_order {
+    enum rig_order_kind kind;
+    uint32_t tick;
+    uint32_t percent;
+};
+
+/* The last hold, stop or fault stop. */
+struct rig_stop {
+    uint32_t tick;       /* of the order, */
+    uint32_t rest_tick;  /* and the first setpoint at rest; UINT32_MAX: there was none yet */
+    uint32_t bound_us;   /* what the stop table says, where it was ordered */
+    int64_t from_q40_mm; /* arc length of the last setpoint before the order, */
+    int64_t rest_q40_mm; /* and at rest */
+};
+
 enum rig_error {
     RIG_ERR_KERNEL = -100, /* no such kernel */
     RIG_ERR_PERIOD = -101, /* a drive's period is not the program's */
     RIG_ERR_COUNTS = -102, /* the drives' counts per mm differ */
-    RIG_ERR_FAULT = -103,  /* a fault that cannot be carried out */
+    RIG_ERR_FAULT = -103,  /* a fault or an order that cannot be carried out */
     RIG_ERR_DRIVE = -200,  /* minus 10 * axis, plus the enum drive_error of that axis */
     RIG_ERR_INTERP = -300, /* the interpolator failed: the program was not checked */
 };
@@ -50,7 +75,12 @@ enum rig_error {
 /* Fields are private. */
 struct rig {
     struct interp interp;
-    struct timebase timebase;
+    struct feed_override feed;
+    const struct rig_order *orders; /* borrowed */
+    uint32_t order_count;
+    uint32_t next_order;
+    struct rig_stop stop;
+    int64_t last_q40_mm;
     struct contour contour;
     struct drive drives[2];
     struct drive_config configs[2];
@@ -85,6 +115,12 @@ void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double frictio
  * those of the axis itself, whatever its encoder says. Of faults of one kind and axis one acts at a time.
  * Returns 0 or RIG_ERR_FAULT. */
 int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count);
+
+/* Commands of this run, by ascending tick, right after rig_begin; they must outlive the rig. Returns 0 or RIG_ERR_FAULT. */
+int rig_orders(struct rig *rig, const struct rig_order *orders, uint32_t count);
+
+/* What became of the last order to stop. */
+void rig_stop_get(const struct rig *rig, struct rig_stop *stop);
 
 /* The next n ticks. Returns 0 or RIG_ERR_INTERP. */
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);

@@ -25,7 +25,8 @@ from hodograph.feed.pieces import FeedPieces
 from hodograph.program import Program, ProgramLimits, ProgramOptions, compile_program, encode
 from hodograph.program.check import Fault, check_image
 from hodograph.program.codes import ProgramError
-from hodograph.program.image import HEADER_SIZE, PIECE_SIZE, SEGMENT_SIZE, with_crc
+from hodograph.program.image import HEADER_SIZE, PIECE_SIZE, SEGMENT_SIZE, STOP_SIZE, with_crc
+from hodograph.program.stops import FAULT, HOLD, no_stops
 from hodograph.spline import PHSpline, from_control_polygon, line
 
 HERE = Path(__file__).parent
@@ -33,7 +34,7 @@ PROGRAMS = HERE / "programs"
 EXAMPLES = HERE.parent.parent / "examples"
 MM = 1 << 40
 
-LIMITS = ProgramLimits(1000, 500_000, 5_000_000, 200_000, (-200 * MM,) * 2, (200 * MM,) * 2)
+LIMITS = ProgramLimits(1000, 500_000, 5_000_000, 200_000, (-200 * MM,) * 2, (200 * MM,) * 2, 250)
 CONTROLLER = ControllerLimits(500.0, 5000.0, 200000.0, 0.02)
 
 
@@ -137,7 +138,7 @@ def without_piece(p: Program, index: int) -> Program:
         own.override_rate_q16_per_s[keep],
         own.override_second_q8_per_s2[keep],
     )
-    return replace(p, pieces=left, duration_q32_s=left.total_q32_s)
+    return replace(p, pieces=left, stops=no_stops(len(left)), duration_q32_s=left.total_q32_s)
 
 
 def longer(p: Program, index: int, by_q32: int) -> Program:
@@ -179,6 +180,7 @@ def split_short(p: Program, index: int) -> Program:
             same(own.override_rate_q16_per_s),
             same(own.override_second_q8_per_s2),
         ),
+        stops=no_stops(p.piece_count + 2),
     )
 
 
@@ -190,7 +192,7 @@ def shortened(p: Program) -> Program:
     slow = compile_program(fine, plan, ProgramOptions(name="broken"))
     fast = plan_feed(slow.length_mm, FeedRequest("minimax", 200.0, 0.1), None, CONTROLLER)
     whole = fast.pieces_over(slow.length_q40)
-    return replace(slow, pieces=whole, duration_q32_s=whole.total_q32_s)
+    return replace(slow, pieces=whole, stops=no_stops(len(whole)), duration_q32_s=whole.total_q32_s)
 
 
 def uneven() -> Program:
@@ -220,6 +222,7 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
     image = encode(p)
     n, m = p.segment_count, p.piece_count
     after = HEADER_SIZE + SEGMENT_SIZE * n
+    table = after + PIECE_SIZE * m
     over = 1 << 8  # 2^-32 mm, four times the tolerance of joints
     straight = line(0, 80)
     fast = FeedRequest("quintic", 600.0, 0.3)
@@ -234,7 +237,7 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
         "size_field": (patch(image, 8, struct.pack("<I", len(image) - 8)), "SIZE", 0),
         "count_too_many": (patch(image, 20, struct.pack("<I", 0xFFFFFFFF)), "SIZE", 0),
         "magic": (patch(image, 0, b"HDGX"), "MAGIC", 0),
-        "version": (patch(image, 4, b"\x02\x00"), "VERSION", 0),
+        "version": (patch(image, 4, b"\x01\x00"), "VERSION", 0),
         "header_size": (patch(image, 6, b"\x00\x01"), "VERSION", 0),
         "crc": (image[:200] + bytes([image[200] ^ 1]) + image[201:], "CRC", 0),
         "no_pieces": (_no_pieces(image, n), "COUNT", 0),
@@ -242,7 +245,6 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
         "period_used": (encode(_other_period(2000)), "PERIOD_USED", 0),
         "flags": (patch(image, 28, b"\x02\x00"), "FLAGS", 0),
         "reserved_76": (patch(image, 76, b"\x01"), "FLAGS", 0),
-        "reserved_127": (patch(image, 127, b"\x01"), "FLAGS", 0),
         "axes": (patch(image, 30, b"\x03\x00"), "AXES", 0),
         "duration": (encode(replace(p, duration_q32_s=p.duration_q32_s + 1)), "DURATION", 0),
         "length_zero": (encode(replace(p, length_q40=0)), "LENGTH", 0),
@@ -305,9 +307,26 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
             "ACCELERATION",
             -1,
         ),
+        "stop_entry": (patch(image, table + STOP_SIZE * 4, b"\0"), "STOP_ENTRY", 4),
+        "stop_reserved": (patch(image, table + STOP_SIZE * 5 + 7, b"\1"), "STOP_ENTRY", 5),
+        "stop_numbers": (patch(image, table + STOP_SIZE * 2 + 4, b"\xa3"), "STOP_NUMBERS", 2),
+        "stop_jerk": (patch(image, table + STOP_SIZE * 2, b"\x9d"), "STOP_NUMBERS", 2),
+        "stop_hold_bound": (encode(_said(p, 6, HOLD, -100)), "STOP_BOUND", 6),
+        "stop_fault_bound": (encode(_said(p, 7, FAULT, -100)), "STOP_BOUND", 7),
+        "stop_long": (encode(_said(p, 3, FAULT, 300_000)), "STOP_LONG", 3),
+        "stop_worst": (patch(image, 112, b"\0"), "STOP_WORST", 0),
+        "stop_worst_way": (patch(image, 124, bytes(4)), "STOP_WORST", 0),
+        "stop_none": (encode(replace(p, stops=no_stops(m))), "STOP_BOUND", m - 1),
         "jerk": (encode(program(straight, hard, "broken", controller=wild)), "JERK", -1),
     }
     return out
+
+
+def _said(p: Program, index: int, kind: int, by_us: int) -> Program:
+    """A stop's bound changed."""
+    bound_us = p.stops.bound_us.astype(np.int64)
+    bound_us[index, kind] += by_us
+    return replace(p, stops=replace(p.stops, bound_us=bound_us.astype(np.uint32)))
 
 
 def _no_pieces(image: bytes, n: int) -> bytes:
@@ -398,7 +417,8 @@ def main() -> None:
         "# Golden programs: file, code it is refused with (OK: none), its number, index of the segment or piece.",
         "# Written by make_golden.py. All are to be checked against these limits:",
         f"limits {LIMITS.period_us} us {LIMITS.feed_um_s} um/s {LIMITS.acceleration_um_s2} um/s^2 "
-        f"{LIMITS.jerk_mm_s3} mm/s^3 {low[0]} {low[1]} {high[0]} {high[1]} q40_mm",
+        f"{LIMITS.jerk_mm_s3} mm/s^3 {low[0]} {low[1]} {high[0]} {high[1]} q40_mm "
+        f"{LIMITS.stop_time_ms} ms",
     ]
     for name, p in good().items():
         image = encode(p)

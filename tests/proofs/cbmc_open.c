@@ -64,7 +64,7 @@ void harness(void)
         const struct program_header *h = &p.header;
         prove(h->segment_count > 0 && h->piece_count > 0);
         prove(p.size == h->image_size && p.size <= size);
-        prove(p.size == 128 + 72 * (uint64_t)h->segment_count + 88 * (uint64_t)h->piece_count);
+        prove(p.size == 128 + 72 * (uint64_t)h->segment_count + 104 * (uint64_t)h->piece_count);
         reached();
     }
 }

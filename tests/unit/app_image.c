@@ -5,6 +5,7 @@
 
 #include "canopen/cob.h"
 #include "core/crc32.h"
+#include "stop_table.h"
 
 #define Q32 (INT64_C(1) << 32)
 #define Q40 (INT64_C(1) << 40)
@@ -43,9 +44,10 @@ void app_image_seal(uint8_t image[APP_IMAGE_SIZE])
 
 void app_image_make(uint8_t image[APP_IMAGE_SIZE], int32_t x_mm, int32_t y_mm)
 {
+    static const uint8_t stops[6] = {102, 116, 102, 118, 124, 118};
     memset(image, 0, APP_IMAGE_SIZE);
     memcpy(image, "HDGP", 4);
-    cob_put(image + 4, 1, 2);
+    cob_put(image + 4, 2, 2);
     cob_put(image + 6, 128, 2);
     cob_put(image + 8, APP_IMAGE_SIZE, 4);
     cob_put(image + 16, 1000, 4);
@@ -56,5 +58,5 @@ void app_image_make(uint8_t image[APP_IMAGE_SIZE], int32_t x_mm, int32_t y_mm)
     put_i64(image + 40, 4 * Q40);
     put_segment(image + 128, x_mm, y_mm);
     put_piece(image + 200);
-    app_image_seal(image);
+    stop_table_write(image, APP_IMAGE_SIZE, stops);
 }

@@ -20,6 +20,7 @@ static struct {
     bool ready;
     bool locked;
     bool fail_send;
+    bool insisted;
     bool fail_store;
     uint32_t missing; /* bytes of a bank for a program */
     uint32_t operations;
@@ -189,6 +190,16 @@ int port_end(void)
 bool port_stop_requested(void)
 {
     return false;
+}
+
+bool port_stop_insisted(void)
+{
+    return self.insisted;
+}
+
+void fake_port_insist(bool insisted)
+{
+    self.insisted = insisted;
 }
 
 uint8_t port_node_id(void)

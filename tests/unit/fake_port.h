@@ -66,6 +66,8 @@ void fake_port_use_store(const struct fake_port_store *store);
 
 /* Called once, after the next critical section: an interrupt between two of them. */
 void fake_port_on_unlock(void (*hook)(void *context), void *context);
+/* What port_stop_insisted says from now on. */
+void fake_port_insist(bool insisted);
 
 /* Called by port_wait; may be NULL. */
 void fake_port_on_wait(void (*hook)(void *context), void *context);

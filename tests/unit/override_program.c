@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "golden.h"
+#include "stop_table.h"
 #include "unity.h"
 
 #define Q40        1099511627776.0
@@ -118,6 +119,26 @@ static void set_bounds(struct override_program *p, uint32_t i)
     put(at + 80, second, 4);
 }
 
+/* The greatest code of at most this: 1 mm/s^2 or 64 mm/s^3 is 64, eight to a factor of 2. */
+static uint8_t code_of(double value)
+{
+    return (uint8_t)fmin(255, floor(64 + 8 * log2(value) - 1e-3));
+}
+
+/* A hold brakes inside the limits, a fault stop inside twice of them. */
+static void set_stops(struct override_program *p)
+{
+    const uint8_t jerk = code_of(p->limit.jerk / 64);
+    const uint8_t acceleration = code_of(p->limit.acceleration);
+    const uint8_t codes[6] = {jerk,
+                              acceleration,
+                              jerk,
+                              (uint8_t)(jerk + 8u),
+                              (uint8_t)(acceleration + 8u),
+                              (uint8_t)(jerk + 8u)};
+    stop_table_fill(&p->program, p->image, codes);
+}
+
 void override_program_limits(struct override_program *p, uint64_t *random)
 {
     p->limit.feed = p->peak.feed * override_random(random, 1.0, 2.5);
@@ -126,6 +147,7 @@ void override_program_limits(struct override_program *p, uint64_t *random)
     for (uint32_t i = 0; i < p->program.header.piece_count; i++) {
         set_bounds(p, i);
     }
+    set_stops(p);
 }
 
 /* v0 + (v1 - v0) (10 x^3 - 15 x^4 + 6 x^5), x = t/T, as F' of a piece that begins at t = a. */
@@ -232,7 +254,7 @@ void override_program_random(struct override_program *p, uint32_t period_us, uin
     header->segment_count = (uint32_t)((double)b.arc_q40 / Q40 / SEGMENT_MM) + 1u;
     p->program.size = header->image_size = PROGRAM_HEADER_SIZE +
                                            header->segment_count * PROGRAM_SEGMENT_SIZE +
-                                           b.count * PROGRAM_PIECE_SIZE;
+                                           b.count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE);
     p->image = calloc(1, p->program.size);
     TEST_ASSERT_NOT_NULL(p->image);
     p->program.image = p->image;

@@ -31,6 +31,8 @@ void tearDown(void)
     for (unsigned i = 0; i < BENCH_DRIVES; ++i) {
         TEST_ASSERT_TRUE_MESSAGE(bench.drives[i].worst_step_counts <= STEP_COUNTS,
                                  "a setpoint jumped");
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, bench.drives[i].cut_moving,
+                                         "power was taken from a moving drive");
         TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, bench.drives[i].quick_stop_moved,
                                          "a target moved in a quick stop");
     }
@@ -478,7 +480,13 @@ static void test_quick_stop_without_end_is_a_fault(void)
     app_bench_periods(&bench, 20);
     expect_fault(FAULT_NOT_STOPPED, 3);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_OFF, machine()->fault_phase);
-    expect_off();
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, drive(0)->state.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, drive(1)->state.state);
+    TEST_ASSERT_EQUAL_HEX16(CIA402_QUICK_STOP, machine()->axes[1].controlword);
+    drive(1)->position_counts += 2 * (int32_t)bench.controller.config.start_tolerance_counts;
+    app_bench_periods(&bench, 2);
+    refused(COMMAND_RESET, MACHINE_MOVING);
+    app_bench_periods(&bench, AXIS_REST_SYNCS);
     recover();
 }
 
@@ -569,6 +577,7 @@ static void test_homing_is_from_off_to_off(void)
     drive(0)->latched_counts = drive(0)->target_counts = 77;
     app_bench_periods(&bench, 2);
     TEST_ASSERT_EQUAL_INT32(drive(0)->position_counts, machine()->axes[0].target_counts);
+    app_bench_periods(&bench, 2);
     port_lock();
     machine_end_homing(machine());
     port_unlock();

@@ -173,13 +173,13 @@ static void test_feed_saturates(void)
     app_bench_periods(&bench, 250);
     motion = bench.controller.machine.motion;
     TEST_ASSERT_INT_WITHIN(20, 15000, motion_feed_um_s(&motion));
-    motion.point.feed_q32_mm_s = INT64_C(2147483) << 32;
+    motion.feed.point.feed_q32_mm_s = INT64_C(2147483) << 32;
     TEST_ASSERT_EQUAL_INT32(2147483000, motion_feed_um_s(&motion));
-    motion.point.feed_q32_mm_s = INT64_C(2147484) << 32;
+    motion.feed.point.feed_q32_mm_s = INT64_C(2147484) << 32;
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, motion_feed_um_s(&motion));
-    motion.point.feed_q32_mm_s = INT64_MAX;
+    motion.feed.point.feed_q32_mm_s = INT64_MAX;
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, motion_feed_um_s(&motion));
-    motion.point.feed_q32_mm_s = INT64_MIN;
+    motion.feed.point.feed_q32_mm_s = INT64_MIN;
     TEST_ASSERT_EQUAL_INT32(-INT32_MAX, motion_feed_um_s(&motion));
 }
 

@@ -12,8 +12,8 @@
 static const struct config config = {
     .period_us = 1000,
     .feed_limit_um_s = 20000,
-    .acceleration_limit_um_s2 = 100000,
-    .jerk_limit_mm_s3 = 2000,
+    .acceleration_limit_um_s2 = 200000,
+    .jerk_limit_mm_s3 = 8000,
     .counts_per_mm = 1000000,
     .travel_min_counts = {-100000000, -100000000},
     .travel_max_counts = {100000000, 100000000},

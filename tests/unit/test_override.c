@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Property test of the timebase: random programs, instants and sequences of commands. Each tick is checked against what
- * docs/protocol.md 1.3 and docs/numerics.md sections 7 and 12 promise: bounds of every piece touched, feed, acceleration
- * and jerk on the path (from the rate and F, and by differences of the setpoints), setpoints on the curve, states, end.
+ * Property test of the feed override: random programs, instants and sequences of hold, resume, override, stop and fault
+ * stop. Each tick is checked against what docs/protocol.md 1.3 and 1.4 and docs/numerics.md sections 7 and 12 promise:
+ * bounds of every piece touched, feed, acceleration and jerk on the path (from the rate and F, and by differences of the
+ * setpoints), setpoints on the curve, brakes inside their numbers, stops inside their bounds, states, end.
  *
  * HODOGRAPH_CASES: how many; HODOGRAPH_SEED: another sequence.
  */
@@ -11,9 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/feed_override.h"
 #include "core/interp.h"
 #include "core/program_time.h"
-#include "core/timebase.h"
 #include "golden.h"
 #include "override_program.h"
 #include "unity.h"
@@ -30,18 +31,22 @@ static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "alpha_exponential.hd
 #define GOLDENS (sizeof GOLDEN / sizeof *GOLDEN)
 
 enum wish { RUN, HOLD, STOP };
+enum phase { PLAN, BRAKE, REST }; /* of feed_override.c */
 
 static struct override_program bank[4][LINES];
 static struct override_program goldens[GOLDENS];
 
 static struct {
     const struct override_program *p;
-    struct timebase tb;
+    struct feed_override feed;
     struct interp interp;
     struct interp exact;
     struct interp_point point;
     double h;
     enum wish wish;
+    int fault;         /* a fault stop was asked for */
+    unsigned asked;    /* tick of the last hold, stop or fault stop, */
+    uint32_t bound_us; /* and its bound */
     uint32_t percent;
     int line;
     unsigned number;
@@ -55,7 +60,7 @@ static struct {
 } now;
 
 static struct {
-    double acceleration, jerk, difference;
+    double acceleration, jerk, difference, of_bound;
     uint64_t ticks;
     unsigned over, ended, held, stopped, saturated;
 } worst;
@@ -137,21 +142,23 @@ static void check_bounds(const struct tick *k, double end_s)
     }
 }
 
+/* A tick of the plan after one of the plan. */
 static void check_motion(const struct timebase *before)
 {
     const double scale = 1.0 / 72057594037927936.0; /* 2^-56 */
     struct tick k;
-    int64_t rise =
-        now.tb.now.rate_q57 - before->now.rate_q57 - before->now.slope_q56 - now.tb.now.slope_q56;
+    int64_t rise = now.feed.time.now.rate_q57 - before->now.rate_q57 - before->now.slope_q56 -
+                   now.feed.time.now.slope_q56;
     at_most("rate is the sum of its slopes", (double)llabs(rise), 1);
     k.rate = (double)before->now.rate_q57 * scale / 2;
     k.slope = (double)before->now.slope_q56 * scale / now.h;
-    k.second = (double)(now.tb.now.slope_q56 - before->now.slope_q56) * scale / (now.h * now.h);
+    k.second =
+        (double)(now.feed.time.now.slope_q56 - before->now.slope_q56) * scale / (now.h * now.h);
     k.time_s = now.time_s;
     double way = now.h * (k.rate + now.h * (k.slope / 2 + now.h * k.second / 6));
-    uint64_t time = timebase_time_q42(&now.tb);
+    uint64_t time = feed_override_time_q42(&now.feed);
     double moved = (double)(time - now.time_q42) / 4398046511104.0;
-    if (now.tb.state != TIMEBASE_ENDED) {
+    if (now.feed.state != FEED_ENDED) {
         at_most("program time", fabs(moved - way), 3.5e-13);
     } else {
         at_most("program time at the end", moved, way + 3.5e-13);
@@ -164,72 +171,140 @@ static void check_motion(const struct timebase *before)
     }
 }
 
-/* Setpoints lie on the curve, at the arc length of the program time. */
-static void check_point(void)
+/* The setpoint is at the arc length of the program time, or of the brake. */
+static void check_arc(double arc)
 {
     double d[4];
-    uint64_t time = timebase_time_q42(&now.tb);
-    int result = interp_at_q42(&now.interp, time, &now.point);
+    const uint64_t time = feed_override_time_q42(&now.feed);
     now.time_q42 = time;
     now.time_s = (double)time / 4398046511104.0;
-    TEST_ASSERT_TRUE_MESSAGE(result >= 0, where("interpolated", result, 0));
+    if (now.feed.phase == BRAKE || (now.feed.phase == REST && now.feed.found == 0)) {
+        const struct path_state *at = &now.feed.brake.at;
+        at_most("arc length of the brake",
+                fabs((double)(at->arc_length_q40_mm - now.point.arc_length_q40_mm)), 1);
+        return;
+    }
     now.piece = piece_of(now.time_s, now.piece);
     override_program_feed(now.p, now.piece, now.time_s, d);
-    double arc = (double)now.point.arc_length_q40_mm / 1099511627776.0;
-    at_most("arc length", fabs(arc - d[0]), 2e-10);
+    at_most("arc length", fabs(arc - d[0]), 3e-10);
+}
+
+static void check_differences(double arc)
+{
+    const double more = now.fault ? 2 : 1; /* codes of a fault stop are 8 steps higher: twice */
+    memmove(now.arc, now.arc + 1, 3 * sizeof *now.arc);
+    now.arc[3] = arc;
+    if (++now.known < 4) {
+        return;
+    }
+    const double jerk =
+        fabs(now.arc[3] - 3 * now.arc[2] + 3 * now.arc[1] - now.arc[0]) / (now.h * now.h * now.h);
+    const double a = fabs(now.arc[3] - 2 * now.arc[2] + now.arc[1]) / (now.h * now.h);
+    at_most("jerk by differences", jerk, more * now.p->limit.jerk * (1 + 1e-6) + 1.0);
+    at_most("acceleration by differences", a, more * now.p->limit.acceleration * (1 + 1e-6) + 1e-3);
+    at_most("never backwards", now.arc[2] - now.arc[3], 2e-10);
+    worst.difference = fmax(worst.difference, jerk / now.p->limit.jerk / more);
+}
+
+/* Setpoints lie on the curve. */
+static void check_point(void)
+{
+    const double arc = (double)now.point.arc_length_q40_mm / 1099511627776.0;
+    check_arc(arc);
     if (now.line) {
         at_most("on the line", fabs((double)(now.point.x_q40_mm - now.point.arc_length_q40_mm)),
                 400);
         at_most("on the line", fabs((double)now.point.y_q40_mm), 0);
-    } else if (now.ticks % 16u == 0 || now.tb.state == TIMEBASE_ENDED) {
+    } else if (now.ticks % 16u == 0 || now.feed.state == FEED_ENDED) {
         struct interp_point exact;
-        interp_seek(&now.exact, time >> 10);
-        interp_at_q42(&now.exact, time, &exact);
+        interp_seek(&now.exact, now.time_q42 >> 10);
+        while (interp_at_arc_length(&now.exact, now.point.arc_length_q40_mm, &exact) < 0) {
+            TEST_ASSERT_TRUE(now.exact.segment_index < now.p->program.header.segment_count);
+            (void)interp_at_arc_length(
+                &now.exact, program_segment_start(&now.p->program, now.exact.segment_index + 1u),
+                &exact);
+        }
         at_most("on the curve",
                 hypot((double)(exact.x_q40_mm - now.point.x_q40_mm),
                       (double)(exact.y_q40_mm - now.point.y_q40_mm)),
                 1.1e6);
     }
-    memmove(now.arc, now.arc + 1, 3 * sizeof *now.arc);
-    now.arc[3] = arc;
-    if (++now.known >= 4) {
-        double jerk = fabs(now.arc[3] - 3 * now.arc[2] + 3 * now.arc[1] - now.arc[0]) /
-                      (now.h * now.h * now.h);
-        at_most("jerk by differences", jerk, now.p->limit.jerk * (1 + 1e-6) + 1.0);
-        worst.difference = fmax(worst.difference, jerk / now.p->limit.jerk);
-    }
+    check_differences(arc);
 }
 
-static enum timebase_state expected_state(void)
+static enum feed_state expected_state(void)
 {
-    int still = now.tb.now.rate_q57 == 0 && now.tb.now.slope_q56 == 0;
-    if (timebase_time_q42(&now.tb) == now.p->program.header.duration_q32_s << 10) {
-        return TIMEBASE_ENDED;
+    if (now.feed.state == FEED_ENDED) {
+        TEST_ASSERT_TRUE(now.time_q42 == now.p->program.header.duration_q32_s << 10);
+        return FEED_ENDED;
     }
-    if (now.wish == STOP) {
-        return still ? TIMEBASE_STOPPED : TIMEBASE_STOPPING;
+    if (now.wish == RUN) {
+        return FEED_RUNNING;
     }
-    return now.wish == RUN ? TIMEBASE_RUNNING : still ? TIMEBASE_HELD : TIMEBASE_HOLDING;
+    if (now.feed.phase == REST) {
+        return now.wish == STOP ? FEED_STOPPED : FEED_HELD;
+    }
+    return now.wish == STOP ? FEED_STOPPING : FEED_HOLDING;
 }
 
 static int over(void)
 {
-    return now.tb.state == TIMEBASE_ENDED || now.tb.state == TIMEBASE_STOPPED;
+    return now.feed.state == FEED_ENDED || now.feed.state == FEED_STOPPED;
+}
+
+static int at_rest(void)
+{
+    return over() || now.feed.state == FEED_HELD;
 }
 
 static void tick(void)
 {
-    struct timebase before = now.tb;
-    timebase_step(&now.tb);
-    if (before.started && before.state != TIMEBASE_ENDED && before.state != TIMEBASE_STOPPED) {
-        check_motion(&before);
+    const struct feed_override before = now.feed;
+    const int rested = at_rest();
+    TEST_ASSERT_EQUAL_INT(0, feed_override_next(&now.feed, &now.interp, &now.point));
+    if (before.time.started && before.phase == PLAN && now.feed.phase == PLAN && !rested) {
+        check_motion(&before.time);
     }
     check_point();
-    TEST_ASSERT_EQUAL_INT_MESSAGE(expected_state(), timebase_state(&now.tb),
-                                  where("state", now.wish, 0));
-    worst.saturated += timebase_saturated(&now.tb) ? 1u : 0u;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected_state(), feed_override_state(&now.feed),
+                                  where("state", now.wish, now.feed.phase));
+    TEST_ASSERT_FALSE_MESSAGE(feed_override_late(&now.feed), where("late", now.bound_us, 0));
+    if (!rested && at_rest() && now.wish != RUN && now.bound_us != 0) {
+        at_most("bound", (double)(now.ticks + 1u - now.asked) * now.h * 1e6, now.bound_us);
+        worst.of_bound =
+            fmax(worst.of_bound, (double)(now.ticks + 1u - now.asked) * now.h * 1e6 / now.bound_us);
+    }
+    worst.saturated += feed_override_saturated(&now.feed) ? 1u : 0u;
     now.ticks++;
     worst.ticks++;
+}
+
+/* The bound counts from here, where waiting happens at rate 1. */
+static void ask(enum program_stop_kind kind)
+{
+    now.asked = now.ticks;
+    now.bound_us = 0;
+    if (now.feed.phase == PLAN && now.feed.time.now.rate_q57 == RATE_ONE &&
+        now.feed.time.now.slope_q56 == 0) {
+        now.bound_us = feed_override_bound_us(&now.feed, kind);
+    }
+}
+
+static void stop(uint64_t *random)
+{
+    if (golden_random(random) % 2u == 0) {
+        if (now.wish == RUN) {
+            ask(PROGRAM_STOP_HOLD);
+        }
+        feed_override_stop(&now.feed);
+    } else {
+        if (!over() && !now.fault) {
+            ask(PROGRAM_STOP_FAULT);
+        }
+        now.fault = 1;
+        feed_override_fault_stop(&now.feed);
+    }
+    now.wish = STOP;
 }
 
 static void command(uint64_t *random)
@@ -237,27 +312,29 @@ static void command(uint64_t *random)
     switch (golden_random(random) % 8u) {
     case 0:
     case 1:
-        timebase_hold(&now.tb);
+        if (now.wish == RUN) {
+            ask(PROGRAM_STOP_HOLD);
+        }
+        feed_override_hold(&now.feed);
         now.wish = now.wish == RUN ? HOLD : now.wish;
         break;
     case 2:
     case 3:
-        timebase_resume(&now.tb);
+        feed_override_resume(&now.feed);
         now.wish = now.wish == HOLD ? RUN : now.wish;
         break;
     case 4:
-        if (golden_random(random) % 4u == 0) {
-            timebase_stop(&now.tb);
-            now.wish = STOP;
+        if (golden_random(random) % 2u == 0) {
+            stop(random);
         }
         break;
     case 5:
         now.percent = 100u * (uint32_t)(golden_random(random) % 3u);
-        timebase_override(&now.tb, now.percent);
+        feed_override_set(&now.feed, now.percent);
         break;
     default:
         now.percent = (uint32_t)(golden_random(random) % 201u);
-        timebase_override(&now.tb, now.percent);
+        feed_override_set(&now.feed, now.percent);
         break;
     }
 }
@@ -277,10 +354,10 @@ static void begin(struct override_program *p, int line, uint32_t period_us, uint
     override_program_limits(p, random);
     interp_begin(&now.interp, &p->program, INTERP_FIXED);
     interp_begin(&now.exact, &p->program, INTERP_DOUBLE);
-    timebase_begin_at(&now.tb, &p->program, period_us, from);
+    feed_override_begin(&now.feed, &p->program, period_us, from);
     interp_seek(&now.interp, from >> 10);
     if (from > 0 && golden_random(random) % 2u == 0) {
-        now.tb.now.rate_q57 = RATE_ONE;
+        now.feed.time.now.rate_q57 = RATE_ONE;
     }
 }
 
@@ -288,31 +365,31 @@ static void begin(struct override_program *p, int line, uint32_t period_us, uint
 static void finish(void)
 {
     struct rate_ticks down;
-    rate_ticks_of(&down, &now.tb.least, RATE_MOST);
-    int64_t ticks = 4 * 2 * ((int64_t)down.rise + down.half) + 100;
+    rate_ticks_of(&down, &now.feed.time.least, RATE_MOST);
+    int64_t ticks = 4 * 2 * ((int64_t)down.rise + down.half) + 10000;
     int64_t wanted = RATE_ONE / 100 * now.percent;
-    wanted = wanted < now.tb.least_q57 ? wanted : now.tb.least_q57;
+    wanted = wanted < now.feed.time.least_q57 ? wanted : now.feed.time.least_q57;
     for (int64_t i = 0; i < ticks && !over(); i++) {
-        int64_t rate = now.tb.now.rate_q57;
-        int still = now.tb.now.slope_q56 == 0;
-        if (now.wish == RUN
-                ? still && rate >= wanted - 100 &&
-                      (now.percent * (RATE_ONE / 100) > now.tb.least_q57 || rate <= wanted + 100)
-                : still && rate == 0) {
+        int64_t rate = now.feed.time.now.rate_q57;
+        int still = now.feed.time.now.slope_q56 == 0 && now.feed.phase == PLAN;
+        if (now.wish == RUN ? still && rate >= wanted - 100 &&
+                                  (now.percent * (RATE_ONE / 100) > now.feed.time.least_q57 ||
+                                   rate <= wanted + 100)
+                            : now.feed.state == FEED_HELD && now.feed.found) {
             return;
         }
         tick();
     }
     TEST_ASSERT_TRUE_MESSAGE(
-        over(), where("never there", (double)now.tb.now.rate_q57 / RATE_ONE, now.percent));
+        over(), where("never there", (double)now.feed.time.now.rate_q57 / RATE_ONE, now.percent));
 }
 
 static void run_to_the_end(void)
 {
-    timebase_resume(&now.tb);
+    feed_override_resume(&now.feed);
     now.wish = now.wish == HOLD ? RUN : now.wish;
     if (now.percent < 50) {
-        timebase_override(&now.tb, now.percent = 50);
+        feed_override_set(&now.feed, now.percent = 50);
     }
     for (unsigned i = 0; i < 100000u && !over(); i++) {
         tick();
@@ -322,13 +399,14 @@ static void run_to_the_end(void)
 
 static void check_over(void)
 {
-    int ended = now.tb.state == TIMEBASE_ENDED;
-    uint64_t time = timebase_time_q42(&now.tb);
+    int ended = now.feed.state == FEED_ENDED;
+    const struct interp_point before = now.point;
     for (int i = 0; i < 4; i++) {
         tick();
     }
-    TEST_ASSERT_TRUE(time == timebase_time_q42(&now.tb));
-    TEST_ASSERT_EQUAL_UINT32(0, timebase_rate_q30(&now.tb));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &now.point, sizeof before);
+    TEST_ASSERT_EQUAL_UINT32(0, feed_override_rate_q30(&now.feed));
+    TEST_ASSERT_TRUE(feed_override_feed_q32(&now.feed) == 0);
     if (ended) {
         TEST_ASSERT_TRUE(now.point.arc_length_q40_mm == now.p->program.header.length_q40_mm);
         TEST_ASSERT_TRUE(now.point.x_q40_mm == now.interp.end.x_q40_mm &&
@@ -355,7 +433,7 @@ static void run_case(uint64_t seed)
         }
     }
     finish();
-    worst.held += now.tb.state == TIMEBASE_HELD;
+    worst.held += now.feed.state == FEED_HELD;
     if (golden_random(&random) % 16u == 0) {
         run_to_the_end();
     }
@@ -363,8 +441,8 @@ static void run_case(uint64_t seed)
         check_over();
     }
     worst.over += over() ? 1u : 0u;
-    worst.ended += now.tb.state == TIMEBASE_ENDED;
-    worst.stopped += now.tb.state == TIMEBASE_STOPPED;
+    worst.ended += now.feed.state == FEED_ENDED;
+    worst.stopped += now.feed.state == FEED_STOPPED;
 }
 
 static unsigned setting(const char *name, unsigned otherwise)
@@ -403,10 +481,10 @@ static void test_any_commands_at_any_instant(void)
         run_case(seed * 0x100000001u + i);
     }
     printf("%u cases, %.3g ticks: acceleration %.6f, jerk %.6f of the limits (by differences "
-           "%.6f); %u "
+           "%.6f); stops %.3f of their bounds; %u "
            "ended, %u stopped, %u held; %u ticks saturated\n",
            cases, (double)worst.ticks, worst.acceleration, worst.jerk, worst.difference,
-           worst.ended, worst.stopped, worst.held, worst.saturated);
+           worst.of_bound, worst.ended, worst.stopped, worst.held, worst.saturated);
     TEST_ASSERT_TRUE(cases < 1000u || (worst.ended > 0 && worst.stopped > 0 && worst.held > 0 &&
                                        worst.saturated > 0 && worst.jerk > 0.9));
     for (uint32_t i = 0; i < 4u * LINES; i++) {

@@ -30,9 +30,9 @@ static void test_header_is_read(void)
 {
     TEST_ASSERT_EQUAL_UINT32(1000, p.header.period_us);
     TEST_ASSERT_EQUAL_UINT32(PROGRAM_FLAG_CLOSED, p.header.flags);
-    TEST_ASSERT_EQUAL_UINT32(p.size, PROGRAM_HEADER_SIZE +
-                                         p.header.segment_count * PROGRAM_SEGMENT_SIZE +
-                                         p.header.piece_count * PROGRAM_PIECE_SIZE);
+    TEST_ASSERT_EQUAL_UINT32(p.size,
+                             PROGRAM_HEADER_SIZE + p.header.segment_count * PROGRAM_SEGMENT_SIZE +
+                                 p.header.piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE));
     TEST_ASSERT_EQUAL_CHAR('\0', p.header.name[32]);
 }
 

@@ -22,9 +22,10 @@ static int scan_limits(const char *line, struct program_limits *l)
 {
     return sscanf(line,
                   "limits %" SCNu32 " us %" SCNu32 " um/s %" SCNu32 " um/s^2 %" SCNu32
-                  " mm/s^3 %" SCNd64 " %" SCNd64 " %" SCNd64 " %" SCNd64,
+                  " mm/s^3 %" SCNd64 " %" SCNd64 " %" SCNd64 " %" SCNd64 " q40_mm %" SCNu32 " ms",
                   &l->period_us, &l->feed_um_s, &l->acceleration_um_s2, &l->jerk_mm_s3,
-                  &l->min_q40_mm[0], &l->min_q40_mm[1], &l->max_q40_mm[0], &l->max_q40_mm[1]) == 8;
+                  &l->min_q40_mm[0], &l->min_q40_mm[1], &l->max_q40_mm[0], &l->max_q40_mm[1],
+                  &l->stop_time_ms) == 9;
 }
 
 static void check_file(const char *name, const struct program_limits *limits, int code,

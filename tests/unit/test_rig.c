@@ -11,7 +11,8 @@
 enum { TICKS = 1001, SETTLING = 200, ROWS = TICKS + SETTLING };
 
 /* A line of 4 mm in 1 s: F = 4 (10 t^3 - 15 t^4 + 6 t^5). */
-static uint8_t image[PROGRAM_HEADER_SIZE + PROGRAM_SEGMENT_SIZE + PROGRAM_PIECE_SIZE];
+static uint8_t
+    image[PROGRAM_HEADER_SIZE + PROGRAM_SEGMENT_SIZE + PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE];
 static struct program program;
 static struct contour_segment segments[1];
 static struct drive_config configs[2];

@@ -4,6 +4,7 @@
 #define port_begin          board_begin
 #define port_end            board_end
 #define port_stop_requested board_stop_requested
+#define port_stop_insisted  board_stop_insisted
 #define port_node_id        board_node_id
 #define port_can_accept     board_can_accept
 #define port_can_send       board_can_send

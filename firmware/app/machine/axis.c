@@ -13,6 +13,7 @@ void axis_init(struct axis *axis, uint8_t node)
     memset(axis, 0, sizeof *axis);
     axis->node = node;
     axis->goal = CIA402_GOAL_OFF;
+    axis->rest_syncs = AXIS_REST_SYNCS;
     pdo_begin_setpoint(node, &axis->setpoint);
 }
 
@@ -76,16 +77,26 @@ static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
     }
 }
 
+static bool moves_in(enum cia402_state state)
+{
+    return state == CIA402_OPERATION_ENABLED || state == CIA402_QUICK_STOP_ACTIVE ||
+           state == CIA402_FAULT_REACTION_ACTIVE;
+}
+
+/* Anew in each state; power finds the axis at rest. */
 static void count_rest(struct axis *axis, uint32_t tolerance_counts)
 {
-    const bool stays = axis->state == CIA402_QUICK_STOP_ACTIVE &&
-                       distance(axis->rest_counts, axis->position_counts) <= tolerance_counts;
-    if (!stays) {
+    if (!moves_in(axis->state)) {
+        axis->rest_syncs = AXIS_REST_SYNCS;
+        axis->rest_counts = axis->position_counts;
+    } else if ((axis->state != axis->rest_state && moves_in(axis->rest_state)) ||
+               distance(axis->rest_counts, axis->position_counts) > tolerance_counts) {
         axis->rest_syncs = 0;
         axis->rest_counts = axis->position_counts;
     } else if (axis->rest_syncs < AXIS_STANDSTILL_SYNCS) {
         axis->rest_syncs++;
     }
+    axis->rest_state = axis->state;
 }
 
 void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max)
@@ -165,10 +176,9 @@ bool axis_obeys(const struct axis *axis)
     return axis_enabled(axis) && !axis->answers.lost && status_watch_obeys(&axis->watch);
 }
 
-static bool moves_in(enum cia402_state state)
+bool axis_moves(const struct axis *axis)
 {
-    return state == CIA402_OPERATION_ENABLED || state == CIA402_QUICK_STOP_ACTIVE ||
-           state == CIA402_FAULT_REACTION_ACTIVE;
+    return moves_in(axis->state) && axis->rest_syncs < AXIS_REST_SYNCS;
 }
 
 /* A statusword that means nothing, once, does not make a moving drive a stopped one. */
@@ -178,7 +188,8 @@ bool axis_left(const struct axis *axis)
         return axis->answers.lost;
     }
     return axis->answers.lost || !moves_in(axis->state) ||
-           axis->rest_syncs >= AXIS_STANDSTILL_SYNCS;
+           (axis->state == CIA402_QUICK_STOP_ACTIVE && axis->rest_state == axis->state &&
+            axis->rest_syncs >= AXIS_STANDSTILL_SYNCS);
 }
 
 bool axis_reached(const struct axis *axis)

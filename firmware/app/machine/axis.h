@@ -19,6 +19,9 @@
 
 #define AXIS_STANDSTILL_SYNCS 250u
 
+/* A drive with power on moves until it has been in one place for so long. */
+#define AXIS_REST_SYNCS 50u
+
 /* With power off a drive that is lost may still come back by itself within this time. */
 #define AXIS_GONE_US 1000000u
 
@@ -55,8 +58,9 @@ struct axis {
     int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
     bool homed;                       /* its drive has the zero that homing gave it */
     int32_t kept_counts; /* where it was when it was seen last before it was to be found again */
-    uint32_t rest_syncs; /* in Quick stop active: for how long it has been at */
+    uint32_t rest_syncs; /* with power on: for how long it has been, in this state, at */
     int32_t rest_counts;
+    enum cia402_state rest_state;
     uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
@@ -119,6 +123,7 @@ bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its targe
 /* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and has
  * been in one place for AXIS_STANDSTILL_SYNCS. */
 bool axis_left(const struct axis *axis);
+bool axis_moves(const struct axis *axis);   /* power is on, and its position has changed lately */
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
 

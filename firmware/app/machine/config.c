@@ -135,6 +135,7 @@ void config_read(struct config *config, const struct od *od)
     config->missed_max = (uint8_t)number(od, 0x2004, 9);
     config->setpoint_timeout_ms = (uint16_t)number(od, 0x2004, 10);
     config->feedforward = (uint8_t)number(od, 0x2004, 11);
+    config->stop_time_ms = (uint16_t)number(od, 0x2004, 12);
     for (uint8_t i = 0; i < AXES_MAX; ++i) {
         const uint8_t sub = (uint8_t)(i + 1u);
         config->node[i] = (uint8_t)number(od, 0x2005, sub);
@@ -211,6 +212,7 @@ void config_limits(const struct config *config, struct program_limits *limits)
     limits->feed_um_s = config->feed_limit_um_s;
     limits->acceleration_um_s2 = config->acceleration_limit_um_s2;
     limits->jerk_mm_s3 = config->jerk_limit_mm_s3;
+    limits->stop_time_ms = config->stop_time_ms;
     for (uint8_t i = 0; i < PLANE_AXES; ++i) {
         limits->min_q40_mm[i] =
             q40_from_counts(config->travel_min_counts[i], config->counts_per_mm, true);

@@ -64,6 +64,7 @@ struct config {
     struct config_axis axis[AXES_MAX];
     uint16_t answer_wait_ms;      /* wall time before an answer counts as missed */
     uint16_t setpoint_timeout_ms; /* a drive without setpoints for so long stops by itself */
+    uint16_t stop_time_ms;        /* a fault stop of a program may take so long; 0: no limit */
     uint8_t node[AXES_MAX];
     uint8_t own_node;    /* the controller itself */
     uint8_t axis_count;  /* 1 ... AXES_MAX */

@@ -28,6 +28,8 @@ const char *fault_text(uint16_t code)
         return "axis is not where its setpoints are, counts";
     case FAULT_SYNC_GAP:
         return "no SYNC for too long with real drives, microseconds";
+    case FAULT_STOP_LATE:
+        return "stop along the path took longer than its bound and a fifth, setpoint";
     default:
         return emcy_text(code);
     }

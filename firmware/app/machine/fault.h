@@ -19,6 +19,8 @@
 #define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
 #define FAULT_AWAY     (EMCY_MANUFACTURER | 0x08u) /* position and setpoint apart; counts */
 #define FAULT_SYNC_GAP (EMCY_MANUFACTURER | 0x09u) /* no SYNC for too long, real drives; us */
+#define FAULT_STOP_LATE                                                                            \
+    (EMCY_MANUFACTURER | 0x0Au) /* a stop along the path beyond its deadline; setpoint */
 
 /* Homing. */
 #define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */

@@ -18,6 +18,17 @@ bool machine_obeyed(const struct machine *machine)
     return machine->unsent_ticks <= MACHINE_UNSENT_MAX;
 }
 
+bool machine_any_moves(const struct machine *machine)
+{
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const struct axis *axis = &machine->axes[i];
+        if (!axis->answers.lost && axis_moves(axis)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 const struct axis *machine_not_stopped(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {

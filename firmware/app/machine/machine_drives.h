@@ -11,6 +11,9 @@ void machine_command(struct machine *machine, enum cia402_goal goal);
 /* Whether every drive answers, is enabled and follows its target, and frames reach them. */
 bool machine_obeyed(const struct machine *machine);
 
+/* Whether a drive that answers has power on and moves yet. */
+bool machine_any_moves(const struct machine *machine);
+
 /* The first drive that still moves by its own power, or NULL. */
 const struct axis *machine_not_stopped(const struct machine *machine);
 

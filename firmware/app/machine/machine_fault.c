@@ -13,7 +13,7 @@ enum machine_refusal machine_reset(struct machine *machine)
     if (machine->state != MACHINE_FAULT || machine->fault_phase == MACHINE_FAULT_RESETTING) {
         return MACHINE_ACCEPTED;
     }
-    if (machine->fault_phase != MACHINE_FAULT_OFF) {
+    if (machine->fault_phase != MACHINE_FAULT_OFF || machine_any_moves(machine)) {
         return MACHINE_MOVING;
     }
     machine_command(machine, CIA402_GOAL_RESET);

@@ -32,7 +32,7 @@ void machine_raise_quick(struct machine *machine, uint16_t code, uint8_t node, u
 
 static void brake_on_path(struct machine *machine)
 {
-    motion_stop(&machine->motion);
+    motion_fault_stop(&machine->motion);
     machine->ticks_left = MACHINE_SETTLE_TICKS;
     machine->fault_phase = MACHINE_FAULT_BRAKING;
     machine->state = MACHINE_FAULT;
@@ -65,12 +65,13 @@ void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code
     }
 }
 
-/* A drive that does not answer may still hear, and brake: power is not taken from it. */
+/* A drive that does not answer may still hear, and brake; one that moves yet would coast: power is not taken from them. */
 void machine_switch_off(struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
-        axis_command(axis, axis->answers.lost ? CIA402_GOAL_QUICK_STOP : CIA402_GOAL_OFF);
+        const bool brakes = axis->answers.lost || axis_moves(axis);
+        axis_command(axis, brakes ? CIA402_GOAL_QUICK_STOP : CIA402_GOAL_OFF);
     }
     machine->fault_phase = MACHINE_FAULT_OFF;
 }

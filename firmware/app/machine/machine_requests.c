@@ -35,6 +35,9 @@ enum machine_refusal machine_disable(struct machine *machine)
         return machine_quick_stop(machine);
     }
     const enum machine_refusal refusal = not_available(machine);
+    if (refusal == MACHINE_ACCEPTED && machine_any_moves(machine)) {
+        return machine_quick_stop(machine);
+    }
     if (refusal == MACHINE_ACCEPTED) {
         machine_command(machine, CIA402_GOAL_OFF);
         machine->state = MACHINE_OFF;

@@ -93,7 +93,9 @@ static void step_motion(struct machine *machine)
     }
     if (!motion_over(&machine->motion)) {
         next_targets(machine);
-        if (machine->state == MACHINE_HOLDING && motion_held(&machine->motion)) {
+        if (motion_late(&machine->motion)) {
+            machine_raise_quick(machine, FAULT_STOP_LATE, 0, machine->statistics.program_tick);
+        } else if (machine->state == MACHINE_HOLDING && motion_held(&machine->motion)) {
             machine->state = MACHINE_HELD;
         }
     } else if (machine_time_is_up(machine)) {
@@ -103,14 +105,18 @@ static void step_motion(struct machine *machine)
 
 static void step_braking(struct machine *machine)
 {
-    if (!machine_obeyed(machine)) {
+    if (!machine_obeyed(machine) || motion_late(&machine->motion)) {
         machine_fault_quick(machine);
     } else if (machine->withheld) {
         return;
     } else if (!motion_over(&machine->motion)) {
         next_targets(machine);
     } else if (machine_time_is_up(machine)) {
-        machine_switch_off(machine);
+        if (machine_any_moves(machine)) {
+            machine_fault_quick(machine);
+        } else {
+            machine_switch_off(machine);
+        }
     }
 }
 

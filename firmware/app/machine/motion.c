@@ -12,7 +12,7 @@ int motion_begin(struct motion *motion, const struct program *program, const str
 {
     memset(motion, 0, sizeof *motion);
     motion->counts_per_mm = config->counts_per_mm;
-    timebase_begin(&motion->timebase, program, config->period_us);
+    feed_override_begin(&motion->feed, program, config->period_us, 0);
     return interp_begin(&motion->interp, program, (enum interp_kernel)config->kernel);
 }
 
@@ -32,7 +32,7 @@ int motion_begin_at(struct motion *motion, const struct program *program,
         return result;
     }
     const uint64_t time_q42_s = program_time_at_q42(program, arc_length_q40_mm);
-    timebase_begin_at(&motion->timebase, program, config->period_us, time_q42_s);
+    feed_override_begin(&motion->feed, program, config->period_us, time_q42_s);
     (void)interp_seek(&motion->interp, time_q42_s >> 10);
     (void)interp_at_q42(&motion->interp, time_q42_s, &motion->point);
     to_counts(motion, &motion->point, start_counts);
@@ -41,11 +41,7 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
 {
-    const uint64_t time_q42_s = timebase_step_q42(&motion->timebase);
-    const struct prepared_piece *piece = motion->timebase.record;
-    const int result = motion->interp.piece != NULL
-                           ? interp_at_piece(&motion->interp, piece, time_q42_s, &motion->point)
-                           : interp_at_q42(&motion->interp, time_q42_s, &motion->point);
+    const int result = feed_override_next(&motion->feed, &motion->interp, &motion->point);
     if (result < 0) {
         return result;
     }
@@ -56,38 +52,48 @@ int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
 
 void motion_stop(struct motion *motion)
 {
-    timebase_stop(&motion->timebase);
+    feed_override_stop(&motion->feed);
+}
+
+void motion_fault_stop(struct motion *motion)
+{
+    feed_override_fault_stop(&motion->feed);
 }
 
 void motion_hold(struct motion *motion)
 {
-    timebase_hold(&motion->timebase);
+    feed_override_hold(&motion->feed);
 }
 
 void motion_resume(struct motion *motion)
 {
-    timebase_resume(&motion->timebase);
+    feed_override_resume(&motion->feed);
 }
 
 void motion_override(struct motion *motion, uint32_t percent)
 {
-    timebase_override(&motion->timebase, percent);
+    feed_override_set(&motion->feed, percent);
 }
 
 bool motion_held(const struct motion *motion)
 {
-    return timebase_state(&motion->timebase) == TIMEBASE_HELD;
+    return feed_override_state(&motion->feed) == FEED_HELD;
+}
+
+bool motion_late(const struct motion *motion)
+{
+    return feed_override_late(&motion->feed) != 0;
 }
 
 bool motion_over(const struct motion *motion)
 {
-    const enum timebase_state state = timebase_state(&motion->timebase);
-    return state == TIMEBASE_ENDED || state == TIMEBASE_STOPPED;
+    const enum feed_state state = feed_override_state(&motion->feed);
+    return state == FEED_ENDED || state == FEED_STOPPED;
 }
 
 uint64_t motion_time_q32_s(const struct motion *motion)
 {
-    return (timebase_time_q42(&motion->timebase) + 512u) >> 10;
+    return (feed_override_time_q42(&motion->feed) + 512u) >> 10;
 }
 
 static int64_t saturated(int64_t value, int64_t most)
@@ -100,13 +106,6 @@ static int64_t saturated(int64_t value, int64_t most)
 
 int32_t motion_feed_um_s(const struct motion *motion)
 {
-    if (motion_over(motion)) {
-        return 0;
-    }
-    /* saturated before each product: below 2^31 um/s times a rate of at most 2^31 stays below 2^62 */
-    const int64_t feed_um_s =
-        saturated(motion->point.feed_q32_mm_s, FEED_MAX_Q32_MM_S) * 1000 / INT64_C(4294967296);
-    const int64_t scaled_um_s =
-        feed_um_s * (int64_t)timebase_rate_q30(&motion->timebase) / INT64_C(1073741824);
-    return (int32_t)saturated(scaled_um_s, INT32_MAX);
+    const int64_t feed_q32 = saturated(feed_override_feed_q32(&motion->feed), FEED_MAX_Q32_MM_S);
+    return (int32_t)saturated(feed_q32 * 1000 / INT64_C(4294967296), INT32_MAX);
 }

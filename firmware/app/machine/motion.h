@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * motion: a program on its way: program time, point on the path and targets of the plane's axes,
- * tick by tick.
+ * motion: a program on its way: what its plan and the commands make of a tick, point on the path and targets of the
+ * plane's axes.
  *
  * Prepared by the mainline, then owned by the tick (under the port's lock).
  */
@@ -12,12 +12,12 @@
 #include <stdint.h>
 
 #include "app/machine/config.h"
+#include "core/feed_override.h"
 #include "core/interp.h"
-#include "core/timebase.h"
 
 struct motion {
     struct interp interp;
-    struct timebase timebase;
+    struct feed_override feed;
     struct interp_point point; /* of the last setpoint */
     uint32_t setpoints;        /* given so far */
     uint32_t counts_per_mm;
@@ -36,8 +36,9 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 /* The next setpoint. 0, or a negative INTERP_ERR_... with targets unchanged. Timer. */
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES]);
 
-/* Asks for a stop along the path. Under the lock. */
+/* Asks for a stop along the path inside the program's limits, or the machine's. Under the lock. */
 void motion_stop(struct motion *motion);
+void motion_fault_stop(struct motion *motion);
 
 /* Feed hold, the end of it, the rate wanted (0 ... 200 %). Under the lock. */
 void motion_hold(struct motion *motion);
@@ -47,10 +48,14 @@ void motion_override(struct motion *motion, uint32_t percent);
 /* True while a hold has the path at rest. */
 bool motion_held(const struct motion *motion);
 
+/* True while it comes to rest and has taken longer than its bound and a fifth. */
+bool motion_late(const struct motion *motion);
+
 /* True when the last setpoint given was the last one: end of the program or of the stop. */
 bool motion_over(const struct motion *motion);
 
-/* Program time of the last setpoint, to nearest; before the first one that of the start. Under the lock. */
+/* Program time of the last setpoint, to nearest; before the first one that of the start; in a brake that of its begin.
+ * Under the lock. */
 uint64_t motion_time_q32_s(const struct motion *motion);
 
 /* Feed along the path at the last setpoint, in um/s, held at 2^31 - 1 (2147 m/s). Under the lock. */

@@ -23,14 +23,14 @@ static struct {
     struct options options;
     struct can_socket socket;
     int wake_fd;
-    volatile sig_atomic_t stop;
+    volatile sig_atomic_t stop;  /* signals so far, 2 at most */
     volatile sig_atomic_t woken; /* virtual time: the mainline has something to do */
 } self;
 
 static void on_signal(int number)
 {
     (void)number;
-    self.stop = 1;
+    self.stop = self.stop < 2 ? self.stop + 1 : 2;
     port_wake();
 }
 
@@ -107,6 +107,11 @@ int port_end(void)
 bool port_stop_requested(void)
 {
     return self.stop != 0 || interrupts_error() != 0;
+}
+
+bool port_stop_insisted(void)
+{
+    return self.stop > 1;
 }
 
 uint8_t port_node_id(void)

@@ -79,6 +79,11 @@ bool port_stop_requested(void)
     return self.link->stop_requested() || self.link->failed();
 }
 
+bool port_stop_insisted(void)
+{
+    return false;
+}
+
 uint8_t port_node_id(void)
 {
     return self.line.node;

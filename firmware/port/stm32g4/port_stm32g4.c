@@ -86,6 +86,11 @@ bool port_stop_requested(void)
     return false;
 }
 
+bool port_stop_insisted(void)
+{
+    return false;
+}
+
 uint8_t port_node_id(void)
 {
     return BOARD_NODE;

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from ..bustime import require_fit
 from ..chain import Chain, load_chain
-from ..errors import InputError
+from ..errors import HodographError, InputError
 from ..feed import Plan
+from ..native import NativeProgram
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.check import check
 from ..program.image import MAGIC
 from ..program.memory import LARGEST_BANK, RECORD_BYTES, memory_bytes
-from ..simulate import Motion, simulate, write_trace
+from ..program.stops import stops_dict, stops_text
+from ..simulate import Motion, StoppedRun, simulate, simulate_stop, write_trace
 from .output import json_text, note, number, print_json, print_rows, progress, write_file
 
 
@@ -102,6 +104,9 @@ def feed(options: Namespace) -> None:
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
     }
+    stops = _program_of(chain)
+    if stops is not None:
+        result["stops"] = stops_dict(stops.stops, stops.piece_starts_mm)
     if options.at is not None:
         t = _within("--at", options.at, plan.duration_s, "s")
         result["arc_length_mm"] = np.atleast_1d(plan.arc_length(t)).tolist()
@@ -122,6 +127,9 @@ def feed(options: Namespace) -> None:
             ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
         ]
     )
+    if stops is not None:
+        for line in stops_text(stops.stops, stops.piece_starts_mm):
+            print(line)
     print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
     for name, peak in chain.peaks.items():
         print(
@@ -131,6 +139,17 @@ def feed(options: Namespace) -> None:
         print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
         for at, s, v in zip(options.at, plan.arc_length(t), plan.feed(t), strict=True):
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
+
+
+def _program_of(chain: Chain) -> Program | None:
+    """The program, for what `feed` says of stops; None without a machine, or where `compile` would refuse it."""
+    if chain.machine_or_none is None:
+        return None
+    try:
+        return chain.program
+    except HodographError as error:
+        note(f"no program: {error}")
+        return None
 
 
 def compile_(options: Namespace) -> None:
@@ -150,6 +169,8 @@ def compile_(options: Namespace) -> None:
         f"{output}: {len(image)} bytes, {program.segment_count} segments, {program.piece_count} feed "
         f"pieces, {program.ticks} ticks of {program.period_us} us"
     )
+    for line in stops_text(program.stops, program.piece_starts_mm):
+        print(line)
 
 
 def _warn_of_size(image: bytes, kernel: str) -> None:
@@ -231,12 +252,56 @@ def simulate_(options: Namespace) -> None:
     chain = load_chain(options.file, options.machine)
     motion = simulate_chain(chain, options.kernel, keep_rows=options.trace is not None)
     print_notes(chain, chain.compilation.plan)
+    stops = [
+        _stopped(chain, options.kernel, kind, at_s)
+        for kind, times in (
+            ("hold", options.hold_at),
+            ("stop", options.stop_at),
+            ("fault", options.fault_at),
+        )
+        for at_s in times
+    ]
     if options.trace is not None:
         write_trace(motion, options.trace)
+        for stop in stops:
+            name = f"{options.trace.stem}.{stop.kind}-{stop.at_s:g}{options.trace.suffix}"
+            write_trace(stop.motion, options.trace.with_name(name))
     if options.json:
-        print_json(motion.summary())
-    else:
-        print_rows(motion_rows(motion))
+        print_json(motion.summary() | {"stops": [stop.summary() for stop in stops]})
+        return
+    print_rows(motion_rows(motion))
+    if stops:
+        _print_stops(stops)
+
+
+def _stopped(chain: Chain, kernel: str | None, kind: str, at_s: float) -> StoppedRun:
+    machine = chain.machine
+    return simulate_stop(
+        NativeProgram(chain.image),
+        machine.models(machine.plane),
+        kind,
+        at_s,
+        kernel=kernel or machine.kernel,
+        counts_per_mm=machine.counts_per_mm,
+        feedforward=machine.plane_feedforward,
+    )
+
+
+def _print_stops(stops: list[StoppedRun]) -> None:
+    print(
+        f"{'stop':<10} {'at s':>9} {'rest after s':>12} {'bound s':>9} {'way mm':>9} {'mm/s^2':>9} {'mm/s^3':>9} "
+        f"{'contour um':>10}"
+    )
+    for stop in stops:
+        most = {
+            unit: max(value for name, value in stop.peak.items() if name.endswith(unit))
+            for unit in ("acceleration_mm_s2", "jerk_mm_s3")
+        }
+        print(
+            f"{stop.kind:<10} {stop.at_s:9.6g} {stop.rest_after_s:12.6g} {stop.bound_s:9.4g} "
+            f"{stop.distance_mm:9.6g} {most['acceleration_mm_s2']:9.6g} {most['jerk_mm_s3']:9.6g} "
+            f"{stop.peak['contour_error_um']:10.4g}"
+        )
 
 
 def volts_words(motion: Motion) -> str:

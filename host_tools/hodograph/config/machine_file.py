@@ -28,7 +28,10 @@ class Supervision:
 
 @dataclass(frozen=True)
 class Machine:
-    """What a machine file says. The limits are the controller's own: they always bind."""
+    """What a machine file says. The limits are the controller's own: they always bind.
+
+    stop_time_ms  a program whose fault stop may take longer is refused
+    """
 
     file: Path
     bitrate: int
@@ -39,6 +42,7 @@ class Machine:
     acceleration_mm_s2: float
     jerk_mm_s3: float
     reserve: float
+    stop_time_ms: int
     start_tolerance_mm: float
     offset_mm: complex
     counts_per_mm: int
@@ -99,6 +103,7 @@ _CONTROLLER = (
     "acceleration_mm_s2",
     "jerk_mm_s3",
     "reserve",
+    "stop_time_ms",
     "start_tolerance_mm",
 )
 _SUPERVISION = ("answer_wait_ms", "missed_max", "setpoint_timeout_ms")
@@ -123,6 +128,7 @@ def load_machine(file: Path) -> Machine:
         acceleration_mm_s2=acceleration_mm_s2,
         jerk_mm_s3=controller.number("jerk_mm_s3", low=1, high=4e9),
         reserve=controller.number("reserve", 0.1, low=0, high=0.9),
+        stop_time_ms=controller.integer("stop_time_ms", 250, low=1, high=60_000),
         start_tolerance_mm=controller.number("start_tolerance_mm", 0.005, low=1e-6, high=10),
         offset_mm=complex(*work.pair("offset_mm", (0.0, 0.0), low=-4096, high=4096)),
         counts_per_mm=counts_per_mm,

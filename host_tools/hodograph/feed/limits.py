@@ -103,7 +103,7 @@ class Limits:
     volts: float | None = None
     axis: AxisLimits = field(default_factory=AxisLimits)
     caps: tuple[FeedCap, ...] = ()
-    reserve: float = 0.05
+    reserve: float = LEAST_RESERVE
     machine: AxisLimits = field(default_factory=AxisLimits)
 
     def __post_init__(self) -> None:

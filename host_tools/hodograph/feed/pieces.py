@@ -94,6 +94,14 @@ def derivative_bounds(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real
     return out[0], out[1], out[2]
 
 
+def part_bounds(duration_q32_s: Int, c_q40: Int, order: int, halvings: int) -> Real:
+    """Bernstein coefficients (M, 2^halvings, n) of a derivative of F (1 to 3) over equal parts of each piece."""
+    parts = derivative_bounds(duration_q32_s, c_q40)[order - 1][:, None, :]
+    for _ in range(halvings):
+        parts = _halved(parts).reshape(parts.shape[0], -1, parts.shape[-1])
+    return parts
+
+
 def derivative_extremes(
     duration_q32_s: Int, c_q40: Int, halvings: int = 4
 ) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:

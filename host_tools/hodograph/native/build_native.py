@@ -18,11 +18,14 @@ PACKAGE = Path(__file__).resolve().parent
 ROOT = PACKAGE.parents[2]
 HEADERS = (
     "core/program_check.h",
+    "core/stop_check.h",
     "core/interp.h",
-    "core/timebase.h",
+    "core/feed_override.h",
     "plant/drive.h",
     "rig/contour.h",
     "rig/rig.h",
+    "rig/stop_search.h",
+    "rig/stop_trial.h",
     "rig/axis_run.h",
 )
 LIBRARIES = ("sim", "core")

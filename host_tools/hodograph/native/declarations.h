@@ -20,6 +20,7 @@ struct program_limits {
     uint32_t period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
     int64_t min_q40_mm[2], max_q40_mm[2];
     uint32_t axis_velocity_um_s[2], axis_acceleration_um_s2[2], axis_jerk_mm_s3[2];
+    uint32_t stop_time_ms;
 };
 struct program_fault {
     int code;
@@ -31,6 +32,17 @@ int program_check(const struct program *p, const struct program_limits *limits,
                   struct program_fault *fault);
 const char *program_error_text(int code);
 
+/* core/stop_check.h */
+enum program_stop_kind { PROGRAM_STOP_HOLD, PROGRAM_STOP_FAULT };
+struct stop_bound {
+    uint32_t time_us, way_um;
+};
+struct stop_walk {
+    ...;
+};
+void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);
+struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece);
+
 /* core/interp.h */
 enum interp_kernel { INTERP_FIXED, INTERP_FLOAT, INTERP_DOUBLE };
 struct interp_point {
@@ -41,7 +53,7 @@ struct interp {
 };
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
 
-/* core/rate.h, core/timebase.h */
+/* core/feed_override.h */
 struct rate {
     int64_t rate_q57, slope_q56;
 };
@@ -49,13 +61,24 @@ struct timebase {
     struct rate now;
     ...;
 };
-void timebase_begin(struct timebase *tb, const struct program *p, uint32_t period_us);
-void timebase_hold(struct timebase *tb);
-void timebase_resume(struct timebase *tb);
-void timebase_override(struct timebase *tb, uint32_t percent);
-void timebase_stop(struct timebase *tb);
-uint64_t timebase_step_q42(struct timebase *tb);
-int timebase_state(const struct timebase *tb);
+struct feed_override {
+    struct timebase time;
+    uint32_t phase;
+    ...;
+};
+void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us, uint64_t time_q42_s);
+void feed_override_hold(struct feed_override *f);
+void feed_override_resume(struct feed_override *f);
+void feed_override_set(struct feed_override *f, uint32_t percent);
+void feed_override_stop(struct feed_override *f);
+void feed_override_fault_stop(struct feed_override *f);
+int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
+int feed_override_state(const struct feed_override *f);
+int feed_override_late(const struct feed_override *f);
+uint64_t feed_override_time_q42(const struct feed_override *f);
+int64_t feed_override_feed_q32(const struct feed_override *f);
+uint32_t feed_override_rate_q30(const struct feed_override *f);
+uint32_t feed_override_bound_us(const struct feed_override *f, int kind);
 
 /* plant/drive.h */
 struct drive_plant {
@@ -131,12 +154,74 @@ struct feedforward_gains {
 void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
 void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts);
 int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count);
+enum rig_order_kind {
+    RIG_ORDER_HOLD,
+    RIG_ORDER_RESUME,
+    RIG_ORDER_OVERRIDE,
+    RIG_ORDER_STOP,
+    RIG_ORDER_FAULT_STOP,
+    ...
+};
+struct rig_order {
+    enum rig_order_kind kind;
+    uint32_t tick, percent;
+};
+struct rig_stop {
+    uint32_t tick, rest_tick, bound_us;
+    int64_t from_q40_mm, rest_q40_mm;
+};
+int rig_orders(struct rig *rig, const struct rig_order *orders, uint32_t count);
+void rig_stop_get(const struct rig *rig, struct rig_stop *stop);
 int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
 int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
 void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
 enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_FAULT, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };
+
+/* rig/stop_search.h */
+struct stop_row {
+    double s_mm, tangent[2], curvature, slope, feed_mm_s;
+};
+struct stop_cap {
+    double from_mm, to_mm, feed_mm_s;
+};
+struct stop_limits {
+    double feed, acceleration, jerk, centripetal;
+    double axis_velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
+    const struct stop_cap *caps;
+    uint32_t cap_count, reach_at_pace, rise_is_cut;
+};
+struct stop_found {
+    uint8_t codes[3];
+    double worst_s, mean_s;
+};
+#define STOP_ROWS ...
+void stop_rows(const struct program *p, const struct stop_limits *limits, struct stop_row *rows);
+void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
+               struct stop_limits *used);
+void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
+                 struct stop_found *found);
+
+/* rig/stop_trial.h */
+struct stop_use {
+    double velocity, acceleration, jerk, path_acceleration, path_jerk;
+};
+struct stop_case {
+    uint64_t seed;
+    uint32_t tick;
+};
+struct stop_trial {
+    uint64_t seed;
+    uint32_t trials, kernel;
+    struct stop_limits hold, fault;
+    struct stop_use of_hold, of_fault;
+    double of_bound[2], longest_s[2];
+    uint32_t measured[2], late, failures;
+    struct stop_case most, longest, failed;
+};
+int stop_trial_run(const struct program *p, struct stop_trial *trial);
+int stop_trial_again(const struct program *p, struct stop_trial *trial, uint32_t tick);
 
 /* rig/axis_run.h */
 struct axis_run {

@@ -37,6 +37,7 @@ class NativeLimits:
     jerk_mm_s3: int = 0
     min_q40_mm: tuple[int, int] = (-(2**52), -(2**52))
     max_q40_mm: tuple[int, int] = (2**52, 2**52)
+    stop_time_ms: int = 0
     axis_velocity_um_s: tuple[int, int] = (0, 0)
     axis_acceleration_um_s2: tuple[int, int] = (0, 0)
     axis_jerk_mm_s3: tuple[int, int] = (0, 0)

@@ -37,6 +37,9 @@ ROW = np.dtype(
 FAULT_KINDS = ("encoder-freeze", "encoder-jump", "saturate", "load", "setpoint-lost")
 """What a `RigFault` can be, in the order of enum rig_fault_kind."""
 
+ORDER_KINDS = ("hold", "resume", "override", "stop", "fault-stop")
+"""What a `RigOrder` can be, in the order of enum rig_order_kind."""
+
 FOR_EVER = 2**32 - 1
 """`ticks` of a fault that does not end."""
 
@@ -55,6 +58,31 @@ class RigFault:
     value: float = 0.0
 
 
+@dataclass(frozen=True)
+class RigOrder:
+    """A command that setpoint `tick` is the first to obey; `percent` of an override."""
+
+    kind: str
+    tick: int
+    percent: int = 0
+
+
+@dataclass(frozen=True)
+class RigStop:
+    """What became of the last hold, stop or fault stop: struct rig_stop.
+
+    tick       the first setpoint that could obey; rest_tick the first one at rest, None: there was none yet
+    bound_s    what the stop table says for the place where it was ordered
+    from_mm, rest_mm  arc lengths of the last setpoint before it and at rest
+    """
+
+    tick: int
+    rest_tick: int | None
+    bound_s: float
+    from_mm: float
+    rest_mm: float
+
+
 class Rig:
     """Interpolator, two drives and contour error; begins with the drives parked at the start point."""
 
@@ -66,8 +94,9 @@ class Rig:
         counts_per_mm: int,
         feedforward: tuple[Feedforward, Feedforward] | None = None,
         faults: Sequence[RigFault] = (),
+        orders: Sequence[RigOrder] = (),
     ) -> None:
-        """Set up, with the controller's feedforward (None: none) and faults.
+        """Set up, with the controller's feedforward (None: none), faults, and orders by ascending tick.
 
         Raises InputError: unknown kernel, figures out of range, program not acceptable.
         """
@@ -104,6 +133,26 @@ class Rig:
                 "axis 0 or 1, ticks from 1 on, volts of a limit above 0"
             )
 
+        self._orders = ffi.new("struct rig_order[]", [_order(order) for order in orders])
+        if lib.rig_orders(self._rig, self._orders, len(orders)) != 0:
+            raise InputError(f"simulation: orders not by ascending tick: {list(orders)}")
+
+    @property
+    def stop(self) -> RigStop | None:
+        """The last stop that was ordered, None: none yet."""
+        ffi, lib = library()
+        own = ffi.new("struct rig_stop *")
+        lib.rig_stop_get(self._rig, own)
+        if own.tick == FOR_EVER:
+            return None
+        return RigStop(
+            own.tick,
+            None if own.rest_tick == FOR_EVER else own.rest_tick,
+            own.bound_us * 1e-6,
+            own.from_q40_mm * 2.0**-40,
+            own.rest_q40_mm * 2.0**-40,
+        )
+
     def run(self, rows: NDArray[np.void]) -> None:
         """Fill `rows` (contiguous, of ROW) with the next ticks."""
         ffi, lib = library()
@@ -132,6 +181,13 @@ def _fault(fault: RigFault) -> tuple[object, ...]:
     if fault.kind not in FAULT_KINDS:
         raise InputError(f'simulation: there is no fault "{fault.kind}"; {", ".join(FAULT_KINDS)}')
     return (FAULT_KINDS.index(fault.kind), *astuple(fault)[1:])
+
+
+def _order(order: RigOrder) -> tuple[object, ...]:
+    """As cffi takes a struct rig_order."""
+    if order.kind not in ORDER_KINDS:
+        raise InputError(f'simulation: there is no order "{order.kind}"; {", ".join(ORDER_KINDS)}')
+    return (ORDER_KINDS.index(order.kind), *astuple(order)[1:])
 
 
 def _begin_error(code: int) -> str:

@@ -6,6 +6,7 @@ from .compiler import Compilation, ProgramOptions, compile_path, compile_program
 from .image import Program, decode, encode
 from .inspection import inspect_dict, inspect_text
 from .limits import ProgramLimits
+from .stop_planning import StopTerms
 
 __all__ = [
     "Compilation",
@@ -13,6 +14,7 @@ __all__ = [
     "Program",
     "ProgramLimits",
     "ProgramOptions",
+    "StopTerms",
     "check",
     "compile_path",
     "compile_program",

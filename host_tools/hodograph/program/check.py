@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rules of docs/protocol.md 1.1 to 1.3, as the controller checks them (firmware/core/program_check.h).
+"""The rules of docs/protocol.md 1.1 to 1.4, as the controller checks them (firmware/core/program_check.h).
 
 Independent of the C code on purpose: a program is judged by both. What the format decides exactly (joints, ranges,
 sums) is decided here in exact integers.
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .check_pieces import last_piece_faults, piece_faults
 from .check_segments import Rule, end_faults, segment_faults, too_short
+from .check_stops import stop_fault
 from .codes import ProgramError
 from .exactmath import segment_ways
 from .image import Program, ReservedFields, decode, open_fault, reserved_fields
@@ -36,7 +37,7 @@ class Fault:
     @property
     def place(self) -> str:
         """Where, in words."""
-        if self.code > -20:
+        if self.code > -20 or self.code == ProgramError.STOP_WORST:
             return "header"
         return f"{'segment' if self.code > -40 else 'piece'} {self.index}"
 
@@ -45,7 +46,7 @@ def check(program: Program, limits: ProgramLimits | None = None) -> Fault | None
     """The first rule that `program` breaks, None when it may run.
 
     The order is that of the controller: header, segments one by one, their end, pieces one by one, their
-    end and sum, and last what two segments have to do with the pieces over them.
+    end and sum, then what two segments have to do with the pieces over them, and last the stops.
     """
     return _check(program, limits, _CLEAN)
 
@@ -58,7 +59,7 @@ def check_image(image: bytes, limits: ProgramLimits | None = None) -> Fault | No
     return _check(decode(image), limits, reserved_fields(image))
 
 
-_CLEAN = ReservedFields(flags=True, axes=True, name=True, pieces=None)
+_CLEAN = ReservedFields(flags=True, axes=True, name=True, pieces=None, stops=None)
 
 
 def _check(
@@ -75,7 +76,15 @@ def _check(
         or _first(last_piece_faults(program))
         or _duration_fault(program)
         or _first([(too_short(program), 0, ProgramError.SEGMENT_SHORT)])
+        or _stop_fault(program, limits, reserved)
     )
+
+
+def _stop_fault(
+    program: Program, limits: ProgramLimits | None, reserved: ReservedFields
+) -> Fault | None:
+    found = stop_fault(program, limits, reserved.stops)
+    return None if found is None else Fault(*found)
 
 
 def _first(rules: list[Rule]) -> Fault | None:

@@ -62,6 +62,11 @@ class ProgramError(IntEnum):
     AXIS_ACCELERATION = -71
     AXIS_JERK = -72
     AXIS_STEP = -73
+    STOP_ENTRY = -60
+    STOP_NUMBERS = -61
+    STOP_BOUND = -62
+    STOP_LONG = -63
+    STOP_WORST = -64
 
     @property
     def text(self) -> str:
@@ -120,4 +125,9 @@ _TEXTS = {
     ProgramError.AXIS_ACCELERATION: "above the acceleration limit of an axis",
     ProgramError.AXIS_JERK: "above the jerk limit of an axis",
     ProgramError.AXIS_STEP: "velocity or acceleration of an axis jumps at a joint",
+    ProgramError.STOP_ENTRY: "some codes of a stop are 0 and some are not, or a reserved field is not 0",
+    ProgramError.STOP_NUMBERS: "a brake would be above the limits of the controller",
+    ProgramError.STOP_BOUND: "a stop can take longer than its bound",
+    ProgramError.STOP_LONG: "a fault stop can take longer than the controller allows",
+    ProgramError.STOP_WORST: "the worst stops of the header are not those of the table",
 }

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil
 
 import numpy as np
@@ -20,6 +20,8 @@ from .geometry import quantise
 from .image import NAME_SIZE, Program
 from .limits import ProgramLimits
 from .neighbours import LEAST_FEED_MM_S, brief_pairs
+from .stop_planning import StopTerms, plan_stops
+from .stops import no_stops
 
 Int = NDArray[np.int64]
 
@@ -47,13 +49,14 @@ class ProgramOptions:
     """What a program holds beside path and feed.
 
     `limits` of the controller, travel included; without, only the rules of the format are checked. `period_us`, when
-    given, must be the plan's.
+    given, must be the plan's. `stops`: what its stops keep beside the plan's limits.
     """
 
     name: str = ""
     offset_mm: complex = 0j
     limits: ProgramLimits | None = None
     period_us: int | None = None
+    stops: StopTerms = field(default_factory=StopTerms)
 
 
 _USUAL = ProgramOptions()
@@ -68,8 +71,8 @@ def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL)
     """Compiles `plan` along `spline`, shifted by the work offset into machine coordinates.
 
     Under policy "respect" the feed is lowered where two neighbouring segments would pass within one tick at
-    200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, and whatever
-    `check` finds).
+    200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, a fault stop longer than
+    it may be, and whatever `check` finds).
     """
     name, offset_mm, period_us = options.name, options.offset_mm, options.period_us
     if period_us is not None and period_us != plan.period_us:
@@ -102,7 +105,9 @@ def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL)
         u_q44=geometry.u_q44,
         v_q44=geometry.v_q44,
         pieces=pieces,
+        stops=no_stops(len(pieces)),
     )
+    program = plan_stops(program, plan, options.stops)
     fault = check(program, options.limits)
     if fault is not None:
         raise PlanError(_advice(fault, program, options.limits, spline))

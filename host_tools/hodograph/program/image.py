@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program image as arrays, to and from bytes; docs/protocol.md 1.1 to 1.3."""
+"""The program image as arrays, to and from bytes; docs/protocol.md 1.1 to 1.4."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..feed.pieces import FeedPieces
 from .codes import ProgramError
+from .stops import Stops
 
 Int = NDArray[np.int64]
 
 MAGIC = b"HDGP"
-VERSION = 1
-HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE = 128, 72, 88
+VERSION = 2
+HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE, STOP_SIZE = 128, 72, 88, 16
 FLAG_CLOSED = 1
 NAME_SIZE = 32
 
-_HEADER = struct.Struct("<4sHHII III HH Q qqq III I 32s 16s".replace(" ", ""))
+_HEADER = struct.Struct("<4sHHII III HH Q qqq III I 32s 4I".replace(" ", ""))
 _CRC_FROM = 16
 _PIECE = np.dtype(
     [
@@ -35,6 +36,7 @@ _PIECE = np.dtype(
         ("reserved", "<u4"),
     ]
 )
+_STOP = np.dtype([("codes", "u1", (2, 3)), ("reserved", "<u2"), ("bound_us", "<u4", 2)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ class Program:
 
     start_q40, x_q40, y_q40  (N,) arc length and point at the start of each segment, mm
     u_q44, v_q44             (N, 3) Bernstein coefficients of w = u + iv, mm^(1/2)
-    pieces                   the M feed pieces
+    pieces                   the M feed pieces, and `stops` for each of them
     Limits of 0 mean none.
     """
 
@@ -63,6 +65,7 @@ class Program:
     u_q44: Int
     v_q44: Int
     pieces: FeedPieces
+    stops: Stops
 
     @property
     def segment_count(self) -> int:
@@ -77,7 +80,7 @@ class Program:
     @property
     def image_size(self) -> int:
         """Bytes of the image."""
-        return HEADER_SIZE + SEGMENT_SIZE * self.segment_count + PIECE_SIZE * self.piece_count
+        return _size(self.segment_count, self.piece_count)
 
     @property
     def ticks(self) -> int:
@@ -93,6 +96,11 @@ class Program:
     def length_mm(self) -> float:
         """Arc length of the path."""
         return self.length_q40 * 2.0**-40
+
+    @property
+    def piece_starts_mm(self) -> NDArray[np.float64]:
+        """Arc length (M,) at the start of each piece."""
+        return np.ldexp(self.pieces.start_q40.astype(np.float64), -40)
 
     def tick_times_q42_s(self) -> NDArray[np.uint64]:
         """Program time (ticks,) of each setpoint in 2^-42 s: min(floor(k period + 1/2), duration)."""
@@ -114,7 +122,9 @@ def encode(program: Program) -> bytes:
     pieces["duration"], pieces["start"], pieces["c"] = own.duration_q32_s, own.start_q40, own.c_q40
     pieces["factor"], pieces["rate"] = own.override_factor_q24, own.override_rate_q16_per_s
     pieces["second"] = own.override_second_q8_per_s2
-    body = segments.tobytes() + pieces.tobytes()
+    stops = np.zeros(program.piece_count, dtype=_STOP)
+    stops["codes"], stops["bound_us"] = program.stops.codes, program.stops.bound_us
+    body = segments.tobytes() + pieces.tobytes() + stops.tobytes()
     name = program.name.encode()
     if len(name) > NAME_SIZE:
         raise InputError(
@@ -141,7 +151,10 @@ def encode(program: Program) -> bytes:
             program.jerk_limit_mm_s3,
             0,
             name,
-            b"",
+            program.stops.worst_us[0],
+            program.stops.worst_um[0],
+            program.stops.worst_us[1],
+            program.stops.worst_um[1],
         )
     except struct.error as error:
         raise InputError(f"program: a header field does not fit the format: {error}") from None
@@ -155,7 +168,7 @@ def with_crc(image: bytes) -> bytes:
 
 
 def decode(image: bytes) -> Program:
-    """The program in an image. Raises InputError, with the code of docs/protocol.md 1.4, for what
+    """The program in an image. Raises InputError, with the code of docs/protocol.md 1.5, for what
     `program_open` of the controller refuses (sizes, magic, version, CRC, counts); the rest is for `check`.
     """
     fault = open_fault(image)
@@ -175,6 +188,13 @@ def decode(image: bytes) -> Program:
         raw["rate"].astype(np.uint32),
         raw["second"].astype(np.uint32),
     )
+    table = np.frombuffer(image, _STOP, piece_count, after + PIECE_SIZE * piece_count)
+    stops = Stops(
+        table["codes"].copy(),
+        table["bound_us"].astype(np.uint32),
+        (head[19], head[21]),
+        (head[20], head[22]),
+    )
     return Program(
         name=head[18].rstrip(b"\0").decode(errors="replace"),
         period_us=head[5],
@@ -192,7 +212,12 @@ def decode(image: bytes) -> Program:
         u_q44=segments[:, 3::2],
         v_q44=segments[:, 4::2],
         pieces=pieces,
+        stops=stops,
     )
+
+
+def _size(segments: int, pieces: int) -> int:
+    return HEADER_SIZE + SEGMENT_SIZE * segments + (PIECE_SIZE + STOP_SIZE) * pieces
 
 
 def open_fault(image: bytes) -> ProgramError | None:
@@ -204,7 +229,7 @@ def open_fault(image: bytes) -> ProgramError | None:
         return ProgramError.MAGIC
     if head[1] != VERSION or head[2] != HEADER_SIZE:
         return ProgramError.VERSION
-    size = HEADER_SIZE + SEGMENT_SIZE * head[6] + PIECE_SIZE * head[7]
+    size = _size(head[6], head[7])
     if head[3] != size or len(image) < size:
         return ProgramError.SIZE
     if head[6] == 0 or head[7] == 0:
@@ -217,13 +242,15 @@ def open_fault(image: bytes) -> ProgramError | None:
 @dataclass(frozen=True, eq=False)
 class ReservedFields:
     """What an image says beside a `Program`: whether flags and reserved bytes of the header, the axis count
-    and the padding of the name are as they must be, and where reserved fields of pieces are not 0 (None: nowhere).
+    and the padding of the name are as they must be, and where reserved fields of pieces, and of their stops, are not 0
+    (None: nowhere).
     """
 
     flags: bool
     axes: bool
     name: bool
     pieces: NDArray[np.bool_] | None
+    stops: NDArray[np.bool_] | None
 
 
 def reserved_fields(image: bytes) -> ReservedFields:
@@ -232,9 +259,11 @@ def reserved_fields(image: bytes) -> ReservedFields:
     name = head[18]
     after = HEADER_SIZE + SEGMENT_SIZE * head[6]
     reserved = np.frombuffer(image, _PIECE, head[7], after)["reserved"]
+    stops = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])["reserved"]
     return ReservedFields(
-        flags=not (head[8] & ~FLAG_CLOSED or head[17] or any(head[19])),
+        flags=not (head[8] & ~FLAG_CLOSED or head[17]),
         axes=head[9] == 2,
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
         pieces=reserved != 0,
+        stops=stops != 0,
     )

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..feed.pieces import derivative_peaks
 from .exactmath import segment_ways, way_to_q40
-from .image import Program
+from .image import VERSION, Program
+from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
 
 _ROWS = 12
 
@@ -21,7 +22,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
     dx, dy, _ = (way_to_q40(way) for way in segment_ways(program.u_q44, program.v_q44))
     return {
         "name": program.name,
-        "version": 1,
+        "version": VERSION,
         "image_bytes": program.image_size,
         "period_us": program.period_us,
         "closed": program.closed,
@@ -45,6 +46,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "override_factor_least": float(pieces.override_factor_q24.min()) * 2.0**-24,
         "override_rate_least_per_s": float(pieces.override_rate_q16_per_s.min()) * 2.0**-16,
         "override_second_least_per_s2": float(pieces.override_second_q8_per_s2.min()) * 2.0**-8,
+        "stops": stops_dict(program.stops, program.piece_starts_mm),
     }
 
 
@@ -72,12 +74,16 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         f"mm/s^2, jerk {d['peak_jerk_mm_s3']:.6g} mm/s^3 (bounds of the pieces)",
         f"override  factor {d['override_factor_least']:.4g}, rate {d['override_rate_least_per_s']:.4g} /s, "
         f"second {d['override_second_least_per_s2']:.4g} /s^2 (tightest)",
+        *stops_text(program.stops, program.piece_starts_mm),
         "",
         " segment       start mm           x mm           y mm      length mm",
         *_rows(_segment_rows(program), full),
         "",
         "   piece     duration s       start mm  feed mm/s  peak acc  peak jerk  factor    rate  second",
         *_rows(_piece_rows(program), full),
+        "",
+        "   piece     hold: mm/s^3   mm/s^2   mm/s^3  bound s    fault: mm/s^3   mm/s^2   mm/s^3  bound s",
+        *_rows(_stop_rows(program), full),
     ]
     return "\n".join(lines) + "\n"
 
@@ -102,6 +108,18 @@ def _piece_rows(program: Program) -> list[str]:
         f"{pieces.override_second_q8_per_s2[i] * 2.0**-8:7.4g}"
         for i in range(program.piece_count)
     ]
+
+
+def _stop_rows(program: Program) -> list[str]:
+    given, bound = numbers(program.stops.codes), program.stops.bound_us * 1e-6
+    rows = []
+    for i in range(program.piece_count):
+        cells = [
+            f"{given[i, kind, 0]:14.6g} {given[i, kind, 1]:8.5g} {given[i, kind, 2]:8.6g} {bound[i, kind]:8.4f}"
+            for kind in (HOLD, FAULT)
+        ]
+        rows.append(f"{i:8d} " + "   ".join(cells))
+    return rows
 
 
 def _rows(rows: list[str], full: bool) -> list[str]:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 class ProgramLimits:
     """What a controller allows, in the units of the protocol; 0 for all but the travel: any.
 
+    stop_time_ms  greatest bound of a fault stop
+
     Those of the axes, (x, y), are proved by the controller's own check only (firmware/core/limit_check.h).
     """
 
@@ -19,6 +21,7 @@ class ProgramLimits:
     jerk_mm_s3: int
     min_q40_mm: tuple[int, int]
     max_q40_mm: tuple[int, int]
+    stop_time_ms: int = 0
     axis_velocity_um_s: tuple[int, int] = (0, 0)
     axis_acceleration_um_s2: tuple[int, int] = (0, 0)
     axis_jerk_mm_s3: tuple[int, int] = (0, 0)

@@ -8,15 +8,19 @@ makes the same result from what a recorder saw on the bus. Both give a `Motion`:
 from .motion import SETTLING_S, Motion, Tally, settling_ticks
 from .recording import analyse
 from .simulation import simulate
+from .stopping import STOP_ORDERS, StoppedRun, simulate_stop
 from .trace import TRACE_HEADER, write_trace
 
 __all__ = [
     "SETTLING_S",
+    "STOP_ORDERS",
     "TRACE_HEADER",
     "Motion",
+    "StoppedRun",
     "Tally",
     "analyse",
     "settling_ticks",
     "simulate",
+    "simulate_stop",
     "write_trace",
 ]

@@ -23,11 +23,11 @@ SPLINE_KEYS = {
 }  # fmt: skip
 FEED_KEYS = {
     "profile", "n_c", "evaluations", "ramp_time_s", "duration_s", "peak_acceleration_mm_s2",
-    "peak_jerk_mm_s3", "planning_s", "peak",
+    "peak_jerk_mm_s3", "planning_s", "peak", "stops",
 }  # fmt: skip
 SIMULATE_KEYS = {
     "ticks", "setpoints_sha256", "encoders_sha256", "max_contour_error_um", "max_following_error_um",
-    "max_volts", "kernel",
+    "max_volts", "kernel", "stops",
 }  # fmt: skip
 TRACE_HEADER = (
     "tick,t_s,arc_length_mm,feed_mm_s,x_cmd_mm,y_cmd_mm,x_set_counts,y_set_counts,x_act_mm,y_act_mm,"

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hodograph.errors import InputError
 from hodograph.feed import AxisLimits, FeedCap, FeedRequest, Limits, Plant, plan_feed, plan_path
 from hodograph.feed.optimal import plan_optimal
+from hodograph.native.feed_override import FeedOverride, State
 from hodograph.native.program import NativeProgram
-from hodograph.native.timebase import State, Timebase
 from hodograph.program import Program, compile_program, encode
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify.cells import cut
@@ -130,33 +130,38 @@ def test_every_profile_keeps_the_limits_with_their_reserve(seed: int) -> None:
 
 
 def run(case: Case, seed: int) -> tuple[dict[str, float], set[State]]:
-    """The controller's program time under random commands, looked at five times a tick."""
+    """The controller's program time under random commands, looked at five times a tick; brakes are not looked at."""
     rng = np.random.default_rng([seed, 23])
-    timebase = Timebase(NativeProgram(encode(case.program)))
+    feed = FeedOverride(NativeProgram(encode(case.program)))
     period = 1e-6 * case.program.period_us
     busy = float(rng.choice((0.002, 0.01, 0.05)))
     instants: list[tuple[float, float, float, float]] = []
     states = set()
-    before = timebase.step()
+    feed.step()
+    before = feed.plan
     for _ in range(MOST_TICKS):
         if rng.uniform() < busy:
             command = rng.integers(5)
             if command == 0:
-                timebase.hold()
+                feed.hold()
             elif command in (1, 2):
-                timebase.resume()
+                feed.resume()
             else:
-                timebase.override(int(rng.choice((20, 50, 80, 100, 120, 200))))
-        after = timebase.step()
-        states.add(timebase.state)
-        if timebase.state == State.ENDED:
+                feed.override(int(rng.choice((20, 50, 80, 100, 120, 200))))
+        feed.step()
+        after = feed.plan
+        states.add(feed.state)
+        if feed.state == State.ENDED:
             break
-        second = (after.slope_per_s - before.slope_per_s) / period
-        for part in np.linspace(0.0, 1.0, COUNT_S):
-            h = part * period
-            way = before.rate * h + before.slope_per_s * h**2 / 2.0 + second * h**3 / 6.0
-            rate = before.rate + before.slope_per_s * h + second * h**2 / 2.0
-            instants.append((before.time_s + way, rate, before.slope_per_s + second * h, second))
+        if before is not None and after is not None:
+            second = (after.slope_per_s - before.slope_per_s) / period
+            for part in np.linspace(0.0, 1.0, COUNT_S):
+                h = part * period
+                way = before.rate * h + before.slope_per_s * h**2 / 2.0 + second * h**3 / 6.0
+                rate = before.rate + before.slope_per_s * h + second * h**2 / 2.0
+                instants.append(
+                    (before.time_s + way, rate, before.slope_per_s + second * h, second)
+                )
         before = after
     t, rate, slope, second = np.array(instants).T
     return worst_ratio(case, t, rate, slope, second), states

@@ -29,6 +29,7 @@ FIELDS = (
     200_000,
     (-200 << 40, -200 << 40),
     (200 << 40, 200 << 40),
+    250,
 )
 LIMITS = ProgramLimits(*FIELDS)
 NATIVE = NativeLimits(*FIELDS)
@@ -144,7 +145,7 @@ def test_whatever_is_compiled_is_accepted(profile, feed, ramp, degree, period_us
         spline.length_mm, request, Limits(None, 2000.0, 50000.0), controller, period_us=period_us
     )
     program = compile_path(spline, plan).program
-    limits = NativeLimits(period_us, *FIELDS[1:])
+    limits = NativeLimits(period_us, *FIELDS[1:-1])
     assert NativeProgram(encode(program)).check(limits) is None
     assert np.array_equal(
         NativeProgram(encode(program)).tick_times_q42_s(), program.tick_times_q42_s()

@@ -15,6 +15,8 @@ from hodograph.program import decode, encode
 from hodograph.program.check import check_image
 from hodograph.program.codes import ProgramError
 from hodograph.program.image import Program
+from hodograph.program.stop_planning import with_bounds
+from hodograph.program.stops import no_stops
 
 GOLDEN = Path(__file__).parents[2] / "data" / "programs" / "alpha_minimax.hdgp"
 FIRST_MM = 2.0**-6
@@ -69,6 +71,7 @@ def creeping_program(back: float) -> Program:
         u_q44=u,
         v_q44=np.zeros_like(u),
         pieces=pieces,
+        stops=no_stops(2),
     )
 
 
@@ -97,7 +100,7 @@ def test_a_piece_that_creeps_back_is_refused_by_both(back: float) -> None:
 
 
 def test_the_same_without_the_way_back_is_accepted() -> None:
-    program = creeping_program(0.0)
+    program = with_bounds(creeping_program(0.0))
     assert most_ends_crossed(program) <= 2
     image = encode(program)
     assert check_image(image, None) is None

@@ -19,8 +19,10 @@ GOOD = [row[0] for row in ROWS if row[1] == "OK"]
 
 
 def limits() -> ProgramLimits:
-    numbers = [int(v) for v in re.findall(r"-?\b\d{4,}\b", LINES[0])]
-    return ProgramLimits(*numbers[:4], (numbers[4], numbers[5]), (numbers[6], numbers[7]))
+    numbers = [int(v) for v in re.findall(r"(?<= )-?\d+\b", LINES[0])]
+    return ProgramLimits(
+        *numbers[:4], (numbers[4], numbers[5]), (numbers[6], numbers[7]), numbers[8]
+    )
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
@@ -55,7 +57,7 @@ def test_codes_are_those_of_the_controller() -> None:
 
 def test_table_limits_are_read() -> None:
     assert limits() == ProgramLimits(
-        1000, 500_000, 5_000_000, 200_000, (-200 << 40,) * 2, (200 << 40,) * 2
+        1000, 500_000, 5_000_000, 200_000, (-200 << 40,) * 2, (200 << 40,) * 2, 250
     )
 
 

@@ -37,6 +37,7 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
         ((CONFIGURATION, 8), supervision.answer_wait_ms),
         ((CONFIGURATION, 9), supervision.missed_max),
         ((CONFIGURATION, 10), supervision.setpoint_timeout_ms),
+        ((CONFIGURATION, 12), machine.stop_time_ms),
         ((CONFIGURATION, 11), feedforward_bits(machine)),
     ]
     for sub, axis in enumerate(machine.axes, start=1):

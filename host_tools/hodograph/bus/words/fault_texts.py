@@ -143,6 +143,10 @@ _SINGLE = {
         "SYNC stayed away for longer than real drives can bridge: the axes left the path",
         "give the controller real-time priority (docs/cli.md, status) and an idle processor; home if in doubt",
     ),
+    0xFF0A: (
+        "a stop along the path took longer than the program says",
+        "compile the program again; if it comes again, report a bug",
+    ),
     0xFF10: (
         "the drive did not take the mode for homing, or the one for motion after it",
         "has the drive a homing mode (0x6502)? switch its local operation off",
@@ -270,6 +274,7 @@ _COUNTS = {
     0xFF07: "ticks in a row",
     0xFF08: "counts apart",
     0xFF09: "us",
+    0xFF0A: "setpoint",
 }
 _PLAIN = (0x6100, 0xFF10)
 

@@ -60,7 +60,25 @@ def _simulate(command: Command) -> None:
     options.machine(simulate)
     options.kernel(simulate)
     options.json(simulate)
-    simulate.add_argument("--trace", type=Path, metavar="CSV", help="write one row a tick")
+    simulate.add_argument(
+        "--trace",
+        type=Path,
+        metavar="CSV",
+        help="write one row a tick; with stops a file for each, CSV.KIND-S.csv, as well",
+    )
+    for name, text in (
+        ("hold", "feed hold"),
+        ("stop", "stop"),
+        ("fault", "fault stop"),
+    ):
+        simulate.add_argument(
+            f"--{name}-at",
+            type=float,
+            nargs="+",
+            default=[],
+            metavar="S",
+            help=f"{text} at these times in seconds, each in a run of its own",
+        )
 
 
 def _report(command: Command) -> None:

@@ -1,0 +1,366 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/feed_override.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "core/qmath.h"
+
+enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
+
+#define TICK_Q30      ((int64_t)1 << 30)
+#define SPARE_TICKS   2                  /* of the deadline: rounding */
+#define SEARCH_STEPS  2                  /* in a tick at rest */
+#define NEAR_Q40_MM   ((int64_t)1 << 25) /* what path_brake_way_q40_mm may be wrong by */
+#define MOST_FEED_Q32 ((int64_t)1 << 45)
+#define MS_Q40        1099511628u /* 2^40 / 1000 */
+
+void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
+                         uint64_t time_q42_s)
+{
+    memset(f, 0, sizeof *f);
+    timebase_begin_at(&f->time, p, period_us, time_q42_s);
+    f->phase = PHASE_PLAN;
+    f->state = timebase_state(&f->time) == TIMEBASE_ENDED ? FEED_ENDED : FEED_RUNNING;
+}
+
+/* --- Commands --- */
+
+static int comes_to_rest(const struct feed_override *f)
+{
+    return f->state == FEED_HOLDING || f->state == FEED_STOPPING;
+}
+
+/* Time left of the program at rate 1, us; held at 4 s. */
+static uint32_t left_us(const struct feed_override *f)
+{
+    const uint64_t left_q42 = f->time.duration_q42_s - f->time.time_q42_s;
+    return left_q42 >> 44 != 0 ? 4000000u : (uint32_t)((left_q42 >> 12) * 15625u >> 24);
+}
+
+/* The bound of the present piece and a fifth, as ticks. Near the end of the program, whose end a brake may not fit before,
+ * what is left of it counts if that is more. */
+static int64_t deadline_q30(const struct feed_override *f)
+{
+    uint32_t bound_us = feed_override_bound_us(f, (enum program_stop_kind)f->kind);
+    const uint32_t end_us = left_us(f);
+    bound_us = end_us > bound_us && end_us / 2u < bound_us ? end_us : bound_us;
+    const uint64_t time_us = qmath_product_unsigned(bound_us, 6u);
+    const uint64_t ticks_q8 = qmath_div_u64(time_us << 8, 5u * f->time.period_us);
+    return ((int64_t)ticks_q8 << 22) + SPARE_TICKS * TICK_Q30;
+}
+
+/* A brake under way ends in time, whoever asked for it. */
+static void ask(struct feed_override *f, enum program_stop_kind kind)
+{
+    f->kind = (uint32_t)kind;
+    f->left_q30 = deadline_q30(f);
+    if (f->phase == PHASE_BRAKE) {
+        const int64_t brake_q30 = (path_brake_ticks(&f->brake) + SPARE_TICKS) * TICK_Q30;
+        f->left_q30 = qmath_greater(f->left_q30, brake_q30);
+    }
+}
+
+void feed_override_hold(struct feed_override *f)
+{
+    if (f->state == FEED_RUNNING) {
+        f->state = f->phase == PHASE_REST ? FEED_HELD : FEED_HOLDING;
+        ask(f, PROGRAM_STOP_HOLD);
+    }
+}
+
+void feed_override_resume(struct feed_override *f)
+{
+    if (f->state == FEED_HOLDING || f->state == FEED_HELD) {
+        timebase_resume(&f->time);
+        f->state = FEED_RUNNING;
+    }
+}
+
+void feed_override_set(struct feed_override *f, uint32_t percent)
+{
+    timebase_override(&f->time, percent);
+}
+
+static int is_over(const struct feed_override *f)
+{
+    return f->state == FEED_STOPPED || f->state == FEED_ENDED;
+}
+
+void feed_override_stop(struct feed_override *f)
+{
+    if (is_over(f) || f->state == FEED_STOPPING) {
+        return;
+    }
+    if (f->phase == PHASE_REST) {
+        f->state = FEED_STOPPED;
+        return;
+    }
+    if (f->state == FEED_RUNNING) {
+        ask(f, PROGRAM_STOP_HOLD);
+    }
+    f->state = FEED_STOPPING;
+}
+
+void feed_override_fault_stop(struct feed_override *f)
+{
+    if (is_over(f) || (f->state == FEED_STOPPING && f->kind == PROGRAM_STOP_FAULT)) {
+        return;
+    }
+    if (f->phase == PHASE_REST) {
+        f->state = FEED_STOPPED;
+        return;
+    }
+    ask(f, PROGRAM_STOP_FAULT);
+    f->replace = f->phase == PHASE_BRAKE ? 1u : 0u;
+    f->state = FEED_STOPPING;
+}
+
+/* --- Where the plan is --- */
+
+/* Program time that passes in a tick, in 2^-40 s per millisecond of the period. */
+static uint32_t pace_q40(const struct timebase *time)
+{
+    const uint32_t rate_q30 = (uint32_t)(time->now.rate_q57 >> 27);
+    return (uint32_t)(qmath_product_unsigned(rate_q30, MS_Q40) >> 30);
+}
+
+/* period_us = 1000 2^this */
+static int period_exponent(const struct timebase *time)
+{
+    return 31 - qmath_clz32(time->period_us / 1000u);
+}
+
+/* rate F' and rate^2 F'' + rate' F' as way of a tick, at the last setpoint; rate' F' also by itself. 0 where the feed is
+ * beyond all brakes. */
+static int plan_state(const struct feed_override *f, const struct interp *it,
+                      struct path_state *state, int64_t *turned_q56)
+{
+    const struct timebase *time = &f->time;
+    const int p = period_exponent(time);
+    const uint32_t pace = pace_q40(time);
+    const int64_t feed = f->point.feed_q32_mm_s;
+    if (qmath_magnitude(feed) >= MOST_FEED_Q32) {
+        return 0;
+    }
+    const int64_t bend_q40 = interp_acceleration_q40(it, time->record, timebase_time_q42(time));
+    const int64_t even = qmath_mul_unsigned(qmath_mul_unsigned(bend_q40, pace), pace);
+    const int64_t at_rate_1 = qmath_mul_unsigned(feed * 65536, MS_Q40);
+    const int64_t turned = qmath_mul_wide(at_rate_1, (int32_t)(time->now.slope_q56 >> 26)) * 4;
+    state->arc_length_q40_mm = f->point.arc_length_q40_mm;
+    state->fine_q56_mm = 0;
+    state->speed_q56 = qmath_shift_clamp(qmath_mul_unsigned(feed * 65536, pace), p);
+    *turned_q56 = qmath_shift_clamp(turned, p);
+    state->acceleration_q56 = qmath_shift_clamp(even, 2 * p) + *turned_q56;
+    return 1;
+}
+
+/* --- A tick --- */
+
+static int plan_tick(struct feed_override *f, struct interp *it)
+{
+    const uint64_t time_q42_s = timebase_step_q42(&f->time);
+    const int result = it->piece != NULL
+                           ? interp_at_piece(it, f->time.record, time_q42_s, &f->point)
+                           : interp_at_q42(it, time_q42_s, &f->point);
+    if (result == INTERP_END) {
+        f->state = FEED_ENDED;
+    }
+    return result;
+}
+
+static void come_to_rest(struct feed_override *f, uint32_t found)
+{
+    f->phase = PHASE_REST;
+    f->found = found;
+    if (comes_to_rest(f)) {
+        f->state = f->state == FEED_STOPPING ? FEED_STOPPED : FEED_HELD;
+    }
+}
+
+static int brake_tick(struct feed_override *f, struct interp *it)
+{
+    path_brake_step(&f->brake);
+    const struct path_state *at = &f->brake.at;
+    const int64_t arc_q40_mm = at->arc_length_q40_mm + (int64_t)(at->fine_q56_mm >> 15);
+    const int result = interp_at_arc_length(it, arc_q40_mm, &f->point);
+    if (result == INTERP_OK && path_brake_ticks(&f->brake) == 0) {
+        interp_search_begin(&f->place, f->time.record, f->time.piece, arc_q40_mm);
+        come_to_rest(f, 0);
+    }
+    return result;
+}
+
+static int numbers(const struct feed_override *f, struct path_brake_numbers *out)
+{
+    struct program_stop stop;
+    program_stop_get(f->time.program, f->time.piece, (enum program_stop_kind)f->kind, &stop);
+    return path_brake_numbers_of(out, &stop, f->time.period_us);
+}
+
+static int ends_on_path(const struct feed_override *f, const struct path_brake *brake)
+{
+    const int64_t end_q40_mm = brake->at.arc_length_q40_mm + path_brake_way_q40_mm(brake);
+    return end_q40_mm + NEAR_Q40_MM <= f->time.program->header.length_q40_mm;
+}
+
+/* Not after the program would have ended. */
+static int ends_in_time(const struct feed_override *f, const struct path_brake *brake)
+{
+    const struct timebase *time = &f->time;
+    const uint64_t left_q40_s = (time->duration_q42_s - time->time_q42_s) >> 2;
+    const uint64_t need_q40_s = qmath_product_unsigned(path_brake_ticks(brake), pace_q40(time))
+                                << period_exponent(time);
+    return time->now.slope_q56 != 0 || need_q40_s < left_q40_s;
+}
+
+/* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the rate rises so fast that the jerk of the
+ * program's limits would have to take away more than a quarter of the deceleration first: the rise is cut instead. */
+static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
+{
+    struct path_brake_numbers own;
+    struct path_brake brake;
+    if (!numbers(f, &own)) {
+        return 0;
+    }
+    if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > own.deceleration_q56 / 4) {
+        return 0;
+    }
+    if (!path_brake_plan(&brake, state, &own) || !ends_on_path(f, &brake) ||
+        !ends_in_time(f, &brake)) {
+        return 0;
+    }
+    f->brake = brake;
+    f->phase = PHASE_BRAKE;
+    f->replace = 0;
+    return 1;
+}
+
+/* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. */
+static void begin_stop(struct feed_override *f, const struct interp *it)
+{
+    struct path_state state;
+    int64_t turned_q56 = 0;
+    const struct timebase *time = &f->time;
+    if (time->started == 0) {
+        return;
+    }
+    const int known = plan_state(f, it, &state, &turned_q56);
+    const int rests = (time->now.rate_q57 | time->now.slope_q56) == 0;
+    if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
+        come_to_rest(f, 1);
+    } else if (!known || !leave_plan(f, &state, turned_q56)) {
+        f->left_q30 -= qmath_lesser(timebase_rate_q30(time), TICK_Q30);
+        timebase_hold(
+            &f->time); /* at a low rate that is at rest before the place of the next brake */
+    }
+}
+
+/* A fault stop's own brake takes the place of one that would take longer. */
+static void replace_brake(struct feed_override *f)
+{
+    struct path_brake_numbers own;
+    struct path_brake brake;
+    if (numbers(f, &own) && path_brake_plan(&brake, &f->brake.at, &own) &&
+        path_brake_ticks(&brake) < path_brake_ticks(&f->brake) && ends_on_path(f, &brake)) {
+        f->brake = brake;
+        f->replace = 0;
+    }
+}
+
+/* On from the place of rest when that is known, and wanted. */
+static void look_for_place(struct feed_override *f, struct interp *it)
+{
+    for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
+        if (interp_search_step(it, &f->place)) {
+            const struct prepared_piece *piece =
+                f->place.piece != NULL ? f->place.piece : &it->own_piece;
+            f->found = 1;
+            timebase_go_from(&f->time, f->place.time_q42_s, f->place.piece_index, f->place.piece,
+                             piece->end_q32_s);
+        }
+    }
+    if (f->found != 0 && f->state == FEED_RUNNING) {
+        f->phase = PHASE_PLAN;
+    }
+}
+
+void feed_override_decide(struct feed_override *f, struct interp *it)
+{
+    if (f->phase == PHASE_REST) {
+        look_for_place(f, it);
+    } else if (f->phase == PHASE_BRAKE) {
+        if (f->replace != 0) {
+            replace_brake(f);
+        }
+    } else {
+        begin_stop(f, it);
+    }
+}
+
+int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out)
+{
+    int result = INTERP_OK;
+    if (f->phase != PHASE_PLAN || comes_to_rest(f)) {
+        feed_override_decide(f, it);
+    }
+    if (f->phase == PHASE_BRAKE) {
+        f->left_q30 -= TICK_Q30;
+        result = brake_tick(f, it);
+    } else if (f->phase == PHASE_PLAN) {
+        result = plan_tick(f, it);
+    }
+    if (result >= 0) {
+        *out = f->point;
+    }
+    return result < 0 ? result : 0;
+}
+
+/* --- What is so --- */
+
+enum feed_state feed_override_state(const struct feed_override *f)
+{
+    return (enum feed_state)f->state;
+}
+
+int feed_override_late(const struct feed_override *f)
+{
+    return comes_to_rest(f) && f->left_q30 < 0;
+}
+
+uint64_t feed_override_time_q42(const struct feed_override *f)
+{
+    return timebase_time_q42(&f->time);
+}
+
+uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind)
+{
+    struct program_stop stop;
+    program_stop_get(f->time.program, f->time.piece, kind, &stop);
+    return stop.bound_us;
+}
+
+int64_t feed_override_feed_q32(const struct feed_override *f)
+{
+    if (f->phase == PHASE_REST || is_over(f)) {
+        return 0;
+    }
+    if (f->phase == PHASE_BRAKE) {
+        /* 2^-56 mm a tick in 2^-32 mm/s: 1000 / 2^24 for each ms of the period */
+        const int64_t speed = f->brake.at.speed_q56 >> period_exponent(&f->time);
+        return qmath_mul_unsigned(speed, 1000u << 8);
+    }
+    const int64_t feed = f->point.feed_q32_mm_s;
+    const uint32_t rate_q30 = timebase_rate_q30(&f->time);
+    return rate_q30 == (uint32_t)TICK_Q30 ? feed : qmath_mul_unsigned(feed, rate_q30) * 4;
+}
+
+uint32_t feed_override_rate_q30(const struct feed_override *f)
+{
+    return f->phase == PHASE_PLAN && !is_over(f) ? timebase_rate_q30(&f->time) : 0u;
+}
+
+int feed_override_saturated(const struct feed_override *f)
+{
+    return f->phase == PHASE_PLAN && timebase_saturated(&f->time);
+}

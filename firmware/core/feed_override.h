@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The feed override: what the plan of a program and the commands make of the next tick. Feed hold, resume, override 0 to
+ * 200 %, stop and fault stop, and a start from rest anywhere in the program. The tool never leaves the curve.
+ *
+ * Override and resume change the rate of program time (core/timebase): along jerk-limited curves inside the override
+ * bounds of every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
+ * (core/path_brake) from the speed and acceleration of the last setpoint, with the numbers that the stop table has for the
+ * piece. Where a brake may not begin the plan goes on for another tick, and where the program ends before a brake would,
+ * it ends. So a stop takes at most the bound of the piece in which it was asked for (docs/protocol.md 1.4).
+ *
+ * At rest of a hold the program time of the place is looked for, a step in each tick; a resume goes on from there. It is
+ * found to 2^-42 s of program time.
+ *
+ * Integers only, the same on every target. One owner: commands called from elsewhere than the tick need the tick held off.
+ */
+#ifndef HODOGRAPH_CORE_FEED_OVERRIDE_H
+#define HODOGRAPH_CORE_FEED_OVERRIDE_H
+
+#include <stdint.h>
+
+#include "core/interp.h"
+#include "core/path_brake.h"
+#include "core/timebase.h"
+
+enum feed_state {
+    FEED_RUNNING = 0,  /* at the override, or on the way to it; also with an override of 0 */
+    FEED_STOPPING = 1, /* comes to rest, for good */
+    FEED_STOPPED = 2,  /* at rest before the end */
+    FEED_ENDED = 3,    /* the last setpoint was the exact end point */
+    FEED_HOLDING = 4,  /* comes to rest until resumed */
+    FEED_HELD = 5,     /* at rest until resumed */
+};
+
+#define FEED_MOST_PERCENT TIMEBASE_MOST_PERCENT
+
+/* Contents private: use the functions. */
+struct feed_override {
+    struct timebase time;
+    struct path_brake brake;
+    struct interp_search place; /* of rest */
+    struct interp_point point;  /* of the last setpoint */
+    uint32_t state;             /* enum feed_state: what is wanted, and whether it is reached */
+    uint32_t phase;             /* where setpoints come from */
+    uint32_t kind;              /* enum program_stop_kind of the stop asked for */
+    uint32_t replace; /* 1: a fault stop, which has not taken the place of the brake yet */
+    uint32_t found;   /* 1: `place` is */
+    int64_t left_q30; /* ticks at rate 1 until the deadline */
+};
+
+/* For a checked program at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.
+ * period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must stay as it is. */
+void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
+                         uint64_t time_q42_s);
+
+/* --- Commands: take effect from the next tick. Any sequence is allowed. Constant time. --- */
+
+/* To rest until resumed. Without effect when stopping, stopped or ended. */
+void feed_override_hold(struct feed_override *f);
+
+/* Back to the override; a brake under way comes to rest first. Without effect when not holding or held. */
+void feed_override_resume(struct feed_override *f);
+
+/* Rate wanted, in per cent; more than 200 counts as 200. Kept while held. */
+void feed_override_set(struct feed_override *f, uint32_t percent);
+
+/* To rest inside the program's limits, and to an end there: final. When the program ends first, it ends. */
+void feed_override_stop(struct feed_override *f);
+
+/* The same inside the machine's limits: at once also from the brake of a hold or a stop. */
+void feed_override_fault_stop(struct feed_override *f);
+
+/* --- Tick --- */
+
+/* The next setpoint; *it is an interpolator of the same program that nobody else moves. After the end, or at rest, the
+ * same point again. Returns 0 or a negative INTERP_ERR_..., then *out is unchanged. Bounded time, tick context. */
+int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
+
+/* Part of feed_override_next, where anything but the plan is wanted: what this tick does about it. By itself, so that the
+ * longest path of a tick in which only the plan goes on can be counted without it. */
+void feed_override_decide(struct feed_override *f, struct interp *it);
+
+/* --- What is so at the last setpoint --- */
+
+enum feed_state feed_override_state(const struct feed_override *f);
+
+/* 1 while it comes to rest for a hold or a stop and has taken longer than its bound and a fifth of it. */
+int feed_override_late(const struct feed_override *f);
+
+/* Program time in 2^-42 s, rounded to nearest; from the first tick of a brake on that of the last setpoint before it,
+ * until the place of rest is found. */
+uint64_t feed_override_time_q42(const struct feed_override *f);
+
+/* What the stop table says that a stop takes at most which is asked for now, in us. */
+uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind);
+
+/* Feed along the path, 2^-32 mm/s. */
+int64_t feed_override_feed_q32(const struct feed_override *f);
+
+/* Rate of program time, 2^30 = 1; 0 in a brake and at rest. */
+uint32_t feed_override_rate_q30(const struct feed_override *f);
+
+/* 1 while the override wanted is more than the pieces allow here, so that the rate stays below. */
+int feed_override_saturated(const struct feed_override *f);
+
+#endif

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The stop table of a program (docs/protocol.md 1.4): how long a stop can take, and whether the table says so. Nothing in
+ * the image is believed: the bounds follow from the feed pieces, the override bounds and the numbers alone
+ * (docs/numerics.md section 7, "Stops"). Integer arithmetic; every value is rounded so that a bound is never too short.
+ *
+ * The table is gone through from the last piece to the first, since a stop that cannot brake in a piece goes on into the
+ * next. About 3000 instructions per piece and kind. Main loop.
+ */
+#ifndef HODOGRAPH_CORE_STOP_CHECK_H
+#define HODOGRAPH_CORE_STOP_CHECK_H
+
+#include <stdint.h>
+
+#include "core/program.h"
+#include "core/program_check.h"
+
+/* Ticks of a stop that are not in the continuous curve: until the command takes effect and its brake is planned, and the
+ * rounding of its three parts. */
+#define STOP_TICKS 6u
+/* Time in which the piece whose numbers count may still change, in periods of program time: three ticks at 200 %. */
+#define STOP_WINDOW_TICKS 6u
+#define STOP_WINDOW                                                                                \
+    8 /* pieces that begin in it, at most (docs/protocol.md 1.3: no two last less than two periods) */
+
+/* From the command to rest, held at UINT32_MAX. */
+struct stop_bound {
+    uint32_t time_us;
+    uint32_t way_um;
+};
+
+/* Contents private. */
+struct stop_walk {
+    const struct program *program;
+    enum program_stop_kind kind;
+    uint64_t window_q32_s;
+    struct stop_bound own[STOP_WINDOW];   /* of the pieces behind, the nearest first, */
+    uint64_t duration_q32_s[STOP_WINDOW]; /* and their durations */
+    struct stop_bound next;               /* bound of the piece behind */
+    uint32_t count;
+};
+
+/* Motion of a piece at any rate that its override bounds allow. */
+struct stop_extent {
+    uint64_t speed_um;  /* greatest, um/s, */
+    uint64_t rising_um; /* and acceleration at a constant rate, um/s^2, */
+    uint64_t slope_um;  /* and what a changing rate adds to it, */
+    uint64_t cut_us;    /* and the time in which such a change is taken back */
+    uint32_t
+        waits; /* eighths of the piece, one after the other, in which no brake may fit, at most, */
+    uint32_t last; /* and so many before its end */
+};
+
+void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
+                       struct stop_extent *out);
+
+/* Where a brake begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate adds.
+ * A rate that still rises is below the greatest by what it goes up while its slope is taken back, in cut_us at least: so of
+ * the slope only that adds to the speed which the brake's jerk takes longer for. um, s; us. */
+struct stop_start {
+    uint64_t speed_um;
+    uint64_t rising_um;
+    uint64_t slope_um;
+    uint64_t cut_us;
+};
+
+/* The brake of the table alone: its continuous curve. */
+struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop);
+
+/* Begins behind the last piece of a program whose pieces and segments have passed their checks. */
+void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);
+
+/* The bound of the piece before: the first call gives that of the last piece, and so on. */
+struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece);
+
+/* Checks the table against limits. Returns 0 or the code of a broken rule; *index is its piece. */
+int stop_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index);
+
+#endif

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""The controller's motion under hold, resume, override, stop and fault stop (core/feed_override.h)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from .library import library
+from .program import NativeProgram, kernel_code
+
+
+class State(IntEnum):
+    """What is wanted, and whether it is reached: enum feed_state."""
+
+    RUNNING = 0
+    STOPPING = 1
+    STOPPED = 2
+    ENDED = 3
+    HOLDING = 4
+    HELD = 5
+
+
+@dataclass(frozen=True)
+class PlanStep:
+    """Where a setpoint of the plan is from: program time, its rate, the slope of that per second."""
+
+    time_s: float
+    rate: float
+    slope_per_s: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """A tick: arc length and point of the setpoint (mm), feed along the path (mm/s), rate of program time."""
+
+    arc_mm: float
+    x_mm: float
+    y_mm: float
+    feed_mm_s: float
+    rate: float
+
+
+class FeedOverride:
+    """One program from its start, tick by tick. Commands take effect from the next step."""
+
+    def __init__(self, program: NativeProgram, kernel: str = "fixed") -> None:
+        """Raises InputError: a program that does not pass the controller's check, no such kernel."""
+        ffi, self._lib = library()
+        program.require()
+        self._program = program  # keeps the image alive
+        self._period_s = 1e-6 * program.period_us
+        self._interp = ffi.new("struct interp *")
+        self._point = ffi.new("struct interp_point *")
+        self._feed = ffi.new("struct feed_override *")
+        self._lib.interp_begin(self._interp, program.pointer, kernel_code(kernel))
+        self._lib.feed_override_begin(self._feed, program.pointer, program.period_us, 0)
+
+    def step(self) -> Step:
+        """The next tick."""
+        self._lib.feed_override_next(self._feed, self._interp, self._point)
+        own = self._point
+        return Step(
+            own.arc_length_q40_mm * 2.0**-40,
+            own.x_q40_mm * 2.0**-40,
+            own.y_q40_mm * 2.0**-40,
+            self._lib.feed_override_feed_q32(self._feed) * 2.0**-32,
+            self._lib.feed_override_rate_q30(self._feed) * 2.0**-30,
+        )
+
+    @property
+    def plan(self) -> PlanStep | None:
+        """Of the last step; None in a brake and at rest."""
+        if self._feed.phase != 0:
+            return None
+        now = self._feed.time.now
+        slope_per_s = now.slope_q56 * 2.0**-56 / self._period_s
+        return PlanStep(self.time_s, now.rate_q57 * 2.0**-57, slope_per_s)
+
+    @property
+    def state(self) -> State:
+        """After the last step."""
+        return State(self._lib.feed_override_state(self._feed))
+
+    @property
+    def late(self) -> bool:
+        """Whether a stop has taken longer than its bound and a fifth."""
+        return bool(self._lib.feed_override_late(self._feed))
+
+    @property
+    def time_s(self) -> float:
+        """Program time of the last step; in a brake that of its begin."""
+        return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
+
+    def hold(self) -> None:
+        """To rest, until resumed."""
+        self._lib.feed_override_hold(self._feed)
+
+    def resume(self) -> None:
+        """Back to the override."""
+        self._lib.feed_override_resume(self._feed)
+
+    def override(self, percent: int) -> None:
+        """The rate wanted, 0 to 200."""
+        self._lib.feed_override_set(self._feed, percent)
+
+    def stop(self) -> None:
+        """To rest inside the program's limits, for good."""
+        self._lib.feed_override_stop(self._feed)
+
+    def fault_stop(self) -> None:
+        """To rest inside the machine's limits, for good."""
+        self._lib.feed_override_fault_stop(self._feed)

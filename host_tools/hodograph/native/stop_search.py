@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""The numbers of stops, found in C (sim/rig/stop_search.h)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .library import library
+from .program import NativeProgram
+
+FREE = (inf, inf)
+
+
+@dataclass(frozen=True)
+class StopLimits:
+    """What a brake has to keep; inf: no limit. mm and s; those of axes (x, y).
+
+    feed, acceleration, jerk   along the path; the numbers of a brake never exceed the last two
+    reach                      of |velocity + time_constant * acceleration| of the axis
+    caps                       (from_mm, to_mm, feed_mm_s) each
+    reach_at_pace              `reach` counts at the rate 1 only
+    rise_is_cut                a brake begins when a rising rate adds a quarter of its deceleration at most
+    """
+
+    feed: float = inf
+    acceleration: float = inf
+    jerk: float = inf
+    centripetal: float = inf
+    axis_velocity: tuple[float, float] = FREE
+    axis_acceleration: tuple[float, float] = FREE
+    axis_jerk: tuple[float, float] = FREE
+    reach: tuple[float, float] = FREE
+    time_constant: tuple[float, float] = (0.0, 0.0)
+    caps: tuple[tuple[float, float, float], ...] = ()
+    reach_at_pace: bool = False
+    rise_is_cut: bool = False
+
+    def raised(self, used: StopLimits) -> StopLimits:
+        """The greater of each limit and of what is used of it with the margin of the search. Caps, constants and what
+        the numbers never exceed stay.
+        """
+
+        def greater(limit: Any, use: Any) -> Any:
+            if isinstance(limit, tuple):
+                return tuple(greater(*pair) for pair in zip(limit, use, strict=True))
+            return max(limit, use * _MARGIN)
+
+        values = {name: greater(getattr(self, name), getattr(used, name)) for name in _RAISED}
+        return replace(self, **values)
+
+
+_RAISED = ("feed", "centripetal", "axis_velocity", "axis_acceleration", "axis_jerk", "reach")
+_MARGIN = 1.0 / (1.0 - 0.003) + 1e-6
+
+
+class StopSearch:
+    """A program whose stops are looked for; it has passed `program_open`, its stop table is not read."""
+
+    def __init__(self, program: NativeProgram) -> None:
+        self._program = program
+        self._count = int(program.pointer.header.piece_count)
+
+    def used(self, limits: StopLimits) -> StopLimits:
+        """What the program itself uses at the rate 1: the greatest value of each quantity that is limited."""
+        ffi, lib = library()
+        given = limits_struct(limits)
+        found = ffi.new("struct stop_limits *")
+        lib.stop_used(self._program.pointer, given[0], self._rows(given), found)
+        values: dict[str, Any] = {}
+        for name in _RAISED:
+            value = getattr(found, name)
+            values[name] = float(value) if isinstance(value, float) else (value[0], value[1])
+        return StopLimits(**values)
+
+    def codes(self, limits: StopLimits) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+        """Codes (M, 3), and times (M, 2) to rest, the longest and the mean of the instants looked at."""
+        ffi, lib = library()
+        given = limits_struct(limits)
+        found = ffi.new("struct stop_found[]", self._count)
+        lib.stop_search(self._program.pointer, given[0], self._rows(given), found)
+        table = np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
+        return table, np.array([(one.worst_s, one.mean_s) for one in found]).reshape(-1, 2)
+
+    def _rows(self, given: tuple[Any, Any]) -> Any:
+        ffi, lib = library()
+        rows = ffi.new("struct stop_row[]", self._program.segment_count * lib.STOP_ROWS)
+        lib.stop_rows(self._program.pointer, given[0], rows)
+        return rows
+
+
+def limits_struct(limits: StopLimits) -> tuple[Any, Any]:
+    """The struct stop_limits and what it points to, which must be kept as long."""
+    ffi, _ = library()
+    caps = ffi.new("struct stop_cap[]", [tuple(cap) for cap in limits.caps])
+    own = ffi.new("struct stop_limits *")
+    for one in fields(limits):
+        if one.name != "caps":
+            setattr(own, one.name, getattr(limits, one.name))
+    own.caps, own.cap_count = caps, len(limits.caps)
+    return own, caps

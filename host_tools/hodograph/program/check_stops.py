@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: MIT
+"""Rules of docs/protocol.md 1.4: what a stop can take beside what the table says; docs/numerics.md section 7.
+
+In floating point and without what the controller's integers (firmware/core/stop_check.c) round up: a bound that
+the controller accepts is never below the one computed here, and above it by some 20 us at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..feed.pieces import part_bounds
+from .codes import ProgramError
+from .image import Program
+from .limits import ProgramLimits
+from .stops import DECELERATION, FAULT, HOLD, JERK_DOWN, JERK_UP, numbers
+
+Real = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+STOP_TICKS = 6
+"""Ticks of a stop that are not in the continuous curve."""
+WINDOW_TICKS = 6
+"""Periods of program time in which the piece whose numbers count may still change,"""
+WINDOW = 8
+"""and how many pieces may begin in them."""
+HALVINGS = 3
+"""Each eighth of a piece is looked at for itself."""
+LITTLE = 0.25
+"""Share of the deceleration that a rising rate of program time may add when a hold's brake begins."""
+_HAIR = 1e-9
+_MOST_US = 2.0**32 - 1.0
+
+
+def stop_fault(
+    program: Program, limits: ProgramLimits | None, reserved: Bool | None = None
+) -> tuple[ProgramError, int] | None:
+    """The first rule broken, in the order of the controller: entries from the first piece on, then the bounds of
+    holds and those of fault stops, each from the last piece on.
+    """
+    entries = list(_entry_faults(program, limits, reserved))
+    if entries:
+        index, _, code = min(entries)
+        return code, index
+    return _bound_fault(program, HOLD, 0) or _bound_fault(
+        program, FAULT, 0 if limits is None else limits.stop_time_ms
+    )
+
+
+def _entry_faults(
+    program: Program, limits: ProgramLimits | None, reserved: Bool | None
+) -> Iterator[tuple[int, int, ProgramError]]:
+    codes = program.stops.codes
+    some, whole = (codes > 0).any(axis=2), (codes > 0).all(axis=2)
+    broken = some != whole
+    if reserved is not None:
+        broken = broken | reserved[:, None]
+    above = np.zeros_like(broken)
+    if limits is not None:
+        own = numbers(codes)
+        most = np.array([limits.jerk_mm_s3, limits.acceleration_um_s2 * 1e-3, limits.jerk_mm_s3])
+        # The controller compares whole um/s^2, rounded down.
+        own[..., DECELERATION] = np.floor(own[..., DECELERATION] * 1e3) / 1e3
+        above = ((own > most * (1.0 + 1e-12)) & (most > 0.0)).any(axis=2) & whole
+    for rank, (mask, code) in enumerate(
+        ((broken, ProgramError.STOP_ENTRY), (above, ProgramError.STOP_NUMBERS))
+    ):
+        if mask.any():
+            piece, kind = np.argwhere(mask)[0]
+            yield int(piece), 2 * int(kind) + rank, code
+
+
+def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramError, int] | None:
+    least_us, least_um = bounds(program, kind)
+    said = program.stops.bound_us[:, kind].astype(np.float64)
+    brief = said < np.minimum(least_us, _MOST_US) - _HAIR
+    too_long = (said > most_ms * 1000.0) & (most_ms > 0)
+    hits = np.flatnonzero(brief | too_long)
+    if hits.size:
+        index = int(hits[-1])
+        return (ProgramError.STOP_BOUND if brief[index] else ProgramError.STOP_LONG), index
+    worst_us, worst_um = program.stops.worst_us[kind], program.stops.worst_um[kind]
+    if worst_us != int(said.max()) or worst_um < min(float(least_um.max()), _MOST_US) - _HAIR:
+        return ProgramError.STOP_WORST, 0
+    return None
+
+
+def bounds(program: Program, kind: int) -> tuple[Real, Real]:
+    """Least bounds (M,) of time in us and of the way in um, from the command to rest."""
+    own_s, own_mm, waits = _own(program, kind)
+    duration = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    way = np.maximum(np.diff(start), 0.0)
+    window_s = WINDOW_TICKS * program.period_us * 1e-6
+    count = duration.size
+    out_s, out_mm = np.zeros(count + 1), np.zeros(count + 1)
+    for i in range(count - 1, -1, -1):
+        if waits[i] > 0.0:
+            own_s[i] = max(own_s[i], waits[i] * duration[i] + out_s[i + 1])
+            own_mm[i] = max(own_mm[i], way[i] + out_mm[i + 1])
+        last, ahead = i + 1, 0.0
+        while last < min(count, i + 1 + WINDOW) and ahead < window_s:
+            ahead += duration[last]
+            last += 1
+        out_s[i], out_mm[i] = own_s[i:last].max(), own_mm[i:last].max()
+    return out_s[:-1] * 1e6, out_mm[:-1] * 1e3
+
+
+def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
+    """Time in s and way in mm (M,) of a stop that brakes in the piece in which it was asked for, 0 where none may, and
+    the share of the piece, up to its end, from which it may go on into the next.
+    """
+    pieces, codes = program.pieces, program.stops.codes[:, kind]
+    period_s = program.period_us * 1e-6
+    feed, acceleration = (
+        part_bounds(pieces.duration_q32_s, pieces.c_q40, order, HALVINGS) for order in (1, 2)
+    )
+    factor = pieces.override_factor_q24 * 2.0**-24
+    speed = np.maximum(feed.max(axis=(1, 2)), 0.0)
+    second = pieces.override_second_q8_per_s2 * 2.0**-8
+    # It rises from 0 and falls to 0 again within a change of the rate by the factor at most.
+    steepest = np.minimum(pieces.override_rate_q16_per_s * 2.0**-16, np.sqrt(factor * second))
+    slope, cut_s = steepest * speed, steepest / second
+    speed = speed * factor
+    rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0) * factor**2
+    given = codes[:, DECELERATION] > 0
+    number = np.where(given[:, None], numbers(codes), 1.0)
+    more_s = np.full(speed.size, STOP_TICKS * period_s)
+    if kind == HOLD:
+        little = LITTLE * number[:, DECELERATION]
+        more_s = np.where(slope > little, more_s + cut_s, more_s)
+        cut_s = np.where(slope > little, cut_s * little / np.maximum(slope, 1e-300), cut_s)
+        slope = np.minimum(slope, little)
+    settled = _settled(program, feed.min(axis=2), acceleration.min(axis=2), number[:, JERK_UP])
+    longest, last = _runs(~settled)
+    more_s = more_s + longest * np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
+    speed = speed + 0.5 * (rising + slope) * period_s
+    lead_s, slope_s = rising / number[:, JERK_DOWN], slope / number[:, JERK_DOWN]
+    # A rate that still rises is below the greatest by what it goes up while its slope is taken back.
+    peak = (
+        speed + rising * (0.5 * lead_s + slope_s) + 0.5 * slope * np.maximum(slope_s - cut_s, 0.0)
+    )
+    time_s, way_mm = _curve(peak, lead_s + slope_s, number)
+    time_s, way_mm = time_s + more_s, way_mm + speed * more_s
+    return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)
+
+
+def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) -> Bool:
+    """Whether a brake fits everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
+    factor = (program.pieces.override_factor_q24 * 2.0**-24)[:, None]
+    falling = np.maximum(-acceleration, 0.0) * factor**2
+    settle_s = 0.5 * falling / jerk_up[:, None] + 1e-6 * program.period_us
+    return np.asarray((falling == 0.0) | (np.maximum(feed, 0.0) >= falling * settle_s))
+
+
+def _runs(mask: Bool) -> tuple[Real, Real]:
+    """Longest runs in each row, and those at the ends of the rows, as shares of the row."""
+    run = np.zeros(mask.shape[0])
+    longest = run
+    for column in mask.T:
+        run = np.where(column, run + 1.0, 0.0)
+        longest = np.maximum(longest, run)
+    return longest / mask.shape[1], run / mask.shape[1]
+
+
+def _curve(peak: Real, lead_s: Real, number: Real) -> tuple[Real, Real]:
+    """Time and way of the S-curve to rest in continuous time, from `peak` of the speed, to which `lead_s` leads."""
+    down, most, up = number[:, JERK_DOWN], number[:, DECELERATION], number[:, JERK_UP]
+    depth = np.minimum(np.sqrt(peak * 2.0 * down * up / (down + up)), most)
+    first_s, last_s = depth / down, depth / up
+    even_s = peak / np.maximum(depth, 1e-300)
+    curve_s = even_s + 0.5 * (first_s + last_s)
+    centre_s = lead_s + 0.5 * curve_s + np.maximum(first_s - last_s, 0.0) / 6.0
+    return lead_s + curve_s, peak * centre_s

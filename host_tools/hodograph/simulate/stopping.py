@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Runs that are stopped on their way: feed hold, stop and fault stop, without a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config.axis_table import Feedforward
+from ..config.drive_file import Drive
+from ..errors import HodographError, InputError
+from ..native import ROW, NativeProgram, Rig
+from ..native.rig import RigOrder
+from .motion import Motion, Tally, settling_ticks
+
+STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
+"""Kinds of a stop, and of the RigOrder that asks for it."""
+
+_HISTORY = 3
+_AXES = ("x", "y")
+
+
+@dataclass(frozen=True, eq=False)
+class StoppedRun:
+    """A run that was stopped.
+
+    kind          one of STOP_ORDERS
+    at_s          time from the program's start at which it was asked for
+    rest_after_s  time from then to the first setpoint at rest
+    distance_mm   way along the path in this time
+    bound_s       longest time by the program's stop table
+    peak          greatest magnitudes from then to rest: of the setpoints, by their differences over one, two and three
+                  periods, along the path and by axis; of the axes, volts and contour error, settling included
+    motion        the run, up to rest and settling
+    """
+
+    kind: str
+    at_s: float
+    rest_after_s: float
+    distance_mm: float
+    bound_s: float
+    peak: dict[str, float]
+    motion: Motion
+
+    def summary(self) -> dict[str, Any]:
+        """The keys that tools may rely on in `--json` output."""
+        return {
+            "kind": self.kind,
+            "at_s": self.at_s,
+            "rest_after_s": self.rest_after_s,
+            "distance_mm": self.distance_mm,
+            "bound_s": self.bound_s,
+            "peak": self.peak,
+        }
+
+
+def simulate_stop(
+    program: NativeProgram,
+    drives: Sequence[Drive],
+    kind: str,
+    at_s: float,
+    *,
+    kernel: str = "fixed",
+    counts_per_mm: int = 1_000_000,
+    feedforward: tuple[Feedforward, Feedforward] | None = None,
+) -> StoppedRun:
+    """A run as `simulate` makes it, that is stopped `at_s` after its first setpoint: the setpoint of this time is the
+    first that obeys. Raises InputError: a time outside the program, and as `simulate`.
+    """
+    period_s = program.period_us * 1e-6
+    if len(drives) != len(_AXES):
+        raise InputError(f"simulate: needs the drives of 2 axes, not {len(drives)}")
+    if not 0.0 <= at_s <= (program.ticks - 1) * period_s:
+        raise InputError(
+            f"{kind} at {at_s:g} s: the program takes from 0 to {(program.ticks - 1) * period_s:.9g} s"
+        )
+    tick = ceil(at_s / period_s - 1e-9)
+    rig = Rig(
+        program,
+        kernel,
+        (drives[0], drives[1]),
+        counts_per_mm,
+        feedforward,
+        orders=(RigOrder(STOP_ORDERS[kind], tick),),
+    )
+    settling = settling_ticks(program.period_us)
+    rows = np.empty(program.ticks + settling, dtype=ROW)
+    rig.run(rows)
+    stop = rig.stop
+    if stop is None or stop.rest_tick is None:
+        raise HodographError(f"simulation: {kind} at {at_s:g} s never came to rest: report a bug")
+    rows = rows[: stop.rest_tick + 1 + settling]
+    tally = Tally(stop.rest_tick + 1, counts_per_mm)
+    tally.add(rows)
+    motion = tally.motion(
+        kernel=kernel,
+        period_us=program.period_us,
+        counts_per_mm=counts_per_mm,
+        ticks=stop.rest_tick + 1,
+        rows=rows,
+    )
+    return StoppedRun(
+        kind,
+        at_s,
+        (stop.rest_tick - tick + 1) * period_s,
+        stop.rest_mm - stop.from_mm,
+        stop.bound_s,
+        _peaks(motion, tick, stop.rest_tick),
+        motion,
+    )
+
+
+def _peaks(motion: Motion, tick: int, rest_tick: int) -> dict[str, float]:
+    """Of the differences that reach into tick … rest_tick + 3: from the last setpoint before the stop to rest."""
+    begin = max(tick - _HISTORY, 0)
+    rows = slice(begin, rest_tick + 1 + _HISTORY)
+    period_s = motion.period_us * 1e-6
+    columns = {"": motion.arc_length_mm[rows]}
+    columns |= {f"{axis}_": motion.cmd_mm[rows, k] for k, axis in enumerate(_AXES)}
+    peaks = {}
+    for name, values in columns.items():
+        padded = np.concatenate((np.repeat(values[:1], _HISTORY if begin == 0 else 0), values))
+        for order, quantity in enumerate(
+            ("velocity_mm_s" if name else "feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3"), start=1
+        ):
+            found = np.diff(padded, order) / period_s**order
+            peaks[name + quantity] = _greatest(found)
+    after = slice(tick, None)
+    for k, axis in enumerate(_AXES):
+        peaks[f"{axis}_volts"] = _greatest(motion.volts[after, k])
+    peaks["contour_error_um"] = _greatest(motion.contour_error_um[after])
+    return peaks
+
+
+def _greatest(values: NDArray[np.float64]) -> float:
+    return float(np.abs(values).max(initial=0.0))

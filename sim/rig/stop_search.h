@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The numbers of a stop: for each feed piece of a program the jerk, deceleration and jerk (codes of docs/protocol.md
+ * 1.4) with which a brake along the path may begin anywhere in the piece and keeps given limits all the way to rest.
+ *
+ * Each brake is followed in double arithmetic from a grid of instants of the piece; limits are kept less STOP_MARGIN,
+ * for what lies between the instants. Derivation: docs/numerics.md section 7. No heap: the caller lends all arrays.
+ * Main loop of a host.
+ */
+#ifndef HODOGRAPH_RIG_STOP_SEARCH_H
+#define HODOGRAPH_RIG_STOP_SEARCH_H
+
+#include <stdint.h>
+
+#include "core/program.h"
+
+#define STOP_ROWS   33u   /* of the path, for each segment */
+#define STOP_MARGIN 0.003 /* share of each limit */
+
+/* The path at an arc length, ascending; two rows with one arc length where segments meet. */
+struct stop_row {
+    double s_mm;
+    double tangent[2];
+    double curvature; /* 1/mm */
+    double slope;     /* of the curvature, 1/mm^2 */
+    double feed_mm_s; /* greatest feed here: caps and centripetal acceleration */
+};
+
+/* A greatest feed on a stretch of the path. */
+struct stop_cap {
+    double from_mm;
+    double to_mm;
+    double feed_mm_s;
+};
+
+/* What a brake has to keep; HUGE_VAL: no limit. The numbers never ask for more than `acceleration` and `jerk`. */
+struct stop_limits {
+    double feed;         /* along the path: mm/s, */
+    double acceleration; /* mm/s^2, */
+    double jerk;         /* mm/s^3 */
+    double centripetal;
+    double axis_velocity[2];
+    double axis_acceleration[2];
+    double axis_jerk[2];
+    double reach[2]; /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
+    double time_constant[2]; /* s */
+    const struct stop_cap *caps;
+    uint32_t cap_count;
+    uint32_t
+        reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
+    uint32_t
+        rise_is_cut; /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
+};
+
+/* What was found for a piece. Codes of 0: no numbers keep the limits from all of its instants. */
+struct stop_found {
+    uint8_t codes[3]; /* jerk, deceleration, jerk */
+    double worst_s;   /* longest brake of the instants looked at at the rate 1, */
+    double mean_s;    /* and their mean */
+};
+
+/* Fills segment_count * STOP_ROWS rows; the program has passed program_open. */
+void stop_rows(const struct program *p, const struct stop_limits *limits, struct stop_row *rows);
+
+/* How far the program itself uses the limits at the rate 1: greatest value of each, limit by limit, in `used`
+ * (same fields; caps and time constants as in limits). */
+void stop_used(const struct program *p, const struct stop_limits *limits,
+               const struct stop_row *rows, struct stop_limits *used);
+
+/* Searches piece_count results. Linear; about 0.5 ms a piece. */
+void stop_search(const struct program *p, const struct stop_limits *limits,
+                 const struct stop_row *rows, struct stop_found *found);
+
+#endif

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: MIT
+"""Stops without a bus: at rest within the bound, inside the limits, on the path; random commands as well."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.chain import Chain, load_chain
+from hodograph.cli.main import main
+from hodograph.errors import HodographError
+from hodograph.native import NativeProgram
+from hodograph.native.stop_search import StopSearch
+from hodograph.native.stop_trial import StopTrials, run_trials
+from hodograph.program.stop_planning import fault_limits, hold_limits
+from hodograph.simulate import simulate, simulate_stop
+
+ROOT = Path(__file__).parents[3]
+ALPHA = ROOT / "examples/alpha_optimal.toml"
+HEART = ROOT / "examples/heart_optimal.toml"
+
+
+def trials(chain: Chain, count: int, seed: int) -> StopTrials:
+    """Random commands on a program, beside the limits that its stops were planned with."""
+    program = NativeProgram(chain.image)
+    search = StopSearch(program)
+    plan, terms = chain.compilation.plan, chain.stop_terms
+    hold, fault = (
+        limits.raised(search.used(limits))
+        for limits in (hold_limits(plan, terms), fault_limits(plan, terms))
+    )
+    return run_trials(program, hold, fault, count, seed=seed)
+
+
+@pytest.mark.parametrize("file", [ALPHA, HEART], ids=["alpha", "heart"])
+@pytest.mark.parametrize("kind", ["hold", "stop", "fault"])
+def test_a_stop_rests_within_its_bound_and_limits(file, kind) -> None:
+    chain = load_chain(file)
+    program = NativeProgram(chain.image)
+    axis, path = (2000.0, 50000.0), (2000.0, 50000.0)
+    for at_s in np.linspace(0.0, chain.program.duration_s, 14)[:-1].tolist():
+        found = simulate_stop(program, chain.machine.models(chain.machine.plane), kind, at_s)
+        assert found.rest_after_s <= found.bound_s
+        assert found.distance_mm >= 0.0
+        if kind == "fault":
+            assert found.peak["acceleration_mm_s2"] <= 5000.0
+            assert found.peak["jerk_mm_s3"] <= 200000.0
+            assert found.rest_after_s < 0.13
+            continue
+        for name, limits in (("", path), ("x_", axis), ("y_", axis)):
+            assert found.peak[f"{name}acceleration_mm_s2"] <= limits[0] * 1.0005
+            assert found.peak[f"{name}jerk_mm_s3"] <= limits[1] * 1.001
+
+
+def test_until_the_stop_the_run_is_the_undisturbed_one() -> None:
+    chain = load_chain(ALPHA)
+    drives = chain.machine.models(chain.machine.plane)
+    whole = simulate(chain.image, drives)
+    found = simulate_stop(NativeProgram(chain.image), drives, "fault", 0.3)
+    assert np.array_equal(found.motion.rows["set_counts"][:300], whole.rows["set_counts"][:300])
+    assert not np.array_equal(found.motion.rows["set_counts"][:310], whole.rows["set_counts"][:310])
+    rest = found.motion.rows["set_counts"][found.motion.ticks - 1 :]
+    assert np.all(rest == rest[0])
+
+
+def test_a_time_outside_the_program_is_refused(capsys) -> None:
+    assert main(["simulate", str(ALPHA), "--fault-at", "9"]) == 2
+    assert "fault at 9 s: the program takes from 0 to 0.729" in capsys.readouterr().err
+
+
+def test_json_and_traces(capsys, tmp_path) -> None:
+    trace = tmp_path / "run.csv"
+    command = ["simulate", str(ALPHA), "--hold-at", "0.1", "0.2", "--stop-at", "0.3"]
+    assert main([*command, "--fault-at", "0.4", "--json", "--trace", str(trace)]) == 0
+    stops = json.loads(capsys.readouterr().out)["stops"]
+    assert [(stop["kind"], stop["at_s"]) for stop in stops] == [
+        ("hold", 0.1),
+        ("hold", 0.2),
+        ("stop", 0.3),
+        ("fault", 0.4),
+    ]
+    keys = {"kind", "at_s", "rest_after_s", "distance_mm", "bound_s", "peak"}
+    assert all(set(stop) == keys for stop in stops)
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        "run.csv",
+        "run.fault-0.4.csv",
+        "run.hold-0.1.csv",
+        "run.hold-0.2.csv",
+        "run.stop-0.3.csv",
+    ]
+    rows = (tmp_path / "run.fault-0.4.csv").read_text(encoding="ascii").splitlines()
+    assert len(rows) == 1 + 400 + round(stops[3]["rest_after_s"] * 1000)
+
+
+def random_file(folder: Path, seed: int) -> Path:
+    """A path file with a random path, profile and limits."""
+    rng = np.random.default_rng([seed, 11])
+    count, closed = int(rng.integers(5, 10)), bool(rng.integers(2))
+    if closed:
+        angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        points = rng.uniform(8.0, 40.0, count) * np.exp(1j * angle)
+    else:
+        points = np.cumsum(
+            rng.uniform(4.0, 30.0, count) * np.exp(1j * np.cumsum(rng.uniform(-1.3, 1.3, count)))
+        )
+    listed = [[round(float(p.real), 6), round(float(p.imag), 6)] for p in points]
+    profile = ("optimal", "quintic", "exponential", "minimax")[int(rng.integers(4))]
+    feed = f'profile = "{profile}"\n'
+    if profile != "optimal":
+        feed += f"nominal_mm_s = {rng.uniform(20, 200):.3f}\nramp_time_s = {rng.uniform(0.05, 0.3):.3f}\n"
+    limits = f"acceleration_mm_s2 = {rng.uniform(800, 3000):.1f}\njerk_mm_s3 = {rng.uniform(2e4, 1e5):.1f}\n"
+    axis = f"acceleration_mm_s2 = {rng.uniform(800, 3000):.1f}\njerk_mm_s3 = {rng.uniform(2e4, 1e5):.1f}\n"
+    if rng.integers(2):
+        limits += f"reserve = {rng.choice([0.002, 0.02, 0.1])}\n"
+    machine = ROOT / "examples/machines/paper_alpha.toml"
+    file = folder / f"random{seed}.toml"
+    file.write_text(
+        f"[path]\nclosed = {str(closed).lower()}\ncontrol_points = {listed}\n[feed]\n{feed}"
+        f'[limits]\n{limits}[limits.axis]\n{axis}[machine]\nfile = "{machine}"\n',
+        encoding="utf-8",
+    )
+    return file
+
+
+def check_random(folder: Path, seed: int, count: int) -> int:
+    """Random commands on a random program; how many trials there were."""
+    try:
+        chain = load_chain(random_file(folder, seed))
+        _ = chain.image
+    except HodographError:
+        return 0
+    found = trials(chain, count, seed)
+    assert found.kept, f"random path {seed}: {found}"
+    assert sum(found.measured) > count // 3
+    return count
+
+
+@pytest.mark.parametrize("file", [ALPHA, HEART, ROOT / "examples/star.toml"], ids=lambda f: f.stem)
+def test_random_commands_on_the_examples(file) -> None:
+    found = trials(load_chain(file), 4000, 7)
+    assert found.kept, found
+
+
+def test_random_commands_on_random_programs(tmp_path) -> None:
+    assert sum(check_random(tmp_path, seed, 1000) for seed in range(8)) >= 5000
+
+
+@pytest.mark.long
+def test_100_000_random_commands(tmp_path) -> None:
+    """None over its limits or its bound, none late."""
+    assert sum(check_random(tmp_path, seed, 1500) for seed in range(100, 190)) >= 100_000

@@ -1,0 +1,281 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/path_brake.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "golden.h"
+#include "unity.h"
+
+#define UNIT  72057594037927936.0 /* 2^56 */
+#define Q40   1099511627776.0
+#define CASES 200000
+
+static uint64_t random_state;
+
+void setUp(void)
+{
+    random_state = 23;
+}
+
+void tearDown(void)
+{
+}
+
+static double uniform(double low, double high)
+{
+    return low + (high - low) * (double)(golden_random(&random_state) >> 11) / 9007199254740992.0;
+}
+
+static double spread(double low, double high)
+{
+    return low * pow(high / low, uniform(0, 1));
+}
+
+/* mm and s */
+struct brake_case {
+    double speed, acceleration, down, most, up, period;
+};
+
+static struct brake_case random_case(void)
+{
+    struct brake_case c = {.speed = spread(0.1, 500),
+                           .down = spread(1e3, 1e6),
+                           .most = spread(50, 1e4),
+                           .up = spread(1e3, 1e6),
+                           .period = 1e-3 * (double)(1u << (golden_random(&random_state) % 4u))};
+    c.acceleration = uniform(-1.5, 1.5) * c.most;
+    return c;
+}
+
+static struct path_state state_of(const struct brake_case *c)
+{
+    const double h = c->period;
+    return (struct path_state){.arc_length_q40_mm = (int64_t)7 << 40,
+                               .speed_q56 = llrint(c->speed * h * UNIT),
+                               .acceleration_q56 = llrint(c->acceleration * h * h * UNIT)};
+}
+
+static struct path_brake_numbers numbers_of(const struct brake_case *c)
+{
+    const double h = c->period;
+    return (struct path_brake_numbers){llrint(c->down * h * h * h * UNIT),
+                                       llrint(c->most * h * h * UNIT),
+                                       llrint(c->up * h * h * h * UNIT)};
+}
+
+/* Ticks of the continuous brake; below 0: there is none. */
+static double continuous_ticks(const struct brake_case *c)
+{
+    const double lead = c->acceleration / c->down;
+    const double ratio = c->down / c->up;
+    const double peak = sqrt((2 * c->speed / c->down + lead * lead) / (1 + ratio));
+    const double used = fmin(peak, c->most / c->down);
+    const double first = fabs(lead + used);
+    const double last = used * ratio;
+    const double left = c->speed + c->acceleration * first / 2;
+    const double even = peak > used ? left / c->most - first / 2 - last / 2 : 0;
+    if (lead + used < 0 && peak <= used) {
+        return -1;
+    }
+    return left > 0 && even >= 0 ? (first + even + last) / c->period : -1;
+}
+
+static void test_codes(void)
+{
+    struct path_brake_numbers n;
+    const struct program_stop stop = {.jerk_down = 64, .deceleration = 64, .jerk_up = 255};
+    for (uint32_t p = 0; p < 4; p++) {
+        const double ms = 1u << p;
+        TEST_ASSERT_TRUE(path_brake_numbers_of(&n, &stop, 1000u << p));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0,
+                                  (double)n.jerk_down_q56 / UNIT / (64e-9 * ms * ms * ms));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, (double)n.deceleration_q56 / UNIT / (1e-6 * ms * ms));
+        TEST_ASSERT_TRUE(n.jerk_up_q56 >= (int64_t)1 << 55);
+    }
+}
+
+static void test_codes_are_rounded_down(void)
+{
+    static const double mantissa[8] = {65536, 71468, 77935, 84990, 92681, 101070, 110217, 120193};
+    for (uint32_t c = 1; c < 256; c++) {
+        const struct program_stop stop = {
+            .jerk_down = (uint8_t)c, .deceleration = (uint8_t)c, .jerk_up = (uint8_t)c};
+        struct path_brake_numbers n;
+        const double exact = mantissa[c & 7u] * exp2(c >> 3);
+        TEST_ASSERT_DOUBLE_WITHIN(2e-5, 1, exact / (65536 * exp2(c / 8.0)));
+        TEST_ASSERT_TRUE(path_brake_numbers_of(&n, &stop, 1000));
+        const double jerk = fmin(exact / 262144 * 1e-9 * UNIT, UNIT * 16);
+        const double deceleration = fmin(exact / 16777216 * 1e-6 * UNIT, UNIT * 16);
+        TEST_ASSERT_TRUE((double)n.jerk_down_q56 <= jerk);
+        TEST_ASSERT_TRUE((double)n.jerk_down_q56 >= jerk * 0.999999 - 1);
+        TEST_ASSERT_TRUE((double)n.deceleration_q56 <= deceleration);
+        TEST_ASSERT_TRUE((double)n.deceleration_q56 >= deceleration * 0.999999 - 1);
+        TEST_ASSERT_EQUAL_INT64(n.jerk_down_q56, n.jerk_up_q56);
+    }
+}
+
+static void test_code_0_is_no_brake(void)
+{
+    struct path_brake_numbers n;
+    const struct program_stop stop = {.jerk_down = 100, .deceleration = 0, .jerk_up = 100};
+    TEST_ASSERT_FALSE(path_brake_numbers_of(&n, &stop, 1000));
+}
+
+/* From 100 mm/s at 1 ms: 20 ms of jerk to 2000 mm/s^2, 30 ms of that, 20 ms to rest: 3.5 mm. */
+static void test_of_a_book(void)
+{
+    const struct brake_case c = {100, 0, 1e5, 2000, 1e5, 1e-3};
+    const struct path_state from = state_of(&c);
+    const struct path_brake_numbers numbers = numbers_of(&c);
+    struct path_brake brake;
+    TEST_ASSERT_TRUE(path_brake_plan(&brake, &from, &numbers));
+    TEST_ASSERT_INT_WITHIN(1, 70, (int)path_brake_ticks(&brake));
+    TEST_ASSERT_DOUBLE_WITHIN(0.06, 3.5, (double)path_brake_way_q40_mm(&brake) / Q40);
+}
+
+/* One tick: a cubic that begins with the state before and ends with the state after it, whose jerk, acceleration and
+ * speed keep the numbers. */
+static void check_tick(const struct path_state *a, const struct path_state *b,
+                       const struct path_brake_numbers *n, int64_t first_acceleration)
+{
+    const int64_t j = b->acceleration_q56 - a->acceleration_q56;
+    const int64_t way = (b->arc_length_q40_mm - a->arc_length_q40_mm) * 65536 +
+                        (int64_t)b->fine_q56_mm - (int64_t)a->fine_q56_mm;
+    const int64_t most = n->deceleration_q56;
+    TEST_ASSERT_TRUE(-j <= n->jerk_down_q56);
+    TEST_ASSERT_TRUE(j <= (n->jerk_up_q56 > n->jerk_down_q56 ? n->jerk_up_q56 : n->jerk_down_q56));
+    TEST_ASSERT_TRUE(b->acceleration_q56 >=
+                     (first_acceleration < -most ? first_acceleration : -most));
+    TEST_ASSERT_EQUAL_INT64(0, j % 6);
+    TEST_ASSERT_EQUAL_INT64(2 * (b->speed_q56 - a->speed_q56), 2 * a->acceleration_q56 + j);
+    TEST_ASSERT_EQUAL_INT64(way, a->speed_q56 + a->acceleration_q56 / 2 + j / 6);
+    TEST_ASSERT_TRUE(b->speed_q56 >= 0);
+    TEST_ASSERT_TRUE(way >= 0);
+}
+
+static void check_brake(struct path_brake *brake, const struct path_state *from,
+                        const struct path_brake_numbers *n)
+{
+    const double first = brake->first;
+    const double last = brake->last;
+    const double sum = first + 2.0 * brake->second + last;
+    const int64_t way = path_brake_way_q40_mm(brake);
+    const int64_t first_acceleration = brake->at.acceleration_q56;
+    struct path_state before = brake->at;
+    TEST_ASSERT_TRUE(fabs((double)(before.speed_q56 - from->speed_q56)) <=
+                     3 * (first * first + last * sum));
+    TEST_ASSERT_TRUE(fabs((double)(before.acceleration_q56 - from->acceleration_q56)) <= 6 * first);
+    TEST_ASSERT_EQUAL_INT64(from->arc_length_q40_mm, before.arc_length_q40_mm);
+    while (path_brake_ticks(brake) > 0) {
+        path_brake_step(brake);
+        check_tick(&before, &brake->at, n, first_acceleration);
+        before = brake->at;
+    }
+    TEST_ASSERT_EQUAL_INT64(0, before.speed_q56);
+    TEST_ASSERT_EQUAL_INT64(0, before.acceleration_q56);
+    TEST_ASSERT_DOUBLE_WITHIN(1 / 32768.0, (double)way / Q40,
+                              (double)(before.arc_length_q40_mm - from->arc_length_q40_mm) / Q40);
+    path_brake_step(brake);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &brake->at, sizeof before);
+}
+
+static bool ordinary(const struct brake_case *c)
+{
+    const double a = c->acceleration;
+    const double most_speed = c->speed + (a > 0 ? a * a / (2 * c->down) : 0);
+    return a > -0.1 * c->most && a < 0.5 * c->most && most_speed * c->period < 4 &&
+           c->up > 0.05 * c->down;
+}
+
+/* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more and the
+ * acceleration is below half the deceleration there is one, at most 3 ticks and 4 % longer. */
+static void test_random_brakes(void)
+{
+    uint32_t found = 0;
+    for (uint32_t i = 0; i < CASES; i++) {
+        const struct brake_case c = random_case();
+        const struct path_state from = state_of(&c);
+        const struct path_brake_numbers numbers = numbers_of(&c);
+        const double least = continuous_ticks(&c);
+        struct path_brake brake;
+        const int fits = path_brake_plan(&brake, &from, &numbers);
+        if (ordinary(&c) && least >= 30 && least < 3000) {
+            TEST_ASSERT_TRUE(fits);
+            TEST_ASSERT_TRUE(path_brake_ticks(&brake) <= least * 1.04 + 3);
+            TEST_ASSERT_TRUE(path_brake_ticks(&brake) >= least - 0.01);
+        }
+        if (fits) {
+            found++;
+            check_brake(&brake, &from, &numbers);
+        }
+    }
+    TEST_ASSERT_TRUE(found > CASES / 2);
+}
+
+static void refused(int64_t speed_q56, int64_t acceleration_q56)
+{
+    const struct path_brake_numbers numbers = {(int64_t)1 << 40, (int64_t)1 << 45,
+                                               (int64_t)1 << 40};
+    const struct path_state from = {.speed_q56 = speed_q56, .acceleration_q56 = acceleration_q56};
+    struct path_brake brake;
+    struct path_brake before;
+    memset(&brake, 0x5A, sizeof brake);
+    before = brake;
+    TEST_ASSERT_FALSE(path_brake_plan(&brake, &from, &numbers));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &brake, sizeof brake);
+}
+
+static void test_refused_states(void)
+{
+    refused(0, 0);
+    refused(PATH_BRAKE_NO_SPEED - 1, 0);
+    refused(-PATH_BRAKE_NO_SPEED, 0);
+    refused(INT64_MIN, 0);
+    refused(PATH_BRAKE_MOST_SPEED + 1, 0);
+    refused(INT64_MAX, 0);
+    refused((int64_t)1 << 50, INT64_MAX);
+    refused((int64_t)1 << 50, -INT64_MAX);
+    refused((int64_t)1 << 50, -((int64_t)1 << 49)); /* speed would pass 0 */
+    refused(PATH_BRAKE_MOST_SPEED, 0);              /* too many ticks */
+}
+
+/* Whatever the numbers are, nothing overflows (the sanitizers watch) and a brake that is found ends at rest. */
+static void test_extreme_numbers(void)
+{
+    for (uint32_t i = 0; i < CASES; i++) {
+        const struct path_brake_numbers n = {
+            (int64_t)(golden_random(&random_state) >> (4 + golden_random(&random_state) % 60u)) | 1,
+            (int64_t)(golden_random(&random_state) >> (4 + golden_random(&random_state) % 60u)) | 1,
+            (int64_t)(golden_random(&random_state) >> (4 + golden_random(&random_state) % 60u)) |
+                1};
+        const struct path_state from = {
+            .speed_q56 =
+                (int64_t)(golden_random(&random_state) >> (2 + golden_random(&random_state) % 60u)),
+            .acceleration_q56 =
+                (int64_t)golden_random(&random_state) >> (3 + golden_random(&random_state) % 60u)};
+        struct path_brake brake;
+        if (path_brake_plan(&brake, &from, &n)) {
+            (void)path_brake_way_q40_mm(&brake);
+            while (path_brake_ticks(&brake) > 0) {
+                path_brake_step(&brake);
+            }
+            TEST_ASSERT_EQUAL_INT64(0, brake.at.speed_q56);
+            TEST_ASSERT_EQUAL_INT64(0, brake.at.acceleration_q56);
+        }
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_codes);
+    RUN_TEST(test_codes_are_rounded_down);
+    RUN_TEST(test_code_0_is_no_brake);
+    RUN_TEST(test_of_a_book);
+    RUN_TEST(test_random_brakes);
+    RUN_TEST(test_refused_states);
+    RUN_TEST(test_extreme_numbers);
+    return UNITY_END();
+}
