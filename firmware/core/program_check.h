@@ -67,7 +67,8 @@ enum program_error {
     PROGRAM_ERR_OVERRIDE = -55,     /* override factor not in 1.0 ... 2.0, rate or second rate 0 */
     PROGRAM_ERR_PIECE_RESERVED = -56, /* reserved field of a piece is not 0 */
     /* stops: index = the piece */
-    PROGRAM_ERR_STOP_ENTRY = -60,   /* some codes of a stop are 0 and some are not, or a reserved field is not 0 */
+    PROGRAM_ERR_STOP_ENTRY =
+        -60, /* some codes of a stop are 0 and some are not, or a reserved field is not 0 */
     PROGRAM_ERR_STOP_NUMBERS = -61, /* a brake would be above the limits of the controller */
     PROGRAM_ERR_STOP_BOUND = -62,   /* a stop can take longer than its bound */
     PROGRAM_ERR_STOP_LONG = -63,    /* a fault stop can take longer than the controller allows */
