@@ -107,7 +107,9 @@ def main() -> int:
     parser.add_argument("target", nargs="?", choices=emulator.TARGETS, default="an386")
     parser.add_argument("kernel", nargs="?", choices=emulator.KERNELS, default="float")
     parser.add_argument("--plain", action="store_true", help="of a tick in which no rate changes")
-    parser.add_argument("--stop", action="store_true", help="of any tick, also one that plans a brake")
+    parser.add_argument(
+        "--stop", action="store_true", help="of any tick, also one that plans a brake"
+    )
     parser.add_argument("--update", action="store_true", help="the tables of docs/wcet.md")
     parser.add_argument("--build", type=Path, default=Path("build"))
     options = parser.parse_args()

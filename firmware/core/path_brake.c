@@ -28,7 +28,8 @@ static int period_exponent(uint32_t period_us)
 static int64_t decoded(uint32_t code, uint32_t unit, int shift)
 {
     const uint64_t product = qmath_product_unsigned(mantissa[code & 7u], unit);
-    return qmath_lesser(qmath_shift_clamp((int64_t)product, shift + (int)(code >> 3)), MOST_Q56);
+    const int up = shift + (int)(code >> 3); /* of less than 2^48 */
+    return up > 12 ? MOST_Q56 : qmath_shift((int64_t)product, up);
 }
 
 int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_stop *stop,
@@ -48,7 +49,9 @@ int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_s
 /* --- Plan --- */
 
 struct ticks {
-    uint32_t first, second, last;
+    uint32_t first;
+    uint32_t second;
+    uint32_t last;
 };
 
 static uint32_t whole_ticks(uint64_t ticks_q16)
@@ -70,7 +73,7 @@ static uint64_t peak_time_q16(const struct path_state *from, const struct path_b
 }
 
 /* About as many ticks as the continuous brake takes; 0 where it takes too many, or would have to turn round. */
-static int first_guess(struct ticks *ticks, const struct path_state *from,
+static int guess_ticks(struct ticks *ticks, const struct path_state *from,
                        const struct path_brake_numbers *n)
 {
     const uint64_t lead_q16 =
@@ -165,7 +168,7 @@ int path_brake_plan(struct path_brake *brake, const struct path_state *from,
 {
     struct path_brake found;
     struct ticks ticks;
-    if (!in_range(from) || !first_guess(&ticks, from, numbers) ||
+    if (!in_range(from) || !guess_ticks(&ticks, from, numbers) ||
         !add_even(&ticks, from, numbers)) {
         return 0;
     }

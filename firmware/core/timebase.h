@@ -89,10 +89,6 @@ void timebase_stop(struct timebase *tb);
 
 /* --- Tick --- */
 
-/* The rate rises no further: a rise under way is cut, and none begins that has been decided. Before each step that shall
- * keep to that. */
-void timebase_rise_no_more(struct timebase *tb);
-
 /* From rest again, at a time in this piece (its record, or NULL): the rate rises from there to the override. The fields
  * are those of a struct interp_search. */
 void timebase_go_from(struct timebase *tb, uint64_t time_q42_s, uint32_t piece,

@@ -19,6 +19,8 @@ from hodograph.bus.hub import LocalHub
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.processes import Process
 from hodograph.bus.sdo.network import Network
+from hodograph.chain import load_chain
+from hodograph.program import encode
 
 CONTROLLER = "build/bin/hodograph-controller"
 DRIVE = "build/bin/hodograph-drive"
@@ -220,3 +222,29 @@ def test_a_signal_stops_the_axes_and_ends(
     assert controller.text() == ""
     drive: Any = machine.network.add_node(2, dictionary(DRIVE_EDS, 2)).sdo
     assert drive[0x6041].raw & 0x6F == 0x40  # Switch on disabled
+
+
+@pytest.fixture(scope="module")
+def optimal(root: Path) -> bytes:
+    return encode(load_chain(root / "examples/alpha_optimal.toml").program)
+
+
+@pytest.mark.parametrize("after_s", [0.003, 0.09, 0.2, 0.35, 0.456, 0.6, 0.73])
+@pytest.mark.parametrize("again", [False, True])
+def test_a_signal_stops_an_optimal_program(
+    machine: Machine, optimal: bytes, after_s: float, again: bool
+) -> None:
+    machine.prepare(optimal)
+    machine.start()
+    machine.clock.sleep(after_s)
+    controller = machine.controller
+    begun_s = machine.clock.now_s()
+    machine.clock.signal(controller.name, controller.child, signal.SIGTERM)
+    if again:
+        machine.clock.sleep(0.002)
+        machine.clock.signal(controller.name, controller.child, signal.SIGTERM)
+    assert machine.clock.await_end(controller.name, controller.child, 15.0) == 0
+    assert machine.clock.now_s() - begun_s < 0.8
+    for node in (2, 3):
+        drive: Any = machine.network.add_node(node, dictionary(DRIVE_EDS, node)).sdo
+        assert drive[0x6041].raw & 0x6F == 0x40  # Switch on disabled

@@ -103,6 +103,12 @@ static void take_setpoint(struct fake_drive *drive, const struct pdo_setpoint *s
     } else if (setpoint->target_counts != drive->quick_stop_target) {
         drive->quick_stop_moved++;
     }
+    const enum cia402_action action = cia402_device_action(&drive->state);
+    if (setpoint->controlword == 0u && (action == CIA402_FOLLOW || action == CIA402_STOP_QUICKLY) &&
+        drive->position_counts != drive->place_before) {
+        drive->cut_moving++;
+    }
+    drive->place_before = drive->position_counts;
     drive->following = follow;
     drive->target_counts = setpoint->target_counts;
     drive->setpoints++;
@@ -169,6 +175,7 @@ static void seek_home(struct fake_drive *drive)
     } else {
         drive->state.flags |= CIA402_STATUS_TARGET_REACHED | CIA402_STATUS_HOMING_ATTAINED;
         drive->position_counts = drive->values.home_offset;
+        drive->place_before = drive->position_counts;
         drive->homed = true;
     }
 }

@@ -65,6 +65,8 @@ struct fake_drive {
     uint32_t stopping_syncs;   /* how long it has taken */
     int32_t quick_stop_target; /* the target that came with the first quick stop command */
     uint32_t quick_stop_moved; /* quick stop commands with another target */
+    int32_t place_before;      /* position at the last setpoint */
+    uint32_t cut_moving;       /* power was taken from it (0x0000) while it moved */
     struct pdo_actual actual;  /* the answer that waits */
     bool silent_heart;         /* sends no heartbeats (the bench sends them) */
     bool dead;                 /* neither hears nor speaks */

@@ -18,6 +18,7 @@ static struct {
     bool ready;
     bool locked;
     bool fail_send;
+    bool insisted;
     bool fail_store;
     uint32_t missing; /* bytes of a bank */
     unsigned wakes;
@@ -145,7 +146,12 @@ bool port_stop_requested(void)
 
 bool port_stop_insisted(void)
 {
-    return false;
+    return self.insisted;
+}
+
+void fake_port_insist(bool insisted)
+{
+    self.insisted = insisted;
 }
 
 uint8_t port_node_id(void)

@@ -50,6 +50,9 @@ struct fake_port_store {
 };
 void fake_port_use_store(const struct fake_port_store *store);
 
+/* What port_stop_insisted says from now on. */
+void fake_port_insist(bool insisted);
+
 /* Called by port_wait; may be NULL. */
 void fake_port_on_wait(void (*hook)(void *context), void *context);
 

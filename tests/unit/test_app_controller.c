@@ -27,6 +27,10 @@ void setUp(void)
 
 void tearDown(void)
 {
+    for (unsigned i = 0; i < BENCH_DRIVES; ++i) {
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, bench.drives[i].cut_moving,
+                                         "power was taken from a moving drive");
+    }
 }
 
 static struct machine *machine(void)
@@ -513,6 +517,71 @@ static void test_shutting_down_while_running_stops_on_the_path(void)
     TEST_ASSERT_EQUAL_INT(NMT_PRE_OPERATIONAL, bench.drives[1].nmt.state);
 }
 
+static void test_shutting_down_at_any_instant(void)
+{
+    for (uint32_t ticks = 1; ticks < APP_IMAGE_TICKS + 300u; ticks += 13u) {
+        setUp();
+        run_some(ticks);
+        fake_port_on_wait(tick_in_wait, NULL);
+        TEST_ASSERT_TRUE(controller_shut_down(&bench.controller));
+        TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
+        TEST_ASSERT_EQUAL_UINT32(0, bench.drives[0].cut_moving);
+    }
+}
+
+static void insist(void *context)
+{
+    app_bench_period(&bench);
+    fake_port_insist(++*(unsigned *)context >= 3u);
+}
+
+static void test_whoever_insists_gets_the_quick_stop(void)
+{
+    unsigned waits = 0;
+    run_some(250);
+    fake_port_on_wait(insist, &waits);
+    TEST_ASSERT_TRUE(controller_shut_down(&bench.controller));
+    app_bench_settle(&bench);
+    TEST_ASSERT_TRUE(waits < 30u);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
+}
+
+/* The drives make the stop that the path does not. */
+static void late_stop(unsigned command, enum machine_state state)
+{
+    run_some(100);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, command));
+    TEST_ASSERT_EQUAL_INT(state, machine()->state);
+    machine()->motion.feed.left_q30 = 0;
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, machine()->state);
+    TEST_ASSERT_EQUAL_HEX16(FAULT_STOP_LATE, machine()->fault.code);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_QUICK, machine()->fault_phase);
+}
+
+static void test_a_hold_beyond_its_deadline(void)
+{
+    late_stop(COMMAND_HOLD, MACHINE_HOLDING);
+}
+
+static void test_a_stop_beyond_its_deadline(void)
+{
+    late_stop(COMMAND_STOP, MACHINE_STOPPING);
+}
+
+static void test_a_fault_stop_beyond_its_deadline(void)
+{
+    run_some(100);
+    port_lock();
+    machine_raise(machine(), EMCY_HEARTBEAT, 3, 0);
+    port_unlock();
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
+    machine()->motion.feed.left_q30 = 0;
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_HEX16(EMCY_HEARTBEAT, machine()->fault.code);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_QUICK, machine()->fault_phase);
+}
+
 static void test_shutting_down_is_bounded_when_ticks_do_not_come(void)
 {
     run_some(250);
@@ -600,6 +669,11 @@ int main(void)
     RUN_TEST(test_real_drives_are_never_awaited);
     RUN_TEST(test_late_ticks_of_a_run_are_counted);
     RUN_TEST(test_shutting_down_while_running_stops_on_the_path);
+    RUN_TEST(test_shutting_down_at_any_instant);
+    RUN_TEST(test_whoever_insists_gets_the_quick_stop);
+    RUN_TEST(test_a_hold_beyond_its_deadline);
+    RUN_TEST(test_a_stop_beyond_its_deadline);
+    RUN_TEST(test_a_fault_stop_beyond_its_deadline);
     RUN_TEST(test_shutting_down_is_bounded_when_ticks_do_not_come);
     RUN_TEST(test_a_full_port_is_counted);
     RUN_TEST(test_nmt_reset_is_obeyed_only_while_off);

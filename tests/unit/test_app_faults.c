@@ -30,6 +30,8 @@ void tearDown(void)
     for (unsigned i = 0; i < BENCH_DRIVES; ++i) {
         TEST_ASSERT_TRUE_MESSAGE(bench.drives[i].worst_step_counts <= STEP_COUNTS,
                                  "a setpoint jumped");
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, bench.drives[i].cut_moving,
+                                         "power was taken from a moving drive");
         TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, bench.drives[i].quick_stop_moved,
                                          "a target moved in a quick stop");
     }
@@ -574,6 +576,7 @@ static void test_homing_is_from_off_to_off(void)
     drive(0)->latched_counts = drive(0)->target_counts = 77;
     app_bench_periods(&bench, 2);
     TEST_ASSERT_EQUAL_INT32(drive(0)->position_counts, machine()->axes[0].target_counts);
+    app_bench_periods(&bench, 2);
     port_lock();
     machine_end_homing(machine());
     port_unlock();

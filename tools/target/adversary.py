@@ -19,6 +19,8 @@ import numpy as np
 
 from hodograph.feed.pieces import FeedPieces
 from hodograph.program import Program, check, encode
+from hodograph.program.stop_planning import with_bounds
+from hodograph.program.stops import Stops
 
 W = tuple[complex, complex, complex]
 
@@ -177,10 +179,14 @@ def _feed(
     return [*pieces, _Piece(_RAMP_Q32, at, down, ramp_bounds)]
 
 
+# Codes of every piece: hold with 1878 mm/s^2 and 46341 mm/s^3, fault stop with 4871 mm/s^2 and 185364 mm/s^3.
+_STOP = ((140, 151, 140), (156, 162, 156))
+
+
 def _program(adversary: Adversary, path: _Path, pieces: list[_Piece], middle: int) -> Program:
     rows = np.array(path.rows, dtype=np.int64)
     bounds = np.array([p.bounds for p in pieces])
-    return Program(
+    program = Program(
         name=adversary.name,
         period_us=1000,
         closed=False,
@@ -202,7 +208,14 @@ def _program(adversary: Adversary, path: _Path, pieces: list[_Piece], middle: in
             np.array([p.c for p in pieces]),
             *((bounds * (2**24, 2**16, 2**8)).astype(np.uint32).T),
         ),
+        stops=Stops(
+            np.tile(np.array(_STOP, dtype=np.uint8), (len(pieces), 1, 1)),
+            np.zeros((len(pieces), 2), dtype=np.uint32),
+            (0, 0),
+            (0, 0),
+        ),
     )
+    return with_bounds(program)
 
 
 def steady() -> list[tuple[int, int]]:

@@ -159,7 +159,9 @@ def run(case: Case, seed: int) -> tuple[dict[str, float], set[State]]:
                 h = part * period
                 way = before.rate * h + before.slope_per_s * h**2 / 2.0 + second * h**3 / 6.0
                 rate = before.rate + before.slope_per_s * h + second * h**2 / 2.0
-                instants.append((before.time_s + way, rate, before.slope_per_s + second * h, second))
+                instants.append(
+                    (before.time_s + way, rate, before.slope_per_s + second * h, second)
+                )
         before = after
     t, rate, slope, second = np.array(instants).T
     return worst_ratio(case, t, rate, slope, second), states
