@@ -58,7 +58,10 @@ void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up
  * A rate that still rises is below the greatest by what it goes up while its slope is taken back, in cut_us at least: so of
  * the slope only that adds to the speed which the brake's jerk takes longer for. um, s; us. */
 struct stop_start {
-    uint64_t speed_um, rising_um, slope_um, cut_us;
+    uint64_t speed_um;
+    uint64_t rising_um;
+    uint64_t slope_um;
+    uint64_t cut_us;
 };
 
 /* The brake of the table alone: its continuous curve. */
