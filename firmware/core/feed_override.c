@@ -236,6 +236,17 @@ static int leave_plan(struct feed_override *f, const struct path_state *state, i
     return 1;
 }
 
+/* The plan goes on for another tick. At a low rate, at which it may be long until the place of the next brake, the rate
+ * goes to 0; at a high one its fall would add to the deceleration that the plan itself has. */
+static void wait_slowly(struct feed_override *f)
+{
+    if (f->time.now.rate_q57 < RATE_ONE / 2) {
+        timebase_hold(&f->time);
+    } else {
+        timebase_rise_no_more(&f->time);
+    }
+}
+
 /* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. */
 static void begin_stop(struct feed_override *f, const struct interp *it)
 {
@@ -251,8 +262,7 @@ static void begin_stop(struct feed_override *f, const struct interp *it)
         come_to_rest(f, 1);
     } else if (!known || !leave_plan(f, &state, turned_q56)) {
         f->left_q30 -= qmath_lesser(timebase_rate_q30(time), TICK_Q30);
-        timebase_hold(
-            &f->time); /* at a low rate that is at rest before the place of the next brake */
+        wait_slowly(f);
     }
 }
 

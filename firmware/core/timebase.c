@@ -63,6 +63,13 @@ void timebase_begin(struct timebase *tb, const struct program *p, uint32_t perio
     timebase_begin_at(tb, p, period_us, 0);
 }
 
+void timebase_rise_no_more(struct timebase *tb)
+{
+    if (tb->plan.move.step_q56 > 0) {
+        rate_move_cut(&tb->plan.move);
+    }
+}
+
 void timebase_go_from(struct timebase *tb, uint64_t time_q42_s, uint32_t piece,
                       const struct prepared_piece *record, uint64_t piece_end_q32_s)
 {

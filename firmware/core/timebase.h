@@ -89,6 +89,9 @@ void timebase_stop(struct timebase *tb);
 
 /* --- Tick --- */
 
+/* A rate that rises stops to: its slope goes to 0 as fast as it rose. Tick context. */
+void timebase_rise_no_more(struct timebase *tb);
+
 /* From rest again, at a time in this piece (its record, or NULL): the rate rises from there to the override. The fields
  * are those of a struct interp_search. */
 void timebase_go_from(struct timebase *tb, uint64_t time_q42_s, uint32_t piece,

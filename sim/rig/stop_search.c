@@ -9,7 +9,8 @@
 #define MOST_INSTANTS 129    /* of a piece; */
 #define INSTANT_S     0.004  /* between two of them at most, where these are enough, */
 #define CLOSE_S       0.0005 /* and in the last look at what was found */
-#define STEP_S        0.002  /* between two looks at a brake */
+#define STEP_S        0.002  /* between two looks at a brake, */
+#define FINE_S        0.0005 /* and in the last look */
 #define GREATEST_CODE 255
 #define BESIDE        1e-6
 #define LEAST_MM_S    1e-4 /* slower is rest */
@@ -263,12 +264,13 @@ static struct state moved(const struct state *from, double j, double t)
 
 /* 1 while the brake keeps the limits all the way. */
 static int brake_keeps(const struct search *search, const struct inverse *inverse,
-                       const struct brake *brake, const struct state *from, uint32_t row)
+                       const struct brake *brake, const struct state *from, uint32_t row,
+                       double step_s)
 {
     struct state begin = *from;
     for (int phase = 0; phase < 3; phase++) {
         double time_s = brake->time_s[phase];
-        int steps = (int)(time_s / STEP_S) + 2;
+        int steps = (int)(time_s / step_s) + 2;
         steps = time_s > 0.0 ? steps : 0;
         for (int k = 0; k <= steps && steps > 0; k++) {
             struct state at = moved(&begin, brake->jerk[phase], time_s * k / steps);
@@ -400,8 +402,8 @@ static int all_keep(const struct search *search, struct piece *piece, const stru
     for (uint32_t n = 0; n < piece->count; n++) {
         uint32_t i = (n + piece->suspect) % piece->count;
         if (times->brakes[i].total_s < NEVER_S &&
-            !brake_keeps(search, &search->inverse, &times->brakes[i], &piece->at[i],
-                         piece->row[i])) {
+            !brake_keeps(search, &search->inverse, &times->brakes[i], &piece->at[i], piece->row[i],
+                         STEP_S)) {
             piece->suspect = i;
             return 0;
         }
@@ -428,7 +430,7 @@ static int state_keeps(const struct search *search, const struct inverse *invers
     if (!brake_plan(&brake, at->v, at->a, numbers, search->period_s)) {
         return may_wait(search, at, numbers);
     }
-    return brake_keeps(search, inverse, &brake, at, row);
+    return brake_keeps(search, inverse, &brake, at, row, FINE_S);
 }
 
 /* The same limits at other rates of program time, also while the rate changes. */

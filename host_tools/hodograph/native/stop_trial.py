@@ -33,8 +33,17 @@ class StopTrials:
     @property
     def kept(self) -> bool:
         """No limit and no bound was passed, no stop was late, none failed."""
-        uses = (*self.of_hold.values(), *self.of_fault.values(), *self.of_bound)
-        return max(uses) <= 1.0 and not self.late and not self.failures
+        return self.within(0.0)
+
+    def within(self, share: float) -> bool:
+        """The same, but limits may have been passed by this share of them."""
+        uses = max(*self.of_hold.values(), *self.of_fault.values())
+        return (
+            uses <= 1.0 + share
+            and max(self.of_bound) <= 1.0
+            and not self.late
+            and not self.failures
+        )
 
 
 def run_trials(

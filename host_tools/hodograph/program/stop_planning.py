@@ -85,9 +85,10 @@ def hold_limits(plan: Plan, terms: StopTerms) -> StopLimits:
         axis_acceleration=_both(own.axis.acceleration_mm_s2, machine.axis_acceleration),
         axis_jerk=_both(own.axis.jerk_mm_s3, machine.axis_jerk),
         caps=tuple((cap.from_mm, cap.to_mm, cap.feed_mm_s) for cap in own.caps),
+        reach=_reach(terms.plants),
+        time_constant=_time_constants(terms.plants),
         reach_at_pace=False,
         rise_is_cut=True,
-        **_volts(terms.plants),
     )
 
 
@@ -101,8 +102,9 @@ def fault_limits(plan: Plan, terms: StopTerms) -> StopLimits:
         axis_velocity=_both(terms.axis.velocity_mm_s, FREE),
         axis_acceleration=_both(terms.axis.acceleration_mm_s2, FREE),
         axis_jerk=_both(terms.axis.jerk_mm_s3, FREE),
+        reach=_reach(terms.drives),
+        time_constant=_time_constants(terms.drives),
         reach_at_pace=True,
-        **_volts(terms.drives),
     )
 
 
@@ -114,11 +116,9 @@ def _both(limit: tuple[float, float] | None, other: tuple[float, float]) -> tupl
     return other if limit is None else (min(limit[0], other[0]), min(limit[1], other[1]))
 
 
-def _volts(plants: Plants | None) -> dict[str, tuple[float, float]]:
-    if plants is None:
-        return {}
-    x, y = plants
-    return {
-        "reach": (x.reach_mm_s, y.reach_mm_s),
-        "time_constant": (x.time_constant_s, y.time_constant_s),
-    }
+def _reach(plants: Plants | None) -> tuple[float, float]:
+    return FREE if plants is None else (plants[0].reach_mm_s, plants[1].reach_mm_s)
+
+
+def _time_constants(plants: Plants | None) -> tuple[float, float]:
+    return (0.0, 0.0) if plants is None else (plants[0].time_constant_s, plants[1].time_constant_s)
