@@ -260,6 +260,7 @@ class Chain:
         return StopTerms(
             plants=plants(machine, limits),
             drives=drive_plants(machine),
+            axis=axis_limits(machine),
             stop_time_ms=machine.stop_time_ms,
         )
 
