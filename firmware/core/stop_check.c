@@ -251,6 +251,10 @@ void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum progr
     walk->window_q32_s = (uint64_t)STOP_WINDOW_TICKS * p->header.period_us * 4295u;
     walk->next = rest;
     walk->count = 0;
+    for (int k = 0; k < STOP_WINDOW; k++) {
+        walk->own[k] = rest;
+        walk->duration_q32_s[k] = 0;
+    }
 }
 
 static void remember(struct stop_walk *walk, struct stop_bound own, uint64_t duration_q32_s)
