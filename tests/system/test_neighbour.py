@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from canopen_bench import BUSY, Hand, hand, object_bytes, program
+from canopen_bench import BUSY, Hand, hand, object_bytes
 from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
 
-from bench import Bench, MakeAlpha, MakeBench
+from bench import EXAMPLES, Bench, MakeAlpha, MakeBench
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Recorder
@@ -19,6 +19,7 @@ from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
 from hodograph.bus.sdo import node
 from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, RUNNING
 from hodograph.bus.sdo.objects import FAULT
+from hodograph.chain import load_chain
 from hodograph.cli.main import main
 
 DRIVE = 2
@@ -201,7 +202,7 @@ def test_a_second_client_beside_an_upload(make_bench: MakeBench, hub: LocalHub) 
     """Another computer, which knows nothing of the turns taken on this one, asks in the middle of a block download: it
     is refused each time, the upload goes on and is whole.
     """
-    bench, image = make_bench(), program("alpha_quintic")
+    bench, image = make_bench(), load_chain(EXAMPLES / "alpha.toml").image
     refused: list[int] = []
     requests = (
         b"\x40" + object_bytes(0x2002, 0),
