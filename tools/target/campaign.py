@@ -137,7 +137,10 @@ class Campaign:
         for name, (commands, ticks) in FAULTY.items():
             runs = [self.trouble(counter, kernel, commands, f"error:{k}") for k in ticks]
             counts[name] = np.concatenate([run[_rising(run)] for run in runs])
-        moving = {name: figures(c[c[:, _FEED] > 0]) for name, c in counts.items()}
+        moving = {
+            name: figures(c if name in FAULTY else c[c[:, _FEED] > 0])  # a brake reads no feed
+            for name, c in counts.items()
+        }
         plain = counts[SCENARIOS[0].name]
         runs = [self.trouble(counter, kernel, None, f"lost:{k}") for k in FAULTY["fault"][1]]
         lost = np.concatenate(runs)
