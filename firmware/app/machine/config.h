@@ -47,7 +47,7 @@ struct config_axis {
     uint32_t velocity_limit_um_s; /* of programs, at every override; 0, here and below: none */
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
-    uint32_t expected_vendor;               /* 0x1018 subs 1 ... 3 of the drive; 0: any */
+    uint32_t expected_vendor; /* 0x1018 subs 1 ... 3 of the drive; 0: any */
     uint32_t expected_product;
     uint32_t expected_revision;
 };
