@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
+from typing import TYPE_CHECKING
 
 from ..bus.address import parse_address
 from ..bus.sdo import actions
@@ -14,18 +15,15 @@ from .bus_commands import reached, stopping
 from .output import note
 from .targets import target
 
+if TYPE_CHECKING:
+    from ..config import Machine
+
 
 def configure(options: Namespace) -> None:
     """hodograph configure."""
     _check_configure(options)
     address = parse_address(options.bus)
-    machine = None
-    if options.file is not None:
-        from ..bustime import require_fit
-        from .motion_commands import machine_of
-
-        machine = machine_of(options.file, options.machine)
-        require_fit(machine)
+    machine = _machine_of_file(options)
     to = target(options) if machine is None else machine
     node = options.node or to.node
     with reached(address, node, to.bitrate, options.wait) as controller:
@@ -57,16 +55,22 @@ def _check_configure(options: Namespace) -> None:
         raise InputError("configure: nothing to do: give a FILE, --store, --forget or --set-node")
 
 
+def _machine_of_file(options: Namespace) -> Machine | None:
+    """The machine of FILE, None without a FILE. Raises InputError: its traffic does not fit on its bus, for one."""
+    if options.file is None:
+        return None
+    from ..bustime import require_fit
+    from .motion_commands import machine_of
+
+    machine = machine_of(options.file, options.machine)
+    require_fit(machine)
+    return machine
+
+
 def home(options: Namespace) -> None:
     """hodograph home."""
     address = parse_address(options.bus)
-    machine = None
-    if options.file is not None:
-        from ..bustime import require_fit
-        from .motion_commands import machine_of
-
-        machine = machine_of(options.file, options.machine)
-        require_fit(machine)
+    machine = _machine_of_file(options)
     to = target(options) if machine is None else machine
     with reached(address, to.node, to.bitrate, options.wait) as controller:
         controller.require_standing()
