@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from bench import EXAMPLES, MakeBench
-from commands import running
+from commands import result, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.frames import RECORD_DTYPE
@@ -25,15 +25,6 @@ MACHINE = str(EXAMPLES / "machines" / "paper_alpha.toml")
 FRAME = struct.Struct("=IB3x8s")
 NOT_RECORDED = {"bus", "deadline_misses", "pace"}
 PERIOD_S = 0.001
-
-
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
-    capsys.readouterr()
-    status = main(arguments)
-    out, err = capsys.readouterr()
-    assert status == 0, err
-    found: dict[str, Any] = json.loads(out)
-    return found
 
 
 def failed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
