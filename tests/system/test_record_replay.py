@@ -109,11 +109,11 @@ def test_a_recording_from_beside(
 
 
 def motion(hub: LocalHub, clock: VirtualClock, jump_at: int) -> None:
-    """Two axes at 50 mm/s beyond SYNC 20; at `jump_at` the first one steps aside by 1 mm."""
+    """The first of two axes at 40 mm/s beyond SYNC 60, within its limits; at `jump_at` the first one steps aside by 1 mm."""
     with LocalBus(hub.address.channel) as out:
         x, speed = 0, 0
         for k in range(1300):
-            speed = min(50_000, speed + 4000) if k > 20 else 0
+            speed += 100 * max(0, 20 - abs(k - 40))
             x += speed + (1_000_000 if k == jump_at else 0)
             out.send_raw(FRAME.pack(0x80, 1, bytes([k % 240 + 1])))
             for node, counts in ((2, x), (3, 0)):
@@ -142,7 +142,7 @@ def test_a_jump_on_the_bus_is_told(
     assert status == 6
     assert f"setpoint jump at SYNC {jump_at} of the recording, axis 1 and 2: speed" in err
     assert "the file is complete" in err.splitlines()[-1]
-    assert len(told["jumps"]) == 2  # speed, acceleration
+    assert len(told["jumps"]) == 5  # speed, acceleration; speed, acceleration, jerk of the first axis
     assert read_recording(tmp_path / "jump.log").size == 1300 * 5
     status, told, err = record("unchecked.log")
     assert (status, told["jumps"]) == (0, None)
