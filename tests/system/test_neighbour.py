@@ -12,13 +12,15 @@ from canopen_bench import BUSY, Hand, hand, object_bytes
 from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
 
 from bench import EXAMPLES, Bench, MakeAlpha, MakeBench
+from commands import running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
 from hodograph.bus.sdo import node
-from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, RUNNING
-from hodograph.bus.sdo.objects import FAULT
+from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, HELD, OFF, READY, RUNNING
+from hodograph.bus.sdo.objects import COMMAND, FAULT, HOLD, QUICK_STOP
+from hodograph.bus.sdo.objects import STOP as STOP_COMMAND
 from hodograph.chain import load_chain
 from hodograph.cli.main import main
 
@@ -26,6 +28,7 @@ DRIVE = 2
 AWAY = 0xFF08
 LOST = 0x8250
 OFF_BIT = 0x80000000
+COMMANDS = {"stop": STOP_COMMAND, "hold": HOLD, "quick-stop": QUICK_STOP}
 
 
 @pytest.fixture
@@ -239,6 +242,46 @@ def test_a_command_beside_another_computers_upload(
         assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
         assert main(["status"]) == 4
         assert "another SDO client" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["stop", "hold", "quick-stop"])
+def test_a_command_to_stop_beside_another_computers_transfer(
+    moving: Moving, hub: LocalHub, command: str
+) -> None:
+    """The program is being read from elsewhere, slowly: that is no reason to wait, and the transfer goes on."""
+    bench, _ = moving(1.0)
+    program = object_bytes(0x2000, 1)
+    with hand(hub, 1) as stranger:
+        assert stranger.ask(b"\x40" + program)[0] == 0x41
+        begun_s = bench.clock.now_s()
+        bench.controller.write_at_once(COMMAND, COMMANDS[command])
+        assert bench.clock.now_s() - begun_s < 0.001
+        taken = stranger.answer()  # of the command: it names another object
+        assert taken == b"\x60" + object_bytes(COMMAND, 0) + bytes(4)
+        assert stranger.ask(b"\x60")[0] == 0x00
+        assert stranger.ask(b"\x70")[0] == 0x10
+        state = {"stop": READY, "hold": HELD, "quick-stop": OFF}[command]
+        stranger.send(b"\x80" + program + b"\0\0\4\5")
+    bench.controller.wait_for((state,), 2.0)
+
+
+@pytest.mark.parametrize("command", ["stop", "hold", "quick-stop"])
+def test_the_commands_to_stop_while_another_computer_goes_on_reading(
+    moving: Moving, hub: LocalHub, command: str
+) -> None:
+    """For seven seconds. Whether the axes stand cannot be asked meanwhile, but they do."""
+    bench, _ = moving(1.0)
+    with hand(hub, 1) as stranger, running(bench.clock, command) as process:
+        assert stranger.ask(b"\x40" + object_bytes(0x2000, 1))[0] == 0x41
+        for k in range(900):  # of 943 segments
+            stranger.send(b"\x70" if k % 2 else b"\x60")
+            bench.clock.sleep(0.008)
+            if process.child.poll() is not None:
+                break
+        stranger.send(b"\x80" + object_bytes(0x2000, 1) + b"\0\0\4\5")
+        assert process.wait() in (0, 4), process.err
+        assert "middle of a transfer" in process.err or not process.err, process.err
+    assert bench.controller.state() in (READY, HELD, OFF)
 
 
 FRAME_BITS_LEAST = 111

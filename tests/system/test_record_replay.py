@@ -109,7 +109,7 @@ def test_a_recording_from_beside(
 
 
 def motion(hub: LocalHub, clock: VirtualClock, jump_at: int) -> None:
-    """The first of two axes at 40 mm/s beyond SYNC 60, within its limits; at `jump_at` the first one steps aside by 1 mm."""
+    """The first of two axes at 40 mm/s beyond SYNC 60, within its limits; at `jump_at` it steps aside by 1 mm."""
     with LocalBus(hub.address.channel) as out:
         x, speed = 0, 0
         for k in range(1300):
@@ -142,7 +142,9 @@ def test_a_jump_on_the_bus_is_told(
     assert status == 6
     assert f"setpoint jump at SYNC {jump_at} of the recording, axis 1 and 2: speed" in err
     assert "the file is complete" in err.splitlines()[-1]
-    assert len(told["jumps"]) == 5  # speed, acceleration; speed, acceleration, jerk of the first axis
+    assert (
+        len(told["jumps"]) == 5
+    )  # speed, acceleration; speed, acceleration, jerk of the first axis
     assert read_recording(tmp_path / "jump.log").size == 1300 * 5
     status, told, err = record("unchecked.log")
     assert (status, told["jumps"]) == (0, None)

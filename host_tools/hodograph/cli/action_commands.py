@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from ..bus.address import parse_address
 from ..bus.sdo import actions
-from ..bus.sdo.objects import BOOT, OFF, READY
+from ..bus.sdo.objects import BOOT, OFF, QUICK_STOP, READY
 from ..errors import InputError
-from .bus_commands import reached, stopping
+from .bus_commands import commanded, reached, stopping
 from .output import note
 from .targets import target
 
@@ -86,8 +86,8 @@ def quick_stop(options: Namespace) -> None:
     """hodograph quick-stop."""
     address = parse_address(options.bus)
     to = target(options)
-    with reached(address, to.node, to.bitrate, options.wait) as controller:
-        actions.quick_stop(controller, options.timeout or actions.BOOT_S)
+    with commanded(address, to.node, to.bitrate, options.wait, QUICK_STOP) as controller:
+        actions.quick_stop_over(controller, options.timeout or actions.BOOT_S)
     print("stopped by the drives, drives off")
 
 
