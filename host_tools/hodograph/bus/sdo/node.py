@@ -85,6 +85,8 @@ class Node:
         self.clock = clock
         self._turns = Turns(address, node_id, clock)
         self._under_way = False
+        self._left_s: float | None = None
+        """What is left of the time that a question may take, None: no limit of its own."""
         self._identified = False
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
@@ -126,7 +128,10 @@ class Node:
         request = bytearray(b"\x40" + nowhere + bytes(4))
         self.sdo.send_request(request)
         begun_s = self.clock.now_s()
-        deadline = begun_s + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+        patience_s = max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+        if self._left_s is not None:
+            patience_s = min(patience_s, self._left_s)
+        deadline = begun_s + patience_s
         with suppress(queue.Empty):
             while (left := deadline - self.clock.now_s()) > 0:
                 answer = self.sdo.responses.get(timeout=left)
@@ -139,7 +144,7 @@ class Node:
                     raise self._busy()
                 self.clock.sleep(_BUSY_LOOK_S)
                 self.sdo.send_request(request)
-                deadline = self.clock.now_s() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+                deadline = self.clock.now_s() + patience_s
         raise _SilentError(f"{self.who()} stopped answering: is its process or its power gone?")
 
     def _busy(self) -> BusyError:
@@ -262,6 +267,7 @@ class Node:
         try:
             while True:
                 try:
+                    self._left_s = max(deadline - self.clock.now_s(), 0.001)
                     with self.turn(turn_wait_s, min(turn_wait_s, BUSY_S)):
                         self._variable(STATE, None).raw  # noqa: B018
                     self._check_identity()
@@ -278,7 +284,7 @@ class Node:
                     if self.clock.now_s() >= deadline:
                         return False
         finally:
-            self.sdo.RESPONSE_TIMEOUT = patience
+            self.sdo.RESPONSE_TIMEOUT, self._left_s = patience, None
 
     def _check_identity(self) -> None:
         """Raises BusError when the node is not what the EDS file describes."""
