@@ -9,7 +9,16 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from canopen_bench import BUSY, Hand, hand, object_bytes
-from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
+from neighbour import (
+    PRE_OPERATIONAL,
+    RESET_NODE,
+    STOP,
+    Neighbour,
+    flood,
+    neighbour,
+    runs_again,
+    settled,
+)
 
 from bench import EXAMPLES, Bench, MakeAlpha, MakeBench
 from commands import running
@@ -28,6 +37,8 @@ DRIVE = 2
 AWAY = 0xFF08
 LOST = 0x8250
 OFF_BIT = 0x80000000
+STEP_IN_STEPS = 5
+"""SYNCs over which one late setpoint shows, differences of the third order included."""
 COMMANDS = {"stop": STOP_COMMAND, "hold": HOLD, "quick-stop": QUICK_STOP}
 
 
@@ -284,16 +295,6 @@ def test_the_commands_to_stop_while_another_computer_goes_on_reading(
     assert bench.controller.state() in (READY, HELD, OFF)
 
 
-FRAME_BITS_LEAST = 111
-"""Of a frame of eight bytes, without stuff bits; at 1 Mbit/s as many microseconds."""
-
-
-def flood(other: Neighbour, identifier: int, seconds: float) -> None:
-    """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
-    for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
-        other.send(identifier, b"\xaa" * 8)
-
-
 @pytest.mark.parametrize("identifier", [0x7FF, 0x6FF])
 def test_a_bus_that_is_full_of_what_matters_less(
     moving: Moving, other: Neighbour, identifier: int
@@ -316,4 +317,27 @@ def test_a_bus_that_is_full_of_what_matters_more(
     bench.clock.sleep(seconds)
     state, code, _ = settled(bench)
     assert (state, code) in ((READY, 0), (FAULT_STATE, LOST))
+    runs_again(path)
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.25])
+def test_a_bus_that_is_full_for_longer_than_simulated_drives_are_waited_for(
+    make_bench: MakeBench, alpha_at: MakeAlpha, other: Neighbour, seconds: float
+) -> None:
+    """The next SYNC is sent after 100 ms, and goes before the setpoints that still wait: one step is made of two, which
+    is found. docs/bus-time.md says so.
+    """
+    bench, path = make_bench(), str(alpha_at(10))
+    recorder = Recorder(bench.bus)
+    assert main(["goto", path]) == 0
+    assert main(["start"]) == 0
+    bench.clock.sleep(1.0)
+    flood(other, 0x001, seconds)
+    bench.clock.sleep(seconds)
+    state, code, _ = settled(bench)
+    assert (state, code) == ((READY, 0) if seconds < 0.2 else (FAULT_STATE, LOST))
+    found = find_jumps(recorder.so_far(), bench.machine.nodes, step_limits(bench.machine))
+    recorder.stop()
+    assert bool(found) == (state == READY)
+    assert all(jump.sync - found[0].sync <= STEP_IN_STEPS for jump in found)
     runs_again(path)
