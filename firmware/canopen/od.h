@@ -21,8 +21,8 @@
 #ifndef CANOPEN_OD_H
 #define CANOPEN_OD_H
 
-#include <stddef.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 /* Data types, numbered as in CiA 301 (and in the DataType keys of EDS files). */
