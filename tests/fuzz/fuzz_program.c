@@ -268,6 +268,7 @@ static void trail_begin(struct trail *trail, const struct program *p)
     struct program_segment first;
     program_segment_get(p, 0, &first);
     const struct interp_point point = {.x_q40_mm = first.x_q40_mm, .y_q40_mm = first.y_q40_mm};
+    memset(trail, 0, sizeof *trail);
     trail->period_s = 1e-6 * p->header.period_us;
     for (int i = 0; i < 4; i++) {
         trail_push(trail, &point);
