@@ -29,11 +29,11 @@ ENTRY = "tick"  # of setpoints.elf: motion_step and the call of it
 NOT_PLAIN = {
     "plain": (
         "timebase_change",
-        "feed_override_decide",
+        "feed_override_stop_tick",
         "path_brake_step",
         "interp_at_arc_length",
     ),
-    "override": ("feed_override_decide", "path_brake_step", "interp_at_arc_length"),
+    "override": ("feed_override_stop_tick", "path_brake_step", "interp_at_arc_length"),
 }
 # Beside them, and not in the table: the tick in which a brake is planned, which has no goal yet.
 STOP: tuple[str, ...] = ()

@@ -8,12 +8,17 @@
 
 enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 
+/* Whether a brake would rest before the end of the path: found out a tick before it begins. */
+enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS };
+
 #define TICK_Q30      ((int64_t)1 << 30)
 #define SPARE_TICKS   2                  /* of the deadline: rounding */
 #define SEARCH_STEPS  2                  /* in a tick at rest */
-#define NEAR_Q40_MM   ((int64_t)1 << 25) /* what path_brake_way_q40_mm may be wrong by */
+#define NO_NUMBERS    2u
 #define MOST_FEED_Q32 ((int64_t)1 << 45)
 #define MS_Q40        1099511628u /* 2^40 / 1000 */
+#define UM_Q40_BITS   30          /* 2^-10 mm is less than */
+#define US_Q42_BITS   22          /* */
 
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)
@@ -50,15 +55,22 @@ static int64_t deadline_q30(const struct feed_override *f)
     return ((int64_t)ticks_q8 << 22) + SPARE_TICKS * TICK_Q30;
 }
 
-/* A brake under way ends in time, whoever asked for it. */
+static void read_numbers(struct feed_override *f)
+{
+    struct program_stop stop;
+    program_stop_get(f->time.program, f->time.piece, (enum program_stop_kind)f->kind, &stop);
+    f->numbers_piece = f->time.piece;
+    f->numbers_kind = path_brake_numbers_of(&f->numbers, &stop, f->time.period_us) ? f->kind : NO_NUMBERS;
+}
+
+/* A brake under way keeps the time that it had. */
 static void ask(struct feed_override *f, enum program_stop_kind kind)
 {
+    const int64_t left_q30 = f->phase == PHASE_BRAKE ? f->left_q30 : 0;
     f->kind = (uint32_t)kind;
-    f->left_q30 = deadline_q30(f);
-    if (f->phase == PHASE_BRAKE) {
-        const int64_t brake_q30 = (path_brake_ticks(&f->brake) + SPARE_TICKS) * TICK_Q30;
-        f->left_q30 = qmath_greater(f->left_q30, brake_q30);
-    }
+    f->left_q30 = qmath_greater(deadline_q30(f), left_q30);
+    f->look = LOOK_NOT_YET;
+    read_numbers(f);
 }
 
 void feed_override_hold(struct feed_override *f)
@@ -178,59 +190,79 @@ static void come_to_rest(struct feed_override *f, uint32_t found)
     }
 }
 
+/* The point at the brake's arc length. */
+static int interpolate_brake(struct feed_override *f, struct interp *it)
+{
+    const struct path_state *at = &f->brake.at;
+    return interp_at_arc_length(it, at->arc_length_q40_mm + (int64_t)(at->fine_q56_mm >> 15), &f->point);
+}
+
+/* The tick that leaves the plan. */
+static int first_brake_tick(struct feed_override *f, struct interp *it)
+{
+    f->left_q30 -= TICK_Q30;
+    path_brake_coast(&f->brake);
+    return interpolate_brake(f, it);
+}
+
 static int brake_tick(struct feed_override *f, struct interp *it)
 {
+    f->left_q30 -= TICK_Q30;
     path_brake_step(&f->brake);
-    const struct path_state *at = &f->brake.at;
-    const int64_t arc_q40_mm = at->arc_length_q40_mm + (int64_t)(at->fine_q56_mm >> 15);
-    const int result = interp_at_arc_length(it, arc_q40_mm, &f->point);
-    if (result == INTERP_OK && path_brake_ticks(&f->brake) == 0) {
-        interp_search_begin(&f->place, f->time.record, f->time.piece, arc_q40_mm);
+    const int result = interpolate_brake(f, it);
+    if (result == INTERP_OK && path_brake_rests(&f->brake)) {
+        interp_search_begin(&f->place, f->time.record, f->time.piece, f->point.arc_length_q40_mm);
         come_to_rest(f, 0);
     }
     return result;
 }
 
-static int numbers(const struct feed_override *f, struct path_brake_numbers *out)
+/* --- The end of the program --- */
+
+static int fits_before_end(const struct feed_override *f, const struct path_state *from)
 {
-    struct program_stop stop;
-    program_stop_get(f->time.program, f->time.piece, (enum program_stop_kind)f->kind, &stop);
-    return path_brake_numbers_of(out, &stop, f->time.period_us);
+    const int64_t left_q40_mm = f->time.program->header.length_q40_mm - from->arc_length_q40_mm;
+    return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-static int ends_on_path(const struct feed_override *f, const struct path_brake *brake)
+/* Whether any brake of the stop table would rest before the end of the path, and before the program does. */
+static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
-    const int64_t end_q40_mm = brake->at.arc_length_q40_mm + path_brake_way_q40_mm(brake);
-    return end_q40_mm + NEAR_Q40_MM <= f->time.program->header.length_q40_mm;
+    const struct program_header *h = &f->time.program->header;
+    const uint32_t way_um = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_um : h->fault_worst_um;
+    const uint32_t time_us = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_us : h->fault_worst_us;
+    const int64_t left_q40_mm = h->length_q40_mm - from->arc_length_q40_mm;
+    const uint64_t left_q42_s = f->time.duration_q42_s - f->time.time_q42_s;
+    return left_q40_mm >> UM_Q40_BITS >= (int64_t)way_um && left_q42_s >> US_Q42_BITS >= time_us;
 }
 
-/* Not after the program would have ended. */
-static int ends_in_time(const struct feed_override *f, const struct path_brake *brake)
+/* --- From the plan to the brake --- */
+
+/* Whether a brake may begin at this state: far from the end at once, else when the look at an earlier tick says so. */
+static int may_leave(struct feed_override *f, const struct path_state *state)
 {
-    const struct timebase *time = &f->time;
-    const uint64_t left_q40_s = (time->duration_q42_s - time->time_q42_s) >> 2;
-    const uint64_t need_q40_s = qmath_product_unsigned(path_brake_ticks(brake), pace_q40(time))
-                                << period_exponent(time);
-    return time->now.slope_q56 != 0 || need_q40_s < left_q40_s;
+    if (f->look == LOOK_FITS || is_far_from_end(f, state)) {
+        return 1;
+    }
+    f->seen = *state;
+    f->look = LOOK_SEEN;
+    return 0;
 }
 
 /* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the rate rises so fast that the jerk of the
  * program's limits would have to take away more than a quarter of the deceleration first: the rise is cut instead. */
 static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
 {
-    struct path_brake_numbers own;
-    struct path_brake brake;
-    if (!numbers(f, &own)) {
+    if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > f->numbers.deceleration_q56 / 4) {
         return 0;
     }
-    if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > own.deceleration_q56 / 4) {
+    if (!may_leave(f, state)) {
         return 0;
     }
-    if (!path_brake_plan(&brake, state, &own) || !ends_on_path(f, &brake) ||
-        !ends_in_time(f, &brake)) {
+    f->look = LOOK_NOT_YET;
+    if (!path_brake_begin(&f->brake, state, &f->numbers)) {
         return 0;
     }
-    f->brake = brake;
     f->phase = PHASE_BRAKE;
     f->replace = 0;
     return 1;
@@ -247,35 +279,53 @@ static void wait_slowly(struct feed_override *f)
     }
 }
 
-/* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. */
-static void begin_stop(struct feed_override *f, const struct interp *it)
+/* The plan is left, or it is known to rest. */
+static int leaves_or_rests(struct feed_override *f, const struct interp *it)
 {
     struct path_state state;
     int64_t turned_q56 = 0;
     const struct timebase *time = &f->time;
-    if (time->started == 0) {
-        return;
-    }
     const int known = plan_state(f, it, &state, &turned_q56);
     const int rests = (time->now.rate_q57 | time->now.slope_q56) == 0;
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
         come_to_rest(f, 1);
-    } else if (!known || !leave_plan(f, &state, turned_q56)) {
-        f->left_q30 -= qmath_lesser(timebase_rate_q30(time), TICK_Q30);
-        wait_slowly(f);
+        return 1;
     }
+    return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
 }
 
-/* A fault stop's own brake takes the place of one that would take longer. */
+/* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. What there is
+ * to find out before is spread over ticks. */
+static int wait_tick(struct feed_override *f, struct interp *it)
+{
+    if (f->time.started != 0) {
+        if (f->numbers_piece != f->time.piece) {
+            read_numbers(f);
+        }
+        if (f->look == LOOK_SEEN) {
+            f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_NOT_YET;
+        } else if (leaves_or_rests(f, it)) {
+            return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERP_OK;
+        }
+        f->left_q30 -= qmath_lesser(timebase_rate_q30(&f->time), TICK_Q30);
+        wait_slowly(f);
+    }
+    return plan_tick(f, it);
+}
+
+/* A fault stop gives its own numbers to the brake of a hold or a stop, where that then rests on the path. */
 static void replace_brake(struct feed_override *f)
 {
-    struct path_brake_numbers own;
-    struct path_brake brake;
-    if (numbers(f, &own) && path_brake_plan(&brake, &f->brake.at, &own) &&
-        path_brake_ticks(&brake) < path_brake_ticks(&f->brake) && ends_on_path(f, &brake)) {
-        f->brake = brake;
-        f->replace = 0;
+    const struct path_state at = f->brake.at;
+    if (f->look == LOOK_NOT_YET && f->numbers_kind == f->kind && fits_before_end(f, &at)) {
+        f->look = LOOK_FITS;
+        return;
     }
+    if (f->look == LOOK_FITS) {
+        (void)path_brake_begin(&f->brake, &at, &f->numbers);
+        f->look = LOOK_NOT_YET;
+    }
+    f->replace = 0;
 }
 
 /* On from the place of rest when that is known, and wanted. */
@@ -295,35 +345,30 @@ static void look_for_place(struct feed_override *f, struct interp *it)
     }
 }
 
-void feed_override_decide(struct feed_override *f, struct interp *it)
+int feed_override_stop_tick(struct feed_override *f, struct interp *it)
 {
-    if (f->phase == PHASE_REST) {
-        look_for_place(f, it);
-    } else if (f->phase == PHASE_BRAKE) {
+    if (f->phase == PHASE_PLAN) {
+        return wait_tick(f, it);
+    }
+    if (f->phase == PHASE_BRAKE) {
         if (f->replace != 0) {
             replace_brake(f);
         }
-    } else {
-        begin_stop(f, it);
+        return brake_tick(f, it);
     }
+    look_for_place(f, it);
+    return f->phase == PHASE_PLAN ? plan_tick(f, it) : INTERP_OK;
 }
 
 int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out)
 {
-    int result = INTERP_OK;
-    if (f->phase != PHASE_PLAN || comes_to_rest(f)) {
-        feed_override_decide(f, it);
+    const int aside = f->phase != PHASE_PLAN || comes_to_rest(f);
+    const int result = aside ? feed_override_stop_tick(f, it) : plan_tick(f, it);
+    if (result < 0) {
+        return result;
     }
-    if (f->phase == PHASE_BRAKE) {
-        f->left_q30 -= TICK_Q30;
-        result = brake_tick(f, it);
-    } else if (f->phase == PHASE_PLAN) {
-        result = plan_tick(f, it);
-    }
-    if (result >= 0) {
-        *out = f->point;
-    }
-    return result < 0 ? result : 0;
+    *out = f->point;
+    return 0;
 }
 
 /* --- What is so --- */

@@ -38,12 +38,17 @@ enum feed_state {
 struct feed_override {
     struct timebase time;
     struct path_brake brake;
+    struct path_brake_numbers numbers; /* of the stop asked for, in this piece: */
+    uint32_t numbers_piece;
+    uint32_t numbers_kind;             /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
+    struct path_state seen;            /* near the end of the program: the state looked at, */
+    uint32_t look;                     /* and how far the look has come */
     struct interp_search place; /* of rest */
     struct interp_point point;  /* of the last setpoint */
     uint32_t state;             /* enum feed_state: what is wanted, and whether it is reached */
     uint32_t phase;             /* where setpoints come from */
     uint32_t kind;              /* enum program_stop_kind of the stop asked for */
-    uint32_t replace; /* 1: a fault stop, which has not taken the place of the brake yet */
+    uint32_t replace; /* 1: a fault stop, whose numbers the brake has not got yet */
     uint32_t found;   /* 1: `place` is */
     int64_t left_q30; /* ticks at rate 1 until the deadline */
 };
@@ -76,9 +81,9 @@ void feed_override_fault_stop(struct feed_override *f);
  * same point again. Returns 0 or a negative INTERP_ERR_..., then *out is unchanged. Bounded time, tick context. */
 int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
 
-/* Part of feed_override_next, where anything but the plan is wanted: what this tick does about it. By itself, so that the
- * longest path of a tick in which only the plan goes on can be counted without it. */
-void feed_override_decide(struct feed_override *f, struct interp *it);
+/* Part of feed_override_next: a tick in which a stop is under way, or rest. By itself, so that the longest path of a tick
+ * in which only the plan goes on can be counted without it. */
+int feed_override_stop_tick(struct feed_override *f, struct interp *it);
 
 /* --- What is so at the last setpoint --- */
 

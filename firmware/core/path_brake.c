@@ -5,9 +5,15 @@
 
 #define FINE_BITS 16 /* from q40 to q56 */
 #define MOST_Q56  ((int64_t)1 << 60)
-#define ATTEMPTS  8
-#define SIX       6
-#define MOST_Q16  ((uint64_t)PATH_BRAKE_MOST_TICKS << 16)
+#define MOST_BITS 12      /* of PATH_BRAKE_MOST_TICKS */
+#define SIXTH_Q32 715827882u
+#define THREE_HALVES_Q16 98304u
+#define SPARE     5       /* ticks of path_brake_fits: two of the motion, three of rounding */
+#define RISE_BITS 7       /* of an acceleration at which a brake begins, over its deceleration */
+#define LEAST     (1 << 22) /* 2^-34 mm a tick squared, or cubed */
+#define FITS_BITS 57      /* of a deceleration that path_brake_fits knows */
+
+enum phase { FALLING, READY, SETTLING, RESTING };
 
 /* --- Numbers of the stop table (docs/protocol.md 1.4) --- */
 
@@ -40,194 +46,253 @@ int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_s
         return 0;
     }
     /* m 2^-24 mm/s^2 in 2^-56 mm a tick squared; m 2^-18 mm/s^3 in 2^-56 mm a tick cubed */
-    out->jerk_down_q56 = decoded(stop->jerk_down, CUBED_MS_Q61, 3 * p - 23);
-    out->deceleration_q56 = decoded(stop->deceleration, SQUARED_MS_Q51, 2 * p - 19);
-    out->jerk_up_q56 = decoded(stop->jerk_up, CUBED_MS_Q61, 3 * p - 23);
+    const struct path_brake_numbers n = {
+        decoded(stop->jerk_down, CUBED_MS_Q61, 3 * p - 23),
+        decoded(stop->deceleration, SQUARED_MS_Q51, 2 * p - 19),
+        decoded(stop->jerk_up, CUBED_MS_Q61, 3 * p - 23),
+    };
+    const int64_t jerk = qmath_lesser(n.jerk_down_q56, n.jerk_up_q56);
+    if (jerk < LEAST || n.deceleration_q56 < LEAST || n.deceleration_q56 >> MOST_BITS >= jerk) {
+        return 0;
+    }
+    *out = n;
     return 1;
 }
 
-/* --- Plan --- */
+/* --- Products of numbers that need more than 64 bits --- */
 
-struct ticks {
-    uint32_t first;
-    uint32_t second;
-    uint32_t last;
+/* A number above 0: mantissa 2^exponent, the mantissa of 31 bits and rounded down. */
+struct rough {
+    uint32_t mantissa;
+    int exponent;
 };
 
-static uint32_t whole_ticks(uint64_t ticks_q16)
+static struct rough rough_of(int64_t a)
 {
-    const uint32_t whole = (uint32_t)((ticks_q16 + 0xFFFFu) >> 16);
-    return whole > 0u ? whole : 1u;
+    const int zeros = qmath_clz64((uint64_t)a | 1u);
+    const struct rough out = {(uint32_t)((uint64_t)a << zeros >> 33), 33 - zeros};
+    return out;
 }
 
-/* Time in which the acceleration falls from 0 to the peak of a brake without an even part: m ticks with
- * m^2 (1 + down/up) = 2 speed/down + (acceleration/down)^2. 0: more ticks than a brake may have. */
-static uint64_t peak_time_q16(const struct path_state *from, const struct path_brake_numbers *n,
-                              uint32_t lead_q16, uint64_t ratio_q16)
+/* need <= 2 a b 2^up for a need below 2^63; 0 where rounding leaves it open. */
+static int within(uint64_t need, struct rough a, struct rough b, int up)
 {
-    const uint64_t sum_q32 = qmath_ratio(2 * from->speed_q56, n->jerk_down_q56, 32) +
-                             qmath_product_unsigned(lead_q16, lead_q16);
-    const int up = qmath_clz64(sum_q32 | 1u);
-    const uint64_t square = qmath_div_u64(sum_q32 << up, ratio_q16 + 65536u);
-    return up < 16 ? qmath_root(square << (16 - up)) : qmath_root(square >> (up - 16));
+    const uint64_t have = 2u * qmath_product_unsigned(a.mantissa, b.mantissa);
+    const int shift = a.exponent + b.exponent + up;
+    if (shift >= 0) {
+        return shift > 63 || have > need >> shift;
+    }
+    return shift >= -63 && have >> -shift >= need;
 }
 
-/* About as many ticks as the continuous brake takes; 0 where it takes too many, or would have to turn round. */
-static int guess_ticks(struct ticks *ticks, const struct path_state *from,
-                       const struct path_brake_numbers *n)
+/* Whether there are whole ticks for the way to rest: b^2 <= 2 j (v - b); for v less b, also a tick later
+ * (docs/numerics.md section 12). */
+static int may_settle(int64_t speed_q56, int64_t fall_q56, int64_t jerk_q56)
 {
-    const uint64_t lead_q16 =
-        qmath_ratio(qmath_magnitude(from->acceleration_q56), n->jerk_down_q56, 16);
-    const uint64_t ratio_q16 = qmath_ratio(n->jerk_down_q56, n->jerk_up_q56, 16);
-    const uint64_t most_q16 = qmath_ratio(n->deceleration_q56, n->jerk_down_q56, 16);
-    if (lead_q16 > MOST_Q16 || ratio_q16 >> 32 != 0) {
+    if (speed_q56 <= fall_q56) {
         return 0;
     }
-    const uint64_t peak_q16 = peak_time_q16(from, n, (uint32_t)lead_q16, ratio_q16);
-    const uint64_t used_q16 = peak_q16 < most_q16 ? peak_q16 : most_q16;
-    if (used_q16 > MOST_Q16) {
-        return 0;
-    }
-    const int64_t first_q16 = from->acceleration_q56 < 0 ? (int64_t)used_q16 - (int64_t)lead_q16
-                                                         : (int64_t)used_q16 + (int64_t)lead_q16;
-    const uint64_t last_q16 = qmath_product_unsigned((uint32_t)used_q16, (uint32_t)ratio_q16) >> 16;
-    if (qmath_magnitude(first_q16) > (int64_t)MOST_Q16 || last_q16 > MOST_Q16 ||
-        (first_q16 < 0 && peak_q16 < most_q16)) {
-        return 0;
-    }
-    ticks->first = whole_ticks((uint64_t)qmath_magnitude(first_q16));
-    ticks->second = 0;
-    ticks->last = whole_ticks(last_q16);
-    return 1;
+    const struct rough fall = rough_of(fall_q56);
+    const uint64_t need = qmath_product_unsigned(fall.mantissa + 1u, fall.mantissa + 1u);
+    return within(need, rough_of(speed_q56 - fall_q56), rough_of(jerk_q56), -2 * fall.exponent);
 }
 
-/* Peak times (n1 + 2 n2 + n3) of a brake with so many ticks in its first part; below 2^63. 0: no speed is left for it. */
-static int64_t twice_speed(const struct path_state *from, uint32_t first)
-{
-    const int64_t a = from->acceleration_q56;
-    if ((qmath_magnitude(a) >> 20) * (int64_t)first >= (int64_t)1 << 41) {
-        return 0;
-    }
-    return qmath_greater(2 * from->speed_q56 + a * (int64_t)first, 0);
-}
+/* --- Begin --- */
 
-/* As many even ticks as the deceleration needs that the jerks leave. */
-static int add_even(struct ticks *ticks, const struct path_state *from,
-                    const struct path_brake_numbers *n)
+/* Neither too slow nor too fast, and no part of the brake takes more than PATH_BRAKE_MOST_TICKS. */
+static int in_range(const struct path_state *from, const struct path_brake_numbers *n)
 {
-    const int64_t left = twice_speed(from, ticks->first);
-    const uint64_t needed = qmath_ratio(left, n->deceleration_q56, 0); /* n1 + 2 n2 + n3 */
-    const uint32_t jerks = ticks->first + ticks->last;
-    if (needed > 2u * PATH_BRAKE_MOST_TICKS) {
-        return 0;
-    }
-    ticks->second = needed > jerks ? ((uint32_t)needed - jerks) / 2u : 0u;
-    return 1;
-}
-
-/* Jerks for these ticks, if they keep the numbers; else a tick more of what is too short. */
-static int fit(struct path_brake *brake, struct ticks *ticks, const struct path_state *from,
-               const struct path_brake_numbers *n)
-{
-    const uint32_t sum = ticks->first + 2u * ticks->second + ticks->last;
-    const uint64_t parts = qmath_product_unsigned(SIX * sum, ticks->last);
-    const int64_t up = (int64_t)qmath_div_u64((uint64_t)twice_speed(from, ticks->first), parts);
-    const int64_t peak = SIX * up * (int64_t)ticks->last;
-    if (SIX * up > n->jerk_up_q56) {
-        ticks->last++;
-        return 0;
-    }
-    if (peak > n->deceleration_q56) {
-        ticks->second++;
-        return 0;
-    }
-    const int64_t way = from->acceleration_q56 + peak;
-    const int64_t size =
-        (int64_t)qmath_div_u64((uint64_t)qmath_magnitude(way), SIX * (uint64_t)ticks->first);
-    if (SIX * size > n->jerk_down_q56) {
-        ticks->first++;
-        return 0;
-    }
-    const int64_t down = way < 0 ? -size : size;
-    brake->up_q56 = up;
-    brake->down_q56 = down;
-    brake->at.acceleration_q56 = SIX * down * (int64_t)ticks->first - peak;
-    brake->at.speed_q56 =
-        (peak * (int64_t)sum - brake->at.acceleration_q56 * (int64_t)ticks->first) / 2;
-    return 1;
-}
-
-static int in_range(const struct path_state *from)
-{
+    const int64_t rise = qmath_greater(from->acceleration_q56, 0);
     return from->speed_q56 >= PATH_BRAKE_NO_SPEED && from->speed_q56 <= PATH_BRAKE_MOST_SPEED &&
-           qmath_magnitude(from->acceleration_q56) <= MOST_Q56;
+           from->acceleration_q56 >= -MOST_Q56 &&
+           from->speed_q56 >> MOST_BITS < n->deceleration_q56 &&
+           rise >> MOST_BITS < n->jerk_down_q56 && rise >> RISE_BITS < n->deceleration_q56 &&
+           rise <= MOST_Q56 && (rise >> 30) * (rise >> 30) <= n->jerk_down_q56;
 }
 
-int path_brake_plan(struct path_brake *brake, const struct path_state *from,
-                    const struct path_brake_numbers *numbers)
+/* Whether the next tick may fall from here: after one without jerk there is still a way to rest. */
+static int may_fall(const struct path_state *at, int64_t jerk_up_q56)
 {
-    struct path_brake found;
-    struct ticks ticks;
-    if (!in_range(from) || !guess_ticks(&ticks, from, numbers) ||
-        !add_even(&ticks, from, numbers)) {
+    const int64_t a = at->acceleration_q56;
+    return a >= 0 || may_settle(at->speed_q56 + a, -a, jerk_up_q56);
+}
+
+int path_brake_begin(struct path_brake *brake, const struct path_state *from,
+                     const struct path_brake_numbers *numbers)
+{
+    if (!in_range(from, numbers)) {
         return 0;
     }
-    found.at = *from;
-    for (int i = 0; i < ATTEMPTS; i++) {
-        if (twice_speed(from, ticks.first) == 0) {
-            return 0;
-        }
-        if (fit(&found, &ticks, from, numbers)) {
-            found.first = ticks.first;
-            found.second = ticks.second;
-            found.last = ticks.last;
-            *brake = found;
-            return 1;
-        }
+    const struct path_state next = {.speed_q56 = from->speed_q56 + from->acceleration_q56,
+                                    .acceleration_q56 = from->acceleration_q56};
+    if (!may_fall(&next, numbers->jerk_up_q56)) {
+        return 0;
     }
-    return 0;
+    brake->at = *from;
+    brake->numbers = *numbers;
+    brake->settle_ticks = 0;
+    brake->phase = FALLING;
+    return 1;
+}
+
+/* --- How deep --- */
+
+/* sqrt(9/4 + 2 w/j) in 2^-16 for 2 < w/j < 2^29: below it by 2^-8 of it at most. */
+static uint32_t depth_root_q16(int64_t w_q56, int64_t jerk_q56)
+{
+    const struct rough w = rough_of(w_q56);
+    const struct rough j = rough_of(jerk_q56);
+    const uint32_t ratio_q15 = w.mantissa / ((j.mantissa >> 15) + 1u);
+    const uint64_t square_q32 =
+        ((uint64_t)9 << 30) + ((uint64_t)ratio_q15 << ((w.exponent - j.exponent + 18) & 63));
+    const int even = qmath_clz64(square_q32) & ~1;
+    const uint32_t root = qmath_root_above((uint32_t)(square_q32 << even >> 32));
+    return (root - (root >> 9) - 3u) << 16 >> (even / 2);
+}
+
+/* Nearly the greatest deceleration b that a tick may bring the acceleration to, b^2 + 3 j b <= 2 j w with w = speed +
+ * acceleration / 2, w > 0: the speed then is w - b / 2, and may_settle. */
+static int64_t depth(int64_t w_q56, int64_t jerk_q56)
+{
+    if (w_q56 >> 1 <= jerk_q56) {
+        return w_q56 >> 1;
+    }
+    return qmath_mul_unsigned(jerk_q56, depth_root_q16(w_q56, jerk_q56) - THREE_HALVES_Q16) * 65536;
+}
+
+/* --- A bound of the way --- */
+
+/* At least x^2 / (2 j); held at 2^62. */
+static int64_t half_square(int64_t x, int64_t j_q56)
+{
+    const struct rough above = rough_of(x);
+    const struct rough below = rough_of(j_q56);
+    const uint64_t square = qmath_product_unsigned(above.mantissa + 1u, above.mantissa + 1u) >> 31;
+    const uint32_t ratio = ((uint32_t)square + 1u) / (below.mantissa >> 15) + 1u;
+    return qmath_shift_clamp((int64_t)ratio + 1, 2 * above.exponent - below.exponent + 15);
+}
+
+/* x^2 + 3/8 y^2 <= 2 a way */
+static int squares_within(int64_t x, int64_t y, int64_t a_q56, int64_t way_q40_mm)
+{
+    const int up = qmath_clz64((uint64_t)qmath_greater(x, y));
+    const uint32_t first = (uint32_t)((uint64_t)x << up >> 33) + 1u;
+    const uint32_t second = (uint32_t)((uint64_t)y << up >> 33) + 1u;
+    const uint64_t part = qmath_product_unsigned(second, second) >> 3;
+    const uint64_t need = qmath_product_unsigned(first, first) + 3u * part + 3u;
+    return within(need, rough_of(a_q56), rough_of(way_q40_mm), FINE_BITS - 2 * (33 - up));
+}
+
+/* The way is at most that with the deceleration alone from a higher speed, and what the last jerk takes
+ * (docs/numerics.md section 12); the deceleration is one that is about reached. */
+int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
+                    int64_t way_q40_mm)
+{
+    const int64_t way_left = way_q40_mm - SPARE * (from->speed_q56 >> FINE_BITS);
+    if (!in_range(from, numbers) || way_left <= 0 || from->acceleration_q56 >> FITS_BITS > 0) {
+        return 0;
+    }
+    const int64_t jerk = qmath_lesser(numbers->jerk_down_q56, numbers->jerk_up_q56);
+    const int64_t rise = qmath_greater(from->acceleration_q56, 0);
+    const int64_t reached = qmath_greater(depth(from->speed_q56 >> 1, jerk), from->speed_q56 >> MOST_BITS);
+    const int64_t most = qmath_lesser(numbers->deceleration_q56, reached);
+    const int64_t fall = qmath_greater(most + from->acceleration_q56, 0);
+    if (most >> FITS_BITS != 0) {
+        return 0;
+    }
+    const int64_t early = half_square(fall, numbers->jerk_down_q56);
+    const int64_t late = half_square(most, numbers->jerk_up_q56);
+    const int64_t speed = from->speed_q56 + early + SPARE * (most + rise);
+    return (early | late) >> 60 == 0 && squares_within(speed, late, most, way_left);
 }
 
 /* --- Tick --- */
 
-/* A sixth of the jerk of the next tick. */
-static int64_t jerk(const struct path_brake *brake)
+/* A tick with six times this jerk. */
+static void move(struct path_state *at, int64_t sixth_q56)
 {
-    return brake->first != 0 ? -brake->down_q56 : brake->second != 0 ? 0 : brake->up_q56;
+    const int64_t a = at->acceleration_q56;
+    const int64_t way = at->speed_q56 + (a >> 1) + sixth_q56 + (int64_t)at->fine_q56_mm;
+    at->arc_length_q40_mm += way >> FINE_BITS;
+    at->fine_q56_mm = (uint32_t)way & ((1u << FINE_BITS) - 1u);
+    at->speed_q56 += a + 3 * sixth_q56;
+    at->acceleration_q56 = a + 6 * sixth_q56;
+}
+
+/* A sixth, rounded towards 0: less by 2^-31 of it and a unit at most. */
+static int64_t sixth_of(int64_t a)
+{
+    return a < 0 ? -qmath_mul_unsigned(-a, SIXTH_Q32) : qmath_mul_unsigned(a, SIXTH_Q32);
+}
+
+/* Towards the deceleration; or as far as rest can still be reached from. */
+static void fall_tick(struct path_brake *brake)
+{
+    const struct path_brake_numbers *n = &brake->numbers;
+    const int64_t a = brake->at.acceleration_q56;
+    const int64_t left = -(n->deceleration_q56 + a);
+    const int64_t jerk =
+        left < 0 ? qmath_greater(left, -n->jerk_down_q56) : qmath_lesser(left, n->jerk_down_q56);
+    struct path_state next = brake->at;
+    move(&next, sixth_of(jerk));
+    if (may_fall(&next, n->jerk_up_q56)) {
+        brake->at = next;
+        return;
+    }
+    const int64_t most = depth(brake->at.speed_q56 + (a >> 1), n->jerk_up_q56) + a;
+    move(&brake->at, jerk < 0 && most > 0 ? sixth_of(qmath_greater(jerk, -most)) : 0);
+    brake->phase = READY;
+}
+
+/* The way to rest: n ticks, n >= 2 v / b, with the jerks 6 (p - q i), i = 0 ... n - 1. Speed and acceleration give way
+ * by what rounding takes (docs/numerics.md section 12). */
+static void settle(struct path_brake *brake)
+{
+    const uint64_t speed = (uint64_t)brake->at.speed_q56;
+    const uint64_t fall = (uint64_t)-brake->at.acceleration_q56;
+    const uint64_t n = qmath_div_up_u64(2u * speed, fall);
+    const uint64_t more = n * fall - 2u * speed; /* below fall */
+    const uint64_t q = qmath_div_u64(more, n * (n * n - 1u));
+    const uint64_t p = qmath_div_u64(speed + q * (n * (n - 1u) / 2u * (4u * n + 1u)), 3u * n * n);
+    const int64_t steady = (int64_t)(6u * n * p);
+    brake->rise_q56 = (int64_t)p;
+    brake->rise_less_q56 = (int64_t)q;
+    brake->settle_ticks = (uint32_t)n;
+    brake->at.acceleration_q56 = 3 * (int64_t)(q * n * (n - 1u)) - steady;
+    brake->at.speed_q56 = (int64_t)(3u * n * n * p - q * (n * (n - 1u) / 2u * (4u * n + 1u)));
+    brake->phase = SETTLING;
+}
+
+static void settle_tick(struct path_brake *brake)
+{
+    move(&brake->at, brake->rise_q56);
+    brake->rise_q56 -= brake->rise_less_q56;
+    brake->settle_ticks--;
+    if (brake->settle_ticks == 0) {
+        brake->phase = RESTING;
+    }
+}
+
+void path_brake_coast(struct path_brake *brake)
+{
+    move(&brake->at, 0);
 }
 
 void path_brake_step(struct path_brake *brake)
 {
-    struct path_state *at = &brake->at;
-    const int64_t j = jerk(brake);
-    if (path_brake_ticks(brake) == 0) {
+    if (brake->phase == FALLING) {
+        fall_tick(brake);
         return;
     }
-    const int64_t way = at->speed_q56 + (at->acceleration_q56 >> 1) + j + (int64_t)at->fine_q56_mm;
-    at->arc_length_q40_mm += way >> FINE_BITS;
-    at->fine_q56_mm = (uint32_t)way & ((1u << FINE_BITS) - 1u);
-    at->speed_q56 += at->acceleration_q56 + 3 * j;
-    at->acceleration_q56 += SIX * j;
-    if (brake->first != 0) {
-        brake->first--;
-    } else if (brake->second != 0) {
-        brake->second--;
-    } else {
-        brake->last--;
+    if (brake->phase == READY) {
+        settle(brake);
+    }
+    if (brake->phase == SETTLING) {
+        settle_tick(brake);
     }
 }
 
-/* speed n + (2 acceleration - peak) n^2 / 6 in the first part, peak n^2 / 6 in the last; the mean speed in the second. */
-int64_t path_brake_way_q40_mm(const struct path_brake *brake)
+int path_brake_rests(const struct path_brake *brake)
 {
-    const int64_t n1 = brake->first;
-    const int64_t n2 = brake->second;
-    const int64_t n3 = brake->last;
-    const int64_t down = brake->down_q56 * n1;
-    const int64_t peak = brake->up_q56 * n3; /* a sixth of it */
-    const int64_t even_from = brake->at.speed_q56 + 3 * (down - 2 * peak) * n1;
-    const int64_t even_to = 3 * peak * n3;
-    return (brake->at.speed_q56 >> FINE_BITS) * n1 +
-           ((2 * down - 3 * peak) >> FINE_BITS) * n1 * n1 +
-           ((even_from + even_to) >> (FINE_BITS + 1)) * n2 + (peak >> FINE_BITS) * n3 * n3;
+    return brake->phase == RESTING;
 }

@@ -52,7 +52,7 @@ static uint64_t scaled(uint64_t value, uint32_t factor_q24)
     return ((value * (factor_q24 >> 8)) >> 16) + (value >> 16) + 1u;
 }
 
-/* v >= f^3 a^2 / (2 j) and what a tick changes, all at the lowest speed and the strongest deceleration. */
+/* v >= f^3 a^2 / (2 j) and what three ticks change, all at the lowest speed and the strongest deceleration. */
 static int settled(const struct program *p, uint64_t speed_um, uint64_t falling_um,
                    uint32_t factor_q24, uint64_t jerk_q18)
 {
@@ -64,7 +64,7 @@ static int settled(const struct program *p, uint64_t speed_um, uint64_t falling_
     if (time_us >= (uint64_t)1 << 28 || fall > MOST_CHANGE_UM) {
         return 0;
     }
-    time_us = time_us / 2u + p->header.period_us;
+    time_us = time_us / 2u + 3u * p->header.period_us;
     return speed_um > qmath_div_up_u64(fall * time_us, 1000000u);
 }
 

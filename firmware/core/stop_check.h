@@ -15,9 +15,9 @@
 #include "core/program.h"
 #include "core/program_check.h"
 
-/* Ticks of a stop that are not in the continuous curve: until the command takes effect and its brake is planned, and the
- * rounding of its three parts. */
-#define STOP_TICKS 6u
+/* Ticks of a stop that are not in the continuous curve: until the command takes effect, and what the brake takes more
+ * (tests/unit/test_path_brake.c). */
+#define STOP_TICKS 9u
 /* Time in which the piece whose numbers count may still change, in periods of program time: three ticks at 200 %. */
 #define STOP_WINDOW_TICKS 6u
 #define STOP_WINDOW                                                                                \

@@ -16,6 +16,7 @@
 #define LEAST_MM_S    1e-4 /* slower is rest */
 #define NEVER_S       1e6
 #define LONGEST_SHARE 0.1
+#define TICKS_MORE 3.0 /* of a brake than of its continuous curve */
 #define FEWER 56 /* codes below the greatest: a brake with less than a 128th of a limit is none */
 #define NO_BRAKE_S   10.0
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
@@ -31,13 +32,6 @@ struct inverse {
 /* A state on the path, at an instant of the program. */
 struct state {
     double s, v, a;
-};
-
-/* Phases of a brake: durations and jerks. */
-struct brake {
-    double time_s[3];
-    double jerk[3];
-    double total_s;
 };
 
 /* One piece with the instants looked at. */
@@ -229,27 +223,41 @@ static double strain(const struct inverse *inverse, const struct stop_row *low,
 
 /* --- The brake --- */
 
-/* The one that the controller would take; 0 where none fits. */
-static int brake_plan(struct brake *brake, double v, double a,
-                      const struct path_brake_numbers *numbers, double period_s)
+/* The one that the controller would make, at arc length 0; 0 where none fits. */
+static int brake_begin(struct path_brake *brake, const struct state *from,
+                       const struct path_brake_numbers *numbers, double period_s)
 {
-    const struct path_state from = {
-        .speed_q56 = (int64_t)ldexp(v * period_s, 56),
-        .acceleration_q56 = (int64_t)ldexp(a * period_s * period_s, 56),
+    const struct path_state state = {
+        .speed_q56 = (int64_t)ldexp(from->v * period_s, 56),
+        .acceleration_q56 = (int64_t)ldexp(from->a * period_s * period_s, 56),
     };
-    struct path_brake plan;
-    if (!path_brake_plan(&plan, &from, numbers)) {
-        return 0;
-    }
-    double jerk = 6.0 / (period_s * period_s * period_s);
-    brake->time_s[0] = plan.first * period_s;
-    brake->time_s[1] = plan.second * period_s;
-    brake->time_s[2] = plan.last * period_s;
-    brake->jerk[0] = -ldexp((double)plan.down_q56, -56) * jerk;
-    brake->jerk[1] = 0.0;
-    brake->jerk[2] = ldexp((double)plan.up_q56, -56) * jerk;
-    brake->total_s = path_brake_ticks(&plan) * period_s;
-    return 1;
+    return path_brake_begin(brake, &state, numbers);
+}
+
+/* How long it takes: the continuous curve, and what whole ticks take more on the mean. */
+static double brake_time(const struct state *from, const struct path_brake_numbers *numbers,
+                         double period_s)
+{
+    double tick3 = ldexp(1.0, -56) / (period_s * period_s * period_s);
+    double down = (double)numbers->jerk_down_q56 * tick3;
+    double up = (double)numbers->jerk_up_q56 * tick3;
+    double most = (double)numbers->deceleration_q56 * tick3 * period_s;
+    double square = from->a * from->a / down;
+    double depth = fmin(sqrt((2.0 * from->v + square) / (1.0 / down + 1.0 / up)), most);
+    double change = from->a + depth > 0.0 ? down : -down;
+    double speed = from->v + (from->a * from->a - depth * depth) / (2.0 * change);
+    double even_s = greater(speed / depth - depth / (2.0 * up), 0.0);
+    return fabs(from->a + depth) / down + even_s + depth / up + TICKS_MORE * period_s;
+}
+
+static struct state state_of(const struct path_brake *brake, double from_mm, double period_s)
+{
+    struct state out = {
+        .s = from_mm + ldexp((double)brake->at.arc_length_q40_mm, -40),
+        .v = ldexp((double)brake->at.speed_q56, -56) / period_s,
+        .a = ldexp((double)brake->at.acceleration_q56, -56) / (period_s * period_s),
+    };
+    return out;
 }
 
 static struct state moved(const struct state *from, double j, double t)
@@ -262,26 +270,38 @@ static struct state moved(const struct state *from, double j, double t)
     return to;
 }
 
+/* 1 while one tick keeps the limits, looked at in `parts` places. */
+static int tick_keeps(const struct search *search, const struct inverse *inverse,
+                      const struct state *from, const struct state *to, uint32_t *row, int parts)
+{
+    double j = (to->a - from->a) / search->period_s;
+    for (int k = 0; k < parts; k++) {
+        struct state at = moved(from, j, search->period_s * k / parts);
+        while (*row + 2u < search->row_count && search->rows[*row + 1u].s_mm <= at.s) {
+            (*row)++;
+        }
+        if (strain(inverse, &search->rows[*row], &at, j) > 1.0) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 /* 1 while the brake keeps the limits all the way. */
 static int brake_keeps(const struct search *search, const struct inverse *inverse,
-                       const struct brake *brake, const struct state *from, uint32_t row,
-                       double step_s)
+                       const struct path_brake *brake, double from_mm, uint32_t row, double step_s)
 {
-    struct state begin = *from;
-    for (int phase = 0; phase < 3; phase++) {
-        double time_s = brake->time_s[phase];
-        int steps = (int)(time_s / step_s) + 2;
-        steps = time_s > 0.0 ? steps : 0;
-        for (int k = 0; k <= steps && steps > 0; k++) {
-            struct state at = moved(&begin, brake->jerk[phase], time_s * k / steps);
-            while (row + 2u < search->row_count && search->rows[row + 1u].s_mm <= at.s) {
-                row++;
-            }
-            if (strain(inverse, &search->rows[row], &at, brake->jerk[phase]) > 1.0) {
-                return 0;
-            }
+    struct path_brake tick = *brake;
+    struct state before = state_of(&tick, from_mm, search->period_s);
+    int parts = (int)ceil(search->period_s / step_s);
+    int ticks = (int)greater(step_s / search->period_s, 1.0);
+    for (int k = 0; !path_brake_rests(&tick); k++) {
+        path_brake_step(&tick);
+        struct state at = state_of(&tick, from_mm, search->period_s);
+        if (k % ticks == 0 && !tick_keeps(search, inverse, &before, &at, &row, parts)) {
+            return 0;
         }
-        begin = moved(&begin, brake->jerk[phase], time_s);
+        before = at;
     }
     return 1;
 }
@@ -363,47 +383,48 @@ static void numbers_of(const struct search *search, const int codes[3],
 /* Times to rest from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
 struct times {
     double mean_s, worst_s, first_s;
-    double longest_s;                   /* brake at any rate */
-    double cost_s;                      /* the mean, and a share of the longest */
-    struct brake brakes[MOST_INSTANTS]; /* total_s NEVER_S: the plan goes on */
+    double longest_s; /* brake at any rate */
+    double cost_s;    /* the mean, and a share of the longest */
+    int brakes[MOST_INSTANTS]; /* 0: the plan goes on */
 };
 
 /* after_s: the time to rest from the end of the piece. */
 static void times_of(const struct search *search, const struct piece *piece,
                      const struct path_brake_numbers *numbers, double after_s, struct times *times)
 {
-    struct brake longest;
+    struct path_brake brake;
     double sum = 0.0;
     times->first_s = after_s;
     times->worst_s = 0.0;
     for (uint32_t i = piece->count; i > 0; i--) {
-        struct brake *brake = &times->brakes[i - 1u];
         const struct state *at = &piece->at[i - 1u];
         double wait = times->first_s + (i == piece->count ? 0.0 : piece->step_s);
         double left = piece->left_s + piece->step_s * (piece->count - i);
         /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not counted,
          * or the worst numbers would be the best. */
-        int planned = brake_plan(brake, at->v, at->a, numbers, search->period_s);
-        int fits = planned && brake->total_s < left;
-        brake->total_s = fits ? brake->total_s : NEVER_S;
-        times->first_s = fits ? brake->total_s : planned ? left : wait;
+        int begins = brake_begin(&brake, at, numbers, search->period_s);
+        double total_s = begins ? brake_time(at, numbers, search->period_s) : NEVER_S;
+        times->brakes[i - 1u] = total_s < left;
+        times->first_s = total_s < left ? total_s : begins ? left : wait;
         times->worst_s = greater(times->worst_s, times->first_s);
         sum += times->first_s;
     }
     times->mean_s = sum / piece->count;
-    int fits = brake_plan(&longest, piece->fastest.v, piece->fastest.a, numbers, search->period_s);
-    times->longest_s = fits ? longest.total_s : NO_BRAKE_S;
+    times->longest_s = brake_begin(&brake, &piece->fastest, numbers, search->period_s)
+                           ? brake_time(&piece->fastest, numbers, search->period_s)
+                           : NO_BRAKE_S;
     times->cost_s = times->mean_s + LONGEST_SHARE * times->longest_s;
 }
 
 /* Whether these brakes keep the limits; the instant that broke one last is looked at first. */
-static int all_keep(const struct search *search, struct piece *piece, const struct times *times)
+static int all_keep(const struct search *search, struct piece *piece, const struct times *times,
+                    const struct path_brake_numbers *numbers)
 {
     for (uint32_t n = 0; n < piece->count; n++) {
         uint32_t i = (n + piece->suspect) % piece->count;
-        if (times->brakes[i].total_s < NEVER_S &&
-            !brake_keeps(search, &search->inverse, &times->brakes[i], &piece->at[i], piece->row[i],
-                         STEP_S)) {
+        struct path_brake brake;
+        if (times->brakes[i] && brake_begin(&brake, &piece->at[i], numbers, search->period_s) &&
+            !brake_keeps(search, &search->inverse, &brake, piece->at[i].s, piece->row[i], STEP_S)) {
             piece->suspect = i;
             return 0;
         }
@@ -418,7 +439,7 @@ static int may_wait(const struct search *search, const struct state *at,
     double period_s = search->period_s;
     double up = ldexp((double)numbers->jerk_up_q56, -56) / (period_s * period_s * period_s);
     return at->v < LEAST_MM_S ||
-           (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - at->a * period_s);
+           (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - 3.0 * at->a * period_s);
 }
 
 /* Whether a brake fits and keeps the limits, or need not fit. */
@@ -426,11 +447,11 @@ static int state_keeps(const struct search *search, const struct inverse *invers
                        const struct state *at, uint32_t row,
                        const struct path_brake_numbers *numbers)
 {
-    struct brake brake;
-    if (!brake_plan(&brake, at->v, at->a, numbers, search->period_s)) {
+    struct path_brake brake;
+    if (!brake_begin(&brake, at, numbers, search->period_s)) {
         return may_wait(search, at, numbers);
     }
-    return brake_keeps(search, inverse, &brake, at, row, FINE_S);
+    return brake_keeps(search, inverse, &brake, at->s, row, FINE_S);
 }
 
 /* The same limits at other rates of program time, also while the rate changes. */
@@ -513,7 +534,7 @@ static int better(const struct search *search, struct piece *piece, const int co
     }
     numbers_of(search, codes, &numbers);
     times_of(search, piece, &numbers, after_s, &times);
-    if (times.cost_s >= best->cost_s || !all_keep(search, piece, &times) ||
+    if (times.cost_s >= best->cost_s || !all_keep(search, piece, &times, &numbers) ||
         (strict && !strictly(search, piece, codes))) {
         return 0;
     }

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "golden.h"
@@ -11,6 +12,8 @@
 #define UNIT  72057594037927936.0 /* 2^56 */
 #define Q40   1099511627776.0
 #define CASES 200000
+#define MORE_TICKS    6
+#define MORE_IN_SHORT 10
 
 static uint64_t random_state;
 
@@ -123,6 +126,17 @@ static void test_code_0_is_no_brake(void)
     TEST_ASSERT_FALSE(path_brake_numbers_of(&n, &stop, 1000));
 }
 
+static int64_t way_q56(const struct path_state *a, const struct path_state *b)
+{
+    return (b->arc_length_q40_mm - a->arc_length_q40_mm) * 65536 + (int64_t)b->fine_q56_mm -
+           (int64_t)a->fine_q56_mm;
+}
+
+static int64_t way_from(const struct path_state *a, const struct path_state *b)
+{
+    return b->arc_length_q40_mm - a->arc_length_q40_mm;
+}
+
 /* From 100 mm/s at 1 ms: 20 ms of jerk to 2000 mm/s^2, 30 ms of that, 20 ms to rest: 3.5 mm. */
 static void test_of_a_book(void)
 {
@@ -130,67 +144,69 @@ static void test_of_a_book(void)
     const struct path_state from = state_of(&c);
     const struct path_brake_numbers numbers = numbers_of(&c);
     struct path_brake brake;
-    TEST_ASSERT_TRUE(path_brake_plan(&brake, &from, &numbers));
-    TEST_ASSERT_INT_WITHIN(1, 70, (int)path_brake_ticks(&brake));
-    TEST_ASSERT_DOUBLE_WITHIN(0.06, 3.5, (double)path_brake_way_q40_mm(&brake) / Q40);
+    int ticks = 0;
+    TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &numbers));
+    for (; !path_brake_rests(&brake); ticks++) {
+        path_brake_step(&brake);
+    }
+    TEST_ASSERT_INT_WITHIN(2, 71, ticks);
+    TEST_ASSERT_DOUBLE_WITHIN(0.06, 3.5, (double)way_from(&from, &brake.at) / Q40);
 }
 
-/* One tick: a cubic that begins with the state before and ends with the state after it, whose jerk, acceleration and
- * speed keep the numbers. */
+/* The state and its numbers in 2^-56 mm and ticks keep what they promise in one tick: a cubic from the state before to the
+ * state after. `slack`: what rounding may add to the last jerk. */
 static void check_tick(const struct path_state *a, const struct path_state *b,
-                       const struct path_brake_numbers *n, int64_t first_acceleration)
+                       const struct path_brake_numbers *n, int64_t first_acceleration,
+                       int64_t slack)
 {
     const int64_t j = b->acceleration_q56 - a->acceleration_q56;
-    const int64_t way = (b->arc_length_q40_mm - a->arc_length_q40_mm) * 65536 +
-                        (int64_t)b->fine_q56_mm - (int64_t)a->fine_q56_mm;
+    const int64_t way = way_q56(a, b);
     const int64_t most = n->deceleration_q56;
-    TEST_ASSERT_TRUE(-j <= n->jerk_down_q56);
-    TEST_ASSERT_TRUE(j <= (n->jerk_up_q56 > n->jerk_down_q56 ? n->jerk_up_q56 : n->jerk_down_q56));
-    TEST_ASSERT_TRUE(b->acceleration_q56 >=
+    const int64_t rise = n->jerk_up_q56 > n->jerk_down_q56 ? n->jerk_up_q56 : n->jerk_down_q56;
+    TEST_ASSERT_TRUE(-j <= n->jerk_down_q56 + slack);
+    TEST_ASSERT_TRUE(j <= rise + slack);
+    TEST_ASSERT_TRUE(b->acceleration_q56 + slack >=
                      (first_acceleration < -most ? first_acceleration : -most));
-    TEST_ASSERT_EQUAL_INT64(0, j % 6);
-    TEST_ASSERT_EQUAL_INT64(2 * (b->speed_q56 - a->speed_q56), 2 * a->acceleration_q56 + j);
-    TEST_ASSERT_EQUAL_INT64(way, a->speed_q56 + a->acceleration_q56 / 2 + j / 6);
+    TEST_ASSERT_TRUE(labs(2 * (b->speed_q56 - a->speed_q56) - 2 * a->acceleration_q56 - j) <=
+                     slack);
+    TEST_ASSERT_TRUE(labs(way - a->speed_q56 - a->acceleration_q56 / 2 - j / 6) <= slack);
     TEST_ASSERT_TRUE(b->speed_q56 >= 0);
     TEST_ASSERT_TRUE(way >= 0);
 }
 
-static void check_brake(struct path_brake *brake, const struct path_state *from,
-                        const struct path_brake_numbers *n)
+/* Ticks until rest. */
+static int check_brake(struct path_brake *brake, const struct path_brake_numbers *n)
 {
-    const double first = brake->first;
-    const double last = brake->last;
-    const double sum = first + 2.0 * brake->second + last;
-    const int64_t way = path_brake_way_q40_mm(brake);
     const int64_t first_acceleration = brake->at.acceleration_q56;
     struct path_state before = brake->at;
-    TEST_ASSERT_TRUE(fabs((double)(before.speed_q56 - from->speed_q56)) <=
-                     3 * (first * first + last * sum));
-    TEST_ASSERT_TRUE(fabs((double)(before.acceleration_q56 - from->acceleration_q56)) <= 6 * first);
-    TEST_ASSERT_EQUAL_INT64(from->arc_length_q40_mm, before.arc_length_q40_mm);
-    while (path_brake_ticks(brake) > 0) {
+    int ticks = 0;
+    for (; !path_brake_rests(brake); ticks++) {
         path_brake_step(brake);
-        check_tick(&before, &brake->at, n, first_acceleration);
+        const int64_t settling = (int64_t)brake->settle_ticks + 16;
+        check_tick(&before, &brake->at, n, first_acceleration, 8 * settling * settling + 64);
         before = brake->at;
+        TEST_ASSERT_TRUE(ticks < 300000);
     }
     TEST_ASSERT_EQUAL_INT64(0, before.speed_q56);
     TEST_ASSERT_EQUAL_INT64(0, before.acceleration_q56);
-    TEST_ASSERT_DOUBLE_WITHIN(1 / 32768.0, (double)way / Q40,
-                              (double)(before.arc_length_q40_mm - from->arc_length_q40_mm) / Q40);
     path_brake_step(brake);
     TEST_ASSERT_EQUAL_MEMORY(&before, &brake->at, sizeof before);
+    return ticks;
 }
 
 static bool ordinary(const struct brake_case *c)
 {
     const double a = c->acceleration;
+    const double least = a < 0 ? a * a / (2 * c->up) - 3.1 * a * c->period : 0;
     const double most_speed = c->speed + (a > 0 ? a * a / (2 * c->down) : 0);
     return a > -0.1 * c->most && a < 0.5 * c->most && most_speed * c->period < 4 &&
-           c->up > 0.05 * c->down;
+           c->most < 4000 * c->period * fmin(c->down, c->up) && c->speed > least;
 }
 
-/* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more and the
- * acceleration is below half the deceleration there is one, at most 3 ticks and 4 % longer. */
+/* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more, and the
+ * acceleration is below half the deceleration, there is one. No brake takes
+ * MORE_TICKS more than the continuous one; a short one with a slow last jerk takes MORE_IN_SHORT.
+ * path_brake_fits never promises less than a brake takes. */
 static void test_random_brakes(void)
 {
     uint32_t found = 0;
@@ -200,16 +216,19 @@ static void test_random_brakes(void)
         const struct path_brake_numbers numbers = numbers_of(&c);
         const double least = continuous_ticks(&c);
         struct path_brake brake;
-        const int fits = path_brake_plan(&brake, &from, &numbers);
-        if (ordinary(&c) && least >= 30 && least < 3000) {
-            TEST_ASSERT_TRUE(fits);
-            TEST_ASSERT_TRUE(path_brake_ticks(&brake) <= least * 1.04 + 3);
-            TEST_ASSERT_TRUE(path_brake_ticks(&brake) >= least - 0.01);
+        const int begins = path_brake_begin(&brake, &from, &numbers);
+        if (!begins) {
+            TEST_ASSERT_FALSE(ordinary(&c) && least >= 30 && least < 3000 && c.up > 0.05 * c.down);
+            continue;
         }
-        if (fits) {
-            found++;
-            check_brake(&brake, &from, &numbers);
+        found++;
+        const int ticks = check_brake(&brake, &numbers);
+        const int64_t way = way_from(&from, &brake.at);
+        if (ordinary(&c) && least >= 0) {
+            TEST_ASSERT_TRUE(ticks >= least - 0.01);
+            TEST_ASSERT_TRUE(ticks <= least + (least < 25 ? MORE_IN_SHORT : MORE_TICKS));
         }
+        TEST_ASSERT_FALSE(path_brake_fits(&from, &numbers, way - 1));
     }
     TEST_ASSERT_TRUE(found > CASES / 2);
 }
@@ -223,7 +242,7 @@ static void refused(int64_t speed_q56, int64_t acceleration_q56)
     struct path_brake before;
     memset(&brake, 0x5A, sizeof brake);
     before = brake;
-    TEST_ASSERT_FALSE(path_brake_plan(&brake, &from, &numbers));
+    TEST_ASSERT_FALSE(path_brake_begin(&brake, &from, &numbers));
     TEST_ASSERT_EQUAL_MEMORY(&before, &brake, sizeof brake);
 }
 
@@ -241,7 +260,7 @@ static void test_refused_states(void)
     refused(PATH_BRAKE_MOST_SPEED, 0);              /* too many ticks */
 }
 
-/* Whatever the numbers are, nothing overflows (the sanitizers watch) and a brake that is found ends at rest. */
+/* Whatever the state and the numbers are, nothing overflows (the sanitizers watch) and a brake that is found ends at rest. */
 static void test_extreme_numbers(void)
 {
     for (uint32_t i = 0; i < CASES; i++) {
@@ -256,14 +275,19 @@ static void test_extreme_numbers(void)
             .acceleration_q56 =
                 (int64_t)golden_random(&random_state) >> (3 + golden_random(&random_state) % 60u)};
         struct path_brake brake;
-        if (path_brake_plan(&brake, &from, &n)) {
-            (void)path_brake_way_q40_mm(&brake);
-            while (path_brake_ticks(&brake) > 0) {
+        const int64_t jerk = n.jerk_up_q56 < n.jerk_down_q56 ? n.jerk_up_q56 : n.jerk_down_q56;
+        if (jerk < 1 << 22 || n.deceleration_q56 < 1 << 22 || n.deceleration_q56 / 4096 >= jerk) {
+            continue;
+        }
+        if (path_brake_begin(&brake, &from, &n)) {
+            for (int tick = 0; !path_brake_rests(&brake); tick++) {
+                TEST_ASSERT_TRUE(tick < 300000);
                 path_brake_step(&brake);
             }
             TEST_ASSERT_EQUAL_INT64(0, brake.at.speed_q56);
             TEST_ASSERT_EQUAL_INT64(0, brake.at.acceleration_q56);
         }
+        (void)path_brake_fits(&from, &n, (int64_t)(golden_random(&random_state) >> 2));
     }
 }
 

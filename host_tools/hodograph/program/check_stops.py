@@ -21,7 +21,7 @@ from .stops import DECELERATION, FAULT, HOLD, JERK_DOWN, JERK_UP, numbers
 Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
-STOP_TICKS = 6
+STOP_TICKS = 9
 """Ticks of a stop that are not in the continuous curve."""
 WINDOW_TICKS = 6
 """Periods of program time in which the piece whose numbers count may still change,"""
@@ -152,7 +152,7 @@ def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) ->
     """Whether a brake fits everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
     factor = (program.pieces.override_factor_q24 * 2.0**-24)[:, None]
     falling = np.maximum(-acceleration, 0.0) * factor**2
-    settle_s = 0.5 * falling / jerk_up[:, None] + 1e-6 * program.period_us
+    settle_s = 0.5 * falling / jerk_up[:, None] + 3e-6 * program.period_us
     return np.asarray((falling == 0.0) | (np.maximum(feed, 0.0) >= falling * settle_s))
 
 
