@@ -9,10 +9,11 @@
 enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 
 /* Whether a brake would rest before the end of the path: found out a tick before it begins. */
-enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS };
+enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 
 #define TICK_Q30      ((int64_t)1 << 30)
 #define SPARE_TICKS   2                  /* of the deadline: rounding */
+#define END_TICKS     2u                 /* until a command counts, and until the end is a setpoint */
 #define SEARCH_STEPS  2                  /* in a tick at rest */
 #define NO_NUMBERS    2u
 #define MOST_FEED_Q32 ((int64_t)1 << 45)
@@ -43,13 +44,10 @@ static uint32_t left_us(const struct feed_override *f)
     return left_q42 >> 44 != 0 ? 4000000u : (uint32_t)((left_q42 >> 12) * 15625u >> 24);
 }
 
-/* The bound of the present piece and a fifth, as ticks. Near the end of the program, whose end a brake may not fit before,
- * what is left of it counts if that is more. */
+/* The bound and a fifth, as ticks. */
 static int64_t deadline_q30(const struct feed_override *f)
 {
-    uint32_t bound_us = feed_override_bound_us(f, (enum program_stop_kind)f->kind);
-    const uint32_t end_us = left_us(f);
-    bound_us = end_us > bound_us && end_us / 2u < bound_us ? end_us : bound_us;
+    const uint32_t bound_us = feed_override_bound_us(f, (enum program_stop_kind)f->kind);
     const uint64_t time_us = qmath_product_unsigned(bound_us, 6u);
     const uint64_t ticks_q8 = qmath_div_u64(time_us << 8, 5u * f->time.period_us);
     return ((int64_t)ticks_q8 << 22) + SPARE_TICKS * TICK_Q30;
@@ -303,9 +301,14 @@ static int wait_tick(struct feed_override *f, struct interp *it)
             read_numbers(f);
         }
         if (f->look == LOOK_SEEN) {
-            f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_NOT_YET;
+            f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_WAIT;
+        }
+        if (f->look == LOOK_WAIT) {
+            f->look = LOOK_NOT_YET;
         } else if (leaves_or_rests(f, it)) {
             return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERP_OK;
+        } else if (f->look == LOOK_FITS) {
+            f->look = LOOK_NOT_YET; /* it was so for this tick only */
         }
         f->left_q30 -= qmath_lesser(timebase_rate_q30(&f->time), TICK_Q30);
         wait_slowly(f);
@@ -391,8 +394,9 @@ uint64_t feed_override_time_q42(const struct feed_override *f)
 uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind)
 {
     struct program_stop stop;
+    const uint32_t end_us = left_us(f) + END_TICKS * f->time.period_us;
     program_stop_get(f->time.program, f->time.piece, kind, &stop);
-    return stop.bound_us;
+    return end_us > stop.bound_us && end_us / 2u < stop.bound_us ? end_us : stop.bound_us;
 }
 
 int64_t feed_override_feed_q32(const struct feed_override *f)

@@ -96,7 +96,8 @@ int feed_override_late(const struct feed_override *f);
  * until the place of rest is found. */
 uint64_t feed_override_time_q42(const struct feed_override *f);
 
-/* What the stop table says that a stop takes at most which is asked for now, in us. */
+/* What a stop takes at most that is asked for now, in us: what the stop table says; but less than twice that before the end
+ * of the program what is left of it, since a brake may not fit before the end. */
 uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind);
 
 /* Feed along the path, 2^-32 mm/s. */

@@ -8,7 +8,8 @@
 #define MOST_BITS 12      /* of PATH_BRAKE_MOST_TICKS */
 #define SIXTH_Q32 715827882u
 #define THREE_HALVES_Q16 98304u
-#define SPARE     5       /* ticks of path_brake_fits: two of the motion, three of rounding */
+#define SPARE     3       /* ticks of path_brake_fits, of the speed, */
+#define SPARE_SPEED 1     /* and of the acceleration: one of the motion, and what the brake takes more */
 #define RISE_BITS 7       /* of an acceleration at which a brake begins, over its deceleration */
 #define LEAST     (1 << 22) /* 2^-34 mm a tick squared, or cubed */
 #define FITS_BITS 57      /* of a deceleration that path_brake_fits knows */
@@ -162,14 +163,20 @@ static int64_t depth(int64_t w_q56, int64_t jerk_q56)
 
 /* --- A bound of the way --- */
 
-/* At least x^2 / (2 j); held at 2^62. */
-static int64_t half_square(int64_t x, int64_t j_q56)
+/* The time in which a jerk makes an acceleration, at least a / j in 2^-16 ticks; held at 2^32 - 1. */
+static uint32_t ramp_ticks_q16(int64_t a_q56, int64_t jerk_q56)
 {
-    const struct rough above = rough_of(x);
-    const struct rough below = rough_of(j_q56);
-    const uint64_t square = qmath_product_unsigned(above.mantissa + 1u, above.mantissa + 1u) >> 31;
-    const uint32_t ratio = ((uint32_t)square + 1u) / (below.mantissa >> 15) + 1u;
-    return qmath_shift_clamp((int64_t)ratio + 1, 2 * above.exponent - below.exponent + 15);
+    const struct rough a = rough_of(a_q56);
+    const struct rough j = rough_of(jerk_q56);
+    const int64_t ratio_q15 = a.mantissa / (j.mantissa >> 15) + 1u;
+    const int64_t ticks_q16 = qmath_shift_clamp(ratio_q15, a.exponent - j.exponent + 1) + 1;
+    return ticks_q16 >> 32 != 0 ? UINT32_MAX : (uint32_t)ticks_q16;
+}
+
+/* a t, for t in 2^-16; at most 2^-47 of it too small. */
+static int64_t over_ticks(int64_t a_q56, uint32_t ticks_q16)
+{
+    return qmath_shift_clamp(qmath_mul_unsigned(a_q56, ticks_q16), 16);
 }
 
 /* x^2 + 3/8 y^2 <= 2 a way */
@@ -193,17 +200,24 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
         return 0;
     }
     const int64_t jerk = qmath_lesser(numbers->jerk_down_q56, numbers->jerk_up_q56);
-    const int64_t rise = qmath_greater(from->acceleration_q56, 0);
+    const int64_t change = numbers->jerk_down_q56; /* of the acceleration, in a tick of the motion */
+    const int64_t rise = qmath_greater(from->acceleration_q56, 0) + change;
     const int64_t reached = qmath_greater(depth(from->speed_q56 >> 1, jerk), from->speed_q56 >> MOST_BITS);
     const int64_t most = qmath_lesser(numbers->deceleration_q56, reached);
-    const int64_t fall = qmath_greater(most + from->acceleration_q56, 0);
+    const int64_t fall = qmath_greater(most + from->acceleration_q56 + change, 0);
     if (most >> FITS_BITS != 0) {
         return 0;
     }
-    const int64_t early = half_square(fall, numbers->jerk_down_q56);
-    const int64_t late = half_square(most, numbers->jerk_up_q56);
-    const int64_t speed = from->speed_q56 + early + SPARE * (most + rise);
-    return (early | late) >> 60 == 0 && squares_within(speed, late, most, way_left);
+    /* what the first jerk leaves of the speed in t ticks, a t / 2, and of the way, a t^2 / 6 */
+    const uint32_t first_q16 = ramp_ticks_q16(fall, numbers->jerk_down_q56);
+    const int64_t early = over_ticks(fall, first_q16) / 2;
+    const int64_t saved = over_ticks(early, first_q16 - (first_q16 >> 10)) / 3;
+    const int64_t late = over_ticks(most, ramp_ticks_q16(most, numbers->jerk_up_q56)) / 2;
+    const int64_t speed = from->speed_q56 + early + SPARE_SPEED * (most + rise);
+    if ((early | late | saved) >> 60 != 0) {
+        return 0;
+    }
+    return squares_within(speed, late, most, way_left + (saved >> FINE_BITS));
 }
 
 /* --- Tick --- */

@@ -60,7 +60,7 @@ int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_s
 int path_brake_begin(struct path_brake *brake, const struct path_state *from,
                      const struct path_brake_numbers *numbers);
 
-/* Whether a brake that begins here, or within two ticks of this motion, rests within a way. An upper bound of the way is
+/* Whether a brake that begins here, or a tick later of this motion, rests within a way. An upper bound of the way is
  * what is compared, so 0 where it just does. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t way_q40_mm);

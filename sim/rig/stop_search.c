@@ -296,7 +296,11 @@ static int brake_keeps(const struct search *search, const struct inverse *invers
     int parts = (int)ceil(search->period_s / step_s);
     int ticks = (int)greater(step_s / search->period_s, 1.0);
     for (int k = 0; !path_brake_rests(&tick); k++) {
-        path_brake_step(&tick);
+        if (k == 0) {
+            path_brake_coast(&tick);
+        } else {
+            path_brake_step(&tick);
+        }
         struct state at = state_of(&tick, from_mm, search->period_s);
         if (k % ticks == 0 && !tick_keeps(search, inverse, &before, &at, &row, parts)) {
             return 0;

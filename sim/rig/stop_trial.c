@@ -172,16 +172,6 @@ static double to_rest(struct course *course, struct stop_trial *trial)
     return at_rest(course) ? ticks : -1.0;
 }
 
-/* The table's; but a brake that would end behind the end is not begun, so the program may end instead. */
-static double bound_of(const struct course *course, enum program_stop_kind kind)
-{
-    const double bound_s = 1e-6 * feed_override_bound_us(&course->feed, kind);
-    const uint64_t now_q42 = feed_override_time_q42(&course->feed);
-    const uint64_t end_q42 = course->interp.program->header.duration_q32_s << 10;
-    const double left_s = now_q42 < end_q42 ? ldexp((double)(end_q42 - now_q42), -42) : 0.0;
-    return left_s < 2.0 * bound_s ? fmax(bound_s, left_s) : bound_s;
-}
-
 static void one(const struct course *from, struct stop_trial *trial, uint64_t seed)
 {
     struct course course = *from;
@@ -194,7 +184,7 @@ static void one(const struct course *from, struct stop_trial *trial, uint64_t se
     const enum program_stop_kind kind = order == 2 ? PROGRAM_STOP_FAULT : PROGRAM_STOP_HOLD;
     const int runs = feed_override_state(&course.feed) == FEED_RUNNING &&
                      feed_override_rate_q30(&course.feed) != 0;
-    const double bound_s = bound_of(&course, kind);
+    const double bound_s = 1e-6 * feed_override_bound_us(&course.feed, kind);
     if (order == 0) {
         feed_override_hold(&course.feed);
     } else if (order == 1) {
