@@ -18,6 +18,7 @@
 static const struct od_hooks od_hooks = {
     .read = od_read_hook,
     .write = od_write_hook,
+    .urgent = od_urgent_hook,
     .written = od_written_hook,
     .domain_begin = od_program_begin,
     .domain_write = od_program_write,

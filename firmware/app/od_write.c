@@ -92,6 +92,13 @@ static uint32_t configure(struct controller *controller, const struct od_entry *
     return cob_get(present, entry->size) == value ? SDO_OK : reconfigure(controller, entry, value);
 }
 
+bool od_urgent_hook(const struct od_entry *entry, uint8_t value)
+{
+    const bool stops = value == (uint8_t)COMMAND_STOP || value == (uint8_t)COMMAND_HOLD ||
+                       value == (uint8_t)COMMAND_QUICK_STOP;
+    return entry->index == 0x2001u && stops;
+}
+
 uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_t *value,
                        uint32_t size)
 {

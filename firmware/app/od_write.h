@@ -10,6 +10,9 @@
 uint32_t od_write_hook(void *context, const struct od_entry *entry, const uint8_t *value,
                        uint32_t size);
 
+/* The urgent hook: hold, stop and quick stop wait for no transfer of another client. */
+bool od_urgent_hook(const struct od_entry *entry, uint8_t value);
+
 /* The written hook: a new configuration takes effect. */
 void od_written_hook(void *context, const struct od_entry *entry);
 

@@ -21,6 +21,7 @@
 #ifndef CANOPEN_OD_H
 #define CANOPEN_OD_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -81,6 +82,10 @@ struct od_hooks {
      * the write: nothing changes. */
     uint32_t (*write)(void *context, const struct od_entry *entry, const uint8_t *value,
                       uint32_t size);
+
+    /* Whether this value is written whoever else has an SDO transfer under way (canopen/sdo_server.h): a command to
+     * stop. Of one byte; the entry can be written. Must change nothing. NULL: none is. */
+    bool (*urgent)(const struct od_entry *entry, uint8_t value);
 
     /* After the new value is in its field. */
     void (*written)(void *context, const struct od_entry *entry);

@@ -23,6 +23,9 @@ enum client_command {
 #define BLOCK_UPLOAD_SUBCOMMAND   0x03u
 #define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
 
+#define EXPEDITED_BYTE  0x2Fu /* initiate download: expedited, one byte */
+#define DOWNLOAD_ANSWER 0x60u
+
 void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uint32_t timeout_us,
                      uint8_t block_segments)
 {
@@ -156,6 +159,29 @@ static int refuse_stranger(const struct sdo_server *s, const uint8_t *data, stru
     return 1;
 }
 
+/* The entry of a write that waits for nobody; NULL: it is another frame. */
+static const struct od_entry *urgent_entry(const struct sdo_server *s, const uint8_t *data)
+{
+    const bool whole = data[5] == 0u && data[6] == 0u && data[7] == 0u;
+    if (s->od->hooks->urgent == NULL || data[0] != EXPEDITED_BYTE || !whole) {
+        return NULL;
+    }
+    const struct od_entry *entry = od_find(s->od, (uint16_t)cob_get(data + 1, 2), data[3]);
+    const bool taken = entry != NULL && entry->size == 1u && (entry->access & OD_WRITE) != 0u;
+    return taken && s->od->hooks->urgent(entry, data[4]) ? entry : NULL;
+}
+
+/* Beside the transfer under way, which is not touched. */
+static int write_beside(const struct sdo_server *s, const struct od_entry *entry,
+                        const uint8_t *data, struct can_msg *out)
+{
+    const uint32_t code = od_write(s->od, entry, data + 4, 1);
+    sdo_server_frame(s, code == SDO_OK ? DOWNLOAD_ANSWER : SDO_ABORT_COMMAND_BYTE, out);
+    memcpy(out->data + 1, data + 1, 3);
+    cob_put(out->data + 4, code, 4);
+    return 1;
+}
+
 static bool from_stranger(const struct sdo_server *s, const uint8_t *data)
 {
     if (s->state == SDO_SERVER_IDLE || begins_again(s, data)) {
@@ -181,6 +207,11 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
 {
     if (!sdo_server_wants(server, in)) {
         return 0;
+    }
+    const struct od_entry *urgent =
+        server->state == SDO_SERVER_IDLE ? NULL : urgent_entry(server, in->data);
+    if (urgent != NULL) {
+        return write_beside(server, urgent, in->data, out);
     }
     if (from_stranger(server, in->data)) {
         return refuse_stranger(server, in->data, out);

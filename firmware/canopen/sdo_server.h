@@ -11,6 +11,10 @@
  * begin again, with the same object: it has lost an answer. One that is in the middle aborts first; one that is gone is
  * forgotten after the timeout. An abort counts when it names the object of the transfer, or none (index 0).
  *
+ * A command to stop gets through: an expedited write of one byte that the dictionary's hook `urgent` names is carried out and answered
+ * beside the transfer under way, which goes on. Its client has to disregard that answer, which names another object than
+ * its own. Within a block, segments are told from such a write by all its eight bytes.
+ *
  * Within a block each frame is a segment by its number. One that is a request for an object that there is, by all its bits, and
  * whose number is not one of the next two, is refused as such. A stranger's frame whose number is just the next one is taken, and then the true one shows: the same
  * number with other bytes ends the transfer, and where even that is missed, the CRC.

@@ -43,7 +43,7 @@ struct path {
 };
 
 /* Velocity, acceleration and jerk of x and y at an instant, at rate 1. */
-struct motion_at {
+struct motion {
     struct real of[AXES][QUANTITIES];
 };
 
@@ -61,10 +61,10 @@ struct check {
     const struct program *program;
     struct real limit[AXES][QUANTITIES]; /* m = 0: none */
     struct real per_period;              /* 1/s */
-    struct motion_at last; /* at the end of the stretch before; at rest before the first */
+    struct motion last; /* at the end of the stretch before; at rest before the first */
 };
 
-static void set_at_rest(struct motion_at *out)
+static void set_at_rest(struct motion *out)
 {
     for (int axis = 0; axis < AXES; axis++) {
         for (int k = 0; k < QUANTITIES; k++) {
@@ -215,7 +215,7 @@ static void feed_at(const struct cell *cell, struct real x, struct real f[QUANTI
 
 /* With tangent T = w^2 / sigma and curvature kappa: velocity F' T, acceleration (F'' + i kappa F'^2) T, jerk
  * (F''' - kappa^2 F'^3 + i (3 kappa F' F'' + kappa_s F'^3)) T. docs/numerics.md 16. */
-static void motion_at(const struct cell *cell, struct real x, struct motion_at *out)
+static void motion_at(const struct cell *cell, struct real x, struct motion *out)
 {
     const struct path *path = cell->path;
     struct real f[QUANTITIES];
@@ -257,7 +257,8 @@ static void motion_at(const struct cell *cell, struct real x, struct motion_at *
 
 /* --- Majorants: coefficients that bound those of the Taylor series at every instant of a cell --- */
 
-/* Of a polynomial about `middle` with a reach of `half`, in powers of (argument - an instant) / unit. */
+/* Of a polynomial c, at every instant within `half` of `middle`: out[k] bounds the coefficient of the power k of the distance from the
+ * instant. */
 static void majorant(struct real *out, const struct real *c, int degree, struct real middle,
                      struct real half)
 {
@@ -323,7 +324,7 @@ static void parameter_majorant(struct real xi[ORDERS + 1], const struct real way
 }
 
 /* Bounds of |q''| in x of velocity, acceleration and jerk of each axis, in their units of time. */
-static void bend_of(const struct cell *cell, struct motion_at *out)
+static void bend_of(const struct cell *cell, struct motion *out)
 {
     const struct path *path = cell->path;
     const struct real one = real_make(1, 0);
@@ -387,9 +388,9 @@ static const int codes[QUANTITIES] = {PROGRAM_ERR_AXIS_VELOCITY, PROGRAM_ERR_AXI
 
 /* Takes a sample into the peaks. 0, or the code of the limit that it passes. */
 static int take_sample(const struct check *check, const struct cell *cell, struct real x,
-                       struct motion_at *peak)
+                       struct motion *peak)
 {
-    struct motion_at found;
+    struct motion found;
     motion_at(cell, x, &found);
     for (int axis = 0; axis < AXES; axis++) {
         struct real values[QUANTITIES];
@@ -405,8 +406,8 @@ static int take_sample(const struct check *check, const struct cell *cell, struc
 }
 
 /* 0 when nothing between samples 2 / parts apart in x can pass a limit, else the code of what may. */
-static int judge(const struct check *check, const struct motion_at *peak,
-                 const struct motion_at *rise, uint32_t parts_log2)
+static int judge(const struct check *check, const struct motion *peak, const struct motion *rise,
+                 uint32_t parts_log2)
 {
     for (int axis = 0; axis < AXES; axis++) {
         for (int k = 0; k < QUANTITIES; k++) {
@@ -423,8 +424,8 @@ static int judge(const struct check *check, const struct motion_at *peak,
 /* One cell without halving: 0 kept, a code with *certain set when a sample passes a limit, else a code. */
 static int check_cell(const struct check *check, const struct cell *cell, int *certain)
 {
-    struct motion_at bend;
-    struct motion_at peak;
+    struct motion bend;
+    struct motion peak;
     int code = 0;
     set_at_rest(&peak);
     bend_of(cell, &bend);
@@ -473,7 +474,7 @@ static void set_cell(struct cell *cell, const struct way *way, const struct path
 
 /* Steps from the end of the cell before to the begin of this one: to a drive a step of velocity is an acceleration of step / period, and
  * so on. */
-static int check_step(const struct check *check, const struct motion_at *now)
+static int check_step(const struct check *check, const struct motion *now)
 {
     const struct real share = real_div(real_make(LIMIT_CHECK_STEP_PERMILLE, 0), real_make(1000, 0));
     for (int axis = 0; axis < AXES; axis++) {
@@ -496,7 +497,7 @@ static int check_stretch(struct check *check, const struct way *way, const struc
                          struct real low, struct real high)
 {
     struct cell cell;
-    struct motion_at now;
+    struct motion now;
     const struct real width = real_sub(high, low);
     uint32_t at = 0; /* the cell from at to at + 1 of 2^halvings */
     int32_t halvings = 0;
@@ -604,7 +605,7 @@ static int any_limit(const struct check *check)
 
 int limit_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
 {
-    struct motion_at rest;
+    struct motion rest;
     struct check check;
     uint32_t segment = 0;
     int code = 0;

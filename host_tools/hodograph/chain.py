@@ -26,6 +26,7 @@ from .program import (
     encode,
     fit_plan,
 )
+from .program.codes import ProgramError
 from .spline import SplineResult, from_control_polygon, through_points
 
 
@@ -123,9 +124,43 @@ def _of_plane(machine: Machine, name: str, units: int) -> tuple[int, int]:
     return x, y
 
 
-def controller_verdict(image: bytes, machine: Machine) -> NativeFault | None:
-    """What the controller of this machine finds in an image; None: it accepts it. Raises InputError: it is no image."""
-    return NativeProgram(image).check(NativeLimits(**asdict(program_limits(machine))))
+def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault | None:
+    """What the controller of this machine finds in a program; None: it accepts it."""
+    return program.check(NativeLimits(**asdict(program_limits(machine))))
+
+
+def proved_limits(machine: Machine) -> str:
+    """The limits that the controller of this machine has proved of each program that it accepts."""
+    x, y = machine.plane
+    return ", ".join(
+        f"{axis.name} {axis.velocity_mm_s:g} mm/s {axis.acceleration_mm_s2:g} mm/s^2 {axis.jerk_mm_s3:g} mm/s^3"
+        for axis in (x, y)
+    )
+
+
+_MORE_ROOM = (0.002, 0.01)
+"""Further shares of the machine's axis limits that are left free where the controller could not prove a plan."""
+_PROVED = (
+    ProgramError.AXIS_VELOCITY,
+    ProgramError.AXIS_ACCELERATION,
+    ProgramError.AXIS_JERK,
+    ProgramError.AXIS_STEP,
+)
+"""What more room may mend."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """A program, and what the controller finds in it."""
+
+    compilation: Compilation
+    native: NativeProgram
+    fault: NativeFault | None
+
+
+def _judge(compilation: Compilation, machine: Machine) -> _Judged:
+    native = NativeProgram(encode(compilation.program))
+    return _Judged(compilation, native, controller_verdict(native, machine))
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +223,7 @@ class Chain:
 
     @property
     def plan(self) -> Plan:
-        """The feed over the spline, as the program has it."""
+        """The feed over the spline, before the program is made of it (`compilation.plan`)."""
         return self._timed_plan[0]
 
     @property
@@ -215,11 +250,15 @@ class Chain:
 
     @cached_property
     def _timed_plan(self) -> tuple[Plan, float]:
-        feed, limits, machine = self.feed, self.limits, self.machine_or_none
+        begin = perf_counter()
+        plan = self._planned(self.limits)
+        return plan, perf_counter() - begin
+
+    def _planned(self, limits: Limits) -> Plan:
+        feed, machine = self.feed, self.machine_or_none
         spline = self.spline_result.spline
         controller = controller_limits(machine) if machine is not None else None
         period_us = machine.period_us if machine is not None else 1000
-        begin = perf_counter()
         with _told_by(f"{self.file.file}:"):
             plan: Plan
             make = plan_optimal if feed.optimal else plan_path
@@ -231,15 +270,33 @@ class Chain:
                 plants(machine, limits),
                 period_us=period_us,
             )
-            plan = fit_plan(spline, plan)
-        return plan, perf_counter() - begin
+            return fit_plan(spline, plan)
 
-    @cached_property
+    @property
     def compilation(self) -> Compilation:
         """The program for the machine."""
+        return self._judged.compilation
+
+    @cached_property
+    def _judged(self) -> _Judged:
+        """The first program that the controller accepts; where it accepts none, the last one tried.
+
+        The controller's bounds of what lies between its samples may be too wide for a plan that uses a limit fully.
+        Such a plan is made again with more room.
+        """
+        machine, limits = self.machine, self.limits
+        judged = _judge(self._compiled(self.plan), machine)
+        for room in _MORE_ROOM:
+            if judged.fault is None or judged.fault.code not in _PROVED:
+                break
+            roomier = replace(limits, machine=limits.machine.scaled(1.0 - room))
+            judged = _judge(self._compiled(self._planned(roomier)), machine)
+        return judged
+
+    def _compiled(self, plan: Plan) -> Compilation:
         machine = self.machine
         limits = program_limits(machine)
-        spline, plan = self.spline_result.spline, self.plan
+        spline = self.spline_result.spline
         with _told_by(f"{self.file.file}:"):
             return compile_path(
                 spline,
@@ -269,18 +326,22 @@ class Chain:
         """The program for the machine."""
         return self.compilation.program
 
-    @cached_property
+    @property
     def image(self) -> bytes:
         """The program's bytes. Raises PlanError: the controller could not prove that it keeps the machine's limits."""
-        image = encode(self.program)
-        fault = controller_verdict(image, self.machine)
+        return self.accepted.image
+
+    @property
+    def accepted(self) -> NativeProgram:
+        """The program as the controller accepts it; raises PlanError as `image` does."""
+        fault = self._judged.fault
         if fault is not None:
             at_mm = self.program.pieces.start_q40[fault.index] * 2.0**-40
             raise PlanError(
                 f"{self.file.file}: the controller would refuse the program: {fault.text} (code {fault.code}) in the "
                 f"feed piece at {at_mm:.6g} mm: lower [limits] there, and please report this path"
             )
-        return image
+        return self._judged.native
 
     def notes(self, plan: Plan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""

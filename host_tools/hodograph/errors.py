@@ -30,6 +30,10 @@ class BusError(HodographError):
     exit_status = 4
 
 
+class BusyError(BusError):
+    """Another client keeps the node to itself."""
+
+
 class RefusedError(HodographError):
     """The controller refused a program, a command or a setting."""
 

@@ -136,11 +136,17 @@ void drive_node_receive(struct drive_node *node, const struct can_msg *in)
         drive_node_send(node, &out);
     }
     (void)heartbeat_consumer_receive(&node->master, in);
+    if (in->id == COB_HEARTBEAT + (uint32_t)node->master.node) {
+        node->master_heard = true;
+    }
 }
 
+/* What has passed since the last call may lie before a heartbeat that came meanwhile: it is no silence then. */
 static void drive_node_watch_master(struct drive_node *node, uint32_t elapsed_us)
 {
-    if (heartbeat_consumer_process(&node->master, elapsed_us) == HEARTBEAT_LOST) {
+    const uint32_t silent_us = node->master_heard ? 0u : elapsed_us;
+    node->master_heard = false;
+    if (heartbeat_consumer_process(&node->master, silent_us) == HEARTBEAT_LOST) {
         drive_node_disconnect(node, EMCY_HEARTBEAT);
         nmt_slave_error(&node->nmt, node->values.error_behaviour[0]);
     }

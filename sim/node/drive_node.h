@@ -52,6 +52,7 @@ struct drive_node {
     struct emcy_producer emcy;
     struct heartbeat_producer heartbeat;
     struct heartbeat_consumer master;
+    bool master_heard; /* since the last drive_node_process */
     struct sync_consumer sync;
     struct pdo_map rpdos[DRIVE_NODE_PDOS];
     struct pdo_map tpdos[DRIVE_NODE_PDOS];

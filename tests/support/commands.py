@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph` commands as processes in virtual time."""
+"""`hodograph` commands: as processes in virtual time, or in the test itself."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import Any
+
+import pytest
 
 from hodograph.bus.clock import VirtualClock
+from hodograph.cli.main import main
 
 LIMIT_S = 120.0
 """Of virtual time: for whatever a command waits for."""
@@ -91,6 +96,15 @@ def run_command(clock: VirtualClock, *words: str) -> subprocess.CompletedProcess
     with running(clock, *words) as command:
         status = command.wait()
         return subprocess.CompletedProcess(words, status, command.out, command.err)
+
+
+def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
+    """The JSON document that a command prints, run in this thread; it has to succeed."""
+    capsys.readouterr()
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    return json.loads(out)
 
 
 def _text(file: tempfile._TemporaryFileWrapper[bytes]) -> str:

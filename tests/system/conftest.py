@@ -20,7 +20,7 @@ from hodograph.bus.address import BUS_VARIABLE
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import Rig, virtual_clock
-from hodograph.bus.sdo.controller import connect
+from hodograph.bus.sdo.controller import OFF, connect
 from hodograph.config import load_machine
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -70,6 +70,7 @@ def _benches(stack: ExitStack, request: pytest.FixtureRequest) -> MakeBench:
         controller = stack.enter_context(connect(bus, machine.node, machine.bitrate))
         controller.require(20.0)
         controller.configure(machine, "fixed")
+        controller.wait_for((OFF,), 20.0)
         return Bench(machine, rig, controller, bus)
 
     return make

@@ -54,6 +54,16 @@ def neighbour(hub: LocalHub) -> Iterator[Neighbour]:
         made.close()
 
 
+FRAME_BITS_LEAST = 111
+"""Of a frame of eight bytes, without stuff bits; at 1 Mbit/s as many microseconds."""
+
+
+def flood(other: Neighbour, identifier: int, seconds: float) -> None:
+    """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
+    for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
+        other.send(identifier, b"\xaa" * 8)
+
+
 @contextmanager
 def real_drives(
     hub: LocalHub, machine: Machine, *, vendor: int = 0x123, controller: tuple[str, ...] = ()

@@ -3,24 +3,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from hodograph.cli.main import main
+from commands import result
 
 pytestmark = pytest.mark.usefixtures("hub")
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
-    status = main(arguments)
-    out, err = capsys.readouterr()
-    assert status == 0, err
-    return json.loads(out)
 
 
 def alpha(folder: Path, gains: dict[str, str], equipment: str = "") -> str:

@@ -3,25 +3,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from commands import result
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Frames, Recorder
 from hodograph.cli.main import main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUN_ONLY = {"bus", "deadline_misses", "pace", "frames", "bus_load", "unhomed_starts"}
-
-
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
-    status = main(arguments)
-    out, err = capsys.readouterr()
-    assert status == 0, err
-    return json.loads(out)
 
 
 @pytest.mark.parametrize(

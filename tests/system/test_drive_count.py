@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from bench import EXAMPLES, MakeBench
+from commands import result
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import OFF, READY
 from hodograph.bus.sdo.network import open_network
@@ -35,14 +34,6 @@ def machine_of(folder: Path, drives: int, period_us: int) -> Path:
     file = folder / f"machine_{drives}.toml"
     file.write_text("[[axis]]".join([head, *axes[:drives]]))
     return file
-
-
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
-    capsys.readouterr()
-    status = main(arguments)
-    out, err = capsys.readouterr()
-    assert status == 0, err
-    return json.loads(out)
 
 
 @pytest.mark.parametrize(("drives", "period_us"), [(3, 1000), (6, 2000)])

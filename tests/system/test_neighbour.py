@@ -9,16 +9,27 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from canopen_bench import BUSY, Hand, hand, object_bytes
-from neighbour import PRE_OPERATIONAL, RESET_NODE, STOP, Neighbour, neighbour, runs_again, settled
+from neighbour import (
+    PRE_OPERATIONAL,
+    RESET_NODE,
+    STOP,
+    Neighbour,
+    flood,
+    neighbour,
+    runs_again,
+    settled,
+)
 
 from bench import EXAMPLES, Bench, MakeAlpha, MakeBench
+from commands import running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
 from hodograph.bus.sdo import node
-from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, RUNNING
-from hodograph.bus.sdo.objects import FAULT
+from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, HELD, OFF, READY, RUNNING
+from hodograph.bus.sdo.objects import COMMAND, FAULT, HOLD, QUICK_STOP
+from hodograph.bus.sdo.objects import STOP as STOP_COMMAND
 from hodograph.chain import load_chain
 from hodograph.cli.main import main
 
@@ -26,6 +37,9 @@ DRIVE = 2
 AWAY = 0xFF08
 LOST = 0x8250
 OFF_BIT = 0x80000000
+STEP_IN_STEPS = 5
+"""SYNCs over which one late setpoint shows, differences of the third order included."""
+COMMANDS = {"stop": STOP_COMMAND, "hold": HOLD, "quick-stop": QUICK_STOP}
 
 
 @pytest.fixture
@@ -241,14 +255,44 @@ def test_a_command_beside_another_computers_upload(
         assert "another SDO client" in capsys.readouterr().err
 
 
-FRAME_BITS_LEAST = 111
-"""Of a frame of eight bytes, without stuff bits; at 1 Mbit/s as many microseconds."""
+@pytest.mark.parametrize("command", ["stop", "hold", "quick-stop"])
+def test_a_command_to_stop_beside_another_computers_transfer(
+    moving: Moving, hub: LocalHub, command: str
+) -> None:
+    """The program is being read from elsewhere, slowly: that is no reason to wait, and the transfer goes on."""
+    bench, _ = moving(1.0)
+    program = object_bytes(0x2000, 1)
+    with hand(hub, 1) as stranger:
+        assert stranger.ask(b"\x40" + program)[0] == 0x41
+        begun_s = bench.clock.now_s()
+        bench.controller.write_at_once(COMMAND, COMMANDS[command])
+        assert bench.clock.now_s() - begun_s < 0.001
+        taken = stranger.answer()  # of the command: it names another object
+        assert taken == b"\x60" + object_bytes(COMMAND, 0) + bytes(4)
+        assert stranger.ask(b"\x60")[0] == 0x00
+        assert stranger.ask(b"\x70")[0] == 0x10
+        state = {"stop": READY, "hold": HELD, "quick-stop": OFF}[command]
+        stranger.send(b"\x80" + program + b"\0\0\4\5")
+    bench.controller.wait_for((state,), 2.0)
 
 
-def flood(other: Neighbour, identifier: int, seconds: float) -> None:
-    """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
-    for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
-        other.send(identifier, b"\xaa" * 8)
+@pytest.mark.parametrize("command", ["stop", "hold", "quick-stop"])
+def test_the_commands_to_stop_while_another_computer_goes_on_reading(
+    moving: Moving, hub: LocalHub, command: str
+) -> None:
+    """For seven seconds. Whether the axes stand cannot be asked meanwhile, but they do."""
+    bench, _ = moving(1.0)
+    with hand(hub, 1) as stranger, running(bench.clock, command) as process:
+        assert stranger.ask(b"\x40" + object_bytes(0x2000, 1))[0] == 0x41
+        for k in range(900):  # of 943 segments
+            stranger.send(b"\x70" if k % 2 else b"\x60")
+            bench.clock.sleep(0.008)
+            if process.child.poll() is not None:
+                break
+        stranger.send(b"\x80" + object_bytes(0x2000, 1) + b"\0\0\4\5")
+        assert process.wait() in (0, 4), process.err
+        assert "middle of a transfer" in process.err or not process.err, process.err
+    assert bench.controller.state() in (READY, HELD, OFF)
 
 
 @pytest.mark.parametrize("identifier", [0x7FF, 0x6FF])
@@ -273,4 +317,27 @@ def test_a_bus_that_is_full_of_what_matters_more(
     bench.clock.sleep(seconds)
     state, code, _ = settled(bench)
     assert (state, code) in ((READY, 0), (FAULT_STATE, LOST))
+    runs_again(path)
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.25])
+def test_a_bus_that_is_full_for_longer_than_simulated_drives_are_waited_for(
+    make_bench: MakeBench, alpha_at: MakeAlpha, other: Neighbour, seconds: float
+) -> None:
+    """The next SYNC is sent after 100 ms, and goes before the setpoints that still wait: one step is made of two, which
+    is found. docs/bus-time.md says so.
+    """
+    bench, path = make_bench(), str(alpha_at(10))
+    recorder = Recorder(bench.bus)
+    assert main(["goto", path]) == 0
+    assert main(["start"]) == 0
+    bench.clock.sleep(1.0)
+    flood(other, 0x001, seconds)
+    bench.clock.sleep(seconds)
+    state, code, _ = settled(bench)
+    assert (state, code) == ((READY, 0) if seconds < 0.2 else (FAULT_STATE, LOST))
+    found = find_jumps(recorder.so_far(), bench.machine.nodes, step_limits(bench.machine))
+    recorder.stop()
+    assert bool(found) == (state == READY)
+    assert all(jump.sync - found[0].sync <= STEP_IN_STEPS for jump in found)
     runs_again(path)

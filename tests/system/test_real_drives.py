@@ -6,17 +6,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from neighbour import real_drives, runs_again, settled
+from neighbour import flood, neighbour, real_drives, runs_again, settled
 
 from bench import PAPER_ALPHA, Bench, MakeAlpha, MakeBench
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
+from hodograph.bus.listening.recorder import Recorder
+from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
 from hodograph.bus.sdo.controller import FAULT_STATE, READY, RUNNING
 from hodograph.bus.sdo.objects import FAULT, TIMING
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 
 SYNC_GAP = 0xFF09
+LOST = 0x8250
 
 
 @pytest.fixture
@@ -66,6 +69,41 @@ def test_simulated_drives_bear_it(
     clock.sleep(0.150)
     clock.resume("controller-1")
     assert settled(bench) == (READY, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "outcome", "late"),
+    [
+        (0.0005, (READY, 0), False),
+        (0.0015, (READY, 0), True),
+        (0.003, (READY, 0), True),
+        (0.006, (FAULT_STATE, LOST), True),
+        (0.15, (FAULT_STATE, LOST), False),
+    ],
+)
+def test_a_bus_full_of_frames_of_higher_priority(
+    real: Bench,
+    hub: LocalHub,
+    alpha_at: MakeAlpha,
+    seconds: float,
+    outcome: tuple[int, int],
+    late: bool,
+) -> None:
+    """Up to 5 ms without an answer are borne. The SYNCs of that time go before the setpoints that wait with them:
+    `late` says that a step is made of two, which the check of a recording finds. docs/bus-time.md.
+    """
+    path = str(alpha_at(10))
+    recorder = Recorder(real.bus)
+    begin(path, real, 1.0)
+    with neighbour(hub) as other:
+        flood(other, 0x001, seconds)
+        real.clock.sleep(seconds)
+    assert settled(real)[:2] == outcome
+    found = find_jumps(recorder.so_far(), real.machine.nodes, step_limits(real.machine))
+    recorder.stop()
+    assert bool(found) == late
+    assert all(jump.sync - found[0].sync <= 10 for jump in found)
+    runs_again(path)
 
 
 def test_virtual_time_keeps_ticks(real: Bench) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from bench import EXAMPLES, MakeBench
-from commands import running
+from commands import result, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.frames import RECORD_DTYPE
@@ -25,15 +25,6 @@ MACHINE = str(EXAMPLES / "machines" / "paper_alpha.toml")
 FRAME = struct.Struct("=IB3x8s")
 NOT_RECORDED = {"bus", "deadline_misses", "pace"}
 PERIOD_S = 0.001
-
-
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
-    capsys.readouterr()
-    status = main(arguments)
-    out, err = capsys.readouterr()
-    assert status == 0, err
-    found: dict[str, Any] = json.loads(out)
-    return found
 
 
 def failed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
@@ -118,11 +109,11 @@ def test_a_recording_from_beside(
 
 
 def motion(hub: LocalHub, clock: VirtualClock, jump_at: int) -> None:
-    """Two axes at 50 mm/s beyond SYNC 20; at `jump_at` the first one steps aside by 1 mm."""
+    """The first of two axes at 40 mm/s beyond SYNC 60, within its limits; at `jump_at` it steps aside by 1 mm."""
     with LocalBus(hub.address.channel) as out:
         x, speed = 0, 0
         for k in range(1300):
-            speed = min(50_000, speed + 4000) if k > 20 else 0
+            speed += 100 * max(0, 20 - abs(k - 40))
             x += speed + (1_000_000 if k == jump_at else 0)
             out.send_raw(FRAME.pack(0x80, 1, bytes([k % 240 + 1])))
             for node, counts in ((2, x), (3, 0)):
@@ -151,7 +142,9 @@ def test_a_jump_on_the_bus_is_told(
     assert status == 6
     assert f"setpoint jump at SYNC {jump_at} of the recording, axis 1 and 2: speed" in err
     assert "the file is complete" in err.splitlines()[-1]
-    assert len(told["jumps"]) == 2  # speed, acceleration
+    assert (
+        len(told["jumps"]) == 5
+    )  # speed, acceleration; speed, acceleration, jerk of the first axis
     assert read_recording(tmp_path / "jump.log").size == 1300 * 5
     status, told, err = record("unchecked.log")
     assert (status, told["jumps"]) == (0, None)

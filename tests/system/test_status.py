@@ -157,14 +157,25 @@ def test_watching_into_a_pipe(controller: Controller, clock: VirtualClock) -> No
     times = [datetime.fromisoformat(line.split()[0]) for line in lines]
     assert times[0].year == 2000
     gaps_s = [(b - a).total_seconds() for a, b in pairwise(times)]
-    assert gaps_s[1:] == pytest.approx([1.0, 1.0], abs=0.002)  # the first one listens longer
+    assert gaps_s == pytest.approx([1.0, 1.0, 1.0], abs=0.002)
 
 
 def test_watching_as_json(controller: Controller, clock: VirtualClock) -> None:
     documents = [json.loads(line) for line in watched(clock, ["--watch", "--json"], 3)]
     assert [set(d) for d in documents] == [KEYS | {"time"}] * 3
     syncs = [d["statistics"]["syncs"] for d in documents]
-    assert [b - a for a, b in pairwise(syncs)] == [500, 500]
+    assert [b - a for a, b in pairwise(syncs)] == pytest.approx([500, 500], abs=1)
+
+
+@pytest.mark.parametrize("interval_ms", [250, 300, 1000])
+def test_looks_are_an_interval_apart_from_the_first_on(
+    controller: Controller, clock: VirtualClock, interval_ms: int
+) -> None:
+    words = ["--watch", "--json", "--interval", str(interval_ms / 1000)]
+    documents = [json.loads(line) for line in watched(clock, words, 5)]
+    times = [datetime.fromisoformat(document["time"]) for document in documents]
+    gaps = [(b - a).total_seconds() for a, b in pairwise(times)]
+    assert gaps == pytest.approx([interval_ms / 1000] * 4, abs=0.005)
 
 
 def watched(clock: VirtualClock, options: list[str], count: int) -> list[str]:

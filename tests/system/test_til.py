@@ -3,18 +3,17 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from boards import BRIDGE, EMULATE, QEMU, board, children, stop_for
+from commands import result
 from hodograph.bus.address import BusAddress
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
@@ -24,20 +23,12 @@ from hodograph.bus.run import BusRun, run_program, station
 from hodograph.bus.sdo.controller import connect
 from hodograph.bus.sdo.objects import BOOT
 from hodograph.chain import load_chain
-from hodograph.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = [str(ROOT / "examples" / f"{name}.toml") for name in ("alpha", "heart")]
 HASHES = ("setpoints_sha256", "encoders_sha256")
 BITRATE = 1_000_000
 MIDWAY_TICKS = 500  # of 1101
-
-
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
-    status = main(arguments)
-    out, err = capsys.readouterr()
-    assert status == 0, err
-    return json.loads(out)
 
 
 def test_the_m4f_runs_alpha_and_heart(

@@ -6,19 +6,17 @@ What they do in all other respects is tested in virtual time: test_bus_run.py, t
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from bench import EXAMPLES, PAPER_ALPHA, VCAN0, MakeAlpha, MakeBench
+from commands import result
 from hodograph.bus.sdo.controller import OFF, RUNNING, connect
 from hodograph.bustime import machine_bus_time
-from hodograph.cli.main import main
 from hodograph.config import load_machine
 
 pytestmark = pytest.mark.bus
@@ -26,14 +24,6 @@ pytestmark = pytest.mark.bus
 ALPHA = str(EXAMPLES / "alpha.toml")
 LIMIT_S = 120.0
 """Of real time: no test is judged by it, one that hangs ends by it."""
-
-
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
-    capsys.readouterr()
-    status = main(arguments)
-    out, err = capsys.readouterr()
-    assert status == 0, err
-    return json.loads(out)
 
 
 @pytest.mark.parametrize("pace", ["real-time", "fast"])

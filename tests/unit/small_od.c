@@ -146,9 +146,16 @@ static uint32_t on_domain_read(void *context, const struct od_entry *entry, uint
     return SDO_OK;
 }
 
+/* As a command to stop: the greatest value of `limited`. */
+static bool is_urgent(const struct od_entry *entry, uint8_t value)
+{
+    return entry->index == 0x2000u && value == SMALL_URGENT;
+}
+
 static const struct od_hooks hooks = {
     .read = on_read,
     .write = on_write,
+    .urgent = is_urgent,
     .written = on_written,
     .domain_begin = on_domain_begin,
     .domain_write = on_domain_write,

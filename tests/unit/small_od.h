@@ -9,6 +9,7 @@
 #include "canopen/od.h"
 
 #define SMALL_DOMAIN_MAX 4096u
+#define SMALL_URGENT     5u /* of 0x2000 */
 
 struct small_values {
     uint32_t device_type;

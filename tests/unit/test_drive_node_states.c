@@ -386,6 +386,26 @@ static void test_error_behaviour(void)
     }
 }
 
+/* A heartbeat just before time passes for the node: what has passed before it is no silence. Never early, one nap late. */
+static void test_the_masters_heartbeat_is_not_missed_early(void)
+{
+    struct can_msg beat;
+    drive_bench_begin();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(0x1016, 1, 0x00010064));
+    cob_frame(&beat, COB_HEARTBEAT + 1, 1);
+    beat.data[0] = NMT_OPERATIONAL;
+    for (int k = 0; k < 3; k++) {
+        drive_node_receive(&bench.node, &beat);
+        drive_node_process(&bench.node, 10000);
+        for (int nap = 0; nap < 10; nap++) {
+            drive_node_process(&bench.node, 10000);
+            TEST_ASSERT_EQUAL_INT(HEARTBEAT_PRESENT, bench.node.master.presence);
+        }
+    }
+    drive_node_process(&bench.node, 1);
+    TEST_ASSERT_EQUAL_INT(HEARTBEAT_MISSING, bench.node.master.presence);
+}
+
 /* Enabled by SDO in CSP with no SYNC at all: stands, and after the time of 0x2101 sub 6 the reaction
  * of 0x6007. */
 static void test_csp_without_sync(void)
@@ -431,6 +451,7 @@ int main(void)
     RUN_TEST(test_reset_says_no_error);
     RUN_TEST(test_abort_connection_codes);
     RUN_TEST(test_error_behaviour);
+    RUN_TEST(test_the_masters_heartbeat_is_not_missed_early);
     RUN_TEST(test_csp_without_sync);
     return UNITY_END();
 }

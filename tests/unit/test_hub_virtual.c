@@ -119,6 +119,26 @@ static int receive(struct can_msg messages[CAN_SOCKET_BATCH])
     return can_socket_receive(&mine, messages, &more);
 }
 
+/* Hears the bus, and wakes nobody. */
+static struct can_socket open_listener(void)
+{
+    struct can_socket listener;
+    char reason[128];
+    TEST_ASSERT_EQUAL(0, can_socket_open(&listener, hub_thread_paths[0], reason, sizeof reason));
+    return listener;
+}
+
+/* The four frames that came within 10 ms; closes the listener. */
+static void take_four(struct can_socket *listener, struct can_msg got[CAN_SOCKET_BATCH])
+{
+    int more = 0;
+    while (clock_ns() < VIRTUAL_TIME_BEGIN_NS + 10000000u) {
+        TEST_ASSERT_GREATER_OR_EQUAL(0, clock_poll(NULL, 0, 0, 10000000));
+    }
+    TEST_ASSERT_EQUAL(4, can_socket_receive(listener, got, &more));
+    can_socket_close(listener);
+}
+
 static void test_time_passes_as_asked_and_not_otherwise(void)
 {
     const uint64_t begin_ns = clock_ns();
@@ -148,27 +168,20 @@ static void test_the_lowest_identifier_goes_first_and_equal_ones_keep_their_orde
 {
     struct can_msg got[CAN_SOCKET_BATCH];
     const struct can_msg low = {.id = 0x080, .len = 1};
-    struct can_socket listener;
-    char reason[128];
-    int more = 0;
-    TEST_ASSERT_EQUAL(0, can_socket_open(&listener, hub_thread_paths[0], reason, sizeof reason));
+    struct can_socket listener = open_listener();
     send_frame(&other, 0x300, 0);
     send_frame(&other, 0x001, 0);
     send_frame(&other, 0x300, 1);
     TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &low));
     say_wait(&other, LOCAL_BUS_NEVER);
     TEST_ASSERT_EQUAL(0, clock_poll(NULL, 0, 0, CLOCK_NS_PER_S) < 0);
-    while (clock_ns() < VIRTUAL_TIME_BEGIN_NS + 10000000u) {
-        TEST_ASSERT_GREATER_OR_EQUAL(0, clock_poll(NULL, 0, 0, 10000000));
-    }
-    TEST_ASSERT_EQUAL(4, can_socket_receive(&listener, got, &more));
+    take_four(&listener, got);
     TEST_ASSERT_EQUAL(0x001, got[0].id);
     TEST_ASSERT_EQUAL(0x080, got[1].id);
     TEST_ASSERT_EQUAL(0x300, got[2].id);
     TEST_ASSERT_EQUAL(0, got[2].len);
     TEST_ASSERT_EQUAL(0x300, got[3].id);
     TEST_ASSERT_EQUAL(1, got[3].len);
-    can_socket_close(&listener);
 }
 
 /* So two that answer each other at once leave room for the others. */
@@ -177,25 +190,18 @@ static void test_an_answer_comes_behind_what_waits_already(void)
     struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
     struct can_msg got[CAN_SOCKET_BATCH];
     const struct can_msg answer = {.id = 0x080, .len = 1};
-    struct can_socket listener;
-    char reason[128];
-    int more = 0;
-    TEST_ASSERT_EQUAL(0, can_socket_open(&listener, hub_thread_paths[0], reason, sizeof reason));
+    struct can_socket listener = open_listener();
     send_frame(&other, 0x300, 0);
     send_frame(&other, 0x301, 0);
     send_frame(&other, 0x302, 0);
     say_wait(&other, LOCAL_BUS_NEVER);
     TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
     TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &answer));
-    while (clock_ns() < VIRTUAL_TIME_BEGIN_NS + 10000000u) {
-        TEST_ASSERT_GREATER_OR_EQUAL(0, clock_poll(NULL, 0, 0, 10000000));
-    }
-    TEST_ASSERT_EQUAL(4, can_socket_receive(&listener, got, &more));
+    take_four(&listener, got);
     TEST_ASSERT_EQUAL(0x300, got[0].id);
     TEST_ASSERT_EQUAL(0x301, got[1].id);
     TEST_ASSERT_EQUAL(0x080, got[2].id);
     TEST_ASSERT_EQUAL(0x302, got[3].id);
-    can_socket_close(&listener);
 }
 
 static void test_filters_and_deferred_frames_do_not_wake(void)

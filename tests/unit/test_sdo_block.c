@@ -508,6 +508,34 @@ static void test_upload_times_out(void)
     expect_abort(SDO_ABORT_TIMEOUT);
 }
 
+static void urgent(void)
+{
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 0, SMALL_URGENT));
+    TEST_ASSERT_EQUAL_HEX8(0x60, talk.answer.data[0]);
+    TEST_ASSERT_EQUAL_HEX16(0x2000, cob_get(talk.answer.data + 1, 2));
+    TEST_ASSERT_EQUAL_UINT8(SMALL_URGENT, talk.small.values.limited);
+    talk.small.values.limited = 0;
+}
+
+/* Before each segment, also where its own number is the next one (0x2F is 47). */
+static void test_an_urgent_write_beside_a_block_download(void)
+{
+    sdo_talk_init(&talk);
+    sdo_server_init(&talk.server, &talk.small.od, TALK_NODE, TALK_TIMEOUT_US, 127);
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0xC6, 0x2005, 0, 127 * 7));
+    for (uint32_t sequence = 1; sequence <= 127; sequence++) {
+        urgent();
+        const uint8_t first = (uint8_t)(sequence | (sequence == 127 ? 0x80u : 0u));
+        TEST_ASSERT_EQUAL(sequence == 127,
+                          sdo_talk_segment(&talk, first, image + (sequence - 1) * 7, 7));
+    }
+    TEST_ASSERT_EQUAL_UINT8(127, talk.answer.data[1]);
+    urgent();
+    finish(127 * 7, crc16_update(0, image, 127 * 7));
+    TEST_ASSERT_EQUAL_INT(1, talk.small.ended);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(image, talk.small.domain, 127 * 7);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -536,5 +564,6 @@ int main(void)
     RUN_TEST(test_upload_repeats_what_was_lost);
     RUN_TEST(test_upload_refusals);
     RUN_TEST(test_upload_times_out);
+    RUN_TEST(test_an_urgent_write_beside_a_block_download);
     return UNITY_END();
 }

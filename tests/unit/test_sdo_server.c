@@ -330,6 +330,43 @@ static void test_a_second_client_is_refused(void)
     TEST_ASSERT_EQUAL_INT(1, talk.small.ended);
 }
 
+/* The transfer goes on in all states; `first`, sub and value of the write are the one thing that lets it through. */
+static void test_an_urgent_write_is_done_beside_a_transfer(void)
+{
+    const uint8_t expected[8] = {0x60, 0x00, 0x20, 0x00};
+    const uint8_t data[7] = {0};
+    sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
+    sdo_talk_segment(&talk, 0x00, data, 7);
+    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 0, SMALL_URGENT));
+    expect_frame(expected);
+    TEST_ASSERT_EQUAL_UINT8(SMALL_URGENT, talk.small.values.limited);
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 0, SMALL_URGENT - 1u));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_LOCAL, sdo_talk_abort_code(&talk));
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2B, 0x2000, 0, SMALL_URGENT));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_LOCAL, sdo_talk_abort_code(&talk));
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 1, SMALL_URGENT));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_LOCAL, sdo_talk_abort_code(&talk));
+    talk.small.veto = SDO_ABORT_STATE;
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 0, SMALL_URGENT));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, sdo_talk_abort_code(&talk));
+    talk.small.veto = SDO_OK;
+    sdo_talk_segment(&talk, 0x11, data, 7);
+    TEST_ASSERT_EQUAL_HEX8(0x30, talk.answer.data[0]);
+    TEST_ASSERT_EQUAL_UINT32(14, talk.small.domain_size);
+    TEST_ASSERT_EQUAL_INT(1, talk.small.ended);
+}
+
+/* One whose client is gone still ends by its time-out. */
+static void test_an_urgent_write_does_not_keep_a_transfer_alive(void)
+{
+    sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 0, SMALL_URGENT));
+    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, 1, &talk.answer));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TIMEOUT, sdo_talk_abort_code(&talk));
+}
+
 /* A second client's attempts do not keep a transfer alive whose client is gone. */
 static void test_a_transfer_that_is_left_times_out_all_the_same(void)
 {
@@ -412,6 +449,8 @@ int main(void)
     RUN_TEST(test_domain_refused_at_the_end);
     RUN_TEST(test_an_abort_midway_is_told_to_the_domain);
     RUN_TEST(test_a_second_client_is_refused);
+    RUN_TEST(test_an_urgent_write_is_done_beside_a_transfer);
+    RUN_TEST(test_an_urgent_write_does_not_keep_a_transfer_alive);
     RUN_TEST(test_a_transfer_that_is_left_times_out_all_the_same);
     RUN_TEST(test_a_lost_answer_to_the_first_request_is_asked_for_again);
     RUN_TEST(test_timeout);

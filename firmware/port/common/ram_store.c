@@ -7,13 +7,11 @@
 
 #define RECORD_BYTES 16u
 
-static uint8_t parameters[PORT_STORE_BANKS_ALL - PORT_STORE_BANKS][PORT_STORE_PARAMETER_BYTES]
-    __attribute__((section(".store"), aligned(8)));
-
 static uint8_t *bank_at(unsigned bank)
 {
     return bank < PORT_STORE_BANKS ? ram_store.memory + (size_t)bank * ram_store.bank_bytes
-                                   : parameters[bank - PORT_STORE_PARAMETERS];
+                                   : ram_store.parameters + (size_t)(bank - PORT_STORE_PARAMETERS) *
+                                                                PORT_STORE_PARAMETER_BYTES;
 }
 
 uint32_t port_store_size(unsigned bank)

@@ -1,25 +1,34 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * ram_store: the store of port.h in memory, lost with the power. For emulated boards, and the first day of a new
- * port; what a board keeps is in flash (port/stm32g4/flash_store.h).
+ * ram_store: the store of port.h in memory. For Linux (port/linux/store.h: also a file that is mapped there), emulated
+ * boards, and the first day of a new port; what a board keeps is in flash (port/stm32g4/flash_store.h).
  *
- * The parameter banks (4 KB in section .store) are here; those for programs belong to the port, which defines `ram_store`:
+ * The memory belongs to the port, which defines `ram_store`:
  *
  *     static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES] __attribute__((section(".store"), aligned(8)));
- *     const struct ram_store ram_store = {banks[0], sizeof banks[0]};
+ *     static uint8_t parameters[RAM_STORE_PARAMETER_BYTES] __attribute__((section(".store"), aligned(8)));
+ *     struct ram_store ram_store = {banks[0], sizeof banks[0], parameters};
  *
- * Section .store is the memory STORE of the linker scripts in firmware/targets.
+ * Section .store is the memory STORE of the linker scripts in firmware/targets. It is lost with the power.
  */
 #ifndef PORT_COMMON_RAM_STORE_H
 #define PORT_COMMON_RAM_STORE_H
 
 #include <stdint.h>
 
+#include "port/port.h"
+
+/* Of all parameter banks together. */
+#define RAM_STORE_PARAMETER_BYTES                                                                  \
+    ((PORT_STORE_BANKS_ALL - PORT_STORE_BANKS) * PORT_STORE_PARAMETER_BYTES)
+
 struct ram_store {
-    uint8_t *memory; /* PORT_STORE_BANKS banks, one behind the other, aligned to 8 */
-    uint32_t bank_bytes;
+    uint8_t *memory;     /* PORT_STORE_BANKS banks, one behind the other, aligned to 8 */
+    uint32_t bank_bytes; /* of each of these */
+    uint8_t *parameters; /* RAM_STORE_PARAMETER_BYTES, aligned to 8 */
 };
 
-extern const struct ram_store ram_store;
+/* Complete before the first function port_store_... is called. */
+extern struct ram_store ram_store;
 
 #endif

@@ -11,16 +11,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "port/common/ram_store.h"
 #include "port/port.h"
 
 #define PROGRAM_BYTES (64u * 1024u * 1024u)
-#define STORE_BYTES                                                                                \
-    ((size_t)PORT_STORE_BANKS * PROGRAM_BYTES +                                                    \
-     (size_t)(PORT_STORE_BANKS_ALL - PORT_STORE_BANKS) * PORT_STORE_PARAMETER_BYTES)
-#define RECORD_BYTES 16u
-#define OWNER_ONLY   (S_IRUSR | S_IWUSR)
+#define STORE_BYTES   ((size_t)PORT_STORE_BANKS * PROGRAM_BYTES + RAM_STORE_PARAMETER_BYTES)
+#define OWNER_ONLY    (S_IRUSR | S_IWUSR)
 
-static uint8_t *memory;
+struct ram_store ram_store;
 
 static int failed(const char *file, const char *why)
 {
@@ -47,8 +45,14 @@ static const char *prepare(int fd)
 static bool map(int flags, int fd)
 {
     void *found = mmap(NULL, STORE_BYTES, PROT_READ | PROT_WRITE, flags, fd, 0);
-    memory = found == MAP_FAILED ? NULL : found;
-    return memory != NULL;
+    if (found == MAP_FAILED) {
+        return false;
+    }
+    uint8_t *memory = found;
+    ram_store = (struct ram_store){.memory = memory,
+                                   .bank_bytes = PROGRAM_BYTES,
+                                   .parameters = memory + (size_t)PORT_STORE_BANKS * PROGRAM_BYTES};
+    return true;
 }
 
 /* The descriptor stays open: the lock on the file goes with it. */
@@ -72,43 +76,4 @@ int store_open(const char *file)
         return failed(file, why);
     }
     return 0;
-}
-
-static uint8_t *bank_at(unsigned bank)
-{
-    const size_t programs = (size_t)PROGRAM_BYTES;
-    return bank < PORT_STORE_BANKS
-               ? memory + bank * programs
-               : memory + PORT_STORE_BANKS * programs +
-                     (size_t)(bank - PORT_STORE_PARAMETERS) * PORT_STORE_PARAMETER_BYTES;
-}
-
-uint32_t port_store_size(unsigned bank)
-{
-    return bank < PORT_STORE_BANKS ? PROGRAM_BYTES : PORT_STORE_PARAMETER_BYTES;
-}
-
-/* Only what makes the rest count has to go. */
-int port_store_erase(unsigned bank)
-{
-    if (bank >= PORT_STORE_BANKS_ALL) {
-        return PORT_ERR_STORE;
-    }
-    memset(bank_at(bank) + port_store_size(bank) - RECORD_BYTES, 0xFF, RECORD_BYTES);
-    return 0;
-}
-
-int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
-{
-    if (bank >= PORT_STORE_BANKS_ALL || offset > port_store_size(bank) ||
-        size > port_store_size(bank) - offset) {
-        return PORT_ERR_STORE;
-    }
-    memcpy(bank_at(bank) + offset, data, size);
-    return 0;
-}
-
-const uint8_t *port_store_data(unsigned bank)
-{
-    return bank_at(bank);
 }

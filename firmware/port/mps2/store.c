@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The store is the board's PSRAM: 16 MiB, with the parameters that ram_store has there. */
+/* The store is the board's PSRAM: 16 MiB. */
 #include "port/common/ram_store.h"
 #include "port/port.h"
 
 #define BANK_BYTES (8u * 1024u * 1024u - PORT_STORE_PARAMETER_BYTES)
 
 static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES] __attribute__((section(".store"), aligned(8)));
-const struct ram_store ram_store = {.memory = banks[0], .bank_bytes = sizeof banks[0]};
+static uint8_t parameters[RAM_STORE_PARAMETER_BYTES] __attribute__((section(".store"), aligned(8)));
+struct ram_store ram_store = {
+    .memory = banks[0], .bank_bytes = sizeof banks[0], .parameters = parameters};

@@ -232,8 +232,7 @@ class VirtualClock:
         self.activate()
         self._forget(name)
         child = start({NAME_VARIABLE: name})
-        while not self._noticed(_JOINED, name) and child.poll() is None:
-            self._look()
+        self._await_notice(name, child, _JOINED)
         return child
 
     def await_end(
@@ -260,10 +259,7 @@ class VirtualClock:
         self.activate()
         self._forget(name)
         child.send_signal(number)
-        while child.poll() is None and not (
-            self._noticed(_INTERRUPTED, name) or self._noticed(_LEFT, name)
-        ):
-            self._look()
+        self._await_notice(name, child, _INTERRUPTED, _LEFT)
 
     def kill(self, name: str, child: subprocess.Popen[bytes]) -> None:
         """Kills a process, as a crash would end it, at the present instant."""
@@ -283,6 +279,11 @@ class VirtualClock:
         self.activate()
         self._send(_CONTINUE, name=name)
 
+    def _await_notice(self, name: str, child: subprocess.Popen[bytes], *kinds: int) -> None:
+        """Until the hub has told one of these of a process, or it has ended; time stands still."""
+        while child.poll() is None and not any((kind, name) in self._notices for kind in kinds):
+            self._look()
+
     def _look(self) -> None:
         """Takes the next message, if one comes soon, while time stands still."""
         if select.select([self._connection], [], [], _LOOK_S)[0]:
@@ -292,9 +293,6 @@ class VirtualClock:
         """Whether that is the last that we heard of it."""
         heard = [kind for kind, of in self._notices if of == name and kind in (_JOINED, _LEFT)]
         return bool(heard) and heard[-1] == _LEFT
-
-    def _noticed(self, kind: int, name: str) -> bool:
-        return (kind, name) in self._notices
 
     def _forget(self, name: str) -> None:
         self._notices = [notice for notice in self._notices if notice[1] != name]

@@ -5,27 +5,25 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
+from typing import TYPE_CHECKING
 
 from ..bus.address import parse_address
 from ..bus.sdo import actions
-from ..bus.sdo.objects import BOOT, OFF, READY
+from ..bus.sdo.objects import BOOT, OFF, QUICK_STOP, READY
 from ..errors import InputError
-from .bus_commands import reached, stopping
+from .bus_commands import commanded, reached, stopping
 from .output import note
 from .targets import target
+
+if TYPE_CHECKING:
+    from ..config import Machine
 
 
 def configure(options: Namespace) -> None:
     """hodograph configure."""
     _check_configure(options)
     address = parse_address(options.bus)
-    machine = None
-    if options.file is not None:
-        from ..bustime import require_fit
-        from .motion_commands import machine_of
-
-        machine = machine_of(options.file, options.machine)
-        require_fit(machine)
+    machine = _machine_of_file(options)
     to = target(options) if machine is None else machine
     node = options.node or to.node
     with reached(address, node, to.bitrate, options.wait) as controller:
@@ -57,16 +55,22 @@ def _check_configure(options: Namespace) -> None:
         raise InputError("configure: nothing to do: give a FILE, --store, --forget or --set-node")
 
 
+def _machine_of_file(options: Namespace) -> Machine | None:
+    """The machine of FILE, None without a FILE. Raises InputError: its traffic does not fit on its bus, for one."""
+    if options.file is None:
+        return None
+    from ..bustime import require_fit
+    from .motion_commands import machine_of
+
+    machine = machine_of(options.file, options.machine)
+    require_fit(machine)
+    return machine
+
+
 def home(options: Namespace) -> None:
     """hodograph home."""
     address = parse_address(options.bus)
-    machine = None
-    if options.file is not None:
-        from ..bustime import require_fit
-        from .motion_commands import machine_of
-
-        machine = machine_of(options.file, options.machine)
-        require_fit(machine)
+    machine = _machine_of_file(options)
     to = target(options) if machine is None else machine
     with reached(address, to.node, to.bitrate, options.wait) as controller:
         controller.require_standing()
@@ -82,8 +86,8 @@ def quick_stop(options: Namespace) -> None:
     """hodograph quick-stop."""
     address = parse_address(options.bus)
     to = target(options)
-    with reached(address, to.node, to.bitrate, options.wait) as controller:
-        actions.quick_stop(controller, options.timeout or actions.BOOT_S)
+    with commanded(address, to.node, to.bitrate, options.wait, QUICK_STOP) as controller:
+        actions.quick_stop_over(controller, options.timeout or actions.BOOT_S)
     print("stopped by the drives, drives off")
 
 

@@ -14,17 +14,20 @@ from ..bus.sdo.controller import (
     BOOT,
     DISABLE,
     OFF,
-    ON_PATH,
     READY,
     RESUME,
     Controller,
     connect,
 )
 from ..bus.sdo.follow import Follower
+from ..bus.sdo.objects import HOLD, MOVING, STOP
 from ..bus.signals import unbroken
-from ..errors import HodographError
+from ..errors import BusyError, HodographError
 from .output import note
 from .targets import target
+
+_BUSY_S = 0.1
+"""How long a command to stop waits for others, to see first that it speaks to a controller."""
 
 
 @contextmanager
@@ -32,6 +35,21 @@ def reached(address: BusAddress, node: int, bitrate: int, wait_s: float) -> Iter
     """A controller that answers; raises BusError when it does not within `wait_s`."""
     with connect(address, node, bitrate) as controller:
         controller.require(wait_s)
+        yield controller
+
+
+@contextmanager
+def commanded(
+    address: BusAddress, node: int, bitrate: int, wait_s: float, command: int
+) -> Iterator[Controller]:
+    """A controller that has been told to stop or to hold, whoever else talks to it.
+
+    Raises BusError when it does not answer within `wait_s`.
+    """
+    with connect(address, node, bitrate) as controller:
+        with suppress(BusyError):
+            controller.require(wait_s, _BUSY_S)
+        controller.command(command)
         yield controller
 
 
@@ -65,8 +83,8 @@ def stop(options: Namespace) -> None:
     """hodograph stop."""
     address = parse_address(options.bus)
     to = target(options)
-    with reached(address, to.node, to.bitrate, options.wait) as controller:
-        was_running = controller.state() in ON_PATH
+    with commanded(address, to.node, to.bitrate, options.wait, STOP) as controller:
+        was_running = controller.state() in MOVING
         controller.stop_and_wait()
         if options.off and controller.state() == READY:
             controller.command(DISABLE)
@@ -78,8 +96,8 @@ def hold(options: Namespace) -> None:
     """hodograph hold."""
     address = parse_address(options.bus)
     to = target(options)
-    with reached(address, to.node, to.bitrate, options.wait) as controller:
-        held = actions.hold(controller, options.timeout or math.inf)
+    with commanded(address, to.node, to.bitrate, options.wait, HOLD) as controller:
+        held = actions.hold_reached(controller, options.timeout or math.inf)
     print("held" if held else "the program had ended")
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..bustime import require_fit
 from ..chain import Chain, load_chain
+from ..config import Machine
 from ..errors import HodographError, InputError
 from ..feed import Plan
 from ..native import NativeProgram
@@ -160,7 +161,7 @@ def compile_(options: Namespace) -> None:
     print_notes(chain, chain.compilation.plan)
     output = options.output or Path(chain.file.name + ".hdgp")
     write_file(output, image)
-    _warn_of_size(image, chain.machine.kernel)
+    _warn_of_size(image, chain.machine)
     program = chain.program
     if options.json:
         print_json({"file": str(output), "bytes": len(image)} | inspect_dict(program))
@@ -173,12 +174,16 @@ def compile_(options: Namespace) -> None:
         print(line)
 
 
-def _warn_of_size(image: bytes, kernel: str) -> None:
-    needed = memory_bytes(image, *RECORD_BYTES[kernel])
-    if needed > LARGEST_BANK:
+def _warn_of_size(image: bytes, machine: Machine) -> None:
+    """Where `upload` would refuse the program for its size."""
+    needed = memory_bytes(image, *RECORD_BYTES[machine.kernel])
+    room, whose = machine.program_bytes, f"[controller] program_bytes of {machine.file.name}"
+    if room is None:
+        room, whose = LARGEST_BANK, "the largest controller there is"
+    if needed > room:
         note(
-            f"takes {needed} bytes of a controller with what is prepared from it, more than the {LARGEST_BANK} of the "
-            "largest one: split the path"
+            f"takes {needed} bytes of a controller with what is prepared from it, more than the {room} of {whose}: "
+            "upload will refuse it; split the path"
         )
 
 

@@ -15,7 +15,7 @@ from ..bus.listening.recordings import RecordingWriter, check_suffix
 from ..bus.listening.setpoint_check import Jump, Step, limits_at, step_limits
 from ..bus.listening.setpoint_watch import SetpointWatch, jumps
 from ..bus.processes import virtual_clock
-from ..bus.sdo.configuration import configured_limits, configured_nodes
+from ..bus.sdo.configuration import configured_axis_limits, configured_limits, configured_nodes
 from ..bus.sdo.controller import connect
 from ..errors import BusError, HodographError, RunError
 from .output import note, print_json
@@ -151,8 +151,12 @@ def _jumps(
     try:
         with connect(address, options.node or 1, DEFAULT_BITRATE) as controller:
             controller.require(_ANSWER_S)
-            limits = limits_at(*configured_limits(controller))
             nodes = configured_nodes(controller)
+            of_axes = configured_axis_limits(controller, len(nodes))
+            seen = [
+                axis for axis, node in zip(of_axes, nodes, strict=True) if node in recording.nodes
+            ]
+            limits = limits_at(*configured_limits(controller), axes=seen)
     except HodographError as error:
         note(f"setpoints were not checked, --machine FILE says what is allowed: {error}")
         return None

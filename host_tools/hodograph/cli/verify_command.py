@@ -7,7 +7,7 @@ from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
 
-from ..chain import Chain, controller_verdict, load_chain
+from ..chain import Chain, controller_verdict, load_chain, proved_limits
 from ..config import PLANE_AXES, Drive, Machine
 from ..errors import InputError, LimitError
 from ..native.program import NativeFault, NativeProgram
@@ -36,12 +36,14 @@ def verify(options: Namespace) -> None:
     """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
     chain = load_chain(options.file, options.machine)
     machine = chain.machine_or_none
-    image = _planned(chain) if options.program is None else _given(options.program)
-    program = decode_file(options.program or options.file, image)
-    NativeProgram(image).require()
-    fault = None if machine is None else controller_verdict(image, machine)
+    native = _planned(chain) if options.program is None else _given(options.program)
+    program = decode_file(options.program or options.file, native.image)
+    fault = None
+    if machine is not None and options.program is not None:  # else it has been accepted already
+        fault = controller_verdict(native, machine)
+    native.require()
     found = verify_program(program, chain.limits, _drives(machine))
-    drives_see = sampled(image)
+    drives_see = sampled(native)
     counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
     noise = bus_noise(counts_per_mm, program.period_us)
     if options.json:
@@ -64,13 +66,7 @@ def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:
         return "controller's check: no machine, so no limits of its axes are proved (use --machine FILE)"
     if fault is not None:
         return f"controller's check: refused, {fault.text} (code {fault.code}, piece {fault.index})"
-    x, y = machine.plane
-    limits = ", ".join(
-        f"{axis.name} {number(axis.velocity_mm_s)} mm/s {number(axis.acceleration_mm_s2)} mm/s^2 "
-        f"{number(axis.jerk_mm_s3)} mm/s^3"
-        for axis in (x, y)
-    )
-    return f"controller's check: proved at all times and overrides: {limits}"
+    return f"controller's check: proved at all times and overrides: {proved_limits(machine)}"
 
 
 def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dict[str, object]:
@@ -82,19 +78,20 @@ def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dic
     return {"controller": {"accepted": False} | refusal}
 
 
-def _planned(chain: Chain) -> bytes:
+def _planned(chain: Chain) -> NativeProgram:
     print_notes(chain, chain.plan)
     if chain.machine_or_none is not None:
-        return chain.image
+        return chain.accepted
     options = ProgramOptions(chain.file.name)
-    return encode(compile_program(chain.spline_result.spline, chain.plan, options))
+    return NativeProgram(encode(compile_program(chain.spline_result.spline, chain.plan, options)))
 
 
-def _given(file: Path) -> bytes:
+def _given(file: Path) -> NativeProgram:
     image = read_image(file)
     if image is None:
         raise InputError(f"{file}: is not a program image: make one with hodograph compile")
-    return image
+    decode_file(file, image)  # its errors name the file
+    return NativeProgram(image)
 
 
 def _drives(machine: Machine | None) -> tuple[Drive, ...]:

@@ -48,6 +48,8 @@ class Machine:
     counts_per_mm: int
     supervision: Supervision
     axes: tuple[Axis, ...]
+    program_bytes: int | None = None
+    """Room for a program in the controller's memory (0x2041 sub 1), for `compile`'s warning; None: not known."""
 
     @property
     def start_tolerance_counts(self) -> int:
@@ -105,6 +107,7 @@ _CONTROLLER = (
     "reserve",
     "stop_time_ms",
     "start_tolerance_mm",
+    "program_bytes",
 )
 _SUPERVISION = ("answer_wait_ms", "missed_max", "setpoint_timeout_ms")
 
@@ -134,6 +137,7 @@ def load_machine(file: Path) -> Machine:
         counts_per_mm=counts_per_mm,
         supervision=_supervision(root),
         axes=axes,
+        program_bytes=controller.integer("program_bytes", 0, low=0, high=2**32 - 1) or None,
     )
 
 

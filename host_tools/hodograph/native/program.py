@@ -77,7 +77,7 @@ class NativeProgram:
             raise InputError(
                 f"program image: {text(lib.program_error_text(code))}: compile it again (code {code})"
             )
-        self._accepted: bool | None = None
+        self._accepted = False
 
     @property
     def period_us(self) -> int:
@@ -101,7 +101,7 @@ class NativeProgram:
         return int(self.pointer.header.duration_q32_s)
 
     def check(self, limits: NativeLimits | None = None) -> NativeFault | None:
-        """The controller's check of all rules; None: accepted."""
+        """The controller's check of all rules; None: accepted, so that it may be interpolated as well."""
         ffi, lib = library()
         given = limits or NativeLimits()
         c_limits = ffi.new(
@@ -111,6 +111,7 @@ class NativeProgram:
         fault = ffi.new("struct program_fault *")
         code = lib.program_check(self.pointer, c_limits, fault)
         if code == 0:
+            self._accepted = True
             return None
         return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
 
@@ -123,7 +124,6 @@ class NativeProgram:
             raise InputError(
                 f"program image: {fault.text} (code {fault.code}, number {fault.index}): compile it again"
             )
-        self._accepted = True
 
     def tick_times_q42_s(self, tick0: int = 0, count: int | None = None) -> NDArray[np.uint64]:
         """Program times of `count` ticks from `tick0` on (default: to the last), s * 2^42, (count,)."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bus.run import BusRun
-from ..chain import Chain
+from ..chain import Chain, proved_limits
 from ..paper import compare, quantity_name, shown
 from ..paper.compare import CASES
 from ..simulate import Motion
@@ -89,6 +89,7 @@ def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
         "anchor": file_name(chain.file.name, "path"),
         "file": str(chain.file.file),
         "notes": chain.notes(plan),
+        "proof": proved_limits(chain.machine),
         "figures": figures,
         "load": _load(run),
     }

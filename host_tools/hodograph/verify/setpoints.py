@@ -48,9 +48,8 @@ def bus_noise(counts_per_mm: int, period_us: int) -> BusNoise:
     return BusNoise(2.0 * q / dt**2, 4.0 * q / dt**3)
 
 
-def sampled(image: bytes) -> tuple[Sampled, ...]:
-    """All kernels, over the whole program with rest before and after. Raises InputError: an image that is refused."""
-    program = NativeProgram(image)
+def sampled(program: NativeProgram) -> tuple[Sampled, ...]:
+    """All kernels, over the whole program with rest before and after. Raises InputError: a program that is refused."""
     dt = 1e-6 * program.period_us
     second = {kernel: np.zeros(2) for kernel in KERNELS}
     third = {kernel: np.zeros(2) for kernel in KERNELS}

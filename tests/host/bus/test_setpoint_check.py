@@ -234,6 +234,49 @@ def test_a_jump_of_the_only_axis_that_still_follows() -> None:
     assert jumps(one_left(0, 600, 1200), limits) == ["turn@3"]
 
 
+OF_AXES = StepLimits(math.inf, math.inf, axes=((1000.0, 200.0, 50.0), (500.0, 200.0, 50.0)))
+UP = (50, 100, 150, 200, 200, 150, 100, 50, 0)
+"""Second differences from rest to 1000 counts a period."""
+
+
+def accelerated(axis: int, *second: int) -> Stream:
+    """One axis by its second differences, from rest."""
+    stream = standing()
+    for place in np.cumsum(np.cumsum(second)):
+        stream.tick(*(int(place) if k == axis else 0 for k in range(2)))
+    return stream
+
+
+def test_each_axis_by_its_own_limits() -> None:
+    assert jumps(accelerated(0, *UP), OF_AXES) == []
+    assert jumps(accelerated(0, *UP, *(-a for a in UP)), OF_AXES) == []
+    assert jumps(accelerated(1, *UP), OF_AXES)[0] == "axis speed@6"
+    # The limit, and 2, 4 or 8 counts of rounding
+    assert jumps(accelerated(0, *UP, 2), OF_AXES) == []
+    assert jumps(accelerated(0, *UP, 3), OF_AXES) == ["axis speed@11"]
+    assert jumps(accelerated(0, 50, 100, 150, 200, 204), OF_AXES) == []
+    assert jumps(accelerated(0, 50, 100, 150, 200, 205), OF_AXES) == ["axis acceleration@6"]
+    assert jumps(accelerated(0, 58, 116), OF_AXES) == []
+    assert jumps(accelerated(0, 58, 117), OF_AXES) == ["axis jerk@3"]
+    assert jumps(accelerated(0, 0, 59), OF_AXES) == ["axis jerk@3"]
+
+
+def test_the_axis_limits_without_a_setpoint_at_a_sync() -> None:
+    """The drive stands at its target meanwhile: nothing is spread over both periods."""
+    stream = accelerated(0, *UP)
+    stream.tick().tick(5500 + 2000, 0).tick(5500 + 3000, 0)
+    found = jumps(stream, OF_AXES)
+    assert "axis speed@12" in found
+    assert {"axis acceleration@11", "axis jerk@11"} <= set(found)
+
+
+def test_a_recording_that_begins_in_motion_has_no_jerk_at_first() -> None:
+    stream = Stream()
+    for place in np.cumsum([0, 500, 700, 850, 950, 1000, 1000]):
+        stream.tick(int(place), 0)
+    assert jumps(stream, OF_AXES) == []
+
+
 def test_third_axis_by_itself() -> None:
     stream = Stream().tick(0, 0, 7).tick(0, 0, 7).tick(0, 0, 7).tick(0, 0, 500)
     found = find_jumps(stream.packed(), (2, 3, 4), LIMITS)
@@ -256,12 +299,13 @@ def streamed(setpoints: NDArray[np.int32]) -> Stream:
     return stream
 
 
-@pytest.mark.parametrize("name", ["alpha", "heart", "star"])
+@pytest.mark.parametrize("name", ["alpha", "heart", "star", "alpha_optimal", "heart_optimal"])
 def test_whole_programs_pass_and_each_jump_in_them_is_found(name: str) -> None:
     chain = load_chain(EXAMPLES / f"{name}.toml")
     machine = chain.machine
     _, setpoints = NativeProgram(chain.image).setpoints("fixed", machine.counts_per_mm)
     limits = step_limits(machine, setpoints)
+    assert len(limits.axes) == len(machine.axes)
     assert find_jumps(streamed(setpoints).packed(), NODES, limits) == []
     least = math.ceil(2 * math.hypot(limits.acceleration, limits.normal)) + 20
     for at in range(50, len(setpoints) - 50, 97):

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from hodograph.cli.main import main
+from hodograph.program.memory import RECORD_BYTES, memory_bytes
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 NAMES = ["alpha", "heart", "star"]
@@ -125,6 +126,31 @@ def test_feed_of_a_dense_path_is_that_of_its_program(
     assert "two neighbouring segments" in notes
     ticks = result(capsys, "simulate", str(file), "--json")["ticks"]
     assert ticks == np.ceil(json.loads(out)["duration_s"] * 1000.0) + 1
+
+
+def test_compile_warns_of_what_the_machines_controller_cannot_hold(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """As `upload` counts: the image and the records that are prepared from it."""
+    text = (EXAMPLES / "machines" / "paper_alpha.toml").read_text()
+    text = text.replace('"../drives/', f'"{EXAMPLES}/drives/')
+    output = tmp_path / "a.hdgp"
+
+    def told(room: int | None) -> str:
+        machine = tmp_path / "machine.toml"
+        line = "" if room is None else f"program_bytes = {room}\n"
+        machine.write_text(text.replace("[controller]\n", f"[controller]\n{line}"))
+        words = ["compile", str(EXAMPLES / "alpha.toml"), "--machine", str(machine)]
+        assert main([*words, "-o", str(output)]) == 0
+        return capsys.readouterr().err
+
+    assert told(None) == ""
+    needed = memory_bytes(output.read_bytes(), *RECORD_BYTES["fixed"])
+    assert told(needed) == ""
+    assert (
+        f"takes {needed} bytes of a controller with what is prepared from it, more than the {needed - 1} of "
+        "[controller] program_bytes of machine.toml: upload will refuse it" in told(needed - 1)
+    )
 
 
 def test_compile_and_inspect(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

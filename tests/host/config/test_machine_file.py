@@ -58,6 +58,7 @@ def test_every_key_of_real_drives() -> None:
     assert machine.supervision == Supervision(
         answer_wait_ms=2, missed_max=1, setpoint_timeout_ms=50
     )
+    assert machine.program_bytes == 129008
     x, y, z = machine.axes
     assert (x.following_window_mm, x.following_timeout_ms, x.quick_stop_mm_s2) == (2, 20, 3000)
     assert x.homing == Homing(17, -200.0, 20.0, 2.0, 200.0)

@@ -14,6 +14,7 @@ from hodograph.config import Machine, load_machine, load_path_file
 from hodograph.errors import PlanError
 from hodograph.feed import AxisLimits, Limits
 from hodograph.feed.limits import MACHINE_SHARE
+from hodograph.native.program import NativeFault, NativeLimits, NativeProgram
 from hodograph.verify import verify_program
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -72,6 +73,40 @@ def test_each_limit_binds(tmp_path: Path, profile: str, name: str) -> None:
     found = {p.quantity: p for p in verify_program(made.program, made.limits).peaks}
     used = max(found[f"{axis}_{name}"].value for axis in "xy")
     assert 0.9 * limit < used <= limit
+
+
+def planned_beyond(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
+    """Plans use so much of the machine's limits: the controller has to refuse them above 1."""
+    monkeypatch.setattr("hodograph.feed.limits.MACHINE_SHARE", share)
+
+
+@pytest.mark.parametrize("profile", FEEDS)
+@pytest.mark.parametrize(("share", "attempts"), [(1.001, 2), (1.005, 3)])
+def test_a_plan_that_is_refused_is_planned_again_with_more_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, profile: str, share: float, attempts: int
+) -> None:
+    planned_beyond(monkeypatch, share)
+    made = chain(tmp_path, NEAR, profile, "respect", machine(jerk_mm_s3=20000.0))
+    verdicts: list[NativeFault | None] = []
+    check = NativeProgram.check
+
+    def kept(self: NativeProgram, limits: NativeLimits | None = None) -> NativeFault | None:
+        verdicts.append(check(self, limits))
+        return verdicts[-1]
+
+    monkeypatch.setattr(NativeProgram, "check", kept)
+    assert made.image
+    assert [verdict is None for verdict in verdicts] == [False] * (attempts - 1) + [True]
+    assert made.compilation.plan.duration_s > made.plan.duration_s
+
+
+def test_a_plan_that_stays_refused_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned_beyond(monkeypatch, 1.05)
+    made = chain(tmp_path, NEAR, "quintic", "respect", machine(jerk_mm_s3=20000.0))
+    with pytest.raises(PlanError, match=r"would refuse the program: above the jerk limit"):
+        _ = made.image
 
 
 def test_a_curve_that_no_feed_can_follow_is_named_with_place_and_curvature(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ import pytest
 
 from hodograph.chain import load_chain
 from hodograph.feed import Limits
-from hodograph.native.program import NativeProgram
 from hodograph.verify import bus_noise, sampled, verify_program
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -17,8 +16,8 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 @pytest.mark.parametrize("name", ["alpha", "heart"])
 def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str) -> None:
     chain = load_chain(EXAMPLES / f"{name}.toml")
-    found = {one.kernel: one for one in sampled(chain.image)}
-    program = NativeProgram(chain.image)
+    found = {one.kernel: one for one in sampled(chain.accepted)}
+    program = chain.accepted
     points = program.points("fixed", program.tick_times_q42_s())
     for axis, key in enumerate(("x_q40_mm", "y_q40_mm")):
         x = points[key].astype(np.float64) * 2.0**-40
@@ -39,10 +38,10 @@ def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str
 
 
 def test_long_programs_are_read_in_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
-    image = load_chain(EXAMPLES / "alpha.toml").image
-    whole = sampled(image)
+    program = load_chain(EXAMPLES / "alpha.toml").accepted
+    whole = sampled(program)
     monkeypatch.setattr("hodograph.verify.setpoints._CHUNK", 37)
-    assert sampled(image) == whole
+    assert sampled(program) == whole
 
 
 def test_rounding_to_counts() -> None:

@@ -13,10 +13,15 @@ acceleration  | |d_k| - |d_(k-1)| | <= a T^2: the second difference of arc lengt
               is added for both; theta counts up to half a radian, so that a step aside is not excused by its own turn.
 turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greatest normal acceleration n is known. It
               holds for each axis, so it is checked too while only one of the plane's drives follows.
+axis          Of each axis by itself, as far as the limits of the machine's axes are known: the first, second and third
+              difference are means of velocity, acceleration and jerk over one to three periods, so at most v T, a T^2
+              and j T^3. Rounding adds 1, 2 and 4 counts, and as much for the kernel's own error. Acceleration and jerk
+              may be 1 % above: the controller lets joints of a program step by 0.5 % of them (docs/limits.md), and
+              a difference may reach over two. A recording that begins in motion shows no jerk before its third step.
 
 Where a SYNC passed without a setpoint the drive stood at its target, and the next setpoint is the step of one period:
 that is what the drive makes of it. One garbled statusword in a row does not hide a drive that follows. Axes beyond the
-plane hold their position: they are checked for speed and acceleration one by one.
+plane hold their position: they are checked for speed and acceleration, and by their own limits, one by one.
 """
 
 from __future__ import annotations
@@ -37,14 +42,22 @@ if TYPE_CHECKING:
     from ...config import Machine
 
 SPEED, ACCELERATION, TURN = "speed", "acceleration", "turn"
+AXIS_RULES = ("axis speed", "axis acceleration", "axis jerk")
+"""By the number of differences less one."""
 _PLANE = 2
 _ROUNDING_COUNTS = 2 * math.sqrt(2.0)
 _ENABLED, _HOMING = 0x0F, 0x10
 _STATE_MASK, _OPERATION_ENABLED = 0x6F, 0x27
 _LARGEST_TURN = 0.5
+_JOINTS = 1.01
+"""Times the limits of acceleration and jerk of an axis."""
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
+
+
+AxisSteps = tuple[float, float, float]
+"""Greatest first, second and third difference of an axis, in counts."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +67,14 @@ class StepLimits:
     speed: float
     acceleration: float
     normal: float = math.inf
+    axes: tuple[AxisSteps, ...] = ()
+    """Of each axis; none where they are not known."""
 
-    def of(self, rule: str) -> float:
-        """What a rule limits."""
+    def of(self, rule: str, axes: tuple[int, ...]) -> float:
+        """What a rule allows to these axes, which count from 1."""
+        if rule in AXIS_RULES:
+            axis = axes[0] - 1
+            return self.axes[axis][AXIS_RULES.index(rule)] if axis < len(self.axes) else math.inf
         if rule == TURN:
             return math.hypot(self.acceleration, self.normal)
         return self.speed if rule == SPEED else self.acceleration
@@ -79,7 +97,7 @@ class Step:
 
     def jump(self, limits: StepLimits) -> Jump:
         """What is said of it where it breaks the limit."""
-        allowed = limits.of(self.rule) + self.aside_counts
+        allowed = limits.of(self.rule, self.axes) + self.aside_counts
         return Jump(self.sync, self.axes, self.rule, self.found_counts, allowed)
 
 
@@ -110,6 +128,7 @@ def step_limits(machine: Machine, setpoints: NDArray[np.int32] | None = None) ->
     return limits_at(
         *(machine.feed_mm_s, machine.acceleration_mm_s2, machine.period_us, machine.counts_per_mm),
         normal,
+        [(a.velocity_mm_s, a.acceleration_mm_s2, a.jerk_mm_s3) for a in machine.axes],
     )
 
 
@@ -119,12 +138,22 @@ def limits_at(
     period_us: int,
     counts_per_mm: int,
     normal: float = math.inf,
+    axes: Sequence[tuple[float, float, float]] = (),
 ) -> StepLimits:
-    """Limits of speed and acceleration along the path, 0: none, in the units of steps."""
+    """Limits of speed and acceleration along the path and of velocity, acceleration and jerk of each axis, 0: none, in
+    the units of steps.
+    """
     period_s = period_us * 1e-6
     speed = feed_mm_s * period_s * counts_per_mm
     acceleration = acceleration_mm_s2 * period_s**2 * counts_per_mm
-    return StepLimits(speed or math.inf, acceleration or math.inf, normal)
+    units = (period_s, _JOINTS * period_s**2, _JOINTS * period_s**3)
+    of_axes = [
+        [limit * counts_per_mm * unit or math.inf for limit, unit in zip(axis, units, strict=True)]
+        for axis in axes
+    ]
+    return StepLimits(
+        speed or math.inf, acceleration or math.inf, normal, tuple((v, a, j) for v, a, j in of_axes)
+    )
 
 
 def require_no_jump(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> None:
@@ -140,7 +169,7 @@ def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list
     jumps = [
         step.jump(limits)
         for measured in _measured(frames, nodes)
-        for step in measured.beyond(limits.of(measured.rule))
+        for step in measured.beyond(limits.of(measured.rule, measured.names))
     ]
     return sorted(jumps, key=lambda jump: jump.sync)
 
@@ -182,18 +211,21 @@ def _integers(data: NDArray[np.uint8]) -> Float:
 
 @dataclass(frozen=True)
 class _Steps:
-    """Rows by SYNC, columns by axis: counts; whether the drive followed."""
+    """Rows by SYNC, columns by axis: counts; whether the drive followed; whether the step is a guess."""
 
     counts: Float
     followed: Bool
+    guessed: Bool
 
     def of(self, axes: tuple[int, ...]) -> _Steps:
-        return _Steps(self.counts[:, axes], self.followed[:, axes])
+        return _Steps(self.counts[:, axes], self.followed[:, axes], self.guessed[:, axes])
 
 
 def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _Steps:
     shape = (sync_at.size, len(nodes))
-    steps = _Steps(np.zeros(shape), np.zeros(shape, dtype=np.bool_))
+    steps = _Steps(
+        np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
+    )
     for axis, node in enumerate(nodes):
         at, control, target = _setpoints(frames[sync_at[0] :], node)
         at += sync_at[0]
@@ -212,6 +244,7 @@ def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _
             steps.followed[sync[i] + 1 : sync[i + 1], axis] = True  # it stands
         if valid[0] and follows[0]:  # begun in motion, perhaps: as fast as it goes on
             steps.followed[sync[0], axis], steps.counts[sync[0], axis] = True, step[0]
+            steps.guessed[sync[0], axis] = True
     return steps
 
 
@@ -246,6 +279,11 @@ class _Measured:
     checked: Bool
     followed: Bool
 
+    @property
+    def names(self) -> tuple[int, ...]:
+        """The axes, which count from 1."""
+        return tuple(axis + 1 for axis in self.axes)
+
     def step(self, row: int) -> Step:
         names = tuple(axis + 1 for axis, f in zip(self.axes, self.followed[row], strict=True) if f)
         return Step(row + 1, names, self.rule, float(self.value[row]), float(self.aside[row]))
@@ -271,7 +309,27 @@ def _measured(frames: Frames, nodes: Sequence[int]) -> list[_Measured]:
     steps = _steps(frames, sync_at, nodes)
     groups = [tuple(range(min(_PLANE, len(nodes))))]
     groups += [(axis,) for axis in range(_PLANE, len(nodes))]
-    return [rule for group in groups if group for rule in _rules(steps.of(group), group)]
+    rules = [rule for group in groups if group for rule in _rules(steps.of(group), group)]
+    return rules + [
+        rule for axis in range(len(nodes)) for rule in _axis_rules(steps.of((axis,)), (axis,))
+    ]
+
+
+def _axis_rules(steps: _Steps, axes: tuple[int]) -> list[_Measured]:
+    """Of one axis: its differences. Before it followed it stood."""
+    counts = np.where(steps.followed, steps.counts, 0.0)[:, 0]
+    followed, known = steps.followed[1:], ~steps.guessed[:, 0]
+    out = []
+    for order, rule in enumerate(AXIS_RULES):
+        value = np.zeros(counts.size)
+        value[order:] = np.abs(np.diff(counts, n=order))
+        checked = followed[:, 0].copy()
+        if order == 2:
+            checked &= known[1:] & known[:-1]
+            checked[1:] &= known[:-2]
+        aside = np.full(checked.size, 2.0 * 2.0**order)
+        out.append(_Measured(rule, axes, value[1:], aside, checked, followed))
+    return out
 
 
 def _rules(steps: _Steps, axes: tuple[int, ...]) -> list[_Measured]:

@@ -15,12 +15,10 @@ from .objects import (
     DISABLE,
     FAULT_STATE,
     HELD,
-    HOLD,
     HOME,
     HOMED,
     HOMING_METHOD,
     OFF,
-    QUICK_STOP,
     READY,
     REFUSED_MOVING,
     RESET,
@@ -30,9 +28,8 @@ BOOT_S = 10.0
 """Patience for drives to be found and configured, switched on or off."""
 
 
-def hold(controller: Controller, wait_s: float = math.inf) -> bool:
-    """Brings the path to rest; false when the program had ended before. As long as braking takes, or `wait_s`."""
-    controller.command(HOLD)
+def hold_reached(controller: Controller, wait_s: float = math.inf) -> bool:
+    """Waits for the rest on the path that HOLD asked for; false when the program had ended before."""
     return controller.wait_for((HELD, READY), wait_s) == HELD
 
 
@@ -59,12 +56,11 @@ def home(
     return [controller.read(AXIS_NODE, axis) for axis in wanted]
 
 
-def quick_stop(controller: Controller, wait_s: float = BOOT_S) -> None:
-    """All drives brake by their own ramps, off the path if need be; returns when they are off.
+def quick_stop_over(controller: Controller, wait_s: float = BOOT_S) -> None:
+    """Waits until the drives, which QUICK_STOP made brake by their own ramps, are off.
 
     Raises RunError when the controller is in a fault then.
     """
-    controller.command(QUICK_STOP)
     controller.wait_for((OFF, BOOT), wait_s)
 
 

@@ -64,6 +64,18 @@ def configured_limits(controller: Node) -> tuple[float, float, int, int]:
     return feed_um_s / 1000, acceleration_um_s2 / 1000, controller.read(objects.PERIOD), counts
 
 
+def configured_axis_limits(controller: Node, axes: int) -> tuple[tuple[float, float, float], ...]:
+    """Velocity in mm/s, acceleration in mm/s^2 and jerk in mm/s^3 of each axis, as they are now. Raises BusError."""
+
+    def of(axis: int) -> tuple[float, float, float]:
+        velocity_um_s = controller.read(objects.AXIS_VELOCITY_LIMIT, axis)
+        acceleration_um_s2 = controller.read(objects.AXIS_ACCELERATION_LIMIT, axis)
+        jerk_mm_s3 = controller.read(objects.AXIS_JERK_LIMIT, axis)
+        return velocity_um_s / 1000, acceleration_um_s2 / 1000, float(jerk_mm_s3)
+
+    return tuple(of(axis) for axis in range(1, axes + 1))
+
+
 def configured_nodes(controller: Node) -> tuple[int, ...]:
     """The nodes of the controller's axes. Raises BusError."""
     count = controller.read(CONFIGURATION, 1)

@@ -23,6 +23,7 @@ from .configuration import configuration, configuration_crc32
 from .network import open_network
 from .node import IDENTITY_OBJECT, Node
 from .objects import (
+    AT_ONCE,
     AXIS_NODE,
     BOOT,
     BOOT_TROUBLE,
@@ -39,7 +40,6 @@ from .objects import (
     HELD,
     HOLD,
     HOLDING,
-    HOMING,
     LOAD,
     MOVING,
     NODE_NUMBER,
@@ -183,9 +183,12 @@ class Controller(Node):
         return self.read(STATE)
 
     def command(self, command: int) -> None:
-        """Gives a command; raises RefusedError with the controller's reason."""
+        """Gives a command; raises RefusedError with the controller's reason. Those to stop never wait."""
         try:
-            self.patiently(COMMAND, None, lambda: self._give(command))
+            if command in AT_ONCE:
+                self.write_at_once(COMMAND, command)
+            else:
+                self.patiently(COMMAND, None, lambda: self._give(command))
         except SdoAbortedError as error:
             reason = self.read(FAULT, 4)
             text = REFUSALS.get(reason, str(error))
@@ -295,13 +298,7 @@ class Controller(Node):
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand."""
-        to_stop = (*ON_PATH, ENABLING, HOMING)
-        if self.state() in to_stop:
-            try:
-                self.command(STOP)
-            except CommandRefusedError:
-                if self.state() in to_stop:
-                    raise
+        self.command(STOP)  # without effect where nothing moves
         self.wait_for((BOOT, OFF, READY), wait_s)
 
     def override(self, percent: int) -> None:

@@ -14,10 +14,10 @@ import can
 import canopen
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from ...errors import BusError, RefusedError, one_line
+from ...errors import BusError, BusyError, RefusedError, one_line
 from ..address import BusAddress
 from ..clock import REAL_CLOCK, Clock
-from .objects import STATE
+from .objects import COMMAND, STATE
 from .turns import TURN_WAIT_S, Turns
 
 IDENTITY_OBJECT = 0x1018
@@ -34,6 +34,9 @@ BUSY_S = 5.0
 _BUSY_LOOK_S = 0.05
 _NOBODY = b"\xff\xff\xff"
 """No object that anybody asks for."""
+_COMMAND = struct.pack("<HB", COMMAND, 0)
+_COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
+_AGAIN_S = 0.25
 _T = TypeVar("_T")
 
 
@@ -50,6 +53,8 @@ class _Answers:
         """Index and sub-index, as in a frame, of what we ask; empty: not known."""
 
     def put(self, answer: bytes) -> None:
+        if answer == _COMMAND_TAKEN and self.asked != _COMMAND:
+            return  # another client's command to stop, which waits for no transfer
         refusal = answer[0] == ABORT and answer[4:8] == ABORT_BUSY.to_bytes(4, "little")
         if not (refusal and self.asked and answer[1:4] != self.asked):
             self._queued.put(answer)
@@ -80,6 +85,8 @@ class Node:
         self.clock = clock
         self._turns = Turns(address, node_id, clock)
         self._under_way = False
+        self._left_s: float | None = None
+        """What is left of the time that a question may take, None: no limit of its own."""
         self._identified = False
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
@@ -90,17 +97,17 @@ class Node:
         self._turns.close()
 
     @contextmanager
-    def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[None]:
+    def turn(self, wait_s: float = TURN_WAIT_S, busy_s: float | None = None) -> Iterator[None]:
         """The node's SDO channel is ours inside; what was sent to others, or came too late to us, is thrown away.
 
-        Raises BusError when there is no turn in `wait_s`, when the node does not answer, or when what is inside can't
-        send.
+        Raises BusyError when there is no turn in `wait_s`, or the node serves another client for more than `busy_s`
+        (None: BUSY_S); BusError when the node does not answer, or when what is inside can't send.
         """
         try:
             with self._turns.turn(wait_s) as handed_over:
                 self._under_way |= handed_over
                 if self._under_way:
-                    self._let_pass()
+                    self._let_pass(BUSY_S if busy_s is None else busy_s)
                 yield
         except SdoCommunicationError:
             self._under_way = True
@@ -111,7 +118,7 @@ class Node:
             self._under_way = True
             raise
 
-    def _let_pass(self) -> None:
+    def _let_pass(self, busy_s: float) -> None:
         """Throws away answers that nobody waits for: all that come before the answer to a question only we ask.
 
         The question is for an object that does not exist, another one for everybody and each time, so the answer is an
@@ -121,7 +128,10 @@ class Node:
         request = bytearray(b"\x40" + nowhere + bytes(4))
         self.sdo.send_request(request)
         begun_s = self.clock.now_s()
-        deadline = begun_s + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+        patience_s = max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+        if self._left_s is not None:
+            patience_s = min(patience_s, self._left_s)
+        deadline = begun_s + patience_s
         with suppress(queue.Empty):
             while (left := deadline - self.clock.now_s()) > 0:
                 answer = self.sdo.responses.get(timeout=left)
@@ -130,15 +140,15 @@ class Node:
                 if int.from_bytes(answer[4:8], "little") != ABORT_BUSY:
                     self._under_way = False
                     return
-                if self.clock.now_s() - begun_s > BUSY_S:
+                if self.clock.now_s() - begun_s > busy_s:
                     raise self._busy()
                 self.clock.sleep(_BUSY_LOOK_S)
                 self.sdo.send_request(request)
-                deadline = self.clock.now_s() + max(LET_PASS_S, self.sdo.RESPONSE_TIMEOUT)
+                deadline = self.clock.now_s() + patience_s
         raise _SilentError(f"{self.who()} stopped answering: is its process or its power gone?")
 
-    def _busy(self) -> BusError:
-        return BusError(
+    def _busy(self) -> BusyError:
+        return BusyError(
             f"{self.who()} is in the middle of a transfer with another SDO client (a program on another computer?): "
             "try again when that is done"
         )
@@ -212,29 +222,69 @@ class Node:
         """The node and its bus, to begin a message with."""
         return f"node {self.node_id} on {self.address}"
 
+    def write_at_once(self, index: int, value: int) -> None:
+        """Writes an object of one byte that the server takes at any time (commands to stop): without a turn, and beside
+        whatever transfer is under way. Raises SdoAbortedError, BusError.
+        """
+        asked = self._answers.asked = _frame_bytes(index, None)
+        request = bytearray(b"\x2f" + asked + bytes((value, 0, 0, 0)))
+        end_s = self.clock.now_s() + float(self.sdo.RESPONSE_TIMEOUT)
+        try:
+            while (now_s := self.clock.now_s()) < end_s:
+                self.sdo.send_request(request)
+                answer = self._answer_to(asked, min(now_s + _AGAIN_S, end_s))
+                code = int.from_bytes(answer[4:8], "little") if answer[:1] == bytes((ABORT,)) else 0
+                if code == ABORT_BUSY:  # a controller that makes stops wait as well
+                    self.clock.sleep(_BUSY_LOOK_S)
+                elif code:
+                    raise SdoAbortedError(code)
+                elif answer:
+                    return
+        except (can.CanError, OSError) as error:
+            raise BusError(f"{self.address}: cannot send: {one_line(error)}") from error
+        finally:
+            self._answers.asked = b""
+        raise BusError(f"{self.who()} stopped answering a command")
+
+    def _answer_to(self, asked: bytes, end_s: float) -> bytes:
+        """The next answer to a write of this object, empty when none comes."""
+        with suppress(queue.Empty):
+            while (left := end_s - self.clock.now_s()) > 0:
+                answer: bytes = self._answers.get(timeout=left)
+                if answer[1:4] == asked and answer[0] in (_COMMAND_TAKEN[0], ABORT):
+                    return answer
+        return b""
+
     def answers(self, wait_s: float, turn_wait_s: float = TURN_WAIT_S) -> bool:
         """Whether the node answers an SDO within `wait_s`.
 
-        Raises BusError when another command keeps it to itself for longer than `turn_wait_s`.
+        Raises BusyError when another command, or a client on another computer, keeps it to itself for longer than
+        `turn_wait_s`.
         """
         patience, self.sdo.RESPONSE_TIMEOUT = self.sdo.RESPONSE_TIMEOUT, min(0.25, wait_s)
-        deadline = self.clock.now_s() + wait_s
+        begun_s = self.clock.now_s()
+        deadline = begun_s + wait_s
         try:
             while True:
                 try:
-                    with self.turn(turn_wait_s):
+                    self._left_s = max(deadline - self.clock.now_s(), 0.001)
+                    with self.turn(turn_wait_s, min(turn_wait_s, BUSY_S)):
                         self._variable(STATE, None).raw  # noqa: B018
                     self._check_identity()
                     return True
                 except SdoAbortedError as error:
-                    raise BusError(
-                        f"{self.who()} is not a Hodograph controller: {error}"
-                    ) from error
+                    if error.code != ABORT_BUSY:
+                        raise BusError(
+                            f"{self.who()} is not a Hodograph controller: {error}"
+                        ) from error
+                    if self.clock.now_s() >= begun_s + turn_wait_s:
+                        raise self._busy() from error
+                    self.clock.sleep(_BUSY_LOOK_S)
                 except (SdoCommunicationError, _SilentError):
                     if self.clock.now_s() >= deadline:
                         return False
         finally:
-            self.sdo.RESPONSE_TIMEOUT = patience
+            self.sdo.RESPONSE_TIMEOUT, self._left_s = patience, None
 
     def _check_identity(self) -> None:
         """Raises BusError when the node is not what the EDS file describes."""
@@ -253,9 +303,11 @@ class Node:
                 )
         self._identified = True
 
-    def require(self, wait_s: float) -> None:
-        """Raises BusError unless the node, and before it our turn at it, comes within `wait_s`."""
-        if not self.answers(wait_s, wait_s):
+    def require(self, wait_s: float, busy_s: float | None = None) -> None:
+        """Raises BusError unless the node answers within `wait_s`, BusyError when others keep it for more than `busy_s`
+        (None: as long).
+        """
+        if not self.answers(wait_s, wait_s if busy_s is None else busy_s):
             raise BusError(
                 f"no answer from {self.who()} in {wait_s:g} s: start the controller "
                 f"(hodograph rig --bus {self.address} brings up a simulated machine)"

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ...errors import BusError
+from ...errors import BusyError
 from ..address import BusAddress
 from ..clock import REAL_CLOCK, Clock
 
@@ -54,7 +54,7 @@ class Turns:
     def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[bool]:
         """The channel is ours inside; true when another had it before. Turns may be nested.
 
-        Raises BusError when others keep the channel for longer than `wait_s`.
+        Raises BusyError when others keep the channel for longer than `wait_s`.
         """
         if len(self._files) < 2 or self._depth:
             yield False
@@ -75,7 +75,7 @@ class Turns:
         finally:
             fcntl.flock(following, fcntl.LOCK_UN)
         if not got:
-            raise BusError(
+            raise BusyError(
                 f"another hodograph command is using {self._who}: no turn in {wait_s:g} s, "
                 "try again when it is done"
             )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from pathlib import Path
 
 from ..values import finite, node_number, node_or_own, percentage, seconds
@@ -45,17 +46,22 @@ def _hold(command: Command) -> None:
             options.timeout(parser_, "as long as braking takes")
 
 
-def _home(command: Command) -> None:
-    home = command(
-        "home", "find the zero of every axis that has a homing method; drives off before and after"
-    )
-    home.add_argument(
+def _machine_file(parser: ArgumentParser, then: str = "") -> None:
+    """FILE, which may be left out; `then` says what is done with it."""
+    parser.add_argument(
         "file",
         metavar="FILE",
         type=Path,
         nargs="?",
-        help="machine file, or a path file that names one: configure the controller from it first",
+        help=f"machine file, or a path file that names one{then}",
     )
+
+
+def _home(command: Command) -> None:
+    home = command(
+        "home", "find the zero of every axis that has a homing method; drives off before and after"
+    )
+    _machine_file(home, ": configure the controller from it first")
     options.bus(home)
     options.node(home)
     options.timeout(home, "what the controller allows")
@@ -65,13 +71,7 @@ def _configure(command: Command) -> None:
     configure = command(
         "configure", "bring the controller's configuration to a machine file, keep it, or forget it"
     )
-    configure.add_argument(
-        "file",
-        metavar="FILE",
-        type=Path,
-        nargs="?",
-        help="machine file, or a path file that names one",
-    )
+    _machine_file(configure)
     configure.add_argument(
         "--store",
         action="store_true",
