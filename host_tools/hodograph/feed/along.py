@@ -83,8 +83,8 @@ class Samples:
 
 def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> Samples:
     """The motion of `pieces` along the path. Cells in which an axis' acceleration or jerk may rise between samples by
-    more than a share of its reserve are cut into parts, where it is near its limit; `filled`: everywhere, since what the
-    plan leaves of a limit is used up by something else (override).
+    more than a share of its reserve are cut into parts, where it is near its limit; `filled`: everywhere, since the
+    override uses up what the plan leaves of a limit.
     """
     track = _track(pieces)
     ends = [end for cap in bounds.limits.caps for end in (cap.from_mm, cap.to_mm)]
