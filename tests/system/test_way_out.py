@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How a moving machine is left: by the signals of its process, once and twice, at any instant of an optimal program.
+"""How a moving machine is left, at any instant of an optimal program: by signals, once and twice, and by its host.
 
 The frames on the bus are the evidence: setpoints rest within the bound of the stop, or the drives were told to stop
 quickly; and a drive whose axis moves is never told to switch off.
@@ -11,6 +11,7 @@ import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import can
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from bench import EXAMPLES, Bench, MakeBench
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.listening.frames import Frames
 from hodograph.bus.listening.recorder import Recorder
+from hodograph.bus.local_bus import LocalBus
+from hodograph.bus.sdo.controller import FAULT_STATE
+from hodograph.bus.sdo.objects import FAULT
 from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.program import Program
@@ -177,3 +181,36 @@ def test_a_second_signal_stops_quickly_at_once(way: Way, after_s: float, again_s
         told_us = heard(frames, node).first_us(QUICK_STOP, at_us)
         assert told_us is not None
         assert told_us - at_us <= again_s * 1e6 + LATE_US
+
+
+HOST_NODE, BEAT_S, SILENT_MS = 127, 0.02, 100
+
+
+@pytest.mark.parametrize("after_s", [0.02, 0.14, 0.3, 0.48, 0.7, 0.9, 1.1])
+def test_a_lost_host_stops_the_axes_on_the_path(
+    make_bench: MakeBench, heart: Program, after_s: float
+) -> None:
+    """0x1016 names it, and it has spoken: its silence is a fault, in which every drive obeys."""
+    bench = make_bench(file=PAPER_HEART)
+    assert main(["goto", HEART]) == 0
+    bench.controller.write(0x1016, 1, HOST_NODE << 16 | SILENT_MS)
+    host = LocalBus(bench.bus.channel, can_filters=[{"can_id": 0x7FF, "can_mask": 0x7FF}])
+    beat = can.Message(arbitration_id=0x700 + HOST_NODE, data=[5], is_extended_id=False)
+    with Recorder(bench.bus) as recorder:
+        assert main(["start"]) == 0
+        for _ in range(round(after_s / BEAT_S)):
+            host.send(beat)
+            bench.clock.sleep(BEAT_S)
+        silent_us = bench.clock.stamp_ns() // 1000 - round(BEAT_S * 1e6)
+        bench.clock.sleep(1.5)
+        frames = recorder.so_far()
+    host.shutdown()
+    assert bench.controller.state() == FAULT_STATE
+    assert [bench.controller.read(FAULT, sub) for sub in (1, 2)] == [0x8130, HOST_NODE]
+    never_coasts(frames)
+    assert switched_off(frames, silent_us)
+    for node in NODES:
+        axis = heard(frames, node)
+        told_us = axis.last_step_us(silent_us) - silent_us - SILENT_MS * 1000
+        assert told_us <= heart.stops.worst_us[1] + 20_000 + LATE_US
+        assert axis.first_us(QUICK_STOP, silent_us) is None
