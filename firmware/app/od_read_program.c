@@ -30,7 +30,8 @@ static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 #define FAULT_FIRST 20u
 
 /* The first piece in which a stop takes as long as the header says that one takes at most. */
-static uint32_t longest_piece(const struct program *p, enum program_stop_kind kind, uint32_t worst_us)
+static uint32_t longest_piece(const struct program *p, enum program_stop_kind kind,
+                              uint32_t worst_us)
 {
     const uint32_t last = p->header.piece_count - 1u;
     for (uint32_t i = 0; i < last; ++i) {

@@ -12,8 +12,6 @@ import numpy as np
 
 from ..bus.listening.setpoint_check import find_jumps, find_rough_starts, step_limits
 from ..native import Contour, NativeProgram
-from ..program import decode
-from ..program.stops import FAULT
 from .evidence import Emergency, Evidence
 from .record import REST_TOLERANCE_COUNTS, Record
 
@@ -193,8 +191,7 @@ def _not_on_path(record: Record, evidence: Evidence) -> list[str]:
     found = _told(record, evidence)
     if not record.case.scenario.expect.on_path or not found or not evidence.moved:
         return []
-    stops = decode(record.job.image).stops
-    most_ticks = ceil(stops.worst_us[FAULT] / record.job.machine.period_us)
+    most_ticks = ceil(record.job.fault_stop_s / (record.job.machine.period_us * 1e-6))
     fault_tick, bad = evidence.tick_at(found[0].time_us), []
     for node, (target, sent) in zip(evidence.nodes, evidence.setpoints(), strict=True):
         steps = np.flatnonzero((np.diff(target) != 0) & sent[1:] & sent[:-1])
