@@ -62,7 +62,8 @@ static enum machine_refusal start(struct controller *controller, int64_t from_q4
     return refusal;
 }
 
-static bool needs_configuration(enum command command)
+/* Wants a configuration, and a controller that stays. */
+static bool begins_something(enum command command)
 {
     return command == COMMAND_ENABLE || command == COMMAND_HOME || command == COMMAND_START ||
            command == COMMAND_START_FROM;
@@ -93,7 +94,10 @@ static enum machine_refusal home(struct controller *controller)
 static enum machine_refusal dispatch(struct controller *controller, enum command command)
 {
     struct machine *machine = &controller->machine;
-    if (needs_configuration(command) && !controller_configured(controller)) {
+    if (begins_something(command) && controller->ending) {
+        return MACHINE_ENDING;
+    }
+    if (begins_something(command) && !controller_configured(controller)) {
         return MACHINE_NOT_CONFIGURED;
     }
     switch (command) {

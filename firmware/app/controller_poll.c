@@ -61,6 +61,7 @@ static void take_frame(struct controller *controller, const struct can_msg *in)
 static bool next_frame(struct controller *controller, struct can_msg *in)
 {
     port_lock();
+    machine_attend(&controller->machine);
     const bool got = frame_queue_take(&controller->queue, in);
     port_unlock();
     return got;

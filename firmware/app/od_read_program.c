@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/od_read_program.h"
 
+#include <stdbool.h>
+
 static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 {
     const struct program_header *header = &slot->program.header;
@@ -22,6 +24,48 @@ static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
     default:
         return 0;
     }
+}
+
+#define STOPS_FIRST 16u /* four numbers of the longest hold, four of the longest fault stop */
+#define FAULT_FIRST 20u
+
+/* The first piece in which a stop takes as long as the header says that one takes at most. */
+static uint32_t longest_piece(const struct program *p, enum program_stop_kind kind,
+                              uint32_t worst_us)
+{
+    const uint32_t last = p->header.piece_count - 1u;
+    for (uint32_t i = 0; i < last; ++i) {
+        struct program_stop stop;
+        program_stop_get(p, i, kind, &stop);
+        if (stop.bound_us == worst_us) {
+            return i;
+        }
+    }
+    return last;
+}
+
+/* An arc length is below 2^22 mm. */
+static uint32_t start_um(const struct program *p, uint32_t piece)
+{
+    const uint64_t start_q20_mm = (uint64_t)program_piece_start(p, piece) >> 20;
+    return (uint32_t)((start_q20_mm * 1000u + (1u << 19)) >> 20);
+}
+
+static uint64_t stop_number(const struct program *p, uint8_t sub)
+{
+    const struct program_header *header = &p->header;
+    const bool fault = sub >= FAULT_FIRST;
+    const uint32_t worst_us = fault ? header->fault_worst_us : header->hold_worst_us;
+    const uint8_t number = (uint8_t)(sub - (fault ? FAULT_FIRST : STOPS_FIRST));
+    if (number == 0u) {
+        return worst_us;
+    }
+    if (number == 1u) {
+        return fault ? header->fault_worst_um : header->hold_worst_um;
+    }
+    const uint32_t piece =
+        longest_piece(p, fault ? PROGRAM_STOP_FAULT : PROGRAM_STOP_HOLD, worst_us);
+    return number == 2u ? piece : start_um(p, piece);
 }
 
 static uint64_t place_number(struct controller *controller, uint8_t sub)
@@ -47,6 +91,9 @@ uint64_t od_read_program(struct controller *controller, uint8_t sub)
     }
     if (!slot->present) {
         return 0;
+    }
+    if (sub >= STOPS_FIRST) {
+        return stop_number(&slot->program, sub);
     }
     return sub < 12u ? header_number(slot, sub) : place_number(controller, sub);
 }

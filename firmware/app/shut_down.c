@@ -5,8 +5,8 @@
 
 #include "port/port.h"
 
-#define STOP_TIME_US 5000000u /* along the path, at most */
-#define OFF_TIME_US  1000000u
+#define OFF_TIME_US        1000000u
+#define STOP_BOUND_MOST_US 60000000u
 
 static bool at_rest(const struct machine *machine)
 {
@@ -66,11 +66,22 @@ static uint32_t quick_time_us(const struct controller *controller)
     return (MACHINE_QUICK_TICKS + AXIS_STANDSTILL_SYNCS) * controller->config.period_us;
 }
 
+/* The machine itself gives a stop up at its deadline, a fifth beyond its bound, or, near the end of a program, beyond twice
+ * that at most; then the axes settle and arrive. This is for a machine whose ticks do not come. */
+static uint32_t path_time_us(const struct controller *controller)
+{
+    const struct program_slot *slot = &controller->slot;
+    const uint32_t told_us = slot->present ? slot->program.header.hold_worst_us : 0u;
+    const uint32_t bound_us = told_us < STOP_BOUND_MOST_US ? told_us : STOP_BOUND_MOST_US;
+    return 3u * bound_us + (MACHINE_SETTLE_TICKS + MACHINE_ARRIVE_TICKS + AXIS_STANDSTILL_SYNCS) *
+                               controller->config.period_us;
+}
+
 /* Where the path is not left in time, or somebody insists, the drives stop by their own ramps. */
 static bool come_to_rest(struct controller *controller)
 {
     (void)commands_execute(controller, COMMAND_STOP);
-    if (wait_until(controller, at_rest, STOP_TIME_US, true)) {
+    if (wait_until(controller, at_rest, path_time_us(controller), true)) {
         return true;
     }
     (void)commands_execute(controller, COMMAND_QUICK_STOP);
@@ -79,6 +90,7 @@ static bool come_to_rest(struct controller *controller)
 
 bool controller_shut_down(struct controller *controller)
 {
+    controller->ending = true;
     const bool stopped = come_to_rest(controller);
     (void)commands_execute(controller, COMMAND_DISABLE);
     (void)wait_until(controller, at_rest, quick_time_us(controller), false);

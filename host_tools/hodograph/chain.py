@@ -79,6 +79,16 @@ def drive_plants(machine: Machine) -> tuple[Plant, Plant] | None:
     return x, y
 
 
+def stop_terms(machine: Machine, limits: Limits) -> StopTerms:
+    """What the stops of a program on a machine keep beside the limits of its plan, which are in `limits`."""
+    return StopTerms(
+        plants=plants(machine, limits),
+        drives=drive_plants(machine),
+        axis=axis_limits(machine),
+        stop_time_ms=machine.stop_time_ms,
+    )
+
+
 def _plant(drive: Drive, volts: float | None) -> Plant:
     plant = Plant(
         drive.gain_rad_s_v * drive.screw_mm_rad,
@@ -313,13 +323,7 @@ class Chain:
     @property
     def stop_terms(self) -> StopTerms:
         """What the stops of the program keep beside the limits of its plan."""
-        machine, limits = self.machine, self.file.limits
-        return StopTerms(
-            plants=plants(machine, limits),
-            drives=drive_plants(machine),
-            axis=axis_limits(machine),
-            stop_time_ms=machine.stop_time_ms,
-        )
+        return stop_terms(self.machine, self.file.limits)
 
     @property
     def program(self) -> Program:

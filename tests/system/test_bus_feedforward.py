@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from commands import result
+from runs import same_motion
 
 pytestmark = pytest.mark.usefixtures("hub")
 
@@ -40,7 +41,7 @@ def test_the_same_bits_as_without_a_bus(capsys: pytest.CaptureFixture[str], tmp_
     file = alpha(tmp_path / "forward", gains)
     simulated = result(capsys, "simulate", file, "--json")
     recorded = result(capsys, "run", file, "--json")
-    assert {key: recorded[key] for key in simulated} == simulated
+    assert same_motion(recorded, simulated)
     plain = result(capsys, "simulate", alpha(tmp_path / "plain", {}), "--json")
     assert plain["setpoints_sha256"] == simulated["setpoints_sha256"]
     assert plain["encoders_sha256"] != simulated["encoders_sha256"]
@@ -51,7 +52,7 @@ def test_friction_and_rating_too(capsys: pytest.CaptureFixture[str], tmp_path: P
     file = alpha(tmp_path / "equipped", gains, "friction_volts = 0.2\nrated_torque_nm = 2")
     simulated = result(capsys, "simulate", file, "--json")
     recorded = result(capsys, "run", file, "--json")
-    assert {key: recorded[key] for key in simulated} == simulated
+    assert same_motion(recorded, simulated)
     for other in ("friction_volts = 0.2", "rated_torque_nm = 2"):
         less = result(capsys, "simulate", alpha(tmp_path / other[:8], gains, other), "--json")
         assert less["encoders_sha256"] != simulated["encoders_sha256"]
@@ -64,7 +65,7 @@ def test_the_tuned_machine_on_the_bus(capsys: pytest.CaptureFixture[str], tmp_pa
     file = tmp_path / "run.log"
     simulated = result(capsys, "simulate", *given, "--json")
     recorded = result(capsys, "run", *given, "--json", "--record", str(file))
-    assert {key: recorded[key] for key in simulated} == simulated
+    assert same_motion(recorded, simulated)
     assert 0.002 < simulated["max_contour_error_um"] < 0.05
     axes = result(capsys, "identify", str(file), "--machine", machine, "--json")["axes"]
     for axis, gain, time_s in zip(axes, (83.0089, 50.4977), (0.19936, 0.15641), strict=True):

@@ -529,6 +529,27 @@ static void test_shutting_down_at_any_instant(void)
     }
 }
 
+static void start_in_wait(void *context)
+{
+    static const enum command beginnings[] = {COMMAND_ENABLE, COMMAND_START, COMMAND_START_FROM,
+                                              COMMAND_HOME};
+    app_bench_period(&bench);
+    for (unsigned i = 0; i < sizeof beginnings / sizeof beginnings[0]; ++i) {
+        TEST_ASSERT_EQUAL_INT(MACHINE_ENDING, commands_execute(&bench.controller, beginnings[i]));
+    }
+    ++*(unsigned *)context;
+}
+
+static void test_on_the_way_out_nothing_begins_any_more(void)
+{
+    unsigned waits = 0;
+    run_some(250);
+    fake_port_on_wait(start_in_wait, &waits);
+    TEST_ASSERT_TRUE(controller_shut_down(&bench.controller));
+    TEST_ASSERT_TRUE(waits > 50u);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
+}
+
 static void insist(void *context)
 {
     app_bench_period(&bench);
@@ -670,6 +691,7 @@ int main(void)
     RUN_TEST(test_late_ticks_of_a_run_are_counted);
     RUN_TEST(test_shutting_down_while_running_stops_on_the_path);
     RUN_TEST(test_shutting_down_at_any_instant);
+    RUN_TEST(test_on_the_way_out_nothing_begins_any_more);
     RUN_TEST(test_whoever_insists_gets_the_quick_stop);
     RUN_TEST(test_a_hold_beyond_its_deadline);
     RUN_TEST(test_a_stop_beyond_its_deadline);

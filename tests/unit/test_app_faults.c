@@ -931,9 +931,124 @@ static void test_heartbeat_time_is_object_1016(void)
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
 }
 
+/* --- The host, where 0x1016 names it --- */
+
+#define HOST_NODE 127u
+
+static void host_says(enum nmt_state state)
+{
+    struct can_msg frame;
+    cob_frame(&frame, COB_HEARTBEAT + HOST_NODE, 1);
+    frame.data[0] = (uint8_t)state;
+    fake_port_receive(&frame);
+    app_bench_settle(&bench);
+}
+
+static void watch_host(uint32_t time_ms)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK,
+                            app_bench_write(&bench, 0x1016, 1, HOST_NODE << 16 | time_ms, 4));
+}
+
+static void test_a_host_that_falls_silent_stops_the_axes_on_the_path(void)
+{
+    watch_host(100);
+    run_some(50);
+    host_says(NMT_OPERATIONAL);
+    app_bench_periods(&bench, 90);
+    host_says(NMT_OPERATIONAL);
+    const uint32_t periods = app_bench_until(&bench, MACHINE_FAULT, 200);
+    TEST_ASSERT_TRUE(periods >= 100u && periods <= 121u);
+    app_bench_settle(&bench);
+    expect_fault(EMCY_HEARTBEAT, HOST_NODE);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
+    until_phase(MACHINE_FAULT_OFF, 1000);
+    app_bench_periods(&bench, 2);
+    expect_off();
+    TEST_ASSERT_EQUAL_UINT32(0, drive(0)->cut_moving);
+    recover();
+}
+
+static void test_a_host_that_restarts_is_lost_too(void)
+{
+    watch_host(1000);
+    run_some(100);
+    host_says(NMT_OPERATIONAL);
+    host_says(NMT_INITIALISING);
+    app_bench_period(&bench);
+    expect_fault(EMCY_HEARTBEAT, HOST_NODE);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
+}
+
+static void test_a_host_is_watched_from_its_first_heartbeat_on(void)
+{
+    watch_host(50);
+    run_some(100);
+    host_says(NMT_INITIALISING);
+    app_bench_periods(&bench, 200);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+}
+
+static void test_without_an_entry_no_host_is_watched(void)
+{
+    run_some(50);
+    host_says(NMT_OPERATIONAL);
+    app_bench_periods(&bench, 300);
+    host_says(NMT_INITIALISING);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+}
+
+static void test_with_drives_off_the_host_may_go(void)
+{
+    watch_host(50);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    host_says(NMT_OPERATIONAL);
+    app_bench_periods(&bench, 300);
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
+}
+
+/* --- The mainline --- */
+
+static void test_a_mainline_that_stands_still_stops_the_axes_on_the_path(void)
+{
+    run_some(100);
+    TEST_ASSERT_EQUAL_UINT32(0, machine()->unattended_us);
+    fake_port_advance_us(1000);
+    fake_port_tick(0);
+    TEST_ASSERT_EQUAL_UINT32(1000, machine()->unattended_us);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT32(0, machine()->unattended_us);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    machine()->unattended_us = MACHINE_UNATTENDED_US + 1u;
+    app_bench_period(&bench);
+    expect_fault(FAULT_UNATTENDED, 0);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
+    until_phase(MACHINE_FAULT_OFF, 1000);
+    TEST_ASSERT_EQUAL_UINT32(0, drive(0)->cut_moving);
+    app_bench_periods(&bench, 2);
+    recover();
+}
+
+static void test_at_standstill_the_mainline_may_take_its_time(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    switch_on();
+    machine()->unattended_us = MACHINE_UNATTENDED_US + 1u;
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_INT(MACHINE_READY, machine()->state);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_a_host_that_falls_silent_stops_the_axes_on_the_path);
+    RUN_TEST(test_a_host_that_restarts_is_lost_too);
+    RUN_TEST(test_a_host_is_watched_from_its_first_heartbeat_on);
+    RUN_TEST(test_without_an_entry_no_host_is_watched);
+    RUN_TEST(test_with_drives_off_the_host_may_go);
+    RUN_TEST(test_a_mainline_that_stands_still_stops_the_axes_on_the_path);
+    RUN_TEST(test_at_standstill_the_mainline_may_take_its_time);
     RUN_TEST(test_one_missed_answer_is_counted_by_axis_and_tolerated);
     RUN_TEST(test_more_than_that_is_a_fault_two_ticks_later);
     RUN_TEST(test_missed_max_is_configured);

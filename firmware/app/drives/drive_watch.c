@@ -20,6 +20,29 @@ static uint32_t time_of(uint8_t node, const uint32_t entries[AXES_MAX])
     return DRIVE_WATCH_HEARTBEAT_MS;
 }
 
+static bool is_drive(const struct config *config, uint8_t node)
+{
+    for (uint8_t i = 0; i < config->axis_count; ++i) {
+        if (config->node[i] == node) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void begin_others(struct drive_watch *watch, const struct config *config,
+                         const uint32_t entries[AXES_MAX])
+{
+    watch->other_count = 0;
+    for (uint8_t i = 0; i < AXES_MAX; ++i) {
+        struct heartbeat_consumer entry;
+        heartbeat_consumer_init_entry(&entry, entries[i]);
+        if (entry.node != 0u && entry.time_us != 0u && !is_drive(config, entry.node)) {
+            watch->others[watch->other_count++] = entry;
+        }
+    }
+}
+
 void drive_watch_begin(struct drive_watch *watch, const struct config *config,
                        const uint32_t entries[AXES_MAX])
 {
@@ -28,6 +51,7 @@ void drive_watch_begin(struct drive_watch *watch, const struct config *config,
         const uint8_t node = config->node[i];
         heartbeat_consumer_init(&watch->consumers[i], node, (uint16_t)time_of(node, entries));
     }
+    begin_others(watch, config, entries);
 }
 
 /* The zero of a drive counts as kept only while there is no gap in which it could have restarted. */
@@ -91,6 +115,28 @@ static void take_event(struct machine *machine, const struct heartbeat_consumer 
     port_unlock();
 }
 
+/* Nobody looks after the machine any more. With drives off there is nothing to bring to rest. */
+static void host_lost(struct machine *machine, uint8_t node)
+{
+    port_lock();
+    if (machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF) {
+        machine_raise(machine, EMCY_HEARTBEAT, node, 0);
+    }
+    port_unlock();
+}
+
+static void take_others(struct drive_watch *watch, struct machine *machine,
+                        const struct can_msg *in)
+{
+    for (uint8_t i = 0; i < watch->other_count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->others[i];
+        const bool present = consumer->presence == HEARTBEAT_PRESENT;
+        if (heartbeat_consumer_receive(consumer, in) == HEARTBEAT_BOOTED && present) {
+            host_lost(machine, consumer->node);
+        }
+    }
+}
+
 void drive_watch_receive(struct drive_watch *watch, struct machine *machine,
                          const struct can_msg *in)
 {
@@ -109,6 +155,7 @@ void drive_watch_receive(struct drive_watch *watch, struct machine *machine,
         }
         take_event(machine, consumer, heartbeat_consumer_receive(consumer, in));
     }
+    take_others(watch, machine, in);
 }
 
 void drive_watch_process(struct drive_watch *watch, struct machine *machine, uint32_t elapsed_us)
@@ -117,5 +164,11 @@ void drive_watch_process(struct drive_watch *watch, struct machine *machine, uin
         struct heartbeat_consumer *consumer = &watch->consumers[i];
         note_silence(watch, machine, i, elapsed_us);
         take_event(machine, consumer, heartbeat_consumer_process(consumer, elapsed_us));
+    }
+    for (uint8_t i = 0; i < watch->other_count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->others[i];
+        if (heartbeat_consumer_process(consumer, elapsed_us) == HEARTBEAT_LOST) {
+            host_lost(machine, consumer->node);
+        }
     }
 }

@@ -2,7 +2,7 @@
 /*
  * drive_watch: heartbeats and emergency messages of the drives, and what they mean for the zero of a homed axis: a drive that
  * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody heard its boot-up
- * message. Mainline; takes the port's lock where it touches the machine.
+ * message. Also heartbeats of the host, where 0x1016 names its node. Mainline; takes the port's lock where it touches the machine.
  */
 #ifndef APP_DRIVES_DRIVE_WATCH_H
 #define APP_DRIVES_DRIVE_WATCH_H
@@ -21,12 +21,15 @@
 
 struct drive_watch {
     struct heartbeat_consumer consumers[AXES_MAX];
+    struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are no drives: a host */
     uint32_t silent_us[AXES_MAX]; /* since the last heartbeat, whatever has begun anew since */
     uint8_t count;
+    uint8_t other_count;
 };
 
 /* Begins to watch the drives of the configuration, all unknown: each from its first heartbeat on. `entries` as in
- * 0x1016: bits 16 ... 23 node, 0 ... 15 time in ms; other nodes in it are of no interest. */
+ * 0x1016: bits 16 ... 23 node, 0 ... 15 time in ms. Other nodes in it are watched as well, likewise from their first
+ * heartbeat on: one that falls silent, or restarts, while drives are on is a fault, and its axes come to rest. */
 void drive_watch_begin(struct drive_watch *watch, const struct config *config,
                        const uint32_t entries[AXES_MAX]);
 

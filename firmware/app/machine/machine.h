@@ -64,6 +64,7 @@ enum machine_refusal {
     MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */
     MACHINE_NOT_CONFIGURED = 12,  /* neither configured since power-on nor restored */
     MACHINE_NOT_HOMED = 13,       /* an axis with a homing method has no zero */
+    MACHINE_ENDING = 17,          /* the controller is being shut down */
     MACHINE_NOT_IN_TIME = 16,     /* drives are real, and the port cannot keep ticks in time */
 };
 
@@ -73,6 +74,11 @@ enum machine_refusal {
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
 #define MACHINE_ANSWER_TICKS 5000u /* time for configured drives to answer a SYNC */
 #define MACHINE_UNSENT_MAX   3u    /* so many ticks in a row the port may refuse frames */
+
+/* With the mainline at a standstill nobody takes a stop, and heartbeats stay away: before the drives stop by these, or a
+ * watchdog restarts the processor, the axes are stopped on the path. */
+#define MACHINE_UNATTENDED_US 1000000u
+
 #define MACHINE_ARRIVE_TICKS 2000u /* time for the axes to reach their targets after settling */
 
 /* Real drives do not wait for a SYNC that is late by more than a period: they extrapolate, or stop. What is added is
@@ -96,6 +102,7 @@ struct machine {
     enum machine_fault_phase fault_phase; /* in FAULT */
     uint32_t ticks_left;       /* settling, enabling, quick stop, resetting, first answers */
     uint32_t override_percent; /* wanted, object 0x2010 sub 1; for every program */
+    uint32_t unattended_us;    /* since the last round of the mainline, by ticks */
     uint32_t sync_us;          /* time of the last SYNC */
     uint32_t unsent_ticks;     /* in a row with a frame that the port refused */
     uint32_t sync_left_us;     /* time of the last SYNC that has left */
@@ -219,6 +226,12 @@ bool machine_busy(const struct machine *machine);
 /* Takes what the TPDO1 of a node says; true when all drives have now answered the present SYNC. */
 bool machine_receive(struct machine *machine, uint8_t node, const struct pdo_actual *actual,
                      uint32_t now_us);
+
+/* A round of the mainline has begun. Under the lock. */
+static inline void machine_attend(struct machine *machine)
+{
+    machine->unattended_us = 0;
+}
 
 /* The axis of a node, or NULL. Pure. */
 struct axis *machine_axis(struct machine *machine, uint8_t node);

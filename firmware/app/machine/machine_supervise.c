@@ -70,8 +70,19 @@ static bool close_sync(struct machine *machine, uint32_t now_us)
     return well;
 }
 
+/* Only while axes move by setpoints or by themselves: at standstill a check of a large program may take long. */
+static void supervise_mainline(struct machine *machine)
+{
+    if (machine->unattended_us <= MACHINE_UNATTENDED_US) {
+        machine->unattended_us += machine->config.period_us;
+    } else if (machine_on_path(machine) || machine->state == MACHINE_HOMING) {
+        machine_raise(machine, FAULT_UNATTENDED, 0, machine->unattended_us);
+    }
+}
+
 void machine_supervise(struct machine *machine, uint32_t now_us)
 {
+    supervise_mainline(machine);
     if (close_sync(machine, now_us)) {
         return;
     }

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..chain import axis_limits, controller_limits, plants, program_limits
+from ..chain import axis_limits, controller_limits, plants, program_limits, stop_terms
 from ..config import Machine
 from ..errors import InputError, RefusedError
 from ..feed import FeedRequest, Limits, plan_path
@@ -40,11 +40,14 @@ def line_image(start_mm: complex, end_mm: complex, machine: Machine) -> bytes:
         plants(machine, limits),
         period_us=machine.period_us,
     )
-    return encode(
-        compile_path(
-            spline, plan, ProgramOptions("goto", 0j, program_limits(machine), machine.period_us)
-        ).program
+    options = ProgramOptions(
+        "goto",
+        0j,
+        program_limits(machine),
+        machine.period_us,
+        stop_terms(machine, limits),
     )
+    return encode(compile_path(spline, plan, options).program)
 
 
 def legs(start_mm: complex, end_mm: complex, machine: Machine) -> list[tuple[complex, complex]]:

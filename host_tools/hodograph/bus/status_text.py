@@ -20,6 +20,7 @@ def status_rows(
     rows += _trouble_rows(status)
     rows.append(("configuration", _configuration_words(status)))
     rows.append(("program", _program_words(status.program)))
+    rows += _stop_rows(status.program)
     rows.append(("position", _position_words(status)))
     rows.append(("feed", f"{status.motion.feed_mm_s:.3f} mm/s"))
     rows.append(("override", _override_words(status.override)))
@@ -96,6 +97,19 @@ def _program_words(program: LoadedProgram) -> str:
         f"{program.segments} segments, {program.pieces} pieces, {program.ticks} ticks, "
         f"{program.duration_s:.3f} s, {program.length_mm:.3f} mm, CRC-32 {program.crc32:08x}{refused}"
     )
+
+
+def _stop_rows(program: LoadedProgram) -> list[Row]:
+    if program.state != "ready":
+        return []
+    return [
+        (
+            name,
+            f"at most {stop.time_s:.4g} s and {stop.distance_mm:.4g} mm to rest, longest from arc length "
+            f"{stop.at_mm:.6g} mm (piece {stop.piece})",
+        )
+        for name, stop in (("hold, stop", program.stops.hold), ("fault stop", program.stops.fault))
+    ]
 
 
 def _position_words(status: Status) -> str:

@@ -20,7 +20,7 @@ from ..program.check import check
 from ..program.image import MAGIC
 from ..program.memory import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from ..program.stops import stops_dict, stops_text
-from ..simulate import Motion, StoppedRun, simulate, simulate_stop, write_trace
+from ..simulate import Motion, StoppedRun, last_tick_s, simulate, simulate_stop, write_trace
 from .output import json_text, note, number, print_json, print_rows, progress, write_file
 
 
@@ -74,7 +74,7 @@ def _pairs(values: NDArray[np.complex128]) -> list[list[float]]:
 
 def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray:
     array = np.asarray(values, dtype=np.float64)
-    bad = array[(array < 0) | (array > end * (1 + 1e-12))]
+    bad = array[~((array >= 0) & (array <= end * (1 + 1e-12)))]
     if bad.size:
         raise InputError(f"{what} {bad[0]:g}: must be from 0 to {end:.9g} {unit}")
     return np.minimum(array, end)
@@ -255,21 +255,20 @@ def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) 
 def simulate_(options: Namespace) -> None:
     """hodograph simulate."""
     chain = load_chain(options.file, options.machine)
+    times = {"hold": options.hold_at, "stop": options.stop_at, "fault": options.fault_at}
+    for kind, values in times.items():
+        _within(f"--{kind}-at", values, last_tick_s(chain.program), "s")
     motion = simulate_chain(chain, options.kernel, keep_rows=options.trace is not None)
     print_notes(chain, chain.compilation.plan)
     stops = [
         _stopped(chain, options.kernel, kind, at_s)
-        for kind, times in (
-            ("hold", options.hold_at),
-            ("stop", options.stop_at),
-            ("fault", options.fault_at),
-        )
-        for at_s in times
+        for kind, values in times.items()
+        for at_s in values
     ]
     if options.trace is not None:
         write_trace(motion, options.trace)
         for stop in stops:
-            name = f"{options.trace.stem}.{stop.kind}-{stop.at_s:g}{options.trace.suffix}"
+            name = f"{options.trace.stem}.{stop.kind}-{_shortest(stop.at_s)}{options.trace.suffix}"
             write_trace(stop.motion, options.trace.with_name(name))
     if options.json:
         print_json(motion.summary() | {"stops": [stop.summary() for stop in stops]})
@@ -277,6 +276,12 @@ def simulate_(options: Namespace) -> None:
     print_rows(motion_rows(motion))
     if stops:
         _print_stops(stops)
+
+
+def _shortest(value: float) -> str:
+    """A number as a part of a name: different ones never look alike."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
 
 
 def _stopped(chain: Chain, kernel: str | None, kind: str, at_s: float) -> StoppedRun:
@@ -303,7 +308,7 @@ def _print_stops(stops: list[StoppedRun]) -> None:
             for unit in ("acceleration_mm_s2", "jerk_mm_s3")
         }
         print(
-            f"{stop.kind:<10} {stop.at_s:9.6g} {stop.rest_after_s:12.6g} {stop.bound_s:9.4g} "
+            f"{stop.kind:<10} {_shortest(stop.at_s):>9} {stop.rest_after_s:12.6g} {stop.bound_s:9.4g} "
             f"{stop.distance_mm:9.6g} {most['acceleration_mm_s2']:9.6g} {most['jerk_mm_s3']:9.6g} "
             f"{stop.peak['contour_error_um']:10.4g}"
         )

@@ -5,18 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 import numpy as np
 
 from ..bus.listening.setpoint_check import find_jumps, find_rough_starts, step_limits
 from ..native import Contour, NativeProgram
-from .evidence import Evidence
+from .evidence import Emergency, Evidence
 from .record import REST_TOLERANCE_COUNTS, Record
 
 CONTROLLER_KILLED = "kill-controller"
 _PATH_TOLERANCE_MM = 3e-6
 """Rounding to counts of 1 nm, and the kernel's own error."""
+
+_FOLLOWS_TICKS = 100
+"""So long at least a drive has to follow its setpoint at the place of rest: it settles there."""
 
 _PROVISIONAL = {0x1000, 0xFF02}
 """What the controller says of a drive until the drive's own emergency code has come (docs/faults.md, policy)."""
@@ -88,6 +92,7 @@ def judge(record: Record) -> Verdict:
             for node in evidence.still_moving(REST_TOLERANCE_COUNTS)
         ]
         violations += _not_seen_at_rest(record, evidence, codes)
+        violations += _not_on_path(record, evidence)
     violations += _unexpected(record, codes, latency, rest)
     violations += _not_recovered(record)
     return Verdict(
@@ -109,12 +114,7 @@ def judge(record: Record) -> Verdict:
 
 def _reaction(record: Record, evidence: Evidence) -> tuple[list[int], Times, Times]:
     """Fault codes, times from the injection to the fault and to rest."""
-    killed = record.case.scenario.action == CONTROLLER_KILLED
-    if killed:
-        found = evidence.emergencies(evidence.drives, evidence.nodes)
-    else:
-        found = evidence.emergencies(evidence.control, (record.job.machine.node,))
-    found = [emergency for emergency in found if emergency.time_us >= record.began_us]
+    found = _told(record, evidence)
     rest: Times
     codes = sorted({e.code for e in found} | set(record.fault_codes))
     if not found:
@@ -127,6 +127,15 @@ def _reaction(record: Record, evidence: Evidence) -> tuple[list[int], Times, Tim
         rest_us = max((time_us for time_us in seen if time_us is not None), default=None)
     rest = (None, None) if rest_us is None else _between(evidence, record.began_us, rest_us)
     return codes, latency, rest
+
+
+def _told(record: Record, evidence: Evidence) -> list[Emergency]:
+    """Faults since the injection: the controller's words, or, when it was killed, the drives'."""
+    if record.case.scenario.action == CONTROLLER_KILLED:
+        found = evidence.emergencies(evidence.drives, evidence.nodes)
+    else:
+        found = evidence.emergencies(evidence.control, (record.job.machine.node,))
+    return [emergency for emergency in found if emergency.time_us >= record.began_us]
 
 
 def _between(evidence: Evidence, from_us: int, to_us: int) -> tuple[int, float]:
@@ -175,6 +184,26 @@ def _not_seen_at_rest(record: Record, evidence: Evidence, codes: list[int]) -> l
     if expect.unseen and len(unknown) < len(last):
         return []
     return [f"nobody saw when node {node} came to rest" for node in unknown]
+
+
+def _not_on_path(record: Record, evidence: Evidence) -> list[str]:
+    """Where the stop has to be on the path: what was late, or was broken off by a quick stop."""
+    found = _told(record, evidence)
+    if not record.case.scenario.expect.on_path or not found or not evidence.moved:
+        return []
+    most_ticks = ceil(record.job.fault_stop_s / (record.job.machine.period_us * 1e-6))
+    fault_tick, bad = evidence.tick_at(found[0].time_us), []
+    for node, (target, sent) in zip(evidence.nodes, evidence.setpoints(), strict=True):
+        steps = np.flatnonzero((np.diff(target) != 0) & sent[1:] & sent[:-1])
+        rest_tick = int(steps[-1]) + 1 if steps.size else 0
+        if rest_tick > fault_tick + most_ticks:
+            bad.append(
+                f"setpoints of node {node} at rest {rest_tick - fault_tick} ticks after the fault, "
+                f"the program's fault stops take {most_ticks} at most"
+            )
+        if not sent[rest_tick : rest_tick + _FOLLOWS_TICKS].all():
+            bad.append(f"node {node} was not led to rest on the path")
+    return bad
 
 
 def _unexpected(record: Record, codes: list[int], latency: Times, rest: Times) -> list[str]:

@@ -35,6 +35,8 @@ class Job:
     """Another path for the same machine."""
     clean: Motion
     setpoints: NDArray[np.int32]
+    fault_stop_s: float
+    """Bound of the longest fault stop."""
 
 
 @dataclass
@@ -78,4 +80,5 @@ def load_job(path: Path) -> Job:
         feedforward=machine.plane_feedforward,
         keep_rows=False,
     )
-    return Job(machine, image, path.with_name("other.toml"), clean, setpoints)
+    longest_us = max(chain.program.stops.worst_us[1:])
+    return Job(machine, image, path.with_name("other.toml"), clean, setpoints, longest_us * 1e-6)

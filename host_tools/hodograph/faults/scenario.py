@@ -17,6 +17,7 @@ within_ticks = 5                    # from the first injection to the fault
 within_ms = 300                     # the same in wall time, where ticks do not go on
 rest_ticks = 400                    # from the fault until the axes are at rest
 rest_ms = 400                       # the same in wall time
+on_path = true                      # the setpoints come to rest on the path, within the program's bound of a fault stop
 unseen = true                       # a drive may be silent as its axis comes to rest: the others are judged
 recover_ms = 3000                   # from the reset until the drives are found and configured anew
 """
@@ -48,7 +49,7 @@ RECOVER_MS, NOTHING_TO_RESET_MS = 3000, 1000
 """How long the way out of a fault may last; of scenarios that give no code, whose machine goes on by itself."""
 _EXPECT = (
     *("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders"),
-    *("unseen", "recover_ms"),
+    *("unseen", "recover_ms", "on_path"),
 )
 
 _OF_SCENARIOS = {"rules", "random", "host", "expect"}
@@ -70,6 +71,7 @@ class Expectation:
     same_encoders: bool = True
     unseen: bool = False
     recover_ms: int = RECOVER_MS
+    on_path: bool = False
 
     @property
     def limits_rest(self) -> bool:
@@ -210,6 +212,7 @@ def _expectation(table: Table, raw: Mapping[str, Any]) -> Expectation:
         recover_ms=table.integer(
             "recover_ms", RECOVER_MS if codes else NOTHING_TO_RESET_MS, low=0, high=NO_LIMIT
         ),
+        on_path=table.flag("on_path", False),
     )
 
 

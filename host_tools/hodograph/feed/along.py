@@ -81,9 +81,10 @@ class Samples:
     jerk: Complex
 
 
-def sample(bounds: PathBounds, pieces: Pieces) -> Samples:
+def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> Samples:
     """The motion of `pieces` along the path. Cells in which an axis' acceleration or jerk may rise between samples by
-    more than a share of its reserve are cut into parts.
+    more than a share of its reserve are cut into parts, where it is near its limit; `filled`: everywhere, since the
+    override uses up what the plan leaves of a limit.
     """
     track = _track(pieces)
     ends = [end for cap in bounds.limits.caps for end in (cap.from_mm, cap.to_mm)]
@@ -92,7 +93,7 @@ def sample(bounds: PathBounds, pieces: Pieces) -> Samples:
     found = []
     for _ in range(_ROUNDS):
         samples = _evaluate(bounds.spline, track, cells)
-        rough = _rough(bounds.limits, samples)
+        rough = _rough(bounds.limits, samples, filled)
         found.append(_taken(samples, ~rough))
         cells = _divided(_Cells(cells.piece[rough], cells.low[rough], cells.high[rough]))
         if not rough.any():
@@ -150,7 +151,7 @@ def _evaluate(spline: PHSpline, track: _Track, cells: _Cells) -> Samples:
     )
 
 
-def _rough(limits: Limits, samples: Samples) -> NDArray[np.bool_]:
+def _rough(limits: Limits, samples: Samples, filled: bool) -> NDArray[np.bool_]:
     """Cells that want to be cut."""
     rough = np.zeros(samples.piece.size, dtype=np.bool_)
     for values, both in (
@@ -160,7 +161,7 @@ def _rough(limits: Limits, samples: Samples) -> NDArray[np.bool_]:
         for one, limit in zip(per_axis(values), both or (), strict=False):
             rise = np.abs(np.diff(one, 2, axis=1)).max(axis=1) / 8.0
             near = np.abs(one).max(axis=1) + rise > (1.0 - 2.0 * limits.reserve) * limit
-            rough |= near & (rise > _ROUGH * limits.reserve * limit)
+            rough |= (near | filled) & (rise > _ROUGH * limits.reserve * limit)
     return rough
 
 

@@ -58,7 +58,7 @@ class Room:
 
     @cached_property
     def _samples(self) -> Samples:
-        return sample(self.bounds, self.pieces)
+        return sample(self.bounds, self.pieces, filled=True)
 
     @cached_property
     def axes(self) -> tuple[Axis, Axis]:

@@ -8,7 +8,7 @@ makes the same result from what a recorder saw on the bus. Both give a `Motion`:
 from .motion import SETTLING_S, Motion, Tally, settling_ticks
 from .recording import analyse
 from .simulation import simulate
-from .stopping import STOP_ORDERS, StoppedRun, simulate_stop
+from .stopping import STOP_ORDERS, StoppedRun, last_tick_s, simulate_stop
 from .trace import TRACE_HEADER, write_trace
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "StoppedRun",
     "Tally",
     "analyse",
+    "last_tick_s",
     "settling_ticks",
     "simulate",
     "simulate_stop",

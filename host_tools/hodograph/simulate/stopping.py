@@ -16,6 +16,7 @@ from ..config.drive_file import Drive
 from ..errors import HodographError, InputError
 from ..native import ROW, NativeProgram, Rig
 from ..native.rig import RigOrder
+from ..program import Program
 from .motion import Motion, Tally, settling_ticks
 
 STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
@@ -59,6 +60,11 @@ class StoppedRun:
         }
 
 
+def last_tick_s(program: NativeProgram | Program) -> float:
+    """Time of a program's last setpoint: the last instant at which a stop may be asked for."""
+    return (program.ticks - 1) * program.period_us * 1e-6
+
+
 def simulate_stop(
     program: NativeProgram,
     drives: Sequence[Drive],
@@ -75,10 +81,9 @@ def simulate_stop(
     period_s = program.period_us * 1e-6
     if len(drives) != len(_AXES):
         raise InputError(f"simulate: needs the drives of 2 axes, not {len(drives)}")
-    if not 0.0 <= at_s <= (program.ticks - 1) * period_s:
-        raise InputError(
-            f"{kind} at {at_s:g} s: the program takes from 0 to {(program.ticks - 1) * period_s:.9g} s"
-        )
+    end_s = last_tick_s(program)
+    if not 0.0 <= at_s <= end_s * (1.0 + 1e-12):
+        raise InputError(f"{kind} at {at_s:g} s: must be from 0 to {end_s:.9g} s")
     tick = ceil(at_s / period_s - 1e-9)
     rig = Rig(
         program,

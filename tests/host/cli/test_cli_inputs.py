@@ -292,7 +292,11 @@ SEALED = {
     "least coefficient": (176, 8, 2**63),
     "duration of a piece": (-88, 8, 0),
 }
-"""What is put into an image, which then gets the right CRC: place (from the end where negative), bytes, value."""
+"""What is put into an image, which then gets the right CRC: place (from the end of the pieces where negative), bytes,
+value.
+"""
+STOP_BYTES = 16
+"""Behind the pieces, for each of them."""
 
 
 @pytest.mark.parametrize("name", SEALED)
@@ -306,7 +310,8 @@ def test_numbers_that_no_program_has(
     capsys.readouterr()
     image = bytearray(file.read_bytes())
     at, size, value = SEALED[name]
-    at %= len(image)
+    pieces = int.from_bytes(image[24:28], "little")
+    at %= len(image) - STOP_BYTES * pieces
     image[at : at + size] = value.to_bytes(size, "little")
     image[12:16] = zlib.crc32(image[16:]).to_bytes(4, "little")
     file.write_bytes(image)

@@ -107,6 +107,23 @@ def test_latencies_are_counted_in_ticks() -> None:
     assert all("away from the curve" in words for words in verdict.violations)
 
 
+def test_a_stop_has_to_be_on_the_path_and_within_its_bound() -> None:
+    """A made-up stop takes 60 ticks; that of the program takes less than a tenth of a second at most."""
+    expect = replace(EXPECT, on_path=True)
+
+    def off_path(recorded: Frames) -> list[str]:
+        words = ("setpoints of", "led to rest")
+        return [bad for bad in violations(record(recorded, expect)) if any(w in bad for w in words)]
+
+    assert off_path(recording(stopped(60), 62, FOREVER)) == []
+    for node, words in enumerate(off_path(recording(stopped(200), 62, FOREVER)), start=2):
+        assert words.startswith(f"setpoints of node {node} at rest ")
+        assert 195 <= int(words.split()[6]) <= 198
+    assert len(off_path(recording(stopped(200), 62, FOREVER))) == 2
+    broken_off = off_path(recording(stopped(60), 62, 90))
+    assert broken_off == [f"node {node} was not led to rest on the path" for node in (2, 3)]
+
+
 def test_no_fault_late_fault_and_a_wrong_one() -> None:
     made = record(recording(job().setpoints, None, FOREVER))
     made.finished = True

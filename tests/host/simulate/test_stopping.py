@@ -66,9 +66,36 @@ def test_until_the_stop_the_run_is_the_undisturbed_one() -> None:
     assert np.all(rest == rest[0])
 
 
-def test_a_time_outside_the_program_is_refused(capsys) -> None:
-    assert main(["simulate", str(ALPHA), "--fault-at", "9"]) == 2
-    assert "fault at 9 s: the program takes from 0 to 0.729" in capsys.readouterr().err
+@pytest.mark.parametrize("option", ["--hold-at", "--stop-at", "--fault-at"])
+@pytest.mark.parametrize("value", ["9", "0.7291", "-0.001", "nan", "inf", "soon", "0.1,0.2"])
+def test_a_time_that_cannot_be_is_refused_in_a_line(capsys, tmp_path, option, value) -> None:
+    """Before anything is run or written, also where others could be."""
+    trace = tmp_path / "run.csv"
+    words = ["simulate", str(ALPHA), "--hold-at", "0.1", f"{option}={value}", "--trace", str(trace)]
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert option in err
+    assert value in err
+    assert not trace.exists()
+
+
+def test_the_message_names_the_times_that_can_be(capsys) -> None:
+    assert main(["simulate", str(ALPHA), "--fault-at", "0.1", "9"]) == 2
+    assert "--fault-at 9: must be from 0 to 0.729 s" in capsys.readouterr().err
+
+
+def test_at_the_first_and_the_last_setpoint(capsys) -> None:
+    """The first is the start itself: nothing moves. At the last the program ends."""
+    words = [word for kind in ("hold", "stop", "fault") for word in (f"--{kind}-at", "0", "0.729")]
+    assert main(["simulate", str(ALPHA), *words, "--json"]) == 0
+    stops = json.loads(capsys.readouterr().out)["stops"]
+    assert [stop["at_s"] for stop in stops] == [0.0, 0.729] * 3
+    for stop in stops:
+        assert 0.0 < stop["rest_after_s"] <= 0.003
+        assert stop["distance_mm"] < 0.001
+        assert stop["bound_s"] >= stop["rest_after_s"]
 
 
 def test_json_and_traces(capsys, tmp_path) -> None:
@@ -93,6 +120,30 @@ def test_json_and_traces(capsys, tmp_path) -> None:
     ]
     rows = (tmp_path / "run.fault-0.4.csv").read_text(encoding="ascii").splitlines()
     assert len(rows) == 1 + 400 + round(stops[3]["rest_after_s"] * 1000)
+
+
+def test_options_add_up_and_instants_that_are_close_have_files_of_their_own(
+    capsys, tmp_path
+) -> None:
+    trace = tmp_path / "run.csv"
+    words = ["--hold-at", "0.1", "--hold-at", "0.10000001", "0.2", "--json", "--trace", str(trace)]
+    assert main(["simulate", str(ALPHA), *words]) == 0
+    stops = json.loads(capsys.readouterr().out)["stops"]
+    assert [stop["at_s"] for stop in stops] == [0.1, 0.10000001, 0.2]
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        "run.csv",
+        "run.hold-0.1.csv",
+        "run.hold-0.10000001.csv",
+        "run.hold-0.2.csv",
+    ]
+
+
+def test_a_second_command_does_not_inherit_the_instants_of_the_first(capsys) -> None:
+    assert main(["simulate", str(ALPHA), "--hold-at", "0.1", "--json"]) == 0
+    assert main(["simulate", str(ALPHA), "--json"]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert len(json.loads(first)["stops"]) == 1
+    assert json.loads(second)["stops"] == []
 
 
 def random_file(folder: Path, seed: int) -> Path:

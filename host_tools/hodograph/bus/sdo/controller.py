@@ -320,6 +320,13 @@ class Controller(Node):
             name: self.read(PROGRAM, sub) for name, sub in _PROGRAM
         }
 
+    def longest_stops(self) -> dict[str, dict[str, int]]:
+        """The longest stop of the program of each kind, "hold" and "fault", by name; zeros without a program."""
+        return {
+            kind: {name: self.read(PROGRAM, first + i) for i, name in enumerate(_LONGEST)}
+            for kind, first in (("hold", 16), ("fault", 20))
+        }
+
 
 _GOES_ON = {
     HOLDING: "it goes on braking; hodograph status tells when it is held",
@@ -349,6 +356,8 @@ _PROGRAM = (
     ("end_x_counts", 14),
     ("end_y_counts", 15),
 )
+_LONGEST = ("time_us", "way_um", "piece", "place_um")
+"""Of PROGRAM from sub 16 on for holds, from sub 20 on for fault stops."""
 
 
 class CommandRefusedError(RefusedError):

@@ -7,6 +7,7 @@ transfers, a few milliseconds on an idle machine; what belongs together is read 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -63,6 +64,24 @@ class Fault:
 
 
 @dataclass(frozen=True)
+class LongestStop:
+    """The longest stop of a kind: from the command to rest, and where it begins. As in `hodograph inspect`."""
+
+    time_s: float
+    distance_mm: float
+    at_mm: float
+    piece: int
+
+
+@dataclass(frozen=True)
+class LongestStops:
+    """Of feed hold and stop, and of fault stops."""
+
+    hold: LongestStop
+    fault: LongestStop
+
+
+@dataclass(frozen=True)
 class LoadedProgram:
     """The active program; numbers are 0 without one. `refused` is why the last upload was refused, None: it was not."""
 
@@ -81,6 +100,7 @@ class LoadedProgram:
     start_y_counts: int
     end_x_counts: int
     end_y_counts: int
+    stops: LongestStops
 
 
 @dataclass(frozen=True)
@@ -241,12 +261,23 @@ def loaded_program(controller: Controller) -> LoadedProgram:
     """Object 0x2000 but the image. Raises BusError."""
     with controller.turn():
         numbers = controller.program_summary()
+        stops = controller.longest_stops()
     code, index = numbers["refused_code"], numbers["refused_index"]
     return LoadedProgram(
         refused=program_fault_text(code, index) if code else None,
         duration_s=numbers.pop("duration_q32_s") * _Q32,
         length_mm=numbers.pop("length_q40_mm") * _Q40,
+        stops=LongestStops(**{kind: _longest(found) for kind, found in stops.items()}),
         **numbers,
+    )
+
+
+def _longest(found: Mapping[str, int]) -> LongestStop:
+    return LongestStop(
+        time_s=found["time_us"] / 1e6,
+        distance_mm=found["way_um"] / 1e3,
+        at_mm=found["place_um"] / 1e3,
+        piece=found["piece"],
     )
 
 

@@ -147,6 +147,10 @@ _SINGLE = {
         "a stop along the path took longer than the program says",
         "compile the program again; if it comes again, report a bug",
     ),
+    0xFF0B: (
+        "the main loop of the controller stood still while axes moved",
+        "give the controller's computer some processor time; if it comes again, report a bug",
+    ),
     0xFF10: (
         "the drive did not take the mode for homing, or the one for motion after it",
         "has the drive a homing mode (0x6502)? switch its local operation off",
@@ -275,6 +279,7 @@ _COUNTS = {
     0xFF08: "counts apart",
     0xFF09: "us",
     0xFF0A: "setpoint",
+    0xFF0B: "us",
 }
 _PLAIN = (0x6100, 0xFF10)
 

@@ -62,6 +62,7 @@ REFUSALS = {
     12: "it has no configuration since its power-on: hodograph configure FILE (upload, goto and run do it as well); "
     "with --store it is there after the next power-on too",
     13: "axes with a homing method are not homed since their drive's power-on: hodograph home, or --unhomed on purpose",
+    17: "the controller is being ended: start it again",
     16: "the drives are real and this computer does not permit real-time priority: run the controller with "
     "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }

@@ -73,8 +73,9 @@ def _simulate(command: Command) -> None:
     ):
         simulate.add_argument(
             f"--{name}-at",
-            type=float,
+            type=finite,
             nargs="+",
+            action="extend",
             default=[],
             metavar="S",
             help=f"{text} at these times in seconds, each in a run of its own",
