@@ -8,6 +8,7 @@
 #   build/host    the compiler of the host (CC), optimised: what runs
 #   build/asan    the same under the address and undefined-behaviour sanitizers: what is tested
 #   build/clang   clang, optimised: a second opinion, compiled by `make lint`
+#   build/fuzz    clang, under both sanitizers, with coverage for libFuzzer: `make fuzz`
 
 SHELL       := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -83,7 +84,11 @@ support_SRC   := $(filter-out $(UNIT_FAKES),$(UNIT_SUPPORT))
 
 OWN_C    := $(wildcard firmware/targets/*.c) $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
 OWN_H    := $(wildcard firmware/*/*.h firmware/app/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
-FUZZ_SRC := $(wildcard tests/fuzz/*.c)
+FUZZ_SRC      := $(wildcard tests/fuzz/*.c)
+FUZZ_NAMES    := $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+# Replays the corpora; libFuzzer has a main() of its own.
+FUZZ_SUPPORT  := tests/fuzz/fuzz.c
+FUZZ_REPLAY   := tests/fuzz/replay.c
 TARGET_TEST_SRC := $(wildcard tests/target/*.c)
 # What only a microcontroller's compiler understands: linted by its flags (firmware/targets/targets.mk).
 BARE_C   := $(filter-out $(OWN_C),$(wildcard firmware/port/*/*.c firmware/targets/*.c))
@@ -107,11 +112,15 @@ clang_CC      := $(CLANG)
 clang_CFLAGS  := $(COMMON) -O2 -g
 clang_LDFLAGS :=
 clang_NEEDS   := $(READY)/packages-lint
-VARIANTS := host asan clang
+fuzz_CC      := $(CLANG)
+fuzz_CFLAGS  := $(COMMON) -O1 -g -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+fuzz_LDFLAGS := -fsanitize=fuzzer,address,undefined
+fuzz_NEEDS   := $(READY)/packages-fuzz
+VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c check test test-all unit unit-plain pytest run til faults lint format soak bench mutants clean distclean help lock packages venv FORCE
+.PHONY: build c check test test-all unit unit-plain pytest run til faults lint format soak bench mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -125,7 +134,9 @@ c: $(HOST_LIBS) $(BINS:%=$(BUILD)/bin/hodograph-%) ## the C archives and program
 
 # Property tests with so many cases that the sanitized build runs only a part of them: optimised, in full.
 PLAIN_BINS := $(BUILD)/host/tests/test_override $(BUILD)/host/tests/test_stm32g4_flash
-ASAN_BINS := $(UNIT_NAMES:%=$(BUILD)/asan/tests/%)
+FUZZ_BINS    := $(FUZZ_NAMES:%=$(BUILD)/fuzz/bin/%)
+FUZZ_REPLAYS := $(FUZZ_NAMES:%=$(BUILD)/asan/tests/%)
+ASAN_BINS := $(UNIT_NAMES:%=$(BUILD)/asan/tests/%) $(FUZZ_REPLAYS)
 UNIT_BINS := $(ASAN_BINS) $(PLAIN_BINS)
 TESTED    := build $(READY)/packages-test $(UNIT_BINS) $(BINS:%=$(BUILD)/asan/bin/hodograph-%)
 
@@ -139,9 +150,9 @@ test: $(TESTED) ## the tests that show whether the tree is sound, C and Python, 
 
 # One after the other: each has the machine for itself. (By the plain word make: `make -n` would run a line with the variable.)
 ALONE := env -u MAKEFLAGS -u MFLAGS make --no-print-directory BUILD=$(BUILD) STAMPS=off
-test-all: $(TESTED) ## every test, the long ones too, all proofs and all counts, nothing taken from stamps; ends with "N passed, N failed"
+test-all: $(TESTED) ## every test, the long ones too, all proofs and all counts, a minute of each fuzz harness, nothing taken from stamps; ends with "N passed, N failed"
 	@$(PY) tools/run_parts.py --tests tests "$(PY) tools/run_tests.py --build $(BUILD) --suite all" \
-	    --tests proofs "$(ALONE) proofs" --step count "$(ALONE) count"
+	    --tests proofs "$(ALONE) proofs" --step count "$(ALONE) count" --tests fuzz "$(ALONE) fuzz FUZZ_S=60 SEED=1 FUZZ="
 
 unit: $(UNIT_BINS) ## the C tests only, under the sanitizers
 	@$(PY) tools/run_tests.py --build $(BUILD) --only unit
@@ -182,6 +193,13 @@ COUNT ?= 20
 mutants: build $(READY)/packages-test $(UNIT_BINS) ## plant mistakes in AREA="core ...", tell which the tests do not notice
 	@$(PY) tools/mutants.py --build $(BUILD) --count $(COUNT) $(AREA)
 
+# FUZZ_S: seconds of each; FUZZ="hub python-path": only these; SEED: of the random numbers
+FUZZ_S ?= 60
+FUZZ   ?=
+SEED   ?= 1
+fuzz: build $(FUZZ_BINS) ## mutated input to every parser, protocol and the controller, FUZZ_S=60 seconds each; ends with "N passed, N failed"
+	@$(PY) tools/fuzz.py --build $(BUILD) --seconds $(FUZZ_S) --seed $(SEED) $(FUZZ)
+
 clean: ## remove build/ and the cffi module
 	rm -rf $(BUILD) host_tools/hodograph/native/_native*.so
 
@@ -205,6 +223,11 @@ $(READY)/packages-test: tools/packages.py | $(READY)/packages
 $(READY)/packages-firmware: tools/packages.py | $(READY)/packages
 	@mkdir -p $(@D)
 	@$(PYTHON) tools/packages.py firmware
+	@touch $@
+
+$(READY)/packages-fuzz: tools/packages.py | $(READY)/packages
+	@mkdir -p $(@D)
+	@$(PYTHON) tools/packages.py fuzz
 	@touch $@
 
 $(READY)/packages-lint: tools/packages.py | $(READY)/packages
@@ -296,6 +319,17 @@ $(foreach v,$(VARIANTS),$(eval $(call VARIANT_RULES,$(v))))
 # Objects of tests and the marks of lint are made by chains of patterns; make would delete them.
 .SECONDARY: $(foreach v,$(VARIANTS),$(call object_of,$(v),$(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC))) \
             $(patsubst %,$(BUILD)/clang/obj/%.tidy-deps,$(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC))
+
+# The harnesses of tests/fuzz: with libFuzzer, and as a test that replays their corpora.
+fuzz_needs = $(call object_of,$(1),$(FUZZ_SUPPORT) $(UNIT_FAKES)) $(BUILD)/$(1)/obj/unity.o $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a) $(BUILD)/$(1)/libhodograph_support.a
+$(FUZZ_BINS): $(BUILD)/fuzz/bin/%: $(BUILD)/fuzz/obj/tests/fuzz/%.o $(call fuzz_needs,fuzz)
+	@mkdir -p $(@D)
+	$(call say,link,$@)
+	$(Q)$(fuzz_CC) $(fuzz_LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group $(LDLIBS)
+$(FUZZ_REPLAYS): $(BUILD)/asan/tests/%: $(BUILD)/asan/obj/tests/fuzz/%.o $(call object_of,asan,$(FUZZ_REPLAY)) $(call fuzz_needs,asan)
+	@mkdir -p $(@D)
+	$(call say,link,$@)
+	$(Q)$(asan_CC) $(asan_LDFLAGS) -o $@ $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) -Wl,--end-group $(LDLIBS)
 
 define BIN_RULE # variant, program, file
 $(3): $(call object_of,$(1),$($(2)_MAIN)) $(LIBS:%=$(BUILD)/$(1)/libhodograph_%.a)

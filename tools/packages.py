@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `firmware` or `flash`. Missing Debian packages are
-installed when this runs as root or with passwordless sudo; otherwise the command to type is printed and
+A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware` or `flash`. Missing Debian
+packages are installed when this runs as root or with passwordless sudo; otherwise the command to type is printed and
 the exit status is 1. Standard library only: it runs before anything is installed.
 """
 
@@ -45,6 +45,17 @@ def _has_python_header() -> bool:
     return Path(sysconfig.get_paths()["include"], "Python.h").exists()
 
 
+def _has_libfuzzer() -> bool:
+    """Whether clang has its runtime, which Debian packages apart."""
+    clang = _which("clang")
+    if clang is None:
+        return False
+    said = subprocess.run(
+        [clang, "-print-runtime-dir"], capture_output=True, text=True, check=False
+    )
+    return any(Path(said.stdout.strip()).glob("libclang_rt.fuzzer*.a"))
+
+
 def _has_venv() -> bool:
     return all(importlib.util.find_spec(name) is not None for name in ("venv", "ensurepip"))
 
@@ -80,6 +91,7 @@ BUILD = (
 )
 TEST = (_program("chromium"), _program("candump"), _program("cansend"))
 LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"), _program("node"))
+FUZZ = (_program("clang"), Need("libFuzzer", _has_libfuzzer, "libclang-rt-dev"))
 FIRMWARE = (
     _program("arm-none-eabi-gcc"),
     _file("/usr/lib/picolibc/arm-none-eabi/picolibc.specs", "picolibc-arm-none-eabi"),
@@ -94,6 +106,7 @@ SETS = {
     "bus": BUS,
     "test": TEST,
     "lint": LINT,
+    "fuzz": FUZZ,
     "firmware": FIRMWARE,
     "flash": FLASH,
 }

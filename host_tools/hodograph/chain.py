@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 
-from .config import Drive, Machine, PathFile, load_machine, load_path_file
+from .config import Drive, Machine, PathFile, is_there, load_machine, load_path_file
 from .errors import InputError, PlanError
 from .feed import AxisLimits, ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
 from .feed.idle_limits import idle_limits
@@ -191,7 +191,7 @@ class Chain:
         name = self.file.machine_file
         if name is None:
             return None
-        if not name.is_file():
+        if not is_there(name):
             raise InputError(
                 f"{self.file.file}: [machine] file names {name}, which is not there: "
                 "correct it or use --machine FILE"

@@ -478,7 +478,8 @@ static bool take_packet(struct hub *hub, struct hub_connection *from, const unio
         return false;
     }
     if (packet->mark != LOCAL_BUS_MARK) {
-        if (from->role != HUB_MEMBER || size != sizeof packet->frame) {
+        if (from->role != HUB_MEMBER || size != sizeof packet->frame ||
+            packet->frame.can_dlc > CAN_MAX_DLEN) {
             return false;
         }
         take_frame(hub, from, &packet->frame);

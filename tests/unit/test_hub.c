@@ -121,6 +121,19 @@ static void test_what_a_full_member_loses_is_counted(void)
     TEST_ASSERT_EQUAL_UINT64((uint64_t)BATCHES * CAN_SOCKET_BATCH, taken + hub_thread_hub.lost);
 }
 
+/* A process that sends a frame of more than 8 bytes is none of ours: its connection ends, and nobody gets the frame. */
+static void test_a_frame_of_nine_bytes_ends_the_connection(void)
+{
+    const struct can_frame wrong = {.can_id = 0x123, .can_dlc = CAN_MAX_DLEN + 1u};
+    const struct can_msg right = {.id = 0x124};
+    struct can_msg got[CAN_SOCKET_BATCH] = {{.id = 0}};
+    TEST_ASSERT_EQUAL((int)sizeof wrong, write(members[0].fd, &wrong, sizeof wrong));
+    TEST_ASSERT_EQUAL(0, can_socket_send(&members[1], &right));
+    TEST_ASSERT_EQUAL(1, receive(&members[2], got, 1));
+    TEST_ASSERT_EQUAL_HEX32(0x124, got[0].id);
+    TEST_ASSERT_EQUAL(-ENETDOWN, receive(&members[0], got, 2));
+}
+
 static void test_buses_are_apart(void)
 {
     const struct can_msg sent = {.id = 0x123};
@@ -184,6 +197,7 @@ int main(void)
     RUN_TEST(test_filters_are_those_of_the_socket);
     RUN_TEST(test_one_leaves_and_the_others_go_on);
     RUN_TEST(test_what_a_full_member_loses_is_counted);
+    RUN_TEST(test_a_frame_of_nine_bytes_ends_the_connection);
     RUN_TEST(test_buses_are_apart);
     RUN_TEST(test_the_end_is_noticed);
     RUN_TEST(test_nobody_serves);

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The C tests: one Unity binary for each tests/unit/test_*.c, under the sanitizers."""
+"""The C tests under the sanitizers: a Unity binary for each tests/unit/test_*.c, and one for each tests/fuzz/fuzz_*.c,
+which replays its corpus.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ class Units:
 
     def sanitized(self) -> list[Path]:
         """One for each test file, of which some run a part of their cases only."""
-        sources = sorted((self.root / "tests/unit").glob("test_*.c"))
+        units = sorted((self.root / "tests/unit").glob("test_*.c"))
+        sources = units + sorted((self.root / "tests/fuzz").glob("fuzz_*.c"))
         return [self.build / "asan/tests" / source.stem for source in sources]
 
     def changed(self) -> list[Path]:

@@ -41,7 +41,9 @@ class Fault:
         """The rules of one sample as text: what `hodograph faults --seed` would draw for seed + sample."""
         if self.scenario is None:
             return []
-        return [line for line in draw(self.scenario, seed + sample).rules.splitlines() if line]
+        return [
+            line for line in draw(self.scenario, seed + sample).rules.splitlines() if line.strip()
+        ]
 
 
 def rig_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault:
@@ -74,8 +76,10 @@ def _pair(rule: str, word: str, known: set[str]) -> tuple[str, float]:
         raise InputError(f'rule "{rule}": {key} has no place here; {", ".join(sorted(known))}')
     try:
         value = float(text) if key == "volts" else float(int(text, 0))
-    except ValueError:
+    except (ValueError, OverflowError):
         raise InputError(f'rule "{rule}": {word} is not a number') from None
+    if not math.isfinite(value):
+        raise InputError(f'rule "{rule}": {word} is not a finite number')
     least = 0 if key == "at" else 1
     if key in ("at", "for", "for_ms", "count") and not least <= value <= LONGEST_TICKS:
         raise InputError(f'rule "{rule}": {word} is out of range')

@@ -36,6 +36,8 @@ def _fault(table: Table, data: Mapping[str, Any]) -> Fault:
         if table.has("rules") or table.has("random"):
             raise table.error("scenario", "is given beside rules: keep one of the two")
         return Fault(name, load_scenario(table.present("scenario")))
+    if table.has("random") and not table.has("rules"):
+        raise table.error("random", "is given without rules that use it: add rules, or take it out")
     return Fault(name, inline_scenario(table, data, name)) if table.has("rules") else Fault(name)
 
 

@@ -5,7 +5,7 @@ from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive
 from .machine_file import PLANE_AXES, Machine, Supervision, load_machine
 from .path_file import PathFile, PathSpec, load_path_file
-from .table import read_toml
+from .table import is_there, read_toml
 
 __all__ = [
     "PLANE_AXES",
@@ -18,6 +18,7 @@ __all__ = [
     "PathSpec",
     "Scaling",
     "Supervision",
+    "is_there",
     "load_drive",
     "load_machine",
     "load_path_file",

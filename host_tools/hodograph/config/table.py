@@ -49,6 +49,14 @@ def read_toml(file: Path) -> dict[str, Any]:
         raise InputError(f"{file}: not valid TOML: nested too deeply") from None
 
 
+def is_there(file: Path) -> bool:
+    """Whether there is a file of this name. A name that no file can have, such as one that is too long, is of none."""
+    try:
+        return file.is_file()
+    except OSError:
+        return False
+
+
 class Table:
     """One table of a TOML file, with the names that it may hold."""
 
@@ -223,7 +231,7 @@ class Table:
     def present(self, key: str) -> Path:
         """As `path`, of a file that is there."""
         found = self.path(key)
-        if not found.is_file():
+        if not is_there(found):
             raise self.error(key, f"names {found}, which is not there")
         return found
 

@@ -29,9 +29,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
-from ..config.table import Table, read_toml
+from ..config.table import Table, is_there, read_toml
 from ..errors import InputError
 
 ACTIONS = (
@@ -166,14 +167,35 @@ def _ranges(root: Table, raw: Mapping[str, Any]) -> dict[str, tuple[Drawn, ...]]
     random_ = raw.get("random", {})
     if not isinstance(random_, dict):
         raise root.error("random", "must be a section")
-    return {name: _range(root, name, value) for name, value in random_.items()}
+    ranges = {name: _range(root, name, value) for name, value in random_.items()}
+    if isinstance(ranges.get("at", (0,))[0], str):
+        raise root.error("random", "at must be [least, greatest], two ticks")
+    return ranges
 
 
 def _try(scenario: Scenario, root: Table) -> None:
+    for rule in scenario.rules:
+        _require_names(rule, root)
     try:
-        draw(scenario, 0).rules  # noqa: B018
+        case = draw(scenario, 0)
+        case.rules  # noqa: B018
     except (KeyError, IndexError, ValueError) as error:
         raise root.error("rules", f"name what [random] does not give: {error}") from None
+    try:
+        case.last_tick, case.longest_ms  # noqa: B018
+    except ValueError:
+        raise root.error("rules", "hold a number that is too long") from None
+
+
+def _require_names(rule: str, root: Table) -> None:
+    """In braces nothing but names: no attributes, indices or formats of Python's."""
+    try:
+        fields = [field[1:] for field in Formatter().parse(rule) if field[1] is not None]
+    except ValueError as error:
+        raise root.error("rules", f"hold {rule!r}: {error}") from None
+    for name, form, conversion in fields:
+        if not str(name).isidentifier() or form or conversion:
+            raise root.error("rules", f"hold {rule!r}: between braces is a name and nothing else")
 
 
 def _texts(table: Table, raw: Mapping[str, Any], key: str) -> tuple[str, ...]:
@@ -243,7 +265,7 @@ def find_scenarios(folder: Path, names: list[str]) -> list[Scenario]:
     found = []
     for name in names:
         file = known.get(name, Path(name))
-        if name not in known and not file.is_file():
+        if name not in known and not is_there(file):
             raise InputError(f'there is no scenario "{name}"; {folder} has {", ".join(known)}')
         found.append(load_scenario(file))
     return found

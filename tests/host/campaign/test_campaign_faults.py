@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 from campaign_files import EXAMPLES
@@ -34,6 +35,9 @@ BAD = [
     ("load node=2 volts=1", r"at is missing"),
     ("load at=4 node=2", r"volts is missing"),
     ("load at=4 node=2 volts=much", r"volts=much is not a number"),
+    ("load at=4 node=2 volts=nan", r"volts=nan is not a finite number"),
+    ("load at=4 node=2 volts=1e999", r"volts=1e999 is not a finite number"),
+    ("encoder-jump at=4 node=2 counts=1" + "0" * 400, r"is not a number"),
     ("load at=4 node=2 counts=1", r"counts has no place here"),
     ("load at=-1 node=2 volts=1", r"at=-1 is out of range"),
     ("load at=4 for=0 node=2 volts=1", r"for=0 is out of range"),
@@ -53,6 +57,12 @@ def test_bad_rules(rule: str, message: str) -> None:
         rig_fault(rule, NODES, 1000)
     assert str(caught.value).startswith(f'rule "{rule}": ')
     assert not re.search(r"\n", str(caught.value))
+
+
+def test_blank_rules_are_none(tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text('text = "x"\npath = "p.toml"\nrules = [" ", "", "load at=5 node=3 volts=1"]\n')
+    assert len(Fault("blank", load_scenario(file)).rules(0, 0, NODES, 1000)) == 1
 
 
 def test_draws_are_those_of_the_faults_command() -> None:

@@ -65,6 +65,10 @@ BAD = [
         r"\[faults 1\] rules name what \[random\] does not give: 't'",
     ),
     (
+        PATHS + '[[faults]]\nname = "a"\nrandom = { at = [5, 9] }',
+        r"\[faults 1\] random is given without rules",
+    ),
+    (
         PATHS + '[[faults]]\nname = "a"\nrules = []\nrandom = 3',
         r"\[faults 1\] random must be a section",
     ),

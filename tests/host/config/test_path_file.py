@@ -293,3 +293,9 @@ def test_a_closed_path_that_comes_back(tmp_path: Path, key: str, tail: list[list
     """Repeated exactly, or passing the same place once more: both are meant."""
     text = f"[path]\nclosed = true\n{key} = {ROUND + tail}\n"
     assert load_path_file(write(tmp_path, text)).path.points.size == len(ROUND + tail)
+
+
+def test_a_machine_file_of_a_name_that_no_file_can_have(tmp_path: Path) -> None:
+    text = GOOD + f'[machine]\nfile = "{"m" * 500}"\n'
+    with pytest.raises(InputError, match="which is not there"):
+        load_chain(write(tmp_path, text)).program  # noqa: B018

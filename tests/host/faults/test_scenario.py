@@ -69,8 +69,16 @@ def test_names_become_rules(tmp_path: Path) -> None:
     ("old", "new", "words"),
     [
         ("{n}", "{m}", "'m'"),
+        ("{n}", "{n[0]}", "between braces is a name"),
+        ("{n}", "{n.imag.x}", "between braces is a name"),
+        ("{n}", "{n!r}", "between braces is a name"),
+        ("{n}", "{n:>9}", "between braces is a name"),
+        ("{n}", "{0}", "between braces is a name"),
+        ("{n}", "{n", "expected '}'"),
         ("[5, 9]", "[9, 5]", "at must be [least, greatest]"),
         ("[5, 9]", "7", "at must be"),
+        ("[5, 9]", '["5", "nine"]', "at must be [least, greatest], two ticks"),
+        ("for_ms=40", "for_ms=" + "4" * 5000, "a number that is too long"),
         ("[0x8130]", '["0x8130"]', "must be a list of numbers"),
         ("within_ticks", "in_ticks", "unknown key"),
         ('rules = ["drop', 'rules = [1, "drop', "must be a list of texts"),
@@ -121,3 +129,8 @@ def test_the_injector_names_file_and_line(tmp_path: Path) -> None:
     done = injector(file)
     assert done.returncode == 2
     assert done.stderr == f"hodograph-injector: {file}: line 2: drop needs id=\n"
+
+
+def test_a_name_that_no_file_can_have(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no scenario"):
+        find_scenarios(tmp_path, ["s" * 500])

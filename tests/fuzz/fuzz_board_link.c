@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What comes from a board: characters to the SLCAN decoder, and requests to the bridge's turns. A line that is decoded is
+ * a frame, and its line gives the same frame again; a request is replied to within the time that it names.
+ *
+ * Input: requests (one byte each says how), then characters.
+ */
+#include <string.h>
+
+#include "bridge/turn.h"
+#include "can/slcan.h"
+#include "fuzz.h"
+
+#define REQUESTS_MAX 64u
+#define ROUNDS_MAX   10000u /* every period and guard time of an input, in slices of 10 ms */
+
+static void decode_again(const struct can_msg *frame)
+{
+    char line[SLCAN_LINE_MAX];
+    struct slcan_decoder decoder;
+    struct can_msg same;
+    memset(&decoder, 0, sizeof decoder);
+    memset(&same, 0, sizeof same);
+    const uint32_t length = slcan_encode(frame, line);
+    FUZZ_CHECK(length <= SLCAN_LINE_MAX);
+    for (uint32_t i = 0; i < length; ++i) {
+        FUZZ_CHECK(slcan_decode(&decoder, line[i], &same) == (i + 1u == length));
+    }
+    FUZZ_CHECK(same.id == frame->id && same.len == frame->len);
+    FUZZ_CHECK(memcmp(same.data, frame->data, frame->len) == 0);
+}
+
+static void characters(struct fuzz_input *in)
+{
+    struct slcan_decoder decoder;
+    memset(&decoder, 0, sizeof decoder);
+    while (fuzz_left(in)) {
+        struct can_msg frame;
+        memset(&frame, 0, sizeof frame);
+        if (slcan_decode(&decoder, (char)fuzz_byte(in), &frame)) {
+            FUZZ_CHECK(frame.id <= CAN_ID_MAX && frame.len <= CAN_DATA_MAX);
+            decode_again(&frame);
+        }
+    }
+}
+
+/* The bridge waits as turn_wait_ns says; `frames` come at the given round. */
+static void request(struct fuzz_input *in, struct turn *turn, uint64_t *now_ns)
+{
+    const uint8_t how = fuzz_byte(in);
+    const struct exchange_header header = {.flags = fuzz_byte(in) & 63u,
+                                           .period_us = fuzz_number(in, 3) % 1000000u,
+                                           .guard_us = fuzz_number(in, 3) % 10000000u};
+    struct exchange_header reply;
+    turn_request(turn, &header, *now_ns);
+    unsigned rounds = 0;
+    while (!turn_over(turn, how >= 0x80u && rounds > (how & 7u) ? 1u : 0u, *now_ns, &reply)) {
+        const uint64_t wait_ns = turn_wait_ns(turn, *now_ns);
+        FUZZ_CHECK(wait_ns > 0u);
+        FUZZ_CHECK(++rounds < ROUNDS_MAX);
+        *now_ns += wait_ns;
+    }
+    *now_ns += 1000ull * how;
+}
+
+static void harness(struct fuzz_input *in)
+{
+    struct turn turn;
+    uint64_t now_ns = 1000000000u;
+    const uint8_t count = fuzz_byte(in);
+    memset(&turn, 0, sizeof turn);
+    for (uint8_t i = 0; i < count && i < REQUESTS_MAX; ++i) {
+        request(in, &turn, &now_ns);
+    }
+    characters(in);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    return fuzz_run(harness, data, size);
+}

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Parts of tools/fuzz.py: mutated input for the Python side, and libFuzzer for the C side (docs/testing.md)."""
