@@ -11,10 +11,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/feed_override.h"
 #include "core/interp.h"
 #include "core/prepared.h"
 #include "core/program_check.h"
-#include "core/timebase.h"
 #include "fuzz.h"
 #include "golden.h"
 
@@ -37,13 +37,13 @@ static const char *const seed_names[SEEDS] = {"line.hdgp",          "line_tiny.h
 enum time_command { TIME_HOLD, TIME_RESUME, TIME_STOP, TIME_OVERRIDE };
 
 struct program_run {
-    struct timebase time;
+    struct feed_override feed;
     struct interp interp;
 };
 
 static void run_begin(struct program_run *run, const struct program *p)
 {
-    timebase_begin(&run->time, p, p->header.period_us);
+    feed_override_begin(&run->feed, p, p->header.period_us, 0);
     FUZZ_CHECK(interp_begin(&run->interp, p, INTERP_DOUBLE) == 0);
 }
 
@@ -51,30 +51,29 @@ static void run_command(struct program_run *run, enum time_command command, uint
 {
     switch (command) {
     case TIME_HOLD:
-        timebase_hold(&run->time);
+        feed_override_hold(&run->feed);
         break;
     case TIME_RESUME:
-        timebase_resume(&run->time);
+        feed_override_resume(&run->feed);
         break;
     case TIME_STOP:
-        timebase_stop(&run->time);
+        feed_override_stop(&run->feed);
         break;
     default:
-        timebase_override(&run->time, percent);
+        feed_override_set(&run->feed, percent);
         break;
     }
 }
 
 static void run_step(struct program_run *run, struct interp_point *point)
 {
-    const uint64_t time_q42_s = timebase_step_q42(&run->time);
-    FUZZ_CHECK(interp_at_q42(&run->interp, time_q42_s, point) >= 0);
+    FUZZ_CHECK(feed_override_next(&run->feed, &run->interp, point) >= 0);
 }
 
 static bool run_over(const struct program_run *run)
 {
-    const enum timebase_state state = timebase_state(&run->time);
-    return state == TIMEBASE_ENDED || state == TIMEBASE_STOPPED;
+    const enum feed_state state = feed_override_state(&run->feed);
+    return state == FEED_ENDED || state == FEED_STOPPED;
 }
 
 /* --- The image --- */
