@@ -20,13 +20,21 @@ enum quantity { VELOCITY, ACCELERATION, JERK, QUANTITIES };
 
 static const struct real zero = {0, 0};
 
+/* What the override bounds of a piece allow at rates of program time up to one. */
+struct level {
+    struct real f2; /* square of this rate, */
+    struct real f3; /* its cube, */
+    struct real mixed; /* 3 times it times the greatest slope, */
+    struct real rate;  /* which is this, */
+    struct real second; /* and the greatest second derivative */
+};
+
 /* One feed piece: F in mm from its start, in powers of u = time / duration. */
 struct way {
     struct real c[WAY_DEGREE + 1];
     struct real per_s; /* 1 / duration */
     struct real factor;
-    struct real rate;
-    struct real second;
+    struct level level[PROGRAM_LEVELS];
     int64_t start_q40_mm;
     struct real end_mm;
 };
@@ -110,6 +118,21 @@ static struct real milli(uint32_t value)
 
 /* --- What is read from the image --- */
 
+static void read_levels(struct way *way, const struct program_override *own)
+{
+    way->factor = real_make((int64_t)own->factor_q14, -14);
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        struct level *level = &way->level[k];
+        const struct real f =
+            k == PROGRAM_LEVEL_FULL ? way->factor : real_make((int64_t)program_level_q9(k), -9);
+        level->rate = real_make((int64_t)program_number(own->rate[k]), -32);
+        level->second = real_make((int64_t)program_number(own->second[k]), -24);
+        level->f2 = real_mul(f, f);
+        level->f3 = real_mul(level->f2, f);
+        level->mixed = real_times(real_mul(f, level->rate), 3);
+    }
+}
+
 static void read_way(struct way *way, const struct program *p, uint32_t i)
 {
     struct program_piece piece;
@@ -122,9 +145,7 @@ static void read_way(struct way *way, const struct program *p, uint32_t i)
     }
     stretch(way->c, WAY_DEGREE, real_scale(duration_s, -e));
     way->per_s = real_div(real_make(1, 0), duration_s);
-    way->factor = real_make((int64_t)piece.override_factor_q24, -24);
-    way->rate = real_make((int64_t)piece.override_rate_q16_per_s, -16);
-    way->second = real_make((int64_t)piece.override_second_q8_per_s2, -8);
+    read_levels(way, &piece.override);
     way->start_q40_mm = piece.start_q40_mm;
     way->end_mm = horner(way->c, WAY_DEGREE, real_make(1, 0));
 }
@@ -362,19 +383,23 @@ static void bend_of(const struct cell *cell, struct motion_at *out)
 /* --- Against the limits --- */
 
 /* At the rates that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration and jerk f v,
- * f^2 a + R v and f^3 j + 3 f R a + S v at most. Magnitudes in, magnitudes out. docs/numerics.md section 7. */
+ * f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out. docs/numerics.md section 7. */
 static void at_all_rates(const struct way *way, const struct real at_one[QUANTITIES],
                          struct real out[QUANTITIES])
 {
     const struct real v = real_abs(at_one[VELOCITY]);
     const struct real a = real_abs(at_one[ACCELERATION]);
     const struct real j = real_abs(at_one[JERK]);
-    const struct real f = way->factor;
-    const struct real f2 = real_mul(f, f);
-    const struct real mixed = real_times(real_mul(real_mul(f, way->rate), a), 3);
-    out[VELOCITY] = real_mul(f, v);
-    out[ACCELERATION] = real_add(real_mul(f2, a), real_mul(way->rate, v));
-    out[JERK] = real_add(real_add(real_mul(real_mul(f2, f), j), mixed), real_mul(way->second, v));
+    out[VELOCITY] = real_mul(way->factor, v);
+    out[ACCELERATION] = zero;
+    out[JERK] = zero;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        const struct level *level = &way->level[k];
+        const struct real turned = real_add(real_mul(level->mixed, a), real_mul(level->second, v));
+        out[ACCELERATION] =
+            real_max(out[ACCELERATION], real_add(real_mul(level->f2, a), real_mul(level->rate, v)));
+        out[JERK] = real_max(out[JERK], real_add(real_mul(level->f3, j), turned));
+    }
 }
 
 static int passes(struct real value, struct real limit)

@@ -27,8 +27,7 @@
 struct prepared_piece {
     uint64_t start_q32_s;
     uint64_t end_q32_s; /* of the last piece the duration */
-    struct rate_pace
-        ahead[RATE_WINDOWS]; /* of the windows that begin with it; for the header's period */
+    struct program_override ahead[RATE_WINDOWS]; /* of the windows that begin with it */
     union {
         struct feed_piece integers;
         struct kernel_double_piece doubles;

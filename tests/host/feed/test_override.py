@@ -64,4 +64,4 @@ def test_under_report_an_exceeded_limit_leaves_no_factor() -> None:
     controller = ControllerLimits(500.0, 5000.0, 200000.0, 0.1)
     limits = Limits(None, None, 40000.0, "report")
     plan = plan_feed(300.0, FeedRequest("quintic", 100.0, 0.1), limits, controller)
-    assert plan.pieces.override_factor_q24.min() == 1 << 24
+    assert plan.pieces.override_factor.min() == 1.0
