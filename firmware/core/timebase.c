@@ -8,7 +8,8 @@ static void set_period(struct timebase *tb, uint32_t period_us)
 {
     uint64_t period = (uint64_t)period_us << 36;
     tb->period_us = period_us;
-    tb->period_log2 = 31u - (uint32_t)qmath_clz32(period_us / 1000u);
+    tb->period_log2 = (period_us >= 2000u ? 1u : 0u) + (period_us >= 4000u ? 1u : 0u) +
+                      (period_us >= 8000u ? 1u : 0u);
     tb->period_q42_s = qmath_div_u64(period, TIMEBASE_REST_UNIT);
     tb->period_rest = (uint32_t)(period - tb->period_q42_s * TIMEBASE_REST_UNIT);
     tb->period_q32_s = (uint32_t)(tb->period_q42_s >> 10) + 1u;
