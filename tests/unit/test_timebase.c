@@ -64,8 +64,8 @@ static void tightest(double *rate, double *second)
     *rate = *second = 1e30;
     for (uint32_t i = 0; i < p.header.piece_count; i++) {
         program_piece_get(&p, i, &piece);
-        double r = piece.override_rate_q16_per_s / 65536.0;
-        double s = piece.override_second_q8_per_s2 / 256.0;
+        double r = (double)program_number(piece.override.rate[0]) / 4294967296.0;
+        double s = (double)program_number(piece.override.second[0]) / 16777216.0;
         *rate = r < *rate ? r : *rate;
         *second = s < *second ? s : *second;
     }

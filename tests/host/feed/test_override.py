@@ -93,7 +93,7 @@ def test_codes_round_down() -> None:
         assert (numbers_of(codes) <= values).all()
         assert (numbers_of(codes)[some & (codes < 255)] >= 0.917 * values[some & (codes < 255)]).all()
         assert (codes_of(numbers_of(np.arange(1, 256))) == np.arange(1, 256)).all()
-    assert rates_per_s([1, 255]).tolist() == [2.0**-16, 120193 * 2.0**-1]
+    assert rates_per_s([1, 255]).tolist() == [71468 * 2.0**-32, 120193 * 2.0**-1]
 
 
 def test_under_report_an_exceeded_limit_leaves_no_factor() -> None:
