@@ -20,21 +20,11 @@ enum quantity { VELOCITY, ACCELERATION, JERK, QUANTITIES };
 
 static const struct real zero = {0, 0};
 
-/* What the override bounds of a piece allow at rates of program time up to one. */
-struct level {
-    struct real f2; /* square of this rate, */
-    struct real f3; /* its cube, */
-    struct real mixed; /* 3 times it times the greatest slope, */
-    struct real rate;  /* which is this, */
-    struct real second; /* and the greatest second derivative */
-};
-
 /* One feed piece: F in mm from its start, in powers of u = time / duration. */
 struct way {
     struct real c[WAY_DEGREE + 1];
     struct real per_s; /* 1 / duration */
-    struct real factor;
-    struct level level[PROGRAM_LEVELS];
+    struct program_override override;
     int64_t start_q40_mm;
     struct real end_mm;
 };
@@ -118,21 +108,6 @@ static struct real milli(uint32_t value)
 
 /* --- What is read from the image --- */
 
-static void read_levels(struct way *way, const struct program_override *own)
-{
-    way->factor = real_make((int64_t)own->factor_q14, -14);
-    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
-        struct level *level = &way->level[k];
-        const struct real f =
-            k == PROGRAM_LEVEL_FULL ? way->factor : real_make((int64_t)program_level_q9(k), -9);
-        level->rate = real_make((int64_t)program_number(own->rate[k]), -32);
-        level->second = real_make((int64_t)program_number(own->second[k]), -24);
-        level->f2 = real_mul(f, f);
-        level->f3 = real_mul(level->f2, f);
-        level->mixed = real_times(real_mul(f, level->rate), 3);
-    }
-}
-
 static void read_way(struct way *way, const struct program *p, uint32_t i)
 {
     struct program_piece piece;
@@ -145,7 +120,7 @@ static void read_way(struct way *way, const struct program *p, uint32_t i)
     }
     stretch(way->c, WAY_DEGREE, real_scale(duration_s, -e));
     way->per_s = real_div(real_make(1, 0), duration_s);
-    read_levels(way, &piece.override);
+    way->override = piece.override;
     way->start_q40_mm = piece.start_q40_mm;
     way->end_mm = horner(way->c, WAY_DEGREE, real_make(1, 0));
 }
@@ -382,23 +357,41 @@ static void bend_of(const struct cell *cell, struct motion_at *out)
 
 /* --- Against the limits --- */
 
+/* The greatest of a quantity in one level. */
+static void in_level(const struct program_override *own, uint32_t level,
+                     const struct real at_one[QUANTITIES], struct real out[QUANTITIES])
+{
+    const int64_t f_q14 =
+        level == PROGRAM_LEVEL_FULL ? own->factor_q14 : (int64_t)program_level_q9(level) * 32;
+    const struct real f = real_make(f_q14, -14);
+    const struct real f2 = real_make(f_q14 * f_q14, -28);
+    const struct real f3 = real_make(f_q14 * f_q14 * f_q14, -42);
+    const struct real rate = real_make((int64_t)program_number(own->rate[level]), -32);
+    const struct real second = real_make((int64_t)program_number(own->second[level]), -24);
+    const struct real mixed = real_times(real_mul(real_mul(f, rate), at_one[ACCELERATION]), 3);
+    out[VELOCITY] = real_mul(f, at_one[VELOCITY]);
+    out[ACCELERATION] =
+        real_add(real_mul(f2, at_one[ACCELERATION]), real_mul(rate, at_one[VELOCITY]));
+    out[JERK] =
+        real_add(real_add(real_mul(f3, at_one[JERK]), mixed), real_mul(second, at_one[VELOCITY]));
+}
+
 /* At the rates that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration and jerk f v,
  * f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out. docs/numerics.md section 7. */
 static void at_all_rates(const struct way *way, const struct real at_one[QUANTITIES],
                          struct real out[QUANTITIES])
 {
-    const struct real v = real_abs(at_one[VELOCITY]);
-    const struct real a = real_abs(at_one[ACCELERATION]);
-    const struct real j = real_abs(at_one[JERK]);
-    out[VELOCITY] = real_mul(way->factor, v);
-    out[ACCELERATION] = zero;
-    out[JERK] = zero;
-    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
-        const struct level *level = &way->level[k];
-        const struct real turned = real_add(real_mul(level->mixed, a), real_mul(level->second, v));
-        out[ACCELERATION] =
-            real_max(out[ACCELERATION], real_add(real_mul(level->f2, a), real_mul(level->rate, v)));
-        out[JERK] = real_max(out[JERK], real_add(real_mul(level->f3, j), turned));
+    struct real magnitude[QUANTITIES];
+    struct real own[QUANTITIES];
+    for (int k = 0; k < QUANTITIES; k++) {
+        magnitude[k] = real_abs(at_one[k]);
+        out[k] = zero;
+    }
+    for (uint32_t level = 0; level < PROGRAM_LEVELS; level++) {
+        in_level(&way->override, level, magnitude, own);
+        for (int k = 0; k < QUANTITIES; k++) {
+            out[k] = real_max(out[k], own[k]);
+        }
     }
 }
 

@@ -58,7 +58,8 @@ static int check_bounds(const struct program_piece *c, const struct program_limi
 static int check_override(const struct program_piece *c)
 {
     const struct program_override *own = &c->override;
-    int good = c->override_factor_q24 >= OVERRIDE_ONE && c->override_factor_q24 <= 2u * OVERRIDE_ONE;
+    int good =
+        c->override_factor_q24 >= OVERRIDE_ONE && c->override_factor_q24 <= 2u * OVERRIDE_ONE;
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
         good = good && own->rate[k] != 0 && own->second[k] != 0;
     }

@@ -26,7 +26,7 @@
 /* A record ends behind the kernel's own part. */
 struct prepared_piece {
     uint64_t start_q32_s;
-    uint64_t end_q32_s; /* of the last piece the duration */
+    uint64_t end_q32_s;                          /* of the last piece the duration */
     struct program_override ahead[RATE_WINDOWS]; /* of the windows that begin with it */
     union {
         struct feed_piece integers;

@@ -57,7 +57,7 @@ struct program_segment {
     int64_t v_q44[3];
 };
 
-#define PROGRAM_LEVELS     7u /* of the override bounds: rates of program time up to which they hold */
+#define PROGRAM_LEVELS 7u /* of the override bounds: rates of program time up to which they hold */
 #define PROGRAM_LEVEL_FULL (PROGRAM_LEVELS - 1u) /* the factor */
 
 /* Override bounds, protocol.md 1.3: program_number of a code is the greatest slope of the rate of program time in

@@ -24,13 +24,13 @@ enum rate_kind {
 
 struct rate_plan {
     struct rate_move move;
-    uint32_t task;      /* what the next tick at rest does, enum rate_task */
-    uint32_t kind;      /* of the move that is on its way or looked for */
-    uint32_t window;    /* looked at next */
-    uint32_t searched;  /* last search above the least factor began in this piece */
-    int64_t wanted_q57; /* what it is all for */
-    int64_t target_q57; /* what is looked for, */
-    int64_t goal_q57;   /* and the next rest on the way there */
+    uint32_t task;           /* what the next tick at rest does, enum rate_task */
+    uint32_t kind;           /* of the move that is on its way or looked for */
+    uint32_t window;         /* looked at next */
+    uint32_t searched;       /* last search above the least factor began in this piece */
+    int64_t wanted_q57;      /* what it is all for */
+    int64_t target_q57;      /* what is looked for, */
+    int64_t goal_q57;        /* and the next rest on the way there */
     struct rate_ticks ticks; /* of the way there */
     /* At rest above the least factor: the way back is known, if it begins by then */
     uint64_t leave_q32_s;

@@ -7,7 +7,8 @@
 
 #define MOST_TICKS                                                                                 \
     ((uint32_t)1 << 18) /* half of a way above the least factor: it leaves less than RATE_SPARE */
-#define MARGIN 8u /* periods: three ticks from decision to move, at twice the rate, and rounding; and those until the rest */
+#define MARGIN                                                                                     \
+    8u /* periods: three ticks from decision to move, at twice the rate, and rounding; and those until the rest */
 
 static uint64_t margin_q32(const struct timebase *tb)
 {
@@ -43,8 +44,7 @@ static int64_t factor_q57(const struct rate_window *w)
 
 static int leaves(struct timebase *tb, const struct rate_window *w)
 {
-    return factor_q57(w) >= tb->now.rate_q57 && fits(tb, w) &&
-           tb->plan.ticks.half < MOST_TICKS;
+    return factor_q57(w) >= tb->now.rate_q57 && fits(tb, w) && tb->plan.ticks.half < MOST_TICKS;
 }
 
 /* Until when a rate above the least factor may last: the way back, at most at this rate, ends inside the window. 0: not

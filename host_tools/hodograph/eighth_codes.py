@@ -22,5 +22,7 @@ _ALL = mantissas(np.arange(GREATEST_CODE + 1))
 
 def codes_below(values: ArrayLike) -> NDArray[np.uint8]:
     """The greatest codes whose m is at most the values; 0: even that of code 1 is more."""
-    found = np.searchsorted(_ALL, np.floor(np.clip(values, 0.0, 2.0**62)).astype(np.uint64), "right")
+    found = np.searchsorted(
+        _ALL, np.floor(np.clip(values, 0.0, 2.0**62)).astype(np.uint64), "right"
+    )
     return (found - 1).astype(np.uint8)

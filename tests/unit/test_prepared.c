@@ -174,7 +174,8 @@ static void test_windows_hold_the_least_of_their_pieces(void)
             for (uint32_t j = i; j < i + (1u << k) && j < plain.header.piece_count; j++) {
                 struct program_override own;
                 program_piece_override(&plain, j, &own);
-                least.factor_q14 = own.factor_q14 < least.factor_q14 ? own.factor_q14 : least.factor_q14;
+                least.factor_q14 =
+                    own.factor_q14 < least.factor_q14 ? own.factor_q14 : least.factor_q14;
                 for (uint32_t n = 0; n < PROGRAM_LEVELS; n++) {
                     least.rate[n] = own.rate[n] < least.rate[n] ? own.rate[n] : least.rate[n];
                     least.second[n] =

@@ -122,8 +122,8 @@ static void test_comes_to_the_target(void)
         const double time = run(&move, &rate, UINT64_MAX);
         const int64_t left = target > from ? target - rate.rate_q57 : rate.rate_q57 - target;
         TEST_ASSERT_TRUE(left >= 0 && left < 2 * (int64_t)ticks.rise * ticks.half);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-12 * total, total * (double)(from + rate.rate_q57) / 2 / RATE_ONE,
-                                  time);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-12 * total,
+                                  total * (double)(from + rate.rate_q57) / 2 / RATE_ONE, time);
         const uint32_t period_q32_s = (uint32_t)(b.period_us * 4294.967296) + 1u;
         const uint64_t span = rate_span_q32(&ticks, (from + rate.rate_q57) / 2, period_q32_s);
         TEST_ASSERT_TRUE(time * b.period_us * 4294.967296 <= (double)span);

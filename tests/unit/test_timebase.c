@@ -275,7 +275,7 @@ static void test_override_saturates(void)
 {
     uint32_t most = 0;
     uint32_t last = 0;
-    set_override(159, 133); /* 14.67 /s, 394 /s^2 */
+    set_override(159, 133);                                              /* 14.67 /s, 394 /s^2 */
     set_factor(0, p.header.piece_count, (1u << 14) + (1u << 12));        /* 1.25 */
     set_factor(10, p.header.piece_count - 10u, (1u << 14) + (1u << 13)); /* 1.5 */
     timebase_begin(&tb, &p, 1000);

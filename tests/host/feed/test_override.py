@@ -5,6 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.override_levels import (
     FULL,
     LEVEL_RATES,
@@ -14,7 +15,6 @@ from hodograph.feed.override_levels import (
     second_codes,
     seconds_per_s2,
 )
-from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 
 
 @settings(max_examples=50, deadline=None)
@@ -44,9 +44,7 @@ def test_no_motion_of_the_override_breaks_a_limit(profile, feed, time, reserve, 
     for corner in range(16):
         pull = rng.uniform(-1.0, 1.0, (3, t.size)) if corner >= 8 else np.ones((3, t.size))
         signs = [1.0 if corner >> bit & 1 else -1.0 for bit in range(3)]
-        lam, d1, d2 = (
-            s * p * b for s, p, b in zip(signs, pull, (most, rate, second), strict=True)
-        )
+        lam, d1, d2 = (s * p * b for s, p, b in zip(signs, pull, (most, rate, second), strict=True))
         slack = 1.0 + 1e-6
         assert np.all(np.abs(lam * v) <= 500.0 * slack)
         assert np.all(np.abs(d1 * v + lam**2 * a) <= 5000.0 * slack)
@@ -91,7 +89,9 @@ def test_codes_round_down() -> None:
         codes = codes_of(values)
         some = codes > 0
         assert (numbers_of(codes) <= values).all()
-        assert (numbers_of(codes)[some & (codes < 255)] >= 0.917 * values[some & (codes < 255)]).all()
+        assert (
+            numbers_of(codes)[some & (codes < 255)] >= 0.917 * values[some & (codes < 255)]
+        ).all()
         assert (codes_of(numbers_of(np.arange(1, 256))) == np.arange(1, 256)).all()
     assert rates_per_s([1, 255]).tolist() == [71468 * 2.0**-32, 120193 * 2.0**-1]
 

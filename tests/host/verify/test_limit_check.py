@@ -151,9 +151,7 @@ def bumped(program: Program, rng: np.random.Generator) -> Program:
 def livelier(program: Program, rng: np.random.Generator) -> Program:
     """One piece allows more of the rate of program time than it should, in one of the levels."""
     pieces = program.pieces
-    name = str(
-        rng.choice(["override_factor_q14", "override_rate_codes", "override_second_codes"])
-    )
+    name = str(rng.choice(["override_factor_q14", "override_rate_codes", "override_second_codes"]))
     values = getattr(pieces, name).copy()
     k = int(rng.integers(len(pieces)))
     if name == "override_factor_q14":
