@@ -25,4 +25,4 @@ def codes_below(values: ArrayLike) -> NDArray[np.uint8]:
     found = np.searchsorted(
         _ALL, np.floor(np.clip(values, 0.0, 2.0**62)).astype(np.uint64), "right"
     )
-    return (found - 1).astype(np.uint8)
+    return np.asarray(found - 1, dtype=np.uint8)
