@@ -24,9 +24,7 @@ static const struct real zero = {0, 0};
 struct way {
     struct real c[WAY_DEGREE + 1];
     struct real per_s; /* 1 / duration */
-    struct real factor;
-    struct real rate;
-    struct real second;
+    struct program_override override;
     int64_t start_q40_mm;
     struct real end_mm;
 };
@@ -122,9 +120,7 @@ static void read_way(struct way *way, const struct program *p, uint32_t i)
     }
     stretch(way->c, WAY_DEGREE, real_scale(duration_s, -e));
     way->per_s = real_div(real_make(1, 0), duration_s);
-    way->factor = real_make((int64_t)piece.override_factor_q24, -24);
-    way->rate = real_make((int64_t)piece.override_rate_q16_per_s, -16);
-    way->second = real_make((int64_t)piece.override_second_q8_per_s2, -8);
+    way->override = piece.override;
     way->start_q40_mm = piece.start_q40_mm;
     way->end_mm = horner(way->c, WAY_DEGREE, real_make(1, 0));
 }
@@ -362,20 +358,42 @@ static void bend_of(const struct cell *cell, struct motion *out)
 
 /* --- Against the limits --- */
 
+/* The greatest of a quantity in one level. */
+static void in_level(const struct program_override *own, uint32_t level,
+                     const struct real at_one[QUANTITIES], struct real out[QUANTITIES])
+{
+    const int64_t f_q14 =
+        level == PROGRAM_LEVEL_FULL ? own->factor_q14 : (int64_t)program_level_q9(level) * 32;
+    const struct real f = real_make(f_q14, -14);
+    const struct real f2 = real_make(f_q14 * f_q14, -28);
+    const struct real f3 = real_make(f_q14 * f_q14 * f_q14, -42);
+    const struct real rate = real_make((int64_t)program_number(own->rate[level]), -32);
+    const struct real second = real_make((int64_t)program_number(own->second[level]), -24);
+    const struct real mixed = real_times(real_mul(real_mul(f, rate), at_one[ACCELERATION]), 3);
+    out[VELOCITY] = real_mul(f, at_one[VELOCITY]);
+    out[ACCELERATION] =
+        real_add(real_mul(f2, at_one[ACCELERATION]), real_mul(rate, at_one[VELOCITY]));
+    out[JERK] =
+        real_add(real_add(real_mul(f3, at_one[JERK]), mixed), real_mul(second, at_one[VELOCITY]));
+}
+
 /* At the rates that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration and jerk f v,
- * f^2 a + R v and f^3 j + 3 f R a + S v at most. Magnitudes in, magnitudes out. docs/numerics.md section 7. */
+ * f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out. docs/numerics.md section 7. */
 static void at_all_rates(const struct way *way, const struct real at_one[QUANTITIES],
                          struct real out[QUANTITIES])
 {
-    const struct real v = real_abs(at_one[VELOCITY]);
-    const struct real a = real_abs(at_one[ACCELERATION]);
-    const struct real j = real_abs(at_one[JERK]);
-    const struct real f = way->factor;
-    const struct real f2 = real_mul(f, f);
-    const struct real mixed = real_times(real_mul(real_mul(f, way->rate), a), 3);
-    out[VELOCITY] = real_mul(f, v);
-    out[ACCELERATION] = real_add(real_mul(f2, a), real_mul(way->rate, v));
-    out[JERK] = real_add(real_add(real_mul(real_mul(f2, f), j), mixed), real_mul(way->second, v));
+    struct real magnitude[QUANTITIES];
+    struct real own[QUANTITIES];
+    for (int k = 0; k < QUANTITIES; k++) {
+        magnitude[k] = real_abs(at_one[k]);
+        out[k] = zero;
+    }
+    for (uint32_t level = 0; level < PROGRAM_LEVELS; level++) {
+        in_level(&way->override, level, magnitude, own);
+        for (int k = 0; k < QUANTITIES; k++) {
+            out[k] = real_max(out[k], own[k]);
+        }
+    }
 }
 
 static int passes(struct real value, struct real limit)

@@ -28,10 +28,7 @@ static int check_ranges(const struct program_piece *c)
             return PROGRAM_ERR_COEFFICIENT;
         }
     }
-    if (c->start_q40_mm < 0 || c->start_q40_mm >= ARC_LIMIT_Q40) {
-        return PROGRAM_ERR_ARC_RANGE;
-    }
-    return c->reserved == 0 ? 0 : PROGRAM_ERR_PIECE_RESERVED;
+    return c->start_q40_mm >= 0 && c->start_q40_mm < ARC_LIMIT_Q40 ? 0 : PROGRAM_ERR_ARC_RANGE;
 }
 
 /* 2^24 / 1000 = 2^21 / 125 */
@@ -60,9 +57,12 @@ static int check_bounds(const struct program_piece *c, const struct program_limi
 
 static int check_override(const struct program_piece *c)
 {
-    int good = c->override_factor_q24 >= OVERRIDE_ONE &&
-               c->override_factor_q24 <= 2u * OVERRIDE_ONE && c->override_rate_q16_per_s != 0 &&
-               c->override_second_q8_per_s2 != 0;
+    const struct program_override *own = &c->override;
+    int good =
+        c->override_factor_q24 >= OVERRIDE_ONE && c->override_factor_q24 <= 2u * OVERRIDE_ONE;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        good = good && own->rate[k] != 0 && own->second[k] != 0;
+    }
     return good ? 0 : PROGRAM_ERR_OVERRIDE;
 }
 

@@ -16,12 +16,11 @@ uint64_t prepared_size(const struct program *p, const struct kernel *kernel)
            (uint64_t)p->header.segment_count * prepared_segment_size(kernel);
 }
 
-static void look_ahead(struct rate_pace ahead[RATE_WINDOWS], const struct program *p, uint32_t i)
+static void look_ahead(struct program_override ahead[RATE_WINDOWS], const struct program *p,
+                       uint32_t i)
 {
-    struct rate_bounds bounds;
     for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
-        rate_bounds_of(&bounds, p, i, rate_window_pieces(k));
-        rate_pace_make(&ahead[k], &bounds, p->header.period_us);
+        rate_bounds_of(&ahead[k], p, i, rate_window_pieces(k));
     }
 }
 

@@ -26,9 +26,8 @@
 /* A record ends behind the kernel's own part. */
 struct prepared_piece {
     uint64_t start_q32_s;
-    uint64_t end_q32_s; /* of the last piece the duration */
-    struct rate_pace
-        ahead[RATE_WINDOWS]; /* of the windows that begin with it; for the header's period */
+    uint64_t end_q32_s;                          /* of the last piece the duration */
+    struct program_override ahead[RATE_WINDOWS]; /* of the windows that begin with it */
     union {
         struct feed_piece integers;
         struct kernel_double_piece doubles;

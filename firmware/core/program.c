@@ -136,13 +136,25 @@ int64_t program_piece_start(const struct program *p, uint32_t i)
     return read_i64(piece_bytes(p, i) + 8);
 }
 
-void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
-                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2)
+void program_piece_override(const struct program *p, uint32_t i, struct program_override *out)
 {
     const uint8_t *b = piece_bytes(p, i);
-    *factor_q24 = read_u32(b + 72);
-    *rate_q16_per_s = read_u32(b + 76);
-    *second_q8_per_s2 = read_u32(b + 80);
+    out->factor_q14 = (uint16_t)read_u16(b + 72);
+    memcpy(out->rate, b + 74, PROGRAM_LEVELS);
+    memcpy(out->second, b + 74 + PROGRAM_LEVELS, PROGRAM_LEVELS);
+}
+
+uint64_t program_number(uint8_t code)
+{
+    static const uint32_t eighth_q16[8] = {65536u, 71468u,  77935u,  84990u,
+                                           92681u, 101070u, 110217u, 120193u};
+    return (uint64_t)eighth_q16[code & 7u] << (code >> 3);
+}
+
+uint32_t program_level_q9(uint32_t level)
+{
+    static const uint16_t rates_q9[PROGRAM_LEVEL_FULL] = {320, 448, 488, 504, 509, 511};
+    return rates_q9[level];
 }
 
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out)
@@ -165,10 +177,12 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
     for (int k = 0; k < 7; k++) {
         out->c_q40_mm[k] = read_i64(b + 16 + 8 * k);
     }
-    out->override_factor_q24 = read_u32(b + 72);
-    out->override_rate_q16_per_s = read_u32(b + 76);
-    out->override_second_q8_per_s2 = read_u32(b + 80);
-    out->reserved = read_u32(b + 84);
+    program_piece_override(p, i, &out->override);
+    out->override_factor_q24 = (uint32_t)out->override.factor_q14 << 10;
+    out->override_rate_q16_per_s =
+        (uint32_t)(program_number(out->override.rate[PROGRAM_LEVEL_FULL]) >> 16);
+    out->override_second_q8_per_s2 =
+        (uint32_t)(program_number(out->override.second[PROGRAM_LEVEL_FULL]) >> 16);
 }
 
 uint32_t program_ticks(const struct program *p)

@@ -57,15 +57,26 @@ struct program_segment {
     int64_t v_q44[3];
 };
 
+#define PROGRAM_LEVELS 7u /* of the override bounds: rates of program time up to which they hold */
+#define PROGRAM_LEVEL_FULL (PROGRAM_LEVELS - 1u) /* the factor */
+
+/* Override bounds, protocol.md 1.3: program_number of a code is the greatest slope of the rate of program time in
+ * 2^-32 /s, its greatest second derivative in 2^-24 /s^2, as long as the rate is at most that of the level. */
+struct program_override {
+    uint16_t factor_q14;
+    uint8_t rate[PROGRAM_LEVELS];
+    uint8_t second[PROGRAM_LEVELS];
+};
+
 /* A feed piece, protocol.md 1.3: F = start + sum of c[k-1] tau^k, tau = t / 2^e. */
 struct program_piece {
     uint64_t duration_q32_s;
     int64_t start_q40_mm;
     int64_t c_q40_mm[7];
     uint32_t override_factor_q24;
-    uint32_t override_rate_q16_per_s;
+    uint32_t override_rate_q16_per_s; /* of the full level, rounded down */
     uint32_t override_second_q8_per_s2;
-    uint32_t reserved;
+    struct program_override override; /* the same, and those of the other levels */
 };
 
 enum program_stop_kind {
@@ -110,9 +121,15 @@ int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 int64_t program_piece_start(const struct program *p, uint32_t i);
 
-/* Only its override bounds, fields as in struct program_piece. */
-void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
-                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2);
+/* Only its override bounds. */
+void program_piece_override(const struct program *p, uint32_t i, struct program_override *out);
+
+/* The number below 2^48 that a code of 8 bits stands for (protocol.md 1.4), also code 0: 2^16, in steps of an eighth of
+ * an octave. */
+uint64_t program_number(uint8_t code);
+
+/* Rate of a level below the full one, 2^-9. */
+uint32_t program_level_q9(uint32_t level);
 
 /* Setpoints of the program: ceil(duration / period) + 1, with the period of the header. Needs a
  * program that passed program_check. */

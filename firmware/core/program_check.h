@@ -65,7 +65,6 @@ enum program_error {
     PROGRAM_ERR_ACCELERATION = -53, /* above its acceleration limit */
     PROGRAM_ERR_JERK = -54,         /* above its jerk limit */
     PROGRAM_ERR_OVERRIDE = -55,     /* override factor not in 1.0 ... 2.0, rate or second rate 0 */
-    PROGRAM_ERR_PIECE_RESERVED = -56, /* reserved field of a piece is not 0 */
     /* axes (core/limit_check.h): index = the piece in which it can happen */
     PROGRAM_ERR_AXIS_VELOCITY = -70,     /* above the velocity limit of an axis */
     PROGRAM_ERR_AXIS_ACCELERATION = -71, /* above its acceleration limit */

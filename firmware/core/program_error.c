@@ -61,7 +61,6 @@ static const struct text texts[] = {
     {PROGRAM_ERR_STOP_BOUND, "a stop can take longer than its bound"},
     {PROGRAM_ERR_STOP_LONG, "a fault stop can take longer than the controller allows"},
     {PROGRAM_ERR_STOP_WORST, "the worst stops of the header are not those of the table"},
-    {PROGRAM_ERR_PIECE_RESERVED, "reserved field of a piece is not 0"},
     {PROGRAM_ERR_AXIS_VELOCITY, "above the velocity limit of an axis"},
     {PROGRAM_ERR_AXIS_ACCELERATION, "above the acceleration limit of an axis"},
     {PROGRAM_ERR_AXIS_JERK, "above the jerk limit of an axis"},

@@ -3,6 +3,8 @@
 
 #include "core/qmath.h"
 
+#define SHORT_TICKS 40u
+
 void rate_ticks_of(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t way_q57)
 {
     const uint32_t way_q30 = (uint32_t)(way_q57 >> 27) + 1u;
@@ -42,7 +44,8 @@ void rate_move_begin(struct rate_move *move, const struct rate *from,
 
 void rate_move_shorten(struct rate_move *move)
 {
-    move->even = move->even < move->rise ? move->even : move->rise;
+    const uint32_t most = 2u * move->rise + SHORT_TICKS;
+    move->even = move->even < most ? move->even : most;
 }
 
 void rate_move_cut(struct rate_move *move)

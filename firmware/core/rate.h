@@ -14,7 +14,6 @@
 
 #include "core/rate_pace.h"
 
-#define RATE_ONE  ((int64_t)1 << 57)
 #define RATE_MOST (2 * RATE_ONE)
 
 struct rate {
@@ -51,7 +50,7 @@ struct rate_move {
 void rate_move_begin(struct rate_move *move, const struct rate *from,
                      const struct rate_ticks *ticks, int64_t step_q56);
 
-/* Comes to rest before the end: as long with an even slope as with a rising one, at most. Before the first tick. */
+/* Comes to rest before the end, if it would have an even slope for long. Before the first tick. */
 void rate_move_shorten(struct rate_move *move);
 
 /* Brings the slope to 0 from now on, as fast as it rose. */

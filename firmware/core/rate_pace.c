@@ -1,54 +1,118 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/rate_pace.h"
 
-#include "core/qmath.h"
-
-#define BOUND_MOST ((uint64_t)1 << 56)
+#define MOST_RATE_CODE   207u /* at 1 ms R is below 2^56 up to this code, */
+#define MOST_SECOND_CODE 223u /* and S up to this one */
+#define ALIKE            4u   /* a factor of 1.4 */
 
 static uint32_t least(uint32_t a, uint32_t b)
 {
     return a < b ? a : b;
 }
 
-void rate_bounds_of(struct rate_bounds *out, const struct program *p, uint32_t first,
+void rate_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
                     uint32_t count)
 {
     const uint32_t left = p->header.piece_count - first;
     const uint32_t behind = first + least(count, left);
-    struct rate_bounds own;
-    program_piece_override(p, first, &out->factor_q24, &out->rate_q16_per_s,
-                           &out->second_q8_per_s2);
+    struct program_override own;
+    program_piece_override(p, first, out);
     for (uint32_t i = first + 1u; i < behind; i++) {
-        program_piece_override(p, i, &own.factor_q24, &own.rate_q16_per_s, &own.second_q8_per_s2);
-        out->factor_q24 = least(out->factor_q24, own.factor_q24);
-        out->rate_q16_per_s = least(out->rate_q16_per_s, own.rate_q16_per_s);
-        out->second_q8_per_s2 = least(out->second_q8_per_s2, own.second_q8_per_s2);
+        program_piece_override(p, i, &own);
+        out->factor_q14 = (uint16_t)least(out->factor_q14, own.factor_q14);
+        for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+            out->rate[k] = (uint8_t)least(out->rate[k], own.rate[k]);
+            out->second[k] = (uint8_t)least(out->second[k], own.second[k]);
+        }
     }
 }
 
-/* bound times unit, rounded down; above `most` it is BOUND_MOST in any case, so no product passes 2^64. */
-static uint64_t scaled(uint32_t bound, uint32_t most, uint64_t unit)
+/* --- Stages --- */
+
+static int64_t rate_of(uint32_t level)
 {
-    const uint64_t a = least(bound, most) * unit;
-    return a < BOUND_MOST ? a : BOUND_MOST;
+    return (int64_t)program_level_q9(level) << 48;
 }
 
-/* At least a / b. */
-static uint32_t quotient_above(uint64_t a, uint64_t b)
+/* The first level with this rate in it. */
+static uint32_t level_of(int64_t rate_q57)
 {
-    return (uint32_t)qmath_div_u64(a, b) + 1u;
+    uint32_t level = 0;
+    while (level < PROGRAM_LEVEL_FULL && rate_of(level) < rate_q57) {
+        level++;
+    }
+    return level;
 }
 
-void rate_pace_make(struct rate_pace *out, const struct rate_bounds *bounds, uint32_t period_us)
+/* The bounds of the higher level are not much below those of the lower one: a rest between them would gain nothing. */
+static int alike(const struct program_override *bounds, uint32_t high, uint32_t low)
 {
-    const uint32_t per_second = 1000000u / period_us;
-    const uint32_t squared = per_second * per_second;
-    const uint64_t slope = scaled(bounds->rate_q16_per_s, per_second << 16,
-                                  qmath_div_u64((uint64_t)1 << 40, per_second));
-    const uint64_t second =
-        scaled(bounds->second_q8_per_s2, squared << 8, qmath_div_u64((uint64_t)1 << 48, squared));
-    out->factor_q24 = bounds->factor_q24;
-    out->turns = quotient_above(slope - 1u, second);
-    out->inverse_slope = quotient_above((uint64_t)1 << 61, slope);
-    out->inverse_root = quotient_above((uint64_t)1 << 45, qmath_root(second));
+    return bounds->rate[high] + ALIKE >= bounds->rate[low] &&
+           bounds->second[high] + ALIKE >= bounds->second[low];
+}
+
+static void stage_up(struct rate_stage *out, const struct program_override *bounds,
+                     int64_t from_q57, int64_t to_q57)
+{
+    const uint32_t top = level_of(to_q57);
+    const uint32_t first = least(level_of(from_q57 + 2 * RATE_SPARE), top);
+    uint32_t level = first;
+    while (level < top && alike(bounds, level + 1u, first)) {
+        level++;
+    }
+    out->level = level;
+    out->goal_q57 = level == top ? to_q57 : rate_of(level);
+}
+
+static void stage_down(struct rate_stage *out, const struct program_override *bounds,
+                       int64_t from_q57, int64_t to_q57)
+{
+    const uint32_t bottom = level_of(to_q57);
+    const uint32_t level = level_of(from_q57);
+    uint32_t low = level;
+    while (low > bottom && alike(bounds, level, low)) {
+        low--;
+    }
+    out->level = level;
+    out->goal_q57 = to_q57;
+    if (!alike(bounds, level, low) && rate_of(low) - RATE_SPARE > to_q57) {
+        out->goal_q57 = rate_of(low) - RATE_SPARE;
+    }
+}
+
+void rate_stage_of(struct rate_stage *out, const struct program_override *bounds, int64_t from_q57,
+                   int64_t to_q57)
+{
+    if (from_q57 < to_q57) {
+        stage_up(out, bounds, from_q57, to_q57);
+    } else {
+        stage_down(out, bounds, from_q57, to_q57);
+    }
+}
+
+/* --- Bounds of a level --- */
+
+/* A code above 0 is T 2^s / 2^16 octaves, T from 2^16 (program_number). With h the period in ms:
+ * R = number 2^21 h / 125, so 2^61 / R = (125 2^40 / T) 2^-s / h; S = number 2^26 h^2 / 15625. */
+void rate_pace_of(struct rate_pace *out, const struct program_override *bounds, uint32_t level,
+                  uint32_t period_log2)
+{
+    /* ceil(125 2^40 / T) */
+    static const uint32_t slopes[8] = {2097152000u, 1923083807u, 1763507455u, 1617119114u,
+                                       1482924801u, 1359839255u, 1246985071u, 1143485507u};
+    /* ceil(125 2^32 / sqrt(T)), and of 2 T */
+    static const uint32_t roots[16] = {2097152000u, 2008232818u, 1923107690u, 1841560367u,
+                                       1763496162u, 1688724256u, 1617132411u, 1548568022u,
+                                       1482910401u, 1420035044u, 1359842489u, 1302179824u,
+                                       1246980095u, 1194108373u, 1143485294u, 1095002950u};
+    /* 125 2^20 2^(i/8), and 2^-15 of it for the rounding of T */
+    static const uint32_t ratios[8] = {131076000u, 142939392u, 155876512u, 169984542u,
+                                       185369457u, 202146827u, 220442678u, 240394444u};
+    const uint32_t rate = least(bounds->rate[level], MOST_RATE_CODE - 8u * period_log2);
+    const uint32_t second = least(bounds->second[level], MOST_SECOND_CODE - 16u * period_log2);
+    const uint32_t apart = rate + 256u - second; /* R / S = number / number 125 / (2^5 h) */
+    const uint32_t down = 25u + 32u + period_log2 - (apart >> 3);
+    out->inverse_slope = (slopes[rate & 7u] >> ((rate >> 3) + period_log2)) + 1u;
+    out->inverse_root = (roots[second & 15u] >> ((second >> 4) + period_log2)) + 1u;
+    out->turns = (down < 32u ? ratios[apart & 7u] >> down : 0u) + 1u;
 }

@@ -9,6 +9,7 @@
 
 #define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
 #define NOWHERE UINT32_MAX
+#define EARLY   8u /* ticks before a rest in which the next move is looked for */
 
 static const struct rate_ticks SHORTEST = {1, 1};
 
@@ -66,11 +67,11 @@ static void begin_move(struct timebase *tb, int64_t step_q56)
     plan->searched = NOWHERE;
 }
 
-static void search(struct rate_plan *plan, enum rate_kind kind, int64_t goal_q57)
+static void search(struct rate_plan *plan, enum rate_kind kind, int64_t target_q57)
 {
     plan->task = RATE_TASK_SEARCH;
     plan->kind = kind;
-    plan->goal_q57 = goal_q57;
+    plan->target_q57 = target_q57;
     plan->window = 0;
 }
 
@@ -138,7 +139,7 @@ static void look_no_more(struct timebase *tb)
 {
     struct rate_plan *plan = &tb->plan;
     if (plan->kind == RATE_SETTLE) {
-        rate_ticks_of(&plan->ticks, &tb->least, qmath_magnitude(plan->goal_q57 - tb->now.rate_q57));
+        rate_search_stage(tb, &tb->least);
         plan->task = RATE_TASK_BEGIN;
     } else {
         rate_plan_give_up(tb);
@@ -170,12 +171,35 @@ void rate_plan_decide(struct timebase *tb)
     }
 }
 
+int64_t rate_plan_from(const struct timebase *tb)
+{
+    return rate_moves(&tb->plan.move) ? tb->plan.move.rest_q57 : tb->now.rate_q57;
+}
+
+/* A stage ends soon: the next one is looked for, so that the rest between them is short. */
+static void look_early(struct timebase *tb, int64_t wanted)
+{
+    struct rate_plan *plan = &tb->plan;
+    const struct rate_move *move = &plan->move;
+    if ((move->rise | move->even) != 0u || move->fall > EARLY || plan->kind != RATE_SETTLE ||
+        wanted > tb->least_q57) {
+        return;
+    }
+    if (plan->task == RATE_TASK_SEARCH) {
+        look(tb);
+    } else if (plan->task == RATE_TASK_NONE && qmath_magnitude(wanted - move->rest_q57) > SMALL) {
+        search(plan, RATE_SETTLE, wanted);
+    }
+}
+
 int64_t rate_plan_move(struct timebase *tb)
 {
     struct rate_plan *plan = &tb->plan;
     int64_t wanted = wanted_rate(tb);
     if (wanted != plan->wanted_q57) {
         change_mind(tb, wanted);
+    } else {
+        look_early(tb, wanted);
     }
     return rate_move_slope(&plan->move, tb->now.slope_q56);
 }

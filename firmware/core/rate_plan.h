@@ -11,9 +11,6 @@
 
 #include "core/rate.h"
 
-#define RATE_SPARE                                                                                 \
-    ((int64_t)1 << 37) /* 10^-6: what a way may leave of itself above the least factor */
-
 struct timebase;
 
 enum rate_task { RATE_TASK_NONE, RATE_TASK_SEARCH, RATE_TASK_BEGIN };
@@ -27,12 +24,13 @@ enum rate_kind {
 
 struct rate_plan {
     struct rate_move move;
-    uint32_t task;      /* what the next tick at rest does, enum rate_task */
-    uint32_t kind;      /* of the move that is on its way or looked for */
-    uint32_t window;    /* looked at next */
-    uint32_t searched;  /* last search above the least factor began in this piece */
-    int64_t wanted_q57; /* what it is all for */
-    int64_t goal_q57;
+    uint32_t task;           /* what the next tick at rest does, enum rate_task */
+    uint32_t kind;           /* of the move that is on its way or looked for */
+    uint32_t window;         /* looked at next */
+    uint32_t searched;       /* last search above the least factor began in this piece */
+    int64_t wanted_q57;      /* what it is all for */
+    int64_t target_q57;      /* what is looked for, */
+    int64_t goal_q57;        /* and the next rest on the way there */
     struct rate_ticks ticks; /* of the way there */
     /* At rest above the least factor: the way back is known, if it begins by then */
     uint64_t leave_q32_s;
@@ -48,6 +46,9 @@ int64_t rate_plan_move(struct timebase *tb);
 /* At rest: 1 when the rate is where it is wanted and may stay there whatever the pieces are. Then the next tick is like
  * this one, and what was planned is off. */
 int rate_plan_steady(struct timebase *tb);
+
+/* Where the rate rests next: its rest, if it falls to it. */
+int64_t rate_plan_from(const struct timebase *tb);
 
 /* At rest, and not steady: one step of deciding what to do next. Keeps `saturated` of *tb. */
 void rate_plan_decide(struct timebase *tb);

@@ -5,10 +5,8 @@
 
 static void look(struct rate_window *w, const struct timebase *tb, uint32_t last)
 {
-    struct rate_bounds bounds;
-    rate_bounds_of(&bounds, tb->program, tb->piece, last + 1u - tb->piece);
-    rate_pace_make(&w->own, &bounds, tb->period_us);
-    w->pace = &w->own;
+    rate_bounds_of(&w->own, tb->program, tb->piece, last + 1u - tb->piece);
+    w->bounds = &w->own;
     w->end_q32_s = tb->piece_end_q42_s >> 10;
     for (uint32_t k = tb->piece + 1u; k <= last; k++) {
         w->end_q32_s += program_piece_duration(tb->program, k);
@@ -22,7 +20,7 @@ void rate_window_get(struct rate_window *w, const struct timebase *tb, uint32_t 
     const uint32_t left = p->header.piece_count - 1u - tb->piece;
     const uint32_t last = tb->piece + (behind < left ? behind : left);
     if (tb->record != NULL) {
-        w->pace = &tb->record->ahead[window];
+        w->bounds = &tb->record->ahead[window];
         w->end_q32_s = prepared_piece_at(p, p->prepared_for, last)->end_q32_s;
     } else {
         look(w, tb, last);

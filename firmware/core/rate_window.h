@@ -14,9 +14,9 @@ struct timebase;
 
 /* The pieces from one on: rate_window_pieces(window) of them, or to the end of the program. */
 struct rate_window {
-    const struct rate_pace *pace; /* of all pieces in it */
-    uint64_t end_q32_s;           /* UINT64_MAX with the last piece */
-    struct rate_pace own;         /* `pace` of a program without prepared records */
+    const struct program_override *bounds; /* of all pieces in it */
+    uint64_t end_q32_s;                    /* UINT64_MAX with the last piece */
+    struct program_override own;           /* `bounds` of a program without prepared records */
 };
 
 /* The window of this number (below RATE_WINDOWS) from the present piece of *tb on. Constant time with prepared records

@@ -8,6 +8,8 @@ static void set_period(struct timebase *tb, uint32_t period_us)
 {
     uint64_t period = (uint64_t)period_us << 36;
     tb->period_us = period_us;
+    tb->period_log2 = (period_us >= 2000u ? 1u : 0u) + (period_us >= 4000u ? 1u : 0u) +
+                      (period_us >= 8000u ? 1u : 0u);
     tb->period_q42_s = qmath_div_u64(period, TIMEBASE_REST_UNIT);
     tb->period_rest = (uint32_t)(period - tb->period_q42_s * TIMEBASE_REST_UNIT);
     tb->period_q32_s = (uint32_t)(tb->period_q42_s >> 10) + 1u;
@@ -19,10 +21,8 @@ static void set_period(struct timebase *tb, uint32_t period_us)
 
 static void set_least(struct timebase *tb)
 {
-    struct rate_bounds bounds;
-    rate_bounds_of(&bounds, tb->program, 0, tb->program->header.piece_count);
-    rate_pace_make(&tb->least, &bounds, tb->period_us);
-    tb->least_q57 = (int64_t)tb->least.factor_q24 << 33;
+    rate_bounds_of(&tb->least, tb->program, 0, tb->program->header.piece_count);
+    tb->least_q57 = (int64_t)tb->least.factor_q14 << 43;
 }
 
 static void set_piece(struct timebase *tb)

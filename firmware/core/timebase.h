@@ -44,6 +44,7 @@ struct timebase {
     uint64_t period_q42_s; /* rounded down */
     uint32_t period_rest;
     uint32_t period_us;
+    uint32_t period_log2;                /* of the period in ms */
     uint32_t period_q32_s;               /* rounded up, for look-ahead */
     uint32_t started;                    /* 0 until the first step */
     uint64_t sixth_q70_s;                /* a sixth of the period */
@@ -56,8 +57,8 @@ struct timebase {
     uint64_t even_q62_s; /* at rest, at a rate other than 1: program time of a tick */
     struct rate now;
     int64_t override_q57;
-    int64_t least_q57;      /* least factor of all pieces */
-    struct rate_pace least; /* all their bounds */
+    int64_t least_q57;             /* least factor of all pieces */
+    struct program_override least; /* all their bounds */
     struct rate_plan plan;
 };
 

@@ -73,7 +73,7 @@ def good() -> dict[str, Program]:
         "heart_exponential": program(heart, exponential, "heart"),
         "heart_minimax": program(heart, FeedRequest("minimax", 150.0, 0.1), "heart"),
         "star_minimax": program(star, FeedRequest("minimax", 60.0, 0.05, degree=9), "star"),
-        "line": program(line(-30 + 10j, 90 - 20j), FeedRequest("quintic", 200.0, 0.2), "line"),
+        "line": program(line(-30 + 10j, 90 - 20j), FeedRequest("quintic", 190.0, 0.2), "line"),
         "line_slow": program(line(0, 0.5 + 0.25j), FeedRequest("quintic", 0.05, 0.5), "line slow"),
         "line_tiny": program(line(5, 5.002), FeedRequest("minimax", 10.0, 0.05), "line tiny"),
         "alpha_offset": program(alpha, exponential, "alpha, shifted", offset_mm=100.0 - 57.25j),
@@ -134,9 +134,9 @@ def without_piece(p: Program, index: int) -> Program:
         own.duration_q32_s[keep],
         own.start_q40[keep],
         own.c_q40[keep],
-        own.override_factor_q24[keep],
-        own.override_rate_q16_per_s[keep],
-        own.override_second_q8_per_s2[keep],
+        own.override_factor_q14[keep],
+        own.override_rate_codes[keep],
+        own.override_second_codes[keep],
     )
     return replace(p, pieces=left, stops=no_stops(len(left)), duration_q32_s=left.total_q32_s)
 
@@ -170,15 +170,18 @@ def split_short(p: Program, index: int) -> Program:
     def same(array: np.ndarray) -> np.ndarray:
         return spread(array, [int(array[index])] * 3)
 
+    def repeated(codes: np.ndarray) -> np.ndarray:
+        return spread(codes, np.tile(codes[index], (3, 1)))
+
     return replace(
         p,
         pieces=FeedPieces(
             spread(own.duration_q32_s, cuts),
             spread(own.start_q40, starts[:3]),
             spread(own.c_q40, rows),
-            same(own.override_factor_q24),
-            same(own.override_rate_q16_per_s),
-            same(own.override_second_q8_per_s2),
+            same(own.override_factor_q14),
+            repeated(own.override_rate_codes),
+            repeated(own.override_second_codes),
         ),
         stops=no_stops(p.piece_count + 2),
     )
@@ -284,21 +287,20 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
         "piece_short": (encode(split_short(p, middle)), "PIECE_SHORT", middle + 1),
         "backwards": (encode(_backwards(p, 1)), "BACKWARDS", 1),
         "override_low": (
-            encode(pieces(p, override_factor_q24=put(2, (1 << 24) - 1))),
+            encode(pieces(p, override_factor_q14=put(2, (1 << 14) - 1))),
             "OVERRIDE",
             2,
         ),
         "override_high": (
-            encode(pieces(p, override_factor_q24=put(2, (2 << 24) + 1))),
+            encode(pieces(p, override_factor_q14=put(2, (2 << 14) + 1))),
             "OVERRIDE",
             2,
         ),
-        "override_rate": (encode(pieces(p, override_rate_q16_per_s=put(7, 0))), "OVERRIDE", 7),
-        "override_second": (encode(pieces(p, override_second_q8_per_s2=put(0, 0))), "OVERRIDE", 0),
-        "piece_reserved": (
-            patch(image, after + PIECE_SIZE * 9 + 84, b"\x01"),
-            "PIECE_RESERVED",
-            9,
+        "override_rate": (encode(pieces(p, override_rate_codes=put((7, 3), 0))), "OVERRIDE", 7),
+        "override_second": (
+            encode(pieces(p, override_second_codes=put((0, 6), 0))),
+            "OVERRIDE",
+            0,
         ),
         "segment_short": (encode(shortened(p)), "SEGMENT_SHORT", -1),
         "feed": (encode(program(line(-120, 160), fast, "broken", controller=wild)), "FEED", -1),

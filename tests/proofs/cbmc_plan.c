@@ -5,7 +5,7 @@
  *
  * prover: cbmc
  * options: --unwind 6 --signed-overflow-check
- * replaces: rate_ticks_of:some_ticks rate_step_of:some_step rate_span_q32:some_span rate_window_get:some_window
+ * replaces: rate_ticks_of:some_ticks rate_step_of:some_step rate_span_q32:some_span rate_window_get:some_window rate_stage_of:some_stage rate_pace_of:some_pace
  * shows: rate_plan_decide rate_plan_reset rate_plan_steady
  * mutant: core/rate_plan.c: down ? -step_q56 : step_q56 => step_q56
  * mutant: core/rate_plan.c: tb->now.rate_q57 > tb->least_q57 ? RATE_STAY : RATE_CLIMB => RATE_STAY
@@ -18,7 +18,7 @@
 /* CBMC has none for 32-bit machines. */
 void *memset(void *to, int value, size_t size)
 {
-    const struct rate_plan none = {{0, 0, 0, 0, 0}, 0, 0, 0, 0, 0, 0, {0, 0}, 0, {0, 0}};
+    const struct rate_plan none = {{0, 0, 0, 0, 0}, 0, 0, 0, 0, 0, 0, 0, {0, 0}, 0, {0, 0}};
     prove(value == 0 && size == sizeof none);
     *(struct rate_plan *)to = none;
     return to;
@@ -54,8 +54,8 @@ static void first(void)
 {
     struct timebase tb;
     struct way way = {0, 0, 0};
-    assume(IS_FACTOR(tb.least.factor_q24));
-    tb.least_q57 = (int64_t)tb.least.factor_q24 << 33;
+    assume(IS_FACTOR(tb.least.factor_q14));
+    tb.least_q57 = (int64_t)tb.least.factor_q14 << 43;
     tb.now.rate_q57 = any_between(0, RATE_ONE);
     tb.now.slope_q56 = 0;
     rate_plan_reset(&tb.plan);

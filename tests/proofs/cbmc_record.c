@@ -41,13 +41,13 @@ static void readers(void)
     struct program p;
     struct program_segment g;
     struct program_piece c;
-    uint32_t bounds[3];
+    struct program_override bounds;
     uint32_t i = nondet_uint32();
     program_segment_get(&p, i, &g);
     program_segment_start(&p, i);
     program_piece_get(&p, i, &c);
     program_piece_duration(&p, i);
-    program_piece_override(&p, i, &bounds[0], &bounds[1], &bounds[2]);
+    program_piece_override(&p, i, &bounds);
 }
 
 static void places(void)

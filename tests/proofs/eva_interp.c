@@ -6,7 +6,7 @@
  * prover: eva
  * options: -eva-slevel 60
  * instead: core/interp.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
- * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end rate_pace_make
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end
  * shows: interp_at_q42 interp_seek prepared_make
  * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
  * mutant: core/interp.c: while (i > 0 && => while (
@@ -14,7 +14,7 @@
  * mutant: core/interp.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
  * mutant: core/prepared.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
  * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
- * mutant: core/rate_pace.c: least(count, left) => count
+ * mutant: core/rate_pace.c: first + least(count, left) => first + count
  */
 #include "core/ph_segment.h"
 #include "core/program.h"

@@ -22,8 +22,7 @@ uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 /*@ ensures \result < 0 || (\result == 0 && in_range(c) && 0 <= c->start_q40_mm < (1 << 62)); */
 static int check_ranges(const struct program_piece *c);
 
-/*@ ensures \result < 0 || (\result == 0 && 0x1000000 <= c->override_factor_q24 <= 0x2000000 &&
-            c->override_rate_q16_per_s > 0 && c->override_second_q8_per_s2 > 0); */
+/*@ ensures \result < 0 || (\result == 0 && 0x1000000 <= c->override_factor_q24 <= 0x2000000); */
 static int check_override(const struct program_piece *c);
 
 #include "core/piece_check.c"

@@ -7,7 +7,7 @@
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/timebase_step.c: timebase_find_piece(tb, time_q42_s, TIMEBASE_MOST_ENDS); => (void)timebase_find_piece;
- * assumes: qmath_div_u64 program_piece_duration rate_bounds_of rate_pace_make rate_plan_reset rate_plan_move rate_plan_decide rate_plan_steady
+ * assumes: qmath_div_u64 program_piece_duration rate_bounds_of rate_plan_reset rate_plan_move rate_plan_decide rate_plan_steady
  * shows: rate_window_get
  * mutant: core/rate_window.c: behind < left ? behind : left => behind
  * mutant: core/rate_window.c: last + 1u - tb->piece => last - tb->piece
@@ -113,9 +113,8 @@ static void look_ahead(const struct timebase *tb)
     //@ loop unroll 5;
     for (uint32_t window = 0; window < RATE_WINDOWS; window++) {
         rate_window_get(&w, tb, window);
-        const struct rate_pace pace = *w.pace;
-        prove(IS_FACTOR(pace.factor_q24) && pace.turns >= 1);
-        prove(pace.inverse_slope <= 0x80000001 && pace.inverse_root <= 0x80040000);
+        const struct program_override bounds = *w.bounds;
+        prove(IS_FACTOR(bounds.factor_q14));
     }
 }
 
@@ -134,12 +133,12 @@ static void tick(const struct program *p)
     }
 }
 
-static struct rate_pace any_pace(void)
+static struct program_override any_bounds(void)
 {
-    struct rate_pace pace = {
-        (uint32_t)any_between(1 << 24, 1 << 25), (uint32_t)any_between(1, UINT32_MAX),
-        (uint32_t)any_between(0, 0x80000001), (uint32_t)any_between(0, 0x80040000)};
-    return pace;
+    struct program_override bounds;
+    Frama_C_make_unknown((char *)&bounds, sizeof bounds);
+    bounds.factor_q14 = (uint16_t)any_between(1 << 14, 1 << 15);
+    return bounds;
 }
 
 int main(void)
@@ -158,7 +157,7 @@ int main(void)
         struct prepared_piece *record = (void *)prepared_piece_at(&p, &any_kernel, i);
         record->end_q32_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(1, POWER(54));
         for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
-            record->ahead[k] = any_pace();
+            record->ahead[k] = any_bounds();
         }
     }
     tick(&p);

@@ -51,13 +51,34 @@ uint64_t some_span(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t pe
     return span;
 }
 
+/* Between both ends. */
+void some_stage(struct rate_stage *out, const struct program_override *bounds, int64_t from_q57,
+                int64_t to_q57)
+{
+    (void)bounds;
+    prove(IS_RATE(from_q57) && IS_RATE(to_q57));
+    out->level = nondet_uint32();
+    out->goal_q57 = nondet_int64();
+    assume(IS_STAGE(out) && (from_q57 < to_q57 ? from_q57 <= out->goal_q57 && out->goal_q57 <= to_q57
+                                               : to_q57 <= out->goal_q57 && out->goal_q57 <= from_q57));
+}
+
+void some_pace(struct rate_pace *out, const struct program_override *bounds, uint32_t level,
+               uint32_t period_log2)
+{
+    (void)bounds;
+    (void)period_log2;
+    prove(level < PROGRAM_LEVELS);
+    assume(IS_PACE(out));
+}
+
 void some_window(struct rate_window *w, const struct timebase *tb, uint32_t window)
 {
     (void)tb;
     prove(window < RATE_WINDOWS);
-    w->own.factor_q24 = nondet_uint32();
-    assume(IS_FACTOR(w->own.factor_q24));
-    w->pace = &w->own;
+    w->own.factor_q14 = (uint16_t)nondet_uint32();
+    assume(IS_FACTOR(w->own.factor_q14));
+    w->bounds = &w->own;
     w->end_q32_s = nondet_uint64();
 }
 
@@ -99,21 +120,22 @@ static int is_way(const struct timebase *tb, const struct way *way)
 static int task_is_sound(const struct timebase *tb)
 {
     const struct rate_plan *plan = &tb->plan;
-    int above = tb->now.rate_q57 > tb->least_q57;
+    int above = rate_plan_from(tb) > tb->least_q57;
+    int64_t aim = plan->task == RATE_TASK_BEGIN ? plan->goal_q57 : plan->target_q57;
     if (plan->task == RATE_TASK_NONE) {
         return 1;
     }
-    if (rate_moves(&plan->move) || !IS_RATE(plan->goal_q57) || plan->wanted_q57 < 0 ||
-        (plan->task == RATE_TASK_BEGIN && !IS_TICKS(&plan->ticks))) {
+    if ((rate_moves(&plan->move) && plan->kind != RATE_SETTLE) || !IS_RATE(aim) ||
+        plan->wanted_q57 < 0 || (plan->task == RATE_TASK_BEGIN && !IS_TICKS(&plan->ticks))) {
         return 0;
     }
     switch (plan->kind) {
     case RATE_STAY:
         return above && plan->task == RATE_TASK_SEARCH;
     case RATE_LEAVE:
-        return above && plan->goal_q57 <= tb->least_q57;
+        return above && aim <= tb->least_q57;
     case RATE_SETTLE:
-        return !above && plan->goal_q57 <= tb->least_q57;
+        return !above && aim <= tb->least_q57;
     default:
         return plan->task == RATE_TASK_SEARCH || IS_TICKS(&plan->back);
     }
@@ -131,8 +153,8 @@ static int is_sound(const struct timebase *tb, const struct way *way)
 
 static void any_timebase(struct timebase *tb, struct way *way)
 {
-    assume(IS_FACTOR(tb->least.factor_q24));
-    tb->least_q57 = (int64_t)tb->least.factor_q24 << 33;
+    assume(IS_FACTOR(tb->least.factor_q14));
+    tb->least_q57 = (int64_t)tb->least.factor_q14 << 43;
     assume(IS_RATE(tb->override_q57));
     assume(tb->state <= TIMEBASE_HELD);
     assume(IS_RATE(tb->now.rate_q57));

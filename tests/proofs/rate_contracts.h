@@ -13,34 +13,31 @@
 #define MOST_SPAN ((uint64_t)1 << 57)
 
 #define IS_PERIOD(us) ((us) == 1000 || (us) == 2000 || (us) == 4000 || (us) == 8000)
-#define IS_FACTOR(f)  (0x1000000 <= (f) && (f) <= 0x2000000)
+#define IS_FACTOR(f)  (0x4000 <= (f) && (f) <= 0x8000) /* q14 */
 #define IS_RATE(q57)  (0 <= (q57) && (q57) <= RATE_MOST)
 #define IS_TICKS(t)   (1 <= (t)->rise && (t)->rise <= (t)->half && (t)->half <= MOST_HALF)
-#define IS_POSITIVE(b)                                                                             \
-    (IS_FACTOR((b)->factor_q24) && (b)->rate_q16_per_s > 0 && (b)->second_q8_per_s2 > 0)
 #define IS_PACE(p)                                                                                 \
-    (IS_FACTOR((p)->factor_q24) && (p)->turns >= 1 && (p)->inverse_slope <= 0x80000001 &&          \
-     (p)->inverse_root <= 0x80040000)
+    ((p)->turns >= 1 && (p)->inverse_slope <= 0x80000001 && (p)->inverse_root <= 0x80040000)
+#define IS_STAGE(s) (IS_RATE((s)->goal_q57) && (s)->level < PROGRAM_LEVELS)
 
 #if defined(__FRAMAC__)
 
 /*@ requires i < p->header.piece_count;
-    assigns *factor_q24, *rate_q16_per_s, *second_q8_per_s2 \from i;
-    ensures \initialized(factor_q24) && \initialized(rate_q16_per_s) && \initialized(second_q8_per_s2);
-    ensures IS_FACTOR(*factor_q24) && *rate_q16_per_s > 0 && *second_q8_per_s2 > 0; */
-void program_piece_override(const struct program *p, uint32_t i, uint32_t *factor_q24,
-                            uint32_t *rate_q16_per_s, uint32_t *second_q8_per_s2);
+    assigns *out \from i;
+    ensures \initialized(out) && IS_FACTOR(out->factor_q14); */
+void program_piece_override(const struct program *p, uint32_t i, struct program_override *out);
 
 /*@ requires first < p->header.piece_count && count > 0;
     assigns *out \from first, count;
-    ensures \initialized(out) && IS_POSITIVE(out); */
-void rate_bounds_of(struct rate_bounds *out, const struct program *p, uint32_t first,
+    ensures \initialized(out) && IS_FACTOR(out->factor_q14); */
+void rate_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
                     uint32_t count);
 
-/*@ requires \initialized(bounds) && IS_POSITIVE(bounds) && IS_PERIOD(period_us);
-    assigns *out \from *bounds, period_us;
+/*@ requires \initialized(bounds) && level < PROGRAM_LEVELS && period_log2 <= 3;
+    assigns *out \from *bounds, level, period_log2;
     ensures \initialized(out) && IS_PACE(out); */
-void rate_pace_make(struct rate_pace *out, const struct rate_bounds *bounds, uint32_t period_us);
+void rate_pace_of(struct rate_pace *out, const struct program_override *bounds, uint32_t level,
+                  uint32_t period_log2);
 
 /* Of this and the next, cbmc_ticks.c shows what compares two numbers: rise <= half, twice a step <= the way. */
 /*@ requires \initialized(pace) && IS_PACE(pace) && IS_RATE(way_q57);

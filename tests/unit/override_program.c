@@ -87,10 +87,15 @@ static void read_pieces(struct override_program *p)
     }
 }
 
-static uint32_t stored(double value, double scale)
+/* The greatest code whose number is at most this. */
+static uint8_t stored(double value, double scale)
 {
-    double a = floor(value * (1.0 - 1e-9) * scale);
-    return a > 4294967295.0 ? UINT32_MAX : a < 1.0 ? 1u : (uint32_t)a;
+    const double number = value * (1.0 - 1e-9) * scale;
+    uint8_t code = 1;
+    while (code < 255 && (double)program_number((uint8_t)(code + 1)) <= number) {
+        code++;
+    }
+    return code;
 }
 
 /* docs/numerics.md section 7; no program limits but those of the controller. */
@@ -104,19 +109,21 @@ static void set_bounds(struct override_program *p, uint32_t i)
     double f = fmin(2.0, limit->feed / v);
     f = fmin(f, sqrt((a + limit->acceleration) / (2.0 * a)));
     f = greater(1.0, fmin(f, cbrt((j + limit->jerk) / (2.0 * j))));
-    uint32_t factor = stored(f, 16777216.0);
-    factor = factor < 1u << 24 ? 1u << 24 : factor;
-    f = piece->factor = factor / 16777216.0;
-    double room_j = limit->jerk - f * f * f * j;
-    uint32_t rate =
-        stored(fmin((limit->acceleration - f * f * a) / v, room_j / (6.0 * f * a)), 65536.0);
-    piece->rate = rate / 65536.0;
-    uint32_t second = stored((room_j - 3.0 * f * piece->rate * a) / v, 256.0);
-    piece->second = second / 256.0;
+    uint32_t factor = (uint32_t)greater(16384.0, floor(f * (1.0 - 1e-9) * 16384.0));
+    piece->rates[PROGRAM_LEVEL_FULL] = factor / 16384.0;
     uint8_t *at = piece_at(p, i);
-    put(at + 72, factor, 4);
-    put(at + 76, rate, 4);
-    put(at + 80, second, 4);
+    put(at + 72, factor, 2);
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        piece->rates[k] = k == PROGRAM_LEVEL_FULL ? factor / 16384.0 : program_level_q9(k) / 512.0;
+        f = piece->rates[k];
+        double room_j = limit->jerk - f * f * f * j;
+        at[74 + k] = stored(fmin((limit->acceleration - f * f * a) / v, room_j / (6.0 * f * a)),
+                            4294967296.0);
+        piece->slopes[k] = ldexp((double)program_number(at[74 + k]), -32);
+        at[74 + PROGRAM_LEVELS + k] =
+            stored((room_j - 3.0 * f * piece->slopes[k] * a) / v, 16777216.0);
+        piece->seconds[k] = ldexp((double)program_number(at[74 + PROGRAM_LEVELS + k]), -24);
+    }
 }
 
 /* The greatest code of at most this: 1 mm/s^2 or 64 mm/s^3 is 64, eight to a factor of 2. */

@@ -19,7 +19,10 @@ struct override_piece {
     double start_s, end_s;
     double c[8];
     double feed, acceleration, jerk; /* greatest magnitudes, rounded up a little */
-    double factor, rate, second;     /* bounds as stored */
+    double rates
+        [PROGRAM_LEVELS]; /* bounds as stored: rates of the levels, the last one is the factor, */
+    double slopes[PROGRAM_LEVELS]; /* and derivatives of the rate */
+    double seconds[PROGRAM_LEVELS];
 };
 
 struct override_program {

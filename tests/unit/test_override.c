@@ -123,6 +123,19 @@ static void check_sample(const struct tick *k, double s)
     worst.jerk = j > worst.jerk ? j : worst.jerk;
 }
 
+/* By how much the bounds of the level that is kept best are passed; 1 and below: they are kept. */
+static double beyond_levels(const struct override_piece *c, double high, double slope,
+                            double second)
+{
+    double least = 1e30;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        const double worst =
+            fmax(high / c->rates[k], fmax(slope / c->slopes[k], second / c->seconds[k]));
+        least = fmin(least, worst);
+    }
+    return least;
+}
+
 /* The bounds of every piece that the tick touches hold over the whole of it. */
 static void check_bounds(const struct tick *k, double end_s)
 {
@@ -136,9 +149,10 @@ static void check_bounds(const struct tick *k, double end_s)
         if (i > now.piece && c->start_s >= end_s) {
             break;
         }
-        at_most("factor", high, c->factor * (1 + 1e-12));
-        at_most("rate", fmax(fabs(k->slope), fabs(last)), c->rate * (1 + 1e-12));
-        at_most("second", fabs(k->second), c->second * (1 + 1e-12));
+        at_most("factor", high, c->rates[PROGRAM_LEVEL_FULL] * (1 + 1e-12));
+        at_most("bounds of a level",
+                beyond_levels(c, high, fmax(fabs(k->slope), fabs(last)), fabs(k->second)),
+                1 + 1e-12);
     }
 }
 
@@ -367,8 +381,13 @@ static void begin(struct override_program *p, int line, uint32_t period_us, uint
 static void finish(void)
 {
     struct rate_ticks down;
-    rate_ticks_of(&down, &now.feed.time.least, RATE_MOST);
-    int64_t ticks = 4 * 2 * ((int64_t)down.rise + down.half) + 10000;
+    struct rate_pace pace;
+    int64_t ticks = 10000;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        rate_pace_of(&pace, &now.feed.time.least, k, now.feed.time.period_log2);
+        rate_ticks_of(&down, &pace, k == PROGRAM_LEVEL_FULL ? RATE_MOST : RATE_ONE);
+        ticks += 4 * 2 * ((int64_t)down.rise + down.half);
+    }
     int64_t wanted = RATE_ONE / 100 * now.percent;
     wanted = wanted < now.feed.time.least_q57 ? wanted : now.feed.time.least_q57;
     for (int64_t i = 0; i < ticks && !over(); i++) {

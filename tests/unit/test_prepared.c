@@ -169,18 +169,20 @@ static void test_windows_hold_the_least_of_their_pieces(void)
     for (uint32_t i = 0; i < plain.header.piece_count; i++) {
         const struct prepared_piece *piece = prepared_piece_at(&ready, fixed, i);
         for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
-            uint32_t least[3] = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
+            struct program_override least;
+            memset(&least, 0xFF, sizeof least);
             for (uint32_t j = i; j < i + (1u << k) && j < plain.header.piece_count; j++) {
-                uint32_t own[3];
-                program_piece_override(&plain, j, &own[0], &own[1], &own[2]);
-                for (int n = 0; n < 3; n++) {
-                    least[n] = own[n] < least[n] ? own[n] : least[n];
+                struct program_override own;
+                program_piece_override(&plain, j, &own);
+                least.factor_q14 =
+                    own.factor_q14 < least.factor_q14 ? own.factor_q14 : least.factor_q14;
+                for (uint32_t n = 0; n < PROGRAM_LEVELS; n++) {
+                    least.rate[n] = own.rate[n] < least.rate[n] ? own.rate[n] : least.rate[n];
+                    least.second[n] =
+                        own.second[n] < least.second[n] ? own.second[n] : least.second[n];
                 }
             }
-            const struct rate_bounds bounds = {least[0], least[1], least[2]};
-            struct rate_pace pace;
-            rate_pace_make(&pace, &bounds, plain.header.period_us);
-            TEST_ASSERT_EQUAL_MEMORY(&pace, &piece->ahead[k], sizeof pace);
+            TEST_ASSERT_EQUAL_MEMORY(&least, &piece->ahead[k], sizeof least);
         }
     }
     end();

@@ -2,6 +2,7 @@
 #include "core/rate.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/qmath.h"
 #include "golden.h"
@@ -31,24 +32,26 @@ struct bounds {
     uint32_t period_us;
 };
 
-static struct bounds make_bounds(uint32_t rate_q16_per_s, uint32_t second_q8_per_s2,
-                                 uint32_t period_us)
+static struct bounds make_bounds(uint8_t rate, uint8_t second, uint32_t period_log2)
 {
-    const struct rate_bounds raw = {1u << 25, rate_q16_per_s, second_q8_per_s2};
-    const double h = period_us * 1e-6;
+    const uint32_t level = 3;
+    struct program_override raw = {0};
     struct bounds b;
-    rate_pace_make(&b.pace, &raw, period_us);
-    b.slope = fmin(rate_q16_per_s / 65536.0 * h, 1) * 72057594037927936.0;
-    b.second = fmin(second_q8_per_s2 / 256.0 * h * h, 1) * 72057594037927936.0;
-    b.period_us = period_us;
+    b.period_us = 1000u << period_log2;
+    const double h = b.period_us * 1e-6;
+    raw.rate[level] = rate;
+    raw.second[level] = second;
+    rate_pace_of(&b.pace, &raw, level, period_log2);
+    b.slope = fmin(ldexp((double)program_number(rate), -32) * h, 1) * 72057594037927936.0;
+    b.second = fmin(ldexp((double)program_number(second), -24) * h * h, 1) * 72057594037927936.0;
     return b;
 }
 
 static struct bounds random_bounds(void)
 {
-    uint32_t rate = (uint32_t)(golden_random(&random_state) >> (32 + below(32)));
-    uint32_t second = (uint32_t)(golden_random(&random_state) >> (32 + below(32)));
-    return make_bounds(rate | 1u, second | 1u, 1000u << below(4));
+    const uint8_t rate = (uint8_t)(1 + below(255));
+    const uint8_t second = (uint8_t)(1 + below(255));
+    return make_bounds(rate, second, (uint32_t)below(4));
 }
 
 static struct rate_move move_of(const struct bounds *b, const struct rate *from, int64_t target,
@@ -119,8 +122,8 @@ static void test_comes_to_the_target(void)
         const double time = run(&move, &rate, UINT64_MAX);
         const int64_t left = target > from ? target - rate.rate_q57 : rate.rate_q57 - target;
         TEST_ASSERT_TRUE(left >= 0 && left < 2 * (int64_t)ticks.rise * ticks.half);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9, total * (double)(from + rate.rate_q57) / 2 / RATE_ONE,
-                                  time);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-12 * total,
+                                  total * (double)(from + rate.rate_q57) / 2 / RATE_ONE, time);
         const uint32_t period_q32_s = (uint32_t)(b.period_us * 4294.967296) + 1u;
         const uint64_t span = rate_span_q32(&ticks, (from + rate.rate_q57) / 2, period_q32_s);
         TEST_ASSERT_TRUE(time * b.period_us * 4294.967296 <= (double)span);
@@ -141,7 +144,7 @@ static void test_a_cut_ends_where_it_said(void)
         }
         if (i % 3 == 0) {
             rate_move_shorten(&move);
-            TEST_ASSERT_TRUE(move.even <= move.rise);
+            TEST_ASSERT_TRUE(move.even <= 2u * move.rise + 40u);
         }
         run(&move, &rate, (uint64_t)below((int64_t)ticks.rise + ticks.half + 1));
         TEST_ASSERT_TRUE(target > from ? rate.rate_q57 >= from && rate.rate_q57 <= target
@@ -152,9 +155,9 @@ static void test_a_cut_ends_where_it_said(void)
 /* The least bounds that the format has, and the greatest. */
 static void test_bounds_at_the_ends_of_the_format(void)
 {
-    for (uint32_t period_us = 1000; period_us <= 8000; period_us *= 2) {
-        const struct bounds slow = make_bounds(1, 1, period_us);
-        const struct bounds fast = make_bounds(UINT32_MAX, UINT32_MAX, period_us);
+    for (uint32_t period_log2 = 0; period_log2 < 4; period_log2++) {
+        const struct bounds slow = make_bounds(1, 1, period_log2);
+        const struct bounds fast = make_bounds(255, 255, period_log2);
         struct rate rate = {RATE_MOST, 0};
         struct rate_ticks ticks;
         move_of(&slow, &rate, 0, &ticks);
@@ -164,6 +167,82 @@ static void test_bounds_at_the_ends_of_the_format(void)
         TEST_ASSERT_TRUE(ticks.rise <= 3 && ticks.half <= 4);
         run(&move, &rate, UINT64_MAX);
     }
+}
+
+/* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a tick. */
+static void test_paces_of_all_codes(void)
+{
+    for (uint32_t period_log2 = 0; period_log2 < 4; period_log2++) {
+        for (int rate = 1; rate < 256; rate++) {
+            for (int second = 1; second < 256; second++) {
+                const struct bounds b = make_bounds((uint8_t)rate, (uint8_t)second, period_log2);
+                const double slope = ldexp(1, 61) / b.pace.inverse_slope;
+                const double root = ldexp(1, 45) / b.pace.inverse_root;
+                TEST_ASSERT_TRUE(slope <= b.slope && root * root <= b.second);
+                TEST_ASSERT_TRUE(slope >= b.slope * 0.8 && root * root >= b.second * 0.8);
+                const double turns = fmin(b.slope, ldexp(1, 56)) / fmin(b.second, ldexp(1, 56));
+                TEST_ASSERT_TRUE(b.pace.turns >= turns * 0.9);
+                TEST_ASSERT_TRUE(b.pace.turns <= turns * 1.25 + 2);
+            }
+        }
+    }
+}
+
+static struct program_override random_levels(void)
+{
+    struct program_override out = {.factor_q14 = 1u << 14};
+    const uint8_t spread = (uint8_t)(1 + below(60));
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        out.rate[k] = (uint8_t)(100 + below(spread));
+        out.second[k] = (uint8_t)(100 + below(spread));
+    }
+    return out;
+}
+
+static double level_rate(uint32_t level)
+{
+    return level == PROGRAM_LEVEL_FULL ? 2.0 : program_level_q9(level) / 512.0;
+}
+
+/* Each stage goes towards the end, within the level whose bounds it takes, and few of them come there. */
+static void test_stages(void)
+{
+    for (int i = 0; i < 100000; i++) {
+        const struct program_override bounds = random_levels();
+        const int64_t to = i % 5 == 0 ? 0 : i % 5 == 1 ? RATE_ONE : below(RATE_ONE + 1);
+        int64_t at = i % 7 == 0 ? 0 : i % 7 == 1 ? RATE_ONE : below(RATE_ONE + 1);
+        uint32_t stages = 0;
+        while (at != to) {
+            struct rate_stage stage;
+            rate_stage_of(&stage, &bounds, at, to);
+            TEST_ASSERT_TRUE(at < to ? stage.goal_q57 > at && stage.goal_q57 <= to
+                                     : stage.goal_q57 < at && stage.goal_q57 >= to);
+            const int64_t most = stage.goal_q57 > at ? stage.goal_q57 : at;
+            TEST_ASSERT_TRUE((double)most / (double)RATE_ONE <= level_rate(stage.level));
+            at = stage.goal_q57;
+            TEST_ASSERT_TRUE(++stages <= PROGRAM_LEVELS);
+        }
+    }
+}
+
+/* Where a rest between two levels would gain nothing there is none. */
+static void test_levels_that_are_alike_are_one(void)
+{
+    struct program_override bounds = {.factor_q14 = 1u << 14};
+    struct rate_stage stage;
+    memset(bounds.rate, 150, sizeof bounds.rate);
+    memset(bounds.second, 120, sizeof bounds.second);
+    rate_stage_of(&stage, &bounds, 0, RATE_ONE);
+    TEST_ASSERT_EQUAL_INT64(RATE_ONE, stage.goal_q57);
+    TEST_ASSERT_EQUAL_UINT32(PROGRAM_LEVEL_FULL, stage.level);
+    rate_stage_of(&stage, &bounds, RATE_ONE, 0);
+    TEST_ASSERT_EQUAL_INT64(0, stage.goal_q57);
+    bounds.rate[PROGRAM_LEVEL_FULL] = 100;
+    rate_stage_of(&stage, &bounds, 0, RATE_ONE);
+    TEST_ASSERT_EQUAL_INT64((int64_t)511 << 48, stage.goal_q57);
+    TEST_ASSERT_EQUAL_UINT32(PROGRAM_LEVEL_FULL - 1u, stage.level);
+    rate_stage_of(&stage, &bounds, RATE_ONE, 0);
+    TEST_ASSERT_EQUAL_INT64(((int64_t)511 << 48) - RATE_SPARE, stage.goal_q57);
 }
 
 static void test_root_above(void)
@@ -210,6 +289,9 @@ int main(void)
     RUN_TEST(test_comes_to_the_target);
     RUN_TEST(test_a_cut_ends_where_it_said);
     RUN_TEST(test_bounds_at_the_ends_of_the_format);
+    RUN_TEST(test_paces_of_all_codes);
+    RUN_TEST(test_stages);
+    RUN_TEST(test_levels_that_are_alike_are_one);
     RUN_TEST(test_root_above);
     RUN_TEST(test_root);
     RUN_TEST(test_root_beside_squares);

@@ -64,8 +64,8 @@ static void tightest(double *rate, double *second)
     *rate = *second = 1e30;
     for (uint32_t i = 0; i < p.header.piece_count; i++) {
         program_piece_get(&p, i, &piece);
-        double r = piece.override_rate_q16_per_s / 65536.0;
-        double s = piece.override_second_q8_per_s2 / 256.0;
+        double r = (double)program_number(piece.override.rate[0]) / 4294967296.0;
+        double s = (double)program_number(piece.override.second[0]) / 16777216.0;
         *rate = r < *rate ? r : *rate;
         *second = s < *second ? s : *second;
     }
@@ -103,24 +103,23 @@ static void check_stop(uint32_t at, uint32_t period_us)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, rate[0]);
 }
 
-static void set_override(uint32_t rate_q16, uint32_t second_q8)
+/* In all levels. */
+static void set_override(uint8_t rate, uint8_t second)
 {
     uint8_t *image = (uint8_t *)(uintptr_t)p.image;
     for (uint32_t i = 0; i < p.header.piece_count; i++) {
         uint8_t *piece = image + PROGRAM_HEADER_SIZE +
                          (size_t)p.header.segment_count * PROGRAM_SEGMENT_SIZE +
                          (size_t)i * PROGRAM_PIECE_SIZE;
-        for (int k = 0; k < 4; k++) {
-            piece[76 + k] = (uint8_t)(rate_q16 >> (8 * k));
-            piece[80 + k] = (uint8_t)(second_q8 >> (8 * k));
-        }
+        memset(piece + 74, rate, PROGRAM_LEVELS);
+        memset(piece + 74 + PROGRAM_LEVELS, second, PROGRAM_LEVELS);
     }
 }
 
 static void test_stop_keeps_the_bounds(void)
 {
     const uint32_t periods[] = {1000, 2000, 4000, 8000};
-    set_override(15 << 16, 400 << 8);
+    set_override(159, 133); /* 14.67 /s, 394 /s^2 */
     for (int i = 0; i < 4; i++) {
         for (uint32_t at = 0; at < 900; at += 37) {
             check_stop(at, periods[i]);
@@ -132,9 +131,9 @@ static void test_stop_for_any_bounds(void)
 {
     uint64_t random = 3;
     for (int i = 0; i < 300; i++) {
-        uint32_t rate = (uint32_t)golden_random(&random) >> (golden_random(&random) % 16u);
-        uint32_t second = (uint32_t)golden_random(&random) >> (golden_random(&random) % 16u);
-        set_override(rate | 1u, second | 1u);
+        uint8_t rate = (uint8_t)(1u + golden_random(&random) % 255u);
+        uint8_t second = (uint8_t)(1u + golden_random(&random) % 255u);
+        set_override(rate, second);
         check_stop((uint32_t)(golden_random(&random) % 300u), 1000u << (i % 4));
     }
 }
@@ -246,7 +245,7 @@ static void test_before_the_first_tick(void)
 
 static void test_override(void)
 {
-    set_override(15 << 16, 400 << 8);
+    set_override(159, 133); /* 14.67 /s, 394 /s^2 */
     timebase_begin(&tb, &p, 1000);
     steps(300);
     timebase_override(&tb, 0);
@@ -259,16 +258,15 @@ static void test_override(void)
     TEST_ASSERT_EQUAL_INT(0, timebase_saturated(&tb));
 }
 
-static void set_factor(uint32_t first, uint32_t behind, uint32_t factor_q24)
+static void set_factor(uint32_t first, uint32_t behind, uint32_t factor_q14)
 {
     uint8_t *image = (uint8_t *)(uintptr_t)p.image;
     for (uint32_t i = first; i < behind; i++) {
         uint8_t *piece = image + PROGRAM_HEADER_SIZE +
                          (size_t)p.header.segment_count * PROGRAM_SEGMENT_SIZE +
                          (size_t)i * PROGRAM_PIECE_SIZE;
-        for (int k = 0; k < 4; k++) {
-            piece[72 + k] = (uint8_t)(factor_q24 >> (8 * k));
-        }
+        piece[72] = (uint8_t)factor_q14;
+        piece[73] = (uint8_t)(factor_q14 >> 8);
     }
 }
 
@@ -277,9 +275,9 @@ static void test_override_saturates(void)
 {
     uint32_t most = 0;
     uint32_t last = 0;
-    set_override(15 << 16, 400 << 8);
-    set_factor(0, p.header.piece_count, (1u << 24) + (1u << 22));        /* 1.25 */
-    set_factor(10, p.header.piece_count - 10u, (1u << 24) + (1u << 23)); /* 1.5 */
+    set_override(159, 133);                                              /* 14.67 /s, 394 /s^2 */
+    set_factor(0, p.header.piece_count, (1u << 14) + (1u << 12));        /* 1.25 */
+    set_factor(10, p.header.piece_count - 10u, (1u << 14) + (1u << 13)); /* 1.5 */
     timebase_begin(&tb, &p, 1000);
     timebase_override(&tb, 999);
     for (uint32_t k = 0; timebase_state(&tb) != TIMEBASE_ENDED; k++) {

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hodograph.feed.override_levels import FACTOR_ONE_Q14, LEVELS, rate_codes, second_codes
 from hodograph.feed.pieces import FeedPieces
 from hodograph.program import Program, check, encode
 from hodograph.program.stop_planning import with_bounds
@@ -206,7 +207,9 @@ def _program(adversary: Adversary, path: _Path, pieces: list[_Piece], middle: in
             np.array([p.duration for p in pieces]),
             np.array([p.start for p in pieces]),
             np.array([p.c for p in pieces]),
-            *((bounds * (2**24, 2**16, 2**8)).astype(np.uint32).T),
+            (bounds[:, 0] * FACTOR_ONE_Q14).astype(np.uint32),
+            np.repeat(rate_codes(bounds[:, 1])[:, None], LEVELS, axis=1),
+            np.repeat(second_codes(bounds[:, 2])[:, None], LEVELS, axis=1),
         ),
         stops=Stops(
             np.tile(np.array(_STOP, dtype=np.uint8), (len(pieces), 1, 1)),

@@ -10,6 +10,8 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from .override_levels import FACTOR_ONE_Q14, FULL, Codes, rates_per_s, seconds_per_s2
+
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 Unsigned = NDArray[np.uint32]
@@ -24,9 +26,9 @@ class FeedPiece:
     duration_q32_s: int
     start_q40: int
     c_q40: tuple[int, ...]
-    override_factor_q24: int
-    override_rate_q16_per_s: int
-    override_second_q8_per_s2: int
+    override_factor_q14: int
+    override_rate_codes: tuple[int, ...]
+    override_second_codes: tuple[int, ...]
 
     @property
     def exponent(self) -> int:
@@ -36,14 +38,14 @@ class FeedPiece:
 
 @dataclass(frozen=True, eq=False)
 class FeedPieces:
-    """All pieces of a program, in order; arrays of length M, `c_q40` (M, 7)."""
+    """All pieces of a program, in order; arrays of length M, `c_q40` (M, 7), codes of the override (M, LEVELS)."""
 
     duration_q32_s: Int
     start_q40: Int
     c_q40: Int
-    override_factor_q24: Unsigned
-    override_rate_q16_per_s: Unsigned
-    override_second_q8_per_s2: Unsigned
+    override_factor_q14: Unsigned
+    override_rate_codes: Codes
+    override_second_codes: Codes
 
     def __len__(self) -> int:
         return int(self.duration_q32_s.size)
@@ -53,13 +55,26 @@ class FeedPieces:
             int(self.duration_q32_s[index]),
             int(self.start_q40[index]),
             tuple(int(c) for c in self.c_q40[index]),
-            int(self.override_factor_q24[index]),
-            int(self.override_rate_q16_per_s[index]),
-            int(self.override_second_q8_per_s2[index]),
+            int(self.override_factor_q14[index]),
+            tuple(int(c) for c in self.override_rate_codes[index]),
+            tuple(int(c) for c in self.override_second_codes[index]),
         )
 
     def __iter__(self) -> Iterator[FeedPiece]:
         return (self[i] for i in range(len(self)))
+
+    @property
+    def override_factor(self) -> Real:
+        """Greatest override (M,)."""
+        return self.override_factor_q14 / FACTOR_ONE_Q14
+
+    def override_rate_per_s(self, level: int = FULL) -> Real:
+        """Greatest slope of the rate of program time (M,) up to the rate of a level."""
+        return rates_per_s(self.override_rate_codes[:, level])
+
+    def override_second_per_s2(self, level: int = FULL) -> Real:
+        """Its greatest second derivative (M,)."""
+        return seconds_per_s2(self.override_second_codes[:, level])
 
     @property
     def total_q32_s(self) -> int:

@@ -289,7 +289,7 @@ def with_override(
         raw.duration_q32_s,
         raw.start_q40,
         raw.c_q40,
-        override.factor_q24,
-        override.rate_q16_per_s,
-        override.second_q8_per_s2,
+        override.factor_q14,
+        override.rate_codes,
+        override.second_codes,
     )

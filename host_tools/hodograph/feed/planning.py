@@ -152,5 +152,5 @@ def _piece_excess(plan: FeedPlan) -> float:
         asked = plan.limits.acceleration_mm_s2, plan.limits.jerk_mm_s3
         bounds[1:] = [min(b, x) if x else b for b, x in zip(bounds[1:], asked, strict=True)]
     excess = max(peak / bound for peak, bound in zip(peaks, bounds, strict=True))
-    rates = min(pieces.override_rate_q16_per_s.min(), pieces.override_second_q8_per_s2.min())
-    return excess if rates > 0 else max(excess, 2.0)
+    least_code = min(pieces.override_rate_codes.min(), pieces.override_second_codes.min())
+    return excess if least_code > 0 else max(excess, 2.0)

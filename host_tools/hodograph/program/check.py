@@ -59,7 +59,7 @@ def check_image(image: bytes, limits: ProgramLimits | None = None) -> Fault | No
     return _check(decode(image), limits, reserved_fields(image))
 
 
-_CLEAN = ReservedFields(flags=True, axes=True, name=True, pieces=None, stops=None)
+_CLEAN = ReservedFields(flags=True, axes=True, name=True, stops=None)
 
 
 def _check(
@@ -72,7 +72,7 @@ def _check(
     return (
         _first(segment_faults(program, ways, limits))
         or _first(end_faults(program, ways))
-        or _first(piece_faults(program, limits, reserved.pieces))
+        or _first(piece_faults(program, limits))
         or _first(last_piece_faults(program))
         or _duration_fault(program)
         or _first([(too_short(program), 0, ProgramError.SEGMENT_SHORT)])

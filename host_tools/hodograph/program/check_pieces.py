@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..feed.override_levels import FACTOR_ONE_Q14
 from ..feed.pieces import (
     DEGREE,
     derivative_bounds,
@@ -33,16 +34,10 @@ JOIN_ACCELERATION_Q16 = 2.0**10
 BACKWARDS_MM_S = -(2.0**-10)
 WAY_SLACK_MM = 2.0**-14
 """What a piece may go behind its start or beyond its end."""
-ONE_Q24 = 1 << 24
 
 
-def piece_faults(
-    program: Program, limits: ProgramLimits | None, reserved: Bool | None = None
-) -> list[Rule]:
-    """What is wrong with the pieces and their joints, in the order of the controller.
-
-    reserved  where the reserved field is not 0
-    """
+def piece_faults(program: Program, limits: ProgramLimits | None) -> list[Rule]:
+    """What is wrong with the pieces and their joints, in the order of the controller."""
     code = ProgramError
     pieces = program.pieces
     duration, start, c = pieces.duration_q32_s, pieces.start_q40, pieces.c_q40
@@ -53,8 +48,6 @@ def piece_faults(
         (large, 0, code.COEFFICIENT),
         (outside, 0, code.ARC_RANGE),
     ]
-    if reserved is not None:
-        ranges.append((reserved, 0, code.PIECE_RESERVED))
     whole = _before_first(ranges, len(pieces))
     if whole == 0:
         return ranges
@@ -77,13 +70,14 @@ def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) ->
     gaps = way[:-1].astype(object) - 16 * advance
     (feed_start, feed_end), (acceleration_start, acceleration_end) = _end_values(duration, c)
     bounds = _bound_faults(duration, c, limits)
-    factor = pieces.override_factor_q24
-    rates = (pieces.override_rate_q16_per_s == 0) | (pieces.override_second_q8_per_s2 == 0)
+    factor = pieces.override_factor_q14
+    codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
+    override = (factor < FACTOR_ONE_Q14) | (factor > 2 * FACTOR_ONE_Q14)
     start_moving = np.array([_moving(feed_start[0], acceleration_start[0])])
     return [
         (np.asarray(np.abs(way) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
         *bounds,
-        (np.asarray((factor < ONE_Q24) | (factor > 2 * ONE_Q24) | rates), 0, code.OVERRIDE),
+        (np.asarray(override | (codes == 0).any(axis=1)), 0, code.OVERRIDE),
         (np.asarray(start[:1] != 0, dtype=np.bool_), 0, code.PIECE_FIRST),
         (start_moving, 0, code.START_MOVING),
         (np.asarray(advance < 0, dtype=np.bool_), 1, code.BACKWARDS),

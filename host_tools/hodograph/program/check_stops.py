@@ -118,11 +118,11 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
     feed, acceleration = (
         part_bounds(pieces.duration_q32_s, pieces.c_q40, order, HALVINGS) for order in (1, 2)
     )
-    factor = pieces.override_factor_q24 * 2.0**-24
+    factor = pieces.override_factor
     speed = np.maximum(feed.max(axis=(1, 2)), 0.0)
-    second = pieces.override_second_q8_per_s2 * 2.0**-8
+    second = pieces.override_second_per_s2()
     # It rises from 0 and falls to 0 again within a change of the rate by the factor at most.
-    steepest = np.minimum(pieces.override_rate_q16_per_s * 2.0**-16, np.sqrt(factor * second))
+    steepest = np.minimum(pieces.override_rate_per_s(), np.sqrt(factor * second))
     slope, cut_s = steepest * speed, steepest / second
     speed = speed * factor
     rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0) * factor**2
@@ -150,7 +150,7 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
 
 def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) -> Bool:
     """Whether a brake fits everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
-    factor = (program.pieces.override_factor_q24 * 2.0**-24)[:, None]
+    factor = program.pieces.override_factor[:, None]
     falling = np.maximum(-acceleration, 0.0) * factor**2
     settle_s = 0.5 * falling / jerk_up[:, None] + 3e-6 * program.period_us
     return np.asarray((falling == 0.0) | (np.maximum(feed, 0.0) >= falling * settle_s))

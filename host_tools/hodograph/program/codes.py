@@ -57,7 +57,6 @@ class ProgramError(IntEnum):
     ACCELERATION = -53
     JERK = -54
     OVERRIDE = -55
-    PIECE_RESERVED = -56
     AXIS_VELOCITY = -70
     AXIS_ACCELERATION = -71
     AXIS_JERK = -72
@@ -120,7 +119,6 @@ _TEXTS = {
     ProgramError.ACCELERATION: "above its acceleration limit",
     ProgramError.JERK: "above its jerk limit",
     ProgramError.OVERRIDE: "override factor not in 1.0 ... 2.0, rate or second rate 0",
-    ProgramError.PIECE_RESERVED: "reserved field of a piece is not 0",
     ProgramError.AXIS_VELOCITY: "above the velocity limit of an axis",
     ProgramError.AXIS_ACCELERATION: "above the acceleration limit of an axis",
     ProgramError.AXIS_JERK: "above the jerk limit of an axis",

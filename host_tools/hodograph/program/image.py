@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..feed.override_levels import LEVELS
 from ..feed.pieces import FeedPieces
 from .codes import ProgramError
 from .stops import Stops
@@ -30,10 +31,9 @@ _PIECE = np.dtype(
         ("duration", "<u8"),
         ("start", "<i8"),
         ("c", "<i8", 7),
-        ("factor", "<u4"),
-        ("rate", "<u4"),
-        ("second", "<u4"),
-        ("reserved", "<u4"),
+        ("factor", "<u2"),
+        ("rate", "u1", LEVELS),
+        ("second", "u1", LEVELS),
     ]
 )
 _STOP = np.dtype([("codes", "u1", (2, 3)), ("reserved", "<u2"), ("bound_us", "<u4", 2)])
@@ -120,8 +120,8 @@ def encode(program: Program) -> bytes:
     pieces = np.zeros(program.piece_count, dtype=_PIECE)
     own = program.pieces
     pieces["duration"], pieces["start"], pieces["c"] = own.duration_q32_s, own.start_q40, own.c_q40
-    pieces["factor"], pieces["rate"] = own.override_factor_q24, own.override_rate_q16_per_s
-    pieces["second"] = own.override_second_q8_per_s2
+    pieces["factor"], pieces["rate"] = own.override_factor_q14, own.override_rate_codes
+    pieces["second"] = own.override_second_codes
     stops = np.zeros(program.piece_count, dtype=_STOP)
     stops["codes"], stops["bound_us"] = program.stops.codes, program.stops.bound_us
     body = segments.tobytes() + pieces.tobytes() + stops.tobytes()
@@ -185,8 +185,8 @@ def decode(image: bytes) -> Program:
         raw["start"].astype(np.int64),
         raw["c"].astype(np.int64),
         raw["factor"].astype(np.uint32),
-        raw["rate"].astype(np.uint32),
-        raw["second"].astype(np.uint32),
+        raw["rate"].copy(),
+        raw["second"].copy(),
     )
     table = np.frombuffer(image, _STOP, piece_count, after + PIECE_SIZE * piece_count)
     stops = Stops(
@@ -242,14 +242,12 @@ def open_fault(image: bytes) -> ProgramError | None:
 @dataclass(frozen=True, eq=False)
 class ReservedFields:
     """What an image says beside a `Program`: whether flags and reserved bytes of the header, the axis count
-    and the padding of the name are as they must be, and where reserved fields of pieces, and of their stops, are not 0
-    (None: nowhere).
+    and the padding of the name are as they must be, and where reserved fields of stops are not 0 (None: nowhere).
     """
 
     flags: bool
     axes: bool
     name: bool
-    pieces: NDArray[np.bool_] | None
     stops: NDArray[np.bool_] | None
 
 
@@ -258,12 +256,10 @@ def reserved_fields(image: bytes) -> ReservedFields:
     head = _HEADER.unpack_from(image)
     name = head[18]
     after = HEADER_SIZE + SEGMENT_SIZE * head[6]
-    reserved = np.frombuffer(image, _PIECE, head[7], after)["reserved"]
     stops = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])["reserved"]
     return ReservedFields(
         flags=not (head[8] & ~FLAG_CLOSED or head[17]),
         axes=head[9] == 2,
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
-        pieces=reserved != 0,
         stops=stops != 0,
     )

@@ -43,9 +43,9 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "peak_feed_mm_s": float(feed.max()),
         "peak_acceleration_mm_s2": float(acceleration.max()),
         "peak_jerk_mm_s3": float(jerk.max()),
-        "override_factor_least": float(pieces.override_factor_q24.min()) * 2.0**-24,
-        "override_rate_least_per_s": float(pieces.override_rate_q16_per_s.min()) * 2.0**-16,
-        "override_second_least_per_s2": float(pieces.override_second_q8_per_s2.min()) * 2.0**-8,
+        "override_factor_least": float(pieces.override_factor.min()),
+        "override_rate_least_per_s": float(pieces.override_rate_per_s().min()),
+        "override_second_least_per_s2": float(pieces.override_second_per_s2().min()),
         "stops": stops_dict(program.stops, program.piece_starts_mm),
     }
 
@@ -100,12 +100,12 @@ def _segment_rows(program: Program) -> list[str]:
 def _piece_rows(program: Program) -> list[str]:
     pieces = program.pieces
     feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)
+    factor = pieces.override_factor
+    rate, second = pieces.override_rate_per_s(), pieces.override_second_per_s2()
     return [
         f"{i:8d} {pieces.duration_q32_s[i] * 2.0**-32:14.9f} {pieces.start_q40[i] * 2.0**-40:14.6f} "
         f"{feed[i]:10.4f} {acceleration[i]:9.2f} {jerk[i]:10.1f} "
-        f"{pieces.override_factor_q24[i] * 2.0**-24:7.4f} "
-        f"{pieces.override_rate_q16_per_s[i] * 2.0**-16:7.4g} "
-        f"{pieces.override_second_q8_per_s2[i] * 2.0**-8:7.4g}"
+        f"{factor[i]:7.4f} {rate[i]:7.4g} {second[i]:7.4g}"
         for i in range(program.piece_count)
     ]
 

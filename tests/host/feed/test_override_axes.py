@@ -193,7 +193,7 @@ def test_a_factor_of_no_use_leaves_its_room_to_holds() -> None:
     """Half of what the reserve leaves would go to an override of 102 %."""
     limits = Limits(axis=AxisLimits(acceleration_mm_s2=(1500.0, 1500.0)), reserve=0.05)
     pieces = plan_optimal(wavy(2), FeedRequest("optimal"), limits).pieces
-    factor = pieces.override_factor_q24 / 2.0**24
+    factor = pieces.override_factor
     assert ((factor == 1.0) | (factor >= 1.05)).all()
     assert (factor == 1.0).sum() > 10
 
@@ -203,7 +203,7 @@ def test_without_such_limits_nothing_changes() -> None:
     request = FeedRequest("minimax", 100.0, 0.1)
     plain = plan_feed(spline.length_mm, request, Limits(None, 2000.0))
     along = plan_path(spline, request, Limits(None, 2000.0))
-    for name in ("duration_q32_s", "c_q40", "override_rate_q16_per_s", "override_factor_q24"):
+    for name in ("duration_q32_s", "c_q40", "override_rate_codes", "override_factor_q14"):
         np.testing.assert_array_equal(getattr(plain.pieces, name), getattr(along.pieces, name))
 
 
@@ -221,7 +221,7 @@ def test_report_lists_what_is_broken_along_the_path() -> None:
     assert "centripetal_mm_s2" in names
     assert "axis y jerk_mm_s3" in names
     assert not any("axis x" in name for name in names)
-    assert plan.pieces.override_factor_q24.min() == 1 << 24
+    assert plan.pieces.override_factor.min() == 1.0
 
 
 def test_the_note_names_the_limit() -> None:

@@ -54,9 +54,9 @@ def creeping_program(back: float) -> Program:
         np.full(2, DURATION_S << 32, dtype=np.int64),
         np.array([0, ways_q40[0]], dtype=np.int64),
         c_q40,
-        np.full(2, 1 << 24, dtype=np.uint32),
-        np.full(2, 1 << 16, dtype=np.uint32),
-        np.full(2, 1 << 8, dtype=np.uint32),
+        np.full(2, 1 << 14, dtype=np.uint32),
+        np.full((2, 7), 128, dtype=np.uint8),
+        np.full((2, 7), 64, dtype=np.uint8),
     )
     u = np.repeat(w_q44[:, None], 3, axis=1)
     return replace(

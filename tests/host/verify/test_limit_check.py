@@ -8,6 +8,7 @@ changes the number of mutated images.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from programs import random_program
 
 from hodograph.chain import load_chain
+from hodograph.feed.override_levels import FACTOR_ONE_Q14, FULL, LEVEL_RATES, LEVELS
 from hodograph.native.program import NativeFault, NativeLimits, NativeProgram
 from hodograph.program import Program, encode
 from hodograph.program.codes import ProgramError
@@ -38,30 +40,32 @@ SAMPLES = 600
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Bounds of the rate of program time in each piece, (M,)."""
+    """Bounds of the rate of program time in each piece, (M,), and of its derivatives up to it."""
 
-    factor: Real
+    most: Real
     rate: Real
     second: Real
 
 
-def rates_of(program: Program) -> Rates:
+def levels_of(program: Program) -> Iterator[Rates]:
     pieces = program.pieces
-    return Rates(
-        pieces.override_factor_q24 * 2.0**-24,
-        pieces.override_rate_q16_per_s * 2.0**-16,
-        pieces.override_second_q8_per_s2 * 2.0**-8,
-    )
+    for level in range(LEVELS):
+        most = np.full(len(pieces), (*LEVEL_RATES, 0.0)[level])
+        yield Rates(
+            pieces.override_factor if level == FULL else most,
+            pieces.override_rate_per_s(level),
+            pieces.override_second_per_s2(level),
+        )
 
 
 def plain(program: Program) -> Program:
     """With overrides of next to no room: what is judged is the motion at rate 1."""
-    one = np.ones_like(program.pieces.override_factor_q24)
+    codes = np.ones_like(program.pieces.override_rate_codes)
     pieces = replace(
         program.pieces,
-        override_factor_q24=one << 24,
-        override_rate_q16_per_s=one,
-        override_second_q8_per_s2=one,
+        override_factor_q14=np.full_like(program.pieces.override_factor_q14, FACTOR_ONE_Q14),
+        override_rate_codes=codes,
+        override_second_codes=codes,
     )
     return replace(program, pieces=pieces)
 
@@ -74,19 +78,20 @@ def peaks(program: Program, samples: int = SAMPLES) -> Real:
     motion = motion_at(cells, cell, np.tile(np.linspace(0.0, 1.0, samples), len(cells)))
     middle = cells.start_s + 0.5 * cells.duration_s
     piece = np.clip(np.searchsorted(ends, middle), 0, ends.size - 1)[cell]
-    rates = rates_of(program)
-    f, r, s = rates.factor[piece], rates.rate[piece], rates.second[piece]
-    out = np.empty((3, 2))
-    for axis in range(2):
-        v, a, j = (
-            np.abs(one[axis])
-            for one in (motion.axis_velocity, motion.axis_acceleration, motion.axis_jerk)
-        )
-        out[:, axis] = (
-            (f * v).max(),
-            (f * f * a + r * v).max(),
-            (f**3 * j + 3.0 * f * r * a + s * v).max(),
-        )
+    out = np.zeros((3, 2))
+    for rates in levels_of(program):
+        f, r, s = rates.most[piece], rates.rate[piece], rates.second[piece]
+        for axis in range(2):
+            v, a, j = (
+                np.abs(one[axis])
+                for one in (motion.axis_velocity, motion.axis_acceleration, motion.axis_jerk)
+            )
+            own = (
+                (f * v).max(),
+                (f * f * a + r * v).max(),
+                (f**3 * j + 3.0 * f * r * a + s * v).max(),
+            )
+            out[:, axis] = np.maximum(out[:, axis], own)
     return out
 
 
@@ -144,16 +149,17 @@ def bumped(program: Program, rng: np.random.Generator) -> Program:
 
 
 def livelier(program: Program, rng: np.random.Generator) -> Program:
-    """One piece allows more of the rate of program time than it should."""
+    """One piece allows more of the rate of program time than it should, in one of the levels."""
     pieces = program.pieces
-    name = str(
-        rng.choice(["override_factor_q24", "override_rate_q16_per_s", "override_second_q8_per_s2"])
-    )
-    values = getattr(pieces, name).astype(np.float64)
+    name = str(rng.choice(["override_factor_q14", "override_rate_codes", "override_second_codes"]))
+    values = getattr(pieces, name).copy()
     k = int(rng.integers(len(pieces)))
-    values[k] *= 1.0 + 10.0 ** rng.uniform(-3.0, 3.0)
-    most = 2.0**25 if name == "override_factor_q24" else 2.0**32 - 1
-    values = np.minimum(values, most).astype(np.uint32)
+    if name == "override_factor_q14":
+        more = float(values[k]) * (1.0 + 10.0 ** rng.uniform(-3.0, 1.0))
+        values[k] = int(min(more, 2.0 * FACTOR_ONE_Q14))
+    else:
+        level = int(rng.integers(LEVELS))
+        values[k, level] = min(int(values[k, level]) + int(rng.integers(1, 80)), 255)
     return replace(program, pieces=replace(pieces, **{name: values}))
 
 
@@ -180,12 +186,14 @@ def test_no_mutated_image_is_accepted_beyond_a_limit() -> None:
 def test_rates_beyond_all_bounds_are_refused() -> None:
     program = programs()[0]
     limits = 1.005 * peaks(program)
-    everything = np.full_like(program.pieces.override_rate_q16_per_s, 2**32 - 1)
-    for name in ("override_rate_q16_per_s", "override_second_q8_per_s2"):
-        pieces = replace(program.pieces, **{name: everything})
-        fault = check(replace(program, pieces=pieces), limits)
-        assert fault is not None
-        assert fault.code in CODES
+    for name in ("override_rate_codes", "override_second_codes"):
+        for level in range(LEVELS):
+            codes = getattr(program.pieces, name).copy()
+            codes[:, level] = 255
+            pieces = replace(program.pieces, **{name: codes})
+            fault = check(replace(program, pieces=pieces), limits)
+            assert fault is not None
+            assert fault.code in CODES
 
 
 def with_a_step_of_curvature(program: Program, segment: int, share: float) -> Program:
