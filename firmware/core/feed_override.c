@@ -141,10 +141,9 @@ static int period_exponent(const struct timebase *time)
     return 31 - qmath_clz32(time->period_us / 1000u);
 }
 
-/* rate F' and rate^2 F'' + rate' F' as way of a tick, at the last setpoint; rate' F' also by itself. 0 where the feed is
- * beyond all brakes. */
-static int plan_state(const struct feed_override *f, const struct interp *it,
-                      struct path_state *state, int64_t *turned_q56)
+/* rate F' and rate^2 F'' + rate' F' as way of a tick. */
+int feed_override_motion(const struct feed_override *f, const struct interp *it,
+                         struct path_state *state, int64_t *turned_q56)
 {
     const struct timebase *time = &f->time;
     const int p = period_exponent(time);
@@ -283,7 +282,7 @@ static int leaves_or_rests(struct feed_override *f, const struct interp *it)
     struct path_state state;
     int64_t turned_q56 = 0;
     const struct timebase *time = &f->time;
-    const int known = plan_state(f, it, &state, &turned_q56);
+    const int known = feed_override_motion(f, it, &state, &turned_q56);
     const int rests = (time->now.rate_q57 | time->now.slope_q56) == 0;
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
         come_to_rest(f, 1);

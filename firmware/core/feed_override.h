@@ -85,6 +85,11 @@ int feed_override_next(struct feed_override *f, struct interp *it, struct interp
  * in which only the plan goes on can be counted without it. */
 int feed_override_stop_tick(struct feed_override *f, struct interp *it);
 
+/* Part of a tick of a stop: how the plan passes the place of its last setpoint; in *turned_q56 what the change of the rate
+ * adds to the acceleration. Returns 1, or 0 where the feed is beyond all brakes. */
+int feed_override_motion(const struct feed_override *f, const struct interp *it,
+                         struct path_state *state, int64_t *turned_q56);
+
 /* --- What is so at the last setpoint --- */
 
 enum feed_state feed_override_state(const struct feed_override *f);

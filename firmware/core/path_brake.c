@@ -211,10 +211,10 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
     /* what the first jerk leaves of the speed in t ticks, a t / 2, and of the way, a t^2 / 6 */
     const uint32_t first_q16 = ramp_ticks_q16(fall, numbers->jerk_down_q56);
     const int64_t early = over_ticks(fall, first_q16) / 2;
-    const int64_t saved = over_ticks(early, first_q16 - (first_q16 >> 10)) / 3;
+    const int64_t saved = qmath_third(over_ticks(early, first_q16 - (first_q16 >> 10)));
     const int64_t late = over_ticks(most, ramp_ticks_q16(most, numbers->jerk_up_q56)) / 2;
     const int64_t speed = from->speed_q56 + early + SPARE_SPEED * (most + rise);
-    if ((early | late | saved) >> 60 != 0) {
+    if ((early | late) >> 60 != 0) {
         return 0;
     }
     return squares_within(speed, late, most, way_left + (saved >> FINE_BITS));
