@@ -140,8 +140,10 @@ void program_piece_override(const struct program *p, uint32_t i, struct program_
 {
     const uint8_t *b = piece_bytes(p, i);
     out->factor_q14 = (uint16_t)read_u16(b + 72);
-    memcpy(out->rate, b + 74, PROGRAM_LEVELS);
-    memcpy(out->second, b + 74 + PROGRAM_LEVELS, PROGRAM_LEVELS);
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        out->rate[k] = b[74u + k];
+        out->second[k] = b[81u + k];
+    }
 }
 
 uint64_t program_number(uint8_t code)

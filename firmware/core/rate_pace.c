@@ -61,7 +61,7 @@ static void stage_up(struct rate_stage *out, const struct program_override *boun
         level++;
     }
     out->level = level;
-    out->goal_q57 = level == top ? to_q57 : rate_of(level);
+    out->goal_q57 = level < top ? rate_of(level) : to_q57;
 }
 
 static void stage_down(struct rate_stage *out, const struct program_override *bounds,
@@ -69,15 +69,15 @@ static void stage_down(struct rate_stage *out, const struct program_override *bo
 {
     const uint32_t bottom = level_of(to_q57);
     const uint32_t level = level_of(from_q57);
-    uint32_t low = level;
-    while (low > bottom && alike(bounds, level, low)) {
-        low--;
+    int64_t goal_q57 = to_q57;
+    for (uint32_t low = level; low > bottom && goal_q57 == to_q57; low--) {
+        if (!alike(bounds, level, low - 1u)) {
+            const int64_t rest_q57 = rate_of(low - 1u) - RATE_SPARE;
+            goal_q57 = rest_q57 > to_q57 ? rest_q57 : to_q57;
+        }
     }
     out->level = level;
-    out->goal_q57 = to_q57;
-    if (!alike(bounds, level, low) && rate_of(low) - RATE_SPARE > to_q57) {
-        out->goal_q57 = rate_of(low) - RATE_SPARE;
-    }
+    out->goal_q57 = goal_q57;
 }
 
 void rate_stage_of(struct rate_stage *out, const struct program_override *bounds, int64_t from_q57,

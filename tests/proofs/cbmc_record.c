@@ -8,7 +8,7 @@
  * options: --unwind 40
  * replaces: segment_bytes:some_segment piece_bytes:some_piece
  * shows: read_u16 read_u32 read_u64 segment_bytes piece_bytes
- * mutant: core/program.c: read_u32(b + 84) => read_u32(b + 85)
+ * mutant: core/program.c: b[81u + k] => b[82u + k]
  * mutant: core/program.c: b + 32 + 16 * k => b + 40 + 16 * k
  * mutant: core/program.c: need != h->image_size => need < h->image_size
  */

@@ -51,7 +51,7 @@ uint64_t some_span(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t pe
     return span;
 }
 
-/* Between both ends. */
+/* Between both ends; a rest on the way is that of a level below 1. */
 void some_stage(struct rate_stage *out, const struct program_override *bounds, int64_t from_q57,
                 int64_t to_q57)
 {
@@ -59,6 +59,7 @@ void some_stage(struct rate_stage *out, const struct program_override *bounds, i
     prove(IS_RATE(from_q57) && IS_RATE(to_q57));
     out->level = nondet_uint32();
     out->goal_q57 = nondet_int64();
+    assume(out->goal_q57 == to_q57 || out->goal_q57 < RATE_ONE);
     assume(IS_STAGE(out) && (from_q57 < to_q57 ? from_q57 <= out->goal_q57 && out->goal_q57 <= to_q57
                                                : to_q57 <= out->goal_q57 && out->goal_q57 <= from_q57));
 }

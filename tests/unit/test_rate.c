@@ -217,6 +217,7 @@ static void test_stages(void)
             rate_stage_of(&stage, &bounds, at, to);
             TEST_ASSERT_TRUE(at < to ? stage.goal_q57 > at && stage.goal_q57 <= to
                                      : stage.goal_q57 < at && stage.goal_q57 >= to);
+            TEST_ASSERT_TRUE(stage.goal_q57 == to || stage.goal_q57 < RATE_ONE);
             const int64_t most = stage.goal_q57 > at ? stage.goal_q57 : at;
             TEST_ASSERT_TRUE((double)most / (double)RATE_ONE <= level_rate(stage.level));
             at = stage.goal_q57;

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..eighth_codes import codes_below, mantissas
+from .eighth_codes import codes_below, mantissas
 
 Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
