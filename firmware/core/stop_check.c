@@ -5,6 +5,7 @@
 #include "core/qmath.h"
 
 #define NO_BOUND UINT32_MAX
+#define END_TICKS 2u /* until a command counts, and until the end of the program is a setpoint */
 
 /* What is beyond these counts as no bound: 2^14 mm/s, 2^24 mm/s^2; so no product below passes 2^63. */
 #define MOST_SPEED_UM  ((uint64_t)1 << 24)
@@ -89,12 +90,34 @@ static void extent_waits(struct stop_extent *out, const struct program *p,
     out->last = run;
 }
 
-/* Greatest slope of the rate, 2^-16 /s: it rises from 0 and falls to 0 again within a change of the rate by the factor at
- * most, by the second at most. */
-static uint64_t greatest_slope_q16(const struct program_piece *c)
+/* Greatest rate of program time in a level. */
+static uint32_t level_rate_q24(const struct program_override *bounds, uint32_t level)
 {
-    uint64_t square_q32 = (uint64_t)c->override_factor_q24 * c->override_second_q8_per_s2;
-    return lesser(c->override_rate_q16_per_s, qmath_root(square_q32) + 1u);
+    return level == PROGRAM_LEVEL_FULL ? (uint32_t)bounds->factor_q14 << 10
+                                       : program_level_q9(level) << 15;
+}
+
+/* Greatest slope of the rate, 2^-16 /s: it rises from 0 and falls to 0 again within a change of the rate by
+ * the greatest rate at most, by the second at most. */
+static uint64_t greatest_slope_q16(const struct program_override *bounds, uint32_t level)
+{
+    const uint64_t second_q8 =
+        lesser((program_number(bounds->second[level]) >> 16) + 1u, (uint64_t)1 << 32);
+    const uint64_t square_q32 = level_rate_q24(bounds, level) * second_q8;
+    const uint64_t rate_q16 = (program_number(bounds->rate[level]) >> 16) + 1u;
+    return lesser(rate_q16, qmath_root(square_q32) + 1u);
+}
+
+void stop_level_start(const struct stop_extent *extent, const struct program_override *bounds,
+                      uint32_t level, struct stop_start *out)
+{
+    const uint32_t rate_q24 = level_rate_q24(bounds, level);
+    const uint64_t slope_q16 = greatest_slope_q16(bounds, level);
+    out->speed_um = scaled(extent->speed_um, rate_q24);
+    out->rising_um = scaled(scaled(extent->rising_um, rate_q24), rate_q24);
+    out->slope_um = (slope_q16 * lesser(extent->speed_um, MOST_SPEED_UM) >> 16) + 1u;
+    /* slope 2^-16 over second 2^-24: 10^6 2^8 */
+    out->cut_us = qmath_div_up_u64(slope_q16 * 256000000u, program_number(bounds->second[level]));
 }
 
 /* Lower bounds of the eighths; gives the upper one of all. */
@@ -116,13 +139,8 @@ void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up
     int64_t low[2][FEED_PARTS];
     program_piece_get(p, piece, &c);
     uint64_t speed = held(parts_below(&c, FEED_VELOCITY, low[0]), 24, MOST_SPEED_UM);
-    out->speed_um = scaled(speed, c.override_factor_q24);
+    out->speed_um = speed;
     out->rising_um = held(parts_below(&c, FEED_ACCELERATION, low[1]), 24, MOST_CHANGE_UM);
-    out->rising_um = scaled(scaled(out->rising_um, c.override_factor_q24), c.override_factor_q24);
-    uint64_t slope_q16 = greatest_slope_q16(&c);
-    out->slope_um = (slope_q16 * lesser(speed, MOST_SPEED_UM) >> 16) + 1u;
-    /* slope 2^-16 over second 2^-8: 10^6 / 2^8 = 15625 / 4 */
-    out->cut_us = qmath_div_up_u64(slope_q16 * 15625u, (uint64_t)c.override_second_q8_per_s2 * 4u);
     extent_waits(out, p, &c, (const int64_t (*)[FEED_PARTS])low, jerk_up_q18);
 }
 
@@ -201,13 +219,11 @@ static uint64_t eighths_us(const struct program *p, uint32_t piece, uint32_t cou
     return micro(program_piece_duration(p, piece) * count, 35, NO_BOUND);
 }
 
-/* The bound with the numbers of a piece, for a brake that begins in it. */
-static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
-                                     const struct stop_extent *extent,
+/* For a brake that begins at a rate of one level. */
+static struct stop_bound level_bound(const struct program *p, const struct stop_start *start,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
-    struct stop_start from = {extent->speed_um, extent->rising_um, extent->slope_um,
-                              extent->cut_us};
+    struct stop_start from = *start;
     uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
     uint64_t little = number(stop->deceleration) * 125u >> 23;
     if (kind == PROGRAM_STOP_HOLD &&
@@ -218,7 +234,6 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
                           : qmath_div_u64(from.cut_us * little, from.slope_um);
         from.slope_um = little;
     }
-    more_us += eighths_us(p, piece, extent->waits);
     /* half a tick more of the first part */
     uint64_t half_um = qmath_div_up_u64(
         lesser(from.rising_um + from.slope_um, MOST_CHANGE_UM) * p->header.period_us, 2000000u);
@@ -226,6 +241,26 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
     struct stop_bound out = stop_curve(&from, stop);
     return sum(out, more_us,
                qmath_div_up_u64(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
+}
+
+/* The bound with the numbers of a piece, for a brake that begins in it. */
+static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
+                                     const struct stop_extent *extent,
+                                     const struct program_stop *stop, enum program_stop_kind kind)
+{
+    const uint64_t wait_us = eighths_us(p, piece, extent->waits);
+    struct program_override bounds;
+    struct stop_bound out = {0, 0};
+    uint64_t speed_um = 0;
+    program_piece_override(p, piece, &bounds);
+    for (uint32_t level = 0; level < PROGRAM_LEVELS; level++) {
+        struct stop_start start;
+        stop_level_start(extent, &bounds, level, &start);
+        out = most_of(out, level_bound(p, &start, stop, kind));
+        speed_um = greater(speed_um, start.speed_um);
+    }
+    return sum(out, wait_us,
+               qmath_div_up_u64(lesser(speed_um, MOST_SPEED_UM + 1u) * lesser(wait_us, MOST_TIME_US), 1000000u));
 }
 
 /* The plan goes on through the last eighths of the piece and into the next. */
@@ -245,11 +280,12 @@ static struct stop_bound waited(const struct program *p, uint32_t piece, uint32_
 void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind)
 {
     const struct stop_bound rest = {0, 0};
+    const struct stop_bound end = {END_TICKS * p->header.period_us, 0};
     walk->program = p;
     walk->kind = kind;
     /* periods in 2^-32 s, up: 2^32 / 10^6 < 4295 */
     walk->window_q32_s = (uint64_t)STOP_WINDOW_TICKS * p->header.period_us * 4295u;
-    walk->next = rest;
+    walk->next = end;
     walk->count = 0;
     for (int k = 0; k < STOP_WINDOW; k++) {
         walk->own[k] = rest;

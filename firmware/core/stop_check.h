@@ -5,7 +5,7 @@
  * (docs/numerics.md section 7, "Stops"). Integer arithmetic; every value is rounded so that a bound is never too short.
  *
  * The table is gone through from the last piece to the first, since a stop that cannot brake in a piece goes on into the
- * next. About 3000 instructions per piece and kind. Main loop.
+ * next. About 10 000 instructions per piece and kind. Main loop.
  */
 #ifndef HODOGRAPH_CORE_STOP_CHECK_H
 #define HODOGRAPH_CORE_STOP_CHECK_H
@@ -40,12 +40,10 @@ struct stop_walk {
     uint32_t count;
 };
 
-/* Motion of a piece at any rate that its override bounds allow. */
+/* Motion of a piece at the rate 1. */
 struct stop_extent {
     uint64_t speed_um;  /* greatest, um/s, */
-    uint64_t rising_um; /* and acceleration at a constant rate, um/s^2, */
-    uint64_t slope_um;  /* and what a changing rate adds to it, */
-    uint64_t cut_us;    /* and the time in which such a change is taken back */
+    uint64_t rising_um; /* and acceleration, um/s^2 */
     uint32_t
         waits; /* eighths of the piece, one after the other, in which no brake may fit, at most, */
     uint32_t last; /* and so many before its end */
@@ -63,6 +61,10 @@ struct stop_start {
     uint64_t slope_um;
     uint64_t cut_us;
 };
+
+/* The greatest of these in a level of the override bounds (docs/protocol.md 1.3). */
+void stop_level_start(const struct stop_extent *extent, const struct program_override *bounds,
+                      uint32_t level, struct stop_start *out);
 
 /* The brake of the table alone: its continuous curve. */
 struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop);

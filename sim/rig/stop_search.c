@@ -42,7 +42,8 @@ struct piece {
     double step_s;
     double left_s;        /* of the program, behind the piece */
     struct state fastest; /* of all rates: greatest speed and acceleration */
-    double factor, rate;  /* greatest rate of program time, and greatest slope of it */
+    double factor;        /* greatest rate of program time; */
+    double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS], second[PROGRAM_LEVELS]; /* bounds up to these rates */
     uint32_t suspect;     /* the instant at which a limit was broken last */
     struct piece *close;  /* the same piece with more instants */
 };
@@ -353,8 +354,12 @@ static void piece_look(const struct search *search, const struct program *p, uin
     piece->left_s = left_s;
     piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
-    piece->rate = fmin(ldexp((double)from.override_rate_q16_per_s, -16),
-                       sqrt(piece->factor * ldexp((double)from.override_second_q8_per_s2, -8)));
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        piece->level[k] =
+            k == PROGRAM_LEVEL_FULL ? piece->factor : ldexp((double)program_level_q9(k), -9);
+        piece->slope[k] = ldexp((double)program_number(from.override.rate[k]), -32);
+        piece->second[k] = ldexp((double)program_number(from.override.second[k]), -24);
+    }
     for (uint32_t k = 0; k < piece->count; k++) {
         double u = (double)k / parts;
         struct state *at = &piece->at[k];
@@ -365,10 +370,29 @@ static void piece_look(const struct search *search, const struct program *p, uin
         piece->fastest.v = greater(piece->fastest.v, at->v);
         piece->fastest.a = greater(piece->fastest.a, at->a);
     }
-    double slope = piece->rate * piece->fastest.v;
     double little = search->rise_is_cut ? 0.25 * search->deceleration : HUGE_VAL;
+    double most = 0.0;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        double rate = piece->level[k];
+        double slope = fmin(piece->slope[k], sqrt(rate * piece->second[k])) * piece->fastest.v;
+        most = greater(most, piece->fastest.a * rate * rate + fmin(slope, little));
+    }
     piece->fastest.v *= piece->factor;
-    piece->fastest.a = piece->fastest.a * piece->factor * piece->factor + fmin(slope, little);
+    piece->fastest.a = most;
+}
+
+/* Greatest slope at a rate of program time, of a rise (sign 1) or a fall (-1): it came from a rest, and can come to one
+ * within the level. */
+static double slope_at(const struct piece *piece, double rate, int sign)
+{
+    double most = 0.0;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        if (rate <= piece->level[k]) {
+            double room = sign > 0 ? fmin(rate, piece->level[k] - rate) : rate;
+            most = greater(most, fmin(piece->slope[k], sqrt(2.0 * room * piece->second[k])));
+        }
+    }
+    return most;
 }
 
 /* --- The search --- */
@@ -461,7 +485,8 @@ static int state_keeps(const struct search *search, const struct inverse *invers
 /* The same limits at other rates of program time, also while the rate changes. */
 static int rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
 {
-    static const double rates[] = {1.0, 0.99, 0.97, 0.93, 0.85, 0.7, 0.5, 0.25, 0.1};
+    static const double rates[] = {
+        1.0, 511.0 / 512, 509.0 / 512, 504.0 / 512, 488.0 / 512, 448.0 / 512, 0.75, 320.0 / 512, 0.5, 0.25, 0.1};
     const size_t count = sizeof rates / sizeof rates[0];
     struct path_brake_numbers numbers;
     numbers_of(search, codes, &numbers);
@@ -476,7 +501,7 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
             }
             for (int slope = -1; slope <= 1; slope++) {
                 struct state from = piece->at[i];
-                double change = piece->rate * from.v;
+                double change = slope_at(piece, rate, slope) * from.v;
                 from.a = rate * rate * from.a + (slope < 0   ? -change
                                                  : slope > 0 ? fmin(change, little)
                                                              : 0.0);

@@ -73,7 +73,7 @@ def good() -> dict[str, Program]:
         "heart_exponential": program(heart, exponential, "heart"),
         "heart_minimax": program(heart, FeedRequest("minimax", 150.0, 0.1), "heart"),
         "star_minimax": program(star, FeedRequest("minimax", 60.0, 0.05, degree=9), "star"),
-        "line": program(line(-30 + 10j, 90 - 20j), FeedRequest("quintic", 190.0, 0.2), "line"),
+        "line": program(line(-30 + 10j, 90 - 20j), FeedRequest("quintic", 200.0, 0.2), "line"),
         "line_slow": program(line(0, 0.5 + 0.25j), FeedRequest("quintic", 0.05, 0.5), "line slow"),
         "line_tiny": program(line(5, 5.002), FeedRequest("minimax", 10.0, 0.05), "line tiny"),
         "alpha_offset": program(alpha, exponential, "alpha, shifted", offset_mm=100.0 - 57.25j),

@@ -8,10 +8,12 @@ the controller accepts is never below the one computed here, and above it by som
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..feed.override_levels import FULL, LEVEL_RATES, LEVELS
 from ..feed.pieces import part_bounds
 from .codes import ProgramError
 from .image import Program
@@ -23,6 +25,8 @@ Bool = NDArray[np.bool_]
 
 STOP_TICKS = 9
 """Ticks of a stop that are not in the continuous curve."""
+END_TICKS = 2
+"""Until a command counts, and until the end of the program is a setpoint."""
 WINDOW_TICKS = 6
 """Periods of program time in which the piece whose numbers count may still change,"""
 WINDOW = 8
@@ -97,6 +101,7 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     window_s = WINDOW_TICKS * program.period_us * 1e-6
     count = duration.size
     out_s, out_mm = np.zeros(count + 1), np.zeros(count + 1)
+    out_s[count] = END_TICKS * program.period_us * 1e-6
     for i in range(count - 1, -1, -1):
         if waits[i] > 0.0:
             own_s[i] = max(own_s[i], waits[i] * duration[i] + out_s[i + 1])
@@ -118,25 +123,54 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
     feed, acceleration = (
         part_bounds(pieces.duration_q32_s, pieces.c_q40, order, HALVINGS) for order in (1, 2)
     )
-    factor = pieces.override_factor
-    speed = np.maximum(feed.max(axis=(1, 2)), 0.0)
-    second = pieces.override_second_per_s2()
-    # It rises from 0 and falls to 0 again within a change of the rate by the factor at most.
-    steepest = np.minimum(pieces.override_rate_per_s(), np.sqrt(factor * second))
-    slope, cut_s = steepest * speed, steepest / second
-    speed = speed * factor
-    rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0) * factor**2
     given = codes[:, DECELERATION] > 0
     number = np.where(given[:, None], numbers(codes), 1.0)
+    settled = _settled(program, feed.min(axis=2), acceleration.min(axis=2), number[:, JERK_UP])
+    longest, last = _runs(~settled)
+    wait_s = longest * np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
+    speed = np.maximum(feed.max(axis=(1, 2)), 0.0)
+    rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0)
+    time_s, way_mm = np.zeros(speed.size), np.zeros(speed.size)
+    for level in range(LEVELS):
+        rate = pieces.override_factor if level == FULL else np.full_like(speed, LEVEL_RATES[level])
+        second = pieces.override_second_per_s2(level)
+        # It rises from 0 and falls to 0 again within a change of the rate by that of the level at most.
+        steepest = np.minimum(pieces.override_rate_per_s(level), np.sqrt(rate * second))
+        own_s, own_mm = _level(
+            _Start(speed * rate, rising * rate**2, steepest * speed, steepest / second),
+            number,
+            kind,
+            wait_s,
+            period_s,
+        )
+        time_s, way_mm = np.maximum(time_s, own_s), np.maximum(way_mm, own_mm)
+    return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """Where brakes begin (M,): greatest speed, acceleration at a constant rate, what a changing rate adds to it, and the
+    time in which that is taken back.
+    """
+
+    speed: Real
+    rising: Real
+    slope: Real
+    cut_s: Real
+
+
+def _level(
+    start: _Start, number: Real, kind: int, wait_s: Real, period_s: float
+) -> tuple[Real, Real]:
+    """Time and way (M,) of stops that begin in one level of the rate."""
+    speed, rising, slope, cut_s = start.speed, start.rising, start.slope, start.cut_s
     more_s = np.full(speed.size, STOP_TICKS * period_s)
     if kind == HOLD:
         little = LITTLE * number[:, DECELERATION]
         more_s = np.where(slope > little, more_s + cut_s, more_s)
         cut_s = np.where(slope > little, cut_s * little / np.maximum(slope, 1e-300), cut_s)
         slope = np.minimum(slope, little)
-    settled = _settled(program, feed.min(axis=2), acceleration.min(axis=2), number[:, JERK_UP])
-    longest, last = _runs(~settled)
-    more_s = more_s + longest * np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
+    more_s = more_s + wait_s
     speed = speed + 0.5 * (rising + slope) * period_s
     lead_s, slope_s = rising / number[:, JERK_DOWN], slope / number[:, JERK_DOWN]
     # A rate that still rises is below the greatest by what it goes up while its slope is taken back.
@@ -144,8 +178,7 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
         speed + rising * (0.5 * lead_s + slope_s) + 0.5 * slope * np.maximum(slope_s - cut_s, 0.0)
     )
     time_s, way_mm = _curve(peak, lead_s + slope_s, number)
-    time_s, way_mm = time_s + more_s, way_mm + speed * more_s
-    return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)
+    return time_s + more_s, way_mm + speed * more_s
 
 
 def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) -> Bool:
