@@ -12,9 +12,9 @@ enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 
 #define TICK_Q30      ((int64_t)1 << 30)
-#define SPARE_TICKS   2                  /* of the deadline: rounding */
-#define END_TICKS     2u                 /* until a command counts, and until the end is a setpoint */
-#define SEARCH_STEPS  2                  /* in a tick at rest */
+#define SPARE_TICKS   2  /* of the deadline: rounding */
+#define END_TICKS     2u /* until a command counts, and until the end is a setpoint */
+#define SEARCH_STEPS  2  /* in a tick at rest */
 #define NO_NUMBERS    2u
 #define MOST_FEED_Q32 ((int64_t)1 << 45)
 #define MS_Q40        1099511628u /* 2^40 / 1000 */
@@ -58,7 +58,8 @@ static void read_numbers(struct feed_override *f)
     struct program_stop stop;
     program_stop_get(f->time.program, f->time.piece, (enum program_stop_kind)f->kind, &stop);
     f->numbers_piece = f->time.piece;
-    f->numbers_kind = path_brake_numbers_of(&f->numbers, &stop, f->time.period_us) ? f->kind : NO_NUMBERS;
+    f->numbers_kind =
+        path_brake_numbers_of(&f->numbers, &stop, f->time.period_us) ? f->kind : NO_NUMBERS;
 }
 
 /* A brake under way keeps the time that it had. */
@@ -191,7 +192,8 @@ static void come_to_rest(struct feed_override *f, uint32_t found)
 static int interpolate_brake(struct feed_override *f, struct interp *it)
 {
     const struct path_state *at = &f->brake.at;
-    return interp_at_arc_length(it, at->arc_length_q40_mm + (int64_t)(at->fine_q56_mm >> 15), &f->point);
+    return interp_at_arc_length(it, at->arc_length_q40_mm + (int64_t)(at->fine_q56_mm >> 15),
+                                &f->point);
 }
 
 /* The tick that leaves the plan. */
@@ -302,12 +304,11 @@ static int wait_tick(struct feed_override *f, struct interp *it)
         if (f->look == LOOK_SEEN) {
             f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_WAIT;
         }
-        if (f->look == LOOK_WAIT) {
-            f->look = LOOK_NOT_YET;
-        } else if (leaves_or_rests(f, it)) {
+        if (f->look != LOOK_WAIT && leaves_or_rests(f, it)) {
             return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERP_OK;
-        } else if (f->look == LOOK_FITS) {
-            f->look = LOOK_NOT_YET; /* it was so for this tick only */
+        }
+        if (f->look != LOOK_SEEN) {
+            f->look = LOOK_NOT_YET; /* what fits, fits in this tick only */
         }
         f->left_q30 -= qmath_lesser(timebase_rate_q30(&f->time), TICK_Q30);
         wait_slowly(f);

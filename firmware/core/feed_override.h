@@ -40,17 +40,17 @@ struct feed_override {
     struct path_brake brake;
     struct path_brake_numbers numbers; /* of the stop asked for, in this piece: */
     uint32_t numbers_piece;
-    uint32_t numbers_kind;             /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
-    struct path_state seen;            /* near the end of the program: the state looked at, */
-    uint32_t look;                     /* and how far the look has come */
+    uint32_t numbers_kind; /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
+    struct path_state seen;     /* near the end of the program: the state looked at, */
+    uint32_t look;              /* and how far the look has come */
     struct interp_search place; /* of rest */
     struct interp_point point;  /* of the last setpoint */
     uint32_t state;             /* enum feed_state: what is wanted, and whether it is reached */
     uint32_t phase;             /* where setpoints come from */
     uint32_t kind;              /* enum program_stop_kind of the stop asked for */
-    uint32_t replace; /* 1: a fault stop, whose numbers the brake has not got yet */
-    uint32_t found;   /* 1: `place` is */
-    int64_t left_q30; /* ticks at rate 1 until the deadline */
+    uint32_t replace;           /* 1: a fault stop, whose numbers the brake has not got yet */
+    uint32_t found;             /* 1: `place` is */
+    int64_t left_q30;           /* ticks at rate 1 until the deadline */
 };
 
 /* For a checked program at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.

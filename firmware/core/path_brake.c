@@ -3,16 +3,15 @@
 
 #include "core/qmath.h"
 
-#define FINE_BITS 16 /* from q40 to q56 */
-#define MOST_Q56  ((int64_t)1 << 60)
-#define MOST_BITS 12      /* of PATH_BRAKE_MOST_TICKS */
-#define SIXTH_Q32 715827882u
+#define FINE_BITS        16 /* from q40 to q56 */
+#define MOST_Q56         ((int64_t)1 << 60)
+#define MOST_BITS        12 /* of PATH_BRAKE_MOST_TICKS */
+#define SIXTH_Q32        715827882u
 #define THREE_HALVES_Q16 98304u
-#define SPARE     3       /* ticks of path_brake_fits, of the speed, */
-#define SPARE_SPEED 1     /* and of the acceleration: one of the motion, and what the brake takes more */
-#define RISE_BITS 7       /* of an acceleration at which a brake begins, over its deceleration */
+#define SPARE     3 /* ticks of path_brake_fits: one of the motion, two that the brake takes more */
+#define RISE_BITS 7 /* of an acceleration at which a brake begins, over its deceleration */
 #define LEAST     (1 << 22) /* 2^-34 mm a tick squared, or cubed */
-#define FITS_BITS 57      /* of a deceleration that path_brake_fits knows */
+#define FITS_BITS 57        /* of a deceleration that path_brake_fits knows */
 
 enum phase { FALLING, READY, SETTLING, RESTING };
 
@@ -200,9 +199,11 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
         return 0;
     }
     const int64_t jerk = qmath_lesser(numbers->jerk_down_q56, numbers->jerk_up_q56);
-    const int64_t change = numbers->jerk_down_q56; /* of the acceleration, in a tick of the motion */
+    const int64_t change =
+        numbers->jerk_down_q56; /* of the acceleration, in a tick of the motion */
     const int64_t rise = qmath_greater(from->acceleration_q56, 0) + change;
-    const int64_t reached = qmath_greater(depth(from->speed_q56 >> 1, jerk), from->speed_q56 >> MOST_BITS);
+    const int64_t reached =
+        qmath_greater(depth(from->speed_q56 >> 1, jerk), from->speed_q56 >> MOST_BITS);
     const int64_t most = qmath_lesser(numbers->deceleration_q56, reached);
     const int64_t fall = qmath_greater(most + from->acceleration_q56 + change, 0);
     if (most >> FITS_BITS != 0) {
@@ -213,7 +214,7 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
     const int64_t early = over_ticks(fall, first_q16) / 2;
     const int64_t saved = qmath_third(over_ticks(early, first_q16 - (first_q16 >> 10)));
     const int64_t late = over_ticks(most, ramp_ticks_q16(most, numbers->jerk_up_q56)) / 2;
-    const int64_t speed = from->speed_q56 + early + SPARE_SPEED * (most + rise);
+    const int64_t speed = from->speed_q56 + early + most + rise;
     if ((early | late) >> 60 != 0) {
         return 0;
     }

@@ -43,9 +43,9 @@ struct path_brake_numbers {
 struct path_brake {
     struct path_state at;
     struct path_brake_numbers numbers;
-    int64_t rise_q56;       /* on the way to rest: a sixth of the jerk of the next tick, */
-    int64_t rise_less_q56;  /* by how much each tick has less of it, */
-    uint32_t settle_ticks;  /* and how many ticks are left */
+    int64_t rise_q56;      /* on the way to rest: a sixth of the jerk of the next tick, */
+    int64_t rise_less_q56; /* by how much each tick has less of it, */
+    uint32_t settle_ticks; /* and how many ticks are left */
     uint32_t phase;
 };
 

@@ -4,7 +4,7 @@
 #include "core/feed_bounds.h"
 #include "core/qmath.h"
 
-#define NO_BOUND UINT32_MAX
+#define NO_BOUND  UINT32_MAX
 #define END_TICKS 2u /* until a command counts, and until the end of the program is a setpoint */
 
 /* What is beyond these counts as no bound: 2^14 mm/s, 2^24 mm/s^2; so no product below passes 2^63. */
@@ -260,7 +260,8 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
         speed_um = greater(speed_um, start.speed_um);
     }
     return sum(out, wait_us,
-               qmath_div_up_u64(lesser(speed_um, MOST_SPEED_UM + 1u) * lesser(wait_us, MOST_TIME_US), 1000000u));
+               qmath_div_up_u64(
+                   lesser(speed_um, MOST_SPEED_UM + 1u) * lesser(wait_us, MOST_TIME_US), 1000000u));
 }
 
 /* The plan goes on through the last eighths of the piece and into the next. */

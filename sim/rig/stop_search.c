@@ -16,7 +16,7 @@
 #define LEAST_MM_S    1e-4 /* slower is rest */
 #define NEVER_S       1e6
 #define LONGEST_SHARE 0.1
-#define TICKS_MORE 3.0 /* of a brake than of its continuous curve */
+#define TICKS_MORE    3.0 /* of a brake than of its continuous curve */
 #define FEWER 56 /* codes below the greatest: a brake with less than a 128th of a limit is none */
 #define NO_BRAKE_S   10.0
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
@@ -43,9 +43,10 @@ struct piece {
     double left_s;        /* of the program, behind the piece */
     struct state fastest; /* of all rates: greatest speed and acceleration */
     double factor;        /* greatest rate of program time; */
-    double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS], second[PROGRAM_LEVELS]; /* bounds up to these rates */
-    uint32_t suspect;     /* the instant at which a limit was broken last */
-    struct piece *close;  /* the same piece with more instants */
+    double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS],
+        second[PROGRAM_LEVELS]; /* bounds up to these rates */
+    uint32_t suspect;           /* the instant at which a limit was broken last */
+    struct piece *close;        /* the same piece with more instants */
 };
 
 struct search {
@@ -411,8 +412,8 @@ static void numbers_of(const struct search *search, const int codes[3],
 /* Times to rest from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
 struct times {
     double mean_s, worst_s, first_s;
-    double longest_s; /* brake at any rate */
-    double cost_s;    /* the mean, and a share of the longest */
+    double longest_s;          /* brake at any rate */
+    double cost_s;             /* the mean, and a share of the longest */
     int brakes[MOST_INSTANTS]; /* 0: the plan goes on */
 };
 
@@ -485,8 +486,9 @@ static int state_keeps(const struct search *search, const struct inverse *invers
 /* The same limits at other rates of program time, also while the rate changes. */
 static int rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
 {
-    static const double rates[] = {
-        1.0, 511.0 / 512, 509.0 / 512, 504.0 / 512, 488.0 / 512, 448.0 / 512, 0.75, 320.0 / 512, 0.5, 0.25, 0.1};
+    static const double rates[] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
+                                   488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
+                                   0.5,         0.25,        0.1};
     const size_t count = sizeof rates / sizeof rates[0];
     struct path_brake_numbers numbers;
     numbers_of(search, codes, &numbers);

@@ -9,9 +9,9 @@
 #include "golden.h"
 #include "unity.h"
 
-#define UNIT  72057594037927936.0 /* 2^56 */
-#define Q40   1099511627776.0
-#define CASES 200000
+#define UNIT          72057594037927936.0 /* 2^56 */
+#define Q40           1099511627776.0
+#define CASES         200000
 #define MORE_TICKS    6
 #define MORE_IN_SHORT 10
 

@@ -149,8 +149,8 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """Where brakes begin (M,): greatest speed, acceleration at a constant rate, what a changing rate adds to it, and the
-    time in which that is taken back.
+    """Where brakes begin (M,): greatest speed, acceleration at a constant rate, what a changing rate adds to it, and
+    the time in which that is taken back.
     """
 
     speed: Real
