@@ -200,7 +200,7 @@ static int interpolate_brake(struct feed_override *f, struct interp *it)
 static int first_brake_tick(struct feed_override *f, struct interp *it)
 {
     f->left_q30 -= TICK_Q30;
-    path_brake_coast(&f->brake);
+    path_brake_first(&f->brake);
     return interpolate_brake(f, it);
 }
 

@@ -288,9 +288,10 @@ static void settle_tick(struct path_brake *brake)
     }
 }
 
-void path_brake_coast(struct path_brake *brake)
+void path_brake_first(struct path_brake *brake)
 {
-    move(&brake->at, 0);
+    const int64_t rise = qmath_greater(brake->at.acceleration_q56, 0);
+    move(&brake->at, -sixth_of(qmath_lesser(rise, brake->numbers.jerk_down_q56)));
 }
 
 void path_brake_step(struct path_brake *brake)

@@ -65,8 +65,9 @@ int path_brake_begin(struct path_brake *brake, const struct path_state *from,
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t way_q40_mm);
 
-/* The first tick of a brake may be one without jerk: cheap, for a tick that had to find out the state. */
-void path_brake_coast(struct path_brake *brake);
+/* The first tick of a brake may be this one, in place of a step: an acceleration above 0 falls, as far as 0, and one below
+ * stays. Cheap, for a tick that had to find out the state. */
+void path_brake_first(struct path_brake *brake);
 
 /* One tick on; `at` is the state then. At rest nothing changes. */
 void path_brake_step(struct path_brake *brake);

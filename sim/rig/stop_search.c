@@ -19,6 +19,7 @@
 #define TICKS_MORE    3.0 /* of a brake than of its continuous curve */
 #define FEWER 56 /* codes below the greatest: a brake with less than a 128th of a limit is none */
 #define NO_BRAKE_S   10.0
+#define FASTER       0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
 #define WAIT_AS_GOOD 1.001 /* or such a one that could also take much longer */
 #define NEAR         1.05  /* so near to the least time without limits no other start is tried */
@@ -299,7 +300,7 @@ static int brake_keeps(const struct search *search, const struct inverse *invers
     int ticks = (int)greater(step_s / search->period_s, 1.0);
     for (int k = 0; !path_brake_rests(&tick); k++) {
         if (k == 0) {
-            path_brake_coast(&tick);
+            path_brake_first(&tick);
         } else {
             path_brake_step(&tick);
         }
@@ -666,7 +667,8 @@ static void search_piece(const struct search *search, struct piece *piece, const
     climb(search, piece, after_s, 0, 8, &rough);
     if (strictly(search, piece, rough.codes)) {
         *best = rough;
-    } else if (lowered(search, piece, rough.codes, after_s, best)) {
+    } else if (lowered(search, piece, rough.codes, after_s, best) ||
+               lowered(search, piece, search->most, after_s, best)) {
         climb(search, piece, after_s, 1, 4, best);
     } else {
         *best = none;
@@ -701,8 +703,9 @@ static void begin(struct search *search, const struct program *p, const struct s
     search->deceleration = limits->acceleration;
     invert(&search->inverse, limits);
     search->at_any_rate = search->inverse;
-    for (int k = 0; k < 2 && limits->reach_at_pace != 0u; k++) {
-        search->at_any_rate.reach[k] = 0.0;
+    for (int k = 0; k < 2; k++) {
+        search->at_any_rate.velocity[k] /= 1.0 + FASTER;
+        search->at_any_rate.reach[k] *= limits->reach_at_pace != 0u ? 0.0 : 1.0;
     }
     for (int k = 0; k < 3; k++) {
         double limit = k == 1 ? limits->acceleration : limits->jerk;

@@ -111,10 +111,6 @@ def test_simulate_needs_no_given_folder(
     assert result(capsys, "simulate", str(EXAMPLES / "alpha.toml"), "--json")["ticks"] > 1000
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the search for stops finds no fault stop in most pieces of this path, where it finds holds",
-)
 def test_feed_of_a_dense_path_is_that_of_its_program(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
