@@ -103,8 +103,10 @@ def test_latencies_are_counted_in_ticks() -> None:
     assert verdict.latency_ticks == 12
     assert verdict.rest_ticks is not None
     assert 60 < verdict.rest_ticks < 72
-    # Setpoints between two nominal ones lie on the chord, beside the curve by some nanometres.
-    assert all("away from the curve" in words for words in verdict.violations)
+    # Setpoints between two nominal ones lie on the chord, beside the curve by some nanometres; and the deceleration
+    # of this stop begins and ends with a step.
+    known = ("away from the curve", "axis jerk")
+    assert all(any(what in words for what in known) for words in verdict.violations)
 
 
 def test_a_stop_has_to_be_on_the_path_and_within_its_bound() -> None:
