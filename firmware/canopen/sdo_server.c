@@ -24,7 +24,6 @@ enum client_command {
 #define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
 
 #define EXPEDITED_BYTE  0x2Fu /* initiate download: expedited, one byte */
-#define DOWNLOAD_ANSWER 0x60u
 
 void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uint32_t timeout_us,
                      uint8_t block_segments)
@@ -176,7 +175,7 @@ static int write_beside(const struct sdo_server *s, const struct od_entry *entry
                         const uint8_t *data, struct can_msg *out)
 {
     const uint32_t code = od_write(s->od, entry, data + 4, 1);
-    sdo_server_frame(s, code == SDO_OK ? DOWNLOAD_ANSWER : SDO_ABORT_COMMAND_BYTE, out);
+    sdo_server_frame(s, code == SDO_OK ? SDO_DOWNLOADED_BYTE : SDO_ABORT_COMMAND_BYTE, out);
     memcpy(out->data + 1, data + 1, 3);
     cob_put(out->data + 4, code, 4);
     return 1;

@@ -19,6 +19,7 @@
 #define SDO_LAST_IN_BLOCK      0x80u
 #define SDO_CRC_SUPPORTED      0x04u
 #define SDO_ABORT_COMMAND_BYTE 0x80u
+#define SDO_DOWNLOADED_BYTE    0x60u /* answer to an initiated, or expedited, download */
 
 /* sdo_server_object.c: between a transfer and the object dictionary */
 uint32_t sdo_server_open_write(struct sdo_server *s, uint32_t announced);

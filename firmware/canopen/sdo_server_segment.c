@@ -5,7 +5,6 @@
 
 #define ASK_EXPEDITED           0x02u
 #define ASK_SIZE_GIVEN          0x01u
-#define ANSWER_DOWNLOAD         0x60u
 #define ANSWER_DOWNLOAD_SEGMENT 0x20u
 #define ANSWER_UPLOAD_EXPEDITED 0x43u /* size given */
 #define ANSWER_UPLOAD_SIZE      0x41u
@@ -43,7 +42,7 @@ int sdo_server_download_initiate(struct sdo_server *s, const uint8_t *data, stru
         return sdo_server_fail(s, code, out);
     }
     s->state = expedited ? SDO_SERVER_IDLE : SDO_SERVER_DOWNLOAD;
-    sdo_server_frame_with_object(s, ANSWER_DOWNLOAD, out);
+    sdo_server_frame_with_object(s, SDO_DOWNLOADED_BYTE, out);
     return 1;
 }
 

@@ -7,6 +7,7 @@
  */
 #include <string.h>
 
+#include "drive_bench.h"
 #include "faults/fault_parse.h"
 #include "fuzz.h"
 #include "injector/bridge.h"
@@ -15,15 +16,6 @@
 #define NODES      2u
 #define TEXT_MAX   4096u
 #define ROUNDS_MAX 4096u
-
-static const struct drive_config figures = {
-    .plant = {83.0089, 0.19936, 1.59, 1.0 / 0.716, 5.0},
-    .pdff = {97.38, 1.19, 252.8, 0.8, 0.85},
-    .encoder_counts_per_rev = 1u << 20,
-    .loop_rate_hz = 16000,
-    .counts_per_mm = 1000000,
-    .period_us = 1000,
-};
 
 static struct fault_rules rules;
 static struct bridge bridge;
@@ -124,8 +116,8 @@ static void harness(struct fuzz_input *in)
     if (!parse(in)) {
         return;
     }
-    FUZZ_CHECK(drive_node_init(&nodes[0], 2, &figures, 0, port) == 0);
-    FUZZ_CHECK(drive_node_init(&nodes[1], 3, &figures, 0, port) == 0);
+    FUZZ_CHECK(drive_node_init(&nodes[0], 2, &drive_bench_config, 0, port) == 0);
+    FUZZ_CHECK(drive_node_init(&nodes[1], 3, &drive_bench_config, 0, port) == 0);
     bridge_init(&bridge, &rules, sides);
     node_faults_init(&faults, &rules, nodes, NODES, noted_by_drive);
     while (fuzz_left(in)) {

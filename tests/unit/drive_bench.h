@@ -20,6 +20,8 @@ struct drive_bench {
 };
 
 extern struct drive_bench bench;
+
+/* The paper's drive of the x axis, at 1 ms and a million counts in a mm. */
 extern const struct drive_config drive_bench_config;
 
 /* Power-on, boot-up, NMT start. */

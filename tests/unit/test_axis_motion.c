@@ -3,22 +3,14 @@
 
 #include <stdlib.h>
 
+#include "drive_bench.h"
 #include "unity.h"
 
 static struct axis_motion axis;
 
-static const struct drive_config config = {
-    .plant = {83.0089, 0.19936, 1.59, 1.0 / 0.716, 5.0},
-    .pdff = {97.38, 1.19, 252.8, 0.8, 0.85},
-    .encoder_counts_per_rev = 1u << 20,
-    .loop_rate_hz = 16000,
-    .counts_per_mm = 1000000,
-    .period_us = 1000,
-};
-
 void setUp(void)
 {
-    TEST_ASSERT_EQUAL_INT(0, axis_motion_init(&axis, &config, -2000000));
+    TEST_ASSERT_EQUAL_INT(0, axis_motion_init(&axis, &drive_bench_config, -2000000));
 }
 
 void tearDown(void)

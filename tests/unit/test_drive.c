@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drive_bench.h"
 #include "plant/drive_private.h"
 #include "rig/axis_run.h"
 #include "unity.h"
@@ -15,15 +16,7 @@ static struct drive_config config;
 
 void setUp(void)
 {
-    const struct drive_config alpha_x = {
-        .plant = {83.0089, 0.19936, 1.59, 1.0 / 0.716, 5.0},
-        .pdff = {97.38, 1.19, 252.8, 0.8, 0.85},
-        .encoder_counts_per_rev = 1u << 20,
-        .loop_rate_hz = 16000,
-        .counts_per_mm = 1000000,
-        .period_us = 1000,
-    };
-    config = alpha_x;
+    config = drive_bench_config;
 }
 
 void tearDown(void)
@@ -118,7 +111,7 @@ static void test_sampling_converges_to_the_continuous_loop(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 4.0, usual / fine);
 }
 
-/* A drive of the figures above beside one of `config`, in either order. */
+/* A drive of the figures of drive_bench beside one of `config`, in either order. */
 static void check_pair(void)
 {
     struct drive b = made();

@@ -6,6 +6,7 @@
 #include "canopen/cob.h"
 #include "canopen/pdo.h"
 #include "canopen/sdo_abort.h"
+#include "drive_bench.h"
 #include "unity.h"
 
 enum { ID = 3, SENT_MAX = 64 };
@@ -14,15 +15,6 @@ static struct drive_node node;
 static struct can_msg sent[SENT_MAX];
 static int sent_count;
 static uint8_t counter;
-
-static const struct drive_config config = {
-    .plant = {83.0089, 0.19936, 1.59, 1.0 / 0.716, 5.0},
-    .pdff = {97.38, 1.19, 252.8, 0.8, 0.85},
-    .encoder_counts_per_rev = 1u << 20,
-    .loop_rate_hz = 16000,
-    .counts_per_mm = 1000000,
-    .period_us = 1000,
-};
 
 static void take(void *context, const struct can_msg *frame)
 {
@@ -113,7 +105,7 @@ void setUp(void)
     const struct drive_node_port port = {take, NULL};
     sent_count = 0;
     counter = 0;
-    TEST_ASSERT_EQUAL_INT(0, drive_node_init(&node, ID, &config, 1000000, port));
+    TEST_ASSERT_EQUAL_INT(0, drive_node_init(&node, ID, &drive_bench_config, 1000000, port));
     drive_node_process(&node, 0);
     nmt(NMT_START);
 }
@@ -136,7 +128,7 @@ static void enable(void)
 static void test_boots_and_beats(void)
 {
     const struct drive_node_port port = {take, NULL};
-    TEST_ASSERT_EQUAL_INT(0, drive_node_init(&node, ID, &config, 0, port));
+    TEST_ASSERT_EQUAL_INT(0, drive_node_init(&node, ID, &drive_bench_config, 0, port));
     sent_count = 0;
     drive_node_process(&node, 0);
     TEST_ASSERT_EQUAL_INT(1, sent_count);
@@ -390,7 +382,7 @@ static void test_reset_node_is_power_on(void)
 
 static void test_bad_figures_are_refused(void)
 {
-    struct drive_config bad = config;
+    struct drive_config bad = drive_bench_config;
     const struct drive_node_port port = {take, NULL};
     bad.plant.gain_rad_s_v = 0.0;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_PLANT, drive_node_init(&node, ID, &bad, 0, port));

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/counts.h"
+#include "drive_bench.h"
 #include "unity.h"
 
 enum { TICKS = 1001, SETTLING = 200, ROWS = TICKS + SETTLING };
@@ -55,15 +56,7 @@ static void make_program(void)
 
 void setUp(void)
 {
-    const struct drive_config axis = {
-        .plant = {83.0089, 0.19936, 1.59, 1.0 / 0.716, 5.0},
-        .pdff = {97.38, 1.19, 252.8, 0.8, 0.85},
-        .encoder_counts_per_rev = 1u << 20,
-        .loop_rate_hz = 16000,
-        .counts_per_mm = 1000000,
-        .period_us = 1000,
-    };
-    configs[0] = configs[1] = axis;
+    configs[0] = configs[1] = drive_bench_config;
     make_program();
 }
 
