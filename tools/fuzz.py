@@ -18,12 +18,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from fuzzing import harnesses
-from fuzzing.harnesses import Result
+from fuzzing.harnesses import EXTRA_S, Result
 
 ROOT = Path(__file__).resolve().parent.parent
 PYTHON = ("path", "machine", "drive", "scenario", "campaign", "recording", "image", "eds")
 _PREFIX = "python-"
-_EXTRA_S = 180
 
 
 def run_target(target: str, build: Path, seconds: int, seed: int) -> Result:
@@ -41,7 +40,7 @@ def run_target(target: str, build: Path, seconds: int, seed: int) -> Result:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=seconds + _EXTRA_S,
+            timeout=seconds + EXTRA_S,
             check=False,
         )
         told = json.loads(done.stdout.splitlines()[-1])

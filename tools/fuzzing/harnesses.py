@@ -17,7 +17,8 @@ _OF_LIBFUZZER = (
 )
 _RUNS_LONG = ("controller", "program")
 """Their time is in runs, not in reading: comparisons of values are not looked at, which doubles their speed."""
-_EXTRA_S = 180  # a run that takes so much longer than asked for hangs
+EXTRA_S = 180
+"""A run that takes so much longer than asked for hangs."""
 _EXECUTIONS = re.compile(r"stat::number_of_executed_units:\s*(\d+)")
 _COVERAGE = re.compile(r"\bcov: (\d+)")
 _WHAT = re.compile(r"broken: .*|runtime error: .*|ERROR: .*|:FAIL: .*")
@@ -64,11 +65,11 @@ def run(name: str, root: Path, build: Path, seconds: int, seed: int) -> Result:
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=subprocess.STDOUT,
-                timeout=seconds + _EXTRA_S,
+                timeout=seconds + EXTRA_S,
                 check=False,
             ).returncode
     except subprocess.TimeoutExpired:
-        return _result(name, log, [f"{name}: not at its end after {seconds + _EXTRA_S} s; {log}"])
+        return _result(name, log, [f"{name}: not at its end after {seconds + EXTRA_S} s; {log}"])
     files = sorted(set(found.glob(f"{name}-*")) - before)
     if status == 0 and not files:
         return _result(name, log, [])

@@ -230,7 +230,7 @@ def _use_machine(file: Path) -> list[Outcome]:
     return [
         command("compile", path, "-o", file.parent / "fuzz.hdgp", "--json"),
         command("simulate", path, "--json"),
-        command("dbc", file),
+        command("dbc", file, "-o", file.parent / "fuzz.dbc"),
     ]
 
 
@@ -424,7 +424,7 @@ class Eds:
         file = folder / "fuzz.eds"
         content = "\n".join(lines).encode("utf-8", "replace")
         file.write_bytes(spoiled(content, random) if random.random() < 0.2 else content)
-        command("dbc", machine, "--eds", file)
+        command("dbc", machine, "--eds", file, "-o", folder / "fuzz.dbc")
 
 
 def _change_lines(lines: list[str], random: Random) -> None:
