@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The rate of program time (lambda) and its way from one rest to another: the second difference is constant within a
- * tick, so the rate is piecewise quadratic and program time piecewise cubic in time. Derivation: docs/numerics.md
+ * tick, so the rate is piecewise quadratic and program time piecewise cubic in time. Derivation: docs/theory/numerics.md
  * section 12, "The rate".
  *
  * Units: rate in 2^-57, its slope in 2^-56 a tick, its second difference in 2^-56 a tick squared. A tick that takes the

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the pieces ahead allow the rate of program time, by level (docs/protocol.md 1.3), and in the form in which a tick
+ * What the pieces ahead allow the rate of program time, by level (docs/reference/protocol.md 1.3), and in the form in which a tick
  * uses it: a move of the rate keeps one pair of bounds, those of the level of its greatest rate, so a way through
- * several levels is made in stages (docs/numerics.md section 12, "Levels"). Integers, no division. Any context.
+ * several levels is made in stages (docs/theory/numerics.md section 12, "Levels"). Integers, no division. Any context.
  */
 #ifndef HODOGRAPH_CORE_RATE_PACE_H
 #define HODOGRAPH_CORE_RATE_PACE_H

@@ -10,7 +10,7 @@ const char node_options_help[] =
     "Simulated CiA 402 servo drives on a SocketCAN bus, one per --axis (at most 6).\n"
     "\n"
     "  --bus INTERFACE  a CAN interface that is up, such as vcan0\n"
-    "  --faults FILE    fault rules, one a line (docs/protocol.md section 4); what they do is\n"
+    "  --faults FILE    fault rules, one a line (docs/reference/protocol.md section 4); what they do is\n"
     "                   printed, one JSON object a line\n"
     "  --axis ...       one drive; keys that are required:\n"
     "                   node (2 to 127), gain_rad_s_v, time_constant_s, screw_mm_rad,\n"

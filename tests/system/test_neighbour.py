@@ -325,7 +325,7 @@ def test_a_bus_that_is_full_for_longer_than_simulated_drives_are_waited_for(
     make_bench: MakeBench, alpha_at: MakeAlpha, other: Neighbour, seconds: float
 ) -> None:
     """The next SYNC is sent after 100 ms, and goes before the setpoints that still wait: one step is made of two, which
-    is found. docs/bus-time.md says so.
+    is found. docs/reference/bus-time.md says so.
     """
     bench, path = make_bench(), str(alpha_at(10))
     recorder = Recorder(bench.bus)

@@ -90,7 +90,7 @@ def test_a_bus_full_of_frames_of_higher_priority(
     late: bool,
 ) -> None:
     """Up to 5 ms without an answer are borne. The SYNCs of that time go before the setpoints that wait with them:
-    `late` says that a step is made of two, which the check of a recording finds. docs/bus-time.md.
+    `late` says that a step is made of two, which the check of a recording finds. docs/reference/bus-time.md.
     """
     path = str(alpha_at(10))
     recorder = Recorder(real.bus)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Plans the stops of a program: the numbers of its brakes, and the bounds that follow from them; docs/numerics.md
+"""Plans the stops of a program: the numbers of its brakes, and the bounds that follow from them;
+docs/theory/numerics.md
 section 7.
 """
 
