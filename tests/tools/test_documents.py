@@ -24,9 +24,10 @@ def test_links_and_merges(page: Path) -> None:
     assert marks == []
 
 
-def test_figures_are_current() -> None:
-    """`make figures` would draw the same ones again."""
-    command = [sys.executable, str(ROOT / "tools" / "draw_figures.py"), "--check"]
+@pytest.mark.parametrize("tool", ["draw_figures.py", "list_options.py"])
+def test_generated_pages_are_current(tool: str) -> None:
+    """`make figures` and `make options` would write the same again."""
+    command = [sys.executable, str(ROOT / "tools" / tool), "--check"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
