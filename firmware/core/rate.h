@@ -2,7 +2,7 @@
 /*
  * The rate of program time (lambda) and its way from one rest to another: the second difference is constant within a
  * tick, so the rate is piecewise quadratic and program time piecewise cubic in time. Derivation: docs/theory/numerics.md
- * section 12, "The rate".
+ * section 12, "Feed override".
  *
  * Units: rate in 2^-57, its slope in 2^-56 a tick, its second difference in 2^-56 a tick squared. A tick that takes the
  * slope from a to b raises the rate by exactly a + b units. Pure functions, integers only, no loop. Tick context.

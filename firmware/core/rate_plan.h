@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Where the rate goes next: one decision for a whole way from rest to rest, spread over the ticks before it, with a way to
- * a safe rest always at hand; part of the timebase. docs/theory/numerics.md section 12, "One move at a time". Tick context,
+ * a safe rest always at hand; part of the timebase. docs/theory/numerics.md section 12, "Override ramps". Tick context,
  * bounded time.
  */
 #ifndef HODOGRAPH_CORE_RATE_PLAN_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Whether there is room for a move of the rate in the pieces ahead: a window in a tick, the narrowest first; part of the
- * timebase. docs/theory/numerics.md section 12, "Windows". Tick context, bounded time.
+ * timebase. docs/theory/numerics.md section 12, "Look-ahead windows". Tick context, bounded time.
  */
 #ifndef HODOGRAPH_CORE_RATE_SEARCH_H
 #define HODOGRAPH_CORE_RATE_SEARCH_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The feed pieces ahead, as far as a move of the rate will run into them (docs/theory/numerics.md section 12, "Windows").
+ * The feed pieces ahead, as far as a move of the rate will run into them (docs/theory/numerics.md section 12, "Look-ahead windows").
  * Tick context.
  */
 #ifndef HODOGRAPH_CORE_RATE_WINDOW_H

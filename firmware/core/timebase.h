@@ -6,7 +6,7 @@
  * Only the rate changes, so the tool never leaves the curve. It moves along jerk-limited curves
  * inside the override bounds of every feed piece that a transition touches (docs/reference/protocol.md 1.3):
  * acceleration and jerk on the path stay inside the controller's limits at any instant, for any
- * sequence of commands (docs/theory/numerics.md section 12, "The rate").
+ * sequence of commands (docs/theory/numerics.md section 12, "Feed override").
  *
  * At rate 1 tick k is at min(k period, duration), without drift, in two resolutions: q42:
  * floor(k period_us 2^42 / 10^6 + 1/2), what a tick uses, and q32 likewise, what the dictionary
