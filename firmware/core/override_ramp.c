@@ -1,16 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/rate_pace.h"
+#include "core/override_ramp.h"
+
+#include "core/qmath.h"
 
 #define MOST_RATE_CODE   207u /* at 1 ms R is below 2^56 up to this code, */
 #define MOST_SECOND_CODE 223u /* and S up to this one */
 #define ALIKE            4u   /* a factor of 1.4 */
+#define SHORT_TICKS      40u
+
+/* --- What the program allows --- */
 
 static uint32_t least(uint32_t a, uint32_t b)
 {
     return a < b ? a : b;
 }
 
-void rate_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
+void override_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
                     uint32_t count)
 {
     const uint32_t left = p->header.piece_count - first;
@@ -29,16 +34,16 @@ void rate_bounds_of(struct program_override *out, const struct program *p, uint3
 
 /* --- Stages --- */
 
-static int64_t rate_of(uint32_t level)
+static int64_t override_of(uint32_t level)
 {
     return (int64_t)program_level_q9(level) << 48;
 }
 
-/* The first level with this rate in it. */
-static uint32_t level_of(int64_t rate_q57)
+/* The first level with this override in it. */
+static uint32_t level_of(int64_t override_q57)
 {
     uint32_t level = 0;
-    while (level < PROGRAM_LEVEL_FULL && rate_of(level) < rate_q57) {
+    while (level < PROGRAM_LEVEL_FULL && override_of(level) < override_q57) {
         level++;
     }
     return level;
@@ -51,36 +56,36 @@ static int alike(const struct program_override *bounds, uint32_t high, uint32_t 
            bounds->second[high] + ALIKE >= bounds->second[low];
 }
 
-static void stage_up(struct rate_stage *out, const struct program_override *bounds,
+static void stage_up(struct ramp_stage *out, const struct program_override *bounds,
                      int64_t from_q57, int64_t to_q57)
 {
     const uint32_t top = level_of(to_q57);
-    const uint32_t first = least(level_of(from_q57 + 2 * RATE_SPARE), top);
+    const uint32_t first = least(level_of(from_q57 + 2 * OVERRIDE_SPARE), top);
     uint32_t level = first;
     while (level < top && alike(bounds, level + 1u, first)) {
         level++;
     }
     out->level = level;
-    out->goal_q57 = level < top ? rate_of(level) : to_q57;
+    out->end_q57 = level < top ? override_of(level) : to_q57;
 }
 
-static void stage_down(struct rate_stage *out, const struct program_override *bounds,
+static void stage_down(struct ramp_stage *out, const struct program_override *bounds,
                        int64_t from_q57, int64_t to_q57)
 {
     const uint32_t bottom = level_of(to_q57);
     const uint32_t level = level_of(from_q57);
-    int64_t goal_q57 = to_q57;
-    for (uint32_t low = level; low > bottom && goal_q57 == to_q57; low--) {
+    int64_t end_q57 = to_q57;
+    for (uint32_t low = level; low > bottom && end_q57 == to_q57; low--) {
         if (!alike(bounds, level, low - 1u)) {
-            const int64_t rest_q57 = rate_of(low - 1u) - RATE_SPARE;
-            goal_q57 = rest_q57 > to_q57 ? rest_q57 : to_q57;
+            const int64_t level_q57 = override_of(low - 1u) - OVERRIDE_SPARE;
+            end_q57 = level_q57 > to_q57 ? level_q57 : to_q57;
         }
     }
     out->level = level;
-    out->goal_q57 = goal_q57;
+    out->end_q57 = end_q57;
 }
 
-void rate_stage_of(struct rate_stage *out, const struct program_override *bounds, int64_t from_q57,
+void override_stage_of(struct ramp_stage *out, const struct program_override *bounds, int64_t from_q57,
                    int64_t to_q57)
 {
     if (from_q57 < to_q57) {
@@ -94,7 +99,7 @@ void rate_stage_of(struct rate_stage *out, const struct program_override *bounds
 
 /* A code above 0 is T 2^s / 2^16 octaves, T from 2^16 (program_number). With h the period in ms:
  * R = number 2^21 h / 125, so 2^61 / R = (125 2^40 / T) 2^-s / h; S = number 2^26 h^2 / 15625. */
-void rate_pace_of(struct rate_pace *out, const struct program_override *bounds, uint32_t level,
+void override_limits_of(struct ramp_limits *out, const struct program_override *bounds, uint32_t level,
                   uint32_t period_log2)
 {
     /* ceil(125 2^40 / T) */
@@ -115,4 +120,76 @@ void rate_pace_of(struct rate_pace *out, const struct program_override *bounds, 
     out->inverse_slope = (slopes[rate & 7u] >> ((rate >> 3) + period_log2)) + 1u;
     out->inverse_root = (roots[second & 15u] >> ((second >> 4) + period_log2)) + 1u;
     out->turns = (down < 32u ? ratios[apart & 7u] >> down : 0u) + 1u;
+}
+
+/* --- Duration --- */
+
+void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *limits, int64_t change_q57)
+{
+    const uint32_t change_q30 = (uint32_t)(change_q57 >> 27) + 1u;
+    const int shift = qmath_clz32(change_q30) & ~1;
+    const uint32_t root = qmath_root_above(change_q30 << shift);
+    const uint32_t turns =
+        ((uint32_t)(qmath_product_unsigned(root, limits->inverse_root) >> 32) >> (shift / 2)) + 1u;
+    const uint32_t half =
+        ((uint32_t)(qmath_product_unsigned(change_q30, limits->inverse_slope) >> 32) >> 3) + 1u;
+    ticks->rise = turns < limits->turns ? turns : limits->turns;
+    ticks->half = half > ticks->rise ? half : ticks->rise;
+}
+
+int64_t override_step_of(const struct ramp_ticks *ticks, int64_t change_q57)
+{
+    const uint64_t parts = qmath_product_unsigned(ticks->rise, ticks->half) << 1;
+    return (int64_t)qmath_div_u64((uint64_t)change_q57, parts);
+}
+
+uint64_t override_span_q32(const struct ramp_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s)
+{
+    const uint32_t mean_q16 = (uint32_t)(mean_q57 >> 41) + 1u;
+    const uint32_t tick_q32_s =
+        (uint32_t)(qmath_product_unsigned(period_q32_s, mean_q16) >> 16) + 1u;
+    return qmath_product_unsigned(ticks->rise + ticks->half, tick_q32_s);
+}
+
+/* --- A ramp under way --- */
+
+void override_ramp_begin(struct override_ramp *ramp, int64_t from_q57,
+                     const struct ramp_ticks *ticks, int64_t step_q56)
+{
+    ramp->step_q56 = step_q56;
+    ramp->end_q57 = from_q57;
+    ramp->rise = ticks->rise;
+    ramp->even = ticks->half - ticks->rise;
+    ramp->fall = 0;
+}
+
+void override_ramp_shorten(struct override_ramp *ramp)
+{
+    const uint32_t most = 2u * ramp->rise + SHORT_TICKS;
+    ramp->even = ramp->even < most ? ramp->even : most;
+}
+
+void override_ramp_cut(struct override_ramp *ramp)
+{
+    ramp->rise = 0;
+    ramp->even = 0;
+}
+
+/* A tick more of rise is one more of fall: twice what it raises the override by. */
+int64_t override_ramp_slope(struct override_ramp *ramp, int64_t slope_q56)
+{
+    int64_t next = slope_q56;
+    if (ramp->rise > 0) {
+        ramp->rise--;
+        ramp->fall++;
+        next += ramp->step_q56;
+        ramp->end_q57 += 2 * (slope_q56 + next);
+    } else if (ramp->even > 0) {
+        ramp->even--;
+        ramp->end_q57 += 2 * slope_q56;
+    } else if (ramp->fall > 0) {
+        ramp->fall--;
+        next -= ramp->step_q56;
+    }
+    return next;
 }

@@ -1,0 +1,472 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/override_plan.h"
+
+#include <string.h>
+
+#include "core/qmath.h"
+
+#define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
+#define NOWHERE UINT32_MAX
+#define EARLY   8u /* ticks before a rest in which the next ramp is looked for */
+/* Half of a ramp above everywhere_q57: it leaves less than OVERRIDE_SPARE. */
+#define MOST_TICKS ((uint32_t)1 << 18)
+/* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the rest. */
+#define MARGIN 8u
+
+static const struct ramp_ticks SHORTEST = {1, 1};
+
+/* --- Commands --- */
+
+static void come_to_rest(struct override_plan *plan)
+{
+    memset(&plan->ramp, 0, sizeof plan->ramp);
+    plan->now.override_q57 = 0;
+    plan->now.slope_q56 = 0;
+    plan->steady = 0;
+    plan->saturated = 0;
+    plan->task = OVERRIDE_DECIDES;
+    plan->searched = NOWHERE;
+    plan->wanted_q57 = -1; /* none yet */
+    plan->return_q32_s = 0;
+}
+
+void override_plan_begin(struct override_plan *plan, const struct program *p)
+{
+    memset(plan, 0, sizeof *plan);
+    override_bounds_of(&plan->everywhere, p, 0, p->header.piece_count);
+    plan->everywhere_q57 = (int64_t)plan->everywhere.factor_q14 << 43;
+    plan->commanded_q57 = OVERRIDE_ONE;
+    come_to_rest(plan);
+}
+
+void override_plan_rest(struct override_plan *plan)
+{
+    plan->started = 1;
+    come_to_rest(plan);
+}
+
+void override_plan_set(struct override_plan *plan, uint32_t percent)
+{
+    const uint32_t used = percent < OVERRIDE_PERCENT ? percent : OVERRIDE_PERCENT;
+    plan->commanded_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
+    plan->steady = 0;
+}
+
+void override_plan_hold(struct override_plan *plan)
+{
+    plan->held = 1;
+    plan->steady = 0;
+}
+
+void override_plan_release(struct override_plan *plan)
+{
+    plan->held = 0;
+    plan->steady = 0;
+}
+
+void override_plan_rise_no_more(struct override_plan *plan)
+{
+    if (plan->ramp.step_q56 > 0) {
+        override_ramp_cut(&plan->ramp);
+    }
+}
+
+static int64_t wanted_override(const struct override_plan *plan)
+{
+    return plan->held != 0 ? 0 : plan->commanded_q57;
+}
+
+/* --- Look-ahead --- */
+
+static void look_at_pieces(struct override_window *w, const struct program_clock *clock,
+                           uint32_t last)
+{
+    override_bounds_of(&w->own, clock->program, clock->piece, last + 1u - clock->piece);
+    w->bounds = &w->own;
+    w->end_q32_s = clock->piece_end_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
+    for (uint32_t k = clock->piece + 1u; k <= last; k++) {
+        w->end_q32_s += program_piece_duration(clock->program, k);
+    }
+}
+
+void override_window_get(struct override_window *w, const struct program_clock *clock,
+                         uint32_t window)
+{
+    const struct program *p = clock->program;
+    const uint32_t behind = override_window_pieces(window) - 1u;
+    const uint32_t left = p->header.piece_count - 1u - clock->piece;
+    const uint32_t last = clock->piece + (behind < left ? behind : left);
+    if (clock->record != NULL) {
+        w->bounds = &clock->record->ahead[window];
+        w->end_q32_s = prepared_piece_at(p, p->prepared_for, last)->end_q32_s;
+    } else {
+        look_at_pieces(w, clock, last);
+    }
+    if (behind >= left) {
+        w->end_q32_s = UINT64_MAX;
+    }
+}
+
+static int64_t factor_q57(const struct override_window *w)
+{
+    return (int64_t)w->bounds->factor_q14 << 43;
+}
+
+/* Where the override rests next: the end of a ramp that falls to it. */
+static int64_t next_rest(const struct override_plan *plan)
+{
+    return override_ramp_moves(&plan->ramp) ? plan->ramp.end_q57 : plan->now.override_q57;
+}
+
+static uint64_t margin_q32(const struct override_plan *plan, const struct program_clock *clock)
+{
+    return qmath_product_unsigned(MARGIN + 2u * plan->ramp.fall, clock->period_q32_s);
+}
+
+/* End and ticks of the first stage to the target, inside these bounds. */
+static void plan_stage(struct override_plan *plan, const struct program_override *bounds,
+                       uint32_t period_log2)
+{
+    const int64_t from_q57 = next_rest(plan);
+    struct ramp_stage stage;
+    struct ramp_limits limits;
+    override_stage_of(&stage, bounds, from_q57, plan->target_q57);
+    override_limits_of(&limits, bounds, stage.level, period_log2);
+    override_ticks_of(&plan->ticks, &limits, qmath_magnitude(stage.end_q57 - from_q57));
+    plan->stage_q57 = stage.end_q57;
+}
+
+/* A ramp that ends where the override may stay: inside the window. */
+static int fits(struct override_plan *plan, const struct program_clock *clock,
+                const struct override_window *w)
+{
+    plan_stage(plan, w->bounds, clock->period_log2);
+    const int64_t mean_q57 = (plan->stage_q57 + next_rest(plan)) / 2;
+    const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
+    return (clock->time_q42_s >> 10) + span + margin_q32(plan, clock) <= w->end_q32_s;
+}
+
+static int returns(struct override_plan *plan, const struct program_clock *clock,
+                   const struct override_window *w)
+{
+    return factor_q57(w) >= plan->now.override_q57 && fits(plan, clock, w) &&
+           plan->ticks.half < MOST_TICKS;
+}
+
+/* Until when an override above everywhere_q57 may last: the ramp back, at most at this override, ends inside the window.
+ * 0: not at all. */
+static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock,
+                          const struct override_window *w, int64_t change_q57, int64_t high_q57,
+                          struct ramp_ticks *ticks)
+{
+    struct ramp_limits limits;
+    override_limits_of(&limits, w->bounds, PROGRAM_LEVEL_FULL, clock->period_log2);
+    override_ticks_of(ticks, &limits, change_q57);
+    const uint64_t span =
+        override_span_q32(ticks, high_q57, clock->period_q32_s) + margin_q32(plan, clock);
+    return ticks->half < MOST_TICKS && span < w->end_q32_s ? w->end_q32_s - span : 0;
+}
+
+/* --- A search: a window in a tick, the narrowest first --- */
+
+static void begin_search(struct override_plan *plan, enum override_kind kind, int64_t target_q57)
+{
+    plan->task = OVERRIDE_SEARCHES;
+    plan->kind = kind;
+    plan->target_q57 = target_q57;
+    plan->window = 0;
+}
+
+/* The ramp back that was found before the override went up. */
+static void go_back(struct override_plan *plan)
+{
+    plan->ticks = plan->back;
+    plan->kind = OVERRIDE_RETURN;
+    plan->stage_q57 = plan->everywhere_q57 - OVERRIDE_SPARE;
+    plan->task = OVERRIDE_BEGINS;
+}
+
+/* No window will do for what was looked for, which was not to settle. */
+static void give_up(struct override_plan *plan)
+{
+    const int64_t now_q57 = plan->now.override_q57;
+    plan->task = OVERRIDE_DECIDES;
+    if (plan->kind == OVERRIDE_STAY) {
+        begin_search(plan, OVERRIDE_CLIMB, plan->wanted_q57);
+    } else if (now_q57 > plan->everywhere_q57) {
+        if (plan->kind == OVERRIDE_RETURN || now_q57 > plan->wanted_q57 + OVERRIDE_SPARE) {
+            go_back(plan);
+        }
+    } else if (now_q57 != plan->everywhere_q57) {
+        begin_search(plan, OVERRIDE_SETTLE, plan->everywhere_q57);
+    }
+}
+
+/* The present override, for longer than is known. */
+static void stay(struct override_plan *plan, const struct program_clock *clock,
+                 const struct override_window *w)
+{
+    struct ramp_ticks ticks;
+    const int64_t now_q57 = plan->now.override_q57;
+    if (factor_q57(w) < now_q57) {
+        give_up(plan);
+        return;
+    }
+    const int64_t change_q57 = now_q57 - plan->everywhere_q57 + OVERRIDE_SPARE;
+    const uint64_t by_q32_s = return_by(plan, clock, w, change_q57, now_q57, &ticks);
+    if (by_q32_s > plan->return_q32_s) {
+        plan->return_q32_s = by_q32_s;
+        plan->back = ticks;
+    }
+}
+
+/* A ramp to an override above everywhere_q57, for which the window has the time of the ramp back too. The same ticks are
+ * enough for both. */
+static void climb(struct override_plan *plan, const struct program_clock *clock,
+                  const struct override_window *w)
+{
+    const int64_t now_q57 = plan->now.override_q57;
+    const int64_t factor = factor_q57(w);
+    struct ramp_stage stage;
+    const int64_t end_q57 = qmath_lesser(plan->wanted_q57, factor);
+    const int64_t high_q57 = qmath_greater(end_q57, now_q57);
+    const int64_t change_q57 = qmath_magnitude(end_q57 - now_q57);
+    override_stage_of(&stage, w->bounds, now_q57, end_q57);
+    if (high_q57 > factor || end_q57 <= plan->everywhere_q57 + OVERRIDE_SPARE ||
+        change_q57 <= OVERRIDE_SPARE || stage.end_q57 != end_q57) {
+        give_up(plan);
+        return;
+    }
+    const int64_t most_q57 =
+        qmath_greater(change_q57, high_q57 - plan->everywhere_q57 + OVERRIDE_SPARE);
+    const uint64_t by_q32_s = return_by(plan, clock, w, most_q57, high_q57, &plan->ticks);
+    /* by then, if it takes what the ramp back may take */
+    const uint64_t there_q32_s = w->end_q32_s - by_q32_s;
+    if (by_q32_s == 0 || (clock->time_q42_s >> 10) + there_q32_s > by_q32_s) {
+        return;
+    }
+    plan->stage_q57 = end_q57;
+    plan->return_q32_s = by_q32_s;
+    plan->back = plan->ticks;
+    plan->saturated = end_q57 < plan->wanted_q57;
+    plan->task = OVERRIDE_BEGINS;
+}
+
+/* The next window, for what is looked for; there is one. */
+static void search(struct override_plan *plan, const struct program_clock *clock)
+{
+    struct override_window w;
+    override_window_get(&w, clock, plan->window);
+    plan->window++;
+    switch (plan->kind) {
+    case OVERRIDE_STAY:
+        stay(plan, clock, &w);
+        break;
+    case OVERRIDE_CLIMB:
+        climb(plan, clock, &w);
+        break;
+    case OVERRIDE_RETURN:
+        plan->task = returns(plan, clock, &w) ? OVERRIDE_BEGINS : OVERRIDE_SEARCHES;
+        break;
+    default:
+        plan->task = fits(plan, clock, &w) ? OVERRIDE_BEGINS : OVERRIDE_SEARCHES;
+        break;
+    }
+}
+
+/* There is no further window. Below everywhere_q57 the least bounds of the program will always do. */
+static void end_search(struct override_plan *plan, const struct program_clock *clock)
+{
+    if (plan->kind == OVERRIDE_SETTLE) {
+        plan_stage(plan, &plan->everywhere, clock->period_log2);
+        plan->task = OVERRIDE_BEGINS;
+    } else {
+        give_up(plan);
+    }
+}
+
+static void search_on(struct override_plan *plan, const struct program_clock *clock)
+{
+    if (plan->window < OVERRIDE_WINDOWS) {
+        search(plan, clock);
+    } else {
+        end_search(plan, clock);
+    }
+}
+
+/* --- At rest --- */
+
+static void begin_ramp(struct override_plan *plan, int64_t step_q56)
+{
+    const int down = plan->stage_q57 < plan->now.override_q57;
+    override_ramp_begin(&plan->ramp, plan->now.override_q57, &plan->ticks,
+                        down ? -step_q56 : step_q56);
+    if (plan->kind == OVERRIDE_SETTLE && plan->window > 1) { /* not inside the present piece */
+        override_ramp_shorten(&plan->ramp);
+    }
+    plan->task = OVERRIDE_DECIDES;
+    plan->searched = NOWHERE;
+}
+
+static void decide_below(struct override_plan *plan, int64_t wanted_q57)
+{
+    const int64_t change_q57 = wanted_q57 - plan->now.override_q57;
+    plan->saturated = 0;
+    if (qmath_magnitude(change_q57) <= 1) {
+        plan->now.override_q57 = wanted_q57;
+    } else if (plan->now.override_q57 > plan->everywhere_q57) {
+        begin_search(plan, OVERRIDE_RETURN,
+                     qmath_lesser(wanted_q57, plan->everywhere_q57 - OVERRIDE_SPARE));
+    } else if (qmath_magnitude(change_q57) <= SMALL) {
+        plan->ticks = SHORTEST;
+        plan->kind = OVERRIDE_SETTLE;
+        plan->stage_q57 = wanted_q57;
+        begin_ramp(plan, qmath_magnitude(change_q57) / 2);
+    } else {
+        begin_search(plan, OVERRIDE_SETTLE, wanted_q57);
+    }
+}
+
+/* What to do next. Above everywhere_q57 once in each piece. */
+static void decide(struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t wanted_q57 = wanted_override(plan);
+    const int same = plan->wanted_q57 == wanted_q57;
+    plan->wanted_q57 = wanted_q57;
+    if (wanted_q57 <= plan->everywhere_q57) {
+        decide_below(plan, wanted_q57);
+    } else if (!same || plan->searched != clock->piece) {
+        const int above = plan->now.override_q57 > plan->everywhere_q57;
+        plan->searched = clock->piece;
+        plan->saturated = wanted_q57 - plan->now.override_q57 > OVERRIDE_SPARE;
+        begin_search(plan, above ? OVERRIDE_STAY : OVERRIDE_CLIMB, wanted_q57);
+    }
+}
+
+/* At rest, and not steady: one step of deciding what to do next. */
+static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock)
+{
+    if (plan->now.override_q57 > plan->everywhere_q57 &&
+        clock->time_q42_s >> 10 >= plan->return_q32_s) {
+        go_back(plan);
+    }
+    if (plan->task == OVERRIDE_BEGINS) {
+        const int64_t change_q57 = qmath_magnitude(plan->stage_q57 - plan->now.override_q57);
+        begin_ramp(plan, override_step_of(&plan->ticks, change_q57));
+    } else if (plan->task == OVERRIDE_SEARCHES) {
+        search_on(plan, clock);
+    } else {
+        decide(plan, clock);
+    }
+}
+
+/* 1 when the override is where it is wanted and may stay there whatever the pieces are. Then the next tick is like this
+ * one, and what was planned is off. */
+static int comes_steady(struct override_plan *plan)
+{
+    const int64_t wanted_q57 = wanted_override(plan);
+    if (wanted_q57 > plan->everywhere_q57 || plan->now.override_q57 != wanted_q57) {
+        return 0;
+    }
+    plan->task = OVERRIDE_DECIDES; /* the command may have come back to it */
+    plan->searched = NOWHERE;
+    plan->saturated = 0;
+    plan->steady = 1;
+    return 1;
+}
+
+/* --- On a ramp --- */
+
+/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above everywhere_q57 on the
+ * way down, where nothing says how to return. */
+static void change_target(struct override_plan *plan, int64_t wanted_q57)
+{
+    struct override_ramp *ramp = &plan->ramp;
+    if (plan->kind == OVERRIDE_RETURN && ramp->end_q57 > plan->everywhere_q57) {
+        return;
+    }
+    if (ramp->step_q56 > 0 ? ramp->end_q57 >= wanted_q57 : ramp->end_q57 <= wanted_q57) {
+        override_ramp_cut(ramp);
+    }
+}
+
+/* A stage ends soon: the next one is looked for, so that the rest between them is short. */
+static void search_early(struct override_plan *plan, const struct program_clock *clock,
+                         int64_t wanted_q57)
+{
+    const struct override_ramp *ramp = &plan->ramp;
+    if ((ramp->rise | ramp->even) != 0u || ramp->fall > EARLY || plan->kind != OVERRIDE_SETTLE ||
+        wanted_q57 > plan->everywhere_q57) {
+        return;
+    }
+    if (plan->task == OVERRIDE_SEARCHES) {
+        search_on(plan, clock);
+    } else if (plan->task == OVERRIDE_DECIDES &&
+               qmath_magnitude(wanted_q57 - ramp->end_q57) > SMALL) {
+        begin_search(plan, OVERRIDE_SETTLE, wanted_q57);
+    }
+}
+
+/* Slope at the end of the next tick of the ramp. */
+static int64_t next_slope(struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t wanted_q57 = wanted_override(plan);
+    if (wanted_q57 != plan->wanted_q57) {
+        change_target(plan, wanted_q57);
+    } else {
+        search_early(plan, clock, wanted_q57);
+    }
+    return override_ramp_slope(&plan->ramp, plan->now.slope_q56);
+}
+
+/* --- Tick --- */
+
+/* A program begins with feed and acceleration zero: there the override may step. */
+static void first_tick(struct override_plan *plan, struct program_clock *clock)
+{
+    plan->started = 1;
+    if (clock->time_q42_s != 0) {
+        return;
+    }
+    plan->now.override_q57 = qmath_lesser(wanted_override(plan), OVERRIDE_ONE);
+    clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    (void)comes_steady(plan);
+}
+
+/* The tick that ends a ramp looks how far each tick at rest will go. */
+static void tick_of_ramp(struct override_plan *plan, struct program_clock *clock)
+{
+    const int64_t slope_q56 = next_slope(plan, clock);
+    program_clock_advance_q62(clock, program_clock_way_q62_s(clock, &plan->now, slope_q56));
+    override_tick(&plan->now, slope_q56);
+    if (!override_ramp_moves(&plan->ramp)) {
+        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    }
+}
+
+void override_plan_change(struct override_plan *plan, struct program_clock *clock)
+{
+    if (override_ramp_moves(&plan->ramp)) {
+        tick_of_ramp(plan, clock);
+        return;
+    }
+    if (!comes_steady(plan)) {
+        tick_of_decision(plan, clock);
+    }
+    if (plan->now.override_q57 != 0) {
+        program_clock_advance_even(clock, plan->now.override_q57);
+    }
+}
+
+uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock)
+{
+    if (plan->steady != 0) { /* nothing is on its way: the same again */
+        program_clock_advance_even(clock, plan->now.override_q57);
+    } else if (plan->started != 0) {
+        override_plan_change(plan, clock);
+    } else {
+        first_tick(plan, clock);
+        return clock->time_q42_s;
+    }
+    return program_clock_enter(clock);
+}
