@@ -152,10 +152,12 @@ int feed_override_motion(const struct feed_override *f, const struct interp *it,
     if (qmath_magnitude(feed) >= MOST_FEED_Q32) {
         return 0;
     }
-    const int64_t bend_q40 = interp_acceleration_q40(it, clock->record, program_clock_time_q42(clock));
+    const int64_t bend_q40 =
+        interp_acceleration_q40(it, clock->record, program_clock_time_q42(clock));
     const int64_t even = qmath_mul_unsigned(qmath_mul_unsigned(bend_q40, time_q40), time_q40);
     const int64_t at_override_1 = qmath_mul_unsigned(feed * 65536, MS_Q40);
-    const int64_t turned = qmath_mul_wide(at_override_1, (int32_t)(f->plan.now.slope_q56 >> 26)) * 4;
+    const int64_t turned =
+        qmath_mul_wide(at_override_1, (int32_t)(f->plan.now.slope_q56 >> 26)) * 4;
     state->arc_length_q40_mm = f->point.arc_length_q40_mm;
     state->fine_q56_mm = 0;
     state->speed_q56 = qmath_shift_clamp(qmath_mul_unsigned(feed * 65536, time_q40), p);
@@ -337,8 +339,8 @@ static void look_for_place(struct feed_override *f, struct interp *it)
             const struct prepared_piece *piece =
                 f->place.piece != NULL ? f->place.piece : &it->own_piece;
             f->found = 1;
-            program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index,
-                              f->place.piece, piece->end_q32_s);
+            program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece,
+                              piece->end_q32_s);
             override_plan_rest(&f->plan);
         }
     }

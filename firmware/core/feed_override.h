@@ -20,8 +20,8 @@
 #include <stdint.h>
 
 #include "core/interp.h"
-#include "core/path_brake.h"
 #include "core/override_plan.h"
+#include "core/path_brake.h"
 #include "core/program_clock.h"
 
 enum feed_state {

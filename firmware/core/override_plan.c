@@ -252,8 +252,7 @@ static void climb(struct override_plan *plan, const struct program_clock *clock,
     plan->task = OVERRIDE_BEGINS;
 }
 
-/* The next window, for what is looked for; there is one. */
-static void search(struct override_plan *plan, const struct program_clock *clock)
+void override_plan_search(struct override_plan *plan, const struct program_clock *clock)
 {
     struct override_window w;
     override_window_get(&w, clock, plan->window);
@@ -288,7 +287,7 @@ static void end_search(struct override_plan *plan, const struct program_clock *c
 static void search_on(struct override_plan *plan, const struct program_clock *clock)
 {
     if (plan->window < OVERRIDE_WINDOWS) {
-        search(plan, clock);
+        override_plan_search(plan, clock);
     } else {
         end_search(plan, clock);
     }

@@ -39,7 +39,7 @@ struct override_plan {
     uint32_t steady;    /* 1: at the commanded override, in which only a command changes anything */
     uint32_t held;      /* 1: the override goes to 0 */
     int64_t commanded_q57;
-    int64_t everywhere_q57; /* greatest override that all pieces allow, */
+    int64_t everywhere_q57;             /* greatest override that all pieces allow, */
     struct program_override everywhere; /* and their least bounds */
     struct override_ramp ramp;
     uint32_t task;           /* of the next tick at rest, enum override_task */
@@ -80,6 +80,9 @@ uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *cl
 
 /* Part of it: a tick that is neither steady nor the first. */
 void override_plan_change(struct override_plan *plan, struct program_clock *clock);
+
+/* Part of it: looks for what is looked for in the next window; there is one. */
+void override_plan_search(struct override_plan *plan, const struct program_clock *clock);
 
 /* --- Look-ahead --- */
 

@@ -16,7 +16,7 @@ static uint32_t least(uint32_t a, uint32_t b)
 }
 
 void override_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
-                    uint32_t count)
+                        uint32_t count)
 {
     const uint32_t left = p->header.piece_count - first;
     const uint32_t behind = first + least(count, left);
@@ -85,8 +85,8 @@ static void stage_down(struct ramp_stage *out, const struct program_override *bo
     out->end_q57 = end_q57;
 }
 
-void override_stage_of(struct ramp_stage *out, const struct program_override *bounds, int64_t from_q57,
-                   int64_t to_q57)
+void override_stage_of(struct ramp_stage *out, const struct program_override *bounds,
+                       int64_t from_q57, int64_t to_q57)
 {
     if (from_q57 < to_q57) {
         stage_up(out, bounds, from_q57, to_q57);
@@ -99,8 +99,8 @@ void override_stage_of(struct ramp_stage *out, const struct program_override *bo
 
 /* A code above 0 is T 2^s / 2^16 octaves, T from 2^16 (program_number). With h the period in ms:
  * R = number 2^21 h / 125, so 2^61 / R = (125 2^40 / T) 2^-s / h; S = number 2^26 h^2 / 15625. */
-void override_limits_of(struct ramp_limits *out, const struct program_override *bounds, uint32_t level,
-                  uint32_t period_log2)
+void override_limits_of(struct ramp_limits *out, const struct program_override *bounds,
+                        uint32_t level, uint32_t period_log2)
 {
     /* ceil(125 2^40 / T) */
     static const uint32_t slopes[8] = {2097152000u, 1923083807u, 1763507455u, 1617119114u,
@@ -124,7 +124,8 @@ void override_limits_of(struct ramp_limits *out, const struct program_override *
 
 /* --- Duration --- */
 
-void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *limits, int64_t change_q57)
+void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *limits,
+                       int64_t change_q57)
 {
     const uint32_t change_q30 = (uint32_t)(change_q57 >> 27) + 1u;
     const int shift = qmath_clz32(change_q30) & ~1;
@@ -154,7 +155,7 @@ uint64_t override_span_q32(const struct ramp_ticks *ticks, int64_t mean_q57, uin
 /* --- A ramp under way --- */
 
 void override_ramp_begin(struct override_ramp *ramp, int64_t from_q57,
-                     const struct ramp_ticks *ticks, int64_t step_q56)
+                         const struct ramp_ticks *ticks, int64_t step_q56)
 {
     ramp->step_q56 = step_q56;
     ramp->end_q57 = from_q57;

@@ -94,8 +94,7 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
     clock->record = p->prepared_for != NULL ? prepared_piece_at(p, p->prepared_for, 0) : NULL;
     clock->piece_end_q42_s =
         end_of_piece(clock, program_piece_duration(p, 0) << PROGRAM_CLOCK_Q32_TO_Q42);
-    if (clock->time_q42_s != clock->duration_q42_s &&
-        clock->time_q42_s >= clock->piece_end_q42_s) {
+    if (clock->time_q42_s != clock->duration_q42_s && clock->time_q42_s >= clock->piece_end_q42_s) {
         find_piece(clock, clock->time_q42_s, UINT32_MAX);
     }
 }

@@ -161,8 +161,8 @@ static void check_motion(const struct override_plan *before)
 {
     const double scale = 1.0 / 72057594037927936.0; /* 2^-56 */
     struct tick k;
-    int64_t rise = now.feed.plan.now.override_q57 - before->now.override_q57 - before->now.slope_q56 -
-                   now.feed.plan.now.slope_q56;
+    int64_t rise = now.feed.plan.now.override_q57 - before->now.override_q57 -
+                   before->now.slope_q56 - now.feed.plan.now.slope_q56;
     at_most("rate is the sum of its slopes", (double)llabs(rise), 1);
     k.rate = (double)before->now.override_q57 * scale / 2;
     k.slope = (double)before->now.slope_q56 * scale / now.h;
@@ -393,16 +393,18 @@ static void finish(void)
     for (int64_t i = 0; i < ticks && !over(); i++) {
         int64_t rate = now.feed.plan.now.override_q57;
         int still = now.feed.plan.now.slope_q56 == 0 && now.feed.phase == PLAN;
-        if (now.wish == RUN ? still && rate >= wanted - 100 &&
-                                  (now.percent * (OVERRIDE_ONE / 100) > now.feed.plan.everywhere_q57 ||
-                                   rate <= wanted + 100)
-                            : now.feed.state == FEED_HELD && now.feed.found) {
+        if (now.wish == RUN
+                ? still && rate >= wanted - 100 &&
+                      (now.percent * (OVERRIDE_ONE / 100) > now.feed.plan.everywhere_q57 ||
+                       rate <= wanted + 100)
+                : now.feed.state == FEED_HELD && now.feed.found) {
             return;
         }
         tick();
     }
     TEST_ASSERT_TRUE_MESSAGE(
-        over(), where("never there", (double)now.feed.plan.now.override_q57 / OVERRIDE_ONE, now.percent));
+        over(),
+        where("never there", (double)now.feed.plan.now.override_q57 / OVERRIDE_ONE, now.percent));
 }
 
 static void run_to_the_end(void)

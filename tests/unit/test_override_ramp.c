@@ -54,8 +54,8 @@ static struct bounds random_bounds(void)
     return make_bounds(rate, second, (uint32_t)below(4));
 }
 
-static struct override_ramp ramp_of(const struct bounds *b, const struct override_state *from, int64_t target,
-                                struct ramp_ticks *ticks)
+static struct override_ramp ramp_of(const struct bounds *b, const struct override_state *from,
+                                    int64_t target, struct ramp_ticks *ticks)
 {
     const int64_t change = target - from->override_q57;
     struct override_ramp ramp;
@@ -81,13 +81,14 @@ static double run(struct override_ramp *ramp, struct override_state *rate, uint6
         }
         override_tick(rate, override_ramp_slope(ramp, rate->slope_q56));
         const int64_t second = rate->slope_q56 - before.slope_q56;
-        TEST_ASSERT_TRUE(rate->override_q57 - before.override_q57 == before.slope_q56 + rate->slope_q56);
+        TEST_ASSERT_TRUE(rate->override_q57 - before.override_q57 ==
+                         before.slope_q56 + rate->slope_q56);
         TEST_ASSERT_TRUE(second == 0 || second == step || second == -step);
         TEST_ASSERT_TRUE(step < 0 ? rate->slope_q56 <= 0 && rate->slope_q56 >= most
                                   : rate->slope_q56 >= 0 && rate->slope_q56 <= most);
-        time +=
-            ((double)before.override_q57 * 3 + (double)before.slope_q56 * 2 + (double)rate->slope_q56) /
-            6 / 72057594037927936.0;
+        time += ((double)before.override_q57 * 3 + (double)before.slope_q56 * 2 +
+                 (double)rate->slope_q56) /
+                6 / 72057594037927936.0;
     }
     TEST_ASSERT_TRUE(rate->slope_q56 == 0);
     TEST_ASSERT_TRUE(rate->override_q57 == ramp->end_q57);
@@ -120,12 +121,15 @@ static void test_comes_to_the_target(void)
             continue; /* too long to run */
         }
         const double time = run(&ramp, &rate, UINT64_MAX);
-        const int64_t left = target > from ? target - rate.override_q57 : rate.override_q57 - target;
+        const int64_t left =
+            target > from ? target - rate.override_q57 : rate.override_q57 - target;
         TEST_ASSERT_TRUE(left >= 0 && left < 2 * (int64_t)ticks.rise * ticks.half);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-12 * total,
-                                  total * (double)(from + rate.override_q57) / 2 / OVERRIDE_ONE, time);
+                                  total * (double)(from + rate.override_q57) / 2 / OVERRIDE_ONE,
+                                  time);
         const uint32_t period_q32_s = (uint32_t)(b.period_us * 4294.967296) + 1u;
-        const uint64_t span = override_span_q32(&ticks, (from + rate.override_q57) / 2, period_q32_s);
+        const uint64_t span =
+            override_span_q32(&ticks, (from + rate.override_q57) / 2, period_q32_s);
         TEST_ASSERT_TRUE(time * b.period_us * 4294.967296 <= (double)span);
     }
 }

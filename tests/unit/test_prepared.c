@@ -155,7 +155,8 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
         clock.piece_end_q42_s = clock.record->end_q32_s << 10; /* as if from the image */
         for (int k = 0; k < 2; k++) {
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
-            TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_piece(&it, clock.record, time_q42_s, &point));
+            TEST_ASSERT_EQUAL_INT(INTERP_OK,
+                                  interp_at_piece(&it, clock.record, time_q42_s, &point));
         }
         memcpy(&before, &point, sizeof point);
         const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
