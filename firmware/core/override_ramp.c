@@ -42,9 +42,10 @@ static int64_t override_of(uint32_t level)
 /* The first level with this override in it. */
 static uint32_t level_of(int64_t override_q57)
 {
+    const uint32_t above_q9 = (uint32_t)((override_q57 + ((int64_t)1 << 48) - 1) >> 48);
     uint32_t level = 0;
-    while (level < PROGRAM_LEVEL_FULL && override_of(level) < override_q57) {
-        level++;
+    for (uint32_t k = 0; k < PROGRAM_LEVEL_FULL; k++) {
+        level += program_level_q9(k) < above_q9 ? 1u : 0u;
     }
     return level;
 }
@@ -69,20 +70,21 @@ static void stage_up(struct ramp_stage *out, const struct program_override *boun
     out->end_q57 = level < top ? override_of(level) : to_q57;
 }
 
+/* To rest just inside the first level below whose bounds are not alike. */
 static void stage_down(struct ramp_stage *out, const struct program_override *bounds,
                        int64_t from_q57, int64_t to_q57)
 {
     const uint32_t bottom = level_of(to_q57);
     const uint32_t level = level_of(from_q57);
-    int64_t end_q57 = to_q57;
-    for (uint32_t low = level; low > bottom && end_q57 == to_q57; low--) {
-        if (!alike(bounds, level, low - 1u)) {
-            const int64_t level_q57 = override_of(low - 1u) - OVERRIDE_SPARE;
-            end_q57 = level_q57 > to_q57 ? level_q57 : to_q57;
-        }
+    uint32_t low = level;
+    while (low > bottom && alike(bounds, level, low - 1u)) {
+        low--;
     }
     out->level = level;
-    out->end_q57 = end_q57;
+    out->end_q57 = to_q57;
+    if (low > bottom && override_of(low - 1u) - OVERRIDE_SPARE > to_q57) {
+        out->end_q57 = override_of(low - 1u) - OVERRIDE_SPARE;
+    }
 }
 
 void override_stage_of(struct ramp_stage *out, const struct program_override *bounds,

@@ -7,12 +7,12 @@
  * options: --unwind 6 --pointer-check --bounds-check
  * shows: timebase_find_piece
  * mutant: core/timebase_private.h: tb->piece + 1u == tb->program->header.piece_count => tb->piece + 2u == tb->program->header.piece_count
- * mutant: core/timebase_step.c: if (time_q42_s >= tb->duration_q42_s) { => if (time_q42_s > tb->duration_q42_s) {
+ * mutant: core/program_clock.c: if (time_q42_s >= tb->duration_q42_s) { => if (time_q42_s > tb->duration_q42_s) {
  * mutant: core/timebase_private.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
  */
 #include "proof.h"
 
-#include "core/timebase_step.c"
+#include "core/program_clock.c"
 
 #define COUNT 3u
 
@@ -33,10 +33,10 @@ static struct kernel kernel = {.piece_size = sizeof(struct prepared_piece) -
 static void place(struct timebase *tb, uint32_t i)
 {
     tb->program = &program;
-    tb->duration_q42_s = program.header.duration_q32_s << TIMEBASE_FINE;
+    tb->duration_q42_s = program.header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
     tb->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    tb->rest = (uint32_t)any_between(0, TIMEBASE_REST_UNIT - 1);
-    tb->fine = (uint32_t)any_between(0, (1 << TIMEBASE_FINE_BITS) - 1);
+    tb->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    tb->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     tb->piece = i;
     tb->piece_end_q42_s = timebase_end_q42_s(tb, nondet_uint64());
     tb->record = program.prepared_for != 0 ? &records[i] : 0;
@@ -46,7 +46,7 @@ void harness(void)
 {
     struct timebase tb;
     program.header.piece_count = COUNT;
-    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> TIMEBASE_FINE);
+    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> PROGRAM_CLOCK_Q32_TO_Q42);
     program.prepared_for = nondet_uint32() != 0 ? &kernel : 0;
     for (uint32_t k = 0; k < COUNT; k++) {
         records[k].end_q32_s = k + 1u == COUNT ? program.header.duration_q32_s : nondet_uint64();

@@ -12,19 +12,19 @@
 #define HODOGRAPH_PLAN_IS_SOUND_H
 
 #include "proof.h"
-#include "rate_contracts.h"
+#include "override_contracts.h"
 
-#include "core/rate.c"
-#include "core/rate_plan.c"
+#include "core/override_ramp.c"
+#include "core/override_plan.c"
 #define climb search_climb
-#include "core/rate_search.c"
+#include "core/override_plan.c"
 #undef climb
 
-/* --- What the plan stands on: rate_contracts.h --- */
+/* --- What the plan stands on: override_contracts.h --- */
 
 static int64_t begun_q57; /* the way that a step was made for */
 
-void some_ticks(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t way_q57)
+void some_ticks(struct ramp_ticks *ticks, const struct ramp_limits *pace, int64_t way_q57)
 {
     (void)pace;
     prove(IS_RATE(way_q57));
@@ -33,7 +33,7 @@ void some_ticks(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t 
     assume(IS_TICKS(ticks));
 }
 
-int64_t some_step(const struct rate_ticks *ticks, int64_t way_q57)
+int64_t some_step(const struct ramp_ticks *ticks, int64_t way_q57)
 {
     prove(IS_TICKS(ticks));
     prove(IS_RATE(way_q57));
@@ -41,7 +41,7 @@ int64_t some_step(const struct rate_ticks *ticks, int64_t way_q57)
     return any_between(0, way_q57 / 2);
 }
 
-uint64_t some_span(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s)
+uint64_t some_span(const struct ramp_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s)
 {
     (void)period_q32_s;
     prove(IS_TICKS(ticks));
@@ -52,31 +52,31 @@ uint64_t some_span(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t pe
 }
 
 /* Between both ends; a rest on the way is that of a level below 1. */
-void some_stage(struct rate_stage *out, const struct program_override *bounds, int64_t from_q57,
+void some_stage(struct ramp_stage *out, const struct program_override *bounds, int64_t from_q57,
                 int64_t to_q57)
 {
     (void)bounds;
     prove(IS_RATE(from_q57) && IS_RATE(to_q57));
     out->level = nondet_uint32();
     out->goal_q57 = nondet_int64();
-    assume(out->goal_q57 == to_q57 || out->goal_q57 < RATE_ONE);
+    assume(out->goal_q57 == to_q57 || out->goal_q57 < OVERRIDE_ONE);
     assume(IS_STAGE(out) && (from_q57 < to_q57 ? from_q57 <= out->goal_q57 && out->goal_q57 <= to_q57
                                                : to_q57 <= out->goal_q57 && out->goal_q57 <= from_q57));
 }
 
-void some_pace(struct rate_pace *out, const struct program_override *bounds, uint32_t level,
+void some_limits(struct ramp_limits *out, const struct program_override *bounds, uint32_t level,
                uint32_t period_log2)
 {
     (void)bounds;
     (void)period_log2;
     prove(level < PROGRAM_LEVELS);
-    assume(IS_PACE(out));
+    assume(IS_LIMITS(out));
 }
 
-void some_window(struct rate_window *w, const struct timebase *tb, uint32_t window)
+void some_window(struct override_window *w, const struct timebase *tb, uint32_t window)
 {
     (void)tb;
-    prove(window < RATE_WINDOWS);
+    prove(window < OVERRIDE_WINDOWS);
     w->own.factor_q14 = (uint16_t)nondet_uint32();
     assume(IS_FACTOR(w->own.factor_q14));
     w->bounds = &w->own;
@@ -98,19 +98,19 @@ static int along(int64_t a, int64_t step)
 
 static int64_t end_of(const struct timebase *tb, const struct way *way)
 {
-    return tb->now.rate_q57 + way->fall + way->ahead;
+    return tb->now.override_q57 + way->fall + way->ahead;
 }
 
 static int is_way(const struct timebase *tb, const struct way *way)
 {
-    const struct rate_move *m = &tb->plan.move;
-    if (!(IS_RATE(tb->now.rate_q57) && tb->now.slope_q56 == way->slope)) {
+    const struct override_ramp *m = &tb->plan.move;
+    if (!(IS_RATE(tb->now.override_q57) && tb->now.slope_q56 == way->slope)) {
         return 0;
     }
-    if (!rate_moves(m)) {
+    if (!override_ramp_moves(m)) {
         return way->slope == 0 && way->fall == 0 && way->ahead == 0;
     }
-    return m->rest_q57 == tb->now.rate_q57 + way->fall && IS_RATE(end_of(tb, way)) &&
+    return m->end_q57 == tb->now.override_q57 + way->fall && IS_RATE(end_of(tb, way)) &&
            m->rise <= MOST_HALF && m->fall <= MOST_HALF && m->rise + m->fall <= MOST_HALF &&
            along(way->slope, m->step_q56) && along(way->fall, m->step_q56) &&
            along(way->ahead, m->step_q56);
@@ -120,36 +120,36 @@ static int is_way(const struct timebase *tb, const struct way *way)
 
 static int task_is_sound(const struct timebase *tb)
 {
-    const struct rate_plan *plan = &tb->plan;
+    const struct override_plan *plan = &tb->plan;
     int above = rate_plan_from(tb) > tb->least_q57;
-    int64_t aim = plan->task == RATE_TASK_BEGIN ? plan->goal_q57 : plan->target_q57;
-    if (plan->task == RATE_TASK_NONE) {
+    int64_t aim = plan->task == OVERRIDE_BEGINS ? plan->goal_q57 : plan->target_q57;
+    if (plan->task == OVERRIDE_DECIDES) {
         return 1;
     }
-    if ((rate_moves(&plan->move) && plan->kind != RATE_SETTLE) || !IS_RATE(aim) ||
-        plan->wanted_q57 < 0 || (plan->task == RATE_TASK_BEGIN && !IS_TICKS(&plan->ticks))) {
+    if ((override_ramp_moves(&plan->move) && plan->kind != OVERRIDE_SETTLE) || !IS_RATE(aim) ||
+        plan->wanted_q57 < 0 || (plan->task == OVERRIDE_BEGINS && !IS_TICKS(&plan->ticks))) {
         return 0;
     }
     switch (plan->kind) {
-    case RATE_STAY:
-        return above && plan->task == RATE_TASK_SEARCH;
-    case RATE_LEAVE:
+    case OVERRIDE_STAY:
+        return above && plan->task == OVERRIDE_SEARCHES;
+    case OVERRIDE_RETURN:
         return above && aim <= tb->least_q57;
-    case RATE_SETTLE:
+    case OVERRIDE_SETTLE:
         return !above && aim <= tb->least_q57;
     default:
-        return plan->task == RATE_TASK_SEARCH || IS_TICKS(&plan->back);
+        return plan->task == OVERRIDE_SEARCHES || IS_TICKS(&plan->back);
     }
 }
 
 /* Above the least factor the way back is known. */
 static int is_sound(const struct timebase *tb, const struct way *way)
 {
-    const struct rate_plan *plan = &tb->plan;
-    int above = tb->now.rate_q57 > tb->least_q57 || end_of(tb, way) > tb->least_q57;
-    return is_way(tb, way) && task_is_sound(tb) && plan->task <= RATE_TASK_BEGIN &&
-           plan->kind <= RATE_CLIMB && plan->window <= RATE_WINDOWS && plan->wanted_q57 >= -1 &&
-           plan->wanted_q57 <= RATE_MOST && (!above || IS_TICKS(&plan->back));
+    const struct override_plan *plan = &tb->plan;
+    int above = tb->now.override_q57 > tb->least_q57 || end_of(tb, way) > tb->least_q57;
+    return is_way(tb, way) && task_is_sound(tb) && plan->task <= OVERRIDE_BEGINS &&
+           plan->kind <= OVERRIDE_CLIMB && plan->window <= OVERRIDE_WINDOWS && plan->wanted_q57 >= -1 &&
+           plan->wanted_q57 <= OVERRIDE_MOST && (!above || IS_TICKS(&plan->back));
 }
 
 static void any_timebase(struct timebase *tb, struct way *way)
@@ -158,11 +158,11 @@ static void any_timebase(struct timebase *tb, struct way *way)
     tb->least_q57 = (int64_t)tb->least.factor_q14 << 43;
     assume(IS_RATE(tb->override_q57));
     assume(tb->state <= TIMEBASE_HELD);
-    assume(IS_RATE(tb->now.rate_q57));
-    way->slope = any_between(-RATE_MOST, RATE_MOST);
-    way->fall = any_between(-RATE_MOST, RATE_MOST);
-    way->ahead = any_between(-RATE_MOST, RATE_MOST);
-    assume(tb->plan.move.step_q56 >= -RATE_MOST && tb->plan.move.step_q56 <= RATE_MOST);
+    assume(IS_RATE(tb->now.override_q57));
+    way->slope = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);
+    way->fall = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);
+    way->ahead = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);
+    assume(tb->plan.move.step_q56 >= -OVERRIDE_MOST && tb->plan.move.step_q56 <= OVERRIDE_MOST);
     assume(is_sound(tb, way));
 }
 

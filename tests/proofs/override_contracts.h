@@ -6,17 +6,17 @@
 #ifndef HODOGRAPH_RATE_CONTRACTS_H
 #define HODOGRAPH_RATE_CONTRACTS_H
 
-#include "core/rate.h"
-#include "core/rate_pace.h"
+#include "core/override_ramp.h"
+#include "core/override_ramp.h"
 
 #define MOST_HALF ((uint32_t)1 << 28) /* ticks of half a way: 2^27 and 1 for the slowest bounds */
 #define MOST_SPAN ((uint64_t)1 << 57)
 
 #define IS_PERIOD(us) ((us) == 1000 || (us) == 2000 || (us) == 4000 || (us) == 8000)
 #define IS_FACTOR(f)  (0x4000 <= (f) && (f) <= 0x8000) /* q14 */
-#define IS_RATE(q57)  (0 <= (q57) && (q57) <= RATE_MOST)
+#define IS_RATE(q57)  (0 <= (q57) && (q57) <= OVERRIDE_MOST)
 #define IS_TICKS(t)   (1 <= (t)->rise && (t)->rise <= (t)->half && (t)->half <= MOST_HALF)
-#define IS_PACE(p)                                                                                 \
+#define IS_LIMITS(p)                                                                                 \
     ((p)->turns >= 1 && (p)->inverse_slope <= 0x80000001 && (p)->inverse_root <= 0x80040000)
 #define IS_STAGE(s) (IS_RATE((s)->goal_q57) && (s)->level < PROGRAM_LEVELS)
 
@@ -30,31 +30,31 @@ void program_piece_override(const struct program *p, uint32_t i, struct program_
 /*@ requires first < p->header.piece_count && count > 0;
     assigns *out \from first, count;
     ensures \initialized(out) && IS_FACTOR(out->factor_q14); */
-void rate_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
+void override_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
                     uint32_t count);
 
 /*@ requires \initialized(bounds) && level < PROGRAM_LEVELS && period_log2 <= 3;
     assigns *out \from *bounds, level, period_log2;
-    ensures \initialized(out) && IS_PACE(out); */
-void rate_pace_of(struct rate_pace *out, const struct program_override *bounds, uint32_t level,
+    ensures \initialized(out) && IS_LIMITS(out); */
+void override_limits_of(struct ramp_limits *out, const struct program_override *bounds, uint32_t level,
                   uint32_t period_log2);
 
 /* Of this and the next, cbmc_ticks.c shows what compares two numbers: rise <= half, twice a step <= the way. */
-/*@ requires \initialized(pace) && IS_PACE(pace) && IS_RATE(way_q57);
+/*@ requires \initialized(pace) && IS_LIMITS(pace) && IS_RATE(way_q57);
     assigns *ticks \from *pace, way_q57;
     ensures \initialized(ticks) && 1 <= ticks->rise && 1 <= ticks->half <= MOST_HALF; */
-void rate_ticks_of(struct rate_ticks *ticks, const struct rate_pace *pace, int64_t way_q57);
+void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *pace, int64_t way_q57);
 
 /*@ requires 1 <= ticks->rise <= MOST_HALF && 1 <= ticks->half <= MOST_HALF && IS_RATE(way_q57);
     assigns \result \from *ticks, way_q57;
-    ensures 0 <= \result <= RATE_ONE; */
-int64_t rate_step_of(const struct rate_ticks *ticks, int64_t way_q57);
+    ensures 0 <= \result <= OVERRIDE_ONE; */
+int64_t override_step_of(const struct ramp_ticks *ticks, int64_t way_q57);
 
 /*@ requires 1 <= ticks->rise <= MOST_HALF && 1 <= ticks->half <= MOST_HALF;
     requires IS_RATE(mean_q57) && 0 < period_q32_s <= (1 << 26);
     assigns \result \from *ticks, mean_q57, period_q32_s;
     ensures \result <= MOST_SPAN; */
-uint64_t rate_span_q32(const struct rate_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s);
+uint64_t override_span_q32(const struct ramp_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s);
 
 #endif
 

@@ -6,18 +6,18 @@
  * prover: eva
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
- * instead: core/timebase_step.c: timebase_find_piece(tb, time_q42_s, TIMEBASE_MOST_ENDS); => (void)timebase_find_piece;
- * assumes: qmath_div_u64 program_piece_duration rate_bounds_of rate_plan_reset rate_plan_move rate_plan_decide rate_plan_steady
- * shows: rate_window_get
- * mutant: core/rate_window.c: behind < left ? behind : left => behind
- * mutant: core/rate_window.c: last + 1u - tb->piece => last - tb->piece
- * mutant: core/timebase.c: percent < TIMEBASE_MOST_PERCENT ? percent => percent < 2 * TIMEBASE_MOST_PERCENT ? percent
- * mutant: core/timebase_change.c: 3 * tb->now.rate_q57 => 64 * tb->now.rate_q57
+ * instead: core/program_clock.c: timebase_find_piece(tb, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)timebase_find_piece;
+ * assumes: qmath_div_u64 program_piece_duration override_bounds_of rate_plan_reset rate_plan_move rate_plan_decide rate_plan_steady
+ * shows: override_window_get
+ * mutant: core/override_plan.c: behind < left ? behind : left => behind
+ * mutant: core/override_plan.c: last + 1u - tb->piece => last - tb->piece
+ * mutant: core/program_clock.c: percent < TIMEBASE_MOST_PERCENT ? percent => percent < 2 * TIMEBASE_MOST_PERCENT ? percent
+ * mutant: core/override_plan.c: 3 * tb->now.override_q57 => 64 * tb->now.override_q57
  */
-#include "core/timebase.h"
+#include "core/override_plan.h"
 #include "proof.h"
 #include "qmath_contracts.h"
-#include "rate_contracts.h"
+#include "override_contracts.h"
 
 /*@ requires i < p->header.piece_count;
     assigns \result \from i;
@@ -26,31 +26,31 @@ uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
 /*@ assigns *plan \from \nothing;
     ensures \initialized(plan); */
-void rate_plan_reset(struct rate_plan *plan);
+void rate_plan_reset(struct override_plan *plan);
 
 /*@ predicate is_timebase(struct timebase *tb) =
-      IS_RATE(tb->now.rate_q57) && -RATE_MOST <= tb->now.slope_q56 <= RATE_MOST && IS_RATE(tb->override_q57) &&
-      RATE_ONE <= tb->least_q57 <= RATE_MOST && tb->state <= TIMEBASE_HELD; */
+      IS_RATE(tb->now.override_q57) && -OVERRIDE_MOST <= tb->now.slope_q56 <= OVERRIDE_MOST && IS_RATE(tb->override_q57) &&
+      OVERRIDE_ONE <= tb->least_q57 <= OVERRIDE_MOST && tb->state <= TIMEBASE_HELD; */
 
 /*@ requires is_timebase(tb);
-    assigns \result, tb->plan \from tb->now.rate_q57;
-    ensures -RATE_MOST <= \result <= RATE_MOST; */
+    assigns \result, tb->plan \from tb->now.override_q57;
+    ensures -OVERRIDE_MOST <= \result <= OVERRIDE_MOST; */
 int64_t rate_plan_move(struct timebase *tb);
 
 /*@ requires is_timebase(tb);
-    assigns tb->plan, tb->now.rate_q57, tb->saturated \from tb->now.rate_q57;
-    ensures IS_RATE(tb->now.rate_q57); */
+    assigns tb->plan, tb->now.override_q57, tb->saturated \from tb->now.override_q57;
+    ensures IS_RATE(tb->now.override_q57); */
 void rate_plan_decide(struct timebase *tb);
 
 /*@ requires is_timebase(tb);
-    assigns \result, tb->plan.task, tb->plan.searched, tb->saturated \from tb->now.rate_q57;
+    assigns \result, tb->plan.task, tb->plan.searched, tb->saturated \from tb->now.override_q57;
     ensures \result == 0 || \result == 1; */
 int rate_plan_steady(struct timebase *tb);
 
-#include "core/rate_window.c"
-#include "core/timebase.c"
-#include "core/timebase_change.c"
-#include "core/timebase_step.c"
+#include "core/override_plan.c"
+#include "core/program_clock.c"
+#include "core/override_plan.c"
+#include "core/program_clock.c"
 
 #define COUNT 3u
 
@@ -58,11 +58,11 @@ static uint64_t records[COUNT * sizeof(struct prepared_piece) / 8];
 
 static const struct kernel any_kernel = {.piece_size = sizeof(struct feed_piece)};
 
-/* Rates up to RATE_MOST, slopes up to a whole way: cbmc_plan.c. */
+/* Rates up to OVERRIDE_MOST, slopes up to a whole way: cbmc_plan.c. */
 static void set_rate(struct timebase *tb)
 {
-    tb->now.rate_q57 = any_between(0, RATE_MOST);
-    tb->now.slope_q56 = any_between(-RATE_MOST, RATE_MOST);
+    tb->now.override_q57 = any_between(0, OVERRIDE_MOST);
+    tb->now.slope_q56 = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);
 }
 
 static uint32_t any_period(void)
@@ -100,8 +100,8 @@ static void place(struct timebase *tb, uint32_t i)
     if (p->prepared_for != NULL) {
         tb->record = prepared_piece_at(p, p->prepared_for, i);
     }
-    tb->rest = (uint32_t)any_between(0, TIMEBASE_REST_UNIT - 1);
-    tb->fine = (uint32_t)any_between(0, (1 << TIMEBASE_FINE_BITS) - 1);
+    tb->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    tb->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     tb->state = (uint32_t)any_between(0, 5);
     tb->steady = (uint32_t)any_between(0, 1);
     tb->started = (uint32_t)any_between(0, 1);
@@ -109,10 +109,10 @@ static void place(struct timebase *tb, uint32_t i)
 
 static void look_ahead(const struct timebase *tb)
 {
-    struct rate_window w;
+    struct override_window w;
     //@ loop unroll 5;
-    for (uint32_t window = 0; window < RATE_WINDOWS; window++) {
-        rate_window_get(&w, tb, window);
+    for (uint32_t window = 0; window < OVERRIDE_WINDOWS; window++) {
+        override_window_get(&w, tb, window);
         const struct program_override bounds = *w.bounds;
         prove(IS_FACTOR(bounds.factor_q14));
     }
@@ -156,7 +156,7 @@ int main(void)
     for (uint32_t i = 0; i < COUNT; i++) {
         struct prepared_piece *record = (void *)prepared_piece_at(&p, &any_kernel, i);
         record->end_q32_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(1, POWER(54));
-        for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
+        for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
             record->ahead[k] = any_bounds();
         }
     }
