@@ -7,7 +7,7 @@
 
 #define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
 #define NOWHERE UINT32_MAX
-#define EARLY   8u /* ticks before a rest in which the next ramp is looked for */
+#define EARLY   16u /* ticks before a rest in which the next ramp is looked for */
 /* Half of a ramp above everywhere_q57: it leaves less than OVERRIDE_SPARE. */
 #define MOST_TICKS ((uint32_t)1 << 18)
 /* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the rest. */
@@ -123,57 +123,14 @@ static uint64_t margin_q32(const struct override_plan *plan, const struct progra
     return qmath_product_unsigned(MARGIN + 2u * plan->ramp.fall, clock->period_q32_s);
 }
 
-/* End and ticks of the first stage to the target, inside these bounds. */
-static void plan_stage(struct override_plan *plan, const struct program_override *bounds,
-                       uint32_t period_log2)
-{
-    const int64_t from_q57 = next_rest(plan);
-    struct ramp_stage stage;
-    struct ramp_limits limits;
-    override_stage_of(&stage, bounds, from_q57, plan->target_q57);
-    override_limits_of(&limits, bounds, stage.level, period_log2);
-    override_ticks_of(&plan->ticks, &limits, qmath_magnitude(stage.end_q57 - from_q57));
-    plan->stage_q57 = stage.end_q57;
-}
-
-/* A ramp that ends where the override may stay: inside the window. */
-static int fits(struct override_plan *plan, const struct program_clock *clock,
-                const struct override_window *w)
-{
-    plan_stage(plan, w->bounds, clock->period_log2);
-    const int64_t mean_q57 = (plan->stage_q57 + next_rest(plan)) / 2;
-    const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
-    return (clock->time_q42_s >> 10) + span + margin_q32(plan, clock) <= w->end_q32_s;
-}
-
-static int returns(struct override_plan *plan, const struct program_clock *clock,
-                   const struct override_window *w)
-{
-    return factor_q57(w) >= plan->now.override_q57 && fits(plan, clock, w) &&
-           plan->ticks.half < MOST_TICKS;
-}
-
-/* Until when an override above everywhere_q57 may last: the ramp back, at most at this override, ends inside the window.
- * 0: not at all. */
-static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock,
-                          const struct override_window *w, int64_t change_q57, int64_t high_q57,
-                          struct ramp_ticks *ticks)
-{
-    struct ramp_limits limits;
-    override_limits_of(&limits, w->bounds, PROGRAM_LEVEL_FULL, clock->period_log2);
-    override_ticks_of(ticks, &limits, change_q57);
-    const uint64_t span =
-        override_span_q32(ticks, high_q57, clock->period_q32_s) + margin_q32(plan, clock);
-    return ticks->half < MOST_TICKS && span < w->end_q32_s ? w->end_q32_s - span : 0;
-}
-
-/* --- A search: a window in a tick, the narrowest first --- */
+/* --- A search: windows, the narrowest first, each in four ticks --- */
 
 static void begin_search(struct override_plan *plan, enum override_kind kind, int64_t target_q57)
 {
     plan->task = OVERRIDE_SEARCHES;
     plan->kind = kind;
     plan->target_q57 = target_q57;
+    plan->step = OVERRIDE_LOOKS;
     plan->window = 0;
 }
 
@@ -182,7 +139,7 @@ static void go_back(struct override_plan *plan)
 {
     plan->ticks = plan->back;
     plan->kind = OVERRIDE_RETURN;
-    plan->stage_q57 = plan->everywhere_q57 - OVERRIDE_SPARE;
+    plan->stage.end_q57 = plan->everywhere_q57 - OVERRIDE_SPARE;
     plan->task = OVERRIDE_BEGINS;
 }
 
@@ -202,94 +159,147 @@ static void give_up(struct override_plan *plan)
     }
 }
 
-/* The present override, for longer than is known. */
-static void stay(struct override_plan *plan, const struct program_clock *clock,
-                 const struct override_window *w)
+/* Whether a ramp up to an override above everywhere_q57 is worth it, and allowed in the window: then `target_q57` is it. */
+static int may_climb(struct override_plan *plan)
 {
-    struct ramp_ticks ticks;
     const int64_t now_q57 = plan->now.override_q57;
-    if (factor_q57(w) < now_q57) {
-        give_up(plan);
-        return;
-    }
-    const int64_t change_q57 = now_q57 - plan->everywhere_q57 + OVERRIDE_SPARE;
-    const uint64_t by_q32_s = return_by(plan, clock, w, change_q57, now_q57, &ticks);
-    if (by_q32_s > plan->return_q32_s) {
-        plan->return_q32_s = by_q32_s;
-        plan->back = ticks;
+    const int64_t factor = factor_q57(&plan->ahead);
+    plan->target_q57 = qmath_lesser(plan->wanted_q57, factor);
+    return now_q57 <= factor && plan->target_q57 > plan->everywhere_q57 + OVERRIDE_SPARE &&
+           qmath_magnitude(plan->target_q57 - now_q57) > OVERRIDE_SPARE;
+}
+
+/* What the window allows, for an override above everywhere_q57. */
+static void check_factor(struct override_plan *plan)
+{
+    if (plan->kind == OVERRIDE_CLIMB) {
+        if (!may_climb(plan)) {
+            give_up(plan);
+        }
+    } else if (factor_q57(&plan->ahead) < plan->now.override_q57) {
+        if (plan->kind == OVERRIDE_STAY) {
+            give_up(plan);
+        } else {
+            plan->step = OVERRIDE_LOOKS;
+        }
     }
 }
 
-/* A ramp to an override above everywhere_q57, for which the window has the time of the ramp back too. The same ticks are
- * enough for both. */
-static void climb(struct override_plan *plan, const struct program_clock *clock,
-                  const struct override_window *w)
+/* The next window. Behind the last, below everywhere_q57, the least bounds of the program, which always do. */
+static void look(struct override_plan *plan, const struct program_clock *clock)
 {
-    const int64_t now_q57 = plan->now.override_q57;
-    const int64_t factor = factor_q57(w);
-    struct ramp_stage stage;
-    const int64_t end_q57 = qmath_lesser(plan->wanted_q57, factor);
-    const int64_t high_q57 = qmath_greater(end_q57, now_q57);
-    const int64_t change_q57 = qmath_magnitude(end_q57 - now_q57);
-    override_stage_of(&stage, w->bounds, now_q57, end_q57);
-    if (high_q57 > factor || end_q57 <= plan->everywhere_q57 + OVERRIDE_SPARE ||
-        change_q57 <= OVERRIDE_SPARE || stage.end_q57 != end_q57) {
+    plan->step = OVERRIDE_STAGES;
+    if (plan->window < OVERRIDE_WINDOWS) {
+        override_window_get(&plan->ahead, clock, plan->window);
+        plan->window++;
+        if (plan->kind != OVERRIDE_SETTLE) {
+            check_factor(plan);
+        }
+    } else if (plan->kind == OVERRIDE_SETTLE) {
+        plan->ahead.bounds = &plan->everywhere;
+        plan->ahead.end_q32_s = UINT64_MAX;
+    } else {
         give_up(plan);
+    }
+}
+
+/* How far one ramp may go with the bounds of the window. Above everywhere_q57 it goes all the way, or not at all. */
+static void find_stage(struct override_plan *plan)
+{
+    plan->step = OVERRIDE_MEASURES;
+    if (plan->kind == OVERRIDE_STAY) {
+        plan->stage.level = PROGRAM_LEVEL_FULL;
         return;
     }
-    const int64_t most_q57 =
-        qmath_greater(change_q57, high_q57 - plan->everywhere_q57 + OVERRIDE_SPARE);
-    const uint64_t by_q32_s = return_by(plan, clock, w, most_q57, high_q57, &plan->ticks);
-    /* by then, if it takes what the ramp back may take */
-    const uint64_t there_q32_s = w->end_q32_s - by_q32_s;
-    if (by_q32_s == 0 || (clock->time_q42_s >> 10) + there_q32_s > by_q32_s) {
+    override_stage_of(&plan->stage, plan->ahead.bounds, next_rest(plan), plan->target_q57);
+    if (plan->kind == OVERRIDE_CLIMB) {
+        plan->stage.level = PROGRAM_LEVEL_FULL;
+        if (plan->stage.end_q57 != plan->target_q57) {
+            give_up(plan);
+        }
+    }
+}
+
+/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above everywhere_q57 the ramp
+ * back. */
+static int64_t change_q57(const struct override_plan *plan, int64_t from_q57)
+{
+    const int64_t back_q57 = plan->high_q57 - plan->everywhere_q57 + OVERRIDE_SPARE;
+    const int64_t ramp_q57 = qmath_magnitude(plan->stage.end_q57 - from_q57);
+    if (plan->kind == OVERRIDE_STAY) {
+        return back_q57;
+    }
+    return plan->kind == OVERRIDE_CLIMB ? qmath_greater(ramp_q57, back_q57) : ramp_q57;
+}
+
+/* How long the ramp takes. */
+static void measure(struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t from_q57 = next_rest(plan);
+    struct ramp_limits limits;
+    plan->step = OVERRIDE_FITS;
+    plan->high_q57 = from_q57;
+    if (plan->kind == OVERRIDE_CLIMB) {
+        plan->high_q57 = qmath_greater(plan->stage.end_q57, from_q57);
+    }
+    override_limits_of(&limits, plan->ahead.bounds, plan->stage.level, clock->period_log2);
+    override_ticks_of(&plan->ticks, &limits, change_q57(plan, from_q57));
+}
+
+/* A ramp to the end of the stage ends, where the override may stay, inside the window. */
+static int fits(const struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t mean_q57 = (plan->stage.end_q57 + plan->high_q57) / 2;
+    const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
+    return (clock->time_q42_s >> 10) + span + margin_q32(plan, clock) <= plan->ahead.end_q32_s &&
+           (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
+}
+
+/* Until when an override above everywhere_q57 may last: the ramp back, at most at this override, ends inside the window.
+ * 0: not at all. */
+static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock)
+{
+    const uint64_t span = margin_q32(plan, clock) +
+                          override_span_q32(&plan->ticks, plan->high_q57, clock->period_q32_s);
+    const uint64_t end_q32_s = plan->ahead.end_q32_s;
+    return plan->ticks.half < MOST_TICKS && span < end_q32_s ? end_q32_s - span : 0;
+}
+
+/* The present override stays, for longer than is known; or a ramp up begins, for which the window has the time of the ramp
+ * back too. */
+static void fit_above(struct override_plan *plan, const struct program_clock *clock)
+{
+    const uint64_t by_q32_s = return_by(plan, clock);
+    const int stays = plan->kind == OVERRIDE_STAY;
+    /* by then, if the ramp up takes what the ramp back may take */
+    const uint64_t there_q32_s = plan->ahead.end_q32_s - by_q32_s;
+    if (stays ? by_q32_s <= plan->return_q32_s
+              : by_q32_s == 0 || (clock->time_q42_s >> 10) + there_q32_s > by_q32_s) {
         return;
     }
-    plan->stage_q57 = end_q57;
     plan->return_q32_s = by_q32_s;
     plan->back = plan->ticks;
-    plan->saturated = end_q57 < plan->wanted_q57;
-    plan->task = OVERRIDE_BEGINS;
+    if (!stays) {
+        plan->saturated = plan->stage.end_q57 < plan->wanted_q57;
+        plan->task = OVERRIDE_BEGINS;
+    }
 }
 
 void override_plan_search(struct override_plan *plan, const struct program_clock *clock)
 {
-    struct override_window w;
-    override_window_get(&w, clock, plan->window);
-    plan->window++;
-    switch (plan->kind) {
-    case OVERRIDE_STAY:
-        stay(plan, clock, &w);
-        break;
-    case OVERRIDE_CLIMB:
-        climb(plan, clock, &w);
-        break;
-    case OVERRIDE_RETURN:
-        plan->task = returns(plan, clock, &w) ? OVERRIDE_BEGINS : OVERRIDE_SEARCHES;
-        break;
-    default:
-        plan->task = fits(plan, clock, &w) ? OVERRIDE_BEGINS : OVERRIDE_SEARCHES;
-        break;
-    }
-}
-
-/* There is no further window. Below everywhere_q57 the least bounds of the program will always do. */
-static void end_search(struct override_plan *plan, const struct program_clock *clock)
-{
-    if (plan->kind == OVERRIDE_SETTLE) {
-        plan_stage(plan, &plan->everywhere, clock->period_log2);
-        plan->task = OVERRIDE_BEGINS;
+    if (plan->step == OVERRIDE_LOOKS) {
+        look(plan, clock);
+    } else if (plan->step == OVERRIDE_STAGES) {
+        find_stage(plan);
+    } else if (plan->step == OVERRIDE_MEASURES) {
+        measure(plan, clock);
     } else {
-        give_up(plan);
-    }
-}
-
-static void search_on(struct override_plan *plan, const struct program_clock *clock)
-{
-    if (plan->window < OVERRIDE_WINDOWS) {
-        override_plan_search(plan, clock);
-    } else {
-        end_search(plan, clock);
+        plan->step = OVERRIDE_LOOKS;
+        if (plan->kind == OVERRIDE_STAY || plan->kind == OVERRIDE_CLIMB) {
+            fit_above(plan, clock);
+        } else if (fits(plan, clock)) {
+            plan->task = OVERRIDE_BEGINS;
+        }
     }
 }
 
@@ -297,7 +307,7 @@ static void search_on(struct override_plan *plan, const struct program_clock *cl
 
 static void begin_ramp(struct override_plan *plan, int64_t step_q56)
 {
-    const int down = plan->stage_q57 < plan->now.override_q57;
+    const int down = plan->stage.end_q57 < plan->now.override_q57;
     override_ramp_begin(&plan->ramp, plan->now.override_q57, &plan->ticks,
                         down ? -step_q56 : step_q56);
     if (plan->kind == OVERRIDE_SETTLE && plan->window > 1) { /* not inside the present piece */
@@ -319,7 +329,7 @@ static void decide_below(struct override_plan *plan, int64_t wanted_q57)
     } else if (qmath_magnitude(change_q57) <= SMALL) {
         plan->ticks = SHORTEST;
         plan->kind = OVERRIDE_SETTLE;
-        plan->stage_q57 = wanted_q57;
+        plan->stage.end_q57 = wanted_q57;
         begin_ramp(plan, qmath_magnitude(change_q57) / 2);
     } else {
         begin_search(plan, OVERRIDE_SETTLE, wanted_q57);
@@ -350,10 +360,10 @@ static void tick_of_decision(struct override_plan *plan, const struct program_cl
         go_back(plan);
     }
     if (plan->task == OVERRIDE_BEGINS) {
-        const int64_t change_q57 = qmath_magnitude(plan->stage_q57 - plan->now.override_q57);
+        const int64_t change_q57 = qmath_magnitude(plan->stage.end_q57 - plan->now.override_q57);
         begin_ramp(plan, override_step_of(&plan->ticks, change_q57));
     } else if (plan->task == OVERRIDE_SEARCHES) {
-        search_on(plan, clock);
+        override_plan_search(plan, clock);
     } else {
         decide(plan, clock);
     }
@@ -399,7 +409,7 @@ static void search_early(struct override_plan *plan, const struct program_clock 
         return;
     }
     if (plan->task == OVERRIDE_SEARCHES) {
-        search_on(plan, clock);
+        override_plan_search(plan, clock);
     } else if (plan->task == OVERRIDE_DECIDES &&
                qmath_magnitude(wanted_q57 - ramp->end_q57) > SMALL) {
         begin_search(plan, OVERRIDE_SETTLE, wanted_q57);

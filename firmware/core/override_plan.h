@@ -3,7 +3,7 @@
  * The plan of the feed override: which ramp comes next on the way to the override that is commanded, and a tick of it.
  *
  * One ramp at a time is decided, from rest to rest, by look-ahead into the feed pieces that it will run into. The decision
- * is spread over the ticks before it, one look-ahead in a tick. Up to `everywhere_q57`, the override that all pieces of
+ * is spread over the ticks before it, one step of a search in a tick. Up to `everywhere_q57`, the override that all pieces of
  * the program allow, the override may rest for as long as it likes. Above it a ramp back is known before a ramp up begins,
  * and when it has to begin (docs/numerics.md section 12, "One move at a time" and "Windows").
  *
@@ -31,6 +31,21 @@ enum override_kind {
     OVERRIDE_CLIMB,  /* a ramp to an override above it */
 };
 
+/* The steps of a search, one in a tick. */
+enum override_search {
+    OVERRIDE_LOOKS,    /* at the next window of pieces: what it allows, */
+    OVERRIDE_STAGES,   /* how far one ramp may go with that, */
+    OVERRIDE_MEASURES, /* how long that ramp takes, */
+    OVERRIDE_FITS,     /* and whether it ends inside the window */
+};
+
+/* Look-ahead: the pieces from one on, as many as the window has, or to the end of the program. */
+struct override_window {
+    const struct program_override *bounds; /* least of all pieces in it */
+    uint64_t end_q32_s;                    /* UINT64_MAX with the last piece */
+    struct program_override own;           /* `bounds` of a program without prepared records */
+};
+
 /* Contents private, but for `now` and `saturated`. */
 struct override_plan {
     struct override_state now;
@@ -42,16 +57,19 @@ struct override_plan {
     int64_t everywhere_q57;             /* greatest override that all pieces allow, */
     struct program_override everywhere; /* and their least bounds */
     struct override_ramp ramp;
-    uint32_t task;           /* of the next tick at rest, enum override_task */
-    uint32_t kind;           /* of the ramp that is on its way or looked for, enum override_kind */
-    uint32_t window;         /* looked at next */
-    uint32_t searched;       /* last search above everywhere_q57 began in this piece */
-    int64_t wanted_q57;      /* what the decision is made for: commanded, or 0 */
-    int64_t target_q57;      /* what is looked for, */
-    int64_t stage_q57;       /* where the next ramp on the way there ends, */
-    struct ramp_ticks ticks; /* and its ticks */
-    uint64_t return_q32_s;   /* above everywhere_q57: a ramp back is known, if it begins by then, */
-    struct ramp_ticks back;  /* and its ticks */
+    uint32_t task;   /* of the next tick at rest, enum override_task */
+    uint32_t kind;   /* of the ramp that is on its way or looked for, enum override_kind */
+    uint32_t step;   /* of the search, enum override_search */
+    uint32_t window; /* looked at next, */
+    struct override_window ahead; /* and the one looked at */
+    uint32_t searched;            /* last search above everywhere_q57 began in this piece */
+    int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
+    int64_t target_q57;           /* what is looked for, */
+    struct ramp_stage stage;      /* where the next ramp on the way there ends, */
+    struct ramp_ticks ticks;      /* and its ticks */
+    int64_t high_q57;             /* greatest override on it */
+    uint64_t return_q32_s;  /* above everywhere_q57: a ramp back is known, if it begins by then, */
+    struct ramp_ticks back; /* and its ticks */
 };
 
 /* For a program at rest, commanded 100 %. Reads all pieces: main loop. */
@@ -81,17 +99,8 @@ uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *cl
 /* Part of it: a tick that is neither steady nor the first. */
 void override_plan_change(struct override_plan *plan, struct program_clock *clock);
 
-/* Part of it: looks for what is looked for in the next window; there is one. */
+/* Part of it: one step of a search. */
 void override_plan_search(struct override_plan *plan, const struct program_clock *clock);
-
-/* --- Look-ahead --- */
-
-/* The pieces from one on, as many as a window has, or to the end of the program. */
-struct override_window {
-    const struct program_override *bounds; /* least of all pieces in it */
-    uint64_t end_q32_s;                    /* UINT64_MAX with the last piece */
-    struct program_override own;           /* `bounds` of a program without prepared records */
-};
 
 /* The window of this number (below OVERRIDE_WINDOWS) from the present piece of the clock on. Constant time with prepared
  * records (core/prepared.h), else it looks at each piece. */
