@@ -208,6 +208,7 @@ static void find_stage(struct override_plan *plan)
 {
     plan->step = OVERRIDE_MEASURES;
     if (plan->kind == OVERRIDE_STAY) {
+        plan->stage.end_q57 = plan->now.override_q57;
         plan->stage.level = PROGRAM_LEVEL_FULL;
         return;
     }

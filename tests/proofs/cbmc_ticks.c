@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A way has no more ticks of rise than of half, whatever the products of override_ticks_of are, so `even` is not negative; and
- * a step is a half of its way at most.
+ * A ramp has no more ticks of rise than of half, whatever the products of override_ticks_of are, so `even` is not negative; and
+ * a step is a half of its change at most.
  *
  * prover: cbmc
  * replaces: qmath_product_unsigned:some_product qmath_div_u64:some_quotient
@@ -34,15 +34,15 @@ uint64_t some_quotient(uint64_t a, uint64_t b)
 
 void harness(void)
 {
-    struct ramp_limits pace;
+    struct ramp_limits limits;
     struct ramp_ticks ticks;
-    int64_t way_q57 = any_between(0, OVERRIDE_MOST);
-    assume(IS_LIMITS(&pace));
-    override_ticks_of(&ticks, &pace, way_q57);
+    int64_t change_q57 = any_between(0, OVERRIDE_MOST);
+    assume(IS_LIMITS(&limits));
+    override_ticks_of(&ticks, &limits, change_q57);
     prove(ticks.rise <= ticks.half);
     ticks.rise = nondet_uint32();
     ticks.half = nondet_uint32();
     assume(IS_TICKS(&ticks));
-    prove(override_step_of(&ticks, way_q57) <= way_q57 / 2);
+    prove(override_step_of(&ticks, change_q57) <= change_q57 / 2);
     reached();
 }

@@ -1,54 +1,55 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A tick of the timebase, for any program of three pieces, with records and without, wherever its time is and after any
- * command: nothing overflows, no window asks for what is behind the last piece. The rate: cbmc_plan.c. Which piece it is in: cbmc_ends.c.
+ * A tick of the program clock and of the plan of its override, for any program of three pieces, with records and without,
+ * wherever its time is and after any command: nothing overflows, no window asks for what is behind the last piece. What the
+ * plan decides: cbmc_plan.c. Which piece the clock is in: cbmc_ends.c.
  *
  * prover: eva
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
- * instead: core/program_clock.c: timebase_find_piece(tb, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)timebase_find_piece;
- * assumes: qmath_div_u64 program_piece_duration override_bounds_of rate_plan_reset rate_plan_move rate_plan_decide rate_plan_steady
+ * instead: core/program_clock.c: find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)find_piece;
+ * assumes: qmath_div_u64 program_piece_duration override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
  * shows: override_window_get
  * mutant: core/override_plan.c: behind < left ? behind : left => behind
- * mutant: core/override_plan.c: last + 1u - tb->piece => last - tb->piece
- * mutant: core/program_clock.c: percent < TIMEBASE_MOST_PERCENT ? percent => percent < 2 * TIMEBASE_MOST_PERCENT ? percent
- * mutant: core/override_plan.c: 3 * tb->now.override_q57 => 64 * tb->now.override_q57
+ * mutant: core/override_plan.c: last + 1u - clock->piece => last - clock->piece
+ * mutant: core/override_plan.c: percent < OVERRIDE_PERCENT ? percent => percent < 2 * OVERRIDE_PERCENT ? percent
+ * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
 #include "core/override_plan.h"
+#include "override_contracts.h"
 #include "proof.h"
 #include "qmath_contracts.h"
-#include "override_contracts.h"
 
 /*@ requires i < p->header.piece_count;
     assigns \result \from i;
     ensures 0 < \result <= (1 << 54); */
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
-/*@ assigns *plan \from \nothing;
-    ensures \initialized(plan); */
-void rate_plan_reset(struct override_plan *plan);
+/*@ predicate is_plan(struct override_plan *plan) =
+      IS_OVERRIDE(plan->now.override_q57) && -OVERRIDE_MOST <= plan->now.slope_q56 <= OVERRIDE_MOST &&
+      IS_OVERRIDE(plan->commanded_q57) && OVERRIDE_ONE <= plan->everywhere_q57 <= OVERRIDE_MOST; */
 
-/*@ predicate is_timebase(struct timebase *tb) =
-      IS_RATE(tb->now.override_q57) && -OVERRIDE_MOST <= tb->now.slope_q56 <= OVERRIDE_MOST && IS_RATE(tb->override_q57) &&
-      OVERRIDE_ONE <= tb->least_q57 <= OVERRIDE_MOST && tb->state <= TIMEBASE_HELD; */
+/*@ assigns plan->now, plan->ramp, plan->steady, plan->saturated, plan->task, plan->searched, plan->wanted_q57,
+            plan->return_q32_s \from \nothing;
+    ensures plan->now.override_q57 == 0 && plan->now.slope_q56 == 0 && plan->steady == 0;
+    ensures \initialized(&plan->ramp); */
+static void come_to_rest(struct override_plan *plan);
 
-/*@ requires is_timebase(tb);
-    assigns \result, tb->plan \from tb->now.override_q57;
+/*@ requires is_plan(plan);
+    assigns \result, plan->ramp, plan->task, plan->kind, plan->step, plan->window, plan->target_q57 \from plan->now.override_q57;
     ensures -OVERRIDE_MOST <= \result <= OVERRIDE_MOST; */
-int64_t rate_plan_move(struct timebase *tb);
+static int64_t next_slope(struct override_plan *plan, const struct program_clock *clock);
 
-/*@ requires is_timebase(tb);
-    assigns tb->plan, tb->now.override_q57, tb->saturated \from tb->now.override_q57;
-    ensures IS_RATE(tb->now.override_q57); */
-void rate_plan_decide(struct timebase *tb);
+/*@ requires is_plan(plan);
+    assigns plan->ramp, plan->now.override_q57, plan->saturated, plan->task \from plan->now.override_q57;
+    ensures IS_OVERRIDE(plan->now.override_q57); */
+static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock);
 
-/*@ requires is_timebase(tb);
-    assigns \result, tb->plan.task, tb->plan.searched, tb->saturated \from tb->now.override_q57;
+/*@ requires is_plan(plan);
+    assigns \result, plan->task, plan->searched, plan->saturated, plan->steady \from plan->now.override_q57;
     ensures \result == 0 || \result == 1; */
-int rate_plan_steady(struct timebase *tb);
+static int comes_steady(struct override_plan *plan);
 
-#include "core/override_plan.c"
-#include "core/program_clock.c"
 #include "core/override_plan.c"
 #include "core/program_clock.c"
 
@@ -58,11 +59,11 @@ static uint64_t records[COUNT * sizeof(struct prepared_piece) / 8];
 
 static const struct kernel any_kernel = {.piece_size = sizeof(struct feed_piece)};
 
-/* Rates up to OVERRIDE_MOST, slopes up to a whole way: cbmc_plan.c. */
-static void set_rate(struct timebase *tb)
+/* Overrides up to OVERRIDE_MOST, slopes up to a whole change: cbmc_plan.c. */
+static void set_override(struct override_plan *plan)
 {
-    tb->now.override_q57 = any_between(0, OVERRIDE_MOST);
-    tb->now.slope_q56 = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);
+    plan->now.override_q57 = any_between(0, OVERRIDE_MOST);
+    plan->now.slope_q56 = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);
 }
 
 static uint32_t any_period(void)
@@ -70,20 +71,17 @@ static uint32_t any_period(void)
     return (uint32_t)1000 << any_between(0, 3);
 }
 
-static void command(struct timebase *tb)
+static void command(struct override_plan *plan)
 {
-    switch (any_between(0, 4)) {
+    switch (any_between(0, 3)) {
     case 0:
-        timebase_hold(tb);
+        override_plan_hold(plan);
         break;
     case 1:
-        timebase_resume(tb);
+        override_plan_release(plan);
         break;
     case 2:
-        timebase_stop(tb);
-        break;
-    case 3:
-        timebase_override(tb, (uint32_t)any_between(0, UINT32_MAX));
+        override_plan_set(plan, (uint32_t)any_between(0, UINT32_MAX));
         break;
     default:
         break;
@@ -91,28 +89,25 @@ static void command(struct timebase *tb)
 }
 
 /* In piece i: its end is beyond the present time. */
-static void place(struct timebase *tb, uint32_t i)
+static void place(struct program_clock *clock, uint32_t i)
 {
-    const struct program *p = tb->program;
-    tb->piece = i;
-    tb->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    tb->piece_end_q42_s = timebase_end_q42_s(tb, (uint64_t)any_between(0, INT64_MAX));
+    const struct program *p = clock->program;
+    clock->piece = i;
+    clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
+    clock->piece_end_q42_s = end_of_piece(clock, (uint64_t)any_between(0, INT64_MAX));
     if (p->prepared_for != NULL) {
-        tb->record = prepared_piece_at(p, p->prepared_for, i);
+        clock->record = prepared_piece_at(p, p->prepared_for, i);
     }
-    tb->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
-    tb->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
-    tb->state = (uint32_t)any_between(0, 5);
-    tb->steady = (uint32_t)any_between(0, 1);
-    tb->started = (uint32_t)any_between(0, 1);
+    clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
 }
 
-static void look_ahead(const struct timebase *tb)
+static void look_ahead(const struct program_clock *clock)
 {
     struct override_window w;
     //@ loop unroll 5;
     for (uint32_t window = 0; window < OVERRIDE_WINDOWS; window++) {
-        override_window_get(&w, tb, window);
+        override_window_get(&w, clock, window);
         const struct program_override bounds = *w.bounds;
         prove(IS_FACTOR(bounds.factor_q14));
     }
@@ -120,16 +115,20 @@ static void look_ahead(const struct timebase *tb)
 
 static void tick(const struct program *p)
 {
-    struct timebase tb;
-    timebase_begin(&tb, p, any_period());
+    struct program_clock clock;
+    struct override_plan plan;
+    program_clock_begin(&clock, p, any_period(), 0);
+    override_plan_begin(&plan, p);
+    plan.ramp.rise = (uint32_t)any_between(0, MOST_HALF);
     //@ loop unroll 3;
     for (uint32_t i = 0; i < COUNT; i++) {
-        set_rate(&tb);
-        place(&tb, i);
-        look_ahead(&tb);
-        command(&tb);
-        timebase_step_q42(&tb);
-        timebase_rate_q30(&tb);
+        set_override(&plan);
+        place(&clock, i);
+        look_ahead(&clock);
+        command(&plan);
+        plan.steady = (uint32_t)any_between(0, 1);
+        plan.started = (uint32_t)any_between(0, 1);
+        override_plan_tick(&plan, &clock);
     }
 }
 
