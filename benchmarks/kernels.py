@@ -71,7 +71,6 @@ class Core:
         ]
         subprocess.run(command, check=True)
         self.lib = ctypes.CDLL(str(target))
-        self.lib.timebase_time_q42.restype = ctypes.c_uint64
 
     def open(self, image: bytes) -> tuple[Any, Any]:
         """struct program and the buffer that it refers to."""

@@ -29,7 +29,7 @@ ENTRY = "tick"  # of setpoints.elf: motion_step and the call of it
 # What a tick does not call while nothing changes the rate; its first one, and all after the end, are plain too.
 NOT_PLAIN = {
     "plain": (
-        "timebase_change",
+        "override_plan_change",
         "feed_override_stop_tick",
         "path_brake_step",
         "interp_at_arc_length",

@@ -11,7 +11,7 @@
 #include "core/counts.h"
 #include "core/interp.h"
 #include "core/prepared.h"
-#include "core/timebase.h"
+#include "core/override_plan.h"
 
 enum { COUNTS_PER_MM = 1000000, SWITCH_TICKS = 40 };
 
@@ -41,7 +41,8 @@ int main(int argc, char **argv)
 {
     struct program p;
     struct interp it;
-    struct timebase tb;
+    struct program_clock clock;
+    struct override_plan plan;
     struct interp_point point;
     volatile int64_t sum = 0;
     unsigned long ticks = 0;
@@ -55,14 +56,15 @@ int main(int argc, char **argv)
     const uint32_t high = argc > 5 ? (uint32_t)atoi(argv[5]) : 100u;
     for (int run = atoi(argv[3]); run > 0; run--) {
         (void)interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2]));
-        timebase_begin(&tb, &p, p.header.period_us);
-        timebase_override(&tb, high);
-        for (unsigned k = 1; timebase_state(&tb) != TIMEBASE_ENDED; k++) {
+        program_clock_begin(&clock, &p, p.header.period_us, 0);
+        override_plan_begin(&plan, &p);
+        override_plan_set(&plan, high);
+        for (unsigned k = 1; clock.time_q42_s != clock.duration_q42_s; k++) {
             if (low != high && k % SWITCH_TICKS == 0) {
-                timebase_override(&tb, k % (2u * SWITCH_TICKS) == 0 ? high : low);
+                override_plan_set(&plan, k % (2u * SWITCH_TICKS) == 0 ? high : low);
             }
-            const uint64_t time_q42_s = timebase_step_q42(&tb);
-            (void)interp_at_piece(&it, tb.record, time_q42_s, &point);
+            const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
+            (void)interp_at_piece(&it, clock.record, time_q42_s, &point);
             sum += counts_from_q40_mm(point.x_q40_mm, COUNTS_PER_MM);
             sum += counts_from_q40_mm(point.y_q40_mm, COUNTS_PER_MM);
             ticks++;

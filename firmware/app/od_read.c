@@ -66,7 +66,7 @@ static uint64_t override_number(const struct machine *machine, uint8_t sub)
     case 1:
         return machine->override_percent;
     case 2:
-        return machine_on_path(machine) ? feed_override_rate_q30(feed) : 0u;
+        return machine_on_path(machine) ? feed_override_actual_q30(feed) : 0u;
     default:
         return machine_on_path(machine) && feed_override_saturated(feed) ? 1u : 0u;
     }

@@ -25,9 +25,10 @@ void feed_override_begin(struct feed_override *f, const struct program *p, uint3
                          uint64_t time_q42_s)
 {
     memset(f, 0, sizeof *f);
-    timebase_begin_at(&f->time, p, period_us, time_q42_s);
+    program_clock_begin(&f->clock, p, period_us, time_q42_s);
+    override_plan_begin(&f->plan, p);
     f->phase = PHASE_PLAN;
-    f->state = timebase_state(&f->time) == TIMEBASE_ENDED ? FEED_ENDED : FEED_RUNNING;
+    f->state = f->clock.time_q42_s == f->clock.duration_q42_s ? FEED_ENDED : FEED_RUNNING;
 }
 
 /* --- Commands --- */
@@ -37,10 +38,10 @@ static int comes_to_rest(const struct feed_override *f)
     return f->state == FEED_HOLDING || f->state == FEED_STOPPING;
 }
 
-/* Time left of the program at rate 1, us; held at 4 s. */
+/* Time left of the program at override 1, us; held at 4 s. */
 static uint32_t left_us(const struct feed_override *f)
 {
-    const uint64_t left_q42 = f->time.duration_q42_s - f->time.time_q42_s;
+    const uint64_t left_q42 = f->clock.duration_q42_s - f->clock.time_q42_s;
     return left_q42 >> 44 != 0 ? 4000000u : (uint32_t)((left_q42 >> 12) * 15625u >> 24);
 }
 
@@ -49,17 +50,17 @@ static int64_t deadline_q30(const struct feed_override *f)
 {
     const uint32_t bound_us = feed_override_bound_us(f, (enum program_stop_kind)f->kind);
     const uint64_t time_us = qmath_product_unsigned(bound_us, 6u);
-    const uint64_t ticks_q8 = qmath_div_u64(time_us << 8, 5u * f->time.period_us);
+    const uint64_t ticks_q8 = qmath_div_u64(time_us << 8, 5u * f->clock.period_us);
     return ((int64_t)ticks_q8 << 22) + SPARE_TICKS * TICK_Q30;
 }
 
 static void read_numbers(struct feed_override *f)
 {
     struct program_stop stop;
-    program_stop_get(f->time.program, f->time.piece, (enum program_stop_kind)f->kind, &stop);
-    f->numbers_piece = f->time.piece;
+    program_stop_get(f->clock.program, f->clock.piece, (enum program_stop_kind)f->kind, &stop);
+    f->numbers_piece = f->clock.piece;
     f->numbers_kind =
-        path_brake_numbers_of(&f->numbers, &stop, f->time.period_us) ? f->kind : NO_NUMBERS;
+        path_brake_numbers_of(&f->numbers, &stop, f->clock.period_us) ? f->kind : NO_NUMBERS;
 }
 
 /* A brake under way keeps the time that it had. */
@@ -83,14 +84,14 @@ void feed_override_hold(struct feed_override *f)
 void feed_override_resume(struct feed_override *f)
 {
     if (f->state == FEED_HOLDING || f->state == FEED_HELD) {
-        timebase_resume(&f->time);
+        override_plan_release(&f->plan);
         f->state = FEED_RUNNING;
     }
 }
 
 void feed_override_set(struct feed_override *f, uint32_t percent)
 {
-    timebase_override(&f->time, percent);
+    override_plan_set(&f->plan, percent);
 }
 
 static int is_over(const struct feed_override *f)
@@ -129,37 +130,37 @@ void feed_override_fault_stop(struct feed_override *f)
 
 /* --- Where the plan is --- */
 
+static uint32_t override_q30(const struct feed_override *f)
+{
+    return (uint32_t)(f->plan.now.override_q57 >> 27);
+}
+
 /* Program time that passes in a tick, in 2^-40 s per millisecond of the period. */
-static uint32_t pace_q40(const struct timebase *time)
+static uint32_t time_of_tick_q40(const struct feed_override *f)
 {
-    const uint32_t rate_q30 = (uint32_t)(time->now.rate_q57 >> 27);
-    return (uint32_t)(qmath_product_unsigned(rate_q30, MS_Q40) >> 30);
+    return (uint32_t)(qmath_product_unsigned(override_q30(f), MS_Q40) >> 30);
 }
 
-/* period_us = 1000 2^this */
-static int period_exponent(const struct timebase *time)
-{
-    return 31 - qmath_clz32(time->period_us / 1000u);
-}
-
-/* rate F' and rate^2 F'' + rate' F' as way of a tick. */
+/* With v the override: v F' and v^2 F'' + v' F' as way of a tick. */
 int feed_override_motion(const struct feed_override *f, const struct interp *it,
                          struct path_state *state, int64_t *turned_q56)
 {
-    const struct timebase *time = &f->time;
-    const int p = period_exponent(time);
-    const uint32_t pace = pace_q40(time);
+    const struct program_clock *clock = &f->clock;
+    const int p = (int)clock->period_log2;
+    const uint32_t time_q40 = time_of_tick_q40(f);
     const int64_t feed = f->point.feed_q32_mm_s;
     if (qmath_magnitude(feed) >= MOST_FEED_Q32) {
         return 0;
     }
-    const int64_t bend_q40 = interp_acceleration_q40(it, time->record, timebase_time_q42(time));
-    const int64_t even = qmath_mul_unsigned(qmath_mul_unsigned(bend_q40, pace), pace);
-    const int64_t at_rate_1 = qmath_mul_unsigned(feed * 65536, MS_Q40);
-    const int64_t turned = qmath_mul_wide(at_rate_1, (int32_t)(time->now.slope_q56 >> 26)) * 4;
+    const int64_t bend_q40 =
+        interp_acceleration_q40(it, clock->record, program_clock_time_q42(clock));
+    const int64_t even = qmath_mul_unsigned(qmath_mul_unsigned(bend_q40, time_q40), time_q40);
+    const int64_t at_override_1 = qmath_mul_unsigned(feed * 65536, MS_Q40);
+    const int64_t turned =
+        qmath_mul_wide(at_override_1, (int32_t)(f->plan.now.slope_q56 >> 26)) * 4;
     state->arc_length_q40_mm = f->point.arc_length_q40_mm;
     state->fine_q56_mm = 0;
-    state->speed_q56 = qmath_shift_clamp(qmath_mul_unsigned(feed * 65536, pace), p);
+    state->speed_q56 = qmath_shift_clamp(qmath_mul_unsigned(feed * 65536, time_q40), p);
     *turned_q56 = qmath_shift_clamp(turned, p);
     state->acceleration_q56 = qmath_shift_clamp(even, 2 * p) + *turned_q56;
     return 1;
@@ -169,9 +170,9 @@ int feed_override_motion(const struct feed_override *f, const struct interp *it,
 
 static int plan_tick(struct feed_override *f, struct interp *it)
 {
-    const uint64_t time_q42_s = timebase_step_q42(&f->time);
+    const uint64_t time_q42_s = override_plan_tick(&f->plan, &f->clock);
     const int result = it->piece != NULL
-                           ? interp_at_piece(it, f->time.record, time_q42_s, &f->point)
+                           ? interp_at_piece(it, f->clock.record, time_q42_s, &f->point)
                            : interp_at_q42(it, time_q42_s, &f->point);
     if (result == INTERP_END) {
         f->state = FEED_ENDED;
@@ -210,7 +211,7 @@ static int brake_tick(struct feed_override *f, struct interp *it)
     path_brake_step(&f->brake);
     const int result = interpolate_brake(f, it);
     if (result == INTERP_OK && path_brake_rests(&f->brake)) {
-        interp_search_begin(&f->place, f->time.record, f->time.piece, f->point.arc_length_q40_mm);
+        interp_search_begin(&f->place, f->clock.record, f->clock.piece, f->point.arc_length_q40_mm);
         come_to_rest(f, 0);
     }
     return result;
@@ -220,18 +221,18 @@ static int brake_tick(struct feed_override *f, struct interp *it)
 
 static int fits_before_end(const struct feed_override *f, const struct path_state *from)
 {
-    const int64_t left_q40_mm = f->time.program->header.length_q40_mm - from->arc_length_q40_mm;
+    const int64_t left_q40_mm = f->clock.program->header.length_q40_mm - from->arc_length_q40_mm;
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
 /* Whether any brake of the stop table would rest before the end of the path, and before the program does. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
-    const struct program_header *h = &f->time.program->header;
+    const struct program_header *h = &f->clock.program->header;
     const uint32_t way_um = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_um : h->fault_worst_um;
     const uint32_t time_us = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_us : h->fault_worst_us;
     const int64_t left_q40_mm = h->length_q40_mm - from->arc_length_q40_mm;
-    const uint64_t left_q42_s = f->time.duration_q42_s - f->time.time_q42_s;
+    const uint64_t left_q42_s = f->clock.duration_q42_s - f->clock.time_q42_s;
     return left_q40_mm >> UM_Q40_BITS >= (int64_t)way_um && left_q42_s >> US_Q42_BITS >= time_us;
 }
 
@@ -248,7 +249,7 @@ static int may_leave(struct feed_override *f, const struct path_state *state)
     return 0;
 }
 
-/* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the rate rises so fast that the jerk of the
+/* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the override rises so fast that the jerk of the
  * program's limits would have to take away more than a quarter of the deceleration first: the rise is cut instead. */
 static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
 {
@@ -267,14 +268,14 @@ static int leave_plan(struct feed_override *f, const struct path_state *state, i
     return 1;
 }
 
-/* The plan goes on for another tick. At a low rate, at which it may be long until the place of the next brake, the rate
- * goes to 0; at a high one its fall would add to the deceleration that the plan itself has. */
+/* The plan goes on for another tick. At a low override, at which it may be long until the place of the next brake, the
+ * override goes to 0; at a high one its fall would add to the deceleration that the plan itself has. */
 static void wait_slowly(struct feed_override *f)
 {
-    if (f->time.now.rate_q57 < RATE_ONE / 2) {
-        timebase_hold(&f->time);
+    if (f->plan.now.override_q57 < OVERRIDE_ONE / 2) {
+        override_plan_hold(&f->plan);
     } else {
-        timebase_rise_no_more(&f->time);
+        override_plan_rise_no_more(&f->plan);
     }
 }
 
@@ -283,9 +284,8 @@ static int leaves_or_rests(struct feed_override *f, const struct interp *it)
 {
     struct path_state state;
     int64_t turned_q56 = 0;
-    const struct timebase *time = &f->time;
     const int known = feed_override_motion(f, it, &state, &turned_q56);
-    const int rests = (time->now.rate_q57 | time->now.slope_q56) == 0;
+    const int rests = (f->plan.now.override_q57 | f->plan.now.slope_q56) == 0;
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
         come_to_rest(f, 1);
         return 1;
@@ -297,8 +297,8 @@ static int leaves_or_rests(struct feed_override *f, const struct interp *it)
  * to find out before is spread over ticks. */
 static int wait_tick(struct feed_override *f, struct interp *it)
 {
-    if (f->time.started != 0) {
-        if (f->numbers_piece != f->time.piece) {
+    if (f->plan.started != 0) {
+        if (f->numbers_piece != f->clock.piece) {
             read_numbers(f);
         }
         if (f->look == LOOK_SEEN) {
@@ -310,7 +310,7 @@ static int wait_tick(struct feed_override *f, struct interp *it)
         if (f->look != LOOK_SEEN) {
             f->look = LOOK_NOT_YET; /* what fits, fits in this tick only */
         }
-        f->left_q30 -= qmath_lesser(timebase_rate_q30(&f->time), TICK_Q30);
+        f->left_q30 -= qmath_lesser(override_q30(f), TICK_Q30);
         wait_slowly(f);
     }
     return plan_tick(f, it);
@@ -339,8 +339,9 @@ static void look_for_place(struct feed_override *f, struct interp *it)
             const struct prepared_piece *piece =
                 f->place.piece != NULL ? f->place.piece : &it->own_piece;
             f->found = 1;
-            timebase_go_from(&f->time, f->place.time_q42_s, f->place.piece_index, f->place.piece,
-                             piece->end_q32_s);
+            program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece,
+                              piece->end_q32_s);
+            override_plan_rest(&f->plan);
         }
     }
     if (f->found != 0 && f->state == FEED_RUNNING) {
@@ -388,14 +389,14 @@ int feed_override_late(const struct feed_override *f)
 
 uint64_t feed_override_time_q42(const struct feed_override *f)
 {
-    return timebase_time_q42(&f->time);
+    return program_clock_time_q42(&f->clock);
 }
 
 uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind)
 {
     struct program_stop stop;
-    const uint32_t end_us = left_us(f) + END_TICKS * f->time.period_us;
-    program_stop_get(f->time.program, f->time.piece, kind, &stop);
+    const uint32_t end_us = left_us(f) + END_TICKS * f->clock.period_us;
+    program_stop_get(f->clock.program, f->clock.piece, kind, &stop);
     return end_us > stop.bound_us && end_us / 2u < stop.bound_us ? end_us : stop.bound_us;
 }
 
@@ -406,20 +407,20 @@ int64_t feed_override_feed_q32(const struct feed_override *f)
     }
     if (f->phase == PHASE_BRAKE) {
         /* 2^-56 mm a tick in 2^-32 mm/s: 1000 / 2^24 for each ms of the period */
-        const int64_t speed = f->brake.at.speed_q56 >> period_exponent(&f->time);
+        const int64_t speed = f->brake.at.speed_q56 >> (int)f->clock.period_log2;
         return qmath_mul_unsigned(speed, 1000u << 8);
     }
     const int64_t feed = f->point.feed_q32_mm_s;
-    const uint32_t rate_q30 = timebase_rate_q30(&f->time);
-    return rate_q30 == (uint32_t)TICK_Q30 ? feed : qmath_mul_unsigned(feed, rate_q30) * 4;
+    const uint32_t now_q30 = override_q30(f);
+    return now_q30 == (uint32_t)TICK_Q30 ? feed : qmath_mul_unsigned(feed, now_q30) * 4;
 }
 
-uint32_t feed_override_rate_q30(const struct feed_override *f)
+uint32_t feed_override_actual_q30(const struct feed_override *f)
 {
-    return f->phase == PHASE_PLAN && !is_over(f) ? timebase_rate_q30(&f->time) : 0u;
+    return f->phase == PHASE_PLAN && !is_over(f) ? override_q30(f) : 0u;
 }
 
 int feed_override_saturated(const struct feed_override *f)
 {
-    return f->phase == PHASE_PLAN && timebase_saturated(&f->time);
+    return f->phase == PHASE_PLAN && f->plan.saturated != 0;
 }

@@ -3,7 +3,7 @@
  * The feed override: what the plan of a program and the commands make of the next tick. Feed hold, resume, override 0 to
  * 200 %, stop and fault stop, and a start from rest anywhere in the program. The tool never leaves the curve.
  *
- * Override and resume change the rate of program time (core/timebase): along jerk-limited curves inside the override
+ * Override and resume change the rate of program time (core/override_plan): along jerk-limited ramps inside the override
  * bounds of every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
  * (core/path_brake) from the speed and acceleration of the last setpoint, with the numbers that the stop table has for the
  * piece. Where a brake may not begin the plan goes on for another tick, and where the program ends before a brake would,
@@ -20,8 +20,9 @@
 #include <stdint.h>
 
 #include "core/interp.h"
+#include "core/override_plan.h"
 #include "core/path_brake.h"
-#include "core/timebase.h"
+#include "core/program_clock.h"
 
 enum feed_state {
     FEED_RUNNING = 0,  /* at the override, or on the way to it; also with an override of 0 */
@@ -32,11 +33,12 @@ enum feed_state {
     FEED_HELD = 5,     /* at rest until resumed */
 };
 
-#define FEED_MOST_PERCENT TIMEBASE_MOST_PERCENT
+#define FEED_MOST_PERCENT OVERRIDE_PERCENT
 
 /* Contents private: use the functions. */
 struct feed_override {
-    struct timebase time;
+    struct program_clock clock;
+    struct override_plan plan;
     struct path_brake brake;
     struct path_brake_numbers numbers; /* of the stop asked for, in this piece: */
     uint32_t numbers_piece;
@@ -50,7 +52,7 @@ struct feed_override {
     uint32_t kind;              /* enum program_stop_kind of the stop asked for */
     uint32_t replace;           /* 1: a fault stop, whose numbers the brake has not got yet */
     uint32_t found;             /* 1: `place` is */
-    int64_t left_q30;           /* ticks at rate 1 until the deadline */
+    int64_t left_q30;           /* ticks at override 1 until the deadline */
 };
 
 /* For a checked program at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.
@@ -66,7 +68,7 @@ void feed_override_hold(struct feed_override *f);
 /* Back to the override; a brake under way comes to rest first. Without effect when not holding or held. */
 void feed_override_resume(struct feed_override *f);
 
-/* Rate wanted, in per cent; more than 200 counts as 200. Kept while held. */
+/* Override wanted, in per cent; more than 200 counts as 200. Kept while held. */
 void feed_override_set(struct feed_override *f, uint32_t percent);
 
 /* To rest inside the program's limits, and to an end there: final. When the program ends first, it ends. */
@@ -85,7 +87,7 @@ int feed_override_next(struct feed_override *f, struct interp *it, struct interp
  * in which only the plan goes on can be counted without it. */
 int feed_override_stop_tick(struct feed_override *f, struct interp *it);
 
-/* Part of a tick of a stop: how the plan passes the place of its last setpoint; in *turned_q56 what the change of the rate
+/* Part of a tick of a stop: how the plan passes the place of its last setpoint; in *turned_q56 what the change of the override
  * adds to the acceleration. Returns 1, or 0 where the feed is beyond all brakes. */
 int feed_override_motion(const struct feed_override *f, const struct interp *it,
                          struct path_state *state, int64_t *turned_q56);
@@ -108,10 +110,10 @@ uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop
 /* Feed along the path, 2^-32 mm/s. */
 int64_t feed_override_feed_q32(const struct feed_override *f);
 
-/* Rate of program time, 2^30 = 1; 0 in a brake and at rest. */
-uint32_t feed_override_rate_q30(const struct feed_override *f);
+/* The override as it is, 2^30 = 1; 0 in a brake and at rest. */
+uint32_t feed_override_actual_q30(const struct feed_override *f);
 
-/* 1 while the override wanted is more than the pieces allow here, so that the rate stays below. */
+/* 1 while the override wanted is more than the pieces allow here, so that the override stays below. */
 int feed_override_saturated(const struct feed_override *f);
 
 #endif

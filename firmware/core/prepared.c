@@ -16,11 +16,11 @@ uint64_t prepared_size(const struct program *p, const struct kernel *kernel)
            (uint64_t)p->header.segment_count * prepared_segment_size(kernel);
 }
 
-static void look_ahead(struct program_override ahead[RATE_WINDOWS], const struct program *p,
+static void look_ahead(struct program_override ahead[OVERRIDE_WINDOWS], const struct program *p,
                        uint32_t i)
 {
-    for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
-        rate_bounds_of(&ahead[k], p, i, rate_window_pieces(k));
+    for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
+        override_bounds_of(&ahead[k], p, i, override_window_pieces(k));
     }
 }
 

@@ -18,16 +18,16 @@
 #include "core/kernel_double.h"
 #include "core/kernel_fixed.h"
 #include "core/kernel_float.h"
+#include "core/override_ramp.h"
 #include "core/program.h"
-#include "core/rate_pace.h"
 
 #define PREPARED_ALIGNMENT 8u /* of the first record */
 
 /* A record ends behind the kernel's own part. */
 struct prepared_piece {
     uint64_t start_q32_s;
-    uint64_t end_q32_s;                          /* of the last piece the duration */
-    struct program_override ahead[RATE_WINDOWS]; /* of the windows that begin with it */
+    uint64_t end_q32_s;                              /* of the last piece the duration */
+    struct program_override ahead[OVERRIDE_WINDOWS]; /* of the windows that begin with it */
     union {
         struct feed_piece integers;
         struct kernel_double_piece doubles;

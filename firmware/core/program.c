@@ -153,12 +153,6 @@ uint64_t program_number(uint8_t code)
     return (uint64_t)eighth_q16[code & 7u] << (code >> 3);
 }
 
-uint32_t program_level_q9(uint32_t level)
-{
-    static const uint16_t rates_q9[PROGRAM_LEVEL_FULL] = {320, 448, 488, 504, 509, 511};
-    return rates_q9[level];
-}
-
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out)
 {
     const uint8_t *b = segment_bytes(p, i);

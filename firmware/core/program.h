@@ -129,7 +129,11 @@ void program_piece_override(const struct program *p, uint32_t i, struct program_
 uint64_t program_number(uint8_t code);
 
 /* Rate of a level below the full one, 2^-9. */
-uint32_t program_level_q9(uint32_t level);
+static inline uint32_t program_level_q9(uint32_t level)
+{
+    static const uint16_t overrides_q9[PROGRAM_LEVEL_FULL] = {320, 448, 488, 504, 509, 511};
+    return overrides_q9[level];
+}
 
 /* Setpoints of the program: ceil(duration / period) + 1, with the period of the header. Needs a
  * program that passed program_check. */

@@ -130,7 +130,7 @@ int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
 int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
 
-/* Program times of n ticks from tick0 on, as the controller's timebase gives them at rate 1, in
+/* Program times of n ticks from tick0 on, as the controller's program clock gives them at override 1, in
  * 2^-42 s. */
 void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 

@@ -88,7 +88,7 @@ static int in_brake(const struct course *course)
 {
     const enum feed_state state = feed_override_state(&course->feed);
     return (state == FEED_HOLDING || state == FEED_STOPPING) &&
-           feed_override_rate_q30(&course->feed) == 0;
+           feed_override_actual_q30(&course->feed) == 0;
 }
 
 static int at_rest(const struct course *course)
@@ -153,7 +153,7 @@ static double to_rest(struct course *course, struct stop_trial *trial)
 {
     double ticks = 0.0;
     for (uint32_t i = 0; i < MOST_TICKS; i++) {
-        const double rate = ldexp((double)feed_override_rate_q30(&course->feed), -30);
+        const double rate = ldexp((double)feed_override_actual_q30(&course->feed), -30);
         if (step(course, trial) != 0) {
             return -1.0;
         }
@@ -183,7 +183,7 @@ static void one(const struct course *from, struct stop_trial *trial, uint64_t se
     const uint32_t order = below(&random, 3u);
     const enum program_stop_kind kind = order == 2 ? PROGRAM_STOP_FAULT : PROGRAM_STOP_HOLD;
     const int runs = feed_override_state(&course.feed) == FEED_RUNNING &&
-                     feed_override_rate_q30(&course.feed) != 0;
+                     feed_override_actual_q30(&course.feed) != 0;
     const double bound_s = 1e-6 * feed_override_bound_us(&course.feed, kind);
     if (order == 0) {
         feed_override_hold(&course.feed);

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The timebase looks for its piece, in a program of any three pieces, with records and without, from any of them and at
+ * The program clock looks for its piece, in a program of any three pieces, with records and without, from any of them and at
  * any time: it never asks for a piece or a record behind the last.
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
- * shows: timebase_find_piece
- * mutant: core/timebase_private.h: tb->piece + 1u == tb->program->header.piece_count => tb->piece + 2u == tb->program->header.piece_count
- * mutant: core/timebase_step.c: if (time_q42_s >= tb->duration_q42_s) { => if (time_q42_s > tb->duration_q42_s) {
- * mutant: core/timebase_private.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
+ * shows: find_piece
+ * mutant: core/program_clock.c: clock->piece + 1u == clock->program->header.piece_count => clock->piece + 2u == clock->program->header.piece_count
+ * mutant: core/program_clock.c: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
+ * mutant: core/program_clock.c: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
  */
 #include "proof.h"
 
-#include "core/timebase_step.c"
+#include "core/program_clock.c"
 
 #define COUNT 3u
 
@@ -30,35 +30,35 @@ static struct kernel kernel = {.piece_size = sizeof(struct prepared_piece) -
                                              offsetof(struct prepared_piece, feed)};
 
 /* In piece i, whose end has been reached. */
-static void place(struct timebase *tb, uint32_t i)
+static void place(struct program_clock *clock, uint32_t i)
 {
-    tb->program = &program;
-    tb->duration_q42_s = program.header.duration_q32_s << TIMEBASE_FINE;
-    tb->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    tb->rest = (uint32_t)any_between(0, TIMEBASE_REST_UNIT - 1);
-    tb->fine = (uint32_t)any_between(0, (1 << TIMEBASE_FINE_BITS) - 1);
-    tb->piece = i;
-    tb->piece_end_q42_s = timebase_end_q42_s(tb, nondet_uint64());
-    tb->record = program.prepared_for != 0 ? &records[i] : 0;
+    clock->program = &program;
+    clock->duration_q42_s = program.header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
+    clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
+    clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
+    clock->piece = i;
+    clock->piece_end_q42_s = end_of_piece(clock, nondet_uint64());
+    clock->record = program.prepared_for != 0 ? &records[i] : 0;
 }
 
 void harness(void)
 {
-    struct timebase tb;
+    struct program_clock clock;
     program.header.piece_count = COUNT;
-    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> TIMEBASE_FINE);
+    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> PROGRAM_CLOCK_Q32_TO_Q42);
     program.prepared_for = nondet_uint32() != 0 ? &kernel : 0;
     for (uint32_t k = 0; k < COUNT; k++) {
         records[k].end_q32_s = k + 1u == COUNT ? program.header.duration_q32_s : nondet_uint64();
     }
     uint32_t i = nondet_uint32();
     __CPROVER_assume(i < COUNT);
-    place(&tb, i);
-    const uint64_t time_q42_s = timebase_rounded_q42(&tb);
-    if (time_q42_s >= tb.piece_end_q42_s) {
-        pass_end(&tb, time_q42_s);
+    place(&clock, i);
+    const uint64_t time_q42_s = program_clock_time_q42(&clock);
+    if (time_q42_s >= clock.piece_end_q42_s) {
+        program_clock_pass_end(&clock, time_q42_s);
     }
-    prove(tb.piece < COUNT);
-    prove(tb.record == 0 || tb.record == &records[tb.piece]);
+    prove(clock.piece < COUNT);
+    prove(clock.record == 0 || clock.record == &records[clock.piece]);
     reached();
 }

@@ -1,67 +1,70 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rate at rest: a tick that looks for a move, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
+ * The override at rest: a tick that looks for a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
  * reset.
  *
  * prover: cbmc
  * options: --unwind 6 --signed-overflow-check
- * replaces: rate_ticks_of:some_ticks rate_step_of:some_step rate_span_q32:some_span rate_window_get:some_window rate_stage_of:some_stage rate_pace_of:some_pace
- * shows: rate_plan_decide rate_plan_reset rate_plan_steady
- * mutant: core/rate_plan.c: down ? -step_q56 : step_q56 => step_q56
- * mutant: core/rate_plan.c: tb->now.rate_q57 > tb->least_q57 ? RATE_STAY : RATE_CLIMB => RATE_STAY
- * mutant: core/rate_plan.c: magnitude(away) / 2 => magnitude(away)
- * mutant: core/rate_search.c: plan->back = plan->ticks; =>
- * mutant: core/rate_plan.c: tb->plan.window < RATE_WINDOWS => tb->plan.window <= RATE_WINDOWS
+ * replaces: override_ticks_of:some_ticks override_step_of:some_step override_span_q32:some_span override_window_get:some_window override_stage_of:some_stage override_limits_of:some_limits
+ * shows: tick_of_decision come_to_rest comes_steady
+ * mutant: core/override_plan.c: down ? -step_q56 : step_q56 => step_q56
+ * mutant: core/override_plan.c: above ? OVERRIDE_STAY : OVERRIDE_CLIMB => OVERRIDE_STAY
+ * mutant: core/override_plan.c: magnitude(change_q57) / 2 => magnitude(change_q57)
+ * mutant: core/override_plan.c: plan->back = plan->ticks; =>
+ * mutant: core/override_plan.c: plan->window < OVERRIDE_WINDOWS => plan->window <= OVERRIDE_WINDOWS
+ * mutant: core/override_plan.c: plan->step = OVERRIDE_MEASURES; => plan->step = OVERRIDE_FITS;
  */
 #include "plan_is_sound.h"
 
 /* CBMC has none for 32-bit machines. */
 void *memset(void *to, int value, size_t size)
 {
-    const struct rate_plan none = {{0, 0, 0, 0, 0}, 0, 0, 0, 0, 0, 0, 0, {0, 0}, 0, {0, 0}};
+    const struct override_ramp none = {0, 0, 0, 0, 0};
     prove(value == 0 && size == sizeof none);
-    *(struct rate_plan *)to = none;
+    *(struct override_ramp *)to = none;
     return to;
 }
 
-/* Begun at rest: 2 d rise half, of which it may leave something, is at most the way that d was made for. */
-static void begin(struct way *way, const struct rate_move *m)
+/* Begun at rest: 2 d rise half, of which it may leave something, is at most the change that d was made for. */
+static void begin(struct way *way, const struct override_ramp *r)
 {
-    prove(m->fall == 0 && m->rise <= MOST_HALF && m->even <= MOST_HALF);
-    int64_t most = begun_q57 >= 0 ? begun_q57 : 2 * qmath_magnitude(m->step_q56);
+    prove(r->fall == 0 && r->rise <= MOST_HALF && r->even <= MOST_HALF);
+    int64_t most = begun_q57 >= 0 ? begun_q57 : 2 * qmath_magnitude(r->step_q56);
     int64_t ahead = any_between(0, most);
-    way->ahead = m->step_q56 < 0 ? -ahead : m->step_q56 > 0 ? ahead : 0;
+    way->ahead = r->step_q56 < 0 ? -ahead : r->step_q56 > 0 ? ahead : 0;
 }
 
 static void at_rest(void)
 {
-    struct timebase tb;
+    struct override_plan plan;
+    struct program_clock clock;
     struct way way;
-    any_timebase(&tb, &way);
-    assume(!rate_moves(&tb.plan.move));
+    any_plan(&plan, &way);
+    assume(!override_ramp_moves(&plan.ramp));
     begun_q57 = -1;
-    if (!rate_plan_steady(&tb)) {
-        rate_plan_decide(&tb);
+    if (!comes_steady(&plan)) {
+        tick_of_decision(&plan, &clock);
     }
-    if (rate_moves(&tb.plan.move)) {
-        begin(&way, &tb.plan.move);
+    if (override_ramp_moves(&plan.ramp)) {
+        begin(&way, &plan.ramp);
     }
-    prove(is_sound(&tb, &way));
+    prove(is_sound(&plan, &way));
 }
 
-/* At time 0 the rate begins at up to 1, else at 0. */
+/* At time 0 the override begins at up to 1, else at 0. */
 static void first(void)
 {
-    struct timebase tb;
+    struct override_plan plan;
     struct way way = {0, 0, 0};
-    assume(IS_FACTOR(tb.least.factor_q14));
-    tb.least_q57 = (int64_t)tb.least.factor_q14 << 43;
-    tb.now.rate_q57 = any_between(0, RATE_ONE);
-    tb.now.slope_q56 = 0;
-    rate_plan_reset(&tb.plan);
-    int steady = rate_plan_steady(&tb);
+    assume(IS_FACTOR(plan.everywhere.factor_q14));
+    plan.everywhere_q57 = (int64_t)plan.everywhere.factor_q14 << 43;
+    assume(plan.kind <= OVERRIDE_CLIMB && plan.window <= OVERRIDE_WINDOWS);
+    come_to_rest(&plan);
+    prove(is_sound(&plan, &way));
+    plan.now.override_q57 = any_between(0, OVERRIDE_ONE);
+    int steady = comes_steady(&plan);
     prove(steady == 0 || steady == 1);
-    prove(is_sound(&tb, &way));
+    prove(is_sound(&plan, &way));
 }
 
 void harness(void)

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A way has no more ticks of rise than of half, whatever the products of rate_ticks_of are, so `even` is not negative; and
- * a step is a half of its way at most.
+ * A ramp has no more ticks of rise than of half, whatever the products of override_ticks_of are, so `even` is not negative; and
+ * a step is a half of its change at most.
  *
  * prover: cbmc
  * replaces: qmath_product_unsigned:some_product qmath_div_u64:some_quotient
- * shows: rate_ticks_of rate_step_of
- * mutant: core/rate.c: half > ticks->rise ? half => half > ticks->rise + 1u ? half
- * mutant: core/rate.c: ? half : ticks->rise => ? half : ticks->rise - 1u
- * mutant: core/rate.c: ticks->rise, ticks->half) << 1 => ticks->rise, ticks->half)
+ * shows: override_ticks_of override_step_of
+ * mutant: core/override_ramp.c: half > ticks->rise ? half => half > ticks->rise + 1u ? half
+ * mutant: core/override_ramp.c: ? half : ticks->rise => ? half : ticks->rise - 1u
+ * mutant: core/override_ramp.c: ticks->rise, ticks->half) << 1 => ticks->rise, ticks->half)
  */
 #include "proof.h"
-#include "rate_contracts.h"
+#include "override_contracts.h"
 
 uint64_t some_product(uint32_t a, uint32_t b)
 {
@@ -30,19 +30,19 @@ uint64_t some_quotient(uint64_t a, uint64_t b)
 }
 
 #include "core/qmath.c"
-#include "core/rate.c"
+#include "core/override_ramp.c"
 
 void harness(void)
 {
-    struct rate_pace pace;
-    struct rate_ticks ticks;
-    int64_t way_q57 = any_between(0, RATE_MOST);
-    assume(IS_PACE(&pace));
-    rate_ticks_of(&ticks, &pace, way_q57);
+    struct ramp_limits limits;
+    struct ramp_ticks ticks;
+    int64_t change_q57 = any_between(0, OVERRIDE_MOST);
+    assume(IS_LIMITS(&limits));
+    override_ticks_of(&ticks, &limits, change_q57);
     prove(ticks.rise <= ticks.half);
     ticks.rise = nondet_uint32();
     ticks.half = nondet_uint32();
     assume(IS_TICKS(&ticks));
-    prove(rate_step_of(&ticks, way_q57) <= way_q57 / 2);
+    prove(override_step_of(&ticks, change_q57) <= change_q57 / 2);
     reached();
 }

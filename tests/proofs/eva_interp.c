@@ -14,12 +14,12 @@
  * mutant: core/interp.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
  * mutant: core/prepared.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
  * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
- * mutant: core/rate_pace.c: first + least(count, left) => first + count
+ * mutant: core/override_ramp.c: first + least(count, left) => first + count
  */
 #include "core/ph_segment.h"
 #include "core/program.h"
 #include "proof.h"
-#include "rate_contracts.h"
+#include "override_contracts.h"
 #include "segment_bounds.h"
 
 /*@ requires i < p->header.segment_count;
@@ -58,7 +58,7 @@ void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[3]);
 #include "core/interp.c"
 #include "core/kernel.c"
 #include "core/prepared.c"
-#include "core/rate_pace.c"
+#include "core/override_ramp.c"
 
 #define COUNT 3u
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/interp.h"
 
-#include "core/timebase.h"
+#include "core/override_plan.h"
 #include "golden.h"
 #include "unity.h"
 
@@ -111,14 +111,15 @@ static void compare_kernels(void)
 {
     static struct interp floating, exact;
     struct interp_point c;
-    struct timebase tb;
+    struct program_clock clock;
+    struct override_plan plan;
     interp_begin(&it, &p, INTERP_FIXED);
     interp_begin(&floating, &p, INTERP_FLOAT);
     interp_begin(&exact, &p, INTERP_DOUBLE);
-    timebase_begin(&tb, &p, p.header.period_us);
+    program_clock_begin(&clock, &p, p.header.period_us, 0);
+    override_plan_begin(&plan, &p);
     for (uint32_t tick = 0; tick < program_ticks(&p); tick++) {
-        timebase_step(&tb);
-        uint64_t time = timebase_time_q42(&tb);
+        const uint64_t time = override_plan_tick(&plan, &clock);
         TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&it, time, &a));
         TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&floating, time, &b));
         TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&exact, time, &c));
@@ -127,7 +128,7 @@ static void compare_kernels(void)
         TEST_ASSERT_LESS_THAN_INT64(10 * NANOMETRE_Q40, distance(b.x_q40_mm, c.x_q40_mm));
         TEST_ASSERT_LESS_THAN_INT64(10 * NANOMETRE_Q40, distance(b.y_q40_mm, c.y_q40_mm));
     }
-    TEST_ASSERT_EQUAL_INT(TIMEBASE_ENDED, timebase_state(&tb));
+    TEST_ASSERT_EQUAL_UINT64(clock.duration_q42_s, clock.time_q42_s);
     TEST_ASSERT_EQUAL_INT64(p.header.length_q40_mm, a.arc_length_q40_mm);
 }
 

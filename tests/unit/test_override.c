@@ -157,17 +157,17 @@ static void check_bounds(const struct tick *k, double end_s)
 }
 
 /* A tick of the plan after one of the plan. */
-static void check_motion(const struct timebase *before)
+static void check_motion(const struct override_plan *before)
 {
     const double scale = 1.0 / 72057594037927936.0; /* 2^-56 */
     struct tick k;
-    int64_t rise = now.feed.time.now.rate_q57 - before->now.rate_q57 - before->now.slope_q56 -
-                   now.feed.time.now.slope_q56;
+    int64_t rise = now.feed.plan.now.override_q57 - before->now.override_q57 -
+                   before->now.slope_q56 - now.feed.plan.now.slope_q56;
     at_most("rate is the sum of its slopes", (double)llabs(rise), 1);
-    k.rate = (double)before->now.rate_q57 * scale / 2;
+    k.rate = (double)before->now.override_q57 * scale / 2;
     k.slope = (double)before->now.slope_q56 * scale / now.h;
     k.second =
-        (double)(now.feed.time.now.slope_q56 - before->now.slope_q56) * scale / (now.h * now.h);
+        (double)(now.feed.plan.now.slope_q56 - before->now.slope_q56) * scale / (now.h * now.h);
     k.time_s = now.time_s;
     double way = now.h * (k.rate + now.h * (k.slope / 2 + now.h * k.second / 6));
     uint64_t time = feed_override_time_q42(&now.feed);
@@ -276,8 +276,8 @@ static void tick(void)
     const struct feed_override before = now.feed;
     const int rested = at_rest();
     TEST_ASSERT_EQUAL_INT(0, feed_override_next(&now.feed, &now.interp, &now.point));
-    if (before.time.started && before.phase == PLAN && now.feed.phase == PLAN && !rested) {
-        check_motion(&before.time);
+    if (before.plan.started && before.phase == PLAN && now.feed.phase == PLAN && !rested) {
+        check_motion(&before.plan);
     }
     check_point();
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected_state(), feed_override_state(&now.feed),
@@ -300,8 +300,8 @@ static void ask(enum program_stop_kind kind)
 {
     now.asked = now.ticks;
     now.bound_us = 0;
-    if (now.feed.phase == PLAN && now.feed.time.now.rate_q57 == RATE_ONE &&
-        now.feed.time.now.slope_q56 == 0) {
+    if (now.feed.phase == PLAN && now.feed.plan.now.override_q57 == OVERRIDE_ONE &&
+        now.feed.plan.now.slope_q56 == 0) {
         now.bound_us = feed_override_bound_us(&now.feed, kind);
     }
 }
@@ -373,36 +373,38 @@ static void begin(struct override_program *p, int line, uint32_t period_us, uint
     feed_override_begin(&now.feed, &p->program, period_us, from);
     interp_seek(&now.interp, from >> 10);
     if (from > 0 && golden_random(random) % 2u == 0) {
-        now.feed.time.now.rate_q57 = RATE_ONE;
+        now.feed.plan.now.override_q57 = OVERRIDE_ONE;
     }
 }
 
 /* Whatever the commands were, the wish is fulfilled in the time that the least bounds take. */
 static void finish(void)
 {
-    struct rate_ticks down;
-    struct rate_pace pace;
+    struct ramp_ticks down;
+    struct ramp_limits limits;
     int64_t ticks = 10000;
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
-        rate_pace_of(&pace, &now.feed.time.least, k, now.feed.time.period_log2);
-        rate_ticks_of(&down, &pace, k == PROGRAM_LEVEL_FULL ? RATE_MOST : RATE_ONE);
+        override_limits_of(&limits, &now.feed.plan.everywhere, k, now.feed.clock.period_log2);
+        override_ticks_of(&down, &limits, k == PROGRAM_LEVEL_FULL ? OVERRIDE_MOST : OVERRIDE_ONE);
         ticks += 4 * 2 * ((int64_t)down.rise + down.half);
     }
-    int64_t wanted = RATE_ONE / 100 * now.percent;
-    wanted = wanted < now.feed.time.least_q57 ? wanted : now.feed.time.least_q57;
+    int64_t wanted = OVERRIDE_ONE / 100 * now.percent;
+    wanted = wanted < now.feed.plan.everywhere_q57 ? wanted : now.feed.plan.everywhere_q57;
     for (int64_t i = 0; i < ticks && !over(); i++) {
-        int64_t rate = now.feed.time.now.rate_q57;
-        int still = now.feed.time.now.slope_q56 == 0 && now.feed.phase == PLAN;
-        if (now.wish == RUN ? still && rate >= wanted - 100 &&
-                                  (now.percent * (RATE_ONE / 100) > now.feed.time.least_q57 ||
-                                   rate <= wanted + 100)
-                            : now.feed.state == FEED_HELD && now.feed.found) {
+        int64_t rate = now.feed.plan.now.override_q57;
+        int still = now.feed.plan.now.slope_q56 == 0 && now.feed.phase == PLAN;
+        if (now.wish == RUN
+                ? still && rate >= wanted - 100 &&
+                      (now.percent * (OVERRIDE_ONE / 100) > now.feed.plan.everywhere_q57 ||
+                       rate <= wanted + 100)
+                : now.feed.state == FEED_HELD && now.feed.found) {
             return;
         }
         tick();
     }
     TEST_ASSERT_TRUE_MESSAGE(
-        over(), where("never there", (double)now.feed.time.now.rate_q57 / RATE_ONE, now.percent));
+        over(),
+        where("never there", (double)now.feed.plan.now.override_q57 / OVERRIDE_ONE, now.percent));
 }
 
 static void run_to_the_end(void)
@@ -426,7 +428,7 @@ static void check_over(void)
         tick();
     }
     TEST_ASSERT_EQUAL_MEMORY(&before, &now.point, sizeof before);
-    TEST_ASSERT_EQUAL_UINT32(0, feed_override_rate_q30(&now.feed));
+    TEST_ASSERT_EQUAL_UINT32(0, feed_override_actual_q30(&now.feed));
     TEST_ASSERT_TRUE(feed_override_feed_q32(&now.feed) == 0);
     if (ended) {
         TEST_ASSERT_TRUE(now.point.arc_length_q40_mm == now.p->program.header.length_q40_mm);

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/interp.h"
-#include "core/timebase.h"
+#include "core/override_plan.h"
 #include "golden.h"
 #include "unity.h"
 
@@ -105,27 +105,29 @@ static void test_same_bits_as_expanded(void)
     }
 }
 
-/* What a tick of the controller does: the piece is looked for by the timebase only. */
-static void test_the_piece_of_the_timebase_is_the_one(void)
+/* What a tick of the controller does: the piece is looked for by the program clock only. */
+static void test_the_piece_of_the_clock_is_the_one(void)
 {
     for (size_t i = 0; i < NAMES; i++) {
-        struct timebase tb;
+        struct program_clock clock;
+        struct override_plan plan;
         struct interp a, b;
         struct interp_point p, q;
         begin(names[i], INTERP_FIXED);
         TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &plain, INTERP_FIXED));
         TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready, INTERP_FIXED));
-        timebase_begin(&tb, &ready, ready.header.period_us);
-        timebase_override(&tb, 200);
+        program_clock_begin(&clock, &ready, ready.header.period_us, 0);
+        override_plan_begin(&plan, &ready);
+        override_plan_set(&plan, 200);
         for (int result = INTERP_OK; result == INTERP_OK;) {
-            const uint64_t time_q42_s = timebase_step_q42(&tb);
+            const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
             memset(&p, 0, sizeof p);
             memset(&q, 0, sizeof q);
             result = interp_at_q42(&a, time_q42_s, &p);
-            TEST_ASSERT_EQUAL_INT(result, interp_at_piece(&b, tb.record, time_q42_s, &q));
+            TEST_ASSERT_EQUAL_INT(result, interp_at_piece(&b, clock.record, time_q42_s, &q));
             TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
         }
-        TEST_ASSERT_EQUAL_INT(TIMEBASE_ENDED, timebase_state(&tb));
+        TEST_ASSERT_EQUAL_UINT64(clock.duration_q42_s, clock.time_q42_s);
         end();
     }
 }
@@ -134,7 +136,8 @@ static void test_the_piece_of_the_timebase_is_the_one(void)
 static void test_a_tick_that_crosses_three_ends_is_refused(void)
 {
     for (uint64_t ends = 2; ends <= 3; ends++) {
-        struct timebase tb;
+        struct program_clock clock;
+        struct override_plan plan;
         struct interp it;
         struct interp_point point, before;
         begin("alpha_exponential.hdgp", INTERP_FIXED);
@@ -147,15 +150,17 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
             piece->start_q32_s = end_q32_s;
         }
         TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &ready, INTERP_FIXED));
-        timebase_begin(&tb, &ready, ready.header.period_us);
-        tb.piece_end_q42_s = tb.record->end_q32_s << 10; /* as if from the image */
+        program_clock_begin(&clock, &ready, ready.header.period_us, 0);
+        override_plan_begin(&plan, &ready);
+        clock.piece_end_q42_s = clock.record->end_q32_s << 10; /* as if from the image */
         for (int k = 0; k < 2; k++) {
-            const uint64_t time_q42_s = timebase_step_q42(&tb);
-            TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_piece(&it, tb.record, time_q42_s, &point));
+            const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
+            TEST_ASSERT_EQUAL_INT(INTERP_OK,
+                                  interp_at_piece(&it, clock.record, time_q42_s, &point));
         }
         memcpy(&before, &point, sizeof point);
-        const uint64_t time_q42_s = timebase_step_q42(&tb);
-        const int result = interp_at_piece(&it, tb.record, time_q42_s, &point);
+        const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
+        const int result = interp_at_piece(&it, clock.record, time_q42_s, &point);
         TEST_ASSERT_EQUAL_INT(ends == 2 ? INTERP_OK : INTERP_ERR_JUMP, result);
         TEST_ASSERT_EQUAL_INT(ends == 2 ? 1 : 0, memcmp(&before, &point, sizeof point) != 0);
         end();
@@ -168,7 +173,7 @@ static void test_windows_hold_the_least_of_their_pieces(void)
     begin("alpha_exponential.hdgp", INTERP_FIXED);
     for (uint32_t i = 0; i < plain.header.piece_count; i++) {
         const struct prepared_piece *piece = prepared_piece_at(&ready, fixed, i);
-        for (uint32_t k = 0; k < RATE_WINDOWS; k++) {
+        for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
             struct program_override least;
             memset(&least, 0xFF, sizeof least);
             for (uint32_t j = i; j < i + (1u << k) && j < plain.header.piece_count; j++) {
@@ -188,21 +193,24 @@ static void test_windows_hold_the_least_of_their_pieces(void)
     end();
 }
 
-/* The rate too, whatever is commanded. */
-static void test_same_rate_as_without_records(void)
+/* The override too, whatever is commanded. */
+static void test_same_override_as_without_records(void)
 {
-    static struct timebase a, b;
+    static struct program_clock a, b;
+    static struct override_plan c, d;
     begin("alpha_exponential.hdgp", INTERP_FIXED);
     for (int n = 0; n < 100; n++) {
-        timebase_begin(&a, &plain, plain.header.period_us);
-        timebase_begin(&b, &ready, plain.header.period_us);
+        program_clock_begin(&a, &plain, plain.header.period_us, 0);
+        program_clock_begin(&b, &ready, plain.header.period_us, 0);
+        override_plan_begin(&c, &plain);
+        override_plan_begin(&d, &ready);
         for (int k = 0; k < 3000; k++) {
             if (golden_random(&seed) % 64u == 0) {
                 const uint32_t percent = (uint32_t)(golden_random(&seed) % 201u);
-                timebase_override(&a, percent);
-                timebase_override(&b, percent);
+                override_plan_set(&c, percent);
+                override_plan_set(&d, percent);
             }
-            TEST_ASSERT_TRUE(timebase_step_q42(&a) == timebase_step_q42(&b));
+            TEST_ASSERT_TRUE(override_plan_tick(&c, &a) == override_plan_tick(&d, &b));
         }
     }
     end();
@@ -222,10 +230,10 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_same_bits_as_expanded);
-    RUN_TEST(test_the_piece_of_the_timebase_is_the_one);
+    RUN_TEST(test_the_piece_of_the_clock_is_the_one);
     RUN_TEST(test_a_tick_that_crosses_three_ends_is_refused);
     RUN_TEST(test_windows_hold_the_least_of_their_pieces);
-    RUN_TEST(test_same_rate_as_without_records);
+    RUN_TEST(test_same_override_as_without_records);
     RUN_TEST(test_an_error_of_the_sink_is_passed_on);
     return UNITY_END();
 }

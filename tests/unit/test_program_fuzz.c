@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "core/interp.h"
-#include "core/timebase.h"
+#include "core/override_plan.h"
 #include "golden.h"
 #include "unity.h"
 

@@ -9,7 +9,7 @@
 #include "app/program_slot.h"
 #include "core/crc32.h"
 #include "core/interp.h"
-#include "core/timebase.h"
+#include "core/override_plan.h"
 #include "fake_port.h"
 #include "flash_model.h"
 #include "golden.h"

@@ -66,14 +66,14 @@ FAULTY = {"fault": (None, (60, 61, 64)), "fault, override": ("steady", (40, 41, 
 SECTIONS = ("motion", "isr", "receive", "kinds")
 
 
-# What a tick does with the rate, and the function of the core that only such a tick calls; the first that fits.
+# What a tick does with the override, and the function of the core that such a tick calls; the first that fits.
 KINDS = {
-    "start": "timebase_start",
-    "moves": "rate_plan_move",
-    "looks": "rate_search",
-    "begins": "rate_step_of",
-    "chooses": "rate_plan_decide",
-    "steady": "timebase_step_q42",
+    "moves": "override_ramp_slope",
+    "looks": "override_plan_search",
+    "begins": "override_step_of",
+    "start": "program_clock_way_q62_s",
+    "chooses": "override_plan_change",
+    "steady": "override_plan_tick",
 }
 _FEED, _SUPERVISION = PARTS.index("feed"), PARTS.index("supervision")
 

@@ -30,7 +30,7 @@ PARTS = (
 
 # FILE:FUNCTION, the first that is found; those of one file from the most special to the most general.
 RULES = (
-    (r"core/(timebase|rate)\w*\.\w:", "rate"),
+    (r"core/(program_clock|override)\w*\.\w:", "rate"),
     (r"core/feed_piece\.\w:feed_piece_(at|point)", "feed"),
     (r"core/interp\.\w:evaluate_feed", "feed"),
     (r"core/kernel_\w+\.\w:(set_|\w+_set$)", "search"),

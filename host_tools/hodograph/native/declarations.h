@@ -54,15 +54,15 @@ struct interp {
 int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
 
 /* core/feed_override.h */
-struct rate {
-    int64_t rate_q57, slope_q56;
+struct override_state {
+    int64_t override_q57, slope_q56;
 };
-struct timebase {
-    struct rate now;
+struct override_plan {
+    struct override_state now;
     ...;
 };
 struct feed_override {
-    struct timebase time;
+    struct override_plan plan;
     uint32_t phase;
     ...;
 };
@@ -77,7 +77,7 @@ int feed_override_state(const struct feed_override *f);
 int feed_override_late(const struct feed_override *f);
 uint64_t feed_override_time_q42(const struct feed_override *f);
 int64_t feed_override_feed_q32(const struct feed_override *f);
-uint32_t feed_override_rate_q30(const struct feed_override *f);
+uint32_t feed_override_actual_q30(const struct feed_override *f);
 uint32_t feed_override_bound_us(const struct feed_override *f, int kind);
 
 /* plant/drive.h */

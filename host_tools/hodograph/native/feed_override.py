@@ -65,7 +65,7 @@ class FeedOverride:
             own.x_q40_mm * 2.0**-40,
             own.y_q40_mm * 2.0**-40,
             self._lib.feed_override_feed_q32(self._feed) * 2.0**-32,
-            self._lib.feed_override_rate_q30(self._feed) * 2.0**-30,
+            self._lib.feed_override_actual_q30(self._feed) * 2.0**-30,
         )
 
     @property
@@ -73,9 +73,9 @@ class FeedOverride:
         """Of the last step; None in a brake and at rest."""
         if self._feed.phase != 0:
             return None
-        now = self._feed.time.now
+        now = self._feed.plan.now
         slope_per_s = now.slope_q56 * 2.0**-56 / self._period_s
-        return PlanStep(self.time_s, now.rate_q57 * 2.0**-57, slope_per_s)
+        return PlanStep(self.time_s, now.override_q57 * 2.0**-57, slope_per_s)
 
     @property
     def state(self) -> State:

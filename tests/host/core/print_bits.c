@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Prints the CRC-32 of all points of a program, tick by tick with a stop near the end: FILE KERNEL. */
+/* Prints the CRC-32 of all points of a program, tick by tick with a hold near the end: FILE KERNEL. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "core/crc32.h"
 #include "core/interp.h"
+#include "core/override_plan.h"
 #include "core/program_check.h"
-#include "core/timebase.h"
 
 static uint8_t image[1 << 20];
 
@@ -23,7 +23,8 @@ int main(int argc, char **argv)
 {
     static struct program p;
     static struct interp it;
-    static struct timebase tb;
+    static struct program_clock clock;
+    static struct override_plan plan;
     struct interp_point point;
     FILE *file = argc == 3 ? fopen(argv[1], "rb") : NULL;
     if (file == NULL) {
@@ -37,13 +38,13 @@ int main(int argc, char **argv)
     }
     uint32_t crc = 0;
     uint32_t ticks = program_ticks(&p);
-    timebase_begin(&tb, &p, p.header.period_us);
+    program_clock_begin(&clock, &p, p.header.period_us, 0);
+    override_plan_begin(&plan, &p);
     for (uint32_t tick = 0; tick < ticks; tick++) {
         if (tick == ticks - ticks / 4) {
-            timebase_stop(&tb);
+            override_plan_hold(&plan);
         }
-        timebase_step(&tb);
-        if (interp_at_q42(&it, timebase_time_q42(&tb), &point) < 0) {
+        if (interp_at_q42(&it, override_plan_tick(&plan, &clock), &point) < 0) {
             return 3;
         }
         crc = add(add(crc, point.x_q40_mm), point.y_q40_mm);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/rate.h"
+#include "core/override_ramp.h"
 
 #include <math.h>
 #include <string.h>
@@ -26,7 +26,7 @@ static int64_t below(int64_t most)
 
 /* Bounds of the format, R and S in the units of a tick as they are meant, and what is made of them. */
 struct bounds {
-    struct rate_pace pace;
+    struct ramp_limits limits;
     double slope;
     double second;
     uint32_t period_us;
@@ -41,7 +41,7 @@ static struct bounds make_bounds(uint8_t rate, uint8_t second, uint32_t period_l
     const double h = b.period_us * 1e-6;
     raw.rate[level] = rate;
     raw.second[level] = second;
-    rate_pace_of(&b.pace, &raw, level, period_log2);
+    override_limits_of(&b.limits, &raw, level, period_log2);
     b.slope = fmin(ldexp((double)program_number(rate), -32) * h, 1) * 72057594037927936.0;
     b.second = fmin(ldexp((double)program_number(second), -24) * h * h, 1) * 72057594037927936.0;
     return b;
@@ -54,78 +54,82 @@ static struct bounds random_bounds(void)
     return make_bounds(rate, second, (uint32_t)below(4));
 }
 
-static struct rate_move move_of(const struct bounds *b, const struct rate *from, int64_t target,
-                                struct rate_ticks *ticks)
+static struct override_ramp ramp_of(const struct bounds *b, const struct override_state *from,
+                                    int64_t target, struct ramp_ticks *ticks)
 {
-    const int64_t way = target - from->rate_q57;
-    struct rate_move move;
-    rate_ticks_of(ticks, &b->pace, way < 0 ? -way : way);
-    int64_t step = rate_step_of(ticks, way < 0 ? -way : way);
+    const int64_t change = target - from->override_q57;
+    struct override_ramp ramp;
+    override_ticks_of(ticks, &b->limits, change < 0 ? -change : change);
+    int64_t step = override_step_of(ticks, change < 0 ? -change : change);
     TEST_ASSERT_TRUE((double)step * ticks->rise <= b->slope);
     TEST_ASSERT_TRUE((double)step <= b->second);
-    rate_move_begin(&move, from, ticks, way < 0 ? -step : step);
-    return move;
+    override_ramp_begin(&ramp, from->override_q57, ticks, change < 0 ? -step : step);
+    return ramp;
 }
 
 /* Runs it to its end, or to a cut after so many ticks: the slope changes by the step at most, never beyond what it rises
- * to, and it rests where the move said. Gives the program time in ticks at rate 1. */
-static double run(struct rate_move *move, struct rate *rate, uint64_t cut)
+ * to, and it rests where the ramp said. Gives the program time in ticks at override 1. */
+static double run(struct override_ramp *ramp, struct override_state *rate, uint64_t cut)
 {
-    const int64_t step = move->step_q56;
-    const int64_t most = step * (int64_t)move->rise;
+    const int64_t step = ramp->step_q56;
+    const int64_t most = step * (int64_t)ramp->rise;
     double time = 0;
-    for (uint64_t n = 0; rate_moves(move); n++) {
-        const struct rate before = *rate;
+    for (uint64_t n = 0; override_ramp_moves(ramp); n++) {
+        const struct override_state before = *rate;
         if (n == cut) {
-            rate_move_cut(move);
+            override_ramp_cut(ramp);
         }
-        rate_tick(rate, rate_move_slope(move, rate->slope_q56));
+        override_tick(rate, override_ramp_slope(ramp, rate->slope_q56));
         const int64_t second = rate->slope_q56 - before.slope_q56;
-        TEST_ASSERT_TRUE(rate->rate_q57 - before.rate_q57 == before.slope_q56 + rate->slope_q56);
+        TEST_ASSERT_TRUE(rate->override_q57 - before.override_q57 ==
+                         before.slope_q56 + rate->slope_q56);
         TEST_ASSERT_TRUE(second == 0 || second == step || second == -step);
         TEST_ASSERT_TRUE(step < 0 ? rate->slope_q56 <= 0 && rate->slope_q56 >= most
                                   : rate->slope_q56 >= 0 && rate->slope_q56 <= most);
-        time +=
-            ((double)before.rate_q57 * 3 + (double)before.slope_q56 * 2 + (double)rate->slope_q56) /
-            6 / 72057594037927936.0;
+        time += ((double)before.override_q57 * 3 + (double)before.slope_q56 * 2 +
+                 (double)rate->slope_q56) /
+                6 / 72057594037927936.0;
     }
     TEST_ASSERT_TRUE(rate->slope_q56 == 0);
-    TEST_ASSERT_TRUE(rate->rate_q57 == move->rest_q57);
+    TEST_ASSERT_TRUE(rate->override_q57 == ramp->end_q57);
     return time;
 }
 
-/* Ticks of the continuous way: with the slope rising to its bound, or not. */
-static double fewest(const struct bounds *b, double way)
+/* Ticks of the continuous change: with the slope rising to its bound, or not. */
+static double fewest(const struct bounds *b, double change)
 {
-    const double peak = sqrt(way / 2 * b->second);
-    return peak <= b->slope ? 2 * sqrt(way / 2 / b->second)
-                            : way / 2 / b->slope + b->slope / b->second;
+    const double peak = sqrt(change / 2 * b->second);
+    return peak <= b->slope ? 2 * sqrt(change / 2 / b->second)
+                            : change / 2 / b->slope + b->slope / b->second;
 }
 
 static void test_comes_to_the_target(void)
 {
     for (int i = 0; i < 20000; i++) {
         const struct bounds b = random_bounds();
-        struct rate rate = {below(RATE_MOST + 1), 0};
-        const int64_t from = rate.rate_q57;
+        struct override_state rate = {below(OVERRIDE_MOST + 1), 0};
+        const int64_t from = rate.override_q57;
         const int64_t target = i % 4 == 0   ? 0
-                               : i % 4 == 1 ? RATE_ONE
-                                            : below(RATE_MOST >> below(40));
-        const double way = fabs((double)(target - from));
-        struct rate_ticks ticks;
-        struct rate_move move = move_of(&b, &rate, target, &ticks);
+                               : i % 4 == 1 ? OVERRIDE_ONE
+                                            : below(OVERRIDE_MOST >> below(40));
+        const double change = fabs((double)(target - from));
+        struct ramp_ticks ticks;
+        struct override_ramp ramp = ramp_of(&b, &rate, target, &ticks);
         const double total = (double)ticks.rise + ticks.half;
-        TEST_ASSERT_TRUE(total <= fewest(&b, way) * 1.002 + 4);
+        TEST_ASSERT_TRUE(total <= fewest(&b, change) * 1.002 + 4);
         if (total > 10000) {
             continue; /* too long to run */
         }
-        const double time = run(&move, &rate, UINT64_MAX);
-        const int64_t left = target > from ? target - rate.rate_q57 : rate.rate_q57 - target;
+        const double time = run(&ramp, &rate, UINT64_MAX);
+        const int64_t left =
+            target > from ? target - rate.override_q57 : rate.override_q57 - target;
         TEST_ASSERT_TRUE(left >= 0 && left < 2 * (int64_t)ticks.rise * ticks.half);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9 + 1e-12 * total,
-                                  total * (double)(from + rate.rate_q57) / 2 / RATE_ONE, time);
+                                  total * (double)(from + rate.override_q57) / 2 / OVERRIDE_ONE,
+                                  time);
         const uint32_t period_q32_s = (uint32_t)(b.period_us * 4294.967296) + 1u;
-        const uint64_t span = rate_span_q32(&ticks, (from + rate.rate_q57) / 2, period_q32_s);
+        const uint64_t span =
+            override_span_q32(&ticks, (from + rate.override_q57) / 2, period_q32_s);
         TEST_ASSERT_TRUE(time * b.period_us * 4294.967296 <= (double)span);
     }
 }
@@ -134,21 +138,21 @@ static void test_a_cut_ends_where_it_said(void)
 {
     for (int i = 0; i < 20000; i++) {
         const struct bounds b = random_bounds();
-        struct rate rate = {below(RATE_MOST + 1), 0};
-        const int64_t from = rate.rate_q57;
-        const int64_t target = below(RATE_MOST + 1);
-        struct rate_ticks ticks;
-        struct rate_move move = move_of(&b, &rate, target, &ticks);
+        struct override_state rate = {below(OVERRIDE_MOST + 1), 0};
+        const int64_t from = rate.override_q57;
+        const int64_t target = below(OVERRIDE_MOST + 1);
+        struct ramp_ticks ticks;
+        struct override_ramp ramp = ramp_of(&b, &rate, target, &ticks);
         if (ticks.half > 5000) {
             continue;
         }
         if (i % 3 == 0) {
-            rate_move_shorten(&move);
-            TEST_ASSERT_TRUE(move.even <= 2u * move.rise + 40u);
+            override_ramp_shorten(&ramp);
+            TEST_ASSERT_TRUE(ramp.even <= 2u * ramp.rise + 40u);
         }
-        run(&move, &rate, (uint64_t)below((int64_t)ticks.rise + ticks.half + 1));
-        TEST_ASSERT_TRUE(target > from ? rate.rate_q57 >= from && rate.rate_q57 <= target
-                                       : rate.rate_q57 <= from && rate.rate_q57 >= target);
+        run(&ramp, &rate, (uint64_t)below((int64_t)ticks.rise + ticks.half + 1));
+        TEST_ASSERT_TRUE(target > from ? rate.override_q57 >= from && rate.override_q57 <= target
+                                       : rate.override_q57 <= from && rate.override_q57 >= target);
     }
 }
 
@@ -158,31 +162,31 @@ static void test_bounds_at_the_ends_of_the_format(void)
     for (uint32_t period_log2 = 0; period_log2 < 4; period_log2++) {
         const struct bounds slow = make_bounds(1, 1, period_log2);
         const struct bounds fast = make_bounds(255, 255, period_log2);
-        struct rate rate = {RATE_MOST, 0};
-        struct rate_ticks ticks;
-        move_of(&slow, &rate, 0, &ticks);
+        struct override_state rate = {OVERRIDE_MOST, 0};
+        struct ramp_ticks ticks;
+        ramp_of(&slow, &rate, 0, &ticks);
         TEST_ASSERT_TRUE((double)ticks.rise + ticks.half <=
-                         fewest(&slow, (double)RATE_MOST) * 1.002 + 4);
-        struct rate_move move = move_of(&fast, &rate, 0, &ticks);
+                         fewest(&slow, (double)OVERRIDE_MOST) * 1.002 + 4);
+        struct override_ramp ramp = ramp_of(&fast, &rate, 0, &ticks);
         TEST_ASSERT_TRUE(ticks.rise <= 3 && ticks.half <= 4);
-        run(&move, &rate, UINT64_MAX);
+        run(&ramp, &rate, UINT64_MAX);
     }
 }
 
 /* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a tick. */
-static void test_paces_of_all_codes(void)
+static void test_limits_of_all_codes(void)
 {
     for (uint32_t period_log2 = 0; period_log2 < 4; period_log2++) {
         for (int rate = 1; rate < 256; rate++) {
             for (int second = 1; second < 256; second++) {
                 const struct bounds b = make_bounds((uint8_t)rate, (uint8_t)second, period_log2);
-                const double slope = ldexp(1, 61) / b.pace.inverse_slope;
-                const double root = ldexp(1, 45) / b.pace.inverse_root;
+                const double slope = ldexp(1, 61) / b.limits.inverse_slope;
+                const double root = ldexp(1, 45) / b.limits.inverse_root;
                 TEST_ASSERT_TRUE(slope <= b.slope && root * root <= b.second);
                 TEST_ASSERT_TRUE(slope >= b.slope * 0.8 && root * root >= b.second * 0.8);
                 const double turns = fmin(b.slope, ldexp(1, 56)) / fmin(b.second, ldexp(1, 56));
-                TEST_ASSERT_TRUE(b.pace.turns >= turns * 0.9);
-                TEST_ASSERT_TRUE(b.pace.turns <= turns * 1.25 + 2);
+                TEST_ASSERT_TRUE(b.limits.turns >= turns * 0.9);
+                TEST_ASSERT_TRUE(b.limits.turns <= turns * 1.25 + 2);
             }
         }
     }
@@ -209,18 +213,18 @@ static void test_stages(void)
 {
     for (int i = 0; i < 100000; i++) {
         const struct program_override bounds = random_levels();
-        const int64_t to = i % 5 == 0 ? 0 : i % 5 == 1 ? RATE_ONE : below(RATE_ONE + 1);
-        int64_t at = i % 7 == 0 ? 0 : i % 7 == 1 ? RATE_ONE : below(RATE_ONE + 1);
+        const int64_t to = i % 5 == 0 ? 0 : i % 5 == 1 ? OVERRIDE_ONE : below(OVERRIDE_ONE + 1);
+        int64_t at = i % 7 == 0 ? 0 : i % 7 == 1 ? OVERRIDE_ONE : below(OVERRIDE_ONE + 1);
         uint32_t stages = 0;
         while (at != to) {
-            struct rate_stage stage;
-            rate_stage_of(&stage, &bounds, at, to);
-            TEST_ASSERT_TRUE(at < to ? stage.goal_q57 > at && stage.goal_q57 <= to
-                                     : stage.goal_q57 < at && stage.goal_q57 >= to);
-            TEST_ASSERT_TRUE(stage.goal_q57 == to || stage.goal_q57 < RATE_ONE);
-            const int64_t most = stage.goal_q57 > at ? stage.goal_q57 : at;
-            TEST_ASSERT_TRUE((double)most / (double)RATE_ONE <= level_rate(stage.level));
-            at = stage.goal_q57;
+            struct ramp_stage stage;
+            override_stage_of(&stage, &bounds, at, to);
+            TEST_ASSERT_TRUE(at < to ? stage.end_q57 > at && stage.end_q57 <= to
+                                     : stage.end_q57 < at && stage.end_q57 >= to);
+            TEST_ASSERT_TRUE(stage.end_q57 == to || stage.end_q57 < OVERRIDE_ONE);
+            const int64_t most = stage.end_q57 > at ? stage.end_q57 : at;
+            TEST_ASSERT_TRUE((double)most / (double)OVERRIDE_ONE <= level_rate(stage.level));
+            at = stage.end_q57;
             TEST_ASSERT_TRUE(++stages <= PROGRAM_LEVELS);
         }
     }
@@ -230,20 +234,20 @@ static void test_stages(void)
 static void test_levels_that_are_alike_are_one(void)
 {
     struct program_override bounds = {.factor_q14 = 1u << 14};
-    struct rate_stage stage;
+    struct ramp_stage stage;
     memset(bounds.rate, 150, sizeof bounds.rate);
     memset(bounds.second, 120, sizeof bounds.second);
-    rate_stage_of(&stage, &bounds, 0, RATE_ONE);
-    TEST_ASSERT_EQUAL_INT64(RATE_ONE, stage.goal_q57);
+    override_stage_of(&stage, &bounds, 0, OVERRIDE_ONE);
+    TEST_ASSERT_EQUAL_INT64(OVERRIDE_ONE, stage.end_q57);
     TEST_ASSERT_EQUAL_UINT32(PROGRAM_LEVEL_FULL, stage.level);
-    rate_stage_of(&stage, &bounds, RATE_ONE, 0);
-    TEST_ASSERT_EQUAL_INT64(0, stage.goal_q57);
+    override_stage_of(&stage, &bounds, OVERRIDE_ONE, 0);
+    TEST_ASSERT_EQUAL_INT64(0, stage.end_q57);
     bounds.rate[PROGRAM_LEVEL_FULL] = 100;
-    rate_stage_of(&stage, &bounds, 0, RATE_ONE);
-    TEST_ASSERT_EQUAL_INT64((int64_t)511 << 48, stage.goal_q57);
+    override_stage_of(&stage, &bounds, 0, OVERRIDE_ONE);
+    TEST_ASSERT_EQUAL_INT64((int64_t)511 << 48, stage.end_q57);
     TEST_ASSERT_EQUAL_UINT32(PROGRAM_LEVEL_FULL - 1u, stage.level);
-    rate_stage_of(&stage, &bounds, RATE_ONE, 0);
-    TEST_ASSERT_EQUAL_INT64(((int64_t)511 << 48) - RATE_SPARE, stage.goal_q57);
+    override_stage_of(&stage, &bounds, OVERRIDE_ONE, 0);
+    TEST_ASSERT_EQUAL_INT64(((int64_t)511 << 48) - OVERRIDE_SPARE, stage.end_q57);
 }
 
 static void test_root_above(void)
@@ -290,7 +294,7 @@ int main(void)
     RUN_TEST(test_comes_to_the_target);
     RUN_TEST(test_a_cut_ends_where_it_said);
     RUN_TEST(test_bounds_at_the_ends_of_the_format);
-    RUN_TEST(test_paces_of_all_codes);
+    RUN_TEST(test_limits_of_all_codes);
     RUN_TEST(test_stages);
     RUN_TEST(test_levels_that_are_alike_are_one);
     RUN_TEST(test_root_above);

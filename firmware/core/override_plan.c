@@ -1,0 +1,482 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/override_plan.h"
+
+#include <string.h>
+
+#include "core/qmath.h"
+
+#define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
+#define NOWHERE UINT32_MAX
+#define EARLY   16u /* ticks before a rest in which the next ramp is looked for */
+/* Half of a ramp above everywhere_q57: it leaves less than OVERRIDE_SPARE. */
+#define MOST_TICKS ((uint32_t)1 << 18)
+/* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the rest. */
+#define MARGIN 8u
+
+static const struct ramp_ticks SHORTEST = {1, 1};
+
+/* --- Commands --- */
+
+static void come_to_rest(struct override_plan *plan)
+{
+    memset(&plan->ramp, 0, sizeof plan->ramp);
+    plan->now.override_q57 = 0;
+    plan->now.slope_q56 = 0;
+    plan->steady = 0;
+    plan->saturated = 0;
+    plan->task = OVERRIDE_DECIDES;
+    plan->searched = NOWHERE;
+    plan->wanted_q57 = -1; /* none yet */
+    plan->return_q32_s = 0;
+}
+
+void override_plan_begin(struct override_plan *plan, const struct program *p)
+{
+    memset(plan, 0, sizeof *plan);
+    override_bounds_of(&plan->everywhere, p, 0, p->header.piece_count);
+    plan->everywhere_q57 = (int64_t)plan->everywhere.factor_q14 << 43;
+    plan->commanded_q57 = OVERRIDE_ONE;
+    come_to_rest(plan);
+}
+
+void override_plan_rest(struct override_plan *plan)
+{
+    plan->started = 1;
+    come_to_rest(plan);
+}
+
+void override_plan_set(struct override_plan *plan, uint32_t percent)
+{
+    const uint32_t used = percent < OVERRIDE_PERCENT ? percent : OVERRIDE_PERCENT;
+    plan->commanded_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
+    plan->steady = 0;
+}
+
+void override_plan_hold(struct override_plan *plan)
+{
+    plan->held = 1;
+    plan->steady = 0;
+}
+
+void override_plan_release(struct override_plan *plan)
+{
+    plan->held = 0;
+    plan->steady = 0;
+}
+
+void override_plan_rise_no_more(struct override_plan *plan)
+{
+    if (plan->ramp.step_q56 > 0) {
+        override_ramp_cut(&plan->ramp);
+    }
+}
+
+static int64_t wanted_override(const struct override_plan *plan)
+{
+    return plan->held != 0 ? 0 : plan->commanded_q57;
+}
+
+/* --- Look-ahead --- */
+
+static void look_at_pieces(struct override_window *w, const struct program_clock *clock,
+                           uint32_t last)
+{
+    override_bounds_of(&w->own, clock->program, clock->piece, last + 1u - clock->piece);
+    w->bounds = &w->own;
+    w->end_q32_s = clock->piece_end_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
+    for (uint32_t k = clock->piece + 1u; k <= last; k++) {
+        w->end_q32_s += program_piece_duration(clock->program, k);
+    }
+}
+
+void override_window_get(struct override_window *w, const struct program_clock *clock,
+                         uint32_t window)
+{
+    const struct program *p = clock->program;
+    const uint32_t behind = override_window_pieces(window) - 1u;
+    const uint32_t left = p->header.piece_count - 1u - clock->piece;
+    const uint32_t last = clock->piece + (behind < left ? behind : left);
+    if (clock->record != NULL) {
+        w->bounds = &clock->record->ahead[window];
+        w->end_q32_s = prepared_piece_at(p, p->prepared_for, last)->end_q32_s;
+    } else {
+        look_at_pieces(w, clock, last);
+    }
+    if (behind >= left) {
+        w->end_q32_s = UINT64_MAX;
+    }
+}
+
+static int64_t factor_q57(const struct override_window *w)
+{
+    return (int64_t)w->bounds->factor_q14 << 43;
+}
+
+/* Where the override rests next: the end of a ramp that falls to it. */
+static int64_t next_rest(const struct override_plan *plan)
+{
+    return override_ramp_moves(&plan->ramp) ? plan->ramp.end_q57 : plan->now.override_q57;
+}
+
+static uint64_t margin_q32(const struct override_plan *plan, const struct program_clock *clock)
+{
+    return qmath_product_unsigned(MARGIN + 2u * plan->ramp.fall, clock->period_q32_s);
+}
+
+/* --- A search: windows, the narrowest first, each in four ticks --- */
+
+static void begin_search(struct override_plan *plan, enum override_kind kind, int64_t target_q57)
+{
+    plan->task = OVERRIDE_SEARCHES;
+    plan->kind = kind;
+    plan->target_q57 = target_q57;
+    plan->step = OVERRIDE_LOOKS;
+    plan->window = 0;
+}
+
+/* The ramp back that was found before the override went up. */
+static void go_back(struct override_plan *plan)
+{
+    plan->ticks = plan->back;
+    plan->kind = OVERRIDE_RETURN;
+    plan->stage.end_q57 = plan->everywhere_q57 - OVERRIDE_SPARE;
+    plan->task = OVERRIDE_BEGINS;
+}
+
+/* No window will do for what was looked for, which was not to settle. */
+static void give_up(struct override_plan *plan)
+{
+    const int64_t now_q57 = plan->now.override_q57;
+    plan->task = OVERRIDE_DECIDES;
+    if (plan->kind == OVERRIDE_STAY) {
+        begin_search(plan, OVERRIDE_CLIMB, plan->wanted_q57);
+    } else if (now_q57 > plan->everywhere_q57) {
+        if (plan->kind == OVERRIDE_RETURN || now_q57 > plan->wanted_q57 + OVERRIDE_SPARE) {
+            go_back(plan);
+        }
+    } else if (now_q57 != plan->everywhere_q57) {
+        begin_search(plan, OVERRIDE_SETTLE, plan->everywhere_q57);
+    }
+}
+
+/* Whether a ramp up to an override above everywhere_q57 is worth it, and allowed in the window: then `target_q57` is it. */
+static int may_climb(struct override_plan *plan)
+{
+    const int64_t now_q57 = plan->now.override_q57;
+    const int64_t factor = factor_q57(&plan->ahead);
+    plan->target_q57 = qmath_lesser(plan->wanted_q57, factor);
+    return now_q57 <= factor && plan->target_q57 > plan->everywhere_q57 + OVERRIDE_SPARE &&
+           qmath_magnitude(plan->target_q57 - now_q57) > OVERRIDE_SPARE;
+}
+
+/* What the window allows, for an override above everywhere_q57. */
+static void check_factor(struct override_plan *plan)
+{
+    if (plan->kind == OVERRIDE_CLIMB) {
+        if (!may_climb(plan)) {
+            give_up(plan);
+        }
+    } else if (factor_q57(&plan->ahead) < plan->now.override_q57) {
+        if (plan->kind == OVERRIDE_STAY) {
+            give_up(plan);
+        } else {
+            plan->step = OVERRIDE_LOOKS;
+        }
+    }
+}
+
+/* The next window. Behind the last, below everywhere_q57, the least bounds of the program, which always do. */
+static void look(struct override_plan *plan, const struct program_clock *clock)
+{
+    plan->step = OVERRIDE_STAGES;
+    if (plan->window < OVERRIDE_WINDOWS) {
+        override_window_get(&plan->ahead, clock, plan->window);
+        plan->window++;
+        if (plan->kind != OVERRIDE_SETTLE) {
+            check_factor(plan);
+        }
+    } else if (plan->kind == OVERRIDE_SETTLE) {
+        plan->ahead.bounds = &plan->everywhere;
+        plan->ahead.end_q32_s = UINT64_MAX;
+    } else {
+        give_up(plan);
+    }
+}
+
+/* How far one ramp may go with the bounds of the window. Above everywhere_q57 it goes all the way, or not at all. */
+static void find_stage(struct override_plan *plan)
+{
+    plan->step = OVERRIDE_MEASURES;
+    if (plan->kind == OVERRIDE_STAY) {
+        plan->stage.end_q57 = plan->now.override_q57;
+        plan->stage.level = PROGRAM_LEVEL_FULL;
+        return;
+    }
+    override_stage_of(&plan->stage, plan->ahead.bounds, next_rest(plan), plan->target_q57);
+    if (plan->kind == OVERRIDE_CLIMB) {
+        plan->stage.level = PROGRAM_LEVEL_FULL;
+        if (plan->stage.end_q57 != plan->target_q57) {
+            give_up(plan);
+        }
+    }
+}
+
+/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above everywhere_q57 the ramp
+ * back. */
+static int64_t change_q57(const struct override_plan *plan, int64_t from_q57)
+{
+    const int64_t back_q57 = plan->high_q57 - plan->everywhere_q57 + OVERRIDE_SPARE;
+    const int64_t ramp_q57 = qmath_magnitude(plan->stage.end_q57 - from_q57);
+    if (plan->kind == OVERRIDE_STAY) {
+        return back_q57;
+    }
+    return plan->kind == OVERRIDE_CLIMB ? qmath_greater(ramp_q57, back_q57) : ramp_q57;
+}
+
+/* How long the ramp takes. */
+static void measure(struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t from_q57 = next_rest(plan);
+    struct ramp_limits limits;
+    plan->step = OVERRIDE_FITS;
+    plan->high_q57 = from_q57;
+    if (plan->kind == OVERRIDE_CLIMB) {
+        plan->high_q57 = qmath_greater(plan->stage.end_q57, from_q57);
+    }
+    override_limits_of(&limits, plan->ahead.bounds, plan->stage.level, clock->period_log2);
+    override_ticks_of(&plan->ticks, &limits, change_q57(plan, from_q57));
+}
+
+/* A ramp to the end of the stage ends, where the override may stay, inside the window. */
+static int fits(const struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t mean_q57 = (plan->stage.end_q57 + plan->high_q57) / 2;
+    const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
+    return (clock->time_q42_s >> 10) + span + margin_q32(plan, clock) <= plan->ahead.end_q32_s &&
+           (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
+}
+
+/* Until when an override above everywhere_q57 may last: the ramp back, at most at this override, ends inside the window.
+ * 0: not at all. */
+static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock)
+{
+    const uint64_t span = margin_q32(plan, clock) +
+                          override_span_q32(&plan->ticks, plan->high_q57, clock->period_q32_s);
+    const uint64_t end_q32_s = plan->ahead.end_q32_s;
+    return plan->ticks.half < MOST_TICKS && span < end_q32_s ? end_q32_s - span : 0;
+}
+
+/* The present override stays, for longer than is known; or a ramp up begins, for which the window has the time of the ramp
+ * back too. */
+static void fit_above(struct override_plan *plan, const struct program_clock *clock)
+{
+    const uint64_t by_q32_s = return_by(plan, clock);
+    const int stays = plan->kind == OVERRIDE_STAY;
+    /* by then, if the ramp up takes what the ramp back may take */
+    const uint64_t there_q32_s = plan->ahead.end_q32_s - by_q32_s;
+    if (stays ? by_q32_s <= plan->return_q32_s
+              : by_q32_s == 0 || (clock->time_q42_s >> 10) + there_q32_s > by_q32_s) {
+        return;
+    }
+    plan->return_q32_s = by_q32_s;
+    plan->back = plan->ticks;
+    if (!stays) {
+        plan->saturated = plan->stage.end_q57 < plan->wanted_q57;
+        plan->task = OVERRIDE_BEGINS;
+    }
+}
+
+void override_plan_search(struct override_plan *plan, const struct program_clock *clock)
+{
+    if (plan->step == OVERRIDE_LOOKS) {
+        look(plan, clock);
+    } else if (plan->step == OVERRIDE_STAGES) {
+        find_stage(plan);
+    } else if (plan->step == OVERRIDE_MEASURES) {
+        measure(plan, clock);
+    } else {
+        plan->step = OVERRIDE_LOOKS;
+        if (plan->kind == OVERRIDE_STAY || plan->kind == OVERRIDE_CLIMB) {
+            fit_above(plan, clock);
+        } else if (fits(plan, clock)) {
+            plan->task = OVERRIDE_BEGINS;
+        }
+    }
+}
+
+/* --- At rest --- */
+
+static void begin_ramp(struct override_plan *plan, int64_t step_q56)
+{
+    const int down = plan->stage.end_q57 < plan->now.override_q57;
+    override_ramp_begin(&plan->ramp, plan->now.override_q57, &plan->ticks,
+                        down ? -step_q56 : step_q56);
+    if (plan->kind == OVERRIDE_SETTLE && plan->window > 1) { /* not inside the present piece */
+        override_ramp_shorten(&plan->ramp);
+    }
+    plan->task = OVERRIDE_DECIDES;
+    plan->searched = NOWHERE;
+}
+
+static void decide_below(struct override_plan *plan, int64_t wanted_q57)
+{
+    const int64_t change_q57 = wanted_q57 - plan->now.override_q57;
+    plan->saturated = 0;
+    if (qmath_magnitude(change_q57) <= 1) {
+        plan->now.override_q57 = wanted_q57;
+    } else if (plan->now.override_q57 > plan->everywhere_q57) {
+        begin_search(plan, OVERRIDE_RETURN,
+                     qmath_lesser(wanted_q57, plan->everywhere_q57 - OVERRIDE_SPARE));
+    } else if (qmath_magnitude(change_q57) <= SMALL) {
+        plan->ticks = SHORTEST;
+        plan->kind = OVERRIDE_SETTLE;
+        plan->stage.end_q57 = wanted_q57;
+        begin_ramp(plan, qmath_magnitude(change_q57) / 2);
+    } else {
+        begin_search(plan, OVERRIDE_SETTLE, wanted_q57);
+    }
+}
+
+/* What to do next. Above everywhere_q57 once in each piece. */
+static void decide(struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t wanted_q57 = wanted_override(plan);
+    const int same = plan->wanted_q57 == wanted_q57;
+    plan->wanted_q57 = wanted_q57;
+    if (wanted_q57 <= plan->everywhere_q57) {
+        decide_below(plan, wanted_q57);
+    } else if (!same || plan->searched != clock->piece) {
+        const int above = plan->now.override_q57 > plan->everywhere_q57;
+        plan->searched = clock->piece;
+        plan->saturated = wanted_q57 - plan->now.override_q57 > OVERRIDE_SPARE;
+        begin_search(plan, above ? OVERRIDE_STAY : OVERRIDE_CLIMB, wanted_q57);
+    }
+}
+
+/* At rest, and not steady: one step of deciding what to do next. */
+static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock)
+{
+    if (plan->now.override_q57 > plan->everywhere_q57 &&
+        clock->time_q42_s >> 10 >= plan->return_q32_s) {
+        go_back(plan);
+    }
+    if (plan->task == OVERRIDE_BEGINS) {
+        const int64_t change_q57 = qmath_magnitude(plan->stage.end_q57 - plan->now.override_q57);
+        begin_ramp(plan, override_step_of(&plan->ticks, change_q57));
+    } else if (plan->task == OVERRIDE_SEARCHES) {
+        override_plan_search(plan, clock);
+    } else {
+        decide(plan, clock);
+    }
+}
+
+/* 1 when the override is where it is wanted and may stay there whatever the pieces are. Then the next tick is like this
+ * one, and what was planned is off. */
+static int comes_steady(struct override_plan *plan)
+{
+    const int64_t wanted_q57 = wanted_override(plan);
+    if (wanted_q57 > plan->everywhere_q57 || plan->now.override_q57 != wanted_q57) {
+        return 0;
+    }
+    plan->task = OVERRIDE_DECIDES; /* the command may have come back to it */
+    plan->searched = NOWHERE;
+    plan->saturated = 0;
+    plan->steady = 1;
+    return 1;
+}
+
+/* --- On a ramp --- */
+
+/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above everywhere_q57 on the
+ * way down, where nothing says how to return. */
+static void change_target(struct override_plan *plan, int64_t wanted_q57)
+{
+    struct override_ramp *ramp = &plan->ramp;
+    if (plan->kind == OVERRIDE_RETURN && ramp->end_q57 > plan->everywhere_q57) {
+        return;
+    }
+    if (ramp->step_q56 > 0 ? ramp->end_q57 >= wanted_q57 : ramp->end_q57 <= wanted_q57) {
+        override_ramp_cut(ramp);
+    }
+}
+
+/* A stage ends soon: the next one is looked for, so that the rest between them is short. */
+static void search_early(struct override_plan *plan, const struct program_clock *clock,
+                         int64_t wanted_q57)
+{
+    const struct override_ramp *ramp = &plan->ramp;
+    if ((ramp->rise | ramp->even) != 0u || ramp->fall > EARLY || plan->kind != OVERRIDE_SETTLE ||
+        wanted_q57 > plan->everywhere_q57) {
+        return;
+    }
+    if (plan->task == OVERRIDE_SEARCHES) {
+        override_plan_search(plan, clock);
+    } else if (plan->task == OVERRIDE_DECIDES &&
+               qmath_magnitude(wanted_q57 - ramp->end_q57) > SMALL) {
+        begin_search(plan, OVERRIDE_SETTLE, wanted_q57);
+    }
+}
+
+/* Slope at the end of the next tick of the ramp. */
+static int64_t next_slope(struct override_plan *plan, const struct program_clock *clock)
+{
+    const int64_t wanted_q57 = wanted_override(plan);
+    if (wanted_q57 != plan->wanted_q57) {
+        change_target(plan, wanted_q57);
+    } else {
+        search_early(plan, clock, wanted_q57);
+    }
+    return override_ramp_slope(&plan->ramp, plan->now.slope_q56);
+}
+
+/* --- Tick --- */
+
+/* A program begins with feed and acceleration zero: there the override may step. */
+static void first_tick(struct override_plan *plan, struct program_clock *clock)
+{
+    plan->started = 1;
+    if (clock->time_q42_s != 0) {
+        return;
+    }
+    plan->now.override_q57 = qmath_lesser(wanted_override(plan), OVERRIDE_ONE);
+    clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    (void)comes_steady(plan);
+}
+
+/* The tick that ends a ramp looks how far each tick at rest will go. */
+static void tick_of_ramp(struct override_plan *plan, struct program_clock *clock)
+{
+    const int64_t slope_q56 = next_slope(plan, clock);
+    program_clock_advance_q62(clock, program_clock_way_q62_s(clock, &plan->now, slope_q56));
+    override_tick(&plan->now, slope_q56);
+    if (!override_ramp_moves(&plan->ramp)) {
+        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    }
+}
+
+void override_plan_change(struct override_plan *plan, struct program_clock *clock)
+{
+    if (override_ramp_moves(&plan->ramp)) {
+        tick_of_ramp(plan, clock);
+        return;
+    }
+    if (!comes_steady(plan)) {
+        tick_of_decision(plan, clock);
+    }
+    if (plan->now.override_q57 != 0) {
+        program_clock_advance_even(clock, plan->now.override_q57);
+    }
+}
+
+uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock)
+{
+    if (plan->steady != 0) { /* nothing is on its way: the same again */
+        program_clock_advance_even(clock, plan->now.override_q57);
+    } else if (plan->started != 0) {
+        override_plan_change(plan, clock);
+    } else {
+        first_tick(plan, clock);
+        return clock->time_q42_s;
+    }
+    return program_clock_enter(clock);
+}

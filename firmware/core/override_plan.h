@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The plan of the feed override: which ramp comes next on the way to the override that is commanded, and a tick of it.
+ *
+ * One ramp at a time is decided, from rest to rest, by look-ahead into the feed pieces that it will run into. The decision
+ * is spread over the ticks before it, one step of a search in a tick. Up to `everywhere_q57`, the override that all pieces of
+ * the program allow, the override may rest for as long as it likes. Above it a ramp back is known before a ramp up begins,
+ * and when it has to begin (docs/numerics.md section 12, "One move at a time" and "Windows").
+ *
+ * Integers only, bounded time, no heap. One owner. Tick context, but for override_plan_begin.
+ */
+#ifndef HODOGRAPH_CORE_OVERRIDE_PLAN_H
+#define HODOGRAPH_CORE_OVERRIDE_PLAN_H
+
+#include <stdint.h>
+
+#include "core/override_ramp.h"
+#include "core/prepared.h"
+#include "core/program_clock.h"
+
+enum override_task {
+    OVERRIDE_DECIDES, /* nothing is looked for */
+    OVERRIDE_SEARCHES,
+    OVERRIDE_BEGINS,
+};
+
+enum override_kind {
+    OVERRIDE_SETTLE, /* a ramp that ends at or below everywhere_q57 and begins there */
+    OVERRIDE_RETURN, /* from above it to below it */
+    OVERRIDE_STAY,   /* no ramp: how long the present override above it may last */
+    OVERRIDE_CLIMB,  /* a ramp to an override above it */
+};
+
+/* The steps of a search, one in a tick. */
+enum override_search {
+    OVERRIDE_LOOKS,    /* at the next window of pieces: what it allows, */
+    OVERRIDE_STAGES,   /* how far one ramp may go with that, */
+    OVERRIDE_MEASURES, /* how long that ramp takes, */
+    OVERRIDE_FITS,     /* and whether it ends inside the window */
+};
+
+/* Look-ahead: the pieces from one on, as many as the window has, or to the end of the program. */
+struct override_window {
+    const struct program_override *bounds; /* least of all pieces in it */
+    uint64_t end_q32_s;                    /* UINT64_MAX with the last piece */
+    struct program_override own;           /* `bounds` of a program without prepared records */
+};
+
+/* Contents private, but for `now` and `saturated`. */
+struct override_plan {
+    struct override_state now;
+    uint32_t saturated; /* 1: the commanded override is more than the pieces allow here */
+    uint32_t started;   /* 0 until the first tick */
+    uint32_t steady;    /* 1: at the commanded override, in which only a command changes anything */
+    uint32_t held;      /* 1: the override goes to 0 */
+    int64_t commanded_q57;
+    int64_t everywhere_q57;             /* greatest override that all pieces allow, */
+    struct program_override everywhere; /* and their least bounds */
+    struct override_ramp ramp;
+    uint32_t task;   /* of the next tick at rest, enum override_task */
+    uint32_t kind;   /* of the ramp that is on its way or looked for, enum override_kind */
+    uint32_t step;   /* of the search, enum override_search */
+    uint32_t window; /* looked at next, */
+    struct override_window ahead; /* and the one looked at */
+    uint32_t searched;            /* last search above everywhere_q57 began in this piece */
+    int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
+    int64_t target_q57;           /* what is looked for, */
+    struct ramp_stage stage;      /* where the next ramp on the way there ends, */
+    struct ramp_ticks ticks;      /* and its ticks */
+    int64_t high_q57;             /* greatest override on it */
+    uint64_t return_q32_s;  /* above everywhere_q57: a ramp back is known, if it begins by then, */
+    struct ramp_ticks back; /* and its ticks */
+};
+
+/* For a program at rest, commanded 100 %. Reads all pieces: main loop. */
+void override_plan_begin(struct override_plan *plan, const struct program *p);
+
+/* The path came to rest otherwise: the override goes on from 0. */
+void override_plan_rest(struct override_plan *plan);
+
+/* --- Commands: take effect in the next tick, or when the ramp under way may be cut. --- */
+
+/* The override wanted, in per cent; more than OVERRIDE_PERCENT counts as that. */
+void override_plan_set(struct override_plan *plan, uint32_t percent);
+
+/* To override 0, and there until it is released. */
+void override_plan_hold(struct override_plan *plan);
+void override_plan_release(struct override_plan *plan);
+
+/* An override that rises does so no more: its slope goes to 0 as fast as it rose. */
+void override_plan_rise_no_more(struct override_plan *plan);
+
+/* --- Tick --- */
+
+/* One tick: moves the override, and the clock with it. Gives program_clock_time_q42; the first call the time begun at.
+ * At the start of a program the override is what is commanded at once, at most 1, since the path is at rest. */
+uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock);
+
+/* Part of it: a tick that is neither steady nor the first. */
+void override_plan_change(struct override_plan *plan, struct program_clock *clock);
+
+/* Part of it: one step of a search. */
+void override_plan_search(struct override_plan *plan, const struct program_clock *clock);
+
+/* The window of this number (below OVERRIDE_WINDOWS) from the present piece of the clock on. Constant time with prepared
+ * records (core/prepared.h), else it looks at each piece. */
+void override_window_get(struct override_window *w, const struct program_clock *clock,
+                         uint32_t window);
+
+#endif

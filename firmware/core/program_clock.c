@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/program_clock.h"
+
+/* The last piece ends with the program. */
+static uint64_t end_of_piece(const struct program_clock *clock, uint64_t end_q42_s)
+{
+    return clock->piece + 1u == clock->program->header.piece_count ? clock->duration_q42_s
+                                                                   : end_q42_s;
+}
+
+/* Of a program without records. */
+static void read_ends(struct program_clock *clock, uint64_t time_q42_s, uint32_t most)
+{
+    for (; time_q42_s >= clock->piece_end_q42_s && most > 0; most--) {
+        clock->piece++;
+        uint64_t length_q32_s = program_piece_duration(clock->program, clock->piece);
+        clock->piece_end_q42_s = end_of_piece(
+            clock, clock->piece_end_q42_s + (length_q32_s << PROGRAM_CLOCK_Q32_TO_Q42));
+    }
+}
+
+/* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
+ * ends at most. When they are not enough, the piece ends before the time, which interp_at_piece refuses. */
+static void find_piece(struct program_clock *clock, uint64_t time_q42_s, uint32_t most)
+{
+    const struct prepared_piece *record = clock->record;
+    const uint64_t time_q32_s = time_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
+    uint32_t left = most;
+    if (record == NULL) {
+        read_ends(clock, time_q42_s, most);
+        return;
+    }
+    do {
+        record = prepared_piece_next(record, clock->program->prepared_for);
+        left--;
+    } while (time_q32_s >= record->end_q32_s && left > 0);
+    clock->record = record;
+    clock->piece += most - left;
+    clock->piece_end_q42_s = record->end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
+}
+
+uint64_t program_clock_pass_end(struct program_clock *clock, uint64_t time_q42_s)
+{
+    if (time_q42_s >= clock->duration_q42_s) {
+        clock->time_q42_s = clock->duration_q42_s;
+        clock->rest = 0;
+        clock->fine = 0;
+        return clock->duration_q42_s;
+    }
+    find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS);
+    return time_q42_s;
+}
+
+uint64_t program_clock_way_q62_s(const struct program_clock *clock,
+                                 const struct override_state *from, int64_t slope_q56)
+{
+    int64_t six_q56 = 3 * from->override_q57 + 2 * from->slope_q56 + slope_q56;
+    int64_t way = qmath_mul_unsigned(six_q56, (uint32_t)(clock->sixth_q70_s >> 32)) +
+                  (qmath_mul_unsigned(six_q56, (uint32_t)clock->sixth_q70_s) >> 32);
+    return (uint64_t)(way > 0 ? way : 0);
+}
+
+static void set_period(struct program_clock *clock, uint32_t period_us)
+{
+    uint64_t period = (uint64_t)period_us << 36;
+    clock->period_us = period_us;
+    clock->period_log2 = (period_us >= 2000u ? 1u : 0u) + (period_us >= 4000u ? 1u : 0u) +
+                         (period_us >= 8000u ? 1u : 0u);
+    clock->period_q42_s = qmath_div_u64(period, PROGRAM_CLOCK_REST_UNIT);
+    clock->period_rest = (uint32_t)(period - clock->period_q42_s * PROGRAM_CLOCK_REST_UNIT);
+    clock->period_q32_s = (uint32_t)(clock->period_q42_s >> 10) + 1u;
+    /* period_us 2^63 / 46875 in two steps */
+    uint64_t high = qmath_div_u64((uint64_t)period_us << 48, 46875u);
+    uint64_t left = ((uint64_t)period_us << 48) - high * 46875u;
+    clock->sixth_q70_s = (high << 15) + qmath_div_u64(left << 15, 46875u);
+}
+
+static void set_time(struct program_clock *clock, uint64_t time_q42_s)
+{
+    clock->time_q42_s = time_q42_s;
+    clock->rest = 0;
+    clock->fine = 0;
+    clock->even_q62_s = 0;
+}
+
+void program_clock_begin(struct program_clock *clock, const struct program *p, uint32_t period_us,
+                         uint64_t time_q42_s)
+{
+    clock->program = p;
+    clock->duration_q42_s = p->header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
+    set_time(clock, time_q42_s < clock->duration_q42_s ? time_q42_s : clock->duration_q42_s);
+    set_period(clock, period_us);
+    clock->piece = 0;
+    clock->record = p->prepared_for != NULL ? prepared_piece_at(p, p->prepared_for, 0) : NULL;
+    clock->piece_end_q42_s =
+        end_of_piece(clock, program_piece_duration(p, 0) << PROGRAM_CLOCK_Q32_TO_Q42);
+    if (clock->time_q42_s != clock->duration_q42_s && clock->time_q42_s >= clock->piece_end_q42_s) {
+        find_piece(clock, clock->time_q42_s, UINT32_MAX);
+    }
+}
+
+void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
+                       const struct prepared_piece *record, uint64_t piece_end_q32_s)
+{
+    set_time(clock, time_q42_s);
+    clock->piece = piece;
+    clock->record = record;
+    clock->piece_end_q42_s = end_of_piece(clock, piece_end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42);
+}
