@@ -27,7 +27,7 @@ uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
 /*@ predicate is_plan(struct override_plan *plan) =
       IS_OVERRIDE(plan->now.override_q57) && -OVERRIDE_MOST <= plan->now.slope_q56 <= OVERRIDE_MOST &&
-      IS_OVERRIDE(plan->commanded_q57) && OVERRIDE_ONE <= plan->everywhere_q57 <= OVERRIDE_MOST; */
+      IS_OVERRIDE(plan->commanded_q57) && OVERRIDE_ONE <= plan->guaranteed_q57 <= OVERRIDE_MOST; */
 
 /*@ assigns plan->now, plan->ramp, plan->steady, plan->saturated, plan->task, plan->searched, plan->wanted_q57,
             plan->return_q32_s \from \nothing;
