@@ -70,7 +70,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "alpha.dbc"
     assert main(["dbc", str(MACHINE), "-o", str(output)]) == 0
     assert "16 frames" in capsys.readouterr().out
-    assert output.read_text() == dbc_text(load_machine(MACHINE))
+    assert output.read_bytes().decode() == dbc_text(load_machine(MACHINE))
 
 
 def test_something_else_than_an_eds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
