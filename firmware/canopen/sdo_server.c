@@ -23,7 +23,7 @@ enum client_command {
 #define BLOCK_UPLOAD_SUBCOMMAND   0x03u
 #define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
 
-#define EXPEDITED_BYTE  0x2Fu /* initiate download: expedited, one byte */
+#define EXPEDITED_BYTE 0x2Fu /* initiate download: expedited, one byte */
 
 void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uint32_t timeout_us,
                      uint8_t block_segments)

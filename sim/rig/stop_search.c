@@ -18,8 +18,9 @@
 #define LONGEST_SHARE 0.1
 #define TICKS_MORE    3.0 /* of a brake than of its continuous curve */
 #define FEWER 56 /* codes below the greatest: a brake with less than a 128th of a limit is none */
-#define NO_BRAKE_S   10.0
-#define FASTER       0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
+#define NO_BRAKE_S 10.0
+#define FASTER                                                                                     \
+    0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
 #define WAIT_AS_GOOD 1.001 /* or such a one that could also take much longer */
 #define NEAR         1.05  /* so near to the least time without limits no other start is tried */
