@@ -13,6 +13,7 @@ from collections import OrderedDict
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from cantools import Error as DbcError
 from cantools.database import Database, Message, Node, Signal
 from cantools.database.conversion import BaseConversion
 from cantools.typechecking import Choices
@@ -20,6 +21,7 @@ from cantools.typechecking import Choices
 from .bustime import Pdo, axis_choice, drive_pdos
 from .config import Axis, Machine
 from .data import DRIVE_EDS
+from .errors import InputError
 
 CONTROLLER = "Controller"
 
@@ -46,8 +48,14 @@ _LIMIT_DIGITS = 9  # of a signal's least and greatest value: 0.1 is no sum of po
 
 
 def dbc_text(machine: Machine, eds: Path = DRIVE_EDS) -> str:
-    """The DBC of a machine whose drives are as `eds` says, with CR LF. Raises InputError: the EDS cannot be read."""
-    messages = sorted(_messages(machine, eds), key=lambda message: message.frame_id)
+    """The DBC of a machine whose drives are as `eds` says, with CR LF.
+
+    Raises InputError: the EDS cannot be read, or gives two objects of a PDO the same name.
+    """
+    try:
+        messages = sorted(_messages(machine, eds), key=lambda message: message.frame_id)
+    except DbcError as error:
+        raise InputError(f"{eds}: its PDOs give no DBC: {error}") from error
     nodes = [Node(name) for name in (CONTROLLER, *map(_node_name, machine.axes))]
     database = Database(messages, nodes, version="", sort_signals=None)
     return database.as_dbc_string(sort_signals=None, sort_attribute_signals=None)
