@@ -88,14 +88,16 @@ def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramErro
         index = int(hits[-1])
         return (ProgramError.STOP_BOUND if brief[index] else ProgramError.STOP_LONG), index
     worst_us, worst_um = program.stops.worst_us[kind], program.stops.worst_um[kind]
-    if worst_us != int(said.max()) or worst_um < min(float(least_um.max()), _MOST_US) * (1.0 - _HAIR):
+    if worst_us != int(said.max()) or worst_um < min(float(least_um.max()), _MOST_US) * (
+        1.0 - _HAIR
+    ):
         return ProgramError.STOP_WORST, 0
     return None
 
 
 def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     """Least bounds (M,) of time in us and of the way in um, from the command to rest."""
-    own_s, own_mm, waits = _own(program, kind)
+    own_s, own_mm, waits = own_bounds(program, kind)
     duration = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
     start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
     way = np.maximum(np.diff(start), 0.0)
@@ -115,7 +117,7 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     return out_s[:-1] * 1e6, out_mm[:-1] * 1e3
 
 
-def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
+def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
     """Time in s and way in mm (M,) of a stop that brakes in the piece in which it was asked for, 0 where none may, and
     the share of the piece, up to its end, from which it may go on into the next.
     """
