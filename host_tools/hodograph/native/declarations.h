@@ -193,6 +193,8 @@ struct stop_limits {
     uint32_t cap_count, reach_at_pace, rise_is_cut;
 };
 struct stop_found {
+    uint8_t known;
+    uint8_t before[3];
     uint8_t codes[3];
     double worst_s, mean_s;
 };
