@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the checks of a feed piece need of feed_bounds, and what they get: eva_bounds.c proves it, eva_piece.c and
- * eva_crossing.c rely on it.
+ * What the checks of a feed piece need of feed_bounds, and what they get: eva_bounds.c proves it, eva_piece.c,
+ * eva_crossing.c and eva_stops.c rely on it.
  */
 #ifndef HODOGRAPH_PIECE_BOUNDS_H
 #define HODOGRAPH_PIECE_BOUNDS_H
@@ -44,5 +44,13 @@ int feed_bounds_contained(const struct program_piece *piece);
     ensures \result == 0 || \result == 1; */
 int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24, int64_t high_q24);
+
+/*@ requires in_range(piece) && 1 <= derivative <= 3;
+    assigns low_q24[0 .. 7], high_q24[0 .. 7] \from *piece, derivative;
+    ensures \initialized(low_q24 + (0 .. 7)) && \initialized(high_q24 + (0 .. 7));
+    ensures \forall integer i; 0 <= i < 8 ==> -FEED_NO_BOUND_Q24 <= low_q24[i] < (1 << 62);
+    ensures \forall integer i; 0 <= i < 8 ==> -FEED_NO_BOUND_Q24 <= high_q24[i] <= FEED_NO_BOUND_Q24; */
+void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
+                       int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
 
 #endif
