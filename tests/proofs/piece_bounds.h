@@ -20,6 +20,8 @@
       -(1 << 54) <= c->c_q40_mm[5] <= (1 << 54) &&
       -(1 << 54) <= c->c_q40_mm[6] <= (1 << 54);
     predicate fits(integer a) = -(1 << 62) < a < (1 << 62);
+    predicate is_low(integer a) = -FEED_NO_BOUND_Q24 <= a < (1 << 62);
+    predicate is_high(integer a) = -FEED_NO_BOUND_Q24 <= a <= FEED_NO_BOUND_Q24;
 */
 /* clang-format on */
 
@@ -46,10 +48,12 @@ int feed_bounds_within(const struct program_piece *piece, enum feed_derivative d
                        int64_t low_q24, int64_t high_q24);
 
 /*@ requires in_range(piece) && 1 <= derivative <= 3;
-    assigns low_q24[0 .. 7], high_q24[0 .. 7] \from *piece, derivative;
+    assigns low_q24[0 .. 7], high_q24[0 .. 7] \from derivative;
     ensures \initialized(low_q24 + (0 .. 7)) && \initialized(high_q24 + (0 .. 7));
-    ensures \forall integer i; 0 <= i < 8 ==> -FEED_NO_BOUND_Q24 <= low_q24[i] < (1 << 62);
-    ensures \forall integer i; 0 <= i < 8 ==> -FEED_NO_BOUND_Q24 <= high_q24[i] <= FEED_NO_BOUND_Q24; */
+    ensures is_low(low_q24[0]) && is_low(low_q24[1]) && is_low(low_q24[2]) && is_low(low_q24[3]);
+    ensures is_low(low_q24[4]) && is_low(low_q24[5]) && is_low(low_q24[6]) && is_low(low_q24[7]);
+    ensures is_high(high_q24[0]) && is_high(high_q24[1]) && is_high(high_q24[2]) && is_high(high_q24[3]);
+    ensures is_high(high_q24[4]) && is_high(high_q24[5]) && is_high(high_q24[6]) && is_high(high_q24[7]); */
 void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
 
