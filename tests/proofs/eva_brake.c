@@ -16,7 +16,7 @@
  * instead: core/path_brake.c: qmath_div_up_u64(2u * speed, fall) => ticks_of(2u * speed, fall)
  * instead: core/path_brake.c: n * fall - 2u * speed => (uint64_t)any_between(0, (int64_t)fall - 1)
  * assumes: qmath_clz64 qmath_div_u64 qmath_third depth
- * shows: path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step
+ * shows: path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step within
  * mutant: core/path_brake.c: up > 12 ? => up > 14 ?
  * mutant: core/path_brake.c: mantissa[code & 7u] => mantissa[code & 15u]
  * mutant: core/path_brake.c: from->speed_q56 <= PATH_BRAKE_MOST_SPEED && =>

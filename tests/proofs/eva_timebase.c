@@ -8,7 +8,7 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/timebase_step.c: timebase_find_piece(tb, time_q42_s, TIMEBASE_MOST_ENDS); => (void)timebase_find_piece;
  * assumes: qmath_div_u64 program_piece_duration rate_bounds_of rate_plan_reset rate_plan_move rate_plan_decide rate_plan_steady
- * shows: rate_window_get
+ * shows: rate_window_get timebase_hold timebase_resume timebase_override timebase_go_from timebase_step_q42 timebase_time_q42 timebase_rate_q30 timebase_saturated timebase_state
  * mutant: core/rate_window.c: behind < left ? behind : left => behind
  * mutant: core/rate_window.c: last + 1u - tb->piece => last - tb->piece
  * mutant: core/timebase.c: percent < TIMEBASE_MOST_PERCENT ? percent => percent < 2 * TIMEBASE_MOST_PERCENT ? percent
@@ -130,6 +130,7 @@ static void tick(const struct program *p)
         command(&tb);
         timebase_step_q42(&tb);
         timebase_rate_q30(&tb);
+        timebase_go_from(&tb, (uint64_t)any_between(0, INT64_MAX), i, tb.record, (uint64_t)any_between(0, POWER(54)));
     }
 }
 

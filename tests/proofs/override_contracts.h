@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What a tick of the feed override takes for granted of the timebase, the brake and the interpolator; for eva_override.c
+ * (docs/numerics.md sections 15.5 and 15.6).
+ */
+#ifndef HODOGRAPH_OVERRIDE_CONTRACTS_H
+#define HODOGRAPH_OVERRIDE_CONTRACTS_H
+
+#include "brake_contracts.h"
+#include "core/feed_override.h"
+#include "rate_contracts.h"
+
+#define MOST_SLOPE       (((int64_t)1 << 57) - 1)
+#define MOST_ARC         (((int64_t)1 << 62) + ((int64_t)1 << 60)) /* length and a piece's coefficients */
+#define MOST_FEED_AT     ((int64_t)1 << 60)
+#define LEAST_ARC        (-((int64_t)1 << 60))
+#define IS_ARC(q40_mm)   (LEAST_ARC <= (q40_mm) && (q40_mm) <= MOST_ARC)
+#define IS_SPEED(q56)    (0 <= (q56) && (q56) <= BRAKE_MOST_RISING)
+#define IS_RESULT(value) (-3 <= (value) && (value) <= 1)
+
+/* clang-format off */
+/*@ predicate is_time(struct timebase *tb) =
+      IS_RATE(tb->now.rate_q57) && -MOST_SLOPE <= tb->now.slope_q56 <= MOST_SLOPE && tb->state <= TIMEBASE_HELD &&
+      tb->piece < tb->program->header.piece_count;
+    predicate is_point(struct interp_point *point) =
+      IS_ARC(point->arc_length_q40_mm) && -MOST_FEED_AT <= point->feed_q32_mm_s <= MOST_FEED_AT;
+    predicate is_at(struct path_state *at) = IS_ARC(at->arc_length_q40_mm) && at->fine_q56_mm < 65536;
+    predicate is_brake(struct path_brake *brake) = is_at(&brake->at) && IS_SPEED(brake->at.speed_q56);
+*/
+/* clang-format on */
+
+/* --- core/timebase.h: eva_timebase.c --- */
+
+/*@ requires is_time(tb);
+    assigns tb->state, tb->steady \from tb->state;
+    ensures tb->state <= TIMEBASE_HELD; */
+void timebase_hold(struct timebase *tb);
+
+/*@ requires is_time(tb);
+    assigns tb->state, tb->steady \from tb->state;
+    ensures tb->state <= TIMEBASE_HELD; */
+void timebase_resume(struct timebase *tb);
+
+/*@ requires is_time(tb);
+    assigns tb->override_q57, tb->steady \from percent; */
+void timebase_override(struct timebase *tb, uint32_t percent);
+
+/*@ requires is_time(tb);
+    assigns tb->plan \from tb->now.rate_q57; */
+void timebase_rise_no_more(struct timebase *tb);
+
+/*@ requires piece < tb->program->header.piece_count;
+    assigns tb->time_q42_s, tb->rest, tb->fine, tb->started, tb->piece, tb->piece_end_q42_s, tb->steady, tb->saturated,
+            tb->even_q62_s, tb->now, tb->plan \from time_q42_s, piece, piece_end_q32_s;
+    ensures is_time(tb); */
+void timebase_go_from(struct timebase *tb, uint64_t time_q42_s, uint32_t piece,
+                      const struct prepared_piece *record, uint64_t piece_end_q32_s);
+
+/*@ requires is_time(tb);
+    assigns \result, tb->time_q42_s, tb->rest, tb->fine, tb->started, tb->state, tb->piece, tb->piece_end_q42_s,
+            tb->steady, tb->saturated, tb->even_q62_s, tb->now, tb->plan \from tb->now.rate_q57;
+    ensures is_time(tb); */
+uint64_t timebase_step_q42(struct timebase *tb);
+
+/*@ requires is_time(tb);
+    assigns \result \from tb->time_q42_s; */
+uint64_t timebase_time_q42(const struct timebase *tb);
+
+/*@ requires is_time(tb);
+    assigns \result \from tb->now.rate_q57;
+    ensures \result <= 0x80000000; */
+uint32_t timebase_rate_q30(const struct timebase *tb);
+
+/*@ assigns \result \from tb->saturated; */
+int timebase_saturated(const struct timebase *tb);
+
+/*@ assigns \result \from tb->state;
+    ensures 0 <= \result <= TIMEBASE_HELD; */
+enum timebase_state timebase_state(const struct timebase *tb);
+
+/* --- core/path_brake.h: eva_brake.c, cbmc_brake.c --- */
+
+/*@ requires IS_PERIOD(period_us) && \initialized(&stop->jerk_down) && \initialized(&stop->jerk_up);
+    assigns \result, *out \from period_us;
+    ensures \result == 0 || \result == 1;
+    ensures \initialized(out) && IS_NUMBERS(out); */
+int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_stop *stop,
+                          uint32_t period_us);
+
+/*@ requires is_at(from) && IS_NUMBERS(numbers);
+    assigns \result, *brake \from *from;
+    ensures \result == 0 || \result == 1;
+    ensures \initialized(brake) && is_brake(brake); */
+int path_brake_begin(struct path_brake *brake, const struct path_state *from,
+                     const struct path_brake_numbers *numbers);
+
+/*@ requires is_at(from) && IS_NUMBERS(numbers);
+    requires -2 * MOST_ARC <= way_q40_mm <= 2 * MOST_ARC;
+    assigns \result \from way_q40_mm;
+    ensures \result == 0 || \result == 1; */
+int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
+                    int64_t way_q40_mm);
+
+/*@ requires is_brake(brake);
+    assigns *brake \from brake->at.speed_q56;
+    ensures \initialized(brake) && is_brake(brake); */
+void path_brake_first(struct path_brake *brake);
+
+/*@ requires is_brake(brake);
+    assigns *brake \from brake->at.speed_q56;
+    ensures \initialized(brake) && is_brake(brake); */
+void path_brake_step(struct path_brake *brake);
+
+/*@ assigns \result \from brake->phase;
+    ensures \result == 0 || \result == 1; */
+int path_brake_rests(const struct path_brake *brake);
+
+/* --- core/interp.h: eva_interp.c --- */
+
+/*@ assigns \result, *out, it->segment_index \from time_q42_s;
+    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
+int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
+
+/*@ assigns \result, *out, it->segment_index \from time_q42_s;
+    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
+int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
+                    struct interp_point *out);
+
+/*@ assigns \result, *out, it->segment_index \from arc_length_q40_mm;
+    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
+int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out);
+
+/*@ assigns \result \from time_q42_s; */
+int64_t interp_acceleration_q40(const struct interp *it, const struct prepared_piece *piece,
+                                uint64_t time_q42_s);
+
+/*@ requires index < 3;
+    assigns search->arc_length_q40_mm, search->time_q42_s, search->piece_index, search->bisecting \from index,
+            arc_length_q40_mm;
+    ensures search->piece_index < 3; */
+void interp_search_begin(struct interp_search *search, const struct prepared_piece *piece,
+                         uint32_t index, int64_t arc_length_q40_mm);
+
+/*@ requires search->piece_index < 3;
+    assigns \result, search->time_q42_s, search->piece_index, search->bisecting, search->low_q42_s, search->high_q42_s,
+            it->piece_index \from search->piece_index;
+    ensures search->piece_index < 3; */
+int interp_search_step(struct interp *it, struct interp_search *search);
+
+#endif
