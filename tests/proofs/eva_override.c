@@ -3,7 +3,7 @@
  * The feed override, for a program of three pieces: every command, a tick and every question, from any phase, state and
  * look, whatever the timebase, the brake and the interpolator give in their ranges: nothing overflows, no conversion
  * changes a number, no division by 0, no entry of the stop table beyond the last is read, and what stands in a field of
- * few values stays one of them.
+ * few values stays one of them. Slopes of the rate below 2^57: docs/numerics.md section 15.6.
  *
  * prover: eva
  * options: -eva-slevel 60 -warn-signed-downcast
@@ -12,6 +12,12 @@
  * instead: core/feed_override.c: qmath_magnitude(feed) >= MOST_FEED_Q32 => feed >= MOST_FEED_Q32 || feed <= -MOST_FEED_Q32
  * assumes: qmath_div_u64 qmath_shift_clamp timebase_hold timebase_resume timebase_override timebase_rise_no_more timebase_go_from timebase_step_q42 timebase_time_q42 timebase_rate_q30 timebase_saturated timebase_state path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step path_brake_rests interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step
  * mutant: core/feed_override.c: MOST_FEED_Q32 ((int64_t)1 << 45) => MOST_FEED_Q32 ((int64_t)1 << 49)
+ * mutant: core/feed_override.c: program_stop_get(f->time.program, f->time.piece, (enum => program_stop_get(f->time.program, f->time.piece + 1u, (enum
+ * mutant: core/feed_override.c: time->now.slope_q56 >> 26 => time->now.slope_q56 >> 25
+ * mutant: core/feed_override.c: (int64_t)ticks_q8 << 22 => (int64_t)ticks_q8 << 40
+ * mutant: core/feed_override.c: f->kind : NO_NUMBERS; => f->kind : NO_NUMBERS + 1u;
+ * mutant: core/feed_override.c: f->place.piece != NULL ? f->place.piece : &it->own_piece => f->place.piece
+ * mutant: core/feed_override.c: f->time.record, f->time.piece, f->point => f->time.record, f->time.piece + 1u, f->point
  */
 #include "override_contracts.h"
 #include "proof.h"
