@@ -12,7 +12,7 @@
 #define HODOGRAPH_PLAN_IS_SOUND_H
 
 #include "proof.h"
-#include "override_contracts.h"
+#include "ramp_contracts.h"
 
 #include "core/override_ramp.c"
 #include "core/override_plan.c"
