@@ -168,11 +168,25 @@ static void tell(struct hub *hub, uint16_t kind, const struct participant *about
     }
 }
 
+static void take_packets(struct hub *hub, struct hub_connection *from, size_t most);
+
+/* What a participant has sent is on the bus before time goes on. */
+static void take_sent(struct hub *hub, uint32_t number)
+{
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        struct hub_connection *each = &hub->connections[i];
+        if (each->fd >= 0 && each->role == HUB_MEMBER && each->number == number) {
+            take_packets(hub, each, SIZE_MAX);
+        }
+    }
+}
+
 static void drop_connection(struct hub *hub, struct hub_connection *gone)
 {
     (void)close(gone->fd);
     gone->fd = -1;
     if (gone->role == HUB_PARTICIPANT) {
+        take_sent(hub, gone->number);
         const struct participant *about = virtual_time_find(&hub->time, gone->number);
         if (about != NULL) {
             tell(hub, LOCAL_BUS_LEFT, about);
@@ -387,8 +401,6 @@ static int go_on(struct hub *hub)
 
 /* --- What processes say --- */
 
-static void take_packets(struct hub *hub, struct hub_connection *from, size_t most);
-
 static void greet(struct hub *hub, struct hub_connection *from,
                   const struct local_bus_control *hello)
 {
@@ -411,16 +423,11 @@ static void greet(struct hub *hub, struct hub_connection *from,
     send_control(hub, from->fd, LOCAL_BUS_WELCOME, from->number, NULL);
 }
 
-/* What the participant has sent before it says that it waits is on the bus before time goes on. */
 static void take_wait(struct hub *hub, const struct hub_connection *from,
                       const struct local_bus_control *wait)
 {
-    const bool sent = (wait->flags & LOCAL_BUS_SENT) != 0u;
-    for (size_t i = 0; i < HUB_CONNECTIONS && sent; ++i) {
-        struct hub_connection *each = &hub->connections[i];
-        if (each->fd >= 0 && each->role == HUB_MEMBER && each->number == from->number) {
-            take_packets(hub, each, SIZE_MAX);
-        }
+    if ((wait->flags & LOCAL_BUS_SENT) != 0u) {
+        take_sent(hub, from->number);
     }
     if (virtual_time_wait(&hub->time, from->number, wait->number, wait->time_ns)) {
         const struct participant *interrupted = virtual_time_find(&hub->time, from->number);

@@ -245,6 +245,22 @@ static void test_what_a_member_sent_before_it_left_goes_out(void)
     TEST_ASSERT_EQUAL(0x124, got[0].id);
 }
 
+/* It ends as soon as it has sent, as a process does at its end: without a wait. */
+static void test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once(void)
+{
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const struct can_msg later = {.id = 0x200};
+    TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &later));
+    send_frame(&other, 0x100, 0);
+    (void)close(other.fd);
+    other.fd = -1;
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL_UINT64(VIRTUAL_TIME_BEGIN_NS + frame_ns(0x100, 0), clock_ns());
+    TEST_ASSERT_EQUAL(1, receive(got));
+    TEST_ASSERT_EQUAL(0x100, got[0].id);
+}
+
 static void test_a_descriptor_of_ones_own_ends_the_wait_at_once(void)
 {
     struct pollfd fds = {.fd = eventfd(1, 0), .events = POLLIN};
@@ -329,6 +345,7 @@ int main(void)
     RUN_TEST(test_an_answer_comes_behind_what_waits_already);
     RUN_TEST(test_filters_and_deferred_frames_do_not_wake);
     RUN_TEST(test_what_a_member_sent_before_it_left_goes_out);
+    RUN_TEST(test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once);
     RUN_TEST(test_a_descriptor_of_ones_own_ends_the_wait_at_once);
     RUN_TEST(test_a_signal_ends_the_wait);
     RUN_TEST(test_a_signal_before_the_wait_ends_it_too);
