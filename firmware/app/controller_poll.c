@@ -171,13 +171,14 @@ static void poll_homing(struct controller *controller, uint32_t elapsed_us)
     }
 }
 
+/* On the way out nothing is asked any more: an answer that comes behind the end would be taken for one to the next client. */
 static void poll_look(struct controller *controller, uint32_t elapsed_us)
 {
     port_lock();
     const bool found = controller->machine.state != MACHINE_BOOT;
     port_unlock();
     struct can_msg out;
-    const bool allowed = found && !homing_busy(&controller->homing);
+    const bool allowed = found && !controller->ending && !homing_busy(&controller->homing);
     if (drive_look_process(&controller->look, &controller->machine, controller->boot.facts, allowed,
                            elapsed_us, &out) != 0) {
         controller_send(&out);
