@@ -111,6 +111,7 @@ static void take_connection(struct hub *hub, unsigned bus)
     fresh->number = 0;
     fresh->filter_count = 0;
     fresh->deferred_count = 0;
+    fresh->tracked_count = 0;
     fresh->queue.count = 0;
 }
 
@@ -242,6 +243,22 @@ static void deliver(struct hub *hub, size_t sender, const struct can_frame *fram
     }
 }
 
+/* Tells its sender that it has left, where that wants to know. It finds it when it wakes for something else. */
+static void deliver_back(struct hub *hub, size_t sender, const struct can_frame *frame)
+{
+    const struct hub_connection *to = &hub->connections[sender];
+    struct local_bus_frame out;
+    if (to->fd < 0 || to->role != HUB_MEMBER || !matches(to->tracked, to->tracked_count, frame)) {
+        return;
+    }
+    memset(&out, 0, sizeof out);
+    out.frame = *frame;
+    out.frame.__res0 = LOCAL_BUS_OWN;
+    out.time_ns = hub->time.now_ns;
+    hub->lost += send_frame(hub, to, &out) ? 0u : 1u;
+    virtual_time_note_frame(&hub->time, to->number);
+}
+
 /* Of two frames the one with the lower value wins the bus. */
 static uint32_t arbitration(const struct can_frame *frame)
 {
@@ -337,6 +354,7 @@ static void end_transmissions(struct hub *hub)
             bus->busy = false;
             start_transmission(hub, i);
             deliver(hub, sender, &frame, hub->time.now_ns);
+            deliver_back(hub, sender, &frame);
         }
     }
 }
@@ -471,6 +489,9 @@ static void take_filters(struct hub_connection *from, const struct local_bus_fil
     if (told->kind == LOCAL_BUS_FILTER) {
         memcpy(from->filters, told->filters, bytes);
         from->filter_count = told->count;
+    } else if (told->kind == LOCAL_BUS_TRACK) {
+        memcpy(from->tracked, told->filters, bytes);
+        from->tracked_count = told->count;
     } else {
         memcpy(from->deferred, told->filters, bytes);
         from->deferred_count = told->count;
@@ -491,7 +512,8 @@ static bool take_packet(struct hub *hub, struct hub_connection *from, const unio
         }
         take_frame(hub, from, &packet->frame);
     } else if (from->role == HUB_MEMBER && (packet->control.kind == LOCAL_BUS_FILTER ||
-                                            packet->control.kind == LOCAL_BUS_DEFER)) {
+                                            packet->control.kind == LOCAL_BUS_DEFER ||
+                                            packet->control.kind == LOCAL_BUS_TRACK)) {
         take_filters(from, &packet->filters, size);
     } else {
         return size == sizeof packet->control && packet->control.version == LOCAL_BUS_VERSION &&
