@@ -21,6 +21,7 @@ struct program_limits {
     int64_t min_q40_mm[2], max_q40_mm[2];
     uint32_t axis_velocity_um_s[2], axis_acceleration_um_s2[2], axis_jerk_mm_s3[2];
     uint32_t stop_time_ms;
+    ...;
 };
 struct program_fault {
     int code;
