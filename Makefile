@@ -23,7 +23,7 @@ CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
 CLANG  ?= clang
 READY  := $(BUILD)/stamps
 
-# What was proved or counted once is not proved or counted again while nothing it depends on has changed (docs/testing.md).
+# What was proved or counted once is not proved or counted again while nothing it depends on has changed (docs/validation/testing.md).
 # STAMPS=off: it is.
 STAMPS ?= on
 stamps_option = $(if $(filter off,$(STAMPS)),--no-stamps)

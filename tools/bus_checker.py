@@ -75,7 +75,7 @@ class BusChecker:
             for base, name in ((_SDO_ANSWER, "SDO answer"), (_SDO_ASK, "SDO request")):
                 self._lengths[base + node] = _SDO_BYTES
                 self._names[base + node] = f"{name} of node {node}"
-        for axis in self.machine.axes:  # docs/protocol.md section 2: not in every machine
+        for axis in self.machine.axes:  # docs/reference/protocol.md section 2: not in every machine
             self._lengths.setdefault(_TPDO3 + axis.node, 4)
             self._names.setdefault(_TPDO3 + axis.node, f"Drive{axis.node}_TPDO3")
         self._drives = {axis.node: self._drive(axis.node) for axis in self.machine.axes}

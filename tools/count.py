@@ -3,7 +3,8 @@
 """count.py: `make count`: instructions of the tick on all cores, compared with the committed ones.
 
 Prints the tables, writes them as JSON, and compares with tests/data/counts.json with no tolerance. Exit status 1 when
-a count differs; `--update` takes the new ones over, there and into docs/counts.md. A core is not counted again while
+a count differs; `--update` takes the new ones over, there and into docs/validation/counts.md. A core is not
+counted again while
 its images, the emulator and the programs are the same (testing/cache.py); `--no-stamps` counts all. Counts belong to a
 compiler: with another version nothing is compared, and this is said.
 """
@@ -24,7 +25,7 @@ from testing.cache import Stamps
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMITTED = ROOT / "tests/data/counts.json"
-DOCUMENT = ROOT / "docs/counts.md"
+DOCUMENT = ROOT / "docs/validation/counts.md"
 _SHOWN = "an386 float"
 _PORT = r"The port adds (\d+) to each tick"
 _WAIT = r"\*supervision\* (\d+), since simulated drives are awaited"

@@ -3,7 +3,7 @@
 """emulate.py TARGET --bus INTERFACE ...: the controller on an emulated board, in place of hodograph-controller.
 
 Starts QEMU with the image of `make firmware`, and hodograph-bridge, which joins it to the bus; ends both. Takes the
-options of hodograph-controller and has its exit status. docs/target.md tells more.
+options of hodograph-controller and has its exit status. docs/guides/target.md tells more.
 """
 
 from __future__ import annotations
@@ -115,7 +115,8 @@ def qemu_command(options: argparse.Namespace, ports: tuple[int, int]) -> list[st
 def _uart(options: argparse.Namespace, ports: tuple[int, int]) -> str:
     """What the UART is joined to. A multiplexed device (mux=on, with one user) has a buffer of 32 characters, which
     goes on filling while the UART is full and gives the next one when the board has read the last. Datagrams are taken
-    from the socket as a whole, where a stream costs a turn of QEMU's main loop for each character (docs/target.md).
+    from the socket as a whole, where a stream costs a turn of QEMU's main loop for each character
+    (docs/guides/target.md).
     """
     if options.serve is None:
         return f"udp,host=127.0.0.1,port={ports[0]},localaddr=127.0.0.1,localport={ports[1]}"

@@ -4,7 +4,8 @@
 
 C harnesses are tests/fuzz/fuzz_NAME.c, with libFuzzer under the address and undefined-behaviour sanitizers; Python
 targets are in tools/fuzzing/targets.py. Without NAME all of them run. Prints executions, coverage and findings of each;
-the last line is `N passed, N failed`, a harness without a finding being one that passed. docs/testing.md has more.
+the last line is `N passed, N failed`, a harness without a finding being one that passed.
+docs/validation/testing.md has more.
 """
 
 from __future__ import annotations

@@ -3,9 +3,10 @@
 """longest_path.py: the longest path through the motion part of a tick, from the instructions of its image.
 
     .venv/bin/python tools/longest_path.py an386 float
-    .venv/bin/python tools/longest_path.py --update     # the tables of docs/wcet.md
+    .venv/bin/python tools/longest_path.py --update     # the tables of docs/validation/wcet.md
 
-Needs `make firmware`. Prints each function with all that it calls, in instructions; docs/wcet.md compares the sum with
+Needs `make firmware`. Prints each function with all that it calls, in instructions; docs/validation/wcet.md
+compares the sum with
 what was counted. Exit status 1 when no bound can be shown.
 """
 
@@ -23,7 +24,7 @@ from target.longest import Bounds, Longest, LongestError
 
 ROOT = Path(__file__).resolve().parents[1]
 COUNTS = ROOT / "tests/data/counts.json"
-DOCUMENT = ROOT / "docs/wcet.md"
+DOCUMENT = ROOT / "docs/validation/wcet.md"
 ENTRY = "tick"  # of setpoints.elf: motion_step and the call of it
 # What a tick does not call while nothing changes the rate; its first one, and all after the end, are plain too.
 NOT_PLAIN = {
@@ -73,7 +74,7 @@ def table(build: Path) -> str:
 
 
 def document(build: Path, text: str) -> str:
-    """docs/wcet.md with what is generated between its marks."""
+    """docs/validation/wcet.md with what is generated between its marks."""
     figures = json.loads(COUNTS.read_text(encoding="utf-8"))
     blocks = {
         "longest": table(build),
@@ -110,7 +111,9 @@ def main() -> int:
     parser.add_argument(
         "--stop", action="store_true", help="of any tick, also one that plans a brake"
     )
-    parser.add_argument("--update", action="store_true", help="the tables of docs/wcet.md")
+    parser.add_argument(
+        "--update", action="store_true", help="the tables of docs/validation/wcet.md"
+    )
     parser.add_argument("--build", type=Path, default=Path("build"))
     options = parser.parse_args()
     try:

@@ -8,7 +8,7 @@ sanitizers; Python modules in a copy of the tree with the tests of their folder.
 notices has survived: it is printed with its place. Mistakes are a random sample that depends on the
 seed alone. What is known from an earlier run (BUILD/mutation/AREA.jsonl) is not tried again for as long
 as the source stays as it is; --again tries those that survived once more. Exit status 0 whatever
-survives: a survivor is for a reader to judge. docs/mutation.md has more.
+survives: a survivor is for a reader to judge. docs/validation/mutation.md has more.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@
  *     controller_start(&controller);              interrupts on
  *     while (...) { port_wait(...); controller_poll(&controller); }
  *
- * docs/architecture.md draws which context runs what. All functions: mainline.
+ * docs/reference/architecture.md draws which context runs what. All functions: mainline.
  */
 #ifndef APP_CONTROLLER_H
 #define APP_CONTROLLER_H

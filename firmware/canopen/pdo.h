@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* pdo: the fixed process data of the bus (docs/protocol.md, section 2).
+/* pdo: the fixed process data of the bus (docs/reference/protocol.md, section 2).
  *
  * `drive` is always the node id of the drive, on both sides. Decoding returns the drive's node id,
  * or 0 when the frame is not this PDO of a node, or PDO_ERR_SHORT when it is but has fewer bytes

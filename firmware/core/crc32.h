@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * CRC-32 of IEEE 802.3: polynomial 0xEDB88320 reflected, initial value and final XOR 0xFFFFFFFF
- * (the CRC of zlib, so `zlib.crc32` in Python gives the same). Source: docs/protocol.md 1.1.
+ * (the CRC of zlib, so `zlib.crc32` in Python gives the same). Source: docs/reference/protocol.md 1.1.
  * Pure functions, any context.
  */
 #ifndef HODOGRAPH_CORE_CRC32_H

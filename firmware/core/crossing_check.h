@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rule of docs/protocol.md 1.2 that needs segments and pieces together: no tick crosses more than two
+ * The rule of docs/reference/protocol.md 1.2 that needs segments and pieces together: no tick crosses more than two
  * segment ends. Used by program_check. Main loop.
  */
 #ifndef HODOGRAPH_CORE_CROSSING_CHECK_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Feed, acceleration and jerk of a piece: values at its ends and bounds over it, in integers of
- * physical units. Derivation: docs/numerics.md section 9, "Checking". Main loop.
+ * physical units. Derivation: docs/theory/numerics.md section 9, "Checking". Main loop.
  */
 #ifndef HODOGRAPH_CORE_FEED_BOUNDS_H
 #define HODOGRAPH_CORE_FEED_BOUNDS_H
@@ -42,7 +42,7 @@ void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative d
                        int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
 
 /* The way a piece may go behind its start or beyond its end: 2^-14 mm. The exponential ramp begins with a step back of
- * some 2e-8 of feed times ramp time (docs/numerics.md section 9). */
+ * some 2e-8 of feed times ramp time (docs/theory/numerics.md section 9). */
 #define FEED_WAY_SLACK_Q36 ((int64_t)1 << 22)
 
 /* 1 when F stays between its values at both ends of the piece, to that slack: a feed that is nowhere far below 0 may

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Evaluating a feed piece in integers: arc length and feed at a time (docs/numerics.md section 9,
+ * Evaluating a feed piece in integers: arc length and feed at a time (docs/theory/numerics.md section 9,
  * "Feed"). Used by the fixed and the float kernel. Pure, tick context.
  */
 #ifndef HODOGRAPH_CORE_FEED_PIECE_H

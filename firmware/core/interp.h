@@ -5,7 +5,7 @@
  * The point is a pure function of (program, time, kernel): the cursor inside struct interp only
  * remembers which segment and piece are looked at. So a run, a seek and a run backwards by seeks
  * give the same bits, and so do a program with prepared records (core/prepared.h) and one without, where the tick
- * expands what it enters. Kernels: docs/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
+ * expands what it enters. Kernels: docs/theory/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
  * (the inverse of arc length). The program must have passed program_check with any limits; the
  * image must outlive the struct. interp_at_q42 is meant for the tick (interrupt); the other functions
  * for the main loop.

@@ -8,7 +8,7 @@
 #define Q50   1125899906842624.0
 #define STEPS 3
 
-/* A feed without limit (docs/protocol.md 1.1: 0) can be beyond what 64 bits hold. */
+/* A feed without limit (docs/reference/protocol.md 1.1: 0) can be beyond what 64 bits hold. */
 #define MOST 4611686018427387904.0 /* 2^62 */
 
 static double power_of_two(int n)

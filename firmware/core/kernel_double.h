@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The double kernel: IEEE double, the host's reference; docs/numerics.md section 11.
+ * The double kernel: IEEE double, the host's reference; docs/theory/numerics.md section 11.
  * Only + - * / and conversions, so with -ffp-contract=off its bits are the same on every IEEE host.
  * Pure, tick context.
  */

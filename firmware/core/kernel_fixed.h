@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The fixed kernel: integers only, for targets without an FPU; the same bits everywhere.
- * Derivation, ranges and the error bound: docs/numerics.md sections 9 and 12. Feed pieces are
+ * Derivation, ranges and the error bound: docs/theory/numerics.md sections 9 and 12. Feed pieces are
  * core/feed_piece.h. Pure, tick context.
  *
  * "Normalised" is divided by 2^exponent of the segment, so that sigma lies in [1/8, 1). Polynomials

@@ -2,7 +2,7 @@
 /*
  * The float kernel: the inverse of arc length and the tangent in single precision, everything else in 32-bit integers with
  * a scale of the segment's own. No double, no 64-bit conversion: int32 to float and back only. Derivation and
- * error bound: docs/numerics.md section 10. Feed pieces are core/feed_piece.h. Only + - * / : with
+ * error bound: docs/theory/numerics.md section 10. Feed pieces are core/feed_piece.h. Only + - * / : with
  * -ffp-contract=off the same bits on every target with IEEE single. Pure, tick context.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_FLOAT_H

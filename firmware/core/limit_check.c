@@ -210,7 +210,7 @@ static void feed_at(const struct cell *cell, struct real x, struct real f[QUANTI
 }
 
 /* With tangent T = w^2 / sigma and curvature kappa: velocity F' T, acceleration (F'' + i kappa F'^2) T, jerk
- * (F''' - kappa^2 F'^3 + i (3 kappa F' F'' + kappa_s F'^3)) T. docs/numerics.md 16. */
+ * (F''' - kappa^2 F'^3 + i (3 kappa F' F'' + kappa_s F'^3)) T. docs/theory/numerics.md 16. */
 static void motion_at(const struct cell *cell, struct real x, struct motion *out)
 {
     const struct path *path = cell->path;
@@ -378,7 +378,7 @@ static void in_level(const struct program_override *own, uint32_t level,
 }
 
 /* At the rates that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration and jerk f v,
- * f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out. docs/numerics.md section 7. */
+ * f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out. docs/theory/numerics.md section 7. */
 static void at_all_rates(const struct way *way, const struct real at_one[QUANTITIES],
                          struct real out[QUANTITIES])
 {

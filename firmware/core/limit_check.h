@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * limit_check: proves that a program keeps the limits of the axes x and y (velocity, acceleration, jerk) at every instant, at every
- * rate of program time that its override bounds allow. docs/limits.md says what is proved and what is not.
+ * rate of program time that its override bounds allow. docs/guides/limits.md says what is proved and what is not.
  *
  * It believes nothing of the image but its coefficients. Time is cut into cells: one feed piece on one segment. In a cell every
  * quantity q of the motion has a bound M of |q''|, by Taylor series with majorants; between two samples h apart q is at most M h^2/8

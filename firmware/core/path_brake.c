@@ -15,7 +15,7 @@
 
 enum phase { FALLING, READY, SETTLING, RESTING };
 
-/* --- Numbers of the stop table (docs/protocol.md 1.4) --- */
+/* --- Numbers of the stop table (docs/reference/protocol.md 1.4) --- */
 
 /* About 2^16 2^(i/8): what the codes are defined by. */
 static const uint32_t mantissa[8] = {65536u, 71468u,  77935u,  84990u,
@@ -86,7 +86,7 @@ static int within(uint64_t need, struct rough a, struct rough b, int up)
 }
 
 /* Whether there are whole ticks for the way to rest: b^2 <= 2 j (v - b); for v less b, also a tick later
- * (docs/numerics.md section 12). */
+ * (docs/theory/numerics.md section 12). */
 static int may_settle(int64_t speed_q56, int64_t fall_q56, int64_t jerk_q56)
 {
     if (speed_q56 <= fall_q56) {
@@ -190,7 +190,7 @@ static int squares_within(int64_t x, int64_t y, int64_t a_q56, int64_t way_q40_m
 }
 
 /* The way is at most that with the deceleration alone from a higher speed, and what the last jerk takes
- * (docs/numerics.md section 12); the deceleration is one that is about reached. */
+ * (docs/theory/numerics.md section 12); the deceleration is one that is about reached. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t way_q40_mm)
 {
@@ -260,7 +260,7 @@ static void fall_tick(struct path_brake *brake)
 }
 
 /* The way to rest: n ticks, n >= 2 v / b, with the jerks 6 (p - q i), i = 0 ... n - 1. Speed and acceleration give way
- * by what rounding takes (docs/numerics.md section 12). */
+ * by what rounding takes (docs/theory/numerics.md section 12). */
 static void settle(struct path_brake *brake)
 {
     const uint64_t speed = (uint64_t)brake->at.speed_q56;

@@ -4,7 +4,7 @@
  *
  * The image holds w in Bernstein form. Products of its coefficients are formed exactly (25-bit
  * limbs) and give x, y and the arc length s as polynomials in z = 2 xi - 1, z from -1 to 1:
- * centred, so that the rounding of a Horner step never grows. docs/numerics.md section 9,
+ * centred, so that the rounding of a Horner step never grows. docs/theory/numerics.md section 9,
  * "Expansion".
  *
  * Pure; about 10^3 instructions on a 32-bit target. Main loop or tick.

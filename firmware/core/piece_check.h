@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rules of docs/protocol.md 1.3.
+ * The rules of docs/reference/protocol.md 1.3.
  * Used by program_check. Main loop.
  */
 #ifndef HODOGRAPH_CORE_PIECE_CHECK_H

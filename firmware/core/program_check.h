@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Checks a program before it may run: every rule of docs/protocol.md 1.1 to 1.3 and the limits of
+ * Checks a program before it may run: every rule of docs/reference/protocol.md 1.1 to 1.3 and the limits of
  * the controller. Integer arithmetic only, so every target and compiler refuses the same programs
  * with the same code. One pass over the image, constant memory, no recursion; about 10^3 to 10^4
  * instructions per segment and piece. Call it from the main loop, not from an interrupt.

@@ -3,7 +3,7 @@
 
 #include "core/feed_piece.h"
 
-/* Least t in [0, duration] with F(t) >= arc length; F rises (within rounding: docs/protocol.md 1.3).
+/* Least t in [0, duration] with F(t) >= arc length; F rises (within rounding: docs/reference/protocol.md 1.3).
  */
 static uint64_t bisect(const struct program_piece *piece, int64_t arc_length_q40_mm)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rules of docs/protocol.md 1.2 that need segments only. Used by program_check. Main loop.
+ * The rules of docs/reference/protocol.md 1.2 that need segments only. Used by program_check. Main loop.
  */
 #ifndef HODOGRAPH_CORE_SEGMENT_CHECK_H
 #define HODOGRAPH_CORE_SEGMENT_CHECK_H

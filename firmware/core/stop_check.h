@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The stop table of a program (docs/protocol.md 1.4): how long a stop can take, and whether the table says so. Nothing in
+ * The stop table of a program (docs/reference/protocol.md 1.4): how long a stop can take, and whether the table says so. Nothing in
  * the image is believed: the bounds follow from the feed pieces, the override bounds and the numbers alone
- * (docs/numerics.md section 7, "Stops"). Integer arithmetic; every value is rounded so that a bound is never too short.
+ * (docs/theory/numerics.md section 7, "Stops"). Integer arithmetic; every value is rounded so that a bound is never too short.
  *
  * The table is gone through from the last piece to the first, since a stop that cannot brake in a piece goes on into the
  * next. About 10 000 instructions per piece and kind. Main loop.
@@ -21,7 +21,7 @@
 /* Time in which the piece whose numbers count may still change, in periods of program time: three ticks at 200 %. */
 #define STOP_WINDOW_TICKS 6u
 #define STOP_WINDOW                                                                                \
-    8 /* pieces that begin in it, at most (docs/protocol.md 1.3: no two last less than two periods) */
+    8 /* pieces that begin in it, at most (docs/reference/protocol.md 1.3: no two last less than two periods) */
 
 /* From the command to rest, held at UINT32_MAX. */
 struct stop_bound {
@@ -62,7 +62,7 @@ struct stop_start {
     uint64_t cut_us;
 };
 
-/* The greatest of these in a level of the override bounds (docs/protocol.md 1.3). */
+/* The greatest of these in a level of the override bounds (docs/reference/protocol.md 1.3). */
 void stop_level_start(const struct stop_extent *extent, const struct program_override *bounds,
                       uint32_t level, struct stop_start *out);
 

@@ -3,9 +3,9 @@
  * port.h: everything that the controller needs of a machine, on one page.
  *
  * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It
- * includes nothing above this file but the headers of can/. docs/port-to-your-board.md makes one.
+ * includes nothing above this file but the headers of can/. docs/guides/port-to-your-board.md makes one.
  *
- * Three contexts (drawn in docs/architecture.md):
+ * Three contexts (drawn in docs/reference/architecture.md):
  *   receive   the CAN receive interrupt: calls port_handlers.receive for every accepted frame
  *   timer     the timer interrupt: calls port_handlers.tick once a period
  *   mainline  main(): everything that may wait

@@ -19,7 +19,7 @@ $(foreach t,an385 microbit rv32,$(eval $(t)_KERNELS := firmware/targets/kernels_
 rv32_LINK    := -march=rv32im -mabi=ilp32
 
 # Boards to hold in one's hands. They have a port of their own, whose board.mk adds them here, and of the images the
-# controller (docs/port-to-your-board.md).
+# controller (docs/guides/port-to-your-board.md).
 #   make firmware NODE=2 CAN_BITS_S=500000
 BOARDS     :=
 NODE       ?= 1
@@ -120,7 +120,7 @@ BOARD ?= nucleo_g474re
 flash: $(BUILD)/firmware/$(BOARD)/controller.elf ## put the controller into a board that is plugged in (BOARD=nucleo_g474re NODE=1 CAN_BITS_S=1000000)
 	@$(PYTHON) tools/packages.py flash
 	@openocd -f $($(BOARD)_OPENOCD) -c "program $< verify reset exit" || { \
-	    echo "flash: openocd does not reach a $(BOARD): is it plugged in, and may you use it? (docs/flash-and-run.md)"; exit 1; }
+	    echo "flash: openocd does not reach a $(BOARD): is it plugged in, and may you use it? (docs/guides/flash-and-run.md)"; exit 1; }
 
 UPDATE ?=
 .PHONY: size

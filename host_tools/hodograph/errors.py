@@ -2,7 +2,7 @@
 """Everything that can go wrong, as one tree of exceptions.
 
 A message is one line that says what, where and what to do. Only `hodograph.cli.main` turns an
-exception into a line on stderr and an exit status; the table of statuses is docs/cli.md.
+exception into a line on stderr and an exit status; the table of statuses is docs/reference/cli.md.
 """
 
 

@@ -11,7 +11,7 @@ const char bridge_options_help[] =
     "usage: hodograph-bridge --bus INTERFACE --out FIFO --in FIFO\n"
     "       hodograph-bridge --bus INTERFACE --slcan SOCKET\n"
     "\n"
-    "Joins a board, emulated by QEMU or not, to a CAN bus of Linux (docs/target.md). "
+    "Joins a board, emulated by QEMU or not, to a CAN bus of Linux (docs/guides/target.md). "
     "tools/emulate.py "
     "starts it for you.\n"
     "\n"

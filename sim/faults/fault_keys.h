@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_keys: the keys of fault rules (docs/protocol.md section 4), each a bit: which kind has
+/* fault_keys: the keys of fault rules (docs/reference/protocol.md section 4), each a bit: which kind has
  * which, and their ranges. */
 #ifndef FAULTS_FAULT_KEYS_H
 #define FAULTS_FAULT_KEYS_H

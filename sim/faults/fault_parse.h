@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_parse: text of fault rules (docs/protocol.md section 4) into structs. Pure, but for the
+/* fault_parse: text of fault rules (docs/reference/protocol.md section 4) into structs. Pure, but for the
  * text of an error. */
 #ifndef FAULTS_FAULT_PARSE_H
 #define FAULTS_FAULT_PARSE_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_rule: one scripted fault, as docs/protocol.md section 4 writes it in a line of text. */
+/* fault_rule: one scripted fault, as docs/reference/protocol.md section 4 writes it in a line of text. */
 #ifndef FAULTS_FAULT_RULE_H
 #define FAULTS_FAULT_RULE_H
 

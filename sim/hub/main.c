@@ -27,7 +27,7 @@ static const char help[] =
     "  --time real     (default) frames are passed on as they come\n"
     "  --time virtual  the processes run in one virtual time: what they do depends on their inputs "
     "alone, not on the load\n"
-    "                  of this machine (docs/virtual-time.md)\n"
+    "                  of this machine (docs/reference/virtual-time.md)\n"
     "  --bitrate N     of the buses in virtual time, bit/s; default 1000000\n"
     "  --speed X       virtual time goes on at most X times as fast as real time; default: as fast "
     "as it can\n"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* bridge: stands between the controller's bus and the drives', passes every frame on, and does to
- * some what the fault rules say (docs/protocol.md section 4).
+ * some what the fault rules say (docs/reference/protocol.md section 4).
  *
  * Rules act on a frame in the order of the file. A frame that changes places with the next one of
  * its direction waits for it for 20 ms at most. While a side is off the bus nothing passes, frames that were held or

@@ -12,7 +12,7 @@ const char injector_options_help[] =
     "Stands between two CAN buses, passes every frame on, and does to some what fault rules say.\n"
     "\n"
     "  --bus INTERFACE  twice: first the controller's bus, then the drives'\n"
-    "  --rules FILE     fault rules, one a line (docs/protocol.md section 4)\n"
+    "  --rules FILE     fault rules, one a line (docs/reference/protocol.md section 4)\n"
     "  --verbose        print what was injected when, one JSON object a line\n"
     "\n"
     "SIGTERM or SIGINT ends it. Exit status: 0 ended as asked, 2 wrong usage, 4 bus not usable.\n";

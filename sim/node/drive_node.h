@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_node: one simulated servo drive on the bus: CANopen slave, CiA 402 drive with the modes CSP
- * and homing, axis model. What each object does: docs/protocol.md section 5.
+ * and homing, axis model. What each object does: docs/reference/protocol.md section 5.
  *
- * Time (docs/protocol.md section 2): SYNC j finds the axis at the instant of SYNC j; the node
+ * Time (docs/reference/protocol.md section 2): SYNC j finds the axis at the instant of SYNC j; the node
  * reports it (its synchronous TPDOs), latches the setpoint that came since SYNC j-1, and computes
  * the period that follows. The SYNC counter is the model's clock: a difference of n means n periods,
  * so the result does not depend on the host's scheduler. In PRE-OPERATIONAL time passes with SYNC

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* node_fault: what can be done to a simulated drive from outside, for fault scenarios.
  *
- * The kinds are those of docs/protocol.md section 4 that a drive carries out; when they act is the
+ * The kinds are those of docs/reference/protocol.md section 4 that a drive carries out; when they act is the
  * caller's business. Each kind is independent of the others; a kind that is on stays on until it is
  * called off, or the drive begins anew (NODE_FAULT_RESTART ends none of them: a broken encoder stays
  * broken). Same context as drive_node_receive, between two frames.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* node_faults: carries out the fault rules that are about drives (docs/protocol.md section 4) on
+/* node_faults: carries out the fault rules that are about drives (docs/reference/protocol.md section 4) on
  * the drives of this process. */
 #ifndef NODE_NODE_FAULTS_H
 #define NODE_NODE_FAULTS_H

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* One simulated servo axis in cyclic synchronous position mode: setpoint interpolation, PDFF loop,
  * motor, screw, encoder. No CAN and no clock: the caller advances it by whole bus periods. Model:
- * docs/numerics.md section 13.
+ * docs/theory/numerics.md section 13.
  *
  * Use: drive_init, then drive_place (or drive_hold), then for every SYNC j: report
  * drive_position_counts and drive_volts_mv (they are those of the instant of SYNC j), latch the
  * setpoint received since SYNC j-1 and call drive_period with it; the axis is commanded to be there
  * at SYNC j+1, in a straight line from the setpoint before, or along a cubic whose speed has no jumps.
  *
- * Parking (docs/protocol.md section 3): an axis that has had one target for DRIVE_PARK_PERIODS
+ * Parking (docs/reference/protocol.md section 3): an axis that has had one target for DRIVE_PARK_PERIODS
  * periods and reads within DRIVE_PARK_INCREMENTS encoder increments of it is put exactly at rest at
  * the target, the integrator empty. So what follows depends on the target alone, however the axis
  * came there.

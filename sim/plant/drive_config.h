@@ -21,7 +21,7 @@ struct drive_pdff {
     double k_vf;
 };
 
-/* How the drive goes from one setpoint to the next (docs/numerics.md section 13). */
+/* How the drive goes from one setpoint to the next (docs/theory/numerics.md section 13). */
 enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1 };
 
 /* Where the loop has its speed from: the motor itself, or the way of the last servo sample by the encoder. */

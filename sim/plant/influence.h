@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What acts on an axis beside its setpoints: offsets of a feedforward, load, friction, brake, a weak
- * supply, a faulty encoder. docs/numerics.md section 13.
+ * supply, a faulty encoder. docs/theory/numerics.md section 13.
  *
  * An axis without any of it is computed by drive.h alone; with all figures neutral
  * influence_period gives the same bits. Pure functions but for the drive that is given.

@@ -7,7 +7,7 @@
  *     volts     = torque_to_volts * torque, within +-volts_limit
  *
  * The integral counts the present sample too (backward Euler) and stands still while the output is
- * saturated. Error of the sampling: docs/numerics.md section 13.
+ * saturated. Error of the sampling: docs/theory/numerics.md section 13.
  */
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H

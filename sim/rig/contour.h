@@ -2,12 +2,12 @@
 /* Contour error: distance of a point from the exact curve of a program, on the branch that is being
  * run.
  *
- * The curve is that of the program image (docs/protocol.md 1.2), every segment expanded once to
+ * The curve is that of the program image (docs/reference/protocol.md 1.2), every segment expanded once to
  * powers of its parameter. The foot of the perpendicular is found by Newton steps from the
  * commanded arc length, across segment ends and, on a closed path, across its start; beyond the
  * ends of an open path the end point is the nearest. Only feet within four times the point's
  * distance from the commanded place count, so that at a self-crossing the branch under the tool is
- * taken, not the other. Method and accuracy: docs/numerics.md section 14.
+ * taken, not the other. Method and accuracy: docs/theory/numerics.md section 14.
  *
  * The error of one point does not depend on points asked before. Double arithmetic and sqrt, the
  * same bits on every IEEE 754 target. No heap: the caller lends the array of segments. Main loop

@@ -3,7 +3,7 @@
  * drives, contour error. Gives the same setpoints and encoder positions as a run on the bus, bit
  * for bit.
  *
- * Timing (docs/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
+ * Timing (docs/reference/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
  * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC
  * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
  * repeat its end point (settling), those behind a stop its place of rest.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of a run without a bus: what a rule of docs/protocol.md section 4 does to an axis, for the
+/* Faults of a run without a bus: what a rule of docs/reference/protocol.md section 4 does to an axis, for the
  * kinds that act on drive or setpoint alone. Nobody supervises here: an axis goes on under its fault
  * where a controller would stop the machine.
  *

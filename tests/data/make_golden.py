@@ -4,7 +4,7 @@
     python tests/data/make_golden.py
 
 Good images hold the alpha, the heart, the star and lines with all profiles. Broken ones each break one
-rule of docs/protocol.md:
+rule of docs/reference/protocol.md:
 the table gives the code that C and Python must both answer, with its segment or piece. All are to be
 checked against LIMITS (repeated in the table). The files are committed; run this again only when the
 format changes.

@@ -24,7 +24,7 @@
 #define TICKS_MAX  1500u
 #define COMMANDS   16u
 #define TRAVEL_MM  300
-#define NOISE_MM   1e-9 /* of the double kernel, docs/numerics.md section 10 */
+#define NOISE_MM   1e-9 /* of the double kernel, docs/theory/numerics.md section 10 */
 #define Q40        1099511627776.0
 #define SEGMENT_AT PROGRAM_HEADER_SIZE
 
@@ -335,7 +335,7 @@ static void set_limits(struct program_limits *limits, const struct program *p,
     }
 }
 
-/* Steps at joints may use 0.5 % of a limit (docs/limits.md); a difference is a mean. */
+/* Steps at joints may use 0.5 % of a limit (docs/guides/limits.md); a difference is a mean. */
 static void keeps_limits(const struct trail *trail, const struct program_limits *limits)
 {
     for (int axis = 0; axis < 2; axis++) {

@@ -3,7 +3,7 @@
  * The feed override, for a program of three pieces: every command, a tick and every question, from any phase, state and
  * look, whatever the plan of the override, the brake and the interpolator give in their ranges: nothing overflows, no conversion
  * changes a number, no division by 0, no entry of the stop table beyond the last is read, and what stands in a field of
- * few values stays one of them. Slopes of the override below 2^57: docs/numerics.md section 15.6.
+ * few values stays one of them. Slopes of the override below 2^57: docs/theory/numerics.md section 15.6.
  *
  * prover: eva
  * options: -eva-slevel 200 -warn-signed-downcast

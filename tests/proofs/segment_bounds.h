@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What follows from the rules of protocol.md 1.2 for the size of w, rounded up: docs/numerics.md section 15.1.
+ * What follows from the rules of protocol.md 1.2 for the size of w, rounded up: docs/theory/numerics.md section 15.1.
  * cbmc_speed.c shows that check_speed lets nothing else through.
  */
 #ifndef HODOGRAPH_SEGMENT_BOUNDS_H

@@ -34,7 +34,8 @@ def test_load_and_dbc_of_a_run(
     assert status == 0, err
     load = json.loads(out)["bus_load"]
     assert load["model_least_percent"] <= load["measured_percent"] <= load["model_worst_percent"]
-    assert load["measured_percent"] == pytest.approx(59.8, abs=0.1)  # docs/bus-time.md section 3
+    # docs/reference/bus-time.md section 3
+    assert load["measured_percent"] == pytest.approx(59.8, abs=0.1)
     assert "Bus load" in (report / "report.html").read_text()
 
     frames = recorder.frames()

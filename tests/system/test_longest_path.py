@@ -42,7 +42,11 @@ def test_nothing_counted_is_longer(target: str, kernel: str, kind: str) -> None:
     ("target", "kernel", "kind", "goal"),
     [
         pytest.param(
-            "an386", "float", "plain", 600, marks=pytest.mark.xfail(reason="624: docs/wcet.md")
+            "an386",
+            "float",
+            "plain",
+            600,
+            marks=pytest.mark.xfail(reason="624: docs/validation/wcet.md"),
         ),
         ("an386", "float", "override", 900),
         ("an385", "fixed", "plain", 1500),

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""docs/port-to-your-board.md, followed to the letter in a copy of the tree: its files, its commands, the same bits."""
+"""docs/guides/port-to-your-board.md, followed to the letter in a copy of the tree: its files, its commands,
+the same bits."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ import pytest
 from copied_tree import copied_tree
 
 ROOT = Path(__file__).resolve().parents[2]
-TEXT = (ROOT / "docs/port-to-your-board.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs/guides/port-to-your-board.md").read_text(encoding="utf-8")
 FILES = re.findall(r"^`(firmware/[^`]+)`\n\n```\w+\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
 COMMANDS = re.search(r"^```sh\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
 

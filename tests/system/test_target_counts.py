@@ -61,7 +61,7 @@ def test_the_counts_of_a_run_are_those_of_the_next() -> None:
 
 
 def test_a_tick_does_one_thing_with_the_rate() -> None:
-    """docs/wcet.md: none starts, moves, looks at a window and begins a move but one of these."""
+    """docs/validation/wcet.md: none starts, moves, looks at a window and begins a move but one of these."""
     counter = Counter(BUILD, TARGETS["an386"], functions=True)
     programs = b"".join(adversary.image(a) for a in adversary.ADVERSARIES)
     counts = counter.count("float", programs, adversary.restless())

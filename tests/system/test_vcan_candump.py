@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""docs/candump.md does what it says: its commands are run, with Debian's can-utils, and their output compared."""
+"""docs/guides/candump.md does what it says: its commands are run, with Debian's can-utils, and their output
+compared."""
 
 from __future__ import annotations
 
@@ -64,7 +65,7 @@ def test_the_page(make_bench: MakeBench, tmp_path: Path) -> None:
     bench = make_bench("real-time")
     bench.controller.wait_for((OFF,), 20.0)
     path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
-    found = examples(ROOT / "docs" / "candump.md")
+    found = examples(ROOT / "docs" / "guides" / "candump.md")
     assert len(found) > 15
     for example in found:
         done = subprocess.run(
@@ -77,7 +78,7 @@ def test_the_page(make_bench: MakeBench, tmp_path: Path) -> None:
             timeout=LIMIT_S,
             check=False,
         )
-        place = f"docs/candump.md, line {example.line}: {example.command}\n{done.stdout}"
+        place = f"docs/guides/candump.md, line {example.line}: {example.command}\n{done.stdout}"
         assert done.returncode == 0, place
         assert re.fullmatch(pattern(example.output), done.stdout), place
 

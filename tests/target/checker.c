@@ -14,7 +14,7 @@ extern const uint8_t startup_store_base[];
 
 static uint32_t image_size(void)
 {
-    const uint8_t *at = startup_store_base + 8; /* docs/protocol.md 1.1 */
+    const uint8_t *at = startup_store_base + 8; /* docs/reference/protocol.md 1.1 */
     return at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 

@@ -98,7 +98,7 @@ static uint8_t stored(double value, double scale)
     return code;
 }
 
-/* docs/numerics.md section 7; no program limits but those of the controller. */
+/* docs/theory/numerics.md section 7; no program limits but those of the controller. */
 static void set_bounds(struct override_program *p, uint32_t i)
 {
     struct override_piece *piece = &p->pieces[i];

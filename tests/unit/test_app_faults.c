@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What the controller does when drives, bus or operator want something else than the program. Numbers of ticks are those
- * of docs/architecture.md. */
+ * of docs/reference/architecture.md. */
 #include <string.h>
 
 #include "app/commands.h"

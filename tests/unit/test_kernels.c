@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The kernels on random segments that reach the limit of the speed ratio, from 32 mm to 1e-10 mm long: the bounds of
- * docs/numerics.md sections 9 to 12. (Against 50-digit arithmetic: benchmarks/kernels.py.)
+ * docs/theory/numerics.md sections 9 to 12. (Against 50-digit arithmetic: benchmarks/kernels.py.)
  */
 #include "core/crc32.h"
 #include "core/kernel_double.h"

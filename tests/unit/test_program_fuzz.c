@@ -83,7 +83,7 @@ static void run_accepted(const struct program *p, const struct program_limits *l
 static void keeps_axis_limits(const struct program_limits *limits, double period_s,
                               const double mm[4][2])
 {
-    const double noise_mm = 1e-9; /* of the kernel, docs/numerics.md section 10 */
+    const double noise_mm = 1e-9; /* of the kernel, docs/theory/numerics.md section 10 */
     for (int axis = 0; axis < 2; axis++) {
         const double one = mm[0][axis] - mm[1][axis];
         const double two = one - (mm[1][axis] - mm[2][axis]);

@@ -1,2 +1,3 @@
 # SPDX-License-Identifier: MIT
-"""Parts of tools/fuzz.py: mutated input for the Python side, and libFuzzer for the C side (docs/testing.md)."""
+"""Parts of tools/fuzz.py: mutated input for the Python side, and libFuzzer for the C side
+(docs/validation/testing.md)."""

@@ -4,7 +4,8 @@
 Each target makes its cases from a random generator alone, so a case is found again by target, seed and number. A
 `Finding` is raised where a rule is broken:
 
-- every command ends with a status of docs/cli.md other than 1, one line of error at most, no traceback, no warning;
+- every command ends with a status of docs/reference/cli.md other than 1, one line of error at most, no
+  traceback, no warning;
 - a document gives the same result in any spelling, and an unknown key or a value that is no number is refused;
 - a recording gives the same result as candump log and as ASC;
 - of an image the check in Python and the controller's own in C give the same verdict.

@@ -2,7 +2,8 @@
 """Programs made to be as dear as the controller accepts them, and the commands to run them with.
 
 At 200 % a tick of these crosses two ends of segments and two of pieces again and again: neighbours are a very short and
-a long one, together just longer than docs/protocol.md 1.2 and 1.3 ask for. Segments have the greatest speed ratio. The
+a long one, together just longer than docs/reference/protocol.md 1.2 and 1.3 ask for. Segments have the
+greatest speed ratio. The
 override bounds of the pieces make the look-ahead of the rate as long as it can be.
 
 Only + - * / and roots of Python's own numbers: the same bytes on every machine.

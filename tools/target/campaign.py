@@ -32,7 +32,8 @@ EXAMPLES = {
     "heart_optimal": ROOT / "tests/data/counts/heart_optimal.hdgp",
 }
 
-# (target, kernel): most instructions of the motion part in a plain tick; docs/counts.md says where it is from.
+# (target, kernel): most instructions of the motion part in a plain tick; docs/validation/counts.md says
+# where it is from.
 GOALS = {("an386", "float"): 600, ("an385", "fixed"): 1500, ("microbit", "fixed"): 4000}
 OVERRIDE_GOAL = 1.5  # times that with the override active
 INTERRUPT_GOAL = 2  # times either for the whole interrupt

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Figures of campaign.py as text: tables for docs/counts.md and the console, JSON of one line for each row."""
+"""Figures of campaign.py as text: tables for docs/validation/counts.md and the console, JSON of one line for
+each row."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
  * order of CiA 301 (7.5.2.36): disable, transmission type, no mapping, entries, their count,
  * times, enable.
  *
- * Pure; docs/protocol.md section 2 has the PDOs.
+ * Pure; docs/reference/protocol.md section 2 has the PDOs.
  */
 #ifndef APP_DRIVES_DRIVE_PDO_H
 #define APP_DRIVES_DRIVE_PDO_H

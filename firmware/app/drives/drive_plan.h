@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * drive_plan: the configuration of one drive as a list of operations on its dictionary, in order:
- * CiA 301 and CiA 402-2, docs/protocol.md section 2.
+ * CiA 301 and CiA 402-2, docs/reference/protocol.md section 2.
  *
  *     drive_plan_begin(&plan, &config, axis, &facts);
  *     while (drive_plan_op(&plan, &op)) { do it; drive_plan_advance(&plan); }

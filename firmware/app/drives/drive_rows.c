@@ -35,7 +35,7 @@ enum pdo_number {
     TPDO4_OFF,
 };
 
-/* docs/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries, fact */
+/* docs/reference/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries, fact */
 const struct drive_pdo drive_pdos[] = {
     [RPDO1] =
         {0x1400, COB_RPDO1, SYNCHRONOUS, 2, 0, true, {0x60400010, 0x607A0020, 0}, DRIVE_NO_FACT},

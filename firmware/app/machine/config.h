@@ -71,7 +71,7 @@ struct config {
     uint8_t kernel;      /* enum interp_kernel */
     uint8_t missed_max;  /* so many answers in a row may be missed */
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
-    uint32_t crc32;      /* of the objects; docs/protocol.md section 3.4 */
+    uint32_t crc32;      /* of the objects; docs/reference/protocol.md section 3.4 */
     /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following window
      * and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit (without one: UINT32_MAX). */
     uint32_t apart_counts[AXES_MAX];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * local_bus: what a process and hodograph-hub say to each other (docs/virtual-time.md).
+ * local_bus: what a process and hodograph-hub say to each other (docs/reference/virtual-time.md).
  *
  * A connection is a UNIX socket of type SOCK_SEQPACKET to the path of a bus; a message is one packet, in the byte order of
  * the machine. There are two kinds of connection:

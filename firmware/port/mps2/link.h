@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line (docs/target.md):
+ * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line (docs/guides/target.md):
  *
  *   link_fifo   records on two FIFOs, exchanged in the tick's interrupt while the clock of the guest stands still
  *   link_slcan  text on a UART, received by interrupt in real time

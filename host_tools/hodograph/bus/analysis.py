@@ -18,7 +18,7 @@ from .listening.frames import Frames
 from .listening.setpoint_check import require_no_jump, step_limits
 
 REACHED_AFTER = 2
-"""Setpoint k is reached at SYNC k+2 (docs/protocol.md section 2)."""
+"""Setpoint k is reached at SYNC k+2 (docs/reference/protocol.md section 2)."""
 
 _AROUND = 220
 """SYNCs kept before and behind a run: late answers show themselves within 200."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The time of a bus: that of this computer, or the virtual time of a local bus (docs/virtual-time.md).
+"""The time of a bus: that of this computer, or the virtual time of a local bus (docs/reference/virtual-time.md).
 
 Whoever talks to nodes counts its time-outs and pauses by the clock of the connection. In virtual time the hub hands
 out the

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A hodograph-hub of our own: local buses for processes that we start (docs/virtual-time.md)."""
+"""A hodograph-hub of our own: local buses for processes that we start (docs/reference/virtual-time.md)."""
 
 from __future__ import annotations
 

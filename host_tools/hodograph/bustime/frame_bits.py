@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Length of classic CAN frames in bits (ISO 11898-1), stuff bits included; docs/bus-time.md section 1.
+"""Length of classic CAN frames in bits (ISO 11898-1), stuff bits included; docs/reference/bus-time.md section 1.
 
 From the start bit to the last bit of the CRC a complementary bit follows every five equal bits; delimiters,
 acknowledgement, end of frame and the three bits of intermission are never stuffed. A length here counts them all,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the periodic frames of a machine take of the bus's time, at worst; docs/bus-time.md section 2."""
+"""What the periodic frames of a machine take of the bus's time, at worst; docs/reference/bus-time.md section 2."""
 
 from __future__ import annotations
 

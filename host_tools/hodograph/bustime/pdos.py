@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The PDOs of a drive as the controller maps them (docs/protocol.md section 2); names and types from its EDS."""
+"""The PDOs of a drive as the controller maps them (docs/reference/protocol.md section 2); names and types
+from its EDS."""
 
 from __future__ import annotations
 

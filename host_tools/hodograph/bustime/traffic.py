@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The frames of a machine in steady motion: who sends what, how often (docs/protocol.md section 2)."""
+"""The frames of a machine in steady motion: who sends what, how often (docs/reference/protocol.md section 2)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The campaign file: which runs to make. Keys and their meaning: docs/campaigns.md."""
+"""The campaign file: which runs to make. Keys and their meaning: docs/guides/campaigns.md."""
 
 from __future__ import annotations
 

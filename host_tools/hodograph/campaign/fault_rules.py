@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faults of a campaign: the rules of docs/protocol.md section 4 that act on one axis alone.
+"""Faults of a campaign: the rules of docs/reference/protocol.md section 4 that act on one axis alone.
 
 What needs frames, a bus or somebody who supervises is the business of `hodograph faults`.
 """

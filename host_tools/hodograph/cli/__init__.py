@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The `hodograph` command: docs/cli.md."""
+"""The `hodograph` command: docs/reference/cli.md."""

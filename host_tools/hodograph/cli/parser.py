@@ -17,7 +17,7 @@ DESCRIPTION = (
 )
 EPILOG = (
     "exit status: 0 done, 1 internal or build, 2 wrong input, 3 path or feed not possible, 4 bus or node, "
-    "5 refused by the controller, 6 run failed, 7 limits exceeded, 130 interrupted (docs/cli.md)"
+    "5 refused by the controller, 6 run failed, 7 limits exceeded, 130 interrupted (docs/reference/cli.md)"
 )
 
 

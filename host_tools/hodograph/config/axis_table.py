@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The tables [[axis]] of a machine file, with what the controller tells each drive (docs/protocol.md section 3)."""
+"""The tables [[axis]] of a machine file, with what the controller tells each drive
+(docs/reference/protocol.md section 3)."""
 
 from __future__ import annotations
 
@@ -82,7 +83,7 @@ class Axis:
     its model.
 
     No program moves the axis beyond its velocity, acceleration and jerk: plans keep them, and the controller proves it
-    before it accepts a program (docs/limits.md).
+    before it accepts a program (docs/guides/limits.md).
 
     Without a drive file (`drive` None) the axis can be run, but not simulated. `following_window_mm` None: the drive
     keeps its own, and the controller looks for an axis that does not follow at all.

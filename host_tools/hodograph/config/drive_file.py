@@ -50,7 +50,7 @@ class Drive:
     encoder_counts_per_rev: int
     loop_rate_hz: int
     interpolation: str = "linear"
-    """How it goes from setpoint to setpoint: "linear" or "cubic" (docs/numerics.md section 13)."""
+    """How it goes from setpoint to setpoint: "linear" or "cubic" (docs/theory/numerics.md section 13)."""
     speed: str = "exact"
     """Of the motor for the loop: "exact", or "differences" of the encoder between two servo samples."""
     delay_samples: int = 0

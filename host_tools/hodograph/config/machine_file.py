@@ -19,7 +19,7 @@ PLANE_AXES = 2
 
 @dataclass(frozen=True)
 class Supervision:
-    """When answers or setpoints that stay away become a fault (docs/protocol.md section 3, object 0x2004)."""
+    """When answers or setpoints that stay away become a fault (docs/reference/protocol.md section 3, object 0x2004)."""
 
     answer_wait_ms: int = 100
     missed_max: int = 1

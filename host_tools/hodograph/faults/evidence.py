@@ -38,7 +38,7 @@ class Evidence:
         self._first = self._first_sync()
 
     def _first_sync(self) -> int | None:
-        """The SYNC that is tick 0 (docs/protocol.md section 4)."""
+        """The SYNC that is tick 0 (docs/reference/protocol.md section 4)."""
         begins = []
         for node in self.nodes:
             at, control, target = _setpoints(self.control, node)

@@ -3,7 +3,7 @@
 
 text = "what happens"
 path = "path.toml"                  # the program, and by it the machine; relative to the file
-rules = ["drop at={at} id={tpdo1}"] # docs/protocol.md section 4, with the names drawn below
+rules = ["drop at={at} id={tpdo1}"] # docs/reference/protocol.md section 4, with the names drawn below
 [random]
 at = [20, 500]                      # a whole number from the first to the second
 node = [2, 3]                       # also gives {tpdo1}, {tpdo2}, {rpdo1}

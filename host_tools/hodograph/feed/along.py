@@ -2,7 +2,7 @@
 """Feed pieces along a path: what they ask of the axes, beside limits of axes, curvature, volts and stretches.
 
 Samples within cells (one piece on one segment of the path); how far a quantity may rise between them is taken
-from its second differences. docs/numerics.md section 7.
+from its second differences. docs/theory/numerics.md section 7.
 """
 
 from __future__ import annotations

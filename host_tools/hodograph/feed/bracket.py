@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The highest feed that keeps its bounds, by a secant within a bracket; docs/numerics.md 5.5."""
+"""The highest feed that keeps its bounds, by a secant within a bracket; docs/theory/numerics.md 5.5."""
 
 from __future__ import annotations
 

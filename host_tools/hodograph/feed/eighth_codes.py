@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers as codes of 8 bits, in steps of an eighth of an octave; docs/protocol.md 1.4."""
+"""Numbers as codes of 8 bits, in steps of an eighth of an octave; docs/reference/protocol.md 1.4."""
 
 from __future__ import annotations
 

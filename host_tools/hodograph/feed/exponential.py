@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What paper (18) adds to the quintic ramp: E(tau; n); docs/numerics.md 5.2.
+"""What paper (18) adds to the quintic ramp: E(tau; n); docs/theory/numerics.md 5.2.
 
     E = (1 - e^(n tau)) A(tau) - (1 - e^(n (1 - tau))) A(1 - tau)
     A = tau (1 - tau)^4 + 4 tau^2 (1 - tau)^3

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Feed pieces in halves: the same feed in more pieces, where a piece has to be short; docs/numerics.md section 7.
+"""Feed pieces in halves: the same feed in more pieces, where a piece has to be short;
+docs/theory/numerics.md section 7.
 
 A half is the polynomial of its piece about its own start, rounded as every piece is: its end is the next start to the
 last bit, its feed is off by less than 2^-30 mm/s. The bounds of the override are those of the piece.

@@ -13,7 +13,7 @@ LEAST_RESERVE, GREATEST_RESERVE = 2e-3, 0.9
 
 MACHINE_SHARE = 0.998
 """Of the machine's axis limits: what plans use. The rest is for rounding, and for the controller's bounds of what lies
-between the places where it looks (docs/limits.md)."""
+between the places where it looks (docs/guides/limits.md)."""
 
 PerAxis = tuple[float, float]
 """One value for x, one for y."""
@@ -82,12 +82,12 @@ class Limits:
 
     feed_mm_s, acceleration_mm_s2, jerk_mm_s3   of the motion along the path (F', F'', F''')
     centripetal_mm_s2   feed^2 times curvature
-    volts               of each axis by the plant of its drive file (docs/numerics.md 13), along the path;
+    volts               of each axis by the plant of its drive file (docs/theory/numerics.md 13), along the path;
                         the drive's own volts_limit where that is less
     axis                of the motion of x and y
     caps                of the feed on stretches of the path; where several meet, the least
     reserve             share of the axes' accelerations, jerks and volts that plans leave free, so that hold, resume
-                        and override keep these limits too (docs/numerics.md section 7)
+                        and override keep these limits too (docs/theory/numerics.md section 7)
 
     machine             of the motion of x and y by the machine file: they always bind
 
@@ -154,7 +154,7 @@ class ControllerLimits:
     """Limits of the controller (machine file): they always bind.
 
     A plan keeps `reserve` (a fraction) of each free for hold and override, and at least LEAST_RESERVE, which
-    the pieces need; docs/numerics.md 5.5 and section 7. Raises InputError.
+    the pieces need; docs/theory/numerics.md 5.5 and section 7. Raises InputError.
     """
 
     feed_mm_s: float

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The highest feed that the path, the limits and the format allow; docs/numerics.md 5.5."""
+"""The highest feed that the path, the limits and the format allow; docs/theory/numerics.md 5.5."""
 
 from __future__ import annotations
 

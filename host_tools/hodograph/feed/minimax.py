@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The feed polynomial of least peak jerk; docs/numerics.md 5.3.
+"""The feed polynomial of least peak jerk; docs/theory/numerics.md 5.3.
 
 The linear program "least peak of an odd polynomial g (the jerk) with a given first moment" has a Gauss
 quadrature as its dual solution, so its answer is known in closed form: at the positive nodes of

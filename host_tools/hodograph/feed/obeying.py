@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far pieces are above the limits along a path that their plan has to keep; docs/numerics.md 5.5."""
+"""How far pieces are above the limits along a path that their plan has to keep; docs/theory/numerics.md 5.5."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bounds for the rate of program time in each feed piece, by level; docs/numerics.md section 7."""
+"""Bounds for the rate of program time in each feed piece, by level; docs/theory/numerics.md section 7."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The levels of the override bounds and their codes; docs/protocol.md 1.3.
+"""The levels of the override bounds and their codes; docs/reference/protocol.md 1.3.
 
 Up to each rate of `LEVEL_RATES` the bounds of slope and second derivative are given apart: at a rate below 1 much of
 acceleration and jerk is free. The last level, `FULL`, is that of all rates up to the factor.

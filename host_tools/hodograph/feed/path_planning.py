@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Planning a feed for a path, inside the limits that depend on where on it the motion is; docs/numerics.md 5.5."""
+"""Planning a feed for a path, inside the limits that depend on where on it the motion is;
+docs/theory/numerics.md 5.5."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pattern search for one variable within bounds; docs/numerics.md 5.4.
+"""Pattern search for one variable within bounds; docs/theory/numerics.md 5.4.
 
 The rules of generalized pattern search as MATLAB's `patternsearch` documents them for its defaults (poll
 +1 then -1, take the first better point, mesh doubled after success and halved after failure, end

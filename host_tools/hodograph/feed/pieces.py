@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Feed pieces of the program format (docs/protocol.md 1.3) as arrays; docs/numerics.md section 6."""
+"""Feed pieces of the program format (docs/reference/protocol.md 1.3) as arrays; docs/theory/numerics.md section 6."""
 
 from __future__ import annotations
 

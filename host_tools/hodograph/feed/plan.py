@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A planned feed: what was asked, what came out, and its pieces; docs/numerics.md sections 5 and 6."""
+"""A planned feed: what was asked, what came out, and its pieces; docs/theory/numerics.md sections 5 and 6."""
 
 from __future__ import annotations
 

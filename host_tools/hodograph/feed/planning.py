@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Planning a feed for a path length inside limits; docs/numerics.md 5.4 and 5.5."""
+"""Planning a feed for a path length inside limits; docs/theory/numerics.md 5.4 and 5.5."""
 
 from __future__ import annotations
 

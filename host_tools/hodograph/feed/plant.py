@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An axis as far as its volts go; docs/numerics.md 13."""
+"""An axis as far as its volts go; docs/theory/numerics.md 13."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a timeline to integer feed pieces; docs/numerics.md section 6."""
+"""From a timeline to integer feed pieces; docs/theory/numerics.md section 6."""
 
 from __future__ import annotations
 

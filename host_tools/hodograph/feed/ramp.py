@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One ramp from rest to a feed, as a function of time; docs/numerics.md section 5.
+"""One ramp from rest to a feed, as a function of time; docs/theory/numerics.md section 5.
 
 Every profile is antisymmetric about its middle, V(tau) + V(1 - tau) = V_f, so only the first half is
 ever computed and the second follows: no rounding breaks the symmetry.

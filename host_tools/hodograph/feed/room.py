@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What limits along a path leave for a changing rate of program time; docs/numerics.md section 7.
+"""What limits along a path leave for a changing rate of program time; docs/theory/numerics.md section 7.
 
 With program time at the rate lambda an axis moves with
 

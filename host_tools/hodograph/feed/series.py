@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A polynomial ramp of unit feed and unit time with its derivatives; docs/numerics.md section 5."""
+"""A polynomial ramp of unit feed and unit time with its derivatives; docs/theory/numerics.md section 5."""
 
 from __future__ import annotations
 

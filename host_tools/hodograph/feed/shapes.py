@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Making the ramp of a request for a given feed: pattern search for n_c; docs/numerics.md 5.4."""
+"""Making the ramp of a request for a given feed: pattern search for n_c; docs/theory/numerics.md 5.4."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Accelerate, go on, decelerate: the exact arc length over time; docs/numerics.md 5.1."""
+"""Accelerate, go on, decelerate: the exact arc length over time; docs/theory/numerics.md 5.1."""
 
 from __future__ import annotations
 

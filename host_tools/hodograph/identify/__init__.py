@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The plant of each axis from a recorded run, with confidence intervals: docs/tuning.md, numerics.md section 18."""
+"""The plant of each axis from a recorded run, with confidence intervals: docs/guides/tuning.md, numerics.md
+section 18."""
 
 from .fit import Estimate, Plant, identify_axis
 from .stretches import Stretch, stretches

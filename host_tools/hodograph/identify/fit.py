@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Least squares for the plant of one axis: docs/numerics.md section 18.
+"""Least squares for the plant of one axis: docs/theory/numerics.md section 18.
 
 The drive's own loop, whose gains the drive file gives, is simulated with the recorded setpoints and offsets; gain, time
 constant and Coulomb friction are those with which positions and volts come out as reported.

@@ -24,7 +24,8 @@ from ..native import AxisInputs
 from .answers import answered, unbroken
 
 PARK_PERIODS = 250
-"""After so many periods with one target a simulated drive stands exactly there (docs/protocol.md section 3)."""
+"""After so many periods with one target a simulated drive stands exactly there (docs/reference/protocol.md
+section 3)."""
 
 _FOLLOWS = 0x1027
 _FOLLOWS_MASK = 0x106F

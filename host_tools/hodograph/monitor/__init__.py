@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The live page: `hodograph monitor`, on a running bus or from a recording (docs/monitor.md).
+"""The live page: `hodograph monitor`, on a running bus or from a recording (docs/guides/monitor.md).
 
 source, replay  where frames come from: a bus, a recording
 decoder         frames to samples, one a SYNC

@@ -2,7 +2,8 @@
 """From a stream of frames to samples, one a SYNC: what was set, what was answered.
 
 Unlike `bus.listening.decode`, which proves that a recording is whole, this one goes on whatever is missing: a value
-that did not come is NaN. An answer may come after the next SYNC (docs/protocol.md section 2), so the last SYNCs are
+that did not come is NaN. An answer may come after the next SYNC (docs/reference/protocol.md section 2), so
+the last SYNCs are
 held back for a few ticks, and two answers between two SYNCs are the late one and the present one.
 """
 

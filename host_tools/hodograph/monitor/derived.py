@@ -4,7 +4,7 @@
 Feed, tangential acceleration and jerk are those of the setpoints: derivatives of the way along them, by a
 polynomial fitted to a window of some 21 ms around each tick (Savitzky and Golay), since third differences of counts
 of 1 nm would be noise of 4000 mm/s^3; the fit leaves some 2 mm/s^3 of it. A setpoint k is compared with what the drives
-report for SYNC k+2 (docs/protocol.md section 2).
+report for SYNC k+2 (docs/reference/protocol.md section 2).
 """
 
 from __future__ import annotations

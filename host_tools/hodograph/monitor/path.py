@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The curve of a program: points to draw, and the distance from it (sim/rig/contour, docs/numerics.md section 14)."""
+"""The curve of a program: points to draw, and the distance from it (sim/rig/contour, docs/theory/numerics.md
+section 14)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Who may see the page and who may command (docs/monitor.md, "Who may do what").
+"""Who may see the page and who may command (docs/guides/monitor.md, "Who may do what").
 
 Three checks. The token, compared in constant time, makes a connection one that may command. The Host header must be a
 name of this machine, so that a foreign site cannot have its own name point here (DNS rebinding). The Origin header

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One simulated axis (sim/plant/drive.h, docs/numerics.md section 13)."""
+"""One simulated axis (sim/plant/drive.h, docs/theory/numerics.md section 13)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class DriveModel:
 
     @property
     def parked(self) -> bool:
-        """Whether it stands exactly at its target (docs/protocol.md section 3)."""
+        """Whether it stands exactly at its target (docs/reference/protocol.md section 3)."""
         _, lib = library()
         return bool(lib.drive_parked(self._drive))
 

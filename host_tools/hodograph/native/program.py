@@ -67,7 +67,7 @@ class NativeProgram:
     """
 
     def __init__(self, image: bytes) -> None:
-        """Open `image` (docs/protocol.md section 1); raises InputError when it cannot be read."""
+        """Open `image` (docs/reference/protocol.md section 1); raises InputError when it cannot be read."""
         ffi, lib = library()
         self.image = bytes(image)
         self._buffer = ffi.from_buffer("uint8_t[]", self.image)

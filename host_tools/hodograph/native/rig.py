@@ -48,7 +48,8 @@ FOR_EVER = 2**32 - 1
 class RigFault:
     """What happens to an axis (0, 1) for `ticks` ticks from tick `at` on (sim/rig/rig_fault.h).
 
-    `value`: bus counts of a jump, volts of a voltage limit or load. Ticks count as in docs/protocol.md section 4.
+    `value`: bus counts of a jump, volts of a voltage limit or load. Ticks count as in
+    docs/reference/protocol.md section 4.
     """
 
     kind: str

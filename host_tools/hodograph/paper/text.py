@@ -52,7 +52,7 @@ def comparison_text(comparison: dict[str, Any]) -> str:
             for name in curves
         )
         lines.append(f"{title:<44}{cells}")
-    lines.append("Why they differ, as far as we know: docs/paper.md")
+    lines.append("Why they differ, as far as we know: docs/validation/paper.md")
     return "\n".join(lines)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The uploaded program: compile, encode, decode, check, print; docs/protocol.md section 1."""
+"""The uploaded program: compile, encode, decode, check, print; docs/reference/protocol.md section 1."""
 
 from .check import Fault, check
 from .compiler import Compilation, ProgramOptions, compile_path, compile_program, fit_plan

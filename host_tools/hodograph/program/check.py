@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rules of docs/protocol.md 1.1 to 1.4, as the controller checks them (firmware/core/program_check.h).
+"""The rules of docs/reference/protocol.md 1.1 to 1.4, as the controller checks them (firmware/core/program_check.h).
 
 Independent of the C code on purpose: a program is judged by both. What the format decides exactly (joints, ranges,
 sums) is decided here in exact integers.

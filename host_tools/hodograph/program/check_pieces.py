@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rules of docs/protocol.md 1.3, vectorised over the feed pieces of a program."""
+"""Rules of docs/reference/protocol.md 1.3, vectorised over the feed pieces of a program."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rules of docs/protocol.md 1.2, vectorised over the segments of a program."""
+"""Rules of docs/reference/protocol.md 1.2, vectorised over the segments of a program."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Rules of docs/protocol.md 1.4: what a stop can take beside what the table says; docs/numerics.md section 7.
+"""Rules of docs/reference/protocol.md 1.4: what a stop can take beside what the table says;
+docs/theory/numerics.md section 7.
 
 In floating point and without what the controller's integers (firmware/core/stop_check.c) round up: a bound that
 the controller accepts is never below the one computed here, and above it by some 20 us at most.

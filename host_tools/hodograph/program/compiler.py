@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a spline and a feed plan to a program; docs/numerics.md section 8."""
+"""From a spline and a feed plan to a program; docs/theory/numerics.md section 8."""
 
 from __future__ import annotations
 

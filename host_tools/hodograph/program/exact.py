@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Reference evaluation of a program in 50 digits; needs mpmath (a development dependency).
 
-The curve and the feed exactly as docs/protocol.md 1.2 and 1.3 define them. For tests of the kernels; slow
+The curve and the feed exactly as docs/reference/protocol.md 1.2 and 1.3 define them. For tests of the kernels; slow
 on purpose (about 1 ms a point).
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Exact integer arithmetic on quantised segments; docs/numerics.md section 8.
+"""Exact integer arithmetic on quantised segments; docs/theory/numerics.md section 8.
 
 Products of q44 numbers are q88 and need up to 104 bits: numpy object arrays of Python integers, about
 1 us a segment and product.

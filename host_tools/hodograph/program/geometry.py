@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A spline as the integer segments of a program; docs/numerics.md section 8."""
+"""A spline as the integer segments of a program; docs/theory/numerics.md section 8."""
 
 from __future__ import annotations
 

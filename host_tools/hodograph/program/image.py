@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program image as arrays, to and from bytes; docs/protocol.md 1.1 to 1.4."""
+"""The program image as arrays, to and from bytes; docs/reference/protocol.md 1.1 to 1.4."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _STOP = np.dtype([("codes", "u1", (2, 3)), ("reserved", "<u2"), ("bound_us", "<u
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A program as the image has it: integers in the Q formats of docs/protocol.md.
+    """A program as the image has it: integers in the Q formats of docs/reference/protocol.md.
 
     start_q40, x_q40, y_q40  (N,) arc length and point at the start of each segment, mm
     u_q44, v_q44             (N, 3) Bernstein coefficients of w = u + iv, mm^(1/2)
@@ -168,7 +168,7 @@ def with_crc(image: bytes) -> bytes:
 
 
 def decode(image: bytes) -> Program:
-    """The program in an image. Raises InputError, with the code of docs/protocol.md 1.5, for what
+    """The program in an image. Raises InputError, with the code of docs/reference/protocol.md 1.5, for what
     `program_open` of the controller refuses (sizes, magic, version, CRC, counts); the rest is for `check`.
     """
     fault = open_fault(image)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How much of a controller's program store an image takes: itself, and the records behind it (docs/protocol.md 1.5)."""
+"""How much of a controller's program store an image takes: itself, and the records behind it
+(docs/reference/protocol.md 1.5)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""No tick may pass more than two segment ends, even at 200 %; docs/protocol.md 1.2."""
+"""No tick may pass more than two segment ends, even at 200 %; docs/reference/protocol.md 1.2."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Plans the stops of a program: the numbers of its brakes, and the bounds that follow from them; docs/numerics.md
+"""Plans the stops of a program: the numbers of its brakes, and the bounds that follow from them;
+docs/theory/numerics.md
 section 7.
 """
 
@@ -148,7 +149,8 @@ class _Halves:
         return [piece for piece, _ in self._parts]
 
     def long_enough(self) -> NDArray[np.bool_]:
-        """Which parts may be halved (M,): no two neighbours may last two periods or less (docs/protocol.md 1.3)."""
+        """Which parts may be halved (M,): no two neighbours may last two periods or less
+        (docs/reference/protocol.md 1.3)."""
         least_q32 = (LEAST_PERIODS * self.program.period_us << 32) // 1_000_000
         return np.asarray(self.program.pieces.duration_q32_s >= 2 * least_q32)
 

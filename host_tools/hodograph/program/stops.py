@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The stop table of a program: what a brake along the path may use, and how long it takes; docs/protocol.md 1.4."""
+"""The stop table of a program: what a brake along the path may use, and how long it takes;
+docs/reference/protocol.md 1.4."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SETTLING_S = 0.2
-"""Time after the last tick that maxima count, hashes and traces do not (docs/protocol.md section 2)."""
+"""Time after the last tick that maxima count, hashes and traces do not (docs/reference/protocol.md section 2)."""
 
 _Q40 = 2.0**-40
 _Q32 = 2.0**-32

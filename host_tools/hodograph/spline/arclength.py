@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Inverse of the arc length polynomial: safeguarded Newton, vectorised; docs/numerics.md 4.3."""
+"""Inverse of the arc length polynomial: safeguarded Newton, vectorised; docs/theory/numerics.md 4.3."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Small Bernstein-form helpers, vectorised over spans (last axis: coefficients).
 
-Everything here is exact algebra on polynomials over [0, 1]; docs/numerics.md section 4.
+Everything here is exact algebra on polynomials over [0, 1]; docs/theory/numerics.md section 4.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def factor_angles(quadratic: Complex) -> tuple[Real, Real]:
     """Angles (rad) by which the two linear factors of quadratics (…, 3) turn over [0, 1].
 
     Each lies within (-pi, pi): [0, 1] seen from a root spans less than pi. A factor that is
-    constant, or a quadratic that starts at 0, counts as 0. docs/numerics.md 3.1.
+    constant, or a quadratic that starts at 0, counts as 0. docs/theory/numerics.md 3.1.
     """
     c = quadratic[..., 0]
     b = 2.0 * (quadratic[..., 1] - c)

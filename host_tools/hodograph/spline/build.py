@@ -19,7 +19,7 @@ from .system import EndRule, System, clamped_end
 
 @dataclass(frozen=True)
 class SplineResult:
-    """A spline, how it was found and how good it is; docs/numerics.md 3.5.
+    """A spline, how it was found and how good it is; docs/theory/numerics.md 3.5.
 
     newton_iterations  linear systems of the whole spline solved, those of continuation and of
                        polishing after changes included

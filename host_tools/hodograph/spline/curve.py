@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The curve: a chain of PH quintic segments, evaluated exactly; docs/numerics.md section 4."""
+"""The curve: a chain of PH quintic segments, evaluated exactly; docs/theory/numerics.md section 4."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class PHSpline:
         return greatest_curvature(self.w)
 
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> PHSpline:
-        """The same curve in shorter segments, as a program wants them (docs/protocol.md 1.2).
+        """The same curve in shorter segments, as a program wants them (docs/reference/protocol.md 1.2).
 
         Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm`
         long and the largest Bernstein coefficient of its speed is (a hair less than) at most

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Paths through given points: end conditions and guiding cubic spline; docs/numerics.md 2.2."""
+"""Paths through given points: end conditions and guiding cubic spline; docs/theory/numerics.md 2.2."""
 
 from __future__ import annotations
 

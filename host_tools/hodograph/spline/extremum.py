@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Greatest curvature of PH quintic segments, at the true extremum; docs/numerics.md 4.4."""
+"""Greatest curvature of PH quintic segments, at the true extremum; docs/theory/numerics.md 4.4."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Getting rid of loops: the other side of a near-cusp; docs/numerics.md 3.3.
+"""Getting rid of loops: the other side of a near-cusp; docs/theory/numerics.md 3.3.
 
 Where the guide all but stops, the continuous square root is a matter of luck: the tangent may
 turn by a or by a - 2 pi. The two choices differ in the sign of all z behind that place, and the

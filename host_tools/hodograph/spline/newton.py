@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Newton-Raphson on the interpolation system, and continuation where it does not converge.
 
-docs/numerics.md sections 2.3 (the iteration, when it stops) and 3.4 (continuation).
+docs/theory/numerics.md sections 2.3 (the iteration, when it stops) and 3.4 (continuation).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """From given points to what the solver needs: nodal points and the hodograph of the guiding curve.
 
-The guiding curve is the cubic B-spline of the control polygon (paper section 1; docs/numerics.md
+The guiding curve is the cubic B-spline of the control polygon (paper section 1; docs/theory/numerics.md
 section 1) or, for given through points, the uniform C2 cubic spline through them. Its hodograph is
 handed on as Bernstein coefficients (M, 3) per span.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How good a solution is: turning of the tangent and bending energy; docs/numerics.md 3.2.
+"""How good a solution is: turning of the tangent and bending energy; docs/theory/numerics.md 3.2.
 
 The same figures are wanted of the spline (hodograph w^2, w quadratic) and of its guide (quadratic
 hodograph), so `Shape` takes the quadratic and the number of times it is multiplied.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Halving segments until they suit the program format; docs/numerics.md 4.5."""
+"""Halving segments until they suit the program format; docs/theory/numerics.md 4.5."""
 
 from __future__ import annotations
 

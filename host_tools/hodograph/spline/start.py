@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Starting values: continuous square root of the guide's hodograph; docs/numerics.md 3.1."""
+"""Starting values: continuous square root of the guide's hodograph; docs/theory/numerics.md 3.1."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The interpolation system (13) of the paper with its end conditions; docs/numerics.md section 2.
+"""The interpolation system (13) of the paper with its end conditions; docs/theory/numerics.md section 2.
 
 Unknowns z_1 … z_M (complex, mm^(1/2)), one per span. The two values beyond the ends follow
 linearly:

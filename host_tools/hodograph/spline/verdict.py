@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whether a converged solution is decent: no loop, no cusp of its own; docs/numerics.md 3.5."""
+"""Whether a converged solution is decent: no loop, no cusp of its own; docs/theory/numerics.md 3.5."""
 
 from __future__ import annotations
 

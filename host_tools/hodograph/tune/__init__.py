@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Servo loops by design: PDFF gains and feedforward from the plant model, margins, and what a wrong model costs.
 
-The method is docs/numerics.md section 17, the use docs/tuning.md.
+The method is docs/theory/numerics.md section 17, the use docs/guides/tuning.md.
 """
 
 from .design import VELOCITIES

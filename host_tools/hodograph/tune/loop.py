@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The servo loop of one axis as a linear sampled system: docs/numerics.md section 17.
+"""The servo loop of one axis as a linear sampled system: docs/theory/numerics.md section 17.
 
 Exact for the simulated drive (sim/plant) but for what is not linear: encoder increments, voltage limit, friction.
 """

@@ -86,7 +86,8 @@ class Curve:
     arc: Real
 
     def parameter(self, segment: Int, arc_mm: Real) -> Real:
-        """xi at an arc length within the segment, both (K,). Newton; docs/numerics.md 12 says why it converges."""
+        """xi at an arc length within the segment, both (K,). Newton; docs/theory/numerics.md 12 says why it
+        converges."""
         arc = self.arc[segment]
         xi = arc_mm / arc.sum(axis=1)
         for _ in range(_NEWTON_STEPS):

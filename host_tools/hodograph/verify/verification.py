@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a program does to the limits of its path file: peaks, and every place beyond a limit; docs/numerics.md 16."""
+"""What a program does to the limits of its path file: peaks, and every place beyond a limit;
+docs/theory/numerics.md 16."""
 
 from __future__ import annotations
 

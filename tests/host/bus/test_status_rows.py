@@ -114,8 +114,8 @@ def test_troubles() -> None:
 
 
 def test_every_key_is_documented() -> None:
-    """docs/cli.md names each key of the JSON document within its item."""
-    items = (ROOT / "docs" / "cli.md").read_text().split("\n- ")
+    """docs/reference/cli.md names each key of the JSON document within its item."""
+    items = (ROOT / "docs" / "reference" / "cli.md").read_text().split("\n- ")
     words = next(item for item in items if item.startswith("`status`"))
     documented = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]*)`", words))))
     faulty = replace(RUNNING, fault=FAULT, boot_trouble=boot_trouble(2, 0x100000, 0, 0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The kernels against 50-digit arithmetic, within the bounds of docs/numerics.md sections 9 to 12.
+"""The kernels against 50-digit arithmetic, within the bounds of docs/theory/numerics.md sections 9 to 12.
 
 A small run of benchmarks/kernels.py: random segments at the limit of the speed ratio and golden programs.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The EDS files as python canopen reads them, against docs/protocol.md."""
+"""The EDS files as python canopen reads them, against docs/reference/protocol.md."""
 
 from __future__ import annotations
 

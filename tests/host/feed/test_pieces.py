@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Feed pieces against the exact profile in 50 digits, and against the rules of docs/protocol.md 1.3."""
+"""Feed pieces against the exact profile in 50 digits, and against the rules of docs/reference/protocol.md 1.3."""
 
 from fractions import Fraction
 

@@ -63,7 +63,8 @@ def recording(
 
 
 def _torques(chain: Chain, cmd_q40: NDArray[np.int64], ticks: int) -> NDArray[np.int64] | None:
-    """Torque offsets by docs/protocol.md section 3.2, in floating point: rounding may differ by one per mille."""
+    """Torque offsets by docs/reference/protocol.md section 3.2, in floating point: rounding may differ by
+    one per mille."""
     forward = chain.machine.plane_feedforward
     if forward is None:
         return None

@@ -71,7 +71,7 @@ def test_one_number_of_a_segment_moved(segment: int, column: int, by: int, sign:
 
 SEGMENT, FIRST_SEGMENT, FIRST_PIECE, PIECE = 72, 128, 128 + 72 * decode(BASE).segment_count, 88
 START, X, Y, U0, V2 = 0, 8, 16, 24, 64
-"""Offsets within a segment: docs/protocol.md 1.2."""
+"""Offsets within a segment: docs/reference/protocol.md 1.2."""
 
 
 def with_number(place: int, number: int) -> bytes:

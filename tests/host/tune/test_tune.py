@@ -111,7 +111,7 @@ def test_every_case_differs_from_the_model(drives: tuple[Drive, Drive]) -> None:
 def test_volts_that_a_plan_leaves_are_for_weaker_plants(
     tmp_path: Path, volts: float, spoiled: bool
 ) -> None:
-    """docs/tuning.md: the fastest feed for 4.5 V of 5 V is none for a plant with a fifth less gain."""
+    """docs/guides/tuning.md: the fastest feed for 4.5 V of 5 V is none for a plant with a fifth less gain."""
     text = (EXAMPLES / "alpha_optimal.toml").read_text().replace("volts = 4.5", f"volts = {volts}")
     file = tmp_path / "alpha.toml"
     file.write_text(text)

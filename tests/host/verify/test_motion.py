@@ -20,7 +20,7 @@ mp.dps = 60
 def exact_point(
     program: Program, piece: int, segment: int, t: mpmath.mpf
 ) -> tuple[mpmath.mpf, ...]:
-    """x, y at t after the start of a piece: the formulas of docs/protocol.md 1.2 and 1.3, nothing else."""
+    """x, y at t after the start of a piece: the formulas of docs/reference/protocol.md 1.2 and 1.3, nothing else."""
     one = program.pieces[piece]
     tau = t / mp.mpf(2) ** one.exponent
     arc = one.start_q40 + sum(c * tau ** (k + 1) for k, c in enumerate(one.c_q40))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """From recorded frames to ticks: what was set, what was answered, by SYNC.
 
-Order on the bus (docs/protocol.md section 2): SYNC j, then the setpoints of tick j; the drives answer SYNC j with TPDO1
+Order on the bus (docs/reference/protocol.md section 2): SYNC j, then the setpoints of tick j; the drives
+answer SYNC j with TPDO1
 and TPDO2, which may come before or after the setpoints, on a late host even after SYNC j+1, but never out of
 order. So the n-th answer belongs to the n-th SYNC; what sits between two SYNCs only checks that.
 """
@@ -21,7 +22,7 @@ SYNC_ID, RPDO1, RPDO2, TPDO1, TPDO2 = 0x080, 0x200, 0x300, 0x180, 0x280
 SDO_REQUEST = 0x600
 SYNC_OVERFLOW = 240
 _UNHOMED_START = bytes([0x2F, 0x55, 0x20, 0x01, 0x01])
-"""Expedited write of 1 to 0x2055 sub 1 (docs/protocol.md section 3.3)."""
+"""Expedited write of 1 to 0x2055 sub 1 (docs/reference/protocol.md section 3.3)."""
 _LONGEST_LAG = 250
 """SYNCs by which an answer may be late: a slow host delays drives, but frames keep their order."""
 _LEAD_IN = 200

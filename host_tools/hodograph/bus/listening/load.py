@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The load of a bus, measured by listening (docs/bus-time.md section 3): bits of every frame, stuff bits computed,
+"""The load of a bus, measured by listening (docs/reference/bus-time.md section 3): bits of every frame,
+stuff bits computed,
 over the time of the bus. `hodograph status` and the live page show this one.
 """
 

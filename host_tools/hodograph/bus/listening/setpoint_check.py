@@ -16,7 +16,8 @@ turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greate
 axis          Of each axis by itself, as far as the limits of the machine's axes are known: the first, second and third
               difference are means of velocity, acceleration and jerk over one to three periods, so at most v T, a T^2
               and j T^3. Rounding adds 1, 2 and 4 counts, and as much for the kernel's own error. Acceleration and jerk
-              may be 1 % above: the controller lets joints of a program step by 0.5 % of them (docs/limits.md), and
+              may be 1 % above: the controller lets joints of a program step by 0.5 % of them
+              (docs/guides/limits.md), and
               a difference may reach over two. A recording that begins in motion shows no jerk before its third step.
 
 Where a SYNC passed without a setpoint the drive stood at its target, and the next setpoint is the step of one period:

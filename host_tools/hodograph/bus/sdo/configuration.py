@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The controller's configuration, as a machine file asks for it (docs/protocol.md section 3)."""
+"""The controller's configuration, as a machine file asks for it (docs/reference/protocol.md section 3)."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
 
 
 def configuration_crc32(wanted: Sequence[tuple[Object, int]], dictionary: ObjectDictionary) -> int:
-    """The CRC-32 that a controller with this configuration has in 0x2050 sub 1 (docs/protocol.md section 3.4).
+    """The CRC-32 that a controller with this configuration has in 0x2050 sub 1 (docs/reference/protocol.md
+    section 3.4).
 
     `dictionary`: the controller's, which says how many bytes a value has.
     """

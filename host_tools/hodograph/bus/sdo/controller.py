@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The controller node as an object: configuration, programs, commands, state.
 
-Speaks SDO through python `canopen` and the controller's EDS; objects are those of docs/protocol.md section 3.
+Speaks SDO through python `canopen` and the controller's EDS; objects are those of docs/reference/protocol.md section 3.
 Every failure is a BusError (nothing or nonsense comes back) or a RefusedError (it said no, and why).
 """
 

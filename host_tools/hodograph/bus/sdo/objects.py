@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Objects, commands and states of the controller (docs/protocol.md section 3) by name."""
+"""Objects, commands and states of the controller (docs/reference/protocol.md section 3) by name."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The controller's state, gathered over SDO into one typed snapshot.
 
-`Status.json()` has the keys that tools may rely on (docs/cli.md). A snapshot of two axes is some 60 short SDO
+`Status.json()` has the keys that tools may rely on (docs/reference/cli.md). A snapshot of two axes is some 60 short SDO
 transfers, a few milliseconds on an idle machine; what belongs together is read in one turn.
 """
 
@@ -105,7 +105,8 @@ class LoadedProgram:
 
 @dataclass(frozen=True)
 class Configured:
-    """What the controller's configuration is and where it is from; CRC-32s as of docs/protocol.md section 3.4.
+    """What the controller's configuration is and where it is from; CRC-32s as of docs/reference/protocol.md
+    section 3.4.
 
     `state` and `stored` are words of CONFIGURED and STORED. `program_crc32`: under which configuration the loaded
     program was checked last; another one than `crc32`: it is checked again before it starts.

@@ -141,7 +141,8 @@ _SINGLE = {
     ),
     0xFF09: (
         "SYNC stayed away for longer than real drives can bridge: the axes left the path",
-        "give the controller real-time priority (docs/cli.md, status) and an idle processor; home if in doubt",
+        "give the controller real-time priority (docs/reference/cli.md, status) and an idle processor; home "
+        "if in doubt",
     ),
     0xFF0A: (
         "a stop along the path took longer than the program says",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words for the codes of the controller's objects (docs/protocol.md section 3)."""
+"""Words for the codes of the controller's objects (docs/reference/protocol.md section 3)."""
 
 from __future__ import annotations
 

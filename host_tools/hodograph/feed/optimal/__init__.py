@@ -4,7 +4,7 @@
 A plan begins with `plan_optimal`. In order: bounds (all limits), feasible (whether they leave any feed), curve (exact
 derivatives by arc length), knots (where to cut), grid (the unknown feed^2 as a piecewise cubic), motion (limited
 quantities), rows and solver (linear programs), window (their sequence), windows (any length), track (polynomials
-in time), peaks (what came of it). docs/numerics.md 5.6.
+in time), peaks (what came of it). docs/theory/numerics.md 5.6.
 """
 
 from .bounds import gather

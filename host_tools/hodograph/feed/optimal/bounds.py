@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What binds a feed along a path, all sources together; docs/numerics.md 5.6."""
+"""What binds a feed along a path, all sources together; docs/theory/numerics.md 5.6."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FREE: PerAxis = (inf, inf)
 
 _MOST_BY_ACCELERATION, _MOST_BY_JERK = 2.0**13, 24.0
 """Greatest feed over what is left of an acceleration, of a jerk: rates of 2^-16 / s and 2^-8 / s^2 are the least of the
-format, and a factor above 1 and the other rate take half of the room each; docs/numerics.md section 7."""
+format, and a factor above 1 and the other rate take half of the room each; docs/theory/numerics.md section 7."""
 
 _PERIODS_TO_FULL_ACCELERATION = 8
 """Without any limit of the jerk the acceleration still builds up within so many periods."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Derivatives of a PH curve by arc length, exact and from either side of joints; docs/numerics.md 5.6.
+"""Derivatives of a PH curve by arc length, exact and from either side of joints; docs/theory/numerics.md 5.6.
 
 PH quintic splines are C2: the curvature is continuous, its derivative jumps at joints. There both sides count.
 """

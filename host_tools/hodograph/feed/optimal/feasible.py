@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limits that leave no feed worth the name: which, where, and what would do; docs/numerics.md 5.6.
+"""Limits that leave no feed worth the name: which, where, and what would do; docs/theory/numerics.md 5.6.
 
 Every path without corners can be run inside any limits, if slowly enough. The bounds of slowness are LEAST_FEED_MM_S
 at every place and the longest time that the format knows. What each limit allows is taken at constant feed; of

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A first idea of the feed, good enough to say where knots should be; docs/numerics.md 5.6."""
+"""A first idea of the feed, good enough to say where knots should be; docs/theory/numerics.md 5.6."""
 
 from __future__ import annotations
 

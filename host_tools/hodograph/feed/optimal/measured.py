@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A window planned again where its pieces, not only the feed they stand for, pass a limit; docs/numerics.md 5.6.
+"""A window planned again where its pieces, not only the feed they stand for, pass a limit; docs/theory/numerics.md 5.6.
 
 Next to rest and at sudden changes a polynomial of degree 7 strays from the feed over arc length that it is made from.
 """

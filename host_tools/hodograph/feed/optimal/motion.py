@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a feed does to the machine at points of a path: every limited quantity; docs/numerics.md 5.6.
+"""What a feed does to the machine at points of a path: every limited quantity; docs/theory/numerics.md 5.6.
 
 With r as a function of x (grid.py) and R1, R2, R3 its derivatives, p = (dx/dt)^2:
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The greatest value of every limited quantity of a track, on the pieces themselves; docs/numerics.md 5.6."""
+"""The greatest value of every limited quantity of a track, on the pieces themselves; docs/theory/numerics.md 5.6."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The quadratic programs of the planner, by PIQP; docs/numerics.md 5.6 says why PIQP."""
+"""The quadratic programs of the planner, by PIQP; docs/theory/numerics.md 5.6 says why PIQP."""
 
 from __future__ import annotations
 

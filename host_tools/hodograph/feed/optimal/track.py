@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Feed over arc length turned into arc length over time: polynomials of degree 7; docs/numerics.md 5.6.
+"""Feed over arc length turned into arc length over time: polynomials of degree 7; docs/theory/numerics.md 5.6.
 
 Each interval becomes a piece with the exact F, F', F'' and F''' at both ends (two-point Hermite): C2, and
 F''' jumps only where the plan's does.

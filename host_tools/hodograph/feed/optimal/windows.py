@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A whole path in windows, so that any length takes time and memory in proportion; docs/numerics.md 5.6.
+"""A whole path in windows, so that any length takes time and memory in proportion; docs/theory/numerics.md 5.6.
 
 Every window is planned to rest at its own end, so whatever comes after it there is a way to stop inside all
 limits: a join can never lead into a dead end. Of each window only the first part is kept, before the place
