@@ -120,7 +120,7 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c check test test-all unit unit-plain pytest run til faults lint format soak bench mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c check test test-all unit unit-plain pytest run til faults lint format soak bench figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -183,6 +183,12 @@ SEEDS ?= 5
 SCENARIO ?=
 faults: build ## inject faults into simulated machines, judge what comes of them, print a table (SEEDS=5, SCENARIO=...)
 	@$(PY) tools/run_faults.py --seeds $(SEEDS) --output $(BUILD)/faults.json $(SCENARIO)
+
+figures: build ## draw the figures of the manual anew (docs/images)
+	@$(PY) tools/draw_figures.py
+
+options: build ## write docs/reference/options.md anew from the command line
+	@$(PY) tools/list_options.py
 
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/bench.py --build $(BUILD)

@@ -5,7 +5,7 @@
  * One ramp at a time is decided, from rest to rest, by look-ahead into the feed pieces that it will run into. The decision
  * is spread over the ticks before it, one step of a search in a tick. Up to `guaranteed_q57`, the override that all pieces of
  * the program allow, the override may rest for as long as it likes. Above it a ramp back is known before a ramp up begins,
- * and when it has to begin (docs/theory/numerics.md section 12, "One move at a time" and "Windows").
+ * and when it has to begin (docs/theory/numerics.md section 12, "Override ramps" and "Look-ahead windows").
  *
  * Integers only, bounded time, no heap. One owner. Tick context, but for override_plan_begin.
  */

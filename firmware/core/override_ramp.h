@@ -2,7 +2,7 @@
 /*
  * Ramps of the feed override: how the override goes from one value to another, at rest at both.
  *
- * The override is the rate of program time (lambda of docs/theory/numerics.md section 12, "The rate"), 1 as planned. On a ramp
+ * The override is the rate of program time (lambda of docs/theory/numerics.md section 12, "Feed override"), 1 as planned. On a ramp
  * its second derivative is constant in each tick, so the override is piecewise quadratic in time. What the feed pieces of a
  * program allow its two derivatives is given by level of the override (docs/reference/protocol.md 1.3); a ramp keeps the bounds of
  * the level of its greatest override, so a change through several levels is made in stages (section 12, "Levels").

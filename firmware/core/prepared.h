@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A program made ready for one kernel: records that the tick reads where they are, so that it expands nothing when it
- * crosses the end of a segment or of a piece (docs/theory/numerics.md section 12, "Prepared programs").
+ * crosses the end of a segment or of a piece (docs/theory/numerics.md section 12, "Precomputed coefficients").
  *
  * The records are made by the controller itself from a program that has passed program_check; they are never uploaded.
  * Layout: those of the pieces, then those of the segments, each of one size. They hold native structs: for the binary

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,14 @@ def test_links_and_merges(page: Path) -> None:
     assert [link for link in links if not (page.parent / link).exists()] == []
     marks = [line for line in text.splitlines() if re.match(r"(<{7}|>{7})( |$)|={7}$", line)]
     assert marks == []
+
+
+@pytest.mark.parametrize("tool", ["draw_figures.py", "list_options.py"])
+def test_generated_pages_are_current(tool: str) -> None:
+    """`make figures` and `make options` would write the same again."""
+    command = [sys.executable, str(ROOT / "tools" / tool), "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_there_are_pages_with_links() -> None:
