@@ -264,10 +264,10 @@ $(UNITY_DIR)/unity.h: $(UNITY_DIR)/unity.c
 ## ---- object dictionaries, generated from the EDS files -------------------------------------------
 
 define OD_RULE
-$(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h &: $(2) $(wildcard tools/eds_*.py) $(VENV)/.ready
+$(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h &: $(2) $(wildcard tools/eds/*.py tools/eds/*.j2) $(VENV)/.ready
 	@mkdir -p $(BUILD)/generated
 	$$(call say,eds,$$<)
-	$$(Q)$(PY) tools/eds_to_c.py $(2) $(1) $(BUILD)/generated
+	$$(Q)PYTHONPATH=tools $(PY) -m eds.to_c $(2) $(1) $(BUILD)/generated
 	@touch $(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h
 endef
 $(if $(filter controller,$(OD_NAMES)),$(eval $(call OD_RULE,controller,firmware/app/controller.eds)))
@@ -428,7 +428,7 @@ format: $(VENV)/.ready ## bring C and Python into the formats that lint asks for
 
 lint-eds: $(VENV)/.ready
 	$(call say,eds,CiA 306)
-	$(Q)$(PY) tools/check_eds.py $(wildcard firmware/app/controller.eds sim/node/drive.eds)
+	$(Q)PYTHONPATH=tools $(PY) -m eds.check $(wildcard firmware/app/controller.eds sim/node/drive.eds)
 
 ## ---- the native module of the Python package -------------------------------------------------------
 

@@ -103,7 +103,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "simulate": {"errors", "config", "native", "program"},
     "verify": {"errors", "names", "config", "feed", "native", "program"},
     "bustime": {"errors", "data", "config"},
-    "dbc": {"data", "config", "bustime"},
+    "dbc": {"errors", "data", "config", "bustime"},
     "bus.address": {"errors"},
     "bus.words": set(),
     "bus.clock": {"errors"},

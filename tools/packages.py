@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -60,6 +61,15 @@ def _has_venv() -> bool:
     return all(importlib.util.find_spec(name) is not None for name in ("venv", "ensurepip"))
 
 
+def _cargo_package() -> str:
+    """The package that has cargo. What bookworm calls so is of 2022 and reads the index of all crates by git."""
+    try:
+        is_bookworm = platform.freedesktop_os_release().get("VERSION_CODENAME") == "bookworm"
+    except OSError:  # no /etc/os-release
+        is_bookworm = False
+    return "cargo-web" if is_bookworm else "cargo"
+
+
 _PACKAGE_OF = {
     "linux.uml": "user-mode-linux",
     "ip": "iproute2",
@@ -72,6 +82,7 @@ _PACKAGE_OF = {
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf",
     "qemu-system-riscv32": "qemu-system-misc",
+    "cargo": _cargo_package(),
 }
 
 BUS = (
@@ -89,7 +100,7 @@ BUILD = (
     Need("the Python modules venv and ensurepip", _has_venv, "python3-venv"),
     *BUS,
 )
-TEST = (_program("chromium"), _program("candump"), _program("cansend"))
+TEST = (_program("chromium"), _program("candump"), _program("cansend"), _program("cargo"))
 LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"), _program("node"))
 FUZZ = (_program("clang"), Need("libFuzzer", _has_libfuzzer, "libclang-rt-dev"))
 FIRMWARE = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""register_facts: what crate stm32-metapac says of the STM32G474RE, fetched once, pinned by its hash.
+"""register_facts: what crate stm32-metapac says of the STM32G474RE, fetched once by cargo, pinned by its hash.
 
 The crate is data that its authors extracted from the manufacturer's files and reviewed register by register; nothing of
 it is compiled or built in. Its tables of constants are read as text (rust_literal).
@@ -8,21 +8,29 @@ it is compiled or built in. Its tables of constants are read as text (rust_liter
 from __future__ import annotations
 
 import hashlib
+import os
 import re
+import shutil
+import subprocess
 import tarfile
-import urllib.error
-import urllib.request
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from rust_literal import read_static
 
-NAME = "stm32-metapac-21.0.0"
-URL = f"https://static.crates.io/crates/stm32-metapac/{NAME}.crate"
+CRATE, VERSION = "stm32-metapac", "21.0.0"
+NAME = f"{CRATE}-{VERSION}"
 SHA256 = "e74b78632cea498cfb28386a29f8bfae7476d6570a78733eb5fecbee66c2f4ce"
 CHIP = "stm32g474re"
-_TIMEOUT_S = 60
+_TIMEOUT_S = 300  # an old cargo reads the index of all crates first
+_MANIFEST = f"""\
+[package]
+name = "facts"
+version = "0.0.0"
+[dependencies]
+{CRATE} = "={VERSION}"
+"""
 
 
 class FactsError(Exception):
@@ -33,20 +41,41 @@ def fetch(cache: Path) -> Path:
     """The crate in the folder `cache`, downloaded when it is not there; its hash is looked at every time."""
     path = cache / f"{NAME}.crate"
     if not path.exists():
-        cache.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(".part")
         try:
-            with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as answer:
-                part.write_bytes(answer.read())
-        except (urllib.error.URLError, TimeoutError) as error:
+            part = path.with_suffix(".part")
+            shutil.copyfile(_downloaded(cache / "cargo"), part)
+            part.replace(path)
+        except (OSError, subprocess.SubprocessError) as error:
             raise FactsError(
-                f"cannot fetch {URL}: {error}; with a network once, or put the file into {cache}"
+                f"cargo cannot fetch {NAME}: {error}; with cargo and a network once, or put {path.name} into {cache}"
             ) from error
-        part.replace(path)
     found = hashlib.sha256(path.read_bytes()).hexdigest()
     if found != SHA256:
         raise FactsError(f"{path} has SHA-256 {found} instead of {SHA256}: remove it")
     return path
+
+
+def _downloaded(project: Path) -> Path:
+    """The crate in the cache of cargo, which gets it for a package that depends on it."""
+    (project / "src").mkdir(parents=True, exist_ok=True)
+    (project / "Cargo.toml").write_text(_MANIFEST, encoding="utf-8")
+    (project / "src" / "lib.rs").touch()
+    done = subprocess.run(
+        ["cargo", "fetch", "--quiet"],
+        cwd=project,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=_TIMEOUT_S,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise OSError(" ".join(done.stderr.split()))
+    home = Path(os.environ.get("CARGO_HOME") or Path.home() / ".cargo")
+    found = sorted(home.glob(f"registry/cache/*/{NAME}.crate"))
+    if not found:
+        raise OSError(f"no such file in {home}/registry/cache")
+    return found[0]
 
 
 class Facts:

@@ -56,6 +56,8 @@ void controller_init(struct controller *controller, uint8_t node)
     frame_queue_init(&controller->queue);
     program_slot_init(&controller->slot);
     program_slot_recover(&controller->slot);
+    controller->slot.attend = controller_beat;
+    controller->slot.self = controller;
     drive_boot_init(&controller->boot);
     drive_look_init(&controller->look);
     homing_init(&controller->homing);

@@ -93,6 +93,9 @@ bool controller_shut_down(struct controller *controller);
 /* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
 bool controller_configured(const struct controller *controller);
 
+/* A life sign from inside long work of a round: the heartbeat, when it is due. `self`: the controller. */
+void controller_beat(void *self);
+
 /* Part of the round: tells of faults (EMCY), states and limits. */
 void controller_report(struct controller *controller);
 

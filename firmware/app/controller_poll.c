@@ -67,17 +67,22 @@ static bool next_frame(struct controller *controller, struct can_msg *in)
     return got;
 }
 
-static void poll_nmt(struct controller *controller, uint32_t elapsed_us)
+static void poll_heartbeat(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    if (heartbeat_producer_process(&controller->heartbeat,
+                                   controller->values.producer_heartbeat_time,
+                                   controller->nmt.state, elapsed_us, &out) != 0) {
+        controller_send(&out);
+    }
+}
+
+static void poll_nmt(struct controller *controller)
 {
     struct can_msg out;
     if (nmt_slave_process(&controller->nmt, &out) != 0) {
         controller_send(&out);
         controller_start_itself(controller);
-    }
-    if (heartbeat_producer_process(&controller->heartbeat,
-                                   controller->values.producer_heartbeat_time,
-                                   controller->nmt.state, elapsed_us, &out) != 0) {
-        controller_send(&out);
     }
 }
 
@@ -166,13 +171,14 @@ static void poll_homing(struct controller *controller, uint32_t elapsed_us)
     }
 }
 
+/* On the way out nothing is asked any more: an answer that comes behind the end would be taken for one to the next client. */
 static void poll_look(struct controller *controller, uint32_t elapsed_us)
 {
     port_lock();
     const bool found = controller->machine.state != MACHINE_BOOT;
     port_unlock();
     struct can_msg out;
-    const bool allowed = found && !homing_busy(&controller->homing);
+    const bool allowed = found && !controller->ending && !homing_busy(&controller->homing);
     if (drive_look_process(&controller->look, &controller->machine, controller->boot.facts, allowed,
                            elapsed_us, &out) != 0) {
         controller_send(&out);
@@ -184,6 +190,15 @@ static uint32_t counted_us(uint32_t elapsed_us)
     return elapsed_us < CONTROLLER_ELAPSED_MAX_US ? elapsed_us : CONTROLLER_ELAPSED_MAX_US;
 }
 
+/* The time of the work counts for nobody else: what the others have sent meanwhile has not been looked at. */
+void controller_beat(void *self)
+{
+    struct controller *controller = self;
+    const uint32_t now_us = port_time_us();
+    poll_heartbeat(controller, now_us - controller->polled_us);
+    controller->polled_us = now_us;
+}
+
 void controller_poll(struct controller *controller)
 {
     struct can_msg in;
@@ -193,7 +208,8 @@ void controller_poll(struct controller *controller)
     const uint32_t now_us = port_time_us();
     const uint32_t elapsed_us = counted_us(now_us - controller->polled_us);
     controller->polled_us = now_us;
-    poll_nmt(controller, elapsed_us);
+    poll_nmt(controller);
+    poll_heartbeat(controller, elapsed_us);
     poll_server(controller, elapsed_us);
     poll_boot(controller, elapsed_us);
     poll_homing(controller, elapsed_us);

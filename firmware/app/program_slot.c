@@ -61,11 +61,13 @@ void program_slot_abandon(struct program_slot *slot)
     slot->receiving = false;
 }
 
-static int check(const struct program *program, const struct config *config,
-                 struct program_fault *fault)
+static int check(const struct program_slot *slot, const struct program *program,
+                 const struct config *config, struct program_fault *fault)
 {
     struct program_limits limits;
     config_limits(config, &limits);
+    limits.attend = slot->attend;
+    limits.self = slot->self;
     return program_check(program, &limits, fault);
 }
 
@@ -125,7 +127,7 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
         slot->refused.code = PROGRAM_ERR_SIZE;
     }
     if (slot->refused.code == 0) {
-        (void)check(&candidate, config, &slot->refused);
+        (void)check(slot, &candidate, config, &slot->refused);
     }
     if (slot->refused.code == 0) {
         slot->refused.code = seal(slot, &candidate, bank, config);
@@ -194,7 +196,7 @@ void program_slot_refresh(struct program_slot *slot, const struct config *config
         return;
     }
     struct program_fault fault = {.code = 0, .index = 0};
-    if (check(&slot->program, config, &fault) == 0) {
+    if (check(slot, &slot->program, config, &fault) == 0) {
         fault.code = prepare(slot, config);
     }
     slot->acceptable = fault.code == 0;

@@ -28,6 +28,9 @@ enum program_slot_state {
 };
 
 struct program_slot {
+    void (*attend)(
+        void *self); /* called with `self` now and then while a program is checked; may be NULL */
+    void *self;
     struct program program;           /* active, when present */
     struct program_fault refused;     /* last refusal; code 0: none */
     int32_t start_counts[PLANE_AXES]; /* first and last setpoint with the present configuration */

@@ -40,6 +40,17 @@ static bool send_sync(struct tick *tick)
     return send(tick, sync_producer_next(&tick->sync));
 }
 
+/* Where frames of the tick before still wait, a SYNC would overtake the setpoints among them, and the drives would make the
+ * way of two periods at the next one. So the tick sends nothing, and program time waits. */
+static enum machine_sync begin_sync(struct tick *tick)
+{
+    if (!port_can_delivered()) {
+        note_refused(tick);
+        return MACHINE_SYNC_WAITS;
+    }
+    return send_sync(tick) ? MACHINE_SYNC_SENT : MACHINE_SYNC_REFUSED;
+}
+
 /* Axes that hold have none. */
 static const struct feedforward_offset *find_offsets(struct tick *tick,
                                                      struct feedforward_offset offset[AXES_MAX])
@@ -115,14 +126,18 @@ void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns)
     const uint32_t started_ns = port_time_ns();
     tick->refused = false;
     tick->setpoint_refused = false;
-    const bool sync_sent = send_sync(tick);
-    machine_note_sync(machine, now_us, sync_sent);
+    const enum machine_sync sync = begin_sync(tick);
+    machine_note_sync(machine, now_us, sync);
     machine_supervise(machine, now_us);
     machine_step(machine);
-    send_process_data(tick);
-    machine_note_sent(machine, (struct machine_sent){.sync = sync_sent,
-                                                     .setpoints = !tick->setpoint_refused,
-                                                     .all = !tick->refused});
+    if (sync == MACHINE_SYNC_WAITS) {
+        machine_note_waiting(machine, now_us);
+    } else {
+        send_process_data(tick);
+        machine_note_sent(machine, (struct machine_sent){.sync = sync == MACHINE_SYNC_SENT,
+                                                         .setpoints = !tick->setpoint_refused,
+                                                         .all = !tick->refused});
+    }
     if (machine_awaits_drives(machine)) {
         port_tick_await(guard_us(machine), machine_busy(machine));
     }

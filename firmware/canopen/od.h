@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* od: an object dictionary: a constant table of entries over one struct that holds the values.
  *
- * tools/eds_to_c.py makes both from an EDS file: `struct od_<name>` with a named, typed field for
+ * tools/eds makes both from an EDS file: `struct od_<name>` with a named, typed field for
  * each value (in the host's byte order, so that the application simply uses the fields),
  * `od_<name>_defaults`, and `od_<name>_table`. This module finds entries and moves values between
  * the struct and the little-endian bytes of the bus, with the checks of CiA 301: existence, access,

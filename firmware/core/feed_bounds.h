@@ -36,7 +36,8 @@ int feed_bounds_within(const struct program_piece *piece, enum feed_derivative d
 #define FEED_PARTS 8
 
 /* Bounds of that derivative over each eighth of the piece (in time), their Bernstein coefficients' least and greatest in
- * 2^-24 units, rounded outwards and held at +-FEED_NO_BOUND_Q24. */
+ * 2^-24 units, rounded outwards. The greatest are held at +-FEED_NO_BOUND_Q24; the least are -FEED_NO_BOUND_Q24 or more,
+ * and below 2^62. */
 void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
 

@@ -639,6 +639,7 @@ int limit_check_all(const struct program *p, const struct program_limits *limits
     for (uint32_t i = 0; i < p->header.piece_count && code == 0; i++) {
         *index = i;
         code = check_piece(&check, i, &segment);
+        program_check_attend(limits);
     }
     code = code != 0 ? code : check_step(&check, &rest);
     *index = code != 0 ? *index : 0u;

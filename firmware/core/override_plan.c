@@ -8,7 +8,7 @@
 #define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
 #define NOWHERE UINT32_MAX
 #define EARLY   16u /* ticks before a rest in which the next ramp is looked for */
-/* Half of a ramp above everywhere_q57: it leaves less than OVERRIDE_SPARE. */
+/* Half of a ramp above guaranteed_q57: it leaves less than OVERRIDE_SPARE. */
 #define MOST_TICKS ((uint32_t)1 << 18)
 /* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the rest. */
 #define MARGIN 8u
@@ -33,8 +33,8 @@ static void come_to_rest(struct override_plan *plan)
 void override_plan_begin(struct override_plan *plan, const struct program *p)
 {
     memset(plan, 0, sizeof *plan);
-    override_bounds_of(&plan->everywhere, p, 0, p->header.piece_count);
-    plan->everywhere_q57 = (int64_t)plan->everywhere.factor_q14 << 43;
+    override_bounds_of(&plan->guaranteed, p, 0, p->header.piece_count);
+    plan->guaranteed_q57 = (int64_t)plan->guaranteed.factor_q14 << 43;
     plan->commanded_q57 = OVERRIDE_ONE;
     come_to_rest(plan);
 }
@@ -139,7 +139,7 @@ static void go_back(struct override_plan *plan)
 {
     plan->ticks = plan->back;
     plan->kind = OVERRIDE_RETURN;
-    plan->stage.end_q57 = plan->everywhere_q57 - OVERRIDE_SPARE;
+    plan->stage.end_q57 = plan->guaranteed_q57 - OVERRIDE_SPARE;
     plan->task = OVERRIDE_BEGINS;
 }
 
@@ -150,26 +150,26 @@ static void give_up(struct override_plan *plan)
     plan->task = OVERRIDE_DECIDES;
     if (plan->kind == OVERRIDE_STAY) {
         begin_search(plan, OVERRIDE_CLIMB, plan->wanted_q57);
-    } else if (now_q57 > plan->everywhere_q57) {
+    } else if (now_q57 > plan->guaranteed_q57) {
         if (plan->kind == OVERRIDE_RETURN || now_q57 > plan->wanted_q57 + OVERRIDE_SPARE) {
             go_back(plan);
         }
-    } else if (now_q57 != plan->everywhere_q57) {
-        begin_search(plan, OVERRIDE_SETTLE, plan->everywhere_q57);
+    } else if (now_q57 != plan->guaranteed_q57) {
+        begin_search(plan, OVERRIDE_SETTLE, plan->guaranteed_q57);
     }
 }
 
-/* Whether a ramp up to an override above everywhere_q57 is worth it, and allowed in the window: then `target_q57` is it. */
+/* Whether a ramp up to an override above guaranteed_q57 is worth it, and allowed in the window: then `target_q57` is it. */
 static int may_climb(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
     const int64_t factor = factor_q57(&plan->ahead);
     plan->target_q57 = qmath_lesser(plan->wanted_q57, factor);
-    return now_q57 <= factor && plan->target_q57 > plan->everywhere_q57 + OVERRIDE_SPARE &&
+    return now_q57 <= factor && plan->target_q57 > plan->guaranteed_q57 + OVERRIDE_SPARE &&
            qmath_magnitude(plan->target_q57 - now_q57) > OVERRIDE_SPARE;
 }
 
-/* What the window allows, for an override above everywhere_q57. */
+/* What the window allows, for an override above guaranteed_q57. */
 static void check_factor(struct override_plan *plan)
 {
     if (plan->kind == OVERRIDE_CLIMB) {
@@ -185,7 +185,7 @@ static void check_factor(struct override_plan *plan)
     }
 }
 
-/* The next window. Behind the last, below everywhere_q57, the least bounds of the program, which always do. */
+/* The next window. Behind the last, below guaranteed_q57, the least bounds of the program, which always do. */
 static void look(struct override_plan *plan, const struct program_clock *clock)
 {
     plan->step = OVERRIDE_STAGES;
@@ -196,14 +196,14 @@ static void look(struct override_plan *plan, const struct program_clock *clock)
             check_factor(plan);
         }
     } else if (plan->kind == OVERRIDE_SETTLE) {
-        plan->ahead.bounds = &plan->everywhere;
+        plan->ahead.bounds = &plan->guaranteed;
         plan->ahead.end_q32_s = UINT64_MAX;
     } else {
         give_up(plan);
     }
 }
 
-/* How far one ramp may go with the bounds of the window. Above everywhere_q57 it goes all the way, or not at all. */
+/* How far one ramp may go with the bounds of the window. Above guaranteed_q57 it goes all the way, or not at all. */
 static void find_stage(struct override_plan *plan)
 {
     plan->step = OVERRIDE_MEASURES;
@@ -221,11 +221,11 @@ static void find_stage(struct override_plan *plan)
     }
 }
 
-/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above everywhere_q57 the ramp
+/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above guaranteed_q57 the ramp
  * back. */
 static int64_t change_q57(const struct override_plan *plan, int64_t from_q57)
 {
-    const int64_t back_q57 = plan->high_q57 - plan->everywhere_q57 + OVERRIDE_SPARE;
+    const int64_t back_q57 = plan->high_q57 - plan->guaranteed_q57 + OVERRIDE_SPARE;
     const int64_t ramp_q57 = qmath_magnitude(plan->stage.end_q57 - from_q57);
     if (plan->kind == OVERRIDE_STAY) {
         return back_q57;
@@ -256,7 +256,7 @@ static int fits(const struct override_plan *plan, const struct program_clock *cl
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
 }
 
-/* Until when an override above everywhere_q57 may last: the ramp back, at most at this override, ends inside the window.
+/* Until when an override above guaranteed_q57 may last: the ramp back, at most at this override, ends inside the window.
  * 0: not at all. */
 static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock)
 {
@@ -324,9 +324,9 @@ static void decide_below(struct override_plan *plan, int64_t wanted_q57)
     plan->saturated = 0;
     if (qmath_magnitude(change_q57) <= 1) {
         plan->now.override_q57 = wanted_q57;
-    } else if (plan->now.override_q57 > plan->everywhere_q57) {
+    } else if (plan->now.override_q57 > plan->guaranteed_q57) {
         begin_search(plan, OVERRIDE_RETURN,
-                     qmath_lesser(wanted_q57, plan->everywhere_q57 - OVERRIDE_SPARE));
+                     qmath_lesser(wanted_q57, plan->guaranteed_q57 - OVERRIDE_SPARE));
     } else if (qmath_magnitude(change_q57) <= SMALL) {
         plan->ticks = SHORTEST;
         plan->kind = OVERRIDE_SETTLE;
@@ -337,16 +337,16 @@ static void decide_below(struct override_plan *plan, int64_t wanted_q57)
     }
 }
 
-/* What to do next. Above everywhere_q57 once in each piece. */
+/* What to do next. Above guaranteed_q57 once in each piece. */
 static void decide(struct override_plan *plan, const struct program_clock *clock)
 {
     const int64_t wanted_q57 = wanted_override(plan);
     const int same = plan->wanted_q57 == wanted_q57;
     plan->wanted_q57 = wanted_q57;
-    if (wanted_q57 <= plan->everywhere_q57) {
+    if (wanted_q57 <= plan->guaranteed_q57) {
         decide_below(plan, wanted_q57);
     } else if (!same || plan->searched != clock->piece) {
-        const int above = plan->now.override_q57 > plan->everywhere_q57;
+        const int above = plan->now.override_q57 > plan->guaranteed_q57;
         plan->searched = clock->piece;
         plan->saturated = wanted_q57 - plan->now.override_q57 > OVERRIDE_SPARE;
         begin_search(plan, above ? OVERRIDE_STAY : OVERRIDE_CLIMB, wanted_q57);
@@ -356,7 +356,7 @@ static void decide(struct override_plan *plan, const struct program_clock *clock
 /* At rest, and not steady: one step of deciding what to do next. */
 static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock)
 {
-    if (plan->now.override_q57 > plan->everywhere_q57 &&
+    if (plan->now.override_q57 > plan->guaranteed_q57 &&
         clock->time_q42_s >> 10 >= plan->return_q32_s) {
         go_back(plan);
     }
@@ -375,7 +375,7 @@ static void tick_of_decision(struct override_plan *plan, const struct program_cl
 static int comes_steady(struct override_plan *plan)
 {
     const int64_t wanted_q57 = wanted_override(plan);
-    if (wanted_q57 > plan->everywhere_q57 || plan->now.override_q57 != wanted_q57) {
+    if (wanted_q57 > plan->guaranteed_q57 || plan->now.override_q57 != wanted_q57) {
         return 0;
     }
     plan->task = OVERRIDE_DECIDES; /* the command may have come back to it */
@@ -387,12 +387,12 @@ static int comes_steady(struct override_plan *plan)
 
 /* --- On a ramp --- */
 
-/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above everywhere_q57 on the
+/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above guaranteed_q57 on the
  * way down, where nothing says how to return. */
 static void change_target(struct override_plan *plan, int64_t wanted_q57)
 {
     struct override_ramp *ramp = &plan->ramp;
-    if (plan->kind == OVERRIDE_RETURN && ramp->end_q57 > plan->everywhere_q57) {
+    if (plan->kind == OVERRIDE_RETURN && ramp->end_q57 > plan->guaranteed_q57) {
         return;
     }
     if (ramp->step_q56 > 0 ? ramp->end_q57 >= wanted_q57 : ramp->end_q57 <= wanted_q57) {
@@ -406,7 +406,7 @@ static void search_early(struct override_plan *plan, const struct program_clock 
 {
     const struct override_ramp *ramp = &plan->ramp;
     if ((ramp->rise | ramp->even) != 0u || ramp->fall > EARLY || plan->kind != OVERRIDE_SETTLE ||
-        wanted_q57 > plan->everywhere_q57) {
+        wanted_q57 > plan->guaranteed_q57) {
         return;
     }
     if (plan->task == OVERRIDE_SEARCHES) {

@@ -3,7 +3,7 @@
  * The plan of the feed override: which ramp comes next on the way to the override that is commanded, and a tick of it.
  *
  * One ramp at a time is decided, from rest to rest, by look-ahead into the feed pieces that it will run into. The decision
- * is spread over the ticks before it, one step of a search in a tick. Up to `everywhere_q57`, the override that all pieces of
+ * is spread over the ticks before it, one step of a search in a tick. Up to `guaranteed_q57`, the override that all pieces of
  * the program allow, the override may rest for as long as it likes. Above it a ramp back is known before a ramp up begins,
  * and when it has to begin (docs/theory/numerics.md section 12, "Override ramps" and "Look-ahead windows").
  *
@@ -25,7 +25,7 @@ enum override_task {
 };
 
 enum override_kind {
-    OVERRIDE_SETTLE, /* a ramp that ends at or below everywhere_q57 and begins there */
+    OVERRIDE_SETTLE, /* a ramp that ends at or below guaranteed_q57 and begins there */
     OVERRIDE_RETURN, /* from above it to below it */
     OVERRIDE_STAY,   /* no ramp: how long the present override above it may last */
     OVERRIDE_CLIMB,  /* a ramp to an override above it */
@@ -54,21 +54,21 @@ struct override_plan {
     uint32_t steady;    /* 1: at the commanded override, in which only a command changes anything */
     uint32_t held;      /* 1: the override goes to 0 */
     int64_t commanded_q57;
-    int64_t everywhere_q57;             /* greatest override that all pieces allow, */
-    struct program_override everywhere; /* and their least bounds */
+    int64_t guaranteed_q57;             /* greatest override that all pieces allow, */
+    struct program_override guaranteed; /* and their least bounds */
     struct override_ramp ramp;
     uint32_t task;   /* of the next tick at rest, enum override_task */
     uint32_t kind;   /* of the ramp that is on its way or looked for, enum override_kind */
     uint32_t step;   /* of the search, enum override_search */
     uint32_t window; /* looked at next, */
     struct override_window ahead; /* and the one looked at */
-    uint32_t searched;            /* last search above everywhere_q57 began in this piece */
+    uint32_t searched;            /* last search above guaranteed_q57 began in this piece */
     int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
     int64_t target_q57;           /* what is looked for, */
     struct ramp_stage stage;      /* where the next ramp on the way there ends, */
     struct ramp_ticks ticks;      /* and its ticks */
     int64_t high_q57;             /* greatest override on it */
-    uint64_t return_q32_s;  /* above everywhere_q57: a ramp back is known, if it begins by then, */
+    uint64_t return_q32_s;  /* above guaranteed_q57: a ramp back is known, if it begins by then, */
     struct ramp_ticks back; /* and its ticks */
 };
 

@@ -8,6 +8,7 @@
 #ifndef HODOGRAPH_CORE_PROGRAM_CHECK_H
 #define HODOGRAPH_CORE_PROGRAM_CHECK_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "core/program.h"
@@ -92,12 +93,24 @@ struct program_limits {
     uint32_t axis_acceleration_um_s2[2];
     uint32_t axis_jerk_mm_s3[2];
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
+    /* Called with `self` at every piece by the parts of the check that take long: so a main loop can give signs of life
+     * meanwhile. NULL: nobody is. */
+    void (*attend)(void *self);
+    void *self;
 };
 
 struct program_fault {
     int code;       /* 0 or enum program_error */
     uint32_t index; /* segment or piece, 0 for the header */
 };
+
+/* For the parts of the check. */
+static inline void program_check_attend(const struct program_limits *limits)
+{
+    if (limits->attend != NULL) {
+        limits->attend(limits->self);
+    }
+}
 
 /* Checks an opened program against all rules. Returns 0, or the code of the first rule broken
  * (header, then segments, then pieces, in order); *fault gets the same code and its index. */

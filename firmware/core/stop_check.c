@@ -369,10 +369,12 @@ static int check_entries(const struct program *p, const struct program_limits *l
     return 0;
 }
 
-/* The bounds of a kind, and the header's worst. most_us: of a bound, 0: any. */
+/* The bounds of a kind, and the header's worst. */
 static int check_kind(const struct program *p, enum program_stop_kind kind,
-                      const struct stop_bound *said, uint32_t most_ms, uint32_t *index)
+                      const struct program_limits *limits, const struct stop_bound *said,
+                      uint32_t *index)
 {
+    const uint32_t most_ms = kind == PROGRAM_STOP_FAULT ? limits->stop_time_ms : 0u;
     struct stop_walk walk;
     uint32_t longest_us = 0;
     uint32_t longest_um = 0;
@@ -390,6 +392,7 @@ static int check_kind(const struct program *p, enum program_stop_kind kind,
         }
         longest_us = stop.bound_us > longest_us ? stop.bound_us : longest_us;
         longest_um = bound.way_um > longest_um ? bound.way_um : longest_um;
+        program_check_attend(limits);
     }
     *index = 0;
     return said->time_us == longest_us && said->way_um >= longest_um ? 0 : PROGRAM_ERR_STOP_WORST;
@@ -402,10 +405,10 @@ int stop_check_all(const struct program *p, const struct program_limits *limits,
     const struct stop_bound fault = {h->fault_worst_us, h->fault_worst_um};
     int code = check_entries(p, limits, index);
     if (code == 0) {
-        code = check_kind(p, PROGRAM_STOP_HOLD, &hold, 0u, index);
+        code = check_kind(p, PROGRAM_STOP_HOLD, limits, &hold, index);
     }
     if (code == 0) {
-        code = check_kind(p, PROGRAM_STOP_FAULT, &fault, limits->stop_time_ms, index);
+        code = check_kind(p, PROGRAM_STOP_FAULT, limits, &fault, index);
     }
     return code;
 }

@@ -65,6 +65,11 @@ int port_can_accept(const struct can_match *filters, size_t count);
 /* Queues one frame for sending, in call order per context. 0 or PORT_ERR_FULL. */
 int port_can_send(const struct can_msg *message);
 
+/* False while a frame that a tick has sent still waits for the bus; true when each has been sent on the bus, or is lost
+ * (bus-off), and where the port cannot know. SYNC has a higher priority than setpoints, so a tick that finds its
+ * predecessor's frames waiting sends none. First in a tick. Timer. */
+bool port_can_delivered(void);
+
 /* --- Time and tick --- */
 
 struct port_handlers {

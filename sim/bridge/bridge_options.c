@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
 #include "bridge/bridge_options.h"
 
+#include <getopt.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -35,20 +37,6 @@ static enum bridge_options_result wrong(struct reason reason, const char *what, 
     return BRIDGE_OPTIONS_WRONG;
 }
 
-static const char **place_of(struct bridge_options *options, const char *name)
-{
-    if (strcmp(name, "--bus") == 0) {
-        return &options->bus;
-    }
-    if (strcmp(name, "--out") == 0) {
-        return &options->out;
-    }
-    if (strcmp(name, "--in") == 0) {
-        return &options->in;
-    }
-    return strcmp(name, "--slcan") == 0 ? &options->slcan : NULL;
-}
-
 static enum bridge_options_result check(const struct bridge_options *options, struct reason reason)
 {
     const bool fifos = options->out != NULL && options->in != NULL;
@@ -65,20 +53,37 @@ static enum bridge_options_result check(const struct bridge_options *options, st
 enum bridge_options_result bridge_options_parse(struct bridge_options *options, int argc,
                                                 char **argv, char *reason_text, size_t size)
 {
+    static const struct option known[] = {
+        {"help", no_argument, NULL, 'h'},        {"bus", required_argument, NULL, 'b'},
+        {"out", required_argument, NULL, 'o'},   {"in", required_argument, NULL, 'i'},
+        {"slcan", required_argument, NULL, 's'}, {NULL, 0, NULL, 0}};
     const struct reason reason = {reason_text, size};
     memset(options, 0, sizeof *options);
-    for (int i = 1; i < argc; i += 2) {
-        if (strcmp(argv[i], "--help") == 0) {
+    optind = 0; /* from the start, in a second call too */
+    for (;;) {
+        const int at = optind > 0 ? optind : 1;
+        switch (getopt_long(argc, argv, "+:", known, NULL)) {
+        case -1:
+            return optind < argc ? wrong(reason, "unknown option", argv[optind])
+                                 : check(options, reason);
+        case 'h':
             return BRIDGE_OPTIONS_HELP;
+        case 'b':
+            options->bus = optarg;
+            break;
+        case 'o':
+            options->out = optarg;
+            break;
+        case 'i':
+            options->in = optarg;
+            break;
+        case 's':
+            options->slcan = optarg;
+            break;
+        case ':':
+            return wrong(reason, "a value must follow the option", argv[at]);
+        default:
+            return wrong(reason, "unknown option", argv[at]);
         }
-        const char **place = place_of(options, argv[i]);
-        if (place == NULL) {
-            return wrong(reason, "unknown option", argv[i]);
-        }
-        if (i + 1 >= argc) {
-            return wrong(reason, "a value must follow the option", argv[i]);
-        }
-        *place = argv[i + 1];
     }
-    return check(options, reason);
 }

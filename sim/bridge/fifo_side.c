@@ -90,6 +90,9 @@ static int send_frames(void)
     const size_t count = self.request.header.count;
     for (size_t i = 0; i < count; ++i) {
         exchange_unpack(&messages[i], &self.request.frames[i]);
+        if (self.request.frames[i].of_tick != 0u) {
+            (void)can_socket_track(self.socket, (uint16_t)messages[i].id);
+        }
     }
     return bus_send(self.socket, messages, count);
 }
@@ -144,6 +147,9 @@ static int serve(void)
     int error = (flags & EXCHANGE_FILTER) != 0u ? set_filters() : send_frames();
     if (error == 0) {
         error = wait_for_turn(now_ns);
+    }
+    if (can_socket_waiting(self.socket) > 0u) {
+        self.reply.header.flags |= EXCHANGE_WAITING;
     }
     if (bus_signals() > 0u) {
         self.reply.header.flags |= EXCHANGE_STOP;

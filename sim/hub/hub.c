@@ -111,6 +111,7 @@ static void take_connection(struct hub *hub, unsigned bus)
     fresh->number = 0;
     fresh->filter_count = 0;
     fresh->deferred_count = 0;
+    fresh->tracked_count = 0;
     fresh->queue.count = 0;
 }
 
@@ -168,11 +169,25 @@ static void tell(struct hub *hub, uint16_t kind, const struct participant *about
     }
 }
 
+static void take_packets(struct hub *hub, struct hub_connection *from, size_t most);
+
+/* What a participant has sent is on the bus before time goes on. */
+static void take_sent(struct hub *hub, uint32_t number)
+{
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        struct hub_connection *each = &hub->connections[i];
+        if (each->fd >= 0 && each->role == HUB_MEMBER && each->number == number) {
+            take_packets(hub, each, SIZE_MAX);
+        }
+    }
+}
+
 static void drop_connection(struct hub *hub, struct hub_connection *gone)
 {
     (void)close(gone->fd);
     gone->fd = -1;
     if (gone->role == HUB_PARTICIPANT) {
+        take_sent(hub, gone->number);
         const struct participant *about = virtual_time_find(&hub->time, gone->number);
         if (about != NULL) {
             tell(hub, LOCAL_BUS_LEFT, about);
@@ -226,6 +241,22 @@ static void deliver(struct hub *hub, size_t sender, const struct can_frame *fram
         }
         virtual_time_note_frame(&hub->time, to->number);
     }
+}
+
+/* Tells its sender that it has left, where that wants to know. It finds it when it wakes for something else. */
+static void deliver_back(struct hub *hub, size_t sender, const struct can_frame *frame)
+{
+    const struct hub_connection *to = &hub->connections[sender];
+    struct local_bus_frame out;
+    if (to->fd < 0 || to->role != HUB_MEMBER || !matches(to->tracked, to->tracked_count, frame)) {
+        return;
+    }
+    memset(&out, 0, sizeof out);
+    out.frame = *frame;
+    out.frame.__res0 = LOCAL_BUS_OWN;
+    out.time_ns = hub->time.now_ns;
+    hub->lost += send_frame(hub, to, &out) ? 0u : 1u;
+    virtual_time_note_frame(&hub->time, to->number);
 }
 
 /* Of two frames the one with the lower value wins the bus. */
@@ -323,6 +354,7 @@ static void end_transmissions(struct hub *hub)
             bus->busy = false;
             start_transmission(hub, i);
             deliver(hub, sender, &frame, hub->time.now_ns);
+            deliver_back(hub, sender, &frame);
         }
     }
 }
@@ -387,8 +419,6 @@ static int go_on(struct hub *hub)
 
 /* --- What processes say --- */
 
-static void take_packets(struct hub *hub, struct hub_connection *from, size_t most);
-
 static void greet(struct hub *hub, struct hub_connection *from,
                   const struct local_bus_control *hello)
 {
@@ -411,16 +441,11 @@ static void greet(struct hub *hub, struct hub_connection *from,
     send_control(hub, from->fd, LOCAL_BUS_WELCOME, from->number, NULL);
 }
 
-/* What the participant has sent before it says that it waits is on the bus before time goes on. */
 static void take_wait(struct hub *hub, const struct hub_connection *from,
                       const struct local_bus_control *wait)
 {
-    const bool sent = (wait->flags & LOCAL_BUS_SENT) != 0u;
-    for (size_t i = 0; i < HUB_CONNECTIONS && sent; ++i) {
-        struct hub_connection *each = &hub->connections[i];
-        if (each->fd >= 0 && each->role == HUB_MEMBER && each->number == from->number) {
-            take_packets(hub, each, SIZE_MAX);
-        }
+    if ((wait->flags & LOCAL_BUS_SENT) != 0u) {
+        take_sent(hub, from->number);
     }
     if (virtual_time_wait(&hub->time, from->number, wait->number, wait->time_ns)) {
         const struct participant *interrupted = virtual_time_find(&hub->time, from->number);
@@ -464,6 +489,9 @@ static void take_filters(struct hub_connection *from, const struct local_bus_fil
     if (told->kind == LOCAL_BUS_FILTER) {
         memcpy(from->filters, told->filters, bytes);
         from->filter_count = told->count;
+    } else if (told->kind == LOCAL_BUS_TRACK) {
+        memcpy(from->tracked, told->filters, bytes);
+        from->tracked_count = told->count;
     } else {
         memcpy(from->deferred, told->filters, bytes);
         from->deferred_count = told->count;
@@ -484,7 +512,8 @@ static bool take_packet(struct hub *hub, struct hub_connection *from, const unio
         }
         take_frame(hub, from, &packet->frame);
     } else if (from->role == HUB_MEMBER && (packet->control.kind == LOCAL_BUS_FILTER ||
-                                            packet->control.kind == LOCAL_BUS_DEFER)) {
+                                            packet->control.kind == LOCAL_BUS_DEFER ||
+                                            packet->control.kind == LOCAL_BUS_TRACK)) {
         take_filters(from, &packet->filters, size);
     } else {
         return size == sizeof packet->control && packet->control.version == LOCAL_BUS_VERSION &&

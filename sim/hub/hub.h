@@ -50,6 +50,8 @@ struct hub_connection {
     size_t filter_count;
     struct can_filter deferred[LOCAL_BUS_FILTERS]; /* what wakes nobody */
     size_t deferred_count;
+    struct can_filter tracked[LOCAL_BUS_FILTERS]; /* what comes back to it */
+    size_t tracked_count;
     struct hub_queue queue;
 };
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
 #include "injector/injector_options.h"
 
+#include <getopt.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -26,46 +28,9 @@ static enum injector_options_result wrong(struct reason reason, const char *what
     return INJECTOR_OPTIONS_WRONG;
 }
 
-static enum injector_options_result set_value(struct injector_options *options, const char *name,
-                                              const char *value, struct reason reason)
+static enum injector_options_result check(const struct injector_options *options,
+                                          struct reason reason)
 {
-    const bool bus = strcmp(name, "--bus") == 0;
-    if (!bus && strcmp(name, "--rules") != 0) {
-        return wrong(reason, "unknown option", name);
-    }
-    if (value == NULL) {
-        return wrong(reason, "a value must follow the option", name);
-    }
-    if (!bus) {
-        options->rules = value;
-        return INJECTOR_OPTIONS_OK;
-    }
-    if (options->bus[1] != NULL) {
-        return wrong(reason, "two buses are enough, not a third", value);
-    }
-    options->bus[options->bus[0] != NULL ? 1 : 0] = value;
-    return INJECTOR_OPTIONS_OK;
-}
-
-enum injector_options_result injector_options_parse(struct injector_options *options, int argc,
-                                                    char **argv, char *reason_text, size_t size)
-{
-    const struct reason reason = {reason_text, size};
-    memset(options, 0, sizeof *options);
-    for (int i = 1; i < argc; i++) {
-        if (strcmp(argv[i], "--help") == 0) {
-            return INJECTOR_OPTIONS_HELP;
-        }
-        if (strcmp(argv[i], "--verbose") == 0) {
-            options->verbose = true;
-            continue;
-        }
-        const char *value = i + 1 < argc ? argv[i + 1] : NULL;
-        if (set_value(options, argv[i], value, reason) != INJECTOR_OPTIONS_OK) {
-            return INJECTOR_OPTIONS_WRONG;
-        }
-        i++;
-    }
     if (options->bus[1] == NULL) {
         return wrong(reason, "two buses are needed, each behind", "--bus");
     }
@@ -73,4 +38,43 @@ enum injector_options_result injector_options_parse(struct injector_options *opt
         return wrong(reason, "two different buses are needed, not twice", options->bus[0]);
     }
     return INJECTOR_OPTIONS_OK;
+}
+
+enum injector_options_result injector_options_parse(struct injector_options *options, int argc,
+                                                    char **argv, char *reason_text, size_t size)
+{
+    static const struct option known[] = {{"help", no_argument, NULL, 'h'},
+                                          {"bus", required_argument, NULL, 'b'},
+                                          {"rules", required_argument, NULL, 'r'},
+                                          {"verbose", no_argument, NULL, 'v'},
+                                          {NULL, 0, NULL, 0}};
+    const struct reason reason = {reason_text, size};
+    memset(options, 0, sizeof *options);
+    optind = 0; /* from the start, in a second call too */
+    for (;;) {
+        const int at = optind > 0 ? optind : 1;
+        switch (getopt_long(argc, argv, "+:", known, NULL)) {
+        case -1:
+            return optind < argc ? wrong(reason, "unknown option", argv[optind])
+                                 : check(options, reason);
+        case 'h':
+            return INJECTOR_OPTIONS_HELP;
+        case 'v':
+            options->verbose = true;
+            break;
+        case 'r':
+            options->rules = optarg;
+            break;
+        case 'b':
+            if (options->bus[1] != NULL) {
+                return wrong(reason, "two buses are enough, not a third", optarg);
+            }
+            options->bus[options->bus[0] != NULL ? 1 : 0] = optarg;
+            break;
+        case ':':
+            return wrong(reason, "a value must follow the option", argv[at]);
+        default:
+            return wrong(reason, "unknown option", argv[at]);
+        }
+    }
 }

@@ -1,8 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-#include <stdio.h>
-#include <string.h>
+#define _GNU_SOURCE
+#include "node/node_options.h"
 
-#include "node/node_options_private.h"
+#include <errno.h>
+#include <getopt.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 const char node_options_help[] =
     "usage: hodograph-drive --bus INTERFACE --axis KEY=VALUE,... [--axis ...] [--faults FILE]\n"
@@ -33,30 +38,212 @@ const char node_options_help[] =
     "\n"
     "SIGTERM or SIGINT ends it. Exit status: 0 ended as asked, 2 wrong usage, 4 bus not usable.\n";
 
-enum node_options_result node_options_wrong(struct node_options_reason reason, const char *what,
-                                            const char *value)
+struct reason {
+    char *text;
+    size_t size;
+};
+
+static enum node_options_result wrong(struct reason reason, const char *what, const char *value)
 {
     (void)snprintf(reason.text, reason.size, "%s '%s' (see --help)", what, value);
     return NODE_OPTIONS_WRONG;
 }
 
-static enum node_options_result set_option(struct node_options *options, const char *name,
-                                           char *value, struct node_options_reason reason)
+enum key_kind { KEY_NUMBER, KEY_U32, KEY_U8 };
+
+struct key {
+    const char *name;
+    size_t offset; /* in struct node_options_axis */
+    enum key_kind kind;
+    bool required;
+};
+
+#define AT(member) offsetof(struct node_options_axis, member)
+
+static const struct key keys[] = {
+    {"node", AT(node), KEY_U8, true},
+    {"gain_rad_s_v", AT(config.plant.gain_rad_s_v), KEY_NUMBER, true},
+    {"time_constant_s", AT(config.plant.time_constant_s), KEY_NUMBER, true},
+    {"screw_mm_rad", AT(config.plant.screw_mm_rad), KEY_NUMBER, true},
+    {"torque_to_volts", AT(config.plant.torque_to_volts), KEY_NUMBER, true},
+    {"volts_limit", AT(config.plant.volts_limit), KEY_NUMBER, true},
+    {"k_pp_rad_s_mm", AT(config.pdff.k_pp_rad_s_mm), KEY_NUMBER, true},
+    {"k_pv_nm_s_rad", AT(config.pdff.k_pv_nm_s_rad), KEY_NUMBER, true},
+    {"k_iv_per_s", AT(config.pdff.k_iv_per_s), KEY_NUMBER, true},
+    {"k_pf_rad_mm", AT(config.pdff.k_pf_rad_mm), KEY_NUMBER, true},
+    {"k_vf", AT(config.pdff.k_vf), KEY_NUMBER, true},
+    {"encoder_counts_per_rev", AT(config.encoder_counts_per_rev), KEY_U32, false},
+    {"loop_rate_hz", AT(config.loop_rate_hz), KEY_U32, false},
+    {"counts_per_mm", AT(config.counts_per_mm), KEY_U32, false},
+    {"interpolation", AT(config.interpolation), KEY_U32, false},
+    {"speed", AT(config.speed), KEY_U32, false},
+    {"delay_samples", AT(config.delay_samples), KEY_U32, false},
+    {"position_mm", AT(position_mm), KEY_NUMBER, false},
+    {"limit_negative_mm", AT(equipment.limit_negative_mm), KEY_NUMBER, false},
+    {"limit_positive_mm", AT(equipment.limit_positive_mm), KEY_NUMBER, false},
+    {"home_from_mm", AT(equipment.home_from_mm), KEY_NUMBER, false},
+    {"home_to_mm", AT(equipment.home_to_mm), KEY_NUMBER, false},
+    {"rated_torque_nm", AT(equipment.rated_torque_nm), KEY_NUMBER, false},
+    {"rated_current_a", AT(equipment.rated_current_a), KEY_NUMBER, false},
+    {"overload_s", AT(equipment.overload_s), KEY_NUMBER, false},
+    {"friction_volts", AT(equipment.friction_volts), KEY_NUMBER, false},
+    {"brake_volts", AT(equipment.brake_volts), KEY_NUMBER, false},
+    {"serial", AT(equipment.serial), KEY_U32, false},
+    {"vendor", AT(equipment.vendor), KEY_U32, false},
+};
+
+enum { KEYS = sizeof keys / sizeof keys[0] };
+
+/* A value in [0, most] without sign or blanks. */
+static bool read_whole(const char *text, unsigned long most, unsigned long *out)
 {
-    const bool faults = strcmp(name, "--faults") == 0;
-    if (!faults && strcmp(name, "--bus") != 0 && strcmp(name, "--axis") != 0) {
-        return node_options_wrong(reason, "unknown option", name);
+    char *end = NULL;
+    errno = 0;
+    *out = strtoul(text, &end, 10);
+    return *text >= '0' && *text <= '9' && *end == '\0' && errno == 0 && *out <= most;
+}
+
+/* Finite, and of a size that any key may have. */
+static bool read_number(const char *text, double *out)
+{
+    char *end = NULL;
+    *out = strtod(text, &end);
+    return end != text && *end == '\0' && *out >= -1e12 && *out <= 1e12;
+}
+
+static bool store(struct node_options_axis *axis, const struct key *key, const char *text)
+{
+    unsigned char *field = (unsigned char *)axis + key->offset;
+    unsigned long whole = 0;
+    double number = 0.0;
+    if (key->kind == KEY_NUMBER) {
+        if (!read_number(text, &number)) {
+            return false;
+        }
+        memcpy(field, &number, sizeof number);
+        return true;
     }
-    if (value == NULL) {
-        return node_options_wrong(reason, "a value must follow the option", name);
+    if (!read_whole(text, key->kind == KEY_U8 ? 127u : UINT32_MAX, &whole)) {
+        return false;
     }
-    if (strcmp(name, "--axis") == 0) {
-        return node_options_add_axis(options, value, reason);
-    }
-    if (faults) {
-        options->faults = value;
+    if (key->kind == KEY_U8) {
+        *field = (unsigned char)whole;
     } else {
-        options->bus = value;
+        const uint32_t value = (uint32_t)whole;
+        memcpy(field, &value, sizeof value);
+    }
+    return true;
+}
+
+static const struct key *find_key(const char *name)
+{
+    for (size_t i = 0; i < KEYS; i++) {
+        if (strcmp(keys[i].name, name) == 0) {
+            return &keys[i];
+        }
+    }
+    return NULL;
+}
+
+/* One KEY=VALUE; cuts `item` in two. */
+static enum node_options_result set_item(struct node_options_axis *axis, char *item, bool *seen,
+                                         struct reason reason)
+{
+    char *value = strchr(item, '=');
+    if (value == NULL) {
+        return wrong(reason, "--axis takes KEY=VALUE,..., not", item);
+    }
+    *value++ = '\0';
+    const struct key *key = find_key(item);
+    if (key == NULL) {
+        return wrong(reason, "--axis has no key", item);
+    }
+    if (seen[key - keys]) {
+        return wrong(reason, "--axis gives twice the key", item);
+    }
+    seen[key - keys] = true;
+    if (!store(axis, key, value)) {
+        value[-1] = '=';
+        return wrong(reason, "--axis has a value that is no number or out of range:", item);
+    }
+    return NODE_OPTIONS_OK;
+}
+
+/* Equipment that is not given is what belongs to the motor. */
+static void equip(struct node_options_axis *axis, const bool *seen)
+{
+    struct node_options_axis whole = *axis;
+    equipment_init(&whole.equipment, &axis->config);
+    whole.equipment.serial = axis->node;
+    for (size_t i = 0; i < KEYS; i++) {
+        const size_t size = keys[i].kind == KEY_NUMBER ? sizeof(double) : sizeof(uint32_t);
+        if (seen[i] && keys[i].offset >= AT(equipment)) {
+            memcpy((unsigned char *)&whole + keys[i].offset,
+                   (const unsigned char *)axis + keys[i].offset, size);
+        }
+    }
+    *axis = whole;
+}
+
+static enum node_options_result check_axis(const struct node_options *options, const bool *seen,
+                                           struct reason reason)
+{
+    const struct node_options_axis *axis = &options->axes[options->axis_count];
+    for (size_t i = 0; i < KEYS; i++) {
+        if (keys[i].required && !seen[i]) {
+            return wrong(reason, "--axis lacks the key", keys[i].name);
+        }
+    }
+    if (axis->node < 2) {
+        return wrong(reason, "--axis needs a node from 2 to 127, not", axis->node == 1 ? "1" : "0");
+    }
+    for (size_t i = 0; i < options->axis_count; i++) {
+        if (options->axes[i].node == axis->node) {
+            return wrong(reason, "--axis: two drives have the same", "node");
+        }
+    }
+    return NODE_OPTIONS_OK;
+}
+
+/* Takes KEY=VALUE,... as another drive; cuts `spec` to pieces. */
+static enum node_options_result add_axis(struct node_options *options, char *spec,
+                                         struct reason reason)
+{
+    bool seen[KEYS] = {false};
+    if (options->axis_count == NODE_OPTIONS_AXES) {
+        return wrong(reason, "too many --axis: at most", "6");
+    }
+    struct node_options_axis *axis = &options->axes[options->axis_count];
+    memset(axis, 0, sizeof *axis);
+    axis->config.encoder_counts_per_rev = 1048576;
+    axis->config.loop_rate_hz = 16000;
+    axis->config.counts_per_mm = 1000000;
+    axis->config.period_us = 1000;
+    for (char *item = spec; item != NULL;) {
+        char *next = strchr(item, ',');
+        if (next != NULL) {
+            *next++ = '\0';
+        }
+        if (set_item(axis, item, seen, reason) != NODE_OPTIONS_OK) {
+            return NODE_OPTIONS_WRONG;
+        }
+        item = next;
+    }
+    equip(axis, seen);
+    if (check_axis(options, seen, reason) != NODE_OPTIONS_OK) {
+        return NODE_OPTIONS_WRONG;
+    }
+    options->axis_count++;
+    return NODE_OPTIONS_OK;
+}
+
+static enum node_options_result check(const struct node_options *options, struct reason reason)
+{
+    if (options->bus == NULL) {
+        return wrong(reason, "the option is missing:", "--bus");
+    }
+    if (options->axis_count == 0) {
+        return wrong(reason, "the option is missing:", "--axis");
     }
     return NODE_OPTIONS_OK;
 }
@@ -64,24 +251,39 @@ static enum node_options_result set_option(struct node_options *options, const c
 enum node_options_result node_options_parse(struct node_options *options, int argc, char **argv,
                                             char *reason_text, size_t size)
 {
-    const struct node_options_reason reason = {reason_text, size};
+    static const struct option known[] = {{"help", no_argument, NULL, 'h'},
+                                          {"bus", required_argument, NULL, 'b'},
+                                          {"faults", required_argument, NULL, 'f'},
+                                          {"axis", required_argument, NULL, 'a'},
+                                          {NULL, 0, NULL, 0}};
+    const struct reason reason = {reason_text, size};
     options->bus = NULL;
     options->faults = NULL;
     options->axis_count = 0;
-    for (int i = 1; i < argc; i += 2) {
-        if (strcmp(argv[i], "--help") == 0) {
+    optind = 0; /* from the start, in a second call too */
+    for (;;) {
+        const int at = optind > 0 ? optind : 1;
+        switch (getopt_long(argc, argv, "+:", known, NULL)) {
+        case -1:
+            return optind < argc ? wrong(reason, "unknown option", argv[optind])
+                                 : check(options, reason);
+        case 'h':
             return NODE_OPTIONS_HELP;
+        case 'b':
+            options->bus = optarg;
+            break;
+        case 'f':
+            options->faults = optarg;
+            break;
+        case 'a':
+            if (add_axis(options, optarg, reason) != NODE_OPTIONS_OK) {
+                return NODE_OPTIONS_WRONG;
+            }
+            break;
+        case ':':
+            return wrong(reason, "a value must follow the option", argv[at]);
+        default:
+            return wrong(reason, "unknown option", argv[at]);
         }
-        char *value = i + 1 < argc ? argv[i + 1] : NULL;
-        if (set_option(options, argv[i], value, reason) != NODE_OPTIONS_OK) {
-            return NODE_OPTIONS_WRONG;
-        }
     }
-    if (options->bus == NULL) {
-        return node_options_wrong(reason, "the option is missing:", "--bus");
-    }
-    if (options->axis_count == 0) {
-        return node_options_wrong(reason, "the option is missing:", "--axis");
-    }
-    return NODE_OPTIONS_OK;
 }

@@ -6,18 +6,26 @@
 
 #include "core/path_brake.h"
 
-#define MOST_INSTANTS 129    /* of a piece; */
-#define INSTANT_S     0.004  /* between two of them at most, where these are enough, */
-#define CLOSE_S       0.0005 /* and in the last look at what was found */
-#define STEP_S        0.002  /* between two looks at a brake, */
-#define FINE_S        0.0005 /* and in the last look */
-#define GREATEST_CODE 255
-#define BESIDE        1e-6
-#define LEAST_MM_S    1e-4 /* slower is rest */
-#define NEVER_S       1e6
-#define LONGEST_SHARE 0.1
-#define TICKS_MORE    3.0 /* of a brake than of its continuous curve */
-#define FEWER 56 /* codes below the greatest: a brake with less than a 128th of a limit is none */
+#define EVEN_INSTANTS  129    /* of a piece, one as long after the other, */
+#define MOST_INSTANTS  1025   /* and with those at places of the path between them; */
+#define ROWS_EACH      4      /* of the path, for such an instant */
+#define INSTANT_S      0.004  /* between two of them at most, where these are enough, */
+#define CLOSE_S        0.0005 /* and in the last look at what was found */
+#define STEP_S         0.002  /* between two looks at a brake, */
+#define FINE_S         0.0005 /* and in the last look */
+#define BRAKE_EACH     5      /* ticks of a brake out of which another may begin, */
+#define BRAKE_INSTANTS 16u    /* and instants at which it has begun, about */
+#define GREATEST_CODE  255
+#define BESIDE         1e-6
+#define LEAST_MM_S     1e-4 /* slower is rest */
+#define NEVER_S        1e6
+#define LONGEST_SHARE  0.1
+#define TICKS_MORE     3.0 /* of a brake than of its continuous curve */
+#define FEWER 24 /* codes below the greatest: a brake with less than an eighth of a limit is none */
+#define LEAST_TICKS                                                                                \
+    6.0 /* of a brake that the jerks alone make: with more jerk the way of one tick would count */
+#define FAR_TICKS                                                                                  \
+    20.0 /* and twice the brake: so far from its end a program has room for a brake, */
 #define NO_BRAKE_S 10.0
 #define FASTER                                                                                     \
     0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
@@ -39,9 +47,12 @@ struct state {
 /* One piece with the instants looked at. */
 struct piece {
     struct state at[MOST_INSTANTS];
+    double at_s[MOST_INSTANTS];  /* since the start of the piece */
     uint32_t row[MOST_INSTANTS]; /* of the path, before it */
     uint32_t count;
-    double step_s;
+    double seconds;
+    int most[3];          /* greatest codes */
+    int before[3];        /* those of a brake out of which one may begin; 0: none */
     double left_s;        /* of the program, behind the piece */
     struct state fastest; /* of all rates: greatest speed and acceleration */
     double factor;        /* greatest rate of program time; */
@@ -63,6 +74,15 @@ struct search {
     double deceleration; /* greatest */
     int most[3];         /* greatest codes */
 };
+
+/* --- Codes --- */
+
+/* The number of a code: jerk, deceleration, jerk for k = 0 ... 2; mm, s. */
+static double number_of(int k, int code)
+{
+    const double mantissa = floor(65536.0 * pow(2.0, (code & 7) / 8.0));
+    return ldexp(mantissa, (code >> 3) - (k == 1 ? 24 : 18));
+}
 
 /* --- The path --- */
 
@@ -343,19 +363,85 @@ static double piece_powers(const struct program_piece *from, double c[8])
     return seconds;
 }
 
+/* Adds an instant, u = 0 ... 1 over the piece, in ascending order; 0: there are too many. */
+static int add_instant(const struct search *search, const double c[8], double u,
+                       struct piece *piece)
+{
+    if (piece->count >= MOST_INSTANTS) {
+        return 0;
+    }
+    struct state *at = &piece->at[piece->count];
+    at->s = piece_value(c, u, 0);
+    at->v = greater(piece_value(c, u, 1) / piece->seconds, 0.0);
+    at->a = piece_value(c, u, 2) / (piece->seconds * piece->seconds);
+    piece->at_s[piece->count] = u * piece->seconds;
+    piece->row[piece->count] = row_at(search, at->s);
+    piece->fastest.v = greater(piece->fastest.v, at->v);
+    piece->fastest.a = greater(piece->fastest.a, at->a);
+    piece->count++;
+    return 1;
+}
+
+/* Adds those of a stretch, from the last one to u = high, at which every `each`-th row of the path is passed, no closer
+ * to each other than step_s: a bend may be narrower than the even instants are apart. */
+static int add_rows(const struct search *search, const double c[8], double high, uint32_t each,
+                    double step_s, struct piece *piece)
+{
+    const double low = piece->at_s[piece->count - 1u] / piece->seconds;
+    const double from = piece->at[piece->count - 1u].s;
+    const double way = piece_value(c, high, 0) - from;
+    uint32_t row = piece->row[piece->count - 1u] + 1u;
+    for (; row < search->row_count && search->rows[row].s_mm < from + way; row += each) {
+        const double u = low + (high - low) * greater(search->rows[row].s_mm - from, 0.0) / way;
+        const double last_s = piece->at_s[piece->count - 1u];
+        if (u * piece->seconds >= last_s + step_s &&
+            high * piece->seconds >= last_s + 2.0 * step_s && !add_instant(search, c, u, piece)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* 0: too many. */
+static int add_instants(const struct search *search, const double c[8], uint32_t each,
+                        double step_s, struct piece *piece)
+{
+    const double parts = fmin(greater(ceil(piece->seconds / step_s), 2.0), EVEN_INSTANTS - 1);
+    int fits = 1;
+    piece->count = 0;
+    piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
+    for (int k = 0; k <= (int)parts && fits; k++) {
+        if (k > 0 && piece->seconds > 2.0 * parts * step_s) {
+            fits = add_rows(search, c, k / parts, each, step_s, piece);
+        }
+        fits = fits && add_instant(search, c, k / parts, piece);
+    }
+    return fits;
+}
+
+/* The greatest codes for the speeds of a piece. */
+static void piece_most(const struct search *search, struct piece *piece)
+{
+    const double half_s = 0.5 * LEAST_TICKS * search->period_s;
+    const double acceleration = 4.0 * greater(piece->fastest.v, LEAST_MM_S) / half_s;
+    for (int k = 0; k < 3; k++) {
+        const double most = k == 1 ? acceleration : acceleration / (4.0 * half_s);
+        piece->most[k] = search->most[k];
+        while (piece->most[k] > 1 && number_of(k, piece->most[k]) > most) {
+            piece->most[k]--;
+        }
+    }
+}
+
 static void piece_look(const struct search *search, const struct program *p, uint32_t i,
                        double left_s, double step_s, struct piece *piece)
 {
     struct program_piece from;
     double c[8];
     program_piece_get(p, i, &from);
-    double seconds = piece_powers(&from, c);
-    double parts = fmin(greater(ceil(seconds / step_s), 2.0), MOST_INSTANTS - 1);
-    piece->count = (uint32_t)parts + 1u;
-    piece->step_s = seconds / parts;
+    piece->seconds = piece_powers(&from, c);
     piece->suspect = 0;
     piece->left_s = left_s;
-    piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
         piece->level[k] =
@@ -363,16 +449,11 @@ static void piece_look(const struct search *search, const struct program *p, uin
         piece->slope[k] = ldexp((double)program_number(from.override.rate[k]), -32);
         piece->second[k] = ldexp((double)program_number(from.override.second[k]), -24);
     }
-    for (uint32_t k = 0; k < piece->count; k++) {
-        double u = (double)k / parts;
-        struct state *at = &piece->at[k];
-        at->s = piece_value(c, u, 0);
-        at->v = greater(piece_value(c, u, 1) / seconds, 0.0);
-        at->a = piece_value(c, u, 2) / (seconds * seconds);
-        piece->row[k] = row_at(search, at->s);
-        piece->fastest.v = greater(piece->fastest.v, at->v);
-        piece->fastest.a = greater(piece->fastest.a, at->a);
+    uint32_t each = ROWS_EACH;
+    while (!add_instants(search, c, each, step_s, piece)) {
+        each *= 2u;
     }
+    piece_most(search, piece);
     double little = search->rise_is_cut ? 0.25 * search->deceleration : HUGE_VAL;
     double most = 0.0;
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
@@ -400,15 +481,16 @@ static double slope_at(const struct piece *piece, double rate, int sign)
 
 /* --- The search --- */
 
-static void numbers_of(const struct search *search, const int codes[3],
-                       struct path_brake_numbers *numbers)
+/* 0: the controller takes no such numbers. */
+static int numbers_of(const struct search *search, const int codes[3],
+                      struct path_brake_numbers *numbers)
 {
     const struct program_stop stop = {
         .jerk_down = (uint8_t)codes[0],
         .deceleration = (uint8_t)codes[1],
         .jerk_up = (uint8_t)codes[2],
     };
-    (void)path_brake_numbers_of(numbers, &stop, search->period_us);
+    return path_brake_numbers_of(numbers, &stop, search->period_us);
 }
 
 /* Times to rest from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
@@ -419,9 +501,28 @@ struct times {
     int brakes[MOST_INSTANTS]; /* 0: the plan goes on */
 };
 
-/* after_s: the time to rest from the end of the piece. */
-static void times_of(const struct search *search, const struct piece *piece,
-                     const struct path_brake_numbers *numbers, double after_s, struct times *times)
+/* Half the time from the instant before to the one behind. */
+static double weight_s(const struct piece *piece, uint32_t i)
+{
+    const uint32_t last = piece->count - 1u;
+    return 0.5 * (piece->at_s[i < last ? i + 1u : last] - piece->at_s[i > 0u ? i - 1u : 0u]);
+}
+
+/* Whether the controller would find room for the brake. */
+static int has_room(const struct search *search, const struct state *at,
+                    const struct path_brake_numbers *numbers)
+{
+    const struct path_state state = {
+        .speed_q56 = (int64_t)ldexp(at->v * search->period_s, 56),
+        .acceleration_q56 = (int64_t)ldexp(at->a * search->period_s * search->period_s, 56),
+    };
+    return path_brake_fits(&state, numbers, (int64_t)ldexp(search->length_mm - at->s, 40));
+}
+
+/* after_s: the time to rest from the end of the piece. Returns 0 where the controller would not begin a brake although the
+ * program still has far to go. */
+static int times_of(const struct search *search, const struct piece *piece,
+                    const struct path_brake_numbers *numbers, double after_s, struct times *times)
 {
     struct path_brake brake;
     double sum = 0.0;
@@ -429,22 +530,28 @@ static void times_of(const struct search *search, const struct piece *piece,
     times->worst_s = 0.0;
     for (uint32_t i = piece->count; i > 0; i--) {
         const struct state *at = &piece->at[i - 1u];
-        double wait = times->first_s + (i == piece->count ? 0.0 : piece->step_s);
-        double left = piece->left_s + piece->step_s * (piece->count - i);
+        double next_s = i == piece->count ? piece->seconds : piece->at_s[i];
+        double wait = times->first_s + (next_s - piece->at_s[i - 1u]);
+        double left = piece->left_s + (piece->seconds - piece->at_s[i - 1u]);
         /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not counted,
          * or the worst numbers would be the best. */
         int begins = brake_begin(&brake, at, numbers, search->period_s);
         double total_s = begins ? brake_time(at, numbers, search->period_s) : NEVER_S;
+        if (begins && at->v * piece->factor > 0.5 * piece->fastest.v &&
+            left > 2.0 * total_s + FAR_TICKS * search->period_s && !has_room(search, at, numbers)) {
+            return 0;
+        }
         times->brakes[i - 1u] = total_s < left;
         times->first_s = total_s < left ? total_s : begins ? left : wait;
         times->worst_s = greater(times->worst_s, times->first_s);
-        sum += times->first_s;
+        sum += times->first_s * weight_s(piece, i - 1u);
     }
-    times->mean_s = sum / piece->count;
+    times->mean_s = sum / piece->seconds;
     times->longest_s = brake_begin(&brake, &piece->fastest, numbers, search->period_s)
                            ? brake_time(&piece->fastest, numbers, search->period_s)
                            : NO_BRAKE_S;
     times->cost_s = times->mean_s + LONGEST_SHARE * times->longest_s;
+    return 1;
 }
 
 /* Whether these brakes keep the limits; the instant that broke one last is looked at first. */
@@ -493,7 +600,9 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
                                    0.5,         0.25,        0.1};
     const size_t count = sizeof rates / sizeof rates[0];
     struct path_brake_numbers numbers;
-    numbers_of(search, codes, &numbers);
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
     double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers.deceleration_q56, -56) /
                                               (search->period_s * search->period_s)
                                         : HUGE_VAL;
@@ -527,7 +636,9 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
 static int close_keep(const struct search *search, const struct piece *close, const int codes[3])
 {
     struct path_brake_numbers numbers;
-    numbers_of(search, codes, &numbers);
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
     for (uint32_t i = 0; i < close->count; i++) {
         if (!state_keeps(search, &search->inverse, &close->at[i], close->row[i], &numbers)) {
             return 0;
@@ -536,10 +647,51 @@ static int close_keep(const struct search *search, const struct piece *close, co
     return 1;
 }
 
-static int within(const struct search *search, const int codes[3])
+/* Whether a brake out of one that has begun with the numbers `before` keeps the limits. */
+static int out_of_brake_keeps(const struct search *search, const struct piece *piece, uint32_t i,
+                              const struct path_brake_numbers *before,
+                              const struct path_brake_numbers *numbers)
+{
+    struct path_brake first;
+    struct path_brake second;
+    if (!brake_begin(&first, &piece->at[i], before, search->period_s)) {
+        return 1;
+    }
+    path_brake_first(&first);
+    for (uint32_t k = 1; !path_brake_rests(&first); k++) {
+        if (k % BRAKE_EACH == 0u && path_brake_begin(&second, &first.at, numbers) &&
+            !brake_keeps(search, &search->at_any_rate, &second, piece->at[i].s, piece->row[i],
+                         FINE_S)) {
+            return 0;
+        }
+        path_brake_step(&first);
+    }
+    return 1;
+}
+
+static int brakes_keep(const struct search *search, const struct piece *piece, const int codes[3])
+{
+    struct path_brake_numbers numbers;
+    struct path_brake_numbers before;
+    if (piece->before[1] == 0 || !numbers_of(search, piece->before, &before)) {
+        return 1;
+    }
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
+    const uint32_t each = 1u + piece->count / BRAKE_INSTANTS;
+    for (uint32_t i = 0; i < piece->count; i += each) {
+        if (!out_of_brake_keeps(search, piece, i, &before, &numbers)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int within(const struct piece *piece, const int codes[3])
 {
     for (int k = 0; k < 3; k++) {
-        if (codes[k] < 1 || codes[k] < search->most[k] - FEWER || codes[k] > search->most[k]) {
+        if (codes[k] < 1 || codes[k] < piece->most[k] - FEWER || codes[k] > piece->most[k]) {
             return 0;
         }
     }
@@ -553,7 +705,8 @@ struct choice {
 
 static int strictly(const struct search *search, const struct piece *piece, const int codes[3])
 {
-    return close_keep(search, piece->close, codes) && rates_keep(search, piece, codes);
+    return close_keep(search, piece->close, codes) && rates_keep(search, piece, codes) &&
+           brakes_keep(search, piece, codes);
 }
 
 /* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
@@ -562,13 +715,11 @@ static int better(const struct search *search, struct piece *piece, const int co
 {
     struct path_brake_numbers numbers;
     struct times times;
-    if (!within(search, codes)) {
+    if (!within(piece, codes) || !numbers_of(search, codes, &numbers)) {
         return 0;
     }
-    numbers_of(search, codes, &numbers);
-    times_of(search, piece, &numbers, after_s, &times);
-    if (times.cost_s >= best->cost_s || !all_keep(search, piece, &times, &numbers) ||
-        (strict && !strictly(search, piece, codes))) {
+    if (!times_of(search, piece, &numbers, after_s, &times) || times.cost_s >= best->cost_s ||
+        !all_keep(search, piece, &times, &numbers) || (strict && !strictly(search, piece, codes))) {
         return 0;
     }
     memcpy(best->codes, codes, sizeof best->codes);
@@ -593,9 +744,9 @@ static void climb(const struct search *search, struct piece *piece, double after
             while (taken) {
                 for (int k = 0; k < 3; k++) {
                     codes[k] = best->codes[k] + step * ways[i][k];
-                    codes[k] = codes[k] > search->most[k] && ways[i][k] > 0 &&
-                                       best->codes[k] < search->most[k]
-                                   ? search->most[k]
+                    codes[k] = codes[k] > piece->most[k] && ways[i][k] > 0 &&
+                                       best->codes[k] < piece->most[k]
+                                   ? piece->most[k]
                                    : codes[k];
                 }
                 taken = better(search, piece, codes, after_s, strict, best);
@@ -614,7 +765,7 @@ static int lowered(const struct search *search, struct piece *piece, const int s
             codes[k] = start[k] - down;
         }
         best->cost_s = NEVER_S;
-        if (!within(search, codes)) {
+        if (!within(piece, codes)) {
             return 0;
         }
         if (better(search, piece, codes, after_s, 1, best)) {
@@ -625,14 +776,14 @@ static int lowered(const struct search *search, struct piece *piece, const int s
 }
 
 /* Starting points all over the codes. */
-static void scan(const struct search *search, struct piece *piece, double after_s,
+static void scan(const struct search *search, struct piece *piece, double after_s, int strict,
                  struct choice *best)
 {
-    for (int a = 0; a <= 48; a += 6) {
-        for (int j1 = 0; j1 <= 32; j1 += 8) {
-            for (int j2 = 0; j2 <= 32; j2 += 8) {
-                int codes[3] = {search->most[0] - j1, search->most[1] - a, search->most[2] - j2};
-                (void)better(search, piece, codes, after_s, 0, best);
+    for (int a = 0; a <= FEWER; a += 6) {
+        for (int j1 = 0; j1 <= FEWER; j1 += 6) {
+            for (int j2 = 0; j2 <= FEWER; j2 += 6) {
+                int codes[3] = {piece->most[0] - j1, piece->most[1] - a, piece->most[2] - j2};
+                (void)better(search, piece, codes, after_s, strict, best);
             }
         }
     }
@@ -643,9 +794,10 @@ static double least_time(const struct search *search, const struct piece *piece,
 {
     struct path_brake_numbers numbers;
     struct times times;
-    numbers_of(search, search->most, &numbers);
-    times_of(search, piece, &numbers, after_s, &times);
-    return times.cost_s;
+    return numbers_of(search, piece->most, &numbers) &&
+                   times_of(search, piece, &numbers, after_s, &times)
+               ? times.cost_s
+               : 0.0;
 }
 
 static void search_piece(const struct search *search, struct piece *piece, const int warm[3],
@@ -653,26 +805,35 @@ static void search_piece(const struct search *search, struct piece *piece, const
 {
     const struct choice none = {{0, 0, 0}, NEVER_S, NEVER_S, NEVER_S, NEVER_S, NEVER_S};
     struct choice rough = none;
-    (void)better(search, piece, search->most, after_s, 0, &rough);
-    (void)better(search, piece, warm, after_s, 0, &rough);
+    (void)better(search, piece, piece->most, after_s, 0, &rough);
+    int near[3];
+    for (int k = 0; k < 3; k++) {
+        near[k] = warm[k] < piece->most[k] ? warm[k] : piece->most[k];
+    }
+    (void)better(search, piece, near, after_s, 0, &rough);
     if (rough.cost_s < NEVER_S) {
         climb(search, piece, after_s, 0, 4, &rough);
     }
     if (rough.cost_s > NEAR * least_time(search, piece, after_s)) {
-        scan(search, piece, after_s, &rough);
+        scan(search, piece, after_s, 0, &rough);
     }
     *best = none;
-    if (rough.cost_s >= NEVER_S && !lowered(search, piece, search->most, after_s, &rough)) {
-        return;
+    if (rough.cost_s < NEVER_S || lowered(search, piece, piece->most, after_s, &rough)) {
+        climb(search, piece, after_s, 0, 8, &rough);
+        if (strictly(search, piece, rough.codes)) {
+            *best = rough;
+            return;
+        }
+        if (!lowered(search, piece, rough.codes, after_s, best) &&
+            !lowered(search, piece, piece->most, after_s, best)) {
+            *best = none;
+        }
     }
-    climb(search, piece, after_s, 0, 8, &rough);
-    if (strictly(search, piece, rough.codes)) {
-        *best = rough;
-    } else if (lowered(search, piece, rough.codes, after_s, best) ||
-               lowered(search, piece, search->most, after_s, best)) {
+    if (best->cost_s >= NEVER_S) {
+        scan(search, piece, after_s, 1, best);
+    }
+    if (best->cost_s < NEVER_S) {
         climb(search, piece, after_s, 1, 4, best);
-    } else {
-        *best = none;
     }
 }
 
@@ -709,12 +870,11 @@ static void begin(struct search *search, const struct program *p, const struct s
         search->at_any_rate.reach[k] *= limits->reach_at_pace != 0u ? 0.0 : 1.0;
     }
     for (int k = 0; k < 3; k++) {
-        double limit = k == 1 ? limits->acceleration : limits->jerk;
+        const double *axis = k == 1 ? limits->axis_acceleration : limits->axis_jerk;
+        double limit = fmin(k == 1 ? limits->acceleration : limits->jerk, hypot(axis[0], axis[1]));
         search->most[k] = 0;
         for (int c = 1; c <= GREATEST_CODE; c++) {
-            double value = floor(65536.0 * pow(2.0, (c & 7) / 8.0)) *
-                           ldexp(1.0, (c >> 3) - (k == 1 ? 24 : 18));
-            search->most[k] = value <= limit ? c : search->most[k];
+            search->most[k] = number_of(k, c) <= limit ? c : search->most[k];
         }
     }
 }
@@ -722,10 +882,45 @@ static void begin(struct search *search, const struct program *p, const struct s
 /* A piece without a brake: the plan goes on into the next. */
 static void wait_for_next(const struct piece *piece, double after_s, struct choice *out)
 {
-    double seconds = piece->step_s * (piece->count - 1u);
+    double seconds = piece->seconds;
     memset(out, 0, sizeof *out);
     out->first_s = out->worst_s = after_s + seconds;
     out->mean_s = after_s + 0.5 * seconds;
+}
+
+/* Codes that are given. */
+static void known_choice(const struct search *search, const struct piece *piece,
+                         const struct stop_found *found, double after_s, struct choice *out)
+{
+    struct path_brake_numbers numbers;
+    struct times times;
+    wait_for_next(piece, after_s, out);
+    if (found->codes[1] == 0u) {
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        out->codes[k] = found->codes[k];
+    }
+    if (!numbers_of(search, out->codes, &numbers) ||
+        !times_of(search, piece, &numbers, after_s, &times)) {
+        return;
+    }
+    out->mean_s = times.mean_s;
+    out->worst_s = times.worst_s;
+    out->first_s = times.first_s;
+}
+
+/* The numbers of a piece, or none where waiting for the next is about as good. */
+static void choose(const struct search *search, struct piece *piece, const int warm[3],
+                   double after_s, struct choice *best)
+{
+    struct choice none;
+    search_piece(search, piece, warm, after_s, best);
+    wait_for_next(piece, after_s, &none);
+    if (none.mean_s < WAIT_BETTER * best->mean_s ||
+        (none.mean_s < WAIT_AS_GOOD * best->mean_s && best->longest_s > 2.0 * none.worst_s)) {
+        *best = none;
+    }
 }
 
 void stop_search(const struct program *p, const struct stop_limits *limits,
@@ -740,15 +935,16 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
     int warm[3] = {search.most[0], search.most[1], search.most[2]};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
-        struct choice none;
         piece_look(&search, p, i - 1u, left_s, INSTANT_S, &piece);
-        piece_look(&search, p, i - 1u, left_s, CLOSE_S, &close);
-        piece.close = &close;
-        search_piece(&search, &piece, warm, after_s, &best);
-        wait_for_next(&piece, after_s, &none);
-        if (none.mean_s < WAIT_BETTER * best.mean_s ||
-            (none.mean_s < WAIT_AS_GOOD * best.mean_s && best.longest_s > 2.0 * none.worst_s)) {
-            best = none;
+        if (found[i - 1u].known != 0u) {
+            known_choice(&search, &piece, &found[i - 1u], after_s, &best);
+        } else {
+            piece_look(&search, p, i - 1u, left_s, CLOSE_S, &close);
+            for (int k = 0; k < 3; k++) {
+                piece.before[k] = found[i - 1u].before[k];
+            }
+            piece.close = &close;
+            choose(&search, &piece, warm, after_s, &best);
         }
         for (int k = 0; k < 3; k++) {
             found[i - 1u].codes[k] = (uint8_t)best.codes[k];
@@ -757,7 +953,7 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
         found[i - 1u].worst_s = best.worst_s;
         found[i - 1u].mean_s = best.mean_s;
         after_s = best.first_s;
-        left_s += piece.step_s * (piece.count - 1u);
+        left_s += piece.seconds;
     }
 }
 

@@ -54,9 +54,11 @@ struct stop_limits {
 
 /* What was found for a piece. Codes of 0: no numbers keep the limits from all of its instants. */
 struct stop_found {
-    uint8_t codes[3]; /* jerk, deceleration, jerk */
-    double worst_s;   /* longest brake of the instants looked at at the rate 1, */
-    double mean_s;    /* and their mean */
+    uint8_t known;     /* set by the caller. 1: the codes are given, and stay; */
+    uint8_t before[3]; /* and codes of a brake out of which this one may begin, 0: none */
+    uint8_t codes[3];  /* jerk, deceleration, jerk */
+    double worst_s;    /* longest brake of the instants looked at at the rate 1, */
+    double mean_s;     /* and their mean */
 };
 
 /* Fills segment_count * STOP_ROWS rows; the program has passed program_open. */
@@ -67,7 +69,7 @@ void stop_rows(const struct program *p, const struct stop_limits *limits, struct
 void stop_used(const struct program *p, const struct stop_limits *limits,
                const struct stop_row *rows, struct stop_limits *used);
 
-/* Searches piece_count results. Linear; about 0.5 ms a piece. */
+/* Searches those of piece_count results that are not known. Linear; about 0.5 ms a piece. */
 void stop_search(const struct program *p, const struct stop_limits *limits,
                  const struct stop_row *rows, struct stop_found *found);
 

@@ -5,7 +5,7 @@
  *
  * prover: cbmc
  * options: --unwind 70
- * shows: qmath_clz64 qmath_div_u64
+ * shows: qmath_clz64 qmath_div_u64 qmath_div_up_u64
  * mutant: core/qmath.c: int shift = qmath_clz32(b); => int shift = 0;
  * mutant: core/qmath.h: return high != 0 ? => return high == 0 ?
  */
@@ -26,6 +26,7 @@ void harness(void)
     uint64_t b = nondet_uint64();
     __CPROVER_assume(b != 0);
     qmath_div_u64(nondet_uint64(), b);
+    qmath_div_up_u64(nondet_uint64(), b);
     int zeros = qmath_clz64(b);
     prove(zeros >= 0 && zeros <= 63 && b >> (63 - zeros) == 1u);
     reached();

@@ -56,8 +56,8 @@ static void first(void)
 {
     struct override_plan plan;
     struct way way = {0, 0, 0};
-    assume(IS_FACTOR(plan.everywhere.factor_q14));
-    plan.everywhere_q57 = (int64_t)plan.everywhere.factor_q14 << 43;
+    assume(IS_FACTOR(plan.guaranteed.factor_q14));
+    plan.guaranteed_q57 = (int64_t)plan.guaranteed.factor_q14 << 43;
     assume(plan.kind <= OVERRIDE_CLIMB && plan.window <= OVERRIDE_WINDOWS);
     come_to_rest(&plan);
     prove(is_sound(&plan, &way));

@@ -6,7 +6,7 @@
  *
  * prover: cbmc
  * options: --unwind 70 --unsigned-overflow-check
- * shows: qmath_root
+ * shows: qmath_root qmath_root_above
  * mutant: core/qmath.c: qmath_clz64(a) & ~1 => 0
  * mutant: core/qmath.c: bit = (uint32_t)1 << 30 => bit = (uint32_t)1 << 31
  * mutant: core/qmath.c: bit >>= 2 => bit >>= 3
@@ -30,6 +30,8 @@ void harness(void)
     __CPROVER_assume(word >= 1u << 30);
     uint32_t root = root_of_word(word, &rest);
     prove(root >= 1u << 15 && root < 1u << 16 && rest <= 2u * root);
+    uint32_t above = qmath_root_above(word);
+    prove(above >= 1u << 15 && above <= 65602u);
     uint64_t a = nondet_uint64();
     uint64_t of_a = qmath_root(a);
     prove(of_a < (uint64_t)1 << 32);

@@ -11,7 +11,7 @@
  * mutant: core/override_ramp.c: ticks->rise, ticks->half) << 1 => ticks->rise, ticks->half)
  */
 #include "proof.h"
-#include "override_contracts.h"
+#include "ramp_contracts.h"
 
 uint64_t some_product(uint32_t a, uint32_t b)
 {

@@ -4,7 +4,7 @@
  * nowhere. Its search through the halves: docs/theory/numerics.md section 15.2.
  *
  * prover: eva
- * shows: bernstein_within
+ * shows: bernstein_within bernstein_halve
  * mutant: core/bernstein.c: return (a >> 1) + (b >> 1) + (a & b & 1); => return (a + b) >> 1;
  * mutant: core/bernstein.c: right[degree - step] => right[degree + step]
  */
@@ -21,7 +21,7 @@ int main(void)
     for (int k = 0; k <= degree; k++) {
         b[k] = any_between(INT64_MIN, INT64_MAX);
     }
-    halve(b, right, degree);
+    bernstein_halve(b, right, degree);
     all_within(b, degree, right[0], right[degree]);
     reached();
     return 0;

@@ -6,11 +6,13 @@
  * prover: eva
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * options: -eva-slevel 40
- * assumes: qmath_clz64 qmath_shift_clamp bernstein_within
- * shows: feed_bounds_start feed_bounds_end feed_bounds_contained feed_bounds_within
+ * assumes: qmath_clz64 qmath_shift_clamp qmath_div_u64 bernstein_within
+ * shows: feed_bounds_start feed_bounds_end feed_bounds_contained feed_bounds_within feed_bounds_parts
  * mutant: core/feed_bounds.c: a[k] >>= 4; => a[k] >>= 2;
  * mutant: core/feed_bounds.c: int shift = 32 - => int shift = 31 -
  * mutant: core/bernstein.c: k <= degree; k++ => k <= 8; k++
+ * mutant: core/feed_bounds.c: apart > 0; apart /= 2 => apart > 0; apart -= 3
+ * mutant: core/feed_bounds.c: qmath_lesser(above + 1, FEED_NO_BOUND_Q24) => above + 1
  */
 #include "piece_bounds.h"
 #include "proof.h"
@@ -39,6 +41,18 @@ static void state(const struct feed_state *s)
     prove(s->acceleration_q16_mm_s2 < POWER(62) && s->acceleration_q16_mm_s2 > -POWER(62));
 }
 
+/* Bounds of all eighths, held as the header says. */
+static void parts(const struct program_piece *c, enum feed_derivative derivative)
+{
+    int64_t low[FEED_PARTS];
+    int64_t high[FEED_PARTS];
+    feed_bounds_parts(c, derivative, low, high);
+    for (int i = 0; i < FEED_PARTS; i++) {
+        prove(low[i] >= -FEED_NO_BOUND_Q24 && low[i] < POWER(62));
+        prove(high[i] >= -FEED_NO_BOUND_Q24 && high[i] <= FEED_NO_BOUND_Q24);
+    }
+}
+
 int main(void)
 {
     struct program_piece c;
@@ -58,6 +72,9 @@ int main(void)
     feed_bounds_within(&c, FEED_VELOCITY, low, high);
     feed_bounds_within(&c, FEED_ACCELERATION, low, high);
     feed_bounds_within(&c, FEED_JERK, low, high);
+    parts(&c, FEED_VELOCITY);
+    parts(&c, FEED_ACCELERATION);
+    parts(&c, FEED_JERK);
     reached();
     return 0;
 }

@@ -9,14 +9,14 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/program_clock.c: find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)find_piece;
  * assumes: qmath_div_u64 program_piece_duration override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
- * shows: override_window_get
+ * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
  * mutant: core/override_plan.c: behind < left ? behind : left => behind
  * mutant: core/override_plan.c: last + 1u - clock->piece => last - clock->piece
  * mutant: core/override_plan.c: percent < OVERRIDE_PERCENT ? percent => percent < 2 * OVERRIDE_PERCENT ? percent
  * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
 #include "core/override_plan.h"
-#include "override_contracts.h"
+#include "ramp_contracts.h"
 #include "proof.h"
 #include "qmath_contracts.h"
 
@@ -27,7 +27,7 @@ uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
 /*@ predicate is_plan(struct override_plan *plan) =
       IS_OVERRIDE(plan->now.override_q57) && -OVERRIDE_MOST <= plan->now.slope_q56 <= OVERRIDE_MOST &&
-      IS_OVERRIDE(plan->commanded_q57) && OVERRIDE_ONE <= plan->everywhere_q57 <= OVERRIDE_MOST; */
+      IS_OVERRIDE(plan->commanded_q57) && OVERRIDE_ONE <= plan->guaranteed_q57 <= OVERRIDE_MOST; */
 
 /*@ assigns plan->now, plan->ramp, plan->steady, plan->saturated, plan->task, plan->searched, plan->wanted_q57,
             plan->return_q32_s \from \nothing;
@@ -129,6 +129,9 @@ static void tick(const struct program *p)
         plan.steady = (uint32_t)any_between(0, 1);
         plan.started = (uint32_t)any_between(0, 1);
         override_plan_tick(&plan, &clock);
+        program_clock_set(&clock, (uint64_t)any_between(0, INT64_MAX), i, clock.record,
+                          (uint64_t)any_between(0, POWER(54)));
+        override_plan_rest(&plan);
     }
 }
 

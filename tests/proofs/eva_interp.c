@@ -6,12 +6,13 @@
  * prover: eva
  * options: -eva-slevel 60
  * instead: core/interp.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
- * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override ph_segment_expand ph_segment_end
- * shows: interp_at_q42 interp_seek prepared_make
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override program_piece_start ph_segment_expand ph_segment_end
+ * shows: interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step interp_seek prepared_make
  * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
  * mutant: core/interp.c: while (i > 0 && => while (
  * mutant: core/interp.c: while (i + 1u < it->program->header.piece_count && => while (i < it->program->header.piece_count &&
  * mutant: core/interp.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
+ * mutant: core/interp.c: if (next < p->header.piece_count && => if (next <= p->header.piece_count &&
  * mutant: core/prepared.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
  * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
  * mutant: core/override_ramp.c: first + least(count, left) => first + count
@@ -19,7 +20,7 @@
 #include "core/ph_segment.h"
 #include "core/program.h"
 #include "proof.h"
-#include "override_contracts.h"
+#include "ramp_contracts.h"
 #include "segment_bounds.h"
 
 /*@ requires i < p->header.segment_count;
@@ -42,6 +43,11 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
     assigns \result \from i;
     ensures 0 < \result <= (1 << 54); */
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
+
+/*@ requires i < p->header.piece_count;
+    assigns \result \from i;
+    ensures 0 <= \result < (1 << 62); */
+int64_t program_piece_start(const struct program *p, uint32_t i);
 
 /*@ requires \initialized(segment) && is_bounded(segment);
     assigns *ph \from \nothing;
@@ -83,6 +89,14 @@ static void piece_at(const void *piece, uint64_t t_q42_s, struct feed_point *out
     out->feed_q32_mm_s = any_between(-POWER(62), POWER(62));
 }
 
+static int64_t piece_acceleration(const void *piece, uint64_t t_q42_s)
+{
+    const struct feed_piece *f = piece;
+    (void)t_q42_s;
+    prove(f->start_q40_mm >= 0);
+    return any_between(INT64_MIN, INT64_MAX);
+}
+
 static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
 {
     const struct kernel_fixed_segment *k = segment;
@@ -96,6 +110,7 @@ static const struct kernel any_kernel = {
     .piece_set = piece_set,
     .segment_set = segment_set,
     .piece_at = piece_at,
+    .piece_acceleration = piece_acceleration,
     .segment_at = segment_at,
 };
 
@@ -141,6 +156,28 @@ static void stays(const struct interp *it)
     }
 }
 
+/* By arc length; and the time of one: a step from a piece, and one between any two times. */
+static void along_path(struct interp *it, uint32_t i)
+{
+    struct interp_point point;
+    struct interp_search search;
+    place(it, i);
+    interp_at_arc_length(it, any_between(INT64_MIN, INT64_MAX), &point);
+    stays(it);
+    place(it, i);
+    interp_acceleration_q40(it, it->piece, any_time());
+    interp_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
+    interp_search_step(it, &search);
+    prove(search.piece_index < COUNT);
+    stays(it);
+    place(it, i);
+    interp_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
+    search.bisecting = 1;
+    search.low_q42_s = any_time();
+    search.high_q42_s = any_time();
+    interp_search_step(it, &search);
+}
+
 static void interpolate(const struct program *p)
 {
     struct interp it;
@@ -160,6 +197,7 @@ static void interpolate(const struct program *p)
         place(&it, i);
         interp_seek(&it, any_time());
         stays(&it);
+        along_path(&it, i);
     }
     place(&it, 0);
     interp_at(&it, any_time(), &point);

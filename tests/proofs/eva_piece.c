@@ -6,7 +6,7 @@
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000
  * assumes: qmath_div_u64 feed_bounds_start feed_bounds_end feed_bounds_contained feed_bounds_within
- * shows: piece_check_all program_piece_get program_piece_duration program_piece_override
+ * shows: piece_check_all program_piece_get program_piece_duration program_piece_start program_piece_override
  * mutant: core/piece_check.c: COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 54) => COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 57)
  * mutant: core/piece_check.c: ((int64_t)1 << 50) => ((int64_t)1 << 61)
  */

@@ -14,7 +14,7 @@
  */
 #include "proof.h"
 #include "qmath_contracts.h"
-#include "override_contracts.h"
+#include "ramp_contracts.h"
 
 #include "core/override_ramp.c"
 

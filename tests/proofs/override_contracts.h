@@ -1,60 +1,141 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the parts of the feed override promise each other: docs/theory/numerics.md sections 12, "Feed override", and 15.4. Each contract stands
- * here once, for the proof that shows it and for those that take it for granted (section 15.5).
+ * What a tick of the feed override takes for granted of the program clock, the plan of the override, the brake and the interpolator; for eva_override.c
+ * (docs/theory/numerics.md sections 15.5 and 15.6).
  */
 #ifndef HODOGRAPH_OVERRIDE_CONTRACTS_H
 #define HODOGRAPH_OVERRIDE_CONTRACTS_H
 
-#include "core/override_ramp.h"
+#include "brake_contracts.h"
+#include "core/feed_override.h"
+#include "ramp_contracts.h"
 
-#define MOST_HALF ((uint32_t)1 << 28) /* ticks of half a ramp: 2^27 and 1 for the slowest bounds */
-#define MOST_SPAN ((uint64_t)1 << 57)
+#define MOST_SLOPE       (((int64_t)1 << 57) - 1)
+#define MOST_ARC         (((int64_t)1 << 62) + ((int64_t)1 << 60)) /* length and a piece's coefficients */
+#define MOST_FEED_AT     ((int64_t)1 << 60)
+#define LEAST_ARC        (-((int64_t)1 << 60))
+#define IS_ARC(q40_mm)   (LEAST_ARC <= (q40_mm) && (q40_mm) <= MOST_ARC)
+#define IS_SPEED(q56)    (0 <= (q56) && (q56) <= BRAKE_MOST_RISING)
+#define IS_RESULT(value) (-3 <= (value) && (value) <= 1)
 
-#define IS_PERIOD(us) ((us) == 1000 || (us) == 2000 || (us) == 4000 || (us) == 8000)
-#define IS_FACTOR(f)  (0x4000 <= (f) && (f) <= 0x8000) /* q14 */
-#define IS_OVERRIDE(q57)  (0 <= (q57) && (q57) <= OVERRIDE_MOST)
-#define IS_TICKS(t)   (1 <= (t)->rise && (t)->rise <= (t)->half && (t)->half <= MOST_HALF)
-#define IS_LIMITS(p)                                                                                 \
-    ((p)->turns >= 1 && (p)->inverse_slope <= 0x80000001 && (p)->inverse_root <= 0x80040000)
-#define IS_STAGE(s) (IS_OVERRIDE((s)->end_q57) && (s)->level < PROGRAM_LEVELS)
+/* clang-format off */
+/*@ predicate is_clock(struct program_clock *clock) = clock->piece < clock->program->header.piece_count;
+    predicate is_plan(struct override_plan *plan) =
+      IS_OVERRIDE(plan->now.override_q57) && -MOST_SLOPE <= plan->now.slope_q56 <= MOST_SLOPE;
+    predicate is_point(struct interp_point *point) =
+      IS_ARC(point->arc_length_q40_mm) && -MOST_FEED_AT <= point->feed_q32_mm_s <= MOST_FEED_AT;
+    predicate is_at(struct path_state *at) = IS_ARC(at->arc_length_q40_mm) && at->fine_q56_mm < 65536;
+    predicate is_brake(struct path_brake *brake) = is_at(&brake->at) && IS_SPEED(brake->at.speed_q56);
+*/
+/* clang-format on */
 
-#if defined(__FRAMAC__)
+/* --- core/program_clock.h, core/override_plan.h: eva_clock.c --- */
 
-/*@ requires i < p->header.piece_count;
-    assigns *out \from i;
-    ensures \initialized(out) && IS_FACTOR(out->factor_q14); */
-void program_piece_override(const struct program *p, uint32_t i, struct program_override *out);
+/*@ requires piece < clock->program->header.piece_count;
+    assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->piece_end_q42_s, clock->even_q62_s
+            \from time_q42_s, piece, piece_end_q32_s;
+    ensures is_clock(clock); */
+void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
+                       const struct prepared_piece *record, uint64_t piece_end_q32_s);
 
-/*@ requires first < p->header.piece_count && count > 0;
-    assigns *out \from first, count;
-    ensures \initialized(out) && IS_FACTOR(out->factor_q14); */
-void override_bounds_of(struct program_override *out, const struct program *p, uint32_t first,
-                    uint32_t count);
+/*@ assigns *plan \from \nothing;
+    ensures \initialized(plan) && plan->now.override_q57 == 0 && plan->now.slope_q56 == 0; */
+void override_plan_begin(struct override_plan *plan, const struct program *p);
 
-/*@ requires \initialized(bounds) && level < PROGRAM_LEVELS && period_log2 <= 3;
-    assigns *out \from *bounds, level, period_log2;
-    ensures \initialized(out) && IS_LIMITS(out); */
-void override_limits_of(struct ramp_limits *out, const struct program_override *bounds, uint32_t level,
-                  uint32_t period_log2);
+/*@ requires is_plan(plan);
+    assigns *plan \from *plan;
+    ensures \initialized(plan) && plan->now.override_q57 == 0 && plan->now.slope_q56 == 0; */
+void override_plan_rest(struct override_plan *plan);
 
-/* Of this and the next, cbmc_ticks.c shows what compares two numbers: rise <= half, twice a step <= the change. */
-/*@ requires \initialized(limits) && IS_LIMITS(limits) && IS_OVERRIDE(change_q57);
-    assigns *ticks \from *limits, change_q57;
-    ensures \initialized(ticks) && 1 <= ticks->rise && 1 <= ticks->half <= MOST_HALF; */
-void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *limits, int64_t change_q57);
+/*@ requires is_plan(plan);
+    assigns plan->held, plan->steady \from \nothing; */
+void override_plan_hold(struct override_plan *plan);
 
-/*@ requires 1 <= ticks->rise <= MOST_HALF && 1 <= ticks->half <= MOST_HALF && IS_OVERRIDE(change_q57);
-    assigns \result \from *ticks, change_q57;
-    ensures 0 <= \result <= OVERRIDE_ONE; */
-int64_t override_step_of(const struct ramp_ticks *ticks, int64_t change_q57);
+/*@ requires is_plan(plan);
+    assigns plan->held, plan->steady \from \nothing; */
+void override_plan_release(struct override_plan *plan);
 
-/*@ requires 1 <= ticks->rise <= MOST_HALF && 1 <= ticks->half <= MOST_HALF;
-    requires IS_OVERRIDE(mean_q57) && 0 < period_q32_s <= (1 << 26);
-    assigns \result \from *ticks, mean_q57, period_q32_s;
-    ensures \result <= MOST_SPAN; */
-uint64_t override_span_q32(const struct ramp_ticks *ticks, int64_t mean_q57, uint32_t period_q32_s);
+/*@ requires is_plan(plan);
+    assigns plan->commanded_q57, plan->steady \from percent; */
+void override_plan_set(struct override_plan *plan, uint32_t percent);
 
-#endif
+/*@ requires is_plan(plan);
+    assigns plan->ramp \from plan->ramp; */
+void override_plan_rise_no_more(struct override_plan *plan);
+
+/*@ requires is_plan(plan) && is_clock(clock);
+    assigns \result, *plan, clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->piece_end_q42_s,
+            clock->even_q62_s \from *plan, clock->time_q42_s;
+    ensures \initialized(plan) && is_plan(plan) && is_clock(clock); */
+uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock);
+
+/* --- core/path_brake.h: eva_brake.c, cbmc_brake.c --- */
+
+/*@ requires IS_PERIOD(period_us) && \initialized(&stop->jerk_down) && \initialized(&stop->jerk_up);
+    assigns \result, *out \from period_us;
+    ensures \result == 0 || \result == 1;
+    ensures \initialized(out) && IS_NUMBERS(out); */
+int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_stop *stop,
+                          uint32_t period_us);
+
+/*@ requires is_at(from) && IS_NUMBERS(numbers);
+    assigns \result, *brake \from *from;
+    ensures \result == 0 || \result == 1;
+    ensures \initialized(brake) && is_brake(brake); */
+int path_brake_begin(struct path_brake *brake, const struct path_state *from,
+                     const struct path_brake_numbers *numbers);
+
+/*@ requires is_at(from) && IS_NUMBERS(numbers);
+    requires -2 * MOST_ARC <= way_q40_mm <= 2 * MOST_ARC;
+    assigns \result \from way_q40_mm;
+    ensures \result == 0 || \result == 1; */
+int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
+                    int64_t way_q40_mm);
+
+/*@ requires is_brake(brake);
+    assigns *brake \from brake->at.speed_q56;
+    ensures \initialized(brake) && is_brake(brake); */
+void path_brake_first(struct path_brake *brake);
+
+/*@ requires is_brake(brake);
+    assigns *brake \from brake->at.speed_q56;
+    ensures \initialized(brake) && is_brake(brake); */
+void path_brake_step(struct path_brake *brake);
+
+/*@ assigns \result \from brake->phase;
+    ensures \result == 0 || \result == 1; */
+int path_brake_rests(const struct path_brake *brake);
+
+/* --- core/interp.h: eva_interp.c --- */
+
+/*@ assigns \result, *out, it->segment_index \from time_q42_s;
+    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
+int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
+
+/*@ assigns \result, *out, it->segment_index \from time_q42_s;
+    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
+int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
+                    struct interp_point *out);
+
+/*@ assigns \result, *out, it->segment_index \from arc_length_q40_mm;
+    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
+int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out);
+
+/*@ assigns \result \from time_q42_s; */
+int64_t interp_acceleration_q40(const struct interp *it, const struct prepared_piece *piece,
+                                uint64_t time_q42_s);
+
+/*@ requires index < 3;
+    assigns search->arc_length_q40_mm, search->time_q42_s, search->piece_index, search->bisecting \from index,
+            arc_length_q40_mm;
+    ensures search->piece_index < 3; */
+void interp_search_begin(struct interp_search *search, const struct prepared_piece *piece,
+                         uint32_t index, int64_t arc_length_q40_mm);
+
+/*@ requires search->piece_index < 3;
+    assigns \result, search->time_q42_s, search->piece_index, search->bisecting, search->low_q42_s, search->high_q42_s,
+            it->piece_index \from search->piece_index;
+    ensures search->piece_index < 3; */
+int interp_search_step(struct interp *it, struct interp_search *search);
 
 #endif

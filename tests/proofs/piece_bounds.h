@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the checks of a feed piece need of feed_bounds, and what they get: eva_bounds.c proves it, eva_piece.c and
- * eva_crossing.c rely on it.
+ * What the checks of a feed piece need of feed_bounds, and what they get: eva_bounds.c proves it, eva_piece.c,
+ * eva_crossing.c and eva_stops.c rely on it.
  */
 #ifndef HODOGRAPH_PIECE_BOUNDS_H
 #define HODOGRAPH_PIECE_BOUNDS_H
@@ -20,6 +20,8 @@
       -(1 << 54) <= c->c_q40_mm[5] <= (1 << 54) &&
       -(1 << 54) <= c->c_q40_mm[6] <= (1 << 54);
     predicate fits(integer a) = -(1 << 62) < a < (1 << 62);
+    predicate is_low(integer a) = -FEED_NO_BOUND_Q24 <= a < (1 << 62);
+    predicate is_high(integer a) = -FEED_NO_BOUND_Q24 <= a <= FEED_NO_BOUND_Q24;
 */
 /* clang-format on */
 
@@ -44,5 +46,15 @@ int feed_bounds_contained(const struct program_piece *piece);
     ensures \result == 0 || \result == 1; */
 int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24, int64_t high_q24);
+
+/*@ requires in_range(piece) && 1 <= derivative <= 3;
+    assigns low_q24[0 .. 7], high_q24[0 .. 7] \from derivative;
+    ensures \initialized(low_q24 + (0 .. 7)) && \initialized(high_q24 + (0 .. 7));
+    ensures is_low(low_q24[0]) && is_low(low_q24[1]) && is_low(low_q24[2]) && is_low(low_q24[3]);
+    ensures is_low(low_q24[4]) && is_low(low_q24[5]) && is_low(low_q24[6]) && is_low(low_q24[7]);
+    ensures is_high(high_q24[0]) && is_high(high_q24[1]) && is_high(high_q24[2]) && is_high(high_q24[3]);
+    ensures is_high(high_q24[4]) && is_high(high_q24[5]) && is_high(high_q24[6]) && is_high(high_q24[7]); */
+void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
+                       int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
 
 #endif

@@ -12,7 +12,7 @@
 #define HODOGRAPH_PLAN_IS_SOUND_H
 
 #include "proof.h"
-#include "override_contracts.h"
+#include "ramp_contracts.h"
 
 #include "core/override_ramp.c"
 #include "core/override_plan.c"
@@ -117,7 +117,7 @@ static int is_way(const struct override_plan *plan, const struct way *way)
 
 static int is_above(const struct override_plan *plan)
 {
-    return next_rest(plan) > plan->everywhere_q57;
+    return next_rest(plan) > plan->guaranteed_q57;
 }
 
 /* What the steps of a search leave to the next ones. */
@@ -125,7 +125,7 @@ static int search_is_sound(const struct override_plan *plan)
 {
     const int climbs = plan->kind == OVERRIDE_CLIMB;
     if (plan->step >= OVERRIDE_STAGES &&
-        ((climbs && plan->target_q57 <= plan->everywhere_q57 + OVERRIDE_SPARE) ||
+        ((climbs && plan->target_q57 <= plan->guaranteed_q57 + OVERRIDE_SPARE) ||
          !IS_OVERRIDE(plan->target_q57))) {
         return 0;
     }
@@ -134,7 +134,7 @@ static int search_is_sound(const struct override_plan *plan)
          !IS_OVERRIDE(plan->stage.end_q57) ||
          (climbs && plan->stage.end_q57 != plan->target_q57) ||
          ((plan->kind == OVERRIDE_RETURN || plan->kind == OVERRIDE_SETTLE) &&
-          plan->stage.end_q57 > plan->everywhere_q57))) {
+          plan->stage.end_q57 > plan->guaranteed_q57))) {
         return 0;
     }
     return plan->step <= OVERRIDE_FITS &&
@@ -157,19 +157,19 @@ static int task_is_sound(const struct override_plan *plan)
     case OVERRIDE_STAY:
         return is_above(plan) && !begins;
     case OVERRIDE_RETURN:
-        return is_above(plan) && aim <= plan->everywhere_q57;
+        return is_above(plan) && aim <= plan->guaranteed_q57;
     case OVERRIDE_SETTLE:
-        return !is_above(plan) && aim <= plan->everywhere_q57;
+        return !is_above(plan) && aim <= plan->guaranteed_q57;
     default:
         return !begins || IS_TICKS(&plan->back);
     }
 }
 
-/* Above everywhere_q57 the ramp back is known. */
+/* Above guaranteed_q57 the ramp back is known. */
 static int is_sound(const struct override_plan *plan, const struct way *way)
 {
-    const int above = plan->now.override_q57 > plan->everywhere_q57 ||
-                      end_of(plan, way) > plan->everywhere_q57;
+    const int above = plan->now.override_q57 > plan->guaranteed_q57 ||
+                      end_of(plan, way) > plan->guaranteed_q57;
     return is_way(plan, way) && task_is_sound(plan) && plan->task <= OVERRIDE_BEGINS &&
            plan->kind <= OVERRIDE_CLIMB && plan->window <= OVERRIDE_WINDOWS &&
            plan->wanted_q57 >= -1 && plan->wanted_q57 <= OVERRIDE_MOST &&
@@ -178,10 +178,10 @@ static int is_sound(const struct override_plan *plan, const struct way *way)
 
 static void any_plan(struct override_plan *plan, struct way *way)
 {
-    assume(IS_FACTOR(plan->everywhere.factor_q14));
-    plan->everywhere_q57 = (int64_t)plan->everywhere.factor_q14 << 43;
+    assume(IS_FACTOR(plan->guaranteed.factor_q14));
+    plan->guaranteed_q57 = (int64_t)plan->guaranteed.factor_q14 << 43;
     assume(IS_FACTOR(plan->ahead.own.factor_q14));
-    plan->ahead.bounds = nondet_uint32() != 0 ? &plan->ahead.own : &plan->everywhere;
+    plan->ahead.bounds = nondet_uint32() != 0 ? &plan->ahead.own : &plan->guaranteed;
     assume(IS_OVERRIDE(plan->commanded_q57));
     assume(IS_OVERRIDE(plan->now.override_q57));
     way->slope = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);

@@ -7,9 +7,13 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
 import can
+import numpy as np
+from numpy.typing import NDArray
 
 from bench import Bench
 from hodograph.bus.hub import LocalHub
+from hodograph.bus.listening.decode import RPDO1, SYNC_ID
+from hodograph.bus.listening.recorder import Frames
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.processes import Process, controller_command, drive_command, virtual_clock
 from hodograph.bus.sdo.controller import FAULT_STATE, OFF, READY, connect
@@ -62,6 +66,15 @@ def flood(other: Neighbour, identifier: int, seconds: float) -> None:
     """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
     for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
         other.send(identifier, b"\xaa" * 8)
+
+
+def latched(frames: Frames, node: int) -> NDArray[np.int64]:
+    """The target that a drive has at each SYNC, in counts, from the first one on."""
+    setpoints = frames["id"] == RPDO1 + node
+    targets = np.ascontiguousarray(frames["data"][:, 2:6]).view("<i4")[:, 0].astype(np.int64)
+    latest = np.maximum.accumulate(np.where(setpoints, np.arange(frames.size), -1))
+    at = latest[frames["id"] == SYNC_ID]
+    return targets[at[at >= 0]]
 
 
 @contextmanager

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
-from neighbour import flood, neighbour, real_drives, runs_again, settled
+from neighbour import flood, latched, neighbour, real_drives, runs_again, settled
 
 from bench import PAPER_ALPHA, Bench, MakeAlpha, MakeBench
+from boards import EMULATE
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.listening.recorder import Recorder
@@ -19,7 +21,6 @@ from hodograph.cli.main import main
 from hodograph.config import load_machine
 
 SYNC_GAP = 0xFF09
-LOST = 0x8250
 
 
 @pytest.fixture
@@ -71,39 +72,68 @@ def test_simulated_drives_bear_it(
     assert settled(bench) == (READY, 0, 0)
 
 
+FEED_COUNTS = 10_000
+"""Way of a period of 1 ms at 10 mm/s: what an axis may be told to go from one SYNC to the next."""
+
+
+def full_bus(bench: Bench, hub: LocalHub, path: str, seconds: float) -> tuple[int, int]:
+    """A bus that is full of higher priority in the middle of a program, and what comes of it; no drive may make the way
+    of two periods at any SYNC.
+    """
+    recorder = Recorder(bench.bus)
+    begin(path, bench, 1.0)
+    with neighbour(hub) as other:
+        flood(other, 0x001, seconds)
+        bench.clock.sleep(seconds)
+    outcome = settled(bench)[:2]
+    frames = recorder.so_far()
+    recorder.stop()
+    assert find_jumps(frames, bench.machine.nodes, step_limits(bench.machine)) == []
+    ways = [np.abs(np.diff(latched(frames, node))).max() for node in bench.machine.nodes]
+    assert FEED_COUNTS / 2 < max(ways) <= FEED_COUNTS + 2
+    return outcome
+
+
 @pytest.mark.parametrize(
-    ("seconds", "outcome", "late"),
+    ("seconds", "outcome"),
     [
-        (0.0005, (READY, 0), False),
-        (0.0015, (READY, 0), True),
-        (0.003, (READY, 0), True),
-        (0.006, (FAULT_STATE, LOST), True),
-        (0.15, (FAULT_STATE, LOST), False),
+        (0.0005, (READY, 0)),
+        (0.0015, (READY, 0)),
+        (0.003, (FAULT_STATE, SYNC_GAP)),
+        (0.006, (FAULT_STATE, SYNC_GAP)),
+        (0.15, (FAULT_STATE, SYNC_GAP)),
     ],
 )
 def test_a_bus_full_of_frames_of_higher_priority(
-    real: Bench,
+    real: Bench, hub: LocalHub, alpha_at: MakeAlpha, seconds: float, outcome: tuple[int, int]
+) -> None:
+    """SYNC waits for the setpoints that wait with it, and program time for both, as far as a gap of SYNC may last."""
+    path = str(alpha_at(10))
+    assert full_bus(real, hub, path, seconds) == outcome
+    runs_again(path)
+
+
+@pytest.mark.parametrize("phase_us", range(0, 1000, 125))
+def test_a_bus_that_is_full_from_any_instant_on(
+    real: Bench, hub: LocalHub, clock: VirtualClock, alpha_at: MakeAlpha, phase_us: int
+) -> None:
+    """For one and a half periods: it begins before SYNC, between SYNC and setpoints, between these, and behind them."""
+    clock.sleep(phase_us * 1e-6)
+    state, _ = full_bus(real, hub, str(alpha_at(10)), 0.0015)
+    assert state in (READY, FAULT_STATE)
+
+
+@pytest.mark.parametrize(("seconds", "state"), [(0.0015, READY), (0.006, FAULT_STATE)])
+def test_a_board_waits_too(
     hub: LocalHub,
+    monkeypatch: pytest.MonkeyPatch,
     alpha_at: MakeAlpha,
     seconds: float,
-    outcome: tuple[int, int],
-    late: bool,
+    state: int,
 ) -> None:
-    """Up to 5 ms without an answer are borne. The SYNCs of that time go before the setpoints that wait with them:
-    `late` says that a step is made of two, which the check of a recording finds. docs/reference/bus-time.md.
-    """
-    path = str(alpha_at(10))
-    recorder = Recorder(real.bus)
-    begin(path, real, 1.0)
-    with neighbour(hub) as other:
-        flood(other, 0x001, seconds)
-        real.clock.sleep(seconds)
-    assert settled(real)[:2] == outcome
-    found = find_jumps(recorder.so_far(), real.machine.nodes, step_limits(real.machine))
-    recorder.stop()
-    assert bool(found) == late
-    assert all(jump.sync - found[0].sync <= 10 for jump in found)
-    runs_again(path)
+    monkeypatch.setenv("HODOGRAPH_CONTROLLER", f"{EMULATE} an386")
+    with real_drives(hub, load_machine(PAPER_ALPHA)) as bench:
+        assert full_bus(bench, hub, str(alpha_at(10)), seconds)[0] == state
 
 
 def test_virtual_time_keeps_ticks(real: Bench) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-import check_eds
+from eds import check as check_eds
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTROLLER = ROOT / "firmware" / "app" / "controller.eds"
@@ -65,6 +65,8 @@ FAULTS = [
     ("DefaultValue=$NODEID+0x180", "DefaultValue=0x180 + $NODEID", "is not of the form $NODEID"),
     ("DefaultValue=$NODEID+0x180", "DefaultValue=$NODEID+0x20000180", "29-bit"),
     ("DefaultValue=$NODEID+0x80", "DefaultValue=0x80", "[1014] DefaultValue is not $NODEID+0x80"),
+    ("DefaultValue=0x60410010\n", "", "[1A00sub1] has no DefaultValue"),
+    ("DefaultValue=$NODEID+0x180", "DefaultValue=$nodeid+0x180", "is not of the form $NODEID"),
     ("HighLimit=240", "HighLimit=239", "above HighLimit"),
     ("LowLimit=0\nHighLimit=240", "LowLimit=241\nHighLimit=240", "LowLimit is above"),
     ("[1018]\nParameterName=Identity object\nObjectType=0x9\nSubNumber=5",

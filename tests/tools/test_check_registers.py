@@ -61,6 +61,29 @@ def test_an_altered_crate_is_refused(tmp_path: Path) -> None:
 def test_without_a_network_it_says_what_to_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(register_facts, "URL", "https://127.0.0.1:1/x.crate")
-    with pytest.raises(register_facts.FactsError, match=r"cannot fetch .* with a network once"):
+    cargo = tmp_path / "bin" / "cargo"
+    cargo.parent.mkdir()
+    cargo.write_text("#!/bin/sh\necho 'error: no network' >&2\nexit 101\n")
+    cargo.chmod(0o755)
+    monkeypatch.setenv("PATH", str(cargo.parent))
+    with pytest.raises(
+        register_facts.FactsError, match=r"cannot fetch .*: error: no network; with"
+    ):
+        register_facts.fetch(tmp_path)
+
+
+def test_without_cargo_it_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(register_facts.FactsError, match=r"cannot fetch .*'cargo'; with cargo and"):
+        register_facts.fetch(tmp_path)
+
+
+def test_a_crate_that_cargo_does_not_keep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cargo = tmp_path / "bin" / "cargo"
+    cargo.parent.mkdir()
+    cargo.write_text("#!/bin/sh\n")
+    cargo.chmod(0o755)
+    monkeypatch.setenv("PATH", str(cargo.parent))
+    monkeypatch.setenv("CARGO_HOME", str(tmp_path / "home"))
+    with pytest.raises(register_facts.FactsError, match=r"no such file in .*registry/cache"):
         register_facts.fetch(tmp_path)

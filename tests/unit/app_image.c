@@ -5,6 +5,7 @@
 
 #include "canopen/cob.h"
 #include "core/crc32.h"
+#include "core/program.h"
 #include "stop_table.h"
 
 #define Q32 (INT64_C(1) << 32)
@@ -32,9 +33,9 @@ static void put_piece(uint8_t *at)
     put_i64(at + 32, 40 * Q40);
     put_i64(at + 40, -60 * Q40);
     put_i64(at + 48, 24 * Q40);
-    cob_put(at + 72, UINT64_C(1) << 24, 4);
-    cob_put(at + 76, UINT64_C(8) << 16, 4);
-    cob_put(at + 80, UINT64_C(200) << 8, 4);
+    cob_put(at + 72, 1u << 14, 2);
+    memset(at + 74, 152, PROGRAM_LEVELS); /* 8 /s */
+    memset(at + 81, 125, PROGRAM_LEVELS); /* 198 /s^2 */
 }
 
 void app_image_seal(uint8_t image[APP_IMAGE_SIZE])

@@ -20,6 +20,7 @@ static struct {
     bool ready;
     bool locked;
     bool fail_send;
+    bool hold;
     bool insisted;
     bool fail_store;
     uint32_t missing; /* bytes of a bank for a program */
@@ -230,6 +231,16 @@ int port_can_send(const struct can_msg *message)
     TEST_ASSERT_TRUE(message->id <= CAN_ID_MAX && message->len <= CAN_DATA_MAX);
     self.sent[self.sent_head++ % SENT_MAX] = *message;
     return 0;
+}
+
+void fake_port_hold_frames(bool hold)
+{
+    self.hold = hold;
+}
+
+bool port_can_delivered(void)
+{
+    return !self.hold;
 }
 
 uint32_t port_time_ns(void)

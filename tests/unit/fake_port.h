@@ -38,6 +38,9 @@ void fake_port_set_timing(enum port_timing timing);
 /* So many of the next frames that pass this filter are refused. */
 void fake_port_refuse(const struct can_match *refused, uint32_t times);
 
+/* What port_can_delivered says from now on: frames of ticks wait for the bus, or not. */
+void fake_port_hold_frames(bool hold);
+
 /* From now on port_can_send, or port_store_write, fails. */
 void fake_port_fail_send(bool fail);
 void fake_port_fail_store(bool fail);

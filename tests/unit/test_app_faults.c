@@ -688,6 +688,73 @@ static void test_program_time_waits_for_a_sync_that_does_not_leave(void)
     refuse_some(COB_SYNC, CAN_ID_MAX, MACHINE_UNSENT_MAX);
 }
 
+/* Twice answer_wait_ms, which is 100, at 1 ms. */
+#define WAITING_TICKS 200u
+
+/* Frames of a tick wait for the bus: a SYNC would go before the setpoints among them. */
+static void test_program_time_waits_for_frames_that_wait_for_the_bus(void)
+{
+    run_some(250);
+    const uint32_t tick = machine()->statistics.program_tick;
+    const uint32_t syncs = machine()->statistics.syncs;
+    const int32_t target = drive(0)->target_counts;
+    fake_port_hold_frames(true);
+    app_bench_periods(&bench, WAITING_TICKS);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, fake_port_awaited_us(), "all have answered");
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    TEST_ASSERT_EQUAL_UINT32(tick, machine()->statistics.program_tick);
+    TEST_ASSERT_EQUAL_UINT32(syncs, machine()->statistics.syncs);
+    TEST_ASSERT_EQUAL_INT32(target, drive(0)->target_counts);
+    TEST_ASSERT_EQUAL_UINT32(WAITING_TICKS, machine()->statistics.frames_not_sent);
+    fake_port_hold_frames(false);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_UINT32(tick + 1u, machine()->statistics.program_tick);
+    TEST_ASSERT_EQUAL_UINT32(syncs + 1u, machine()->statistics.syncs);
+    TEST_ASSERT_EQUAL_UINT32(0, machine()->statistics.missed_tpdos);
+    (void)app_bench_until(&bench, MACHINE_READY, 1000);
+    TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, drive(0)->position_counts);
+}
+
+static void test_frames_that_wait_for_too_long_are_a_fault(void)
+{
+    run_some(250);
+    fake_port_hold_frames(true);
+    app_bench_periods(&bench, WAITING_TICKS + MACHINE_UNSENT_MAX);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    app_bench_period(&bench);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, machine()->state);
+    TEST_ASSERT_EQUAL_HEX16(FAULT_NOT_SENT, machine()->fault.code);
+    const uint32_t syncs = machine()->statistics.syncs;
+    app_bench_periods(&bench, 50);
+    TEST_ASSERT_EQUAL_UINT32(syncs, machine()->statistics.syncs);
+    fake_port_hold_frames(false);
+    app_bench_period(&bench);
+    expect_fault(FAULT_NOT_SENT, 0);
+    until_phase(MACHINE_FAULT_OFF, MACHINE_QUICK_TICKS);
+    recover();
+}
+
+static void test_real_drives_wait_for_one_tick_only(void)
+{
+    real_drives(5);
+    run_some(250);
+    fake_port_hold_frames(true);
+    app_bench_period(&bench);
+    fake_port_hold_frames(false);
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    fake_port_hold_frames(true);
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    const int32_t target = drive(0)->target_counts;
+    fake_port_hold_frames(false);
+    app_bench_period(&bench);
+    expect_fault(FAULT_SYNC_GAP, 0);
+    TEST_ASSERT_EQUAL_INT32(target, drive(0)->target_counts);
+    until_phase(MACHINE_FAULT_OFF, 100);
+    recover();
+}
+
 /* --- Position and setpoint --- */
 
 static void test_a_drive_that_does_not_follow_without_a_word(void)
@@ -1094,6 +1161,9 @@ int main(void)
     RUN_TEST(test_program_time_waits_for_a_setpoint_that_does_not_leave);
     RUN_TEST(test_program_time_waits_for_a_setpoint_of_another_axis);
     RUN_TEST(test_program_time_waits_for_a_sync_that_does_not_leave);
+    RUN_TEST(test_program_time_waits_for_frames_that_wait_for_the_bus);
+    RUN_TEST(test_frames_that_wait_for_too_long_are_a_fault);
+    RUN_TEST(test_real_drives_wait_for_one_tick_only);
     RUN_TEST(test_a_drive_that_does_not_follow_without_a_word);
     RUN_TEST(test_ready_means_at_the_target);
     RUN_TEST(test_an_axis_that_arrives_late_is_waited_for);

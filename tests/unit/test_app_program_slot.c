@@ -42,10 +42,31 @@ static int upload(void)
     return program_slot_finish(&slot, sizeof image, &config);
 }
 
+static void count_call(void *self)
+{
+    unsigned *calls = self;
+    (*calls)++;
+}
+
 static void expect_active(const uint8_t *expected)
 {
     TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_READY, program_slot_state(&slot));
     TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, slot.program.image, APP_IMAGE_SIZE);
+}
+
+static void test_a_check_lets_the_main_loop_give_signs_of_life(void)
+{
+    struct config limited = config;
+    unsigned calls = 0;
+    limited.axis[0].velocity_limit_um_s = 20000;
+    slot.attend = count_call;
+    slot.self = &calls;
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    TEST_ASSERT_EQUAL_UINT(2, calls); /* stops of both kinds of the one piece; no limits of axes */
+    limited.crc32++;
+    program_slot_refresh(&slot, &limited);
+    TEST_ASSERT_TRUE(slot.acceptable);
+    TEST_ASSERT_EQUAL_UINT(2 + 3, calls);
 }
 
 static void test_a_good_image_becomes_the_program(void)
@@ -207,6 +228,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_a_good_image_becomes_the_program);
+    RUN_TEST(test_a_check_lets_the_main_loop_give_signs_of_life);
     RUN_TEST(test_an_upload_may_break_off_anywhere);
     RUN_TEST(test_a_truncated_image_is_refused_though_the_bank_holds_more);
     RUN_TEST(test_a_refusal_says_what_and_where);

@@ -245,6 +245,63 @@ static void test_what_a_member_sent_before_it_left_goes_out(void)
     TEST_ASSERT_EQUAL(0x124, got[0].id);
 }
 
+/* It ends as soon as it has sent, as a process does at its end: without a wait. */
+static void test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once(void)
+{
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const struct can_msg later = {.id = 0x200};
+    TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &later));
+    send_frame(&other, 0x100, 0);
+    (void)close(other.fd);
+    other.fd = -1;
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL_UINT64(VIRTUAL_TIME_BEGIN_NS + frame_ns(0x100, 0), clock_ns());
+    TEST_ASSERT_EQUAL(1, receive(got));
+    TEST_ASSERT_EQUAL(0x100, got[0].id);
+}
+
+/* Frames that wait are told of at their last bit; that wakes nobody. */
+static void test_tracked_frames_are_waited_for_until_their_last_bit(void)
+{
+    struct can_msg got[CAN_SOCKET_BATCH];
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    const struct can_msg setpoint = {.id = 0x202};
+    const struct can_msg other_kind = {.id = 0x300};
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(0, can_socket_track(&mine, 0x202));
+    TEST_ASSERT_EQUAL(0, can_socket_track(&mine, 0x202));
+    TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &setpoint));
+    TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &setpoint));
+    TEST_ASSERT_EQUAL(0, can_socket_send(&mine, &other_kind));
+    TEST_ASSERT_EQUAL(2, can_socket_waiting(&mine));
+    const uint64_t one_ns = frame_ns(0x202, 0);
+    TEST_ASSERT_EQUAL(0, clock_poll(&fds, 1, 1, one_ns - 1u));
+    TEST_ASSERT_EQUAL(0, receive(got));
+    TEST_ASSERT_EQUAL(2, can_socket_waiting(&mine));
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, one_ns)); /* in the middle of the second */
+    TEST_ASSERT_EQUAL_UINT64(VIRTUAL_TIME_BEGIN_NS + 2u * one_ns - 1u, clock_ns());
+    TEST_ASSERT_EQUAL(0, receive(got));
+    TEST_ASSERT_EQUAL(1, can_socket_waiting(&mine));
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, 1));
+    TEST_ASSERT_EQUAL(0, receive(got));
+    TEST_ASSERT_EQUAL(0, can_socket_waiting(&mine));
+}
+
+static void test_no_more_frames_are_tracked_than_there_is_room_for(void)
+{
+    for (uint16_t i = 0; i < CAN_SOCKET_TRACKED; ++i) {
+        TEST_ASSERT_EQUAL(0, can_socket_track(&mine, (uint16_t)(0x200u + i)));
+    }
+    TEST_ASSERT_EQUAL(-ENOSPC, can_socket_track(&mine, 0x300));
+    TEST_ASSERT_EQUAL(-ENOSPC, can_socket_track(&mine, 0x200));
+    can_socket_untrack(&mine, 0x201);
+    can_socket_untrack(&mine, 0x201); /* there is no other */
+    TEST_ASSERT_EQUAL(CAN_SOCKET_TRACKED - 1u, can_socket_waiting(&mine));
+    can_socket_forget(&mine);
+    TEST_ASSERT_EQUAL(0, can_socket_waiting(&mine));
+}
+
 static void test_a_descriptor_of_ones_own_ends_the_wait_at_once(void)
 {
     struct pollfd fds = {.fd = eventfd(1, 0), .events = POLLIN};
@@ -329,6 +386,9 @@ int main(void)
     RUN_TEST(test_an_answer_comes_behind_what_waits_already);
     RUN_TEST(test_filters_and_deferred_frames_do_not_wake);
     RUN_TEST(test_what_a_member_sent_before_it_left_goes_out);
+    RUN_TEST(test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once);
+    RUN_TEST(test_tracked_frames_are_waited_for_until_their_last_bit);
+    RUN_TEST(test_no_more_frames_are_tracked_than_there_is_room_for);
     RUN_TEST(test_a_descriptor_of_ones_own_ends_the_wait_at_once);
     RUN_TEST(test_a_signal_ends_the_wait);
     RUN_TEST(test_a_signal_before_the_wait_ends_it_too);

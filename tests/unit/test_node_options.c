@@ -171,6 +171,14 @@ static void test_options_themselves(void)
     TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
                           node_options_parse(&options, 1, none, reason, sizeof reason));
     TEST_ASSERT_NULL(options.faults);
+    char *operand[] = {"hodograph-drive", "--bus=vcan0", "vcan1", "--help"};
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
+                          node_options_parse(&options, 4, operand, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_STRING("unknown option 'vcan1' (see --help)", reason);
+    char *letters[] = {"hodograph-drive", "-xy"};
+    TEST_ASSERT_EQUAL_INT(NODE_OPTIONS_WRONG,
+                          node_options_parse(&options, 2, letters, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_STRING("unknown option '-xy' (see --help)", reason);
     TEST_ASSERT_NOT_NULL(strstr(node_options_help, "Exit status"));
 }
 

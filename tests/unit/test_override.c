@@ -384,18 +384,18 @@ static void finish(void)
     struct ramp_limits limits;
     int64_t ticks = 10000;
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
-        override_limits_of(&limits, &now.feed.plan.everywhere, k, now.feed.clock.period_log2);
+        override_limits_of(&limits, &now.feed.plan.guaranteed, k, now.feed.clock.period_log2);
         override_ticks_of(&down, &limits, k == PROGRAM_LEVEL_FULL ? OVERRIDE_MOST : OVERRIDE_ONE);
         ticks += 4 * 2 * ((int64_t)down.rise + down.half);
     }
     int64_t wanted = OVERRIDE_ONE / 100 * now.percent;
-    wanted = wanted < now.feed.plan.everywhere_q57 ? wanted : now.feed.plan.everywhere_q57;
+    wanted = wanted < now.feed.plan.guaranteed_q57 ? wanted : now.feed.plan.guaranteed_q57;
     for (int64_t i = 0; i < ticks && !over(); i++) {
         int64_t rate = now.feed.plan.now.override_q57;
         int still = now.feed.plan.now.slope_q56 == 0 && now.feed.phase == PLAN;
         if (now.wish == RUN
                 ? still && rate >= wanted - 100 &&
-                      (now.percent * (OVERRIDE_ONE / 100) > now.feed.plan.everywhere_q57 ||
+                      (now.percent * (OVERRIDE_ONE / 100) > now.feed.plan.guaranteed_q57 ||
                        rate <= wanted + 100)
                 : now.feed.state == FEED_HELD && now.feed.found) {
             return;

@@ -293,6 +293,35 @@ static void fall_off_the_bus(void)
     serve();
 }
 
+static void test_frames_of_the_interrupts_are_delivered_when_they_are_on_the_bus(void)
+{
+    start();
+    TEST_ASSERT_TRUE(fdcan_delivered(&can));
+    for (uint32_t i = 1; i <= 5u; ++i) {
+        TEST_ASSERT_TRUE(send(i, FDCAN_URGENT));
+    }
+    for (uint32_t i = 1; i <= 5u; ++i) {
+        TEST_ASSERT_FALSE(fdcan_delivered(&can));
+        expect_sent(i);
+    }
+    TEST_ASSERT_TRUE(fdcan_delivered(&can));
+}
+
+static void test_frames_of_the_mainline_are_not_waited_for(void)
+{
+    start();
+    TEST_ASSERT_TRUE(send(10, FDCAN_ORDINARY));
+    TEST_ASSERT_TRUE(fdcan_delivered(&can));
+    TEST_ASSERT_TRUE(send(1, FDCAN_URGENT));
+    TEST_ASSERT_TRUE(send(11, FDCAN_ORDINARY));
+    TEST_ASSERT_FALSE(fdcan_delivered(&can));
+    expect_sent(10);
+    TEST_ASSERT_FALSE(fdcan_delivered(&can));
+    expect_sent(1);
+    TEST_ASSERT_TRUE(fdcan_delivered(&can));
+    expect_sent(11);
+}
+
 static void test_after_bus_off_it_comes_back_with_nothing_old(void)
 {
     start();
@@ -352,6 +381,8 @@ int main(void)
     RUN_TEST(test_a_full_queue_refuses_and_keeps_its_order);
     RUN_TEST(test_the_mainline_holds_up_the_tick_by_one_frame);
     RUN_TEST(test_nothing_is_taken_off_the_bus);
+    RUN_TEST(test_frames_of_the_interrupts_are_delivered_when_they_are_on_the_bus);
+    RUN_TEST(test_frames_of_the_mainline_are_not_waited_for);
     RUN_TEST(test_after_bus_off_it_comes_back_with_nothing_old);
     RUN_TEST(test_errors_are_told);
     return UNITY_END();

@@ -8,6 +8,7 @@
 #define port_node_id        board_node_id
 #define port_can_accept     board_can_accept
 #define port_can_send       board_can_send
+#define port_can_delivered  board_can_delivered
 #define port_time_ns        board_time_ns
 #define port_time_us        board_time_us
 #define port_start          board_start
@@ -167,15 +168,18 @@ static void test_the_context_decides_whose_turn_it_is(void)
         TEST_ASSERT_EQUAL_INT(0, port_can_send(&message));
     }
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, fdcan_model_waiting(), "the mainline's go one at a time");
+    TEST_ASSERT_TRUE(port_can_delivered());
     chip_in_handler(true);
     for (unsigned i = 0; i < 2u; ++i) {
         TEST_ASSERT_EQUAL_INT(0, port_can_send(&message));
     }
     chip_in_handler(false);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(3, fdcan_model_waiting(), "the tick's all at once");
+    TEST_ASSERT_FALSE(port_can_delivered());
     while (fdcan_model_transmit(&frame)) {
         irq_can();
     }
+    TEST_ASSERT_TRUE(port_can_delivered());
 }
 
 static void test_the_lock_holds_off_both(void)

@@ -2,23 +2,24 @@
 # SPDX-License-Identifier: MIT
 # fetch_provers.sh LOCK OUT: puts Frama-C and CBMC under OUT, as OUT/bin/{frama-c,cbmc,goto-cc,goto-instrument}.
 #
-# A package is the one of LOCK, by its hash. When the mirror has replaced it by a newer one (which Debian does to stable
-# releases every few months), apt takes that, under Debian's signature, and this says so.
+# apt downloads each package of LOCK from its Debian release, under Debian's signature, and its hash is compared with that of
+# LOCK. Where the release has a newer one by now (Debian replaces packages of stable releases every few months), that is taken,
+# and this says so. The archive is the one this machine's apt has Debian from, or $DEBIAN_MIRROR.
 #
 # Nothing is installed. Frama-C asks findlib for packages that are linked into it already; empty descriptions satisfy it.
 set -euo pipefail
 lock=$1 out=$2
-archive=${DEBIAN_MIRROR:-https://deb.debian.org/debian}
+# shellcheck disable=SC2016  # apt fills in these fields
+archive=${DEBIAN_MIRROR:-$(apt-get indextargets --format '$(ORIGIN)|$(LABEL)|$(REPO_URI)' 'Created-By: Packages' |
+    awk -F '|' '!found && ($1 == "Debian" && $2 == "Debian" || $3 ~ /\/debian\/?$/) { print $3; found = 1 }')}
+if [ -z "$archive" ]; then
+    echo "fetch_provers: apt has no Debian archive here: set DEBIAN_MIRROR to the address of one" >&2
+    exit 1
+fi
 mkdir -p "$out"
 out=$(cd "$out" && pwd)
 rm -rf "${out:?}"/{root,bin,stubs,debs}
 mkdir -p "$out"/{root,bin,debs}
-
-# pinned HASH PATH FILE: the very file of the lock; false when the mirror does not have it.
-pinned() {
-    python3 -c 'import sys, urllib.request; urllib.request.urlretrieve(*sys.argv[1:])' "$archive/$2" "$3" 2>/dev/null || return 1
-    echo "$1  $3" | sha256sum --check --status
-}
 
 # apt_of SUITE COMMAND...: apt-get with an archive and a state of its own.
 apt_of() {
@@ -31,22 +32,19 @@ apt_of() {
         -o Acquire::Languages=none -o APT::Sandbox::User="$(id -un)" "${@:2}"
 }
 
-# newest SUITE PACKAGE: into debs/, signature and hash looked at by apt.
-newest() {
+# fetch SUITE PACKAGE: into debs/; apt looks at the signature.
+fetch() {
     [ -e "$out/apt/$1/updated" ] || apt_of "$1" update
     touch "$out/apt/$1/updated"
     (cd "$out/debs" && apt_of "$1" download "$2")
 }
 
-while read -r hash suite path; do
-    file=$out/debs/${path##*/}
-    package=${path##*/}
-    package=${package%%_*}
-    if ! pinned "$hash" "$path" "$file"; then
-        rm -f "$file"
-        newest "$suite" "$package"
-        file=$(ls "$out/debs/${package}"_*.deb)
-        echo "fetch_provers: the mirror has no ${path##*/} of the hash locked; took ${file##*/} of $suite, $(sha256sum < "$file" | cut -d' ' -f1): bring $lock up to date"
+while read -r hash suite locked; do
+    package=${locked%%_*}
+    fetch "$suite" "$package"
+    file=$(ls "$out/debs/${package}"_*.deb)
+    if ! echo "$hash  $file" | sha256sum --check --status; then
+        echo "fetch_provers: $suite has ${file##*/} instead of $locked, $(sha256sum < "$file" | cut -d' ' -f1): bring $lock up to date"
     fi
     dpkg-deb -x "$file" "$out/root"
 done < <(grep -v '^#' "$lock")

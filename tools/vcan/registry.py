@@ -3,7 +3,7 @@
 
 A folder holds `info.json` and `lock`. Whoever keeps the bus alive holds the lock (flock), so a folder
 whose lock is free is a left-over, whatever became of its processes. A user-mode bus also keeps its
-socket and boot log there.
+socket and boot log there. The lock is flock itself, not `filelock`: tools/with-vcan runs before .venv is there.
 """
 
 from __future__ import annotations

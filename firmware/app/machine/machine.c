@@ -115,19 +115,6 @@ uint32_t machine_answer_wait_us(const struct machine *machine)
     return (real ? MACHINE_REAL_WAIT_MAX_MS : wait_ms) * US_PER_MS;
 }
 
-bool machine_awaits_drives(const struct machine *machine)
-{
-    if (machine->state == MACHINE_BOOT || !machine->simulated || !machine->sync_sent) {
-        return false;
-    }
-    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!machine->axes[i].answers.lost) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* A drive that is lost is not waited for: the others have to be braked in time. */
 static bool all_answered(const struct machine *machine)
 {
@@ -138,6 +125,20 @@ static bool all_answered(const struct machine *machine)
         }
     }
     return true;
+}
+
+bool machine_awaits_drives(const struct machine *machine)
+{
+    if (machine->state == MACHINE_BOOT || !machine->simulated || !machine->sync_sent ||
+        (machine->sync_waits && all_answered(machine))) {
+        return false;
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        if (!machine->axes[i].answers.lost) {
+            return true;
+        }
+    }
+    return false;
 }
 
 bool machine_receive(struct machine *machine, uint8_t node, const struct pdo_actual *actual,

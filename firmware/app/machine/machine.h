@@ -73,7 +73,8 @@ enum machine_refusal {
 #define MACHINE_QUICK_TICKS  2000u /* time for the drives to end a quick stop */
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
 #define MACHINE_ANSWER_TICKS 5000u /* time for configured drives to answer a SYNC */
-#define MACHINE_UNSENT_MAX   3u    /* so many ticks in a row the port may refuse frames */
+#define MACHINE_UNSENT_MAX                                                                         \
+    3u /* so many ticks in a row the port may refuse frames, or not be rid of them */
 
 /* With the mainline at a standstill nobody takes a stop, and heartbeats stay away: before the drives stop by these, or a
  * watchdog restarts the processor, the axes are stopped on the path. */
@@ -110,6 +111,7 @@ struct machine {
         arriving_ticks; /* since the settling time of a motion was over, with an axis away from its target */
     bool sync_sent;      /* the last SYNC has left */
     bool sync_now;       /* and that of this tick */
+    bool sync_waits;     /* this tick has none: the one before is not over */
     bool setpoints_sent; /* and all setpoints after it */
     bool
         withheld; /* this tick makes no new setpoint: its SYNC, or a setpoint before it, has not left */
@@ -190,10 +192,16 @@ void machine_switch_off(struct machine *machine);
 
 /* The SYNC before this tick is over: counts missing answers, watches the drives. */
 void machine_supervise(struct machine *machine, uint32_t now_us);
-/* First in a tick: whether its SYNC has left. Without it, or where a setpoint of the tick before did not leave, program time
+/* What has become of the SYNC of a tick. */
+enum machine_sync {
+    MACHINE_SYNC_SENT,    /* queued, the only frame of ours that waits for the bus */
+    MACHINE_SYNC_REFUSED, /* the port had no room */
+    MACHINE_SYNC_WAITS, /* not made: frames of the tick before are still waiting, and this tick sends nothing */
+};
+/* First in a tick. Without a SYNC, or where the port refused a setpoint of the tick before, program time
  * stands still: a drive never gets a step larger than the program's. With real drives that follow, a longer time than
  * MACHINE_GAP_US since the SYNC before is a fault, and a quick stop: they have not followed the path meanwhile. */
-void machine_note_sync(struct machine *machine, uint32_t now_us, bool sent);
+void machine_note_sync(struct machine *machine, uint32_t now_us, enum machine_sync sync);
 /* What has left in a tick. */
 struct machine_sent {
     bool sync;
@@ -202,6 +210,9 @@ struct machine_sent {
 };
 /* Last in a tick. More than MACHINE_UNSENT_MAX ticks in a row with a refused frame are a fault when drives are on. */
 void machine_note_sent(struct machine *machine, struct machine_sent sent);
+/* The same of a tick that sends nothing. It counts as one with a refused frame; with simulated drives, for which ticks may wait, only
+ * where there has been no SYNC for twice the time that answers may be late. */
+void machine_note_waiting(struct machine *machine, uint32_t now_us);
 /* Moves on by one tick: states, goals and targets of the axes. */
 void machine_step(struct machine *machine);
 /* Counts ticks_left down; true when there are none left. */
@@ -215,7 +226,8 @@ static inline bool machine_drives_operational(const struct machine *machine)
 {
     return machine->state != MACHINE_BOOT;
 }
-/* Whether the next tick should wait for the drives' answers: they are simulated and not all lost. */
+/* Whether the next tick should wait for the drives' answers: they are simulated and not all lost; and, where frames wait for the bus,
+ * some have not answered yet. */
 bool machine_awaits_drives(const struct machine *machine);
 /* Whether at lock step the next tick should come as soon as the drives have answered: something
  * moves, switches or has to be waited for. */

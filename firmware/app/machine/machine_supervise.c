@@ -49,6 +49,16 @@ static void close_unanswered(struct machine *machine, struct answers *answers, u
 }
 
 /* True when every drive is well. */
+static bool drives_well(const struct machine *machine)
+{
+    bool well = true;
+    for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
+        well = well && axis_well(&machine->axes[i]);
+    }
+    return well;
+}
+
+/* The same, at the end of a SYNC. */
 static bool close_sync(struct machine *machine, uint32_t now_us)
 {
     const bool sent = machine->sync_sent;
@@ -83,7 +93,8 @@ static void supervise_mainline(struct machine *machine)
 void machine_supervise(struct machine *machine, uint32_t now_us)
 {
     supervise_mainline(machine);
-    if (close_sync(machine, now_us)) {
+    const bool well = machine->sync_waits ? drives_well(machine) : close_sync(machine, now_us);
+    if (well) {
         return;
     }
     for (uint8_t i = 0; i < machine->config.axis_count && machine->state != MACHINE_BOOT; ++i) {
@@ -95,11 +106,13 @@ void machine_supervise(struct machine *machine, uint32_t now_us)
 }
 
 /* The drives' clock is the SYNC, so what they should have reached counts from those that left. */
-void machine_note_sync(struct machine *machine, uint32_t now_us, bool sent)
+void machine_note_sync(struct machine *machine, uint32_t now_us, enum machine_sync sync)
 {
+    const bool sent = sync == MACHINE_SYNC_SENT;
     const uint32_t gap_us = now_us - machine->sync_left_us;
     const bool follow = machine_on_path(machine) || machine->state == MACHINE_READY;
     machine->sync_now = sent;
+    machine->sync_waits = sync == MACHINE_SYNC_WAITS;
     machine->withheld = !sent || !machine->setpoints_sent;
     if (sent) {
         machine->sync_left_us = now_us;
@@ -109,17 +122,32 @@ void machine_note_sync(struct machine *machine, uint32_t now_us, bool sent)
     }
 }
 
+static void note_unsent(struct machine *machine)
+{
+    const bool on = machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF;
+    if (machine->unsent_ticks < UINT32_MAX) {
+        machine->unsent_ticks++;
+    }
+    if (on && machine->unsent_ticks > MACHINE_UNSENT_MAX) {
+        machine_raise(machine, FAULT_NOT_SENT, 0, machine->unsent_ticks);
+    }
+}
+
 void machine_note_sent(struct machine *machine, struct machine_sent sent)
 {
     machine->sync_sent = sent.sync;
     machine->setpoints_sent = sent.setpoints;
     if (sent.all) {
         machine->unsent_ticks = 0;
-    } else if (machine->unsent_ticks < UINT32_MAX) {
-        machine->unsent_ticks++;
+    } else {
+        note_unsent(machine);
     }
-    const bool on = machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF;
-    if (on && machine->unsent_ticks > MACHINE_UNSENT_MAX) {
-        machine_raise(machine, FAULT_NOT_SENT, 0, machine->unsent_ticks);
+}
+
+void machine_note_waiting(struct machine *machine, uint32_t now_us)
+{
+    const uint32_t patience_us = 2u * machine_answer_wait_us(machine);
+    if (!machine->simulated || now_us - machine->sync_left_us > patience_us) {
+        note_unsent(machine);
     }
 }

@@ -44,21 +44,32 @@ static int tell_hub(const struct can_socket *socket, uint16_t kind, const struct
     return send(socket->fd, &told, size, MSG_NOSIGNAL) == (ssize_t)size ? 0 : -errno;
 }
 
+/* Frames of ours that are tracked pass as well; with no filter all do. */
+static int tell_kernel(const struct can_socket *socket)
+{
+    struct can_filter raw[CAN_SOCKET_FILTERS + CAN_SOCKET_TRACKED];
+    size_t count = socket->filter_count;
+    raw_filters(raw, socket->filters, count);
+    for (size_t i = 0; i < socket->tracked_count && socket->filter_count > 0u; ++i) {
+        const struct can_match own = {socket->tracked[i], CAN_ID_MAX};
+        raw_filters(&raw[count++], &own, 1);
+    }
+    if (count == 0u) {
+        return 0;
+    }
+    const socklen_t bytes = (socklen_t)(count * sizeof raw[0]);
+    return setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_FILTER, raw, bytes) == 0 ? 0 : -errno;
+}
+
+/* Here at once, and soon at the hub, which then wakes nobody for other frames. */
 int can_socket_filter(struct can_socket *socket, const struct can_match *filters, size_t count)
 {
-    struct can_filter raw[CAN_SOCKET_FILTERS];
     if (count > CAN_SOCKET_FILTERS) {
         return -EINVAL;
     }
-    if (socket
-            ->local) { /* here at once, and soon at the hub, which then wakes nobody for other frames */
-        memcpy(socket->filters, filters, count * sizeof filters[0]);
-        socket->filter_count = count;
-        return tell_hub(socket, LOCAL_BUS_FILTER, filters, count);
-    }
-    raw_filters(raw, filters, count);
-    const socklen_t bytes = (socklen_t)(count * sizeof raw[0]);
-    return setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_FILTER, raw, bytes) == 0 ? 0 : -errno;
+    memcpy(socket->filters, filters, count * sizeof filters[0]);
+    socket->filter_count = count;
+    return socket->local ? tell_hub(socket, LOCAL_BUS_FILTER, filters, count) : tell_kernel(socket);
 }
 
 int can_socket_defer(struct can_socket *socket, const struct can_match *frames, size_t count)
@@ -68,6 +79,74 @@ int can_socket_defer(struct can_socket *socket, const struct can_match *frames, 
     }
     return socket->local && clock_is_virtual() ? tell_hub(socket, LOCAL_BUS_DEFER, frames, count)
                                                : 0;
+}
+
+static int ask_back(const struct can_socket *socket)
+{
+    const int on = 1;
+    if (socket->local) {
+        struct can_match ids[CAN_SOCKET_TRACKED];
+        for (size_t i = 0; i < socket->tracked_count; ++i) {
+            ids[i] = (struct can_match){socket->tracked[i], CAN_ID_MAX};
+        }
+        return tell_hub(socket, LOCAL_BUS_TRACK, ids, socket->tracked_count);
+    }
+    const int error =
+        setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on) == 0 ? 0
+                                                                                        : -errno;
+    return error == 0 ? tell_kernel(socket) : error;
+}
+
+static bool is_among(const uint16_t *ids, size_t count, uint16_t id)
+{
+    size_t i = 0;
+    while (i < count && ids[i] != id) {
+        ++i;
+    }
+    return i < count;
+}
+
+int can_socket_track(struct can_socket *socket, uint16_t id)
+{
+    if (socket->local && !clock_is_virtual()) {
+        return 0;
+    }
+    if (!is_among(socket->tracked, socket->tracked_count, id)) {
+        if (socket->tracked_count == CAN_SOCKET_TRACKED) {
+            return -ENOSPC;
+        }
+        socket->tracked[socket->tracked_count++] = id;
+        const int error = ask_back(socket);
+        if (error != 0) {
+            socket->tracked_count--;
+            return error;
+        }
+    }
+    if (socket->waiting_count == CAN_SOCKET_TRACKED) {
+        return -ENOSPC;
+    }
+    socket->waiting[socket->waiting_count++] = id;
+    return 0;
+}
+
+void can_socket_untrack(struct can_socket *socket, uint16_t id)
+{
+    for (size_t i = 0; i < socket->waiting_count; ++i) {
+        if (socket->waiting[i] == id) {
+            socket->waiting[i] = socket->waiting[--socket->waiting_count];
+            return;
+        }
+    }
+}
+
+size_t can_socket_waiting(const struct can_socket *socket)
+{
+    return socket->waiting_count;
+}
+
+void can_socket_forget(struct can_socket *socket)
+{
+    socket->waiting_count = 0;
 }
 
 static struct can_frame raw_frame(const struct can_msg *message)
@@ -144,6 +223,35 @@ static void convert(struct can_msg *message, const struct can_frame *frame)
     memcpy(message->data, frame->data, frame->can_dlc);
 }
 
+/* Whether it is one that this socket has sent. */
+static int is_own(const struct can_socket *socket, const struct mmsghdr *header,
+                  const struct local_bus_frame *frame)
+{
+    return socket->local ? (frame->frame.__res0 & LOCAL_BUS_OWN) != 0u
+                         : (header->msg_hdr.msg_flags & MSG_CONFIRM) != 0;
+}
+
+/* Of the frames that have come: those that the caller wants, and ours that have left. Returns how many are in `messages`. */
+static int sort_out(struct can_socket *socket, const struct mmsghdr *headers,
+                    const struct local_bus_frame *frames, int got,
+                    struct can_msg messages[CAN_SOCKET_BATCH])
+{
+    const size_t size = socket->local ? sizeof frames[0] : sizeof frames[0].frame;
+    int count = 0;
+    for (int i = 0; i < got; ++i) {
+        if (headers[i].msg_len != size || !plain_frame(&frames[i].frame)) {
+            continue;
+        }
+        convert(&messages[count], &frames[i].frame);
+        if (is_own(socket, &headers[i], &frames[i])) {
+            can_socket_untrack(socket, (uint16_t)messages[count].id);
+        } else {
+            count += passes(socket, &messages[count]) ? 1 : 0;
+        }
+    }
+    return count;
+}
+
 /* An empty message is how a local bus ends; what came before it is still given. */
 static int at_end(const struct mmsghdr *headers, int got)
 {
@@ -169,13 +277,7 @@ int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SO
     if (got < 0) {
         return errno == EAGAIN || errno == EINTR ? 0 : -errno;
     }
-    int count = 0;
-    for (int i = 0; i < got; ++i) {
-        if (headers[i].msg_len == size && plain_frame(&frames[i].frame)) {
-            convert(&messages[count], &frames[i].frame);
-            count += passes(socket, &messages[count]) ? 1 : 0;
-        }
-    }
+    const int count = sort_out(socket, headers, frames, got, messages);
     *more = got == (int)CAN_SOCKET_BATCH;
     return count == 0 && socket->local && at_end(headers, got) ? -ENETDOWN : count;
 }

@@ -4,7 +4,11 @@
  * the Linux port and by the simulated drives.
  *
  * The socket never blocks. Remote, extended and error frames are dropped on the way in. Frames that
- * this socket sends do not come back to it; other sockets of the same machine see them.
+ * this socket sends are not received by it; other sockets of the same machine see them.
+ *
+ * Tracking tells whether frames have been sent on the bus, not only queued: SocketCAN gives them back when the controller has
+ * sent them (drivers without that, and vcan, when they are queued), a local bus in virtual time at their last bit. On a local bus in
+ * real time, which has no bit times, nothing ever waits.
  */
 #ifndef PORT_LINUX_CAN_SOCKET_H
 #define PORT_LINUX_CAN_SOCKET_H
@@ -18,6 +22,7 @@
 
 #define CAN_SOCKET_FILTERS 40u
 #define CAN_SOCKET_BATCH   32u
+#define CAN_SOCKET_TRACKED 16u /* identifiers, and frames at a time */
 
 struct can_socket {
     int fd; /* for poll(); -1 when closed */
@@ -25,6 +30,10 @@ struct can_socket {
     struct can_match filters[CAN_SOCKET_FILTERS];
     size_t filter_count;
     bool local;
+    uint16_t tracked[CAN_SOCKET_TRACKED]; /* identifiers that were ever tracked */
+    size_t tracked_count;
+    uint16_t waiting[CAN_SOCKET_TRACKED]; /* of the tracked frames that have not come back */
+    size_t waiting_count;
 };
 
 /* Opens and binds: a network interface, or with a '/' in its name the local bus of hodograph-hub (sim/hub) at this path.
@@ -42,6 +51,19 @@ int can_socket_defer(struct can_socket *socket, const struct can_match *frames, 
 /* 0; -EAGAIN when the queue is full (the frame is not sent); else a negative errno (interface down,
  * removed). */
 int can_socket_send(struct can_socket *socket, const struct can_msg *message);
+
+/* Tracks the next frame with this identifier; call it before the frame is sent. 0; -ENOSPC when too many are tracked, or another
+ * negative errno: then it is not tracked. */
+int can_socket_track(struct can_socket *socket, uint16_t id);
+
+/* The frame was not sent after all. */
+void can_socket_untrack(struct can_socket *socket, uint16_t id);
+
+/* How many tracked frames still wait for the bus, as far as can_socket_receive has seen. */
+size_t can_socket_waiting(const struct can_socket *socket);
+
+/* Gives up those that wait: a controller that leaves the bus drops its frames without a word. */
+void can_socket_forget(struct can_socket *socket);
 
 /* Sends up to CAN_SOCKET_BATCH frames in one call of the system. Returns how many went out, from the
  * first on; -EAGAIN when not even one did (queue full); else a negative errno. */

@@ -31,6 +31,13 @@ static struct {
     uint32_t mainline_turns; /* atomic too */
 } self;
 
+static __thread bool in_tick;
+
+bool interrupts_in_tick(void)
+{
+    return in_tick;
+}
+
 void port_lock(void)
 {
     (void)pthread_mutex_lock(&self.lock);
@@ -72,8 +79,10 @@ static void run_tick(void)
 {
     port_lock();
     const uint64_t late_ns = schedule_start(&self.schedule, self.now_ns);
+    in_tick = true;
     self.handlers.tick(self.handlers.self, now_us(),
                        late_ns < UINT32_MAX ? (uint32_t)late_ns : UINT32_MAX);
+    in_tick = false;
     schedule_finish(&self.schedule, self.schedule.hurry ? self.now_ns : clock_ns());
     port_unlock();
 }

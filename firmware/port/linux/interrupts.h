@@ -34,6 +34,9 @@ void interrupts_mainline_sleeps(void);
 /* Virtual time: sleeps until an interrupt comes, for `longest_ns` at most, and runs it. Mainline. */
 void interrupts_run(uint64_t longest_ns);
 
+/* Whether the caller is a tick. */
+bool interrupts_in_tick(void);
+
 /* Ends the thread and waits for it. Harmless when it never started. */
 void interrupts_end(void);
 

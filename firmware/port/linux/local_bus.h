@@ -22,13 +22,16 @@
 #include <linux/can.h>
 
 #define LOCAL_BUS_MARK    0xFFFFFFFFu /* no identifier of a frame: so this is no frame */
-#define LOCAL_BUS_VERSION 1u
+#define LOCAL_BUS_VERSION 2u
 #define LOCAL_BUS_NAME    32u /* bytes of a name with its end */
 #define LOCAL_BUS_FILTERS 48u
 #define LOCAL_BUS_NEVER   UINT64_MAX
 
 /* The name of a participant, where the program that started it wants to know it by one. */
 #define LOCAL_BUS_NAME_VARIABLE "HODOGRAPH_PARTICIPANT"
+
+/* In frame.__res0 of a frame that comes back to the member that has sent it (LOCAL_BUS_TRACK); 0 in all others. */
+#define LOCAL_BUS_OWN 1u
 
 /* A frame on its way to a member. */
 struct local_bus_frame {
@@ -42,6 +45,9 @@ enum local_bus_kind {
     LOCAL_BUS_HELLO_PARTICIPANT = 2, /* name; flags: WATCHES */
     LOCAL_BUS_FILTER = 3,            /* of a member: frames that it wants (local_bus_filters) */
     LOCAL_BUS_DEFER = 4,             /* of a member: frames that do not wake its participant */
+    LOCAL_BUS_TRACK =
+        8, /* of a member: frames of its own that come back to it when their last bit is sent, in virtual
+                          * time; they do not wake its participant */
     LOCAL_BUS_WAIT = 5,     /* number: of the last grant; flags: SENT; time_ns: when to wake
                                   * it, or before it with a frame */
     LOCAL_BUS_SUSPEND = 6,  /* name: it gets no more grants, as if its processor stood still */
@@ -75,7 +81,7 @@ struct local_bus_control {
  * none of them every frame passes. */
 struct local_bus_filters {
     uint32_t mark;
-    uint16_t kind; /* LOCAL_BUS_FILTER or LOCAL_BUS_DEFER */
+    uint16_t kind; /* LOCAL_BUS_FILTER, LOCAL_BUS_DEFER or LOCAL_BUS_TRACK */
     uint16_t count;
     struct can_filter filters[LOCAL_BUS_FILTERS]; /* the packet ends after `count` of them */
 };

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
 #include "port/linux/options.h"
 
+#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,48 +66,51 @@ static enum options_result set_pace(struct options *options, const char *value)
     return OPTIONS_OK;
 }
 
-static enum options_result set_valued(struct options *options, const char *name, const char *value)
-{
-    if (strcmp(name, "--bus") == 0) {
-        options->bus = value;
-        return OPTIONS_OK;
-    }
-    if (strcmp(name, "--store") == 0) {
-        options->store = value;
-        return OPTIONS_OK;
-    }
-    return strcmp(name, "--node") == 0 ? set_node(options, value) : set_pace(options, value);
-}
-
-static bool takes_value(const char *name)
-{
-    return strcmp(name, "--bus") == 0 || strcmp(name, "--node") == 0 ||
-           strcmp(name, "--pace") == 0 || strcmp(name, "--store") == 0;
-}
-
 enum options_result options_parse(struct options *options, int argc, char **argv)
 {
+    static const struct option known[] = {
+        {"help", no_argument, NULL, 'h'},        {"bus", required_argument, NULL, 'b'},
+        {"node", required_argument, NULL, 'n'},  {"pace", required_argument, NULL, 'p'},
+        {"store", required_argument, NULL, 's'}, {"no-realtime", no_argument, NULL, 'r'},
+        {"verbose", no_argument, NULL, 'v'},     {NULL, 0, NULL, 0}};
     *options = (struct options){.bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME};
-    for (int i = 1; i < argc; ++i) {
-        if (strcmp(argv[i], "--help") == 0) {
+    enum options_result result = OPTIONS_OK;
+    optind = 0; /* from the start, in a second call too */
+    while (result == OPTIONS_OK) {
+        const int at = optind > 0 ? optind : 1;
+        switch (getopt_long(argc, argv, "+:", known, NULL)) {
+        case -1:
+            if (optind < argc) {
+                return wrong("unknown argument", argv[optind]);
+            }
+            return options->bus != NULL ? OPTIONS_OK
+                                        : wrong("name the CAN interface with", "--bus");
+        case 'h':
             (void)fputs(help, stdout);
             return OPTIONS_HELP;
-        }
-        if (strcmp(argv[i], "--verbose") == 0) {
-            options->verbose = true;
-        } else if (strcmp(argv[i], "--no-realtime") == 0) {
+        case 'b':
+            options->bus = optarg;
+            break;
+        case 'n':
+            result = set_node(options, optarg);
+            break;
+        case 'p':
+            result = set_pace(options, optarg);
+            break;
+        case 's':
+            options->store = optarg;
+            break;
+        case 'r':
             options->no_realtime = true;
-        } else if (!takes_value(argv[i])) {
-            return wrong("unknown argument", argv[i]);
-        } else if (i + 1 >= argc) {
-            return wrong("a value is missing after", argv[i]);
-        } else {
-            const enum options_result result = set_valued(options, argv[i], argv[i + 1]);
-            if (result != OPTIONS_OK) {
-                return result;
-            }
-            ++i;
+            break;
+        case 'v':
+            options->verbose = true;
+            break;
+        case ':':
+            return wrong("a value is missing after", argv[at]);
+        default:
+            return wrong("unknown argument", argv[at]);
         }
     }
-    return options->bus != NULL ? OPTIONS_OK : wrong("name the CAN interface with", "--bus");
+    return result;
 }

@@ -17,12 +17,16 @@
 #include "port/linux/options.h"
 #include "port/linux/store.h"
 
+#define LOST_NS 100000000u /* real drives have long stopped by then */
+
 enum exit_status { EXIT_MACHINE = 1, EXIT_USAGE = 2, EXIT_BUS = 4 };
 
 static struct {
     struct options options;
     struct can_socket socket;
     int wake_fd;
+    bool waits; /* frames of ticks, for the bus */
+    uint64_t waits_since_ns;
     volatile sig_atomic_t stop;  /* signals so far, 2 at most */
     volatile sig_atomic_t woken; /* virtual time: the mainline has something to do */
 } self;
@@ -124,9 +128,41 @@ int port_can_accept(const struct can_match *filters, size_t count)
     return can_socket_filter(&self.socket, filters, count) == 0 ? 0 : PORT_ERR_SYSTEM;
 }
 
+/* A frame that cannot be tracked counts as delivered. */
+static int send_from_tick(const struct can_msg *message)
+{
+    const bool tracked = can_socket_track(&self.socket, (uint16_t)message->id) == 0;
+    const int error = can_socket_send(&self.socket, message);
+    if (error != 0 && tracked) {
+        can_socket_untrack(&self.socket, (uint16_t)message->id);
+    }
+    return error;
+}
+
 int port_can_send(const struct can_msg *message)
 {
-    return can_socket_send(&self.socket, message) == 0 ? 0 : PORT_ERR_FULL;
+    const int error =
+        interrupts_in_tick() ? send_from_tick(message) : can_socket_send(&self.socket, message);
+    return error == 0 ? 0 : PORT_ERR_FULL;
+}
+
+/* An interface that goes bus-off drops what it was to send, and nothing tells. On a local bus nothing is lost. */
+bool port_can_delivered(void)
+{
+    if (can_socket_waiting(&self.socket) == 0u) {
+        self.waits = false;
+        return true;
+    }
+    const uint64_t now_ns = clock_ns();
+    if (!self.waits) {
+        self.waits = true;
+        self.waits_since_ns = now_ns;
+    }
+    if (!self.socket.local && now_ns - self.waits_since_ns > LOST_NS) {
+        can_socket_forget(&self.socket);
+        self.waits = false;
+    }
+    return !self.waits;
 }
 
 uint32_t port_time_ns(void)

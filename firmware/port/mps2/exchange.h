@@ -19,7 +19,8 @@
 struct exchange_frame {
     uint32_t id;
     uint8_t len;
-    uint8_t reserved[3];
+    uint8_t of_tick; /* request: 1, the next tick asks whether it has been sent on the bus */
+    uint8_t reserved[2];
     uint8_t data[CAN_DATA_MAX];
 };
 
@@ -35,8 +36,9 @@ enum exchange_request_flag {
 };
 
 enum exchange_reply_flag {
-    EXCHANGE_DUE = 1,  /* the next tick is due */
-    EXCHANGE_STOP = 2, /* the controller shall end */
+    EXCHANGE_DUE = 1,     /* the next tick is due */
+    EXCHANGE_STOP = 2,    /* the controller shall end */
+    EXCHANGE_WAITING = 4, /* frames of ticks still wait for the bus */
 };
 
 /* Before the frames of either message. */

@@ -15,6 +15,7 @@ static struct {
     uint32_t late_ns;        /* of the next tick */
     volatile uint32_t ticks; /* so far; wraps */
     volatile bool woken;
+    bool in_tick; /* nothing else runs meanwhile */
 } self;
 
 void interrupts_begin(const struct link *link)
@@ -26,6 +27,11 @@ void interrupts_begin(const struct link *link)
 void interrupts_end(void)
 {
     systick_end();
+}
+
+bool interrupts_in_tick(void)
+{
+    return self.in_tick;
 }
 
 int port_start(const struct port_handlers *handlers, uint32_t period_us)
@@ -82,7 +88,9 @@ void startup_systick(void)
     systick_tick();
     self.ticks++;
     self.wish = (struct link_wish){.awaiting = false};
+    self.in_tick = true;
     run_tick();
+    self.in_tick = false;
     self.late_ns = self.link->after_tick(&self.wish);
 }
 

@@ -9,6 +9,7 @@
 #ifndef PORT_MPS2_INTERRUPTS_H
 #define PORT_MPS2_INTERRUPTS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "port/mps2/link.h"
@@ -20,6 +21,9 @@
 void interrupts_begin(const struct link *link);
 
 void interrupts_end(void);
+
+/* Whether the caller is a tick. */
+bool interrupts_in_tick(void);
 
 /* A frame for the receive handler. Any interrupt; harmless before port_start(). */
 void interrupts_receive(const struct can_msg *message);

@@ -34,6 +34,9 @@ struct link {
     /* Any context. 0 or PORT_ERR_FULL. */
     int (*send)(const struct can_msg *message);
 
+    /* port_can_delivered(): in a tick. */
+    bool (*delivered)(void);
+
     /* In the tick's interrupt, after the tick. `wish` changes when a frame that was received ends the waiting. Returns how late the next tick
      * will be, in ns. */
     uint32_t (*after_tick)(const struct link_wish *wish);

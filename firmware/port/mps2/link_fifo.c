@@ -89,11 +89,18 @@ static int send(const struct can_msg *message)
     int result = PORT_ERR_FULL;
     const uint32_t before = core_mask();
     if (self.out.header.count < EXCHANGE_FRAMES && !self.failed) {
-        exchange_pack(&self.out.frames[self.out.header.count++], message);
+        struct exchange_frame *frame = &self.out.frames[self.out.header.count++];
+        exchange_pack(frame, message);
+        frame->of_tick = interrupts_in_tick() ? 1u : 0u;
         result = 0;
     }
     core_unmask(before);
     return result;
+}
+
+static bool delivered(void)
+{
+    return (self.in.header.flags & EXCHANGE_WAITING) == 0u;
 }
 
 static uint16_t tick_flags(const struct link_wish *wish)
@@ -140,6 +147,7 @@ const struct link link_fifo = {
     .begin = begin,
     .accept = accept,
     .send = send,
+    .delivered = delivered,
     .after_tick = after_tick,
     .end = end,
     .stop_requested = stop_requested,

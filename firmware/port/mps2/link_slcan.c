@@ -10,6 +10,7 @@ static struct {
     struct slcan_decoder decoder;
     struct can_match filters[PORT_FILTERS];
     size_t filter_count;
+    uint32_t mark; /* behind the last frame of a tick */
     volatile bool stop;
 } self;
 
@@ -50,7 +51,17 @@ static int accept(const struct can_match *filters, size_t count)
 static int send(const struct can_msg *message)
 {
     char line[SLCAN_LINE_MAX];
-    return uart_send(line, slcan_encode(message, line)) ? 0 : PORT_ERR_FULL;
+    const bool sent = uart_send(line, slcan_encode(message, line));
+    if (sent && interrupts_in_tick()) {
+        self.mark = uart_mark();
+    }
+    return sent ? 0 : PORT_ERR_FULL;
+}
+
+/* Up to the adapter: what waits there nobody tells. */
+static bool delivered(void)
+{
+    return uart_passed(self.mark);
 }
 
 /* The clock alone says when the next tick is due. */
@@ -84,6 +95,7 @@ const struct link link_slcan = {
     .begin = begin,
     .accept = accept,
     .send = send,
+    .delivered = delivered,
     .after_tick = after_tick,
     .end = end,
     .stop_requested = stop_requested,

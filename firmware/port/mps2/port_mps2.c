@@ -99,6 +99,11 @@ int port_can_send(const struct can_msg *message)
     return self.link->send(message);
 }
 
+bool port_can_delivered(void)
+{
+    return self.link->delivered();
+}
+
 uint32_t port_time_ns(void)
 {
     return systick_ns();

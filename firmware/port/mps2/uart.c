@@ -53,6 +53,16 @@ bool uart_send(const char *text, uint32_t length)
     return room;
 }
 
+uint32_t uart_mark(void)
+{
+    return self.head;
+}
+
+bool uart_passed(uint32_t mark)
+{
+    return (int32_t)(self.tail - mark) >= 0;
+}
+
 bool uart_idle(void)
 {
     return self.head == self.tail;

@@ -39,6 +39,7 @@ struct fdcan {
     struct fdcan_queue urgent;   /* of the interrupts */
     struct fdcan_queue ordinary; /* of the mainline */
     struct fdcan_events events;
+    bool mainline_last;   /* the youngest frame in the chip is the mainline's */
     uint32_t guard_100ns; /* before a tick, in which the mainline's frames stay back */
     bool off;             /* not on the bus: not started, or bus-off */
 };
@@ -57,6 +58,9 @@ void fdcan_stop(struct fdcan *can);
 
 /* False: off the bus, or no room; the frame is not queued. Any context. */
 bool fdcan_send(struct fdcan *can, const struct can_msg *message, enum fdcan_sender sender);
+
+/* Whether no frame of the interrupts waits for the bus: each has been sent, or was dropped in bus-off. Any context. */
+bool fdcan_delivered(const struct fdcan *can);
 
 /* Receive interrupt: first acknowledge, then fetch until there is none, then attend to what was acknowledged. */
 uint32_t fdcan_acknowledge(void);

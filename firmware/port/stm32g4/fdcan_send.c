@@ -40,6 +40,7 @@ void fdcan_feed(struct fdcan *can)
             return;
         }
         transmit(status, fdcan_queue_front(queue));
+        can->mainline_last = queue == &can->ordinary;
         fdcan_queue_drop(queue);
     }
 }
@@ -54,4 +55,16 @@ bool fdcan_send(struct fdcan *can, const struct can_msg *message, enum fdcan_sen
     }
     (void)cpu_hold(before);
     return taken;
+}
+
+/* The chip sends in the order of the requests, and takes a frame of the mainline only when it is empty: where that is the youngest
+ * there, those of the interrupts have gone. */
+bool fdcan_delivered(const struct fdcan *can)
+{
+    const uint8_t before = cpu_hold(CPU_PRIORITY_TICK);
+    const uint32_t room = reg_get(fdcan_get(FDCAN_TXFQS), FDCAN_TXFQS_TFFL);
+    const bool in_chip = room < FDCAN_FIFO_ELEMENTS && !can->mainline_last;
+    const bool waits = fdcan_queue_front(&can->urgent) != NULL || in_chip;
+    (void)cpu_hold(before);
+    return can->off || !waits;
 }

@@ -107,6 +107,11 @@ int port_can_send(const struct can_msg *message)
     return fdcan_send(&self.can, message, sender) ? 0 : PORT_ERR_FULL;
 }
 
+bool port_can_delivered(void)
+{
+    return fdcan_delivered(&self.can);
+}
+
 uint32_t port_time_ns(void)
 {
     return tick_timer_ns();

@@ -8,12 +8,13 @@ is opened again. The first line tells which campaign it belongs to.
 from __future__ import annotations
 
 import base64
-import fcntl
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
+
+from filelock import lock_descriptor
 
 from ..errors import InputError
 from .execute import Built, Outcome
@@ -97,12 +98,10 @@ def journal(folder: Path, fingerprint: str, total: int, *, fresh: bool) -> Itera
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror}") from None
     with stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not lock_descriptor(stream.fileno(), blocking=False):
             raise InputError(
                 f"{file}: another `hodograph campaign` is at work on it: wait for it, or use another folder with -o"
-            ) from None
+            )
         made = Journal(stream, Results(total))
         made.read(fingerprint, fresh=fresh)
         yield made

@@ -21,6 +21,7 @@ struct program_limits {
     int64_t min_q40_mm[2], max_q40_mm[2];
     uint32_t axis_velocity_um_s[2], axis_acceleration_um_s2[2], axis_jerk_mm_s3[2];
     uint32_t stop_time_ms;
+    ...;
 };
 struct program_fault {
     int code;
@@ -193,6 +194,8 @@ struct stop_limits {
     uint32_t cap_count, reach_at_pace, rise_is_cut;
 };
 struct stop_found {
+    uint8_t known;
+    uint8_t before[3];
     uint8_t codes[3];
     double worst_s, mean_s;
 };

@@ -77,14 +77,26 @@ class StopSearch:
             values[name] = float(value) if isinstance(value, float) else (value[0], value[1])
         return StopLimits(**values)
 
-    def codes(self, limits: StopLimits) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-        """Codes (M, 3), and times (M, 2) to rest, the longest and the mean of the instants looked at."""
+    def codes(
+        self,
+        limits: StopLimits,
+        given: NDArray[np.uint8],
+        known: NDArray[np.bool_],
+        before: NDArray[np.uint8] | None = None,
+    ) -> NDArray[np.uint8]:
+        """Codes (M, 3): `given` where they are `known` (M,), found elsewhere; good also for a brake that begins out of
+        one with the codes `before` (M, 3).
+        """
         ffi, lib = library()
-        given = limits_struct(limits)
+        own = limits_struct(limits)
         found = ffi.new("struct stop_found[]", self._count)
-        lib.stop_search(self._program.pointer, given[0], self._rows(given), found)
-        table = np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
-        return table, np.array([(one.worst_s, one.mean_s) for one in found]).reshape(-1, 2)
+        for one, codes, is_known in zip(found, given.tolist(), known.tolist(), strict=True):
+            one.known, one.codes = is_known, codes
+        if before is not None:
+            for one, codes in zip(found, before.tolist(), strict=True):
+                one.before = codes
+        lib.stop_search(self._program.pointer, own[0], self._rows(own), found)
+        return np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
 
     def _rows(self, given: tuple[Any, Any]) -> Any:
         ffi, lib = library()

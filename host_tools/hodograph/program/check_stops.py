@@ -36,7 +36,8 @@ HALVINGS = 3
 """Each eighth of a piece is looked at for itself."""
 LITTLE = 0.25
 """Share of the deceleration that a rising rate of program time may add when a hold's brake begins."""
-_HAIR = 1e-9
+_HAIR = 1e-12
+"""Share of a bound that rounding may take from it here."""
 _MOST_US = 2.0**32 - 1.0
 
 
@@ -81,21 +82,23 @@ def _entry_faults(
 def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramError, int] | None:
     least_us, least_um = bounds(program, kind)
     said = program.stops.bound_us[:, kind].astype(np.float64)
-    brief = said < np.minimum(least_us, _MOST_US) - _HAIR
+    brief = said < np.minimum(least_us, _MOST_US) * (1.0 - _HAIR)
     too_long = (said > most_ms * 1000.0) & (most_ms > 0)
     hits = np.flatnonzero(brief | too_long)
     if hits.size:
         index = int(hits[-1])
         return (ProgramError.STOP_BOUND if brief[index] else ProgramError.STOP_LONG), index
     worst_us, worst_um = program.stops.worst_us[kind], program.stops.worst_um[kind]
-    if worst_us != int(said.max()) or worst_um < min(float(least_um.max()), _MOST_US) - _HAIR:
+    if worst_us != int(said.max()) or worst_um < min(float(least_um.max()), _MOST_US) * (
+        1.0 - _HAIR
+    ):
         return ProgramError.STOP_WORST, 0
     return None
 
 
 def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     """Least bounds (M,) of time in us and of the way in um, from the command to rest."""
-    own_s, own_mm, waits = _own(program, kind)
+    own_s, own_mm, waits = own_bounds(program, kind)
     duration = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
     start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
     way = np.maximum(np.diff(start), 0.0)
@@ -115,7 +118,7 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     return out_s[:-1] * 1e6, out_mm[:-1] * 1e3
 
 
-def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
+def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
     """Time in s and way in mm (M,) of a stop that brakes in the piece in which it was asked for, 0 where none may, and
     the share of the piece, up to its end, from which it may go on into the next.
     """
@@ -141,10 +144,10 @@ def _own(program: Program, kind: int) -> tuple[Real, Real, Real]:
             _Start(speed * rate, rising * rate**2, steepest * speed, steepest / second),
             number,
             kind,
-            wait_s,
             period_s,
         )
         time_s, way_mm = np.maximum(time_s, own_s), np.maximum(way_mm, own_mm)
+    time_s, way_mm = time_s + wait_s, way_mm + speed * pieces.override_factor * wait_s
     return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)
 
 
@@ -160,10 +163,8 @@ class _Start:
     cut_s: Real
 
 
-def _level(
-    start: _Start, number: Real, kind: int, wait_s: Real, period_s: float
-) -> tuple[Real, Real]:
-    """Time and way (M,) of stops that begin in one level of the rate."""
+def _level(start: _Start, number: Real, kind: int, period_s: float) -> tuple[Real, Real]:
+    """Time and way (M,) of stops that begin in one level of the rate, waits left out."""
     speed, rising, slope, cut_s = start.speed, start.rising, start.slope, start.cut_s
     more_s = np.full(speed.size, STOP_TICKS * period_s)
     if kind == HOLD:
@@ -171,7 +172,6 @@ def _level(
         more_s = np.where(slope > little, more_s + cut_s, more_s)
         cut_s = np.where(slope > little, cut_s * little / np.maximum(slope, 1e-300), cut_s)
         slope = np.minimum(slope, little)
-    more_s = more_s + wait_s
     speed = speed + 0.5 * (rising + slope) * period_s
     lead_s, slope_s = rising / number[:, JERK_DOWN], slope / number[:, JERK_DOWN]
     # A rate that still rises is below the greatest by what it goes up while its slope is taken back.

@@ -6,19 +6,31 @@ section 7.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import PlanError
 from ..feed import AxisLimits, Plan
+from ..feed.halving import halved
 from ..feed.plant import Plants
 from ..native.program import NativeProgram
 from ..native.stop_bounds import stop_bounds
 from ..native.stop_search import FREE, StopLimits, StopSearch
+from .check_stops import END_TICKS, own_bounds
 from .image import Program, encode
-from .stops import FAULT, HOLD, Stops
+from .stops import DECELERATION, FAULT, HOLD, Stops, no_stops
+
+WORTH_SHARE = 0.9
+"""Parts of a piece, and numbers, have to make the bound shorter to this share of what it is without them."""
+LEAST_PERIODS = 2
+"""A part of a piece is not halved below this."""
+MOST_MISSES = 2
+"""Halvings without numbers, after which a part is not halved again."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +50,149 @@ class StopTerms:
 
 
 def plan_stops(program: Program, plan: Plan, terms: StopTerms) -> Program:
-    """The program with its stop table. Raises PlanError: a fault stop may take longer than `stop_time_ms`."""
-    image = NativeProgram(encode(program))
-    search = StopSearch(image)
-    codes = np.zeros((program.piece_count, 2, 3), dtype=np.uint8)
-    for kind, limits in ((HOLD, hold_limits(plan, terms)), (FAULT, fault_limits(plan, terms))):
-        codes[:, kind] = search.codes(limits.raised(search.used(limits)))[0]
-    return _checked(with_bounds(replace(program, stops=replace(program.stops, codes=codes))), terms)
+    """The program with its stop table. Feed pieces in which no numbers are found are halved, as far as that helps: a
+    place where no brake may begin, such as a narrow bend that is passed as fast as its limits allow, need not keep the
+    whole piece from braking. Raises PlanError: a fault stop may take longer than `stop_time_ms`.
+    """
+    search = StopSearch(NativeProgram(encode(program)))
+    limits = [
+        own.raised(search.used(own))
+        for own in (hold_limits(plan, terms), fault_limits(plan, terms))
+    ]
+    tree = _Halves(program)
+    codes = _searched(tree, limits)
+    for kind in (HOLD, FAULT):
+        codes[_better_without(_with_codes(tree.program, codes), kind, tree.pieces), kind] = 0
+    return _checked(with_bounds(_with_codes(*tree.joined(codes))), terms)
+
+
+def _searched(tree: _Halves, limits: Sequence[StopLimits]) -> NDArray[np.uint8]:
+    """Codes (M, 2, 3) of a program whose pieces without numbers of a kind are halved until all have them, or are too
+    short to be halved, or MOST_MISSES halvings one after the other have found none. What has numbers keeps them, so
+    nothing is searched twice.
+    """
+    count = tree.program.piece_count
+    codes = np.zeros((count, 2, 3), dtype=np.uint8)
+    known = np.zeros((count, 2), dtype=np.bool_)
+    misses: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
+    while True:
+        _search_round(tree.program, limits, codes, known)
+        found = codes[:, :, DECELERATION] != 0
+        tree.count_misses(misses, (found & ~known).any(axis=1))
+        lacking = ~found.all(axis=1) & ~known.all(axis=1)
+        chosen = lacking & tree.long_enough() & (misses < MOST_MISSES)
+        if not chosen.any():
+            return codes
+        known = np.repeat(found | ~chosen[:, None], 1 + chosen, axis=0)
+        codes, misses = np.repeat(codes, 1 + chosen, axis=0), np.repeat(misses, 1 + chosen)
+        tree.halve(chosen)
+
+
+def _search_round(
+    program: Program,
+    limits: Sequence[StopLimits],
+    codes: NDArray[np.uint8],
+    known: NDArray[np.bool_],
+) -> None:
+    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: numbers
+    for it are known only where those of the hold are.
+    """
+    search = StopSearch(NativeProgram(encode(program)))
+    codes[:, HOLD] = search.codes(limits[HOLD], codes[:, HOLD], known[:, HOLD])
+    given = known[:, FAULT] & (known[:, HOLD] | (codes[:, HOLD, DECELERATION] == 0))
+    codes[:, FAULT] = search.codes(limits[FAULT], codes[:, FAULT], given, codes[:, HOLD])
+
+
+def _better_without(program: Program, kind: int, pieces: list[int]) -> NDArray[np.bool_]:
+    """Parts (M,) that had better have no numbers of a kind: those whose numbers give a bound that is longer by a tenth
+    than the way on into the next part, and all of a piece (`pieces`, (M,)) where numbers that differ between its parts
+    make no bound shorter by that.
+    """
+    own_s, _, waits = own_bounds(program, kind)
+    duration_s = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    out: NDArray[np.bool_] = np.zeros(duration_s.size, dtype=np.bool_)
+    next_s = END_TICKS * program.period_us * 1e-6
+    for _, group in groupby(range(duration_s.size - 1, -1, -1), key=pieces.__getitem__):
+        parts = list(group)
+        whole_s, worst_s = float(duration_s[parts].sum()) + next_s, 0.0
+        for i in parts:
+            waiting_s = float(duration_s[i]) + next_s
+            numbers_s = max(own_s[i], waits[i] * duration_s[i] + next_s if waits[i] > 0.0 else 0.0)
+            out[i] = waiting_s < WORTH_SHARE * numbers_s
+            next_s = waiting_s if out[i] else numbers_s
+            worst_s = max(worst_s, next_s)
+        differ = (program.stops.codes[parts, kind] != program.stops.codes[parts[0], kind]).any()
+        if differ and worst_s > WORTH_SHARE * whole_s:
+            out[parts], next_s = True, whole_s
+    return out
+
+
+def _with_codes(program: Program, codes: NDArray[np.uint8]) -> Program:
+    return replace(program, stops=replace(no_stops(program.piece_count), codes=codes))
+
+
+class _Halves:
+    """A program some of whose feed pieces are halved, and their halves again.
+
+    A part is known by the piece that it is of, and its number as in a binary heap: 1 is the whole piece, 2 n and
+    2 n + 1 are the halves of n.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self._whole = self.program = program
+        self._parts = [(piece, 1) for piece in range(program.piece_count)]
+        self._new: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+
+    @property
+    def pieces(self) -> list[int]:
+        """The piece (M,) that each part is of."""
+        return [piece for piece, _ in self._parts]
+
+    def long_enough(self) -> NDArray[np.bool_]:
+        """Which parts may be halved (M,): no two neighbours may last two periods or less
+        (docs/reference/protocol.md 1.3)."""
+        least_q32 = (LEAST_PERIODS * self.program.period_us << 32) // 1_000_000
+        return np.asarray(self.program.pieces.duration_q32_s >= 2 * least_q32)
+
+    def halve(self, chosen: NDArray[np.bool_]) -> None:
+        """Halves the chosen parts (M,)."""
+        self.program = _with_pieces(self.program, chosen)
+        self._new = np.flatnonzero(np.repeat(chosen, 1 + chosen))
+        self._parts = [
+            (piece, own)
+            for (piece, number), halves in zip(self._parts, chosen.tolist(), strict=True)
+            for own in ((2 * number, 2 * number + 1) if halves else (number,))
+        ]
+
+    def count_misses(self, misses: NDArray[np.int64], found: NDArray[np.bool_]) -> None:
+        """Counts in `misses` (M,) the last halvings of each part, one after the other, after which neither half had
+        numbers that it had not had (`found`, (M,)).
+        """
+        either = found[self._new].reshape(-1, 2).any(axis=1).repeat(2)
+        misses[self._new] = np.where(either, 0, misses[self._new] + 1)
+
+    def joined(self, codes: NDArray[np.uint8]) -> tuple[Program, NDArray[np.uint8]]:
+        """The program and its codes (M, 2, 3) without the halves that have the same numbers."""
+        leaves = dict(zip(self._parts, codes, strict=True))
+        inner: set[tuple[int, int]] = set()
+        for piece, number in self._parts:
+            inner |= {(piece, number >> up) for up in range(1, number.bit_length())}
+        for piece, number in sorted(inner, key=lambda part: -part[1]):
+            low, high = (piece, 2 * number), (piece, 2 * number + 1)
+            if low in leaves and high in leaves and np.array_equal(leaves[low], leaves[high]):
+                leaves[piece, number] = leaves.pop(low)
+                leaves.pop(high)
+        tree = _Halves(self._whole)
+        while True:
+            chosen = np.array([part not in leaves for part in tree._parts])
+            if not chosen.any():
+                return tree.program, np.stack([leaves[part] for part in tree._parts])
+            tree.halve(chosen)
+
+
+def _with_pieces(program: Program, chosen: NDArray[np.bool_]) -> Program:
+    pieces = halved(program.pieces, chosen, program.length_q40)
+    return replace(program, pieces=pieces, stops=no_stops(len(pieces)))
 
 
 def with_bounds(program: Program) -> Program:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from pathlib import Path
 
@@ -11,7 +12,9 @@ import pytest
 
 from hodograph.cli.main import main
 from hodograph.config import load_machine
+from hodograph.data import DRIVE_EDS
 from hodograph.dbc import dbc_text
+from hodograph.errors import InputError
 
 MACHINES = Path(__file__).resolve().parents[3] / "examples" / "machines"
 MACHINE = MACHINES / "paper_alpha.toml"
@@ -70,7 +73,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "alpha.dbc"
     assert main(["dbc", str(MACHINE), "-o", str(output)]) == 0
     assert "16 frames" in capsys.readouterr().out
-    assert output.read_text() == dbc_text(load_machine(MACHINE))
+    assert output.read_bytes().decode() == dbc_text(load_machine(MACHINE))
 
 
 def test_something_else_than_an_eds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -78,3 +81,28 @@ def test_something_else_than_an_eds(tmp_path: Path, capsys: pytest.CaptureFixtur
     eds.write_text("hello")
     assert main(["dbc", str(MACHINE), "-o", str(tmp_path / "x"), "--eds", str(eds)]) == 2
     assert "not an EDS" in capsys.readouterr().err
+
+
+def drive_with(folder: Path, old: str, new: str) -> Path:
+    text = DRIVE_EDS.read_text(encoding="utf-8")
+    assert old in text
+    eds = folder / "drive.eds"
+    eds.write_text(text.replace(old, new), encoding="utf-8")
+    return eds
+
+
+def test_two_objects_of_one_name_are_refused(tmp_path: Path) -> None:
+    eds = drive_with(tmp_path, "ParameterName=Target position", "ParameterName=Controlword")
+    with pytest.raises(InputError, match=r"drive\.eds: its PDOs give no DBC: .*Drive2_Controlword"):
+        dbc_text(load_machine(MACHINE), eds)
+
+
+def test_a_name_longer_than_a_dbc_has_room_for(tmp_path: Path) -> None:
+    name = "Target position in the coordinates of the machine"
+    eds = drive_with(tmp_path, "ParameterName=Target position", f"ParameterName={name}")
+    text = dbc_text(load_machine(MACHINE), eds)
+    assert max(map(len, re.findall(r"^ SG_ (\w+) :", text, re.MULTILINE))) == 32
+    found = cantools.database.load_string(text, "dbc", strict=True).get_message_by_name(
+        "Drive2_RPDO1"
+    )
+    assert found.signals[1].name == "Drive2_TargetPositionInTheCoordinatesOfTheMachine"

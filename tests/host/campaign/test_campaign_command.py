@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import io
 import json
 import random
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from campaign_files import EXAMPLES, MACHINE, PATH, Write, table
+from filelock import lock_descriptor
 
 from hodograph.campaign import conduct as conducting
 from hodograph.campaign import engine as engines
@@ -179,7 +179,7 @@ def test_two_at_once_are_refused(
     folder = tmp_path / "out"
     folder.mkdir()
     with (folder / "runs.journal").open("wb") as held:
-        fcntl.flock(held, fcntl.LOCK_EX)
+        assert lock_descriptor(held.fileno(), blocking=False)
         assert run(write('paths = ["path.toml"]'), folder) == 2
     assert "another `hodograph campaign` is at work on it" in capsys.readouterr().err
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-TOOL = ROOT / "tools" / "eds_to_c.py"
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT / "tools")}
+TOOL = [sys.executable, "-m", "eds.to_c"]
 EDS_FILES = {
     "controller": ROOT / "firmware" / "app" / "controller.eds",
     "drive": ROOT / "sim" / "node" / "drive.eds",
@@ -103,8 +105,12 @@ AccessType=rw
 
 
 def run(eds: Path, name: str, out: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(TOOL), str(eds), name, str(out)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return tool(str(eds), name, str(out))
+
+
+def tool(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [*TOOL, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=ENVIRONMENT)
 
 
 def generate(text: str, folder: Path) -> tuple[str, str]:
@@ -189,9 +195,7 @@ def test_missing_file(tmp_path: Path) -> None:
 
 
 def test_usage(tmp_path: Path) -> None:
-    result = subprocess.run(
-        [sys.executable, str(TOOL)], capture_output=True, text=True, check=False
-    )
+    result = tool()
     assert result.returncode == 2
     assert "usage" in result.stderr
 

@@ -58,9 +58,10 @@ def to_c(message: Message) -> Frame:
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     folder = tmp_path_factory.mktemp("device")
-    tool = str(ROOT / "tools" / "eds_to_c.py")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tools")}
     for name, eds in EDS_FILES.items():
-        subprocess.run([sys.executable, tool, str(eds), name, str(folder)], check=True)
+        command = [sys.executable, "-m", "eds.to_c", str(eds), name, str(folder)]
+        subprocess.run(command, check=True, env=environment)
     sources = [Path(__file__).with_name("device.c"), *(ROOT / "firmware" / "canopen").glob("*.c")]
     made = folder / "device.so"
     command = [os.environ.get("CC", "cc"), "-std=c99", "-O1", "-fPIC", "-shared"]

@@ -94,7 +94,9 @@ def test_a_plan_that_is_refused_is_planned_again_with_more_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, profile: str, share: float, attempts: int
 ) -> None:
     planned_beyond(monkeypatch, share)
-    made = chain(tmp_path, NEAR, profile, "respect", machine(jerk_mm_s3=20000.0))
+    # A plan that uses a tenth of the usual jerk fully leaves no room for a brake until it is past the bend.
+    slow = replace(machine(jerk_mm_s3=20000.0), stop_time_ms=1000)
+    made = chain(tmp_path, NEAR, profile, "respect", slow)
     verdicts: list[NativeFault | None] = []
     check = NativeProgram.check
 

@@ -8,13 +8,14 @@ to let pass what was still on its way to the other: two connections of one proce
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from filelock import lock_descriptor, unlock_descriptor
 
 from ...errors import BusyError
 from ..address import BusAddress
@@ -65,7 +66,7 @@ class Turns:
             yield _put_down(self._sign, self._files[1])
         finally:
             self._depth -= 1
-            fcntl.flock(self._files[1], fcntl.LOCK_UN)
+            unlock_descriptor(self._files[1])
 
     def _take(self, wait_s: float) -> None:
         deadline = self._clock.now_s() + wait_s
@@ -73,7 +74,7 @@ class Turns:
         try:
             got = self._lock(following, deadline) and self._lock(turn, deadline)
         finally:
-            fcntl.flock(following, fcntl.LOCK_UN)
+            unlock_descriptor(following)
         if not got:
             raise BusyError(
                 f"another hodograph command is using {self._who}: no turn in {wait_s:g} s, "
@@ -81,14 +82,11 @@ class Turns:
             )
 
     def _lock(self, file: int, deadline: float) -> bool:
-        while True:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                return True
-            except BlockingIOError:
-                if self._clock.now_s() >= deadline:
-                    return False
-            self._clock.sleep(_LOOK_S)
+        while not lock_descriptor(file, blocking=False):
+            if self._clock.now_s() >= deadline:
+                return False
+            self._clock.sleep(_LOOK_S)  # the clock may be that of a bus in virtual time
+        return True
 
 
 def _folder(address: BusAddress) -> Path:

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Stops are planned where a program is hard to stop: narrow bends, and paths of micrometres."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hodograph.chain import Chain
+from hodograph.config import load_machine, load_path_file
+from hodograph.native import NativeProgram
+from hodograph.native.stop_search import StopSearch
+from hodograph.native.stop_trial import StopTrials, run_trials
+from hodograph.program.stop_planning import fault_limits, hold_limits
+from hodograph.program.stops import DECELERATION
+
+MACHINE = Path(__file__).resolve().parents[3] / "examples/machines/paper_alpha.toml"
+CONSTANT = 'profile = "minimax"\nnominal_mm_s = 90\nramp_time_s = 0.3\n'
+ZIG_ZAG = """[[0.0, 0.0], [1.2, 2.7], [1.3, 0.0], [1.9, 2.7], [10.5, 0.0], [5.8, 2.7], [2.3, 0.0], [9.3, 2.7],
+[5.2, 0.0], [17.7, 2.7], [23.0, 0.0], [28.3, 2.7], [10.3, 0.0], [20.7, 2.7], [13.9, 0.0], [25.7, 2.7]]"""
+
+
+def chain(folder: Path, points: str, feed: str, limits: str = "", stop_time_ms: int = 250) -> Chain:
+    file = folder / "path.toml"
+    file.write_text(
+        f"[path]\nclosed = false\n{points}\n[feed]\n{feed}[limits]\nacceleration_mm_s2 = 2000\n"
+        f'jerk_mm_s3 = 40000\n{limits}[machine]\nfile = "{MACHINE}"\n',
+        encoding="utf-8",
+    )
+    return Chain(load_path_file(file), replace(load_machine(MACHINE), stop_time_ms=stop_time_ms))
+
+
+def trials(made: Chain) -> StopTrials:
+    program = NativeProgram(made.image)
+    search = StopSearch(program)
+    plan, terms = made.compilation.plan, made.stop_terms
+    hold, fault = (
+        limits.raised(search.used(limits))
+        for limits in (hold_limits(plan, terms), fault_limits(plan, terms))
+    )
+    return run_trials(program, hold, fault, 2000, seed=3)
+
+
+@pytest.mark.parametrize("apart_mm", [1e-6, 1e-3, 0.1])
+def test_a_bend_without_brakes_does_not_keep_its_piece_from_braking(
+    tmp_path: Path, apart_mm: float
+) -> None:
+    points = f"through = [[0, 0], [10, 0], [{10 + apart_mm}, 0], [20, 5]]"
+    axis = "[limits.axis]\njerk_mm_s3 = 20000\n"
+    made = chain(tmp_path, points, CONSTANT, axis)
+    stops, count = made.program.stops, made.program.piece_count
+    assert stops.worst(0).time_s < 0.25
+    assert stops.worst(1).time_s < 0.25
+    assert count < 3 * len(made.plan.pieces)
+    assert (stops.codes[:, 1, DECELERATION] != 0).sum() > count // 2
+    found = trials(made)
+    assert found.within(0.01), found
+
+
+def test_bends_in_long_pieces_are_looked_at(tmp_path: Path) -> None:
+    """Constant feed in pieces of seconds; the bends take milliseconds."""
+    found = trials(chain(tmp_path, f"control_points = {ZIG_ZAG}", CONSTANT))
+    assert found.within(0.01), found
+
+
+def test_stops_on_a_path_of_micrometres_are_never_late(tmp_path: Path) -> None:
+    points = "control_points = [[0, 0], [0.0008, 0.0013], [0.0007, 0.0028], [0.0004, 0.0043]]"
+    made = chain(tmp_path, points, CONSTANT.replace("0.3", "0.2"), stop_time_ms=0)
+    found = trials(made)
+    assert found.kept, found
+    assert sum(found.measured) > 500
