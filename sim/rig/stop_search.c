@@ -419,13 +419,16 @@ static int add_instants(const struct search *search, const double c[8], uint32_t
     return fits;
 }
 
-/* The greatest codes for the speeds of a piece. */
+/* The greatest codes of a piece: no less than a stop within LEAST_TICKS from its greatest speed needs, and beyond that only
+ * what takes a quarter of the path left behind it in as many ticks. */
 static void piece_most(const struct search *search, struct piece *piece)
 {
-    const double half_s = 0.5 * LEAST_TICKS * search->period_s;
-    const double acceleration = 4.0 * greater(piece->fastest.v, LEAST_MM_S) / half_s;
+    const double span_s = LEAST_TICKS * search->period_s;
+    const double left_mm = greater(search->length_mm - piece->at[piece->count - 1u].s, 0.0);
+    const double acceleration =
+        greater(8.0 * greater(piece->fastest.v, LEAST_MM_S), left_mm / (4.0 * span_s)) / span_s;
     for (int k = 0; k < 3; k++) {
-        const double most = k == 1 ? acceleration : acceleration / (4.0 * half_s);
+        const double most = k == 1 ? acceleration : acceleration / (2.0 * span_s);
         piece->most[k] = search->most[k];
         while (piece->most[k] > 1 && number_of(k, piece->most[k]) > most) {
             piece->most[k]--;
