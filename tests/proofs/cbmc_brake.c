@@ -12,7 +12,6 @@
  * mutant: core/path_brake.c: if (speed_q56 <= fall_q56) { => if (speed_q56 < 0) {
  * mutant: core/path_brake.c: at->speed_q56 += a + 3 * sixth_q56; => at->speed_q56 += a - 3 * sixth_q56;
  * mutant: core/path_brake.c: if (!may_fall(&next, numbers->jerk_up_q56)) { => if (next.speed_q56 < 0) {
- * mutant: core/path_brake.c: -sixth_of(qmath_lesser(rise, => sixth_of(qmath_lesser(rise,
  */
 #include "brake_contracts.h"
 #include "proof.h"
