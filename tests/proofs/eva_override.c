@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The feed override, for a program of three pieces: every command, a tick and every question, from any phase, state and
- * look, whatever the timebase, the brake and the interpolator give in their ranges: nothing overflows, no conversion
- * changes a number, no division by 0, no entry of the stop table beyond the last is read, and what stands in a field of
+ * look, whatever the timebase, the brake and the interpolator give in their ranges: nothing overflows, no conversion to a
+ * signed type changes a number, no division by 0, no entry of the stop table beyond the last is read, and what stands in a field of
  * few values stays one of them. Slopes of the rate below 2^57: docs/numerics.md section 15.6.
  *
  * prover: eva
