@@ -17,6 +17,7 @@ enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 #define SEARCH_STEPS  2  /* in a tick at rest */
 #define NO_NUMBERS    2u
 #define MOST_FEED_Q32 ((int64_t)1 << 45)
+#define MOST_SLOPE_Q56 (((int64_t)1 << 57) - 1)
 #define MS_Q40        1099511628u /* 2^40 / 1000 */
 #define UM_Q40_BITS   30          /* 2^-10 mm is less than */
 #define US_Q42_BITS   22          /* */

@@ -10,11 +10,8 @@
  * replaces: within:some_answer depth:some_depth sixth_of:some_sixth
  * mutant: core/path_brake.c: if (may_fall(&next, n->jerk_up_q56)) { => if (next.speed_q56 > 0) {
  * mutant: core/path_brake.c: if (speed_q56 <= fall_q56) { => if (speed_q56 < 0) {
- * mutant: core/path_brake.c: at->speed_q56 += a + 3 * sixth_q56; => at->speed_q56 += a + 2 * sixth_q56;
+ * mutant: core/path_brake.c: at->speed_q56 += a + 3 * sixth_q56; => at->speed_q56 += a - 3 * sixth_q56;
  * mutant: core/path_brake.c: if (!may_fall(&next, numbers->jerk_up_q56)) { => if (next.speed_q56 < 0) {
- * mutant: core/path_brake.c: left < 0 ? qmath_greater(left, => left > 0 ? qmath_greater(left,
- * mutant: core/path_brake.c: jerk < 0 && most > 0 ? sixth_of => jerk < 0 ? sixth_of
- * mutant: core/path_brake.c: -sixth_of(qmath_lesser(rise, => sixth_of(qmath_lesser(rise,
  */
 #include "brake_contracts.h"
 #include "proof.h"

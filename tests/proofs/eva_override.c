@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The feed override, for a program of three pieces: every command, a tick and every question, from any phase, state and
- * look, whatever the plan of the override, the brake and the interpolator give in their ranges: nothing overflows, no conversion
- * changes a number, no division by 0, no entry of the stop table beyond the last is read, and what stands in a field of
- * few values stays one of them. Slopes of the override below 2^57: docs/theory/numerics.md section 15.6.
+ * look, whatever the plan of the override, the brake and the interpolator give in their ranges: nothing overflows, no
+ * conversion to a signed type changes a number, no division by 0, no entry of the stop table beyond the last is read, and
+ * what stands in a field of few values stays one of them.
  *
  * prover: eva
  * options: -eva-slevel 60 -warn-signed-downcast
@@ -13,7 +13,7 @@
  * assumes: qmath_div_u64 qmath_shift_clamp program_clock_set override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_rise_no_more override_plan_tick path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step path_brake_rests interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step
  * mutant: core/feed_override.c: MOST_FEED_Q32 ((int64_t)1 << 45) => MOST_FEED_Q32 ((int64_t)1 << 49)
  * mutant: core/feed_override.c: program_stop_get(f->clock.program, f->clock.piece, (enum => program_stop_get(f->clock.program, f->clock.piece + 1u, (enum
- * mutant: core/feed_override.c: f->plan.now.slope_q56 >> 26 => f->plan.now.slope_q56 >> 25
+ * mutant: core/feed_override.c: slope_q56 >> 26 => slope_q56 >> 25
  * mutant: core/feed_override.c: (int64_t)ticks_q8 << 22 => (int64_t)ticks_q8 << 40
  * mutant: core/feed_override.c: f->kind : NO_NUMBERS; => f->kind : NO_NUMBERS + 1u;
  * mutant: core/feed_override.c: f->place.piece != NULL ? f->place.piece : &it->own_piece => f->place.piece

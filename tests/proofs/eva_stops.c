@@ -61,6 +61,7 @@ int main(void)
     uint32_t index;
     Frama_C_make_unknown((char *)image, sizeof image);
     Frama_C_make_unknown((char *)&limits, sizeof limits);
+    limits.attend = NULL;
     Frama_C_make_unknown((char *)&p.header, sizeof p.header);
     p.image = image;
     p.size = sizeof image;

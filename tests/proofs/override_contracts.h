@@ -10,7 +10,7 @@
 #include "core/feed_override.h"
 #include "ramp_contracts.h"
 
-#define MOST_SLOPE       (((int64_t)1 << 57) - 1)
+#define MOST_SLOPE       ((int64_t)1 << 57)
 #define MOST_ARC         (((int64_t)1 << 62) + ((int64_t)1 << 60)) /* length and a piece's coefficients */
 #define MOST_FEED_AT     ((int64_t)1 << 60)
 #define LEAST_ARC        (-((int64_t)1 << 60))
