@@ -28,7 +28,7 @@ COMMITTED = ROOT / "tests/data/counts.json"
 DOCUMENT = ROOT / "docs/validation/counts.md"
 _SHOWN = "an386 float"
 _PORT = r"The port adds (\d+) to each tick"
-_WAIT = r"\*supervision\* (\d+), since simulated drives are awaited"
+_WAIT = r"\*supervision\* (\d+), since"
 
 
 def blocks(figures: dict[str, Any]) -> dict[str, str]:

@@ -157,8 +157,8 @@ int feed_override_motion(const struct feed_override *f, const struct interp *it,
         interp_acceleration_q40(it, clock->record, program_clock_time_q42(clock));
     const int64_t even = qmath_mul_unsigned(qmath_mul_unsigned(bend_q40, time_q40), time_q40);
     const int64_t at_override_1 = qmath_mul_unsigned(feed * 65536, MS_Q40);
-    const int64_t turned =
-        qmath_mul_wide(at_override_1, (int32_t)(f->plan.now.slope_q56 >> 26)) * 4;
+    const int64_t slope_q56 = qmath_lesser(f->plan.now.slope_q56, MOST_SLOPE_Q56);
+    const int64_t turned = qmath_mul_wide(at_override_1, (int32_t)(slope_q56 >> 26)) * 4;
     state->arc_length_q40_mm = f->point.arc_length_q40_mm;
     state->fine_q56_mm = 0;
     state->speed_q56 = qmath_shift_clamp(qmath_mul_unsigned(feed * 65536, time_q40), p);

@@ -11,7 +11,7 @@
  * instead: core/qmath.h: int32_t low = (int32_t)((uint32_t)a >> 1); => int32_t low = (int32_t)any_between(0, INT32_MAX);
  * instead: core/feed_override.c: qmath_magnitude(feed) >= MOST_FEED_Q32 => feed >= MOST_FEED_Q32 || feed <= -MOST_FEED_Q32
  * assumes: qmath_div_u64 qmath_shift_clamp program_clock_set override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_rise_no_more override_plan_tick path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step path_brake_rests interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step
- * mutant: core/feed_override.c: MOST_FEED_Q32 ((int64_t)1 << 45) => MOST_FEED_Q32 ((int64_t)1 << 49)
+ * mutant: core/feed_override.c: ((int64_t)1 << 45) => ((int64_t)1 << 49)
  * mutant: core/feed_override.c: program_stop_get(f->clock.program, f->clock.piece, (enum => program_stop_get(f->clock.program, f->clock.piece + 1u, (enum
  * mutant: core/feed_override.c: slope_q56 >> 26 => slope_q56 >> 25
  * mutant: core/feed_override.c: (int64_t)ticks_q8 << 22 => (int64_t)ticks_q8 << 40

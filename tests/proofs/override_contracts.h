@@ -6,6 +6,8 @@
 #ifndef HODOGRAPH_OVERRIDE_CONTRACTS_H
 #define HODOGRAPH_OVERRIDE_CONTRACTS_H
 
+#include "proof.h"
+
 #include "brake_contracts.h"
 #include "core/feed_override.h"
 #include "ramp_contracts.h"
