@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 COUNTS = ROOT / "tests/data/counts.json"
 DOCUMENT = ROOT / "docs/validation/wcet.md"
 ENTRY = "tick"  # of setpoints.elf: motion_step and the call of it
-# What a tick does not call while nothing changes the rate; its first one, and all after the end, are plain too.
+# What a tick does not call while nothing changes the override; its first one is not plain.
 NOT_PLAIN = {
     "plain": (
         "override_plan_change",

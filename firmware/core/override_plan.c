@@ -456,6 +456,10 @@ static void tick_of_ramp(struct override_plan *plan, struct program_clock *clock
 
 void override_plan_change(struct override_plan *plan, struct program_clock *clock)
 {
+    if (plan->started == 0) {
+        first_tick(plan, clock);
+        return;
+    }
     if (override_ramp_moves(&plan->ramp)) {
         tick_of_ramp(plan, clock);
         return;
@@ -472,11 +476,8 @@ uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *cl
 {
     if (plan->steady != 0) { /* nothing is on its way: the same again */
         program_clock_advance_even(clock, plan->now.override_q57);
-    } else if (plan->started != 0) {
-        override_plan_change(plan, clock);
     } else {
-        first_tick(plan, clock);
-        return clock->time_q42_s;
+        override_plan_change(plan, clock);
     }
     return program_clock_enter(clock);
 }

@@ -96,7 +96,7 @@ void override_plan_rise_no_more(struct override_plan *plan);
  * At the start of a program the override is what is commanded at once, at most 1, since the path is at rest. */
 uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock);
 
-/* Part of it: a tick that is neither steady nor the first. */
+/* Part of it: a tick that is not steady; also the first. */
 void override_plan_change(struct override_plan *plan, struct program_clock *clock);
 
 /* Part of it: one step of a search. */
