@@ -1,56 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/program_clock.h"
 
-/* The last piece ends with the program. */
-static uint64_t end_of_piece(const struct program_clock *clock, uint64_t end_q42_s)
-{
-    return clock->piece + 1u == clock->program->header.piece_count ? clock->duration_q42_s
-                                                                   : end_q42_s;
-}
-
-/* Of a program without records. */
-static void read_ends(struct program_clock *clock, uint64_t time_q42_s, uint32_t most)
-{
-    for (; time_q42_s >= clock->piece_end_q42_s && most > 0; most--) {
-        clock->piece++;
-        uint64_t length_q32_s = program_piece_duration(clock->program, clock->piece);
-        clock->piece_end_q42_s = end_of_piece(
-            clock, clock->piece_end_q42_s + (length_q32_s << PROGRAM_CLOCK_Q32_TO_Q42));
-    }
-}
-
-/* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
- * ends at most. When they are not enough, the piece ends before the time, which interp_at_piece refuses. */
-static void find_piece(struct program_clock *clock, uint64_t time_q42_s, uint32_t most)
-{
-    const struct prepared_piece *record = clock->record;
-    const uint64_t time_q32_s = time_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
-    uint32_t left = most;
-    if (record == NULL) {
-        read_ends(clock, time_q42_s, most);
-        return;
-    }
-    do {
-        record = prepared_piece_next(record, clock->program->prepared_for);
-        left--;
-    } while (time_q32_s >= record->end_q32_s && left > 0);
-    clock->record = record;
-    clock->piece += most - left;
-    clock->piece_end_q42_s = record->end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
-}
-
-uint64_t program_clock_pass_end(struct program_clock *clock, uint64_t time_q42_s)
-{
-    if (time_q42_s >= clock->duration_q42_s) {
-        clock->time_q42_s = clock->duration_q42_s;
-        clock->rest = 0;
-        clock->fine = 0;
-        return clock->duration_q42_s;
-    }
-    find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS);
-    return time_q42_s;
-}
-
 uint64_t program_clock_way_q62_s(const struct program_clock *clock,
                                  const struct override_state *from, int64_t slope_q56)
 {
@@ -93,9 +43,9 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
     clock->piece = 0;
     clock->record = p->prepared_for != NULL ? prepared_piece_at(p, p->prepared_for, 0) : NULL;
     clock->piece_end_q42_s =
-        end_of_piece(clock, program_piece_duration(p, 0) << PROGRAM_CLOCK_Q32_TO_Q42);
+        program_clock_end_of_piece(clock, program_piece_duration(p, 0) << PROGRAM_CLOCK_Q32_TO_Q42);
     if (clock->time_q42_s != clock->duration_q42_s && clock->time_q42_s >= clock->piece_end_q42_s) {
-        find_piece(clock, clock->time_q42_s, UINT32_MAX);
+        program_clock_find_piece(clock, clock->time_q42_s, UINT32_MAX);
     }
 }
 
@@ -105,5 +55,6 @@ void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_
     set_time(clock, time_q42_s);
     clock->piece = piece;
     clock->record = record;
-    clock->piece_end_q42_s = end_of_piece(clock, piece_end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42);
+    clock->piece_end_q42_s =
+        program_clock_end_of_piece(clock, piece_end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42);
 }

@@ -102,9 +102,59 @@ static inline void program_clock_advance_even(struct program_clock *clock, int64
     clock->rest = rest;
 }
 
-/* The time is at or beyond the end of the present piece: goes to the piece that it is in, or stays at the duration.
- * Part of program_clock_enter. */
-uint64_t program_clock_pass_end(struct program_clock *clock, uint64_t time_q42_s);
+/* The last piece ends with the program. */
+static inline uint64_t program_clock_end_of_piece(const struct program_clock *clock,
+                                                  uint64_t end_q42_s)
+{
+    return clock->piece + 1u == clock->program->header.piece_count ? clock->duration_q42_s
+                                                                   : end_q42_s;
+}
+
+/* Of a program without records. */
+static inline void program_clock_read_ends(struct program_clock *clock, uint64_t time_q42_s,
+                                           uint32_t most)
+{
+    for (; time_q42_s >= clock->piece_end_q42_s && most > 0; most--) {
+        clock->piece++;
+        uint64_t length_q32_s = program_piece_duration(clock->program, clock->piece);
+        clock->piece_end_q42_s = program_clock_end_of_piece(
+            clock, clock->piece_end_q42_s + (length_q32_s << PROGRAM_CLOCK_Q32_TO_Q42));
+    }
+}
+
+/* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
+ * ends at most. When they are not enough, the piece ends before the time, which interp_at_piece refuses. */
+static inline void program_clock_find_piece(struct program_clock *clock, uint64_t time_q42_s,
+                                            uint32_t most)
+{
+    const struct prepared_piece *record = clock->record;
+    const uint64_t time_q32_s = time_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
+    uint32_t left = most;
+    if (record == NULL) {
+        program_clock_read_ends(clock, time_q42_s, most);
+        return;
+    }
+    do {
+        record = prepared_piece_next(record, clock->program->prepared_for);
+        left--;
+    } while (time_q32_s >= record->end_q32_s && left > 0);
+    clock->record = record;
+    clock->piece += most - left;
+    clock->piece_end_q42_s = record->end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
+}
+
+/* The time is at or beyond the end of the present piece: goes to the piece that it is in, or stays at the duration. */
+static inline uint64_t program_clock_pass_end(struct program_clock *clock, uint64_t time_q42_s)
+{
+    if (time_q42_s >= clock->duration_q42_s) {
+        clock->time_q42_s = clock->duration_q42_s;
+        clock->rest = 0;
+        clock->fine = 0;
+        return clock->duration_q42_s;
+    }
+    program_clock_find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS);
+    return time_q42_s;
+}
 
 /* Enters the piece that the time is in; gives program_clock_time_q42. */
 static inline uint64_t program_clock_enter(struct program_clock *clock)

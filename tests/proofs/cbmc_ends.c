@@ -5,10 +5,10 @@
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
- * shows: find_piece
- * mutant: core/program_clock.c: clock->piece + 1u == clock->program->header.piece_count => clock->piece + 2u == clock->program->header.piece_count
- * mutant: core/program_clock.c: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
- * mutant: core/program_clock.c: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
+ * shows: program_clock_find_piece
+ * mutant: core/program_clock.h: clock->piece + 1u == clock->program->header.piece_count => clock->piece + 2u == clock->program->header.piece_count
+ * mutant: core/program_clock.h: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
+ * mutant: core/program_clock.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
  */
 #include "proof.h"
 
@@ -38,7 +38,7 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     clock->piece = i;
-    clock->piece_end_q42_s = end_of_piece(clock, nondet_uint64());
+    clock->piece_end_q42_s = program_clock_end_of_piece(clock, nondet_uint64());
     clock->record = program.prepared_for != 0 ? &records[i] : 0;
 }
 

@@ -7,7 +7,7 @@
  * prover: eva
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
- * instead: core/program_clock.c: find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)find_piece;
+ * instead: core/program_clock.h: program_clock_find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)program_clock_find_piece;
  * assumes: qmath_div_u64 program_piece_duration override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
  * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
  * mutant: core/override_plan.c: behind < left ? behind : left => behind
@@ -94,7 +94,7 @@ static void place(struct program_clock *clock, uint32_t i)
     const struct program *p = clock->program;
     clock->piece = i;
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    clock->piece_end_q42_s = end_of_piece(clock, (uint64_t)any_between(0, INT64_MAX));
+    clock->piece_end_q42_s = program_clock_end_of_piece(clock, (uint64_t)any_between(0, INT64_MAX));
     if (p->prepared_for != NULL) {
         clock->record = prepared_piece_at(p, p->prepared_for, i);
     }
