@@ -52,13 +52,13 @@ OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
 LIBS        := app node injector bridge hub faults port mps2 stm32g4 canopen can sim core od
 core_SRC    := $(wildcard firmware/core/*.c)
 canopen_SRC := $(wildcard firmware/canopen/*.c)
-sim_SRC     := $(wildcard sim/plant/*.c sim/rig/*.c)
+sim_SRC     := $(wildcard sim/plant/*.c sim/offline/*.c)
 app_SRC     := $(filter-out %/main.c,$(wildcard firmware/app/*.c firmware/app/*/*.c))
 port_SRC    := $(filter-out %/main.c,$(wildcard firmware/port/linux/*.c firmware/port/common/*.c))
 node_SRC    := $(filter-out %/main.c,$(wildcard sim/node/*.c))
 faults_SRC  := $(wildcard sim/faults/*.c)
 injector_SRC := $(filter-out %/main.c,$(wildcard sim/injector/*.c))
-bridge_SRC  := $(filter-out %/main.c,$(wildcard sim/bridge/*.c))
+bridge_SRC  := $(filter-out %/main.c,$(wildcard sim/gateway/*.c))
 hub_SRC     := $(filter-out %/main.c,$(wildcard sim/hub/*.c))
 can_SRC     := $(wildcard firmware/can/*.c)
 mps2_SRC    := $(wildcard firmware/port/mps2/command_line.c)
@@ -70,7 +70,7 @@ BINS            := controller drive injector bridge hub
 controller_MAIN := $(wildcard firmware/app/main.c firmware/port/linux/main.c)
 drive_MAIN      := $(wildcard sim/node/main.c)
 injector_MAIN   := $(wildcard sim/injector/main.c)
-bridge_MAIN     := $(wildcard sim/bridge/main.c)
+bridge_MAIN     := $(wildcard sim/gateway/main.c)
 hub_MAIN        := $(wildcard sim/hub/main.c)
 BINS            := $(foreach b,$(BINS),$(if $($(b)_MAIN),$(b)))
 
@@ -436,7 +436,7 @@ NATIVE := host_tools/hodograph/native/_native.abi3.so
 .PHONY: native
 native: $(NATIVE)
 $(NATIVE): host_tools/hodograph/native/build_native.py host_tools/hodograph/native/declarations.h $(BUILD)/host/libhodograph_core.a $(BUILD)/host/libhodograph_sim.a \
-           $(wildcard firmware/core/*.h sim/plant/*.h sim/rig/*.h) $(VENV)/.editable
+           $(wildcard firmware/core/*.h sim/plant/*.h sim/offline/*.h) $(VENV)/.editable
 	$(call say,cffi,$@)
 	$(Q)$(PY) $< --build $(BUILD)
 	@touch $@

@@ -17,7 +17,7 @@ from typing import Any
 
 from hodograph.bus.address import parse_address
 from hodograph.bus.run import run_program, station
-from hodograph.chain import load_chain
+from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -26,7 +26,7 @@ RUNS = [(name, pace) for pace in ("fast", "real-time") for name in ("alpha", "he
 
 def measure(name: str, pace: str) -> dict[str, Any]:
     """One run of an example."""
-    chain = load_chain(ROOT / "examples" / f"{name}.toml")
+    chain = load_pipeline(ROOT / "examples" / f"{name}.toml")
     address = parse_address("socketcan:vcan0")
     with station(chain.machine, address, pace, 5.0, print) as at:
         run = run_program(at, chain.machine, chain.image, chain.machine.kernel)

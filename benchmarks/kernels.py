@@ -10,7 +10,7 @@ Compiles firmware/core as a shared object of its own. Prints the figures and wri
 - noise: third differences of the unrounded output at 1 kHz minus those of the exact points, mm/s^3, and the
   same for the feed (first differences of the chord);
 - speed: time of a tick relative to the double kernel, and instructions of a tick where `valgrind` is there (the
-  motion part, to counts, with prepared records, as in the controller; on microcontrollers: benchmarks/counts.py);
+  motion part, to counts, with coefficient records, as in the controller; on microcontrollers: benchmarks/counts.py);
 - override: instructions of a tick of the fixed kernel at a constant override, while the rate is on its way all
   the time, and above the factor that every piece allows.
 """

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from hodograph.bus.listening.frames import FRAME_DTYPE, Frames
-from hodograph.chain import load_chain
+from hodograph.bus.capture.frames import FRAME_DTYPE, Frames
 from hodograph.monitor.decoder import Decoder
 from hodograph.monitor.derived import Derivation
 from hodograph.monitor.messages import encode, rows_message
 from hodograph.monitor.path import ProgramPath
+from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -32,7 +32,7 @@ LOOK_TICKS = 40
 
 def traffic() -> tuple[bytes, Frames]:
     """Program image and frames of the alpha, run and begun again."""
-    chain = load_chain(EXAMPLES / "alpha.toml", None)
+    chain = load_pipeline(EXAMPLES / "alpha.toml", None)
     motion = simulate(chain.image, chain.machine.models(chain.machine.plane))
     rows = motion.rows
     frames = np.zeros((LAPS * len(rows), FRAMES_A_TICK), dtype=FRAME_DTYPE)

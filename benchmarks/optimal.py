@@ -25,9 +25,9 @@ sys.path[:0] = [str(ROOT / "benchmarks/support"), str(ROOT / "host_tools")]
 from collocation import Optimum, Task, solve  # noqa: E402
 from toppra_bound import bound  # noqa: E402
 
-from hodograph.chain import Chain, controller_limits, load_chain, plants  # noqa: E402
 from hodograph.errors import HodographError  # noqa: E402
 from hodograph.feed import Limits  # noqa: E402
+from hodograph.pipeline import Pipeline, controller_limits, load_pipeline, plants  # noqa: E402
 from hodograph.verify import sampled, verify_program  # noqa: E402
 
 PAPER = """feed_mm_s = 100
@@ -91,15 +91,15 @@ def random_path(seed: int) -> str:
     return f"[path]\nclosed = {str(closed).lower()}\ncontrol_points = {listed}\n"
 
 
-def chain_of(case: Case, feed: str, reserve: float, folder: Path) -> Chain:
+def chain_of(case: Case, feed: str, reserve: float, folder: Path) -> Pipeline:
     """A path file of the case with this section [feed]."""
     text = f"{case.path}[feed]\n{feed}[limits]\nreserve = {reserve}\n{case.limits}"
     file = folder / "case.toml"
     file.write_text(text + f'[machine]\nfile = "{case.machine}"\n', encoding="utf-8")
-    return load_chain(file)
+    return load_pipeline(file)
 
 
-def task_of(chain: Chain) -> Task:
+def task_of(chain: Pipeline) -> Task:
     """What the planner has to obey, its reserve aside: path file and controller."""
     limits, own = chain.file.limits, controller_limits(chain.machine)
     kept = 1.0 - own.kept_free

@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hodograph.chain import Chain, load_chain
 from hodograph.config import Drive, load_machine
 from hodograph.config.axis_table import Feedforward
 from hodograph.identify import Stretch, identify_axis
 from hodograph.native import AxisInputs, Contour, NativeProgram
+from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import Motion, simulate
 from hodograph.tune import Asked, tune
 from hodograph.tune.cases import CASES, outcomes
@@ -66,7 +66,9 @@ def loops() -> dict[str, tuple[Drives, Forward]]:
     }
 
 
-def between_um(chain: Chain, motion: Motion, drives: Drives, forward: Forward) -> dict[str, float]:
+def between_um(
+    chain: Pipeline, motion: Motion, drives: Drives, forward: Forward
+) -> dict[str, float]:
     """Greatest distance of the true position from the curve at any servo sample; how far this model is off at SYNCs;
     samples of both axes at the voltage limit.
     """
@@ -136,7 +138,7 @@ def contours() -> dict[str, Any]:
     figures: dict[str, Any] = {}
     tuned = loops()
     for name in PATHS:
-        chain = load_chain(EXAMPLES / f"{name}.toml")
+        chain = load_pipeline(EXAMPLES / f"{name}.toml")
         x, y = chain.machine.models(chain.machine.plane)
         paper: tuple[Drives, Forward] = ((x, y), None)
         figures[name] = {}
@@ -171,7 +173,7 @@ def sensitivity() -> dict[str, Any]:
         files = [EXAMPLES / f"{name}.toml" for name in PATHS]
         files += [weaker_volts(name, Path(folder)) for name in PATHS if "optimal" in name]
         for file in files:
-            chain = load_chain(file)
+            chain = load_pipeline(file)
             own_x, own_y = chain.machine.models(chain.machine.plane)
             loops = {
                 "paper": ((own_x, own_y), None),
@@ -193,7 +195,7 @@ def plants() -> dict[str, Any]:
     """Errors of the plants found from noisy reports of the alpha and the heart, %, by friction."""
     figures: dict[str, Any] = {}
     for name in ("alpha", "heart"):
-        chain = load_chain(EXAMPLES / f"{name}.toml")
+        chain = load_pipeline(EXAMPLES / f"{name}.toml")
         given = chain.machine.models(chain.machine.plane)
         for friction in (0.0, 0.2):
             truth = [

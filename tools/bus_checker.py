@@ -17,13 +17,13 @@ import cantools
 import numpy as np
 from numpy.typing import NDArray
 
-from bus_beats import AFTER, RESET, RESET_COMMUNICATION, START, Beats
 from bus_drives import Drive, field_of
-from bus_streams import Stream
-from hodograph.bus.listening.frame_batch import Frames
+from heartbeat_check import AFTER, RESET, RESET_COMMUNICATION, START, Beats
+from hodograph.bus.capture.frame_batch import Frames
 from hodograph.bus.sdo.node import NOWHERE
 from hodograph.config import Machine
 from hodograph.dbc import dbc_text
+from pdo_sequence_check import Stream
 
 _NMT, _SYNC, _EMCY, _TPDO1, _RPDO1, _TPDO2, _TPDO3 = 0x000, 0x080, 0x080, 0x180, 0x200, 0x280, 0x380
 _SDO_ANSWER, _SDO_ASK, _HEARTBEAT = 0x580, 0x600, 0x700

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bus_streams import Stream
-from hodograph.bus.listening.frames import Frames
+from hodograph.bus.capture.frames import Frames
+from pdo_sequence_check import Stream
 
 _TPDO1, _RPDO1 = 0x180, 0x200
 _FOLLOWING_ERROR, _WARNING = 0x2000, 0x0080

@@ -57,7 +57,7 @@ C_RULES: dict[str, set[str]] = {
         "generated",
     },
     "sim/plant": set(),
-    "sim/rig": {"firmware/core", "sim/plant"},
+    "sim/offline": {"firmware/core", "sim/plant"},
     "sim/node": {
         "firmware/can",
         "firmware/canopen",
@@ -77,7 +77,7 @@ C_RULES: dict[str, set[str]] = {
         "sim/faults",
     },
     "sim/hub": {"firmware/port/linux/end_signals.h", "firmware/port/linux/local_bus.h"},
-    "sim/bridge": {
+    "sim/gateway": {
         "firmware/can",
         "firmware/port/linux/can_socket.h",
         "firmware/port/linux/clock.h",
@@ -105,10 +105,10 @@ PYTHON_RULES: dict[str, set[str]] = {
     "bustime": {"errors", "data", "config"},
     "dbc": {"errors", "data", "config", "bustime"},
     "bus.address": {"errors"},
-    "bus.words": set(),
+    "bus.diagnostics": set(),
     "bus.clock": {"errors"},
     "bus.local_bus": {"bus.clock"},
-    "bus.listening": {"errors", "config", "bustime", "bus.address", "bus.clock"},
+    "bus.capture": {"errors", "config", "bustime", "bus.address", "bus.clock"},
     "bus.sdo": {
         "errors",
         "names",
@@ -118,13 +118,13 @@ PYTHON_RULES: dict[str, set[str]] = {
         "bus.address",
         "bus.clock",
         "bus.local_bus",
-        "bus.words",
+        "bus.diagnostics",
     },
     "bus": {
         "bus.address",
         "bus.clock",
-        "bus.words",
-        "bus.listening",
+        "bus.diagnostics",
+        "bus.capture",
         "bus.sdo",
         "errors",
         "names",
@@ -135,10 +135,10 @@ PYTHON_RULES: dict[str, set[str]] = {
         "native",
         "program",
         "simulate",
-        "chain",
+        "pipeline",
         "bustime",
     },
-    "chain": {"errors", "config", "spline", "feed", "program", "native"},
+    "pipeline": {"errors", "config", "spline", "feed", "program", "native"},
     "paper": {
         "errors",
         "data",
@@ -147,7 +147,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "feed",
         "program",
         "simulate",
-        "chain",
+        "pipeline",
     },
     "report": {
         "errors",
@@ -157,13 +157,13 @@ PYTHON_RULES: dict[str, set[str]] = {
         "feed",
         "program",
         "simulate",
-        "chain",
+        "pipeline",
         "bus",
         "bustime",
         "paper",
         "tune",
     },
-    "tune": {"errors", "config", "native", "simulate", "chain"},
+    "tune": {"errors", "config", "native", "simulate", "pipeline"},
     "identify": {"errors", "config", "native", "bus"},
     "monitor": {"errors", "data", "config", "native", "bus", "bustime", "__init__"},
     "faults.scenario": {"errors", "config"},
@@ -173,7 +173,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "config",
         "native",
         "simulate",
-        "chain",
+        "pipeline",
         "bus",
         "faults.scenario",
     },
@@ -184,7 +184,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "feed",
         "native",
         "simulate",
-        "chain",
+        "pipeline",
         "faults.scenario",
         "report",
         "__init__",
@@ -195,7 +195,7 @@ PYTHON_RULES: dict[str, set[str]] = {
 }
 
 # What the native module may take from the C side.
-NATIVE_MAY_INCLUDE = ("core/", "plant/", "rig/")
+NATIVE_MAY_INCLUDE = ("core/", "plant/", "offline/")
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"(?P<own>[^"]+)"|<(?P<system>[^>]+)>)')
 _C_ROOTS = ("firmware", "sim")
@@ -353,7 +353,7 @@ def _native_includes(root: Path) -> Iterator[Breach]:
                     yield Breach(
                         path,
                         number,
-                        f'the native module may not use "{header}" (may: core, plant, rig)',
+                        f'the native module may not use "{header}" (may: core, plant, offline)',
                     )
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hodograph.chain import load_chain
+from hodograph.pipeline import load_pipeline
 from target import adversary, counting, emulator
 
 
@@ -28,7 +28,7 @@ def image_of(program: str) -> bytes:
         if row.name == program:
             return adversary.image(row)
     path = Path(program)
-    return load_chain(path).image if path.suffix == ".toml" else path.read_bytes()
+    return load_pipeline(path).image if path.suffix == ".toml" else path.read_bytes()
 
 
 def show(names: Sequence[str], counts: counting.Counts, worst: int) -> None:

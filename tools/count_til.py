@@ -19,7 +19,7 @@ from pathlib import Path
 import til
 from count_tick import show
 from emulate import TARGETS
-from hodograph.chain import load_chain
+from hodograph.pipeline import load_pipeline
 from target import emulator
 from target.counting import Counter, read
 from target.parts import PARTS
@@ -38,7 +38,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--worst", type=int, default=3, help="show so many of the worst ticks")
     parser.add_argument("file", metavar="FILE", type=Path)
     options = parser.parse_args(arguments)
-    chain = load_chain(options.file)
+    chain = load_pipeline(options.file)
     if options.kernel:
         chain = replace(chain, given_machine=replace(chain.machine, kernel=options.kernel))
     target = emulator.TARGETS[options.target]

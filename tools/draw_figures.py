@@ -26,9 +26,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from hodograph.bustime.frame_bits import worst_bits
-from hodograph.chain import Chain, load_chain
 from hodograph.native import NativeProgram
 from hodograph.native.feed_override import FeedOverride, State
+from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program import encode
 from hodograph.report.style import BLUE, GREEN, GREY, INK, ORANGE, RED, SOFT, styled
 
@@ -47,15 +47,15 @@ def svg(figure: Figure) -> str:
     return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
 
 
-def example(name: str) -> Chain:
+def example(name: str) -> Pipeline:
     """The pipeline of an example path."""
-    return load_chain(ROOT / "examples" / name)
+    return load_pipeline(ROOT / "examples" / name)
 
 
 # --- Path and feed ---
 
 
-def draw_path(axes: Axes, chain: Chain) -> None:
+def draw_path(axes: Axes, chain: Pipeline) -> None:
     """Control polygon, nodal points, and the PH segments of the program in alternating colours."""
     spline = chain.spline_result.spline
     polygon, nodes = chain.file.path.points, spline.nodal_points
@@ -94,7 +94,7 @@ def trace(program: NativeProgram, stop: str = "", tick: int = 0) -> Trace:
     return Trace(period_s * np.arange(feed.size), feed, acceleration)
 
 
-def native(chain: Chain) -> NativeProgram:
+def native(chain: Pipeline) -> NativeProgram:
     """The program of a path, as the controller runs it."""
     return NativeProgram(encode(chain.compilation.program))
 

@@ -24,11 +24,11 @@ from pathlib import Path
 
 from bus_checker import BusChecker
 from hodograph.bus.address import BusAddress
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.run import run_program, station
-from hodograph.chain import Chain, load_chain
 from hodograph.errors import HodographError
+from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -46,7 +46,7 @@ class Soak:
         """Plans and simulates the programs. Raises HodographError."""
         self.address = address
         self.note = note
-        self.chains = [load_chain(file, machine) for file in PROGRAMS]
+        self.chains = [load_pipeline(file, machine) for file in PROGRAMS]
         self.machine = self.chains[0].machine
         self.expected = [self._simulated(chain) for chain in self.chains]
         self.checker = BusChecker(self.machine)
@@ -56,7 +56,7 @@ class Soak:
         self.wall_s = 0.0
         self.dropped = 0
 
-    def _simulated(self, chain: Chain) -> tuple[str, str]:
+    def _simulated(self, chain: Pipeline) -> tuple[str, str]:
         drives = [axis.drive for axis in self.machine.plane if axis.drive is not None]
         counts = self.machine.counts_per_mm
         motion = simulate(chain.image, drives, kernel=KERNEL, counts_per_mm=counts)

@@ -20,8 +20,8 @@ from emulate import TARGETS
 from hodograph.bus.address import DEFAULT_BUS, parse_address
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.run import BusRun, run_program, station
-from hodograph.chain import Chain, load_chain
 from hodograph.errors import HodographError
+from hodograph.pipeline import Pipeline, load_pipeline
 
 EMULATE = Path(__file__).resolve().parent / "emulate.py"
 
@@ -37,7 +37,7 @@ def local_bus(*, virtual: bool = True) -> Iterator[str]:
         yield str(hub.address)
 
 
-def run(chain: Chain, bus: str, pace: str, controller: str | None) -> BusRun:
+def run(chain: Pipeline, bus: str, pace: str, controller: str | None) -> BusRun:
     """One run; `controller` None: hodograph-controller."""
     with station(chain.machine, parse_address(bus), pace, 15.0, _note, controller) as at:
         return run_program(at, chain.machine, chain.image, chain.machine.kernel)
@@ -45,7 +45,7 @@ def run(chain: Chain, bus: str, pace: str, controller: str | None) -> BusRun:
 
 def compare(file: Path, options: argparse.Namespace, bus: str) -> bool:
     """Whether both give the same bits."""
-    chain = load_chain(file)
+    chain = load_pipeline(file)
     pace = "fast" if options.link == "fifo" else "real-time"
     image = f" --image {options.image}" if options.image else ""
     boards = {name: f"{EMULATE} {name} --link {options.link}{image}" for name in options.target}

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The motion part of the controller's tick, over and over: FILE KERNEL RUNS [LOW HIGH]. Prints how many ticks that were.
- * As in the controller, the program has prepared records, which are not part of what is compared: those of all RUNS are
+ * As in the controller, the program has coefficient records, which are not part of what is compared: those of all RUNS are
  * made once. The override changes between LOW and HIGH per cent every 40 ticks, when they differ.
  */
 #include <stdio.h>
@@ -10,7 +10,7 @@
 
 #include "core/counts.h"
 #include "core/interp.h"
-#include "core/prepared.h"
+#include "core/coefficients.h"
 #include "core/override_plan.h"
 
 enum { COUNTS_PER_MM = 1000000, SWITCH_TICKS = 40 };
@@ -29,11 +29,11 @@ static int prepare(struct program *p, uint32_t number)
 {
     uint8_t *to = (uint8_t *)records;
     const struct kernel *kernel = kernel_find(number);
-    if (kernel == NULL || prepared_size(p, kernel) > sizeof records ||
-        prepared_make(p, kernel, put, &to) != 0) {
+    if (kernel == NULL || coefficients_size(p, kernel) > sizeof records ||
+        coefficients_make(p, kernel, put, &to) != 0) {
         return -1;
     }
-    prepared_attach(p, kernel, (const uint8_t *)records);
+    coefficients_attach(p, kernel, (const uint8_t *)records);
     return 0;
 }
 

@@ -59,10 +59,10 @@ void controller_init(struct controller *controller, uint8_t node)
     controller->slot.attend = controller_beat;
     controller->slot.self = controller;
     drive_boot_init(&controller->boot);
-    drive_look_init(&controller->look);
+    drive_polling_init(&controller->look);
     homing_init(&controller->homing);
-    drive_watch_begin(&controller->watch, &controller->config,
-                      controller->values.consumer_heartbeat_time);
+    drive_monitor_begin(&controller->watch, &controller->config,
+                        controller->values.consumer_heartbeat_time);
     sdo_server_init(&controller->server, &controller->od, controller->node, SDO_TIMEOUT_US,
                     SDO_BLOCK_SEGMENTS);
     nmt_slave_init(&controller->nmt, controller->node, &controller_reset_hooks, controller);

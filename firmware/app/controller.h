@@ -16,8 +16,8 @@
 #include <stdint.h>
 
 #include "app/drives/drive_boot.h"
-#include "app/drives/drive_look.h"
-#include "app/drives/drive_watch.h"
+#include "app/drives/drive_monitor.h"
+#include "app/drives/drive_polling.h"
 #include "app/drives/homing.h"
 #include "app/frame_queue.h"
 #include "app/machine/machine.h"
@@ -56,8 +56,8 @@ struct controller {
     struct parameter_store store;
     struct program_slot slot;
     struct drive_boot boot;
-    struct drive_watch watch;
-    struct drive_look look;
+    struct drive_monitor watch;
+    struct drive_polling look;
     struct homing homing;
     struct od od;
     struct od_controller values;

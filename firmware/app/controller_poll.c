@@ -38,7 +38,7 @@ static void take_answer(struct controller *controller, const struct can_msg *in)
     struct can_msg out;
     if (drive_boot_receive(&controller->boot, in, &out) != 0 ||
         homing_receive(&controller->homing, in, &out) != 0 ||
-        drive_look_receive(&controller->look, in, &out) != 0) {
+        drive_polling_receive(&controller->look, in, &out) != 0) {
         controller_send(&out);
     }
 }
@@ -54,7 +54,7 @@ static void take_frame(struct controller *controller, const struct can_msg *in)
         }
     } else {
         take_answer(controller, in);
-        drive_watch_receive(&controller->watch, &controller->machine, in);
+        drive_monitor_receive(&controller->watch, &controller->machine, in);
     }
 }
 
@@ -115,7 +115,7 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
     struct axis *axis = machine_axis(&controller->machine, command->data[1]);
     if (axis != NULL) {
         const uint32_t i = (uint32_t)(axis - controller->machine.axes);
-        const struct drive_facts *facts = &controller->boot.facts[i];
+        const struct drive_properties *facts = &controller->boot.facts[i];
         axis->digital_inputs = facts->value[DRIVE_INPUTS];
         axis->torque_mapped = facts->known[DRIVE_TORQUE_MAPPED];
         axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
@@ -142,8 +142,8 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
     if (boot_requested(&controller->machine)) {
         port_tick_urgent(false);
         drive_boot_begin(&controller->boot, &controller->config);
-        drive_watch_begin(&controller->watch, &controller->config,
-                          controller->values.consumer_heartbeat_time);
+        drive_monitor_begin(&controller->watch, &controller->config,
+                            controller->values.consumer_heartbeat_time);
     }
     struct can_msg out;
     int due = drive_boot_process(&controller->boot, elapsed_us, &out);
@@ -179,8 +179,8 @@ static void poll_look(struct controller *controller, uint32_t elapsed_us)
     port_unlock();
     struct can_msg out;
     const bool allowed = found && !controller->ending && !homing_busy(&controller->homing);
-    if (drive_look_process(&controller->look, &controller->machine, controller->boot.facts, allowed,
-                           elapsed_us, &out) != 0) {
+    if (drive_polling_process(&controller->look, &controller->machine, controller->boot.facts,
+                              allowed, elapsed_us, &out) != 0) {
         controller_send(&out);
     }
 }
@@ -214,6 +214,6 @@ void controller_poll(struct controller *controller)
     poll_boot(controller, elapsed_us);
     poll_homing(controller, elapsed_us);
     poll_look(controller, elapsed_us);
-    drive_watch_process(&controller->watch, &controller->machine, elapsed_us);
+    drive_monitor_process(&controller->watch, &controller->machine, elapsed_us);
     controller_report(controller);
 }

@@ -138,8 +138,8 @@ void od_written_hook(void *context, const struct od_entry *entry)
         machine_override(&controller->machine, controller->values.override.percent);
         port_unlock();
     } else if (entry->index == 0x1016) {
-        drive_watch_begin(&controller->watch, &controller->config,
-                          controller->values.consumer_heartbeat_time);
+        drive_monitor_begin(&controller->watch, &controller->config,
+                            controller->values.consumer_heartbeat_time);
     } else if (entry->index == 0x1003) {
         emcy_producer_forget(&controller->emcy);
     }

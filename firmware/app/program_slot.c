@@ -5,9 +5,9 @@
 
 #include "app/bank_record.h"
 #include "app/program_table.h"
+#include "core/coefficients.h"
 #include "core/counts.h"
 #include "core/interp.h"
-#include "core/prepared.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)
@@ -35,9 +35,9 @@ uint64_t program_slot_memory(uint32_t kernel, uint8_t number)
     case 1:
         return bank_record_room(0);
     case 2:
-        return made_for != NULL ? prepared_segment_size(made_for) : 0u;
+        return made_for != NULL ? coefficients_segment_size(made_for) : 0u;
     default:
-        return made_for != NULL ? prepared_piece_size(made_for) : 0u;
+        return made_for != NULL ? coefficients_piece_size(made_for) : 0u;
     }
 }
 

@@ -63,7 +63,7 @@ int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config);
 void program_slot_abandon(struct program_slot *slot);
 
-/* Brings start, end, `acceptable` and the prepared records up to date; costs a whole check when the configuration is
+/* Brings start, end, `acceptable` and the coefficient records up to date; costs a whole check when the configuration is
  * another one, and a copy of the program in the other bank when the kernel is another one. */
 void program_slot_refresh(struct program_slot *slot, const struct config *config);
 

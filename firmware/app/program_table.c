@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "app/bank_record.h"
-#include "core/prepared.h"
+#include "core/coefficients.h"
 #include "core/program_check.h"
 #include "port/port.h"
 
@@ -37,12 +37,13 @@ static struct place behind(unsigned bank, const struct program *program)
 
 static bool fits(unsigned bank, const struct program *program, const struct kernel *made_for)
 {
-    return program->header.image_size + prepared_size(program, made_for) <= bank_record_room(bank);
+    return program->header.image_size + coefficients_size(program, made_for) <=
+           bank_record_room(bank);
 }
 
 static void attach(unsigned bank, struct program *program, const struct kernel *made_for)
 {
-    prepared_attach(program, made_for, port_store_data(bank) + program->header.image_size);
+    coefficients_attach(program, made_for, port_store_data(bank) + program->header.image_size);
 }
 
 int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
@@ -55,7 +56,7 @@ int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
     if (!fits(bank, program, made_for)) {
         return PROGRAM_ERR_ROOM;
     }
-    if (prepared_make(program, made_for, put_records, &place) != 0) {
+    if (coefficients_make(program, made_for, put_records, &place) != 0) {
         return PROGRAM_ERR_STORE;
     }
     attach(bank, program, made_for);
@@ -69,11 +70,11 @@ bool program_table_find(unsigned bank, struct program *program, uint32_t kernel)
     if (made_for == NULL) {
         return false;
     }
-    if (program->prepared_for == made_for) {
+    if (program->coefficients_for == made_for) {
         return true;
     }
     if (!fits(bank, program, made_for) ||
-        prepared_make(program, made_for, compare_records, &place) != 0) {
+        coefficients_make(program, made_for, compare_records, &place) != 0) {
         return false;
     }
     attach(bank, program, made_for);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * program_table: the prepared records (core/prepared.h) of the program in a bank of the store, right behind its image,
+ * program_table: the coefficient records (core/coefficients.h) of the program in a bank of the store, right behind its image,
  * for the kernel that the tick uses. The controller makes them itself when an upload has passed its checks; what it
  * finds there after power-on it compares with what it would write. Mainline.
  */

@@ -337,7 +337,7 @@ static void look_for_place(struct feed_override *f, struct interp *it)
 {
     for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
         if (interp_search_step(it, &f->place)) {
-            const struct prepared_piece *piece =
+            const struct coefficients_piece *piece =
                 f->place.piece != NULL ? f->place.piece : &it->own_piece;
             f->found = 1;
             program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece,

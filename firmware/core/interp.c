@@ -10,28 +10,28 @@
 
 static void load_piece(struct interp *it, uint32_t i, uint64_t start_q32_s)
 {
-    prepared_piece_make(&it->own_piece, it->program, it->kernel, i, start_q32_s);
+    coefficients_piece_make(&it->own_piece, it->program, it->kernel, i, start_q32_s);
     it->piece_index = i;
 }
 
 static void load_segment(struct interp *it, uint32_t i)
 {
-    prepared_segment_make(&it->own_segment, it->program, it->kernel, i);
+    coefficients_segment_make(&it->own_segment, it->program, it->kernel, i);
     it->segment_index = i;
 }
 
-static const struct prepared_piece *present_piece(const struct interp *it)
+static const struct coefficients_piece *present_piece(const struct interp *it)
 {
     return it->piece != NULL ? it->piece : &it->own_piece;
 }
 
-static const struct prepared_segment *present_segment(const struct interp *it)
+static const struct coefficients_segment *present_segment(const struct interp *it)
 {
     return it->segment != NULL ? it->segment : &it->own_segment;
 }
 
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
-static void evaluate_feed(const struct interp *it, const struct prepared_piece *piece,
+static void evaluate_feed(const struct interp *it, const struct coefficients_piece *piece,
                           uint64_t time_q42_s, struct feed_point *f)
 {
     uint64_t t = time_q42_s - (piece->start_q32_s << FINE_BITS);
@@ -65,7 +65,7 @@ static int enter_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
 /* Makes the piece of this time, below the duration, the present one, crossing `most` ends at most. */
 static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
 {
-    const struct prepared_piece *piece = present_piece(it);
+    const struct coefficients_piece *piece = present_piece(it);
     if (time_q32_s < piece->start_q32_s) {
         return INTERP_ERR_JUMP;
     }
@@ -75,13 +75,13 @@ static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
     if (it->piece == NULL) {
         return enter_piece(it, time_q32_s, most);
     }
-    const struct prepared_piece *last =
-        prepared_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
+    const struct coefficients_piece *last =
+        coefficients_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
     for (; piece != last && time_q32_s >= piece->end_q32_s; most--) {
         if (most == 0) {
             return INTERP_ERR_JUMP;
         }
-        piece = prepared_piece_next(piece, it->kernel);
+        piece = coefficients_piece_next(piece, it->kernel);
     }
     it->piece = piece;
     return INTERP_OK;
@@ -113,8 +113,8 @@ static int enter_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t 
 
 static int step_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
 {
-    const uint32_t size = prepared_segment_size(it->kernel);
-    const struct prepared_segment *segment = it->segment;
+    const uint32_t size = coefficients_segment_size(it->kernel);
+    const struct coefficients_segment *segment = it->segment;
     uint32_t left = most;
     if (arc_length_q40_mm >= segment->to_q40_mm) {
         do {
@@ -139,7 +139,7 @@ static int step_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t m
  * back only where the feed dips below zero by rounding. */
 static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
 {
-    const struct prepared_segment *segment = present_segment(it);
+    const struct coefficients_segment *segment = present_segment(it);
     if (arc_length_q40_mm >= segment->from_q40_mm && arc_length_q40_mm < segment->to_q40_mm) {
         return INTERP_OK;
     }
@@ -163,8 +163,8 @@ static void set_end(struct interp *it)
 
 static void go_to_begin(struct interp *it)
 {
-    if (it->program->prepared_for == it->kernel) {
-        it->piece = prepared_piece_at(it->program, it->kernel, 0);
+    if (it->program->coefficients_for == it->kernel) {
+        it->piece = coefficients_piece_at(it->program, it->kernel, 0);
     } else {
         it->piece = NULL;
         load_piece(it, 0, 0);
@@ -185,8 +185,8 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
     it->length_q40_mm = p->header.length_q40_mm;
     set_end(it);
     go_to_begin(it);
-    if (p->prepared_for == it->kernel) {
-        it->segment = prepared_segment_at(p, it->kernel, 0);
+    if (p->coefficients_for == it->kernel) {
+        it->segment = coefficients_segment_at(p, it->kernel, 0);
     } else {
         it->segment = NULL;
         load_segment(it, 0);
@@ -219,7 +219,7 @@ static int evaluate_path(struct interp *it, int64_t arc_length_q40_mm, uint32_t 
     return INTERP_OK;
 }
 
-int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
+int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out)
 {
     if (time_q42_s >> FINE_BITS >= piece->end_q32_s) {
@@ -253,14 +253,14 @@ int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct in
     return result;
 }
 
-int64_t interp_acceleration_q40(const struct interp *it, const struct prepared_piece *piece,
+int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
                                 uint64_t time_q42_s)
 {
-    const struct prepared_piece *own = piece != NULL ? piece : present_piece(it);
+    const struct coefficients_piece *own = piece != NULL ? piece : present_piece(it);
     return it->kernel->piece_acceleration(&own->feed, time_q42_s - (own->start_q32_s << FINE_BITS));
 }
 
-void interp_search_begin(struct interp_search *search, const struct prepared_piece *piece,
+void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
                          uint32_t index, int64_t arc_length_q40_mm)
 {
     search->arc_length_q40_mm = arc_length_q40_mm;
@@ -270,8 +270,8 @@ void interp_search_begin(struct interp_search *search, const struct prepared_pie
     search->bisecting = 0;
 }
 
-static const struct prepared_piece *searched_piece(const struct interp *it,
-                                                   const struct interp_search *search)
+static const struct coefficients_piece *searched_piece(const struct interp *it,
+                                                       const struct interp_search *search)
 {
     return search->piece != NULL ? search->piece : &it->own_piece;
 }
@@ -280,7 +280,7 @@ static void search_next_piece(struct interp *it, struct interp_search *search)
 {
     search->piece_index++;
     if (search->piece != NULL) {
-        search->piece = prepared_piece_next(search->piece, it->kernel);
+        search->piece = coefficients_piece_next(search->piece, it->kernel);
     } else {
         load_piece(it, search->piece_index, it->own_piece.end_q32_s);
     }
@@ -289,7 +289,7 @@ static void search_next_piece(struct interp *it, struct interp_search *search)
 int interp_search_step(struct interp *it, struct interp_search *search)
 {
     const struct program *p = it->program;
-    const struct prepared_piece *piece = searched_piece(it, search);
+    const struct coefficients_piece *piece = searched_piece(it, search);
     const uint64_t start_q42_s = piece->start_q32_s << FINE_BITS;
     if (search->bisecting == 0) {
         const uint32_t next = search->piece_index + 1u;

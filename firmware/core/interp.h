@@ -4,7 +4,7 @@
  *
  * The point is a pure function of (program, time, kernel): the cursor inside struct interp only
  * remembers which segment and piece are looked at. So a run, a seek and a run backwards by seeks
- * give the same bits, and so do a program with prepared records (core/prepared.h) and one without, where the tick
+ * give the same bits, and so do a program with coefficient records (core/coefficients.h) and one without, where the tick
  * expands what it enters. Kernels: docs/theory/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
  * (the inverse of arc length). The program must have passed program_check with any limits; the
  * image must outlive the struct. interp_at_q42 is meant for the tick (interrupt); the other functions
@@ -15,9 +15,9 @@
 
 #include <stdint.h>
 
+#include "core/coefficients.h"
 #include "core/feed_piece.h"
 #include "core/kernel.h"
-#include "core/prepared.h"
 #include "core/program.h"
 
 enum interp_result {
@@ -43,15 +43,15 @@ struct interp_point {
 struct interp {
     const struct program *program;
     const struct kernel *kernel;
-    const struct prepared_piece *piece;     /* the present ones of a program with records, */
-    const struct prepared_segment *segment; /* else NULL: those below */
-    uint32_t piece_index;                   /* of those below */
+    const struct coefficients_piece *piece;     /* the present ones of a program with records, */
+    const struct coefficients_segment *segment; /* else NULL: those below */
+    uint32_t piece_index;                       /* of those below */
     uint32_t segment_index;
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
     struct interp_point end; /* the exact end point */
-    struct prepared_piece own_piece;
-    struct prepared_segment own_segment;
+    struct coefficients_piece own_piece;
+    struct coefficients_segment own_segment;
 };
 
 /* Starts at time 0. Returns 0 or INTERP_ERR_... Main loop. */
@@ -67,7 +67,7 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
 /* The same of a program with records, by whoever has already found the piece that this time lies in: its record. Nothing
  * is looked for but the segment; the cursor of pieces stays where it is. INTERP_ERR_JUMP too when the piece ends before
  * this time and is not the last; it must not begin behind it. */
-int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
+int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out);
 
 /* The point at an arc length, for whoever knows that without a time (core/feed_override); held inside the path. Of *out
@@ -77,14 +77,14 @@ int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct in
 
 /* F'' in 2^-40 mm/s^2 at a time of the piece given, which interp_at_piece has just evaluated; of a program without
  * records: NULL, for the piece of interp_at_q42. Tick context. */
-int64_t interp_acceleration_q40(const struct interp *it, const struct prepared_piece *piece,
+int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
                                 uint64_t time_q42_s);
 
 /* Where the program is at an arc length, found step by step: the least time at which F has come to it. */
 struct interp_search {
     int64_t arc_length_q40_mm;
-    uint64_t time_q42_s;                /* when it is found */
-    const struct prepared_piece *piece; /* that it lies in; NULL of a program without records */
+    uint64_t time_q42_s;                    /* when it is found */
+    const struct coefficients_piece *piece; /* that it lies in; NULL of a program without records */
     uint32_t piece_index;
     uint32_t bisecting; /* the piece is known; the time is between these two, from its start: */
     uint64_t low_q42_s;
@@ -92,7 +92,7 @@ struct interp_search {
 };
 
 /* Looks from piece `index` on (its record, or NULL), which begins at or before the arc length. */
-void interp_search_begin(struct interp_search *search, const struct prepared_piece *piece,
+void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
                          uint32_t index, int64_t arc_length_q40_mm);
 
 /* One step: goes on by a piece, or halves the time. 1 when it is found, else 0. A program without records: the cursor of

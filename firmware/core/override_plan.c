@@ -98,7 +98,7 @@ void override_window_get(struct override_window *w, const struct program_clock *
     const uint32_t last = clock->piece + (behind < left ? behind : left);
     if (clock->record != NULL) {
         w->bounds = &clock->record->ahead[window];
-        w->end_q32_s = prepared_piece_at(p, p->prepared_for, last)->end_q32_s;
+        w->end_q32_s = coefficients_piece_at(p, p->coefficients_for, last)->end_q32_s;
     } else {
         look_at_pieces(w, clock, last);
     }

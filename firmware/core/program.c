@@ -87,8 +87,8 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size)
         return err;
     }
     p->image = image;
-    p->prepared = NULL;
-    p->prepared_for = NULL;
+    p->coefficients = NULL;
+    p->coefficients_for = NULL;
     p->size = p->header.image_size;
     uint32_t crc = crc32_update(0, image + CRC_FROM, p->size - CRC_FROM);
     return crc == p->header.crc32 ? 0 : PROGRAM_ERR_CRC;

@@ -98,8 +98,8 @@ struct program {
     const uint8_t *image;
     uint32_t size;
     struct program_header header;
-    const uint8_t *prepared;           /* records of core/prepared.h, if there are any, */
-    const struct kernel *prepared_for; /* for this kernel; else NULL */
+    const uint8_t *coefficients;           /* records of core/coefficients.h, if there are any, */
+    const struct kernel *coefficients_for; /* for this kernel; else NULL */
 };
 
 /* Opens an image of `size` bytes: magic, version, header size, counts against the size, CRC. The

@@ -41,7 +41,8 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
     set_time(clock, time_q42_s < clock->duration_q42_s ? time_q42_s : clock->duration_q42_s);
     set_period(clock, period_us);
     clock->piece = 0;
-    clock->record = p->prepared_for != NULL ? prepared_piece_at(p, p->prepared_for, 0) : NULL;
+    clock->record =
+        p->coefficients_for != NULL ? coefficients_piece_at(p, p->coefficients_for, 0) : NULL;
     clock->piece_end_q42_s =
         program_clock_end_of_piece(clock, program_piece_duration(p, 0) << PROGRAM_CLOCK_Q32_TO_Q42);
     if (clock->time_q42_s != clock->duration_q42_s && clock->time_q42_s >= clock->piece_end_q42_s) {
@@ -50,7 +51,7 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
 }
 
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct prepared_piece *record, uint64_t piece_end_q32_s)
+                       const struct coefficients_piece *record, uint64_t piece_end_q32_s)
 {
     set_time(clock, time_q42_s);
     clock->piece = piece;

@@ -15,8 +15,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/coefficients.h"
 #include "core/override_ramp.h"
-#include "core/prepared.h"
 #include "core/program.h"
 #include "core/qmath.h"
 
@@ -37,13 +37,13 @@ struct program_clock {
     uint64_t period_q42_s; /* rounded down */
     uint32_t period_rest;
     uint32_t period_us;
-    uint32_t period_log2;                /* of the period in ms */
-    uint32_t period_q32_s;               /* rounded up, for look-ahead */
-    uint64_t sixth_q70_s;                /* a sixth of the period */
-    uint64_t even_q62_s;                 /* program time of a tick whose override does not change */
-    uint32_t piece;                      /* of the last tick, */
-    const struct prepared_piece *record; /* its record, or NULL where the program has none, */
-    uint64_t piece_end_q42_s;            /* and its end; of the last piece the duration */
+    uint32_t period_log2;  /* of the period in ms */
+    uint32_t period_q32_s; /* rounded up, for look-ahead */
+    uint64_t sixth_q70_s;  /* a sixth of the period */
+    uint64_t even_q62_s;   /* program time of a tick whose override does not change */
+    uint32_t piece;        /* of the last tick, */
+    const struct coefficients_piece *record; /* its record, or NULL where the program has none, */
+    uint64_t piece_end_q42_s;                /* and its end; of the last piece the duration */
 };
 
 /* Sets the clock to a program time of a checked program; beyond the duration: to the duration.
@@ -53,7 +53,7 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
 
 /* Sets the clock to a time inside this piece; `record` as in the struct. Tick context. */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct prepared_piece *record, uint64_t piece_end_q32_s);
+                       const struct coefficients_piece *record, uint64_t piece_end_q32_s);
 
 /* Program time of a tick in 2^-62 s, in which the override changes from `from` to the slope at its end (2^-56 a tick):
  * six times its mean is 3 override + 2 slope + next slope. */
@@ -127,7 +127,7 @@ static inline void program_clock_read_ends(struct program_clock *clock, uint64_t
 static inline void program_clock_find_piece(struct program_clock *clock, uint64_t time_q42_s,
                                             uint32_t most)
 {
-    const struct prepared_piece *record = clock->record;
+    const struct coefficients_piece *record = clock->record;
     const uint64_t time_q32_s = time_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
     uint32_t left = most;
     if (record == NULL) {
@@ -135,7 +135,7 @@ static inline void program_clock_find_piece(struct program_clock *clock, uint64_
         return;
     }
     do {
-        record = prepared_piece_next(record, clock->program->prepared_for);
+        record = coefficients_piece_next(record, clock->program->coefficients_for);
         left--;
     } while (time_q32_s >= record->end_q32_s && left > 0);
     clock->record = record;

@@ -9,7 +9,7 @@
 
 #include "faults/fault_file.h"
 #include "faults/fault_log.h"
-#include "injector/bridge.h"
+#include "injector/forwarder.h"
 #include "injector/injector_options.h"
 #include "injector/outbox.h"
 #include "port/linux/can_socket.h"
@@ -26,7 +26,7 @@ struct injector {
     struct can_socket sockets[2]; /* by enum fault_side */
     struct outbox outboxes[2];    /* what waits for the end of a batch, to that side */
     struct fault_rules rules;
-    struct bridge bridge;
+    struct forwarder forwarder;
     uint64_t now_ns;
     int failed; /* negative errno of a bus, 0: none */
     bool verbose;
@@ -57,7 +57,8 @@ static void note(void *context, const struct fault_watch *watch, enum fault_side
                  const struct can_msg *frame, bool on)
 {
     const struct injector *injector = context;
-    const struct fault_event event = {watch->rule, injector->now_ns, injector->bridge.ticks.tick};
+    const struct fault_event event = {watch->rule, injector->now_ns,
+                                      injector->forwarder.ticks.tick};
     if (!injector->verbose) {
         return;
     }
@@ -80,7 +81,7 @@ static int receive(struct injector *injector, enum fault_side from)
         }
         injector->now_ns = clock_ns();
         for (int i = 0; i < count; i++) {
-            bridge_receive(&injector->bridge, from, &frames[i], injector->now_ns);
+            forwarder_receive(&injector->forwarder, from, &frames[i], injector->now_ns);
         }
         flush_both(injector);
     }
@@ -90,7 +91,7 @@ static int receive(struct injector *injector, enum fault_side from)
 /* Until something is due. Without a limit where nothing is: to set and unset a timer for every frame costs. */
 static int await(const struct injector *injector, struct pollfd wait[3])
 {
-    const uint64_t due_ns = bridge_due_ns(&injector->bridge);
+    const uint64_t due_ns = forwarder_due_ns(&injector->forwarder);
     if (due_ns == UINT64_MAX) {
         return clock_poll(wait, 2, 3, CLOCK_NEVER);
     }
@@ -116,9 +117,9 @@ static int run(struct injector *injector, int signals)
                 injector->failed = error != 0 ? error : injector->failed;
             }
         }
-        if (ready <= 0 || bridge_due_ns(&injector->bridge) != UINT64_MAX) {
+        if (ready <= 0 || forwarder_due_ns(&injector->forwarder) != UINT64_MAX) {
             injector->now_ns = clock_ns();
-            bridge_process(&injector->bridge, injector->now_ns);
+            forwarder_process(&injector->forwarder, injector->now_ns);
             flush_both(injector);
         }
     }
@@ -148,8 +149,8 @@ static int start(struct injector *injector, const struct injector_options *optio
         }
     }
     injector->verbose = options->verbose;
-    bridge_init(&injector->bridge, &injector->rules,
-                (struct bridge_port){send_frame, note, injector});
+    forwarder_init(&injector->forwarder, &injector->rules,
+                   (struct forwarder_port){send_frame, note, injector});
     (void)sched_setscheduler(0, SCHED_FIFO, &priority);
     return run(injector, signals);
 }

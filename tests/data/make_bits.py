@@ -13,8 +13,8 @@ import lzma
 from pathlib import Path
 
 import numpy as np
-
 from hodograph.chain import load_chain
+
 from hodograph.errors import HodographError
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.request import PERIODS_US, PROFILES

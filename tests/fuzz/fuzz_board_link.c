@@ -7,9 +7,9 @@
  */
 #include <string.h>
 
-#include "bridge/turn.h"
 #include "can/slcan.h"
 #include "fuzz.h"
+#include "gateway/pacing.h"
 
 #define REQUESTS_MAX 64u
 #define ROUNDS_MAX   10000u /* every period and guard time of an input, in slices of 10 ms */

@@ -160,7 +160,7 @@ static void deliver(struct fuzz_input *in)
 static bool identity_fits(unsigned axis)
 {
     const struct config_axis *expected = &self.config.axis[axis];
-    const struct drive_facts *facts = &self.boot.facts[axis];
+    const struct drive_properties *facts = &self.boot.facts[axis];
     const uint32_t wanted[3] = {expected->expected_vendor, expected->expected_product,
                                 expected->expected_revision};
     bool fits = true;

@@ -10,7 +10,7 @@
 #include "drive_bench.h"
 #include "faults/fault_parse.h"
 #include "fuzz.h"
-#include "injector/bridge.h"
+#include "injector/forwarder.h"
 #include "node/node_faults.h"
 
 #define NODES      2u
@@ -18,7 +18,7 @@
 #define ROUNDS_MAX 4096u
 
 static struct fault_rules rules;
-static struct bridge bridge;
+static struct forwarder forwarder;
 static struct drive_node nodes[NODES];
 static struct node_faults faults;
 static uint64_t now_ns;
@@ -83,7 +83,7 @@ static void take(struct fuzz_input *in, uint8_t what)
         frame.id = usual[(what >> 2) & 7u];
     }
     const enum fault_side from = (what & 1u) != 0u ? FAULT_SIDE_CONTROLLER : FAULT_SIDE_DRIVES;
-    bridge_receive(&bridge, from, &frame, now_ns);
+    forwarder_receive(&forwarder, from, &frame, now_ns);
     node_faults_receive(&faults, &frame, now_ns);
     for (unsigned i = 0; i < NODES; ++i) {
         drive_node_receive(&nodes[i], &frame);
@@ -94,11 +94,11 @@ static void pass_time(uint32_t us)
 {
     const uint64_t end_ns = now_ns + 1000ull * us;
     unsigned rounds = 0;
-    while (bridge_due_ns(&bridge) <= end_ns) {
-        const uint64_t due_ns = bridge_due_ns(&bridge);
+    while (forwarder_due_ns(&forwarder) <= end_ns) {
+        const uint64_t due_ns = forwarder_due_ns(&forwarder);
         FUZZ_CHECK(++rounds < ROUNDS_MAX);
         now_ns = due_ns > now_ns ? due_ns : now_ns;
-        bridge_process(&bridge, now_ns);
+        forwarder_process(&forwarder, now_ns);
     }
     now_ns = end_ns;
     node_faults_process(&faults, now_ns);
@@ -110,7 +110,7 @@ static void pass_time(uint32_t us)
 static void harness(struct fuzz_input *in)
 {
     const struct drive_node_port port = {from_drive, NULL};
-    const struct bridge_port sides = {from_bridge, noted, NULL};
+    const struct forwarder_port sides = {from_bridge, noted, NULL};
     memset(&rules, 0, sizeof rules);
     now_ns = 1000000000u;
     if (!parse(in)) {
@@ -118,7 +118,7 @@ static void harness(struct fuzz_input *in)
     }
     FUZZ_CHECK(drive_node_init(&nodes[0], 2, &drive_bench_config, 0, port) == 0);
     FUZZ_CHECK(drive_node_init(&nodes[1], 3, &drive_bench_config, 0, port) == 0);
-    bridge_init(&bridge, &rules, sides);
+    forwarder_init(&forwarder, &rules, sides);
     node_faults_init(&faults, &rules, nodes, NODES, noted_by_drive);
     while (fuzz_left(in)) {
         const uint8_t what = fuzz_byte(in);

@@ -11,9 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/coefficients.h"
 #include "core/feed_override.h"
 #include "core/interp.h"
-#include "core/prepared.h"
 #include "core/program_check.h"
 #include "fuzz.h"
 #include "golden.h"
@@ -375,13 +375,13 @@ static struct program prepare(const struct program *p, struct records *records)
 {
     const struct kernel *kernel = kernel_find(INTERP_DOUBLE);
     struct program prepared = *p;
-    records->room = (size_t)prepared_size(p, kernel);
+    records->room = (size_t)coefficients_size(p, kernel);
     records->used = 0;
     records->bytes = malloc(records->room);
     FUZZ_CHECK(records->bytes != NULL);
-    FUZZ_CHECK(prepared_make(p, kernel, keep_record, records) == 0);
+    FUZZ_CHECK(coefficients_make(p, kernel, keep_record, records) == 0);
     FUZZ_CHECK(records->used == records->room);
-    prepared_attach(&prepared, kernel, records->bytes);
+    coefficients_attach(&prepared, kernel, records->bytes);
     return prepared;
 }
 

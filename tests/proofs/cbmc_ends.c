@@ -24,10 +24,10 @@ uint64_t program_piece_duration(const struct program *p, uint32_t i)
     return duration;
 }
 
-static struct prepared_piece records[COUNT];
+static struct coefficients_piece records[COUNT];
 static struct program program;
-static struct kernel kernel = {.piece_size = sizeof(struct prepared_piece) -
-                                             offsetof(struct prepared_piece, feed)};
+static struct kernel kernel = {.piece_size = sizeof(struct coefficients_piece) -
+                                             offsetof(struct coefficients_piece, feed)};
 
 /* In piece i, whose end has been reached. */
 static void place(struct program_clock *clock, uint32_t i)
@@ -39,7 +39,7 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     clock->piece = i;
     clock->piece_end_q42_s = program_clock_end_of_piece(clock, nondet_uint64());
-    clock->record = program.prepared_for != 0 ? &records[i] : 0;
+    clock->record = program.coefficients_for != 0 ? &records[i] : 0;
 }
 
 void harness(void)
@@ -47,7 +47,7 @@ void harness(void)
     struct program_clock clock;
     program.header.piece_count = COUNT;
     program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> PROGRAM_CLOCK_Q32_TO_Q42);
-    program.prepared_for = nondet_uint32() != 0 ? &kernel : 0;
+    program.coefficients_for = nondet_uint32() != 0 ? &kernel : 0;
     for (uint32_t k = 0; k < COUNT; k++) {
         records[k].end_q32_s = k + 1u == COUNT ? program.header.duration_q32_s : nondet_uint64();
     }

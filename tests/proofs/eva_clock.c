@@ -55,7 +55,7 @@ static int comes_steady(struct override_plan *plan);
 
 #define COUNT 3u
 
-static uint64_t records[COUNT * sizeof(struct prepared_piece) / 8];
+static uint64_t records[COUNT * sizeof(struct coefficients_piece) / 8];
 
 static const struct kernel any_kernel = {.piece_size = sizeof(struct feed_piece)};
 
@@ -95,8 +95,8 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->piece = i;
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     clock->piece_end_q42_s = program_clock_end_of_piece(clock, (uint64_t)any_between(0, INT64_MAX));
-    if (p->prepared_for != NULL) {
-        clock->record = prepared_piece_at(p, p->prepared_for, i);
+    if (p->coefficients_for != NULL) {
+        clock->record = coefficients_piece_at(p, p->coefficients_for, i);
     }
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
@@ -149,14 +149,14 @@ int main(void)
     Frama_C_make_unknown((char *)&p.header, sizeof p.header);
     p.header.piece_count = COUNT;
     p.header.duration_q32_s = (uint64_t)any_between(1, POWER(53));
-    p.prepared = NULL;
-    p.prepared_for = NULL;
+    p.coefficients = NULL;
+    p.coefficients_for = NULL;
     tick(&p);
     Frama_C_make_unknown((char *)records, sizeof records);
-    p.prepared = (const uint8_t *)records;
-    p.prepared_for = &any_kernel;
+    p.coefficients = (const uint8_t *)records;
+    p.coefficients_for = &any_kernel;
     for (uint32_t i = 0; i < COUNT; i++) {
-        struct prepared_piece *record = (void *)prepared_piece_at(&p, &any_kernel, i);
+        struct coefficients_piece *record = (void *)coefficients_piece_at(&p, &any_kernel, i);
         record->end_q32_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(1, POWER(54));
         for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
             record->ahead[k] = any_bounds();

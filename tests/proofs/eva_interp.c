@@ -7,14 +7,14 @@
  * options: -eva-slevel 60
  * instead: core/interp.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
  * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override program_piece_start ph_segment_expand ph_segment_end
- * shows: interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step interp_seek prepared_make
+ * shows: interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step interp_seek coefficients_make
  * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
  * mutant: core/interp.c: while (i > 0 && => while (
  * mutant: core/interp.c: while (i + 1u < it->program->header.piece_count && => while (i < it->program->header.piece_count &&
  * mutant: core/interp.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
  * mutant: core/interp.c: if (next < p->header.piece_count && => if (next <= p->header.piece_count &&
- * mutant: core/prepared.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
- * mutant: core/prepared.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
+ * mutant: core/coefficients.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
+ * mutant: core/coefficients.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
  * mutant: core/override_ramp.c: first + least(count, left) => first + count
  */
 #include "core/ph_segment.h"
@@ -63,7 +63,7 @@ void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[3]);
 
 #include "core/interp.c"
 #include "core/kernel.c"
-#include "core/prepared.c"
+#include "core/coefficients.c"
 #include "core/override_ramp.c"
 
 #define COUNT 3u
@@ -117,7 +117,7 @@ static const struct kernel any_kernel = {
 const struct kernel *const kernels_linked[KERNELS] = {&any_kernel, NULL, NULL};
 
 static uint64_t
-    records[COUNT * (sizeof(struct prepared_piece) + sizeof(struct prepared_segment)) / 8 +
+    records[COUNT * (sizeof(struct coefficients_piece) + sizeof(struct coefficients_segment)) / 8 +
                         1];
 static uint32_t filled;
 
@@ -141,8 +141,8 @@ static void place(struct interp *it, uint32_t i)
         load_piece(it, i, (uint64_t)any_between(0, POWER(54)));
         load_segment(it, i);
     } else {
-        it->piece = prepared_piece_at(it->program, it->kernel, i);
-        it->segment = prepared_segment_at(it->program, it->kernel, i);
+        it->piece = coefficients_piece_at(it->program, it->kernel, i);
+        it->segment = coefficients_segment_at(it->program, it->kernel, i);
     }
 }
 
@@ -151,8 +151,8 @@ static void stays(const struct interp *it)
 {
     if (it->piece != NULL) {
         prove((const void *)it->piece <
-              (const void *)prepared_segment_at(it->program, it->kernel, 0));
-        prove(it->segment >= prepared_segment_at(it->program, it->kernel, 0));
+              (const void *)coefficients_segment_at(it->program, it->kernel, 0));
+        prove(it->segment >= coefficients_segment_at(it->program, it->kernel, 0));
     }
 }
 
@@ -214,12 +214,12 @@ int main(void)
     p.header.period_us = (uint32_t)1000 << any_between(0, 3);
     p.header.duration_q32_s = (uint64_t)any_between(1, POWER(54) - 1);
     p.header.length_q40_mm = any_between(1, POWER(62) - 1);
-    p.prepared = NULL;
-    p.prepared_for = NULL;
+    p.coefficients = NULL;
+    p.coefficients_for = NULL;
     interpolate(&p);
-    if (prepared_make(&p, &any_kernel, take, records) == 0) {
-        prove(filled == prepared_size(&p, &any_kernel) && filled <= sizeof records);
-        prepared_attach(&p, &any_kernel, (const uint8_t *)records);
+    if (coefficients_make(&p, &any_kernel, take, records) == 0) {
+        prove(filled == coefficients_size(&p, &any_kernel) && filled <= sizeof records);
+        coefficients_attach(&p, &any_kernel, (const uint8_t *)records);
         interpolate(&p);
         reached();
     }

@@ -50,7 +50,7 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
     clock->record = NULL;
 }
 
-static struct prepared_piece record;
+static struct coefficients_piece record;
 
 static struct path_state any_at(void)
 {

@@ -38,7 +38,7 @@
             \from time_q42_s, piece, piece_end_q32_s;
     ensures is_clock(clock); */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct prepared_piece *record, uint64_t piece_end_q32_s);
+                       const struct coefficients_piece *record, uint64_t piece_end_q32_s);
 
 /*@ assigns *plan \from \nothing;
     ensures \initialized(plan) && plan->now.override_q57 == 0 && plan->now.slope_q56 == 0; */
@@ -116,7 +116,7 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
 
 /*@ assigns \result, *out, it->segment_index \from time_q42_s;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint64_t time_q42_s,
+int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out);
 
 /*@ assigns \result, *out, it->segment_index \from arc_length_q40_mm;
@@ -124,14 +124,14 @@ int interp_at_piece(struct interp *it, const struct prepared_piece *piece, uint6
 int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out);
 
 /*@ assigns \result \from time_q42_s; */
-int64_t interp_acceleration_q40(const struct interp *it, const struct prepared_piece *piece,
+int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
                                 uint64_t time_q42_s);
 
 /*@ requires index < 3;
     assigns search->arc_length_q40_mm, search->time_q42_s, search->piece_index, search->bisecting \from index,
             arc_length_q40_mm;
     ensures search->piece_index < 3; */
-void interp_search_begin(struct interp_search *search, const struct prepared_piece *piece,
+void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
                          uint32_t index, int64_t arc_length_q40_mm);
 
 /*@ requires search->piece_index < 3;

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hodograph.bus.listening.frames import FRAME_DTYPE, RECORD_DTYPE, Frames
-from hodograph.chain import load_chain
+from hodograph.bus.capture.frames import FRAME_DTYPE, RECORD_DTYPE, Frames
+from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -19,7 +19,7 @@ ENABLED = 0x1237
 @cache
 def alpha() -> tuple[bytes, Frames]:
     """Program image and frames of the alpha: 300 SYNCs of standstill, the run, settling."""
-    chain = load_chain(EXAMPLES / "alpha.toml", None)
+    chain = load_pipeline(EXAMPLES / "alpha.toml", None)
     motion = simulate(
         chain.image, [axis.drive for axis in chain.machine.axes if axis.drive is not None]
     )

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import Bench
+from hodograph.bus.capture.decode import RPDO1, SYNC_ID
+from hodograph.bus.capture.recorder import Frames
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.decode import RPDO1, SYNC_ID
-from hodograph.bus.listening.recorder import Frames
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.processes import Process, controller_command, drive_command, virtual_clock
 from hodograph.bus.sdo.controller import FAULT_STATE, OFF, READY, connect

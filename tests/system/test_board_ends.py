@@ -13,15 +13,15 @@ import pytest
 
 from boards import board
 from hodograph.bus.address import BusAddress
+from hodograph.bus.capture.recorder import Frames, Recorder
+from hodograph.bus.capture.setpoint_check import require_no_jump, step_limits
 from hodograph.bus.clock import REAL_CLOCK, Clock
 from hodograph.bus.goto import goto
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Frames, Recorder
-from hodograph.bus.listening.setpoint_check import require_no_jump, step_limits
 from hodograph.bus.processes import Process, drive_command, virtual_clock
 from hodograph.bus.sdo.controller import STATISTICS, Controller, connect
-from hodograph.chain import Chain, load_chain
 from hodograph.native import NativeProgram
+from hodograph.pipeline import Pipeline, load_pipeline
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVE_EDS = ROOT / "sim/node/drive.eds"
@@ -43,7 +43,7 @@ LOOK_US = 10_000
 class Running:
     """A board in the middle of the alpha; everything on the bus is recorded."""
 
-    chain: Chain
+    chain: Pipeline
     address: BusAddress
     clock: Clock
     board: Process
@@ -52,7 +52,7 @@ class Running:
     is_virtual: bool
 
 
-def begin(controller: Controller, chain: Chain, percent: int) -> None:
+def begin(controller: Controller, chain: Pipeline, percent: int) -> None:
     _, setpoints = NativeProgram(chain.image).setpoints("fixed", chain.machine.counts_per_mm)
     controller.require(END_S)
     controller.configure(chain.machine, "fixed")
@@ -65,7 +65,7 @@ def begin(controller: Controller, chain: Chain, percent: int) -> None:
 @pytest.fixture(params=["slcan", "fifo"])
 def running(request: pytest.FixtureRequest, one_core: None) -> Iterator[Running]:
     """With FIFOs in virtual time, over SLCAN in real time."""
-    chain, link = load_chain(ROOT / "examples/alpha.toml"), request.param
+    chain, link = load_pipeline(ROOT / "examples/alpha.toml"), request.param
     with ExitStack() as stack:
         address = stack.enter_context(LocalHub(virtual=link == "fifo")).address
         clock = virtual_clock(address)

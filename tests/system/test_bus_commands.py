@@ -22,9 +22,9 @@ from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import END_S
 from hodograph.bus.sdo.controller import OFF, READY, RUNNING, Controller, connect
 from hodograph.bus.sdo.objects import PROGRAM_MEMORY
-from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.errors import BusError, RefusedError
+from hodograph.pipeline import load_pipeline
 from hodograph.program.memory import LARGEST_BANK, RECORD_BYTES
 
 ALPHA = EXAMPLES / "alpha.toml"
@@ -80,13 +80,13 @@ def test_refusals(controller: Controller, capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.mark.parametrize("spoil", ["cut", "bit", "limits", "empty header"])
 def test_spoilt_upload_keeps_the_old_program(controller: Controller, spoil: str) -> None:
-    image = load_chain(ALPHA).image
+    image = load_pipeline(ALPHA).image
     controller.upload(image)
     crc = controller.program_crc()
     spoilt = {
         "cut": image[: len(image) // 2],
         "bit": image[:1000] + bytes([image[1000] ^ 4]) + image[1001:],
-        "limits": load_chain(EXAMPLES / "heart.toml").image,
+        "limits": load_pipeline(EXAMPLES / "heart.toml").image,
         "empty header": bytes(128),
     }[spoil]
     if spoil == "limits":
@@ -98,7 +98,7 @@ def test_spoilt_upload_keeps_the_old_program(controller: Controller, spoil: str)
 
 
 def test_broken_off_upload_keeps_the_old_program(controller: Controller) -> None:
-    image = load_chain(ALPHA).image
+    image = load_pipeline(ALPHA).image
     controller.upload(image)
     crc = controller.program_crc()
 
@@ -107,7 +107,7 @@ def test_broken_off_upload_keeps_the_old_program(controller: Controller) -> None
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        controller.upload(load_chain(EXAMPLES / "heart.toml").image, interrupt)
+        controller.upload(load_pipeline(EXAMPLES / "heart.toml").image, interrupt)
     assert controller.program_crc() == crc
     controller.upload(image)
     assert controller.program_crc() == crc

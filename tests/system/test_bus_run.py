@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from commands import result
+from hodograph.bus.capture.recorder import Frames, Recorder
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Frames, Recorder
 from hodograph.cli.main import main
 from runs import SIMULATE_ONLY, same_motion
 

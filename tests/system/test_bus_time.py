@@ -10,13 +10,13 @@ from typing import Any
 import cantools
 import pytest
 
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Recorder
-from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.dbc import dbc_text
 from hodograph.native import NativeProgram
+from hodograph.pipeline import load_pipeline
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -46,7 +46,7 @@ def test_load_and_dbc_of_a_run(
         if frame["id"] == 0x202:
             targets.append(float(decoded["Drive2_TargetPosition"]))
     assert targets[0] == 0
-    program = NativeProgram(load_chain(file).image)
+    program = NativeProgram(load_pipeline(file).image)
     _, setpoints = program.setpoints("fixed", machine.counts_per_mm)
     assert (min(targets), max(targets)) == pytest.approx(
         (setpoints[:, 0].min() / 1e6, setpoints[:, 0].max() / 1e6)

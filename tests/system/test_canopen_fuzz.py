@@ -16,7 +16,7 @@ from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.run import run_program, station
-from hodograph.chain import Chain, load_chain
+from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import Motion, simulate
 
 BURST = 3
@@ -93,9 +93,9 @@ class Noise:
 
 
 @cache
-def alpha(root: Path) -> tuple[Chain, Motion]:
+def alpha(root: Path) -> tuple[Pipeline, Motion]:
     """The program, and what it does undisturbed."""
-    chain = load_chain(root / "examples/alpha.toml")
+    chain = load_pipeline(root / "examples/alpha.toml")
     drives = [axis.drive for axis in chain.machine.plane if axis.drive is not None]
     return chain, simulate(chain.image, drives, counts_per_mm=chain.machine.counts_per_mm)
 

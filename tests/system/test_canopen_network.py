@@ -22,10 +22,10 @@ from canopen_bench import (
     until,
 )
 
+from hodograph.bus.capture.frames import Frames
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.frames import Frames
-from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.processes import virtual_clock
 from hodograph.bustime.frame_bits import exact_bits
 
@@ -77,7 +77,7 @@ def controller(hub: LocalHub, clock: VirtualClock) -> Iterator[Listened]:
         yield Listened(node)
 
 
-def answers_to_sync(hub: LocalHub, node: canopen.RemoteNode) -> list[int]:
+def tpdo_monitor_to_sync(hub: LocalHub, node: canopen.RemoteNode) -> list[int]:
     """COB-IDs of what a SYNC is answered with."""
     with listener(hub, 0x180, 0x280, 0x380, 0x480, node=node.id) as bus:
         node.network.send_message(0x80, b"\x01")
@@ -88,17 +88,17 @@ def answers_to_sync(hub: LocalHub, node: canopen.RemoteNode) -> list[int]:
 def test_all_commands(hub: LocalHub, drive: Listened) -> None:
     node = drive.node
     assert drive.states(2) == [PRE_OPERATIONAL] * 2
-    assert answers_to_sync(hub, node) == []
+    assert tpdo_monitor_to_sync(hub, node) == []
     drive.command("OPERATIONAL", OPERATIONAL)
-    assert answers_to_sync(hub, node) == [0x180, 0x280]
+    assert tpdo_monitor_to_sync(hub, node) == [0x180, 0x280]
     assert node.sdo[0x1000].raw == 0x00020192
     drive.command("STOPPED", STOPPED)
-    assert answers_to_sync(hub, node) == []
+    assert tpdo_monitor_to_sync(hub, node) == []
     with pytest.raises(canopen.SdoCommunicationError):
         node.sdo.upload(0x1000, 0)
     drive.command("PRE-OPERATIONAL", PRE_OPERATIONAL)
     assert node.sdo[0x1000].raw == 0x00020192
-    assert answers_to_sync(hub, node) == []
+    assert tpdo_monitor_to_sync(hub, node) == []
 
 
 @pytest.mark.parametrize("command", ["RESET", "RESET COMMUNICATION"])

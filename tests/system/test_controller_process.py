@@ -19,7 +19,7 @@ from hodograph.bus.hub import LocalHub
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.processes import Process
 from hodograph.bus.sdo.network import Network
-from hodograph.chain import load_chain
+from hodograph.pipeline import load_pipeline
 from hodograph.program import encode
 
 CONTROLLER = "build/bin/hodograph-controller"
@@ -250,7 +250,7 @@ def test_a_signal_stops_the_axes_and_ends(
 
 @pytest.fixture(scope="module")
 def optimal(root: Path) -> bytes:
-    return encode(load_chain(root / "examples/alpha_optimal.toml").program)
+    return encode(load_pipeline(root / "examples/alpha_optimal.toml").program)
 
 
 @pytest.mark.parametrize("after_s", [0.003, 0.09, 0.2, 0.35, 0.456, 0.6, 0.73])

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from browser import Browser, Page
-from hodograph.bus.listening.recordings import write_recording
+from hodograph.bus.capture.recordings import write_recording
 from traffic import alpha, recorded
 
 ROOT = Path(__file__).resolve().parents[2]

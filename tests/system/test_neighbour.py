@@ -22,16 +22,16 @@ from neighbour import (
 
 from bench import EXAMPLES, Bench, MakeAlpha, MakeBench
 from commands import running
+from hodograph.bus.capture.recorder import Recorder
+from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Recorder
-from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
 from hodograph.bus.sdo import node
 from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, HELD, OFF, READY, RUNNING
 from hodograph.bus.sdo.objects import COMMAND, FAULT, HOLD, QUICK_STOP
 from hodograph.bus.sdo.objects import STOP as STOP_COMMAND
-from hodograph.chain import load_chain
 from hodograph.cli.main import main
+from hodograph.pipeline import load_pipeline
 
 DRIVE = 2
 AWAY = 0xFF08
@@ -215,7 +215,7 @@ def test_a_second_client_beside_an_upload(make_bench: MakeBench, hub: LocalHub) 
     """Another computer, which knows nothing of the turns taken on this one, asks in the middle of a block download: it
     is refused each time, the upload goes on and is whole.
     """
-    bench, image = make_bench(), load_chain(EXAMPLES / "alpha.toml").image
+    bench, image = make_bench(), load_pipeline(EXAMPLES / "alpha.toml").image
     refused: list[int] = []
     requests = (
         b"\x40" + object_bytes(0x2002, 0),

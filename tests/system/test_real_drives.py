@@ -11,10 +11,10 @@ from neighbour import flood, latched, neighbour, real_drives, runs_again, settle
 
 from bench import PAPER_ALPHA, Bench, MakeAlpha, MakeBench
 from boards import EMULATE
+from hodograph.bus.capture.recorder import Recorder
+from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Recorder
-from hodograph.bus.listening.setpoint_check import find_jumps, step_limits
 from hodograph.bus.sdo.controller import FAULT_STATE, READY, RUNNING
 from hodograph.bus.sdo.objects import FAULT, TIMING
 from hodograph.cli.main import main

@@ -13,10 +13,10 @@ import pytest
 
 from bench import EXAMPLES, MakeBench
 from commands import result, running
+from hodograph.bus.capture.frames import RECORD_DTYPE
+from hodograph.bus.capture.recordings import read_recording, write_recording
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.frames import RECORD_DTYPE
-from hodograph.bus.listening.recordings import read_recording, write_recording
 from hodograph.bus.local_bus import LocalBus
 from hodograph.cli.main import main
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hodograph.bus.capture.recorder import Recorder
+from hodograph.bus.capture.recordings import read_recording, write_recording
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Recorder
-from hodograph.bus.listening.recordings import read_recording, write_recording
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bustime.frame_bits import exact_bits
 

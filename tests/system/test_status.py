@@ -19,9 +19,9 @@ import pytest
 
 from bench import PAPER_ALPHA, MakeBench
 from commands import running
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.processes import Process, controller_command
 from hodograph.bus.sdo.controller import OFF, Controller, connect
 from hodograph.bus.sdo.status import snapshot

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.chain import load_chain
+from hodograph.pipeline import load_pipeline
 from hodograph.program import decode
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -112,7 +112,7 @@ def test_the_document_shows_the_committed_counts() -> None:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_images_that_are_counted_are_those_of_the_examples(name: str) -> None:
-    compiled = load_chain(ROOT / f"examples/{name}.toml").program
+    compiled = load_pipeline(ROOT / f"examples/{name}.toml").program
     counted = decode(EXAMPLES[name].read_bytes())
     assert counted.ticks == compiled.ticks
     assert counted.segment_count == compiled.segment_count

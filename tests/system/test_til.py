@@ -15,14 +15,14 @@ import pytest
 from boards import BRIDGE, EMULATE, QEMU, board, children, stop_for
 from commands import result
 from hodograph.bus.address import BusAddress
+from hodograph.bus.capture.recorder import Frames, Recorder
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Frames, Recorder
 from hodograph.bus.processes import Process
 from hodograph.bus.run import BusRun, run_program, station
 from hodograph.bus.sdo.controller import connect
 from hodograph.bus.sdo.objects import BOOT
-from hodograph.chain import load_chain
+from hodograph.pipeline import load_pipeline
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = [str(ROOT / "examples" / f"{name}.toml") for name in ("alpha", "heart")]
@@ -45,7 +45,7 @@ def test_the_m4f_runs_alpha_and_heart(
 
 def _recorded_run(target: str, stopped: str | None = None) -> tuple[Frames, BusRun]:
     """The alpha at the board; `stopped`: a program of it that stands still for a second on the way."""
-    chain = load_chain(Path(FILES[0]))
+    chain = load_pipeline(Path(FILES[0]))
     victims: list[int] = []
 
     def progress(tick: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bench import VCAN0
-from hodograph.bus.listening.recorder import Recorder
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.cli.main import main
 
 pytestmark = pytest.mark.bus

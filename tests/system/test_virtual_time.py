@@ -18,10 +18,10 @@ import pytest
 
 from bench import PAPER_ALPHA, MakeBench
 from commands import run_command, running
+from hodograph.bus.capture.recorder import Recorder
+from hodograph.bus.capture.recordings.candump import candump_lines
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.listening.recorder import Recorder
-from hodograph.bus.listening.recordings.candump import candump_lines
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.processes import Process, drive_command, find_program
 from hodograph.bus.sdo.controller import OFF

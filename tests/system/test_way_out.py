@@ -17,14 +17,14 @@ import pytest
 from numpy.typing import NDArray
 
 from bench import EXAMPLES, Bench, MakeBench
+from hodograph.bus.capture.frames import Frames
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.clock import VirtualClock
-from hodograph.bus.listening.frames import Frames
-from hodograph.bus.listening.recorder import Recorder
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.sdo.controller import FAULT_STATE
 from hodograph.bus.sdo.objects import FAULT
-from hodograph.chain import load_chain
 from hodograph.cli.main import main
+from hodograph.pipeline import load_pipeline
 from hodograph.program import Program
 
 HEART = str(EXAMPLES / "heart_optimal.toml")
@@ -127,7 +127,7 @@ def way(make_bench: MakeBench) -> Iterator[Way]:
 
 @pytest.fixture(scope="module")
 def heart() -> Program:
-    return load_chain(EXAMPLES / "heart_optimal.toml").program
+    return load_pipeline(EXAMPLES / "heart_optimal.toml").program
 
 
 def signalled(way: Way, end: signal.Signals, again_s: float | None = None) -> tuple[int, int]:

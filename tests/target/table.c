@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "core/prepared.h"
+#include "core/coefficients.h"
 
 extern uint8_t startup_store_base[];
 
@@ -72,11 +72,11 @@ int table_make(struct program *program, uint32_t kernel)
 {
     const struct kernel *made_for = kernel_find(kernel);
     uint32_t offset = 0;
-    if (made_for == NULL || prepared_size(program, made_for) > TABLE_SIZE) {
+    if (made_for == NULL || coefficients_size(program, made_for) > TABLE_SIZE) {
         return -1;
     }
     erase();
-    (void)prepared_make(program, made_for, write_records, &offset);
-    prepared_attach(program, made_for, startup_store_base + TABLE_AT);
+    (void)coefficients_make(program, made_for, write_records, &offset);
+    coefficients_attach(program, made_for, startup_store_base + TABLE_AT);
     return 0;
 }

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bus_checker import BusChecker
-from hodograph.bus.listening.frames import RECORD_DTYPE
+from hodograph.bus.capture.frames import RECORD_DTYPE
 from hodograph.config import load_machine
 
 MACHINE = Path(__file__).resolve().parents[2] / "examples" / "machines" / "paper_alpha.toml"

@@ -18,13 +18,13 @@ GOOD = {
     "firmware/port/linux/own.h": "#include <poll.h>\n",
     "firmware/app/tick.c": '#include "core/interp.h"\n#include "od_controller.h"\n',
     "sim/plant/drive.h": "\n",
-    "sim/rig/rig.c": '#include "plant/drive.h"\n#include "core/interp.h"\n',
+    "sim/offline/offline.c": '#include "plant/drive.h"\n#include "core/interp.h"\n',
     "host_tools/hodograph/__init__.py": "",
     "host_tools/hodograph/errors.py": "",
     "host_tools/hodograph/spline/__init__.py": "from .curve import Curve\n",
     "host_tools/hodograph/spline/curve.py": "from ..errors import E\n",
     "host_tools/hodograph/feed/__init__.py": "import numpy\n",
-    "host_tools/hodograph/native/build_native.py": 'H = ("core/interp.h", "rig/rig.h")\n',
+    "host_tools/hodograph/native/build_native.py": 'H = ("core/interp.h", "offline/offline.h")\n',
 }
 
 
@@ -49,7 +49,7 @@ def test_a_good_tree_has_no_breach(tmp_path: Path) -> None:
         ("firmware/port/board/x.c", '#include "port/linux/own.h"\n', "firmware/port/* may not use"),
         ("firmware/port/linux/x.c", '#include "app/tick.h"\n', "firmware/port/* may not use"),
         ("sim/plant/x.c", '#include "core/interp.h"\n', "sim/plant may not use firmware/core"),
-        ("sim/rig/x.c", '#include "nowhere.h"\n', "is neither ours nor generated"),
+        ("sim/offline/x.c", '#include "nowhere.h"\n', "is neither ours nor generated"),
         ("firmware/new/x.c", "", "x.c:1: this folder has no row"),
         ("host_tools/hodograph/spline/x.py", "import os\nfrom ..feed import y\n", "x.py:2: spline"),
         ("host_tools/hodograph/feed/x.py", "import hodograph.program.image\n", "x.py:1: feed may"),

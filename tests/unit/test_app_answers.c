@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/machine/answers.h"
+#include "app/machine/tpdo_monitor.h"
 
 #include "unity.h"
 
 #define PERIOD_US 1000u
 
-static struct answers answers;
+static struct tpdo_monitor answers;
 static uint32_t now_us;
 static uint32_t wait_us;
 static uint8_t missed_max;
 
 void setUp(void)
 {
-    answers_init(&answers);
+    tpdo_monitor_init(&answers);
     now_us = UINT32_MAX - 3u * PERIOD_US; /* soon to wrap */
     wait_us = 0;
     missed_max = 1;
@@ -27,25 +27,25 @@ static uint32_t sync(unsigned count)
 {
     const uint32_t sync_us = now_us;
     for (unsigned i = 0; i < count; ++i) {
-        answers_take(&answers, sync_us + 300u);
+        tpdo_monitor_take(&answers, sync_us + 300u);
     }
     now_us += PERIOD_US;
-    return answers_close_sync(&answers, now_us, sync_us, wait_us, missed_max);
+    return tpdo_monitor_close_sync(&answers, now_us, sync_us, wait_us, missed_max);
 }
 
-/* What the tick uses has to do exactly what answers_close_sync does, wherever it says that it has done it. */
+/* What the tick uses has to do exactly what tpdo_monitor_close_sync does, wherever it says that it has done it. */
 static void test_the_quick_end_of_a_sync_is_the_same_as_the_thorough_one(void)
 {
     static const uint8_t counts[] = {1, 1, 0, 1, 2, 1, 0, 0, 3, 1, 1, 0, 0, 0, 1, 1, 2, 0, 1, 5, 1};
     uint32_t quick_ones = 0;
     wait_us = 2u * PERIOD_US;
     for (uint32_t i = 0; i < sizeof counts; ++i) {
-        struct answers quick = answers;
+        struct tpdo_monitor quick = answers;
         for (unsigned k = 0; k < counts[i]; ++k) {
-            answers_take(&quick, now_us + 300u);
+            tpdo_monitor_take(&quick, now_us + 300u);
         }
-        const struct answers before = quick;
-        const bool done = answers_close_answered(&quick);
+        const struct tpdo_monitor before = quick;
+        const bool done = tpdo_monitor_close_answered(&quick);
         const uint32_t missed = sync(counts[i]);
         TEST_ASSERT_EQUAL_MEMORY(done ? &answers : &before, &quick, sizeof quick);
         TEST_ASSERT_TRUE(!done || missed == 0u);
@@ -82,7 +82,7 @@ static void test_one_more_than_permitted_in_a_row_is_lost_until_the_next_answer(
         }
         TEST_ASSERT_EQUAL_UINT32(1, sync(0));
         TEST_ASSERT_TRUE(answers.lost);
-        answers_take(&answers, now_us);
+        tpdo_monitor_take(&answers, now_us);
         TEST_ASSERT_FALSE(answers.lost);
     }
 }
@@ -183,7 +183,7 @@ static void test_restart_keeps_the_presence_only(void)
     (void)sync(1);
     (void)sync(0);
     (void)sync(0);
-    answers_restart(&answers);
+    tpdo_monitor_restart(&answers);
     TEST_ASSERT_TRUE(answers.present);
     TEST_ASSERT_FALSE(answers.lost);
     TEST_ASSERT_EQUAL_UINT32(0, answers.missed);

@@ -337,7 +337,7 @@ static void test_what_a_drive_says_of_itself_is_kept(void)
     drive(1)->values.identity_object.vendor_id = 0x123;
     drive(1)->values.identity_object.serial_number = 99;
     boot();
-    const struct drive_facts *facts = bench.controller.boot.facts;
+    const struct drive_properties *facts = bench.controller.boot.facts;
     TEST_ASSERT_TRUE(drive_is_simulated(&facts[0]));
     TEST_ASSERT_FALSE(drive_is_simulated(&facts[1]));
     TEST_ASSERT_EQUAL_UINT32(99, facts[1].value[DRIVE_SERIAL]);

@@ -156,12 +156,12 @@ static void test_the_records_are_those_of_the_kernel(void)
     struct config other = config;
     TEST_ASSERT_EQUAL_INT(0, upload());
     const unsigned bank = slot.bank;
-    TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.prepared_for);
+    TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.coefficients_for);
     other.kernel = 1;
     other.crc32 = 2;
     program_slot_refresh(&slot, &other);
     TEST_ASSERT_TRUE(slot.acceptable);
-    TEST_ASSERT_EQUAL_PTR(kernel_find(1), slot.program.prepared_for);
+    TEST_ASSERT_EQUAL_PTR(kernel_find(1), slot.program.coefficients_for);
     TEST_ASSERT_EQUAL_UINT(1u - bank, slot.bank);
     expect_active(image);
     fake_port_fail_store(true);
@@ -198,7 +198,7 @@ static void test_after_power_on_the_newest_program_is_there(void)
         power_on();
         expect_active(image);
         TEST_ASSERT_TRUE(slot.acceptable);
-        TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.prepared_for);
+        TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.coefficients_for);
         TEST_ASSERT_EQUAL_INT32(x * 1000000, slot.start_counts[0]);
     }
     const unsigned bank = slot.bank;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/machine/status_watch.h"
+#include "app/machine/statusword_monitor.h"
 
 #include "app/machine/fault.h"
 #include "canopen/cia402.h"
@@ -7,12 +7,12 @@
 
 #define GOOD (0x0027u | CIA402_STATUS_VOLTAGE | CIA402_STATUS_REMOTE | CIA402_STATUS_FOLLOWS)
 
-static struct status_watch watch;
+static struct statusword_monitor watch;
 
 void setUp(void)
 {
-    status_watch_init(&watch);
-    status_watch_take(&watch, GOOD, true);
+    statusword_monitor_init(&watch);
+    statusword_monitor_take(&watch, GOOD, true);
 }
 
 void tearDown(void)
@@ -23,13 +23,13 @@ void tearDown(void)
 static void expect_trouble(unsigned statusword, uint16_t code, bool obeys)
 {
     for (unsigned i = 0; i < STATUS_WATCH_TOLERATED; ++i) {
-        status_watch_take(&watch, (uint16_t)statusword, true);
-        TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, status_watch_trouble(&watch));
-        TEST_ASSERT_TRUE(status_watch_obeys(&watch));
+        statusword_monitor_take(&watch, (uint16_t)statusword, true);
+        TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, statusword_monitor_trouble(&watch));
+        TEST_ASSERT_TRUE(statusword_monitor_follows(&watch));
     }
-    status_watch_take(&watch, (uint16_t)statusword, true);
-    TEST_ASSERT_EQUAL_HEX16(code, status_watch_trouble(&watch));
-    TEST_ASSERT_EQUAL_INT(obeys, status_watch_obeys(&watch));
+    statusword_monitor_take(&watch, (uint16_t)statusword, true);
+    TEST_ASSERT_EQUAL_HEX16(code, statusword_monitor_trouble(&watch));
+    TEST_ASSERT_EQUAL_INT(obeys, statusword_monitor_follows(&watch));
 }
 
 static void test_each_bit_that_goes(void)
@@ -55,17 +55,17 @@ static void test_good_answers_in_between_start_the_count_anew(void)
 {
     for (unsigned i = 0; i < 20; ++i) {
         for (unsigned k = 0; k < STATUS_WATCH_TOLERATED; ++k) {
-            status_watch_take(&watch, GOOD & (uint16_t)~CIA402_STATUS_REMOTE, true);
+            statusword_monitor_take(&watch, GOOD & (uint16_t)~CIA402_STATUS_REMOTE, true);
         }
-        status_watch_take(&watch, GOOD, true);
+        statusword_monitor_take(&watch, GOOD, true);
     }
-    TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, status_watch_trouble(&watch));
+    TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, statusword_monitor_trouble(&watch));
 }
 
 /* A drive without the bit cannot lose it. */
 static void test_a_bit_never_seen_is_not_missed(void)
 {
-    status_watch_init(&watch);
+    statusword_monitor_init(&watch);
     expect_trouble(GOOD & ~CIA402_STATUS_VOLTAGE, EMCY_NO_ERROR, true);
 }
 
@@ -74,9 +74,9 @@ static void test_while_homing_bits_12_and_13_mean_something_else(void)
     const uint16_t homing =
         (uint16_t)((GOOD & ~CIA402_STATUS_FOLLOWS) | CIA402_STATUS_FOLLOWING_ERROR);
     for (unsigned i = 0; i < 2u * STATUS_WATCH_TOLERATED; ++i) {
-        status_watch_take(&watch, homing, false);
+        statusword_monitor_take(&watch, homing, false);
     }
-    TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, status_watch_trouble(&watch));
+    TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, statusword_monitor_trouble(&watch));
 }
 
 int main(void)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "rig/contour.h"
+#include "offline/contour.h"
 
 #include <math.h>
 #include <string.h>

@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "drive_bench.h"
+#include "offline/axis_run.h"
 #include "plant/drive_private.h"
-#include "rig/axis_run.h"
 #include "unity.h"
 
 enum { TICKS = 400 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "rig/rig.h"
+#include "offline/offline.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,8 +17,8 @@ static uint8_t
 static struct program program;
 static struct contour_segment segments[1];
 static struct drive_config configs[2];
-static struct rig rig;
-static struct rig_row rows[ROWS];
+static struct offline rig;
+static struct offline_row rows[ROWS];
 
 static void put(uint8_t *at, int64_t value)
 {
@@ -66,7 +66,7 @@ void tearDown(void)
 
 static int begin(void)
 {
-    return rig_begin(&rig, &program, INTERP_FIXED, configs, segments);
+    return offline_begin(&rig, &program, INTERP_FIXED, configs, segments);
 }
 
 static void test_rows_of_a_line(void)
@@ -112,18 +112,18 @@ static void test_positions_are_those_of_the_drive_alone(void)
 static void test_faulty_set_up_is_refused(void)
 {
     configs[1].pdff.k_vf = -1.0;
-    TEST_ASSERT_EQUAL_INT(RIG_ERR_DRIVE - 10 + DRIVE_ERR_GAIN, begin());
+    TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_DRIVE - 10 + DRIVE_ERR_GAIN, begin());
     configs[0].plant.gain_rad_s_v = 0.0;
-    TEST_ASSERT_EQUAL_INT(RIG_ERR_DRIVE + DRIVE_ERR_PLANT, begin());
+    TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_DRIVE + DRIVE_ERR_PLANT, begin());
     setUp();
     configs[1].period_us = 2000;
-    TEST_ASSERT_EQUAL_INT(RIG_ERR_PERIOD, begin());
+    TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_PERIOD, begin());
     setUp();
     configs[1].counts_per_mm = 1000;
-    TEST_ASSERT_EQUAL_INT(RIG_ERR_COUNTS, begin());
+    TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_COUNTS, begin());
     setUp();
-    TEST_ASSERT_EQUAL_INT(RIG_ERR_KERNEL,
-                          rig_begin(&rig, &program, (enum interp_kernel)3, configs, segments));
+    TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_KERNEL,
+                          offline_begin(&rig, &program, (enum interp_kernel)3, configs, segments));
 }
 
 static void test_times_and_points(void)
@@ -134,7 +134,7 @@ static void test_times_and_points(void)
     struct interp interp;
     TEST_ASSERT_EQUAL_INT(0, begin());
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
-    rig_times(&program, 0, TICKS + 2, times);
+    offline_times(&program, 0, TICKS + 2, times);
     TEST_ASSERT_EQUAL_UINT64(UINT64_C(4398046511), times[1]);
     TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 42, times[TICKS - 1]);
     TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 42, times[TICKS + 1]);
@@ -144,7 +144,7 @@ static void test_times_and_points(void)
         times[TICKS - 1 - k] = kept;
     }
     TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &program, INTERP_FIXED));
-    TEST_ASSERT_EQUAL_INT(0, rig_points(&interp, TICKS, times, 1000000, points, counts));
+    TEST_ASSERT_EQUAL_INT(0, offline_points(&interp, TICKS, times, 1000000, points, counts));
     for (int k = 0; k < TICKS; k++) {
         TEST_ASSERT_EQUAL_INT64(rows[TICKS - 1 - k].cmd_q40_mm[0], points[k].x_q40_mm);
         TEST_ASSERT_EQUAL_INT32(rows[TICKS - 1 - k].set_counts[0], counts[2 * k]);
@@ -157,7 +157,7 @@ static void test_times_do_not_drift_in_long_programs(void)
     uint64_t time;
     program.header.duration_q32_s = (UINT64_C(1) << 54) - 1u;
     program.header.period_us = 8000;
-    rig_times(&program, 499999999, 1, &time); /* 3 999 999.992 s */
+    offline_times(&program, 499999999, 1, &time); /* 3 999 999.992 s */
     TEST_ASSERT_EQUAL_UINT64((UINT64_C(3999999) << 42) + UINT64_C(4362862139015), time);
 }
 
@@ -167,21 +167,21 @@ static void test_feedforward(void)
 {
     const struct feedforward_gains none[2] = {{0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}};
     struct feedforward_gains gains[2] = {{0, 0, 500, 0, 0}, {0, 0, 500, 0, 0}};
-    static struct rig_row forward[ROWS];
-    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    static struct offline_row forward[ROWS];
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
-    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
-    rig_feedforward(&rig, none);
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    offline_feedforward(&rig, none);
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
     for (int k = 0; k < ROWS; k++) {
         TEST_ASSERT_EQUAL_INT32_ARRAY(rows[k].act_counts, forward[k].act_counts, 2);
         TEST_ASSERT_EQUAL_INT16_ARRAY(rows[k].volts_mv, forward[k].volts_mv, 2);
     }
     configs[0].pdff.k_pf_rad_mm = 0.3; /* 0.3 + 0.5 * 1/1.59 is near the 1/1.59 of the screw */
-    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
-    TEST_ASSERT_EQUAL_INT(0, rig_begin(&rig, &program, INTERP_FIXED, configs, segments));
-    rig_feedforward(&rig, gains);
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    offline_feedforward(&rig, gains);
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
     const int32_t plain = rows[500].set_counts[0] - rows[500].act_counts[0];
     const int32_t better = forward[500].set_counts[0] - forward[500].act_counts[0];
@@ -189,14 +189,14 @@ static void test_feedforward(void)
 }
 
 /* Runs with these faults into `faulty`; `rows` has the run without. */
-static struct rig_row faulty[ROWS];
+static struct offline_row faulty[ROWS];
 
-static void run_with(const struct rig_fault *faults, uint32_t count)
+static void run_with(const struct offline_fault *faults, uint32_t count)
 {
     TEST_ASSERT_EQUAL_INT(0, begin());
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, rig_faults(&rig, faults, count));
+    TEST_ASSERT_EQUAL_INT(0, offline_faults(&rig, faults, count));
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, faulty, ROWS));
 }
 
@@ -217,24 +217,24 @@ enum { TICK_0 = 3 };
 
 static void test_faults_begin_in_their_tick(void)
 {
-    const struct rig_fault never = {RIG_FAULT_LOAD, 0, ROWS, 1, 2.0};
-    struct rig_fault fault = {RIG_FAULT_LOAD, 1, 100, 50, 2.0};
+    const struct offline_fault never = {OFFLINE_FAULT_LOAD, 0, ROWS, 1, 2.0};
+    struct offline_fault fault = {OFFLINE_FAULT_LOAD, 1, 100, 50, 2.0};
     run_with(&never, 1);
     TEST_ASSERT_EQUAL_INT(ROWS, first_difference());
     run_with(&fault, 1);
     TEST_ASSERT_EQUAL_INT(TICK_0 + 100, first_difference());
     TEST_ASSERT_TRUE(faulty[TICK_0 + 100].act_counts[1] <
                      -1000000); /* a positive load pushes back */
-    fault.kind = RIG_FAULT_ENCODER_FREEZE;
+    fault.kind = OFFLINE_FAULT_ENCODER_FREEZE;
     fault.axis = 0;
     run_with(&fault, 1);
     TEST_ASSERT_EQUAL_INT(TICK_0 + 100, first_difference());
-    fault.kind = RIG_FAULT_ENCODER_JUMP;
+    fault.kind = OFFLINE_FAULT_ENCODER_JUMP;
     fault.value = 10000.0;
     run_with(&fault, 1);
     TEST_ASSERT_EQUAL_INT(TICK_0 + 100, first_difference());
     fault.at = 0;
-    fault.kind = RIG_FAULT_SATURATE;
+    fault.kind = OFFLINE_FAULT_SATURATE;
     fault.value = 0.05;
     run_with(&fault, 1);
     TEST_ASSERT_TRUE(first_difference() >= TICK_0);
@@ -246,7 +246,7 @@ static void test_faults_begin_in_their_tick(void)
 /* While an encoder reads 10 um too much the axis is 10 um short; afterwards it is where it was. */
 static void test_faults_end(void)
 {
-    const struct rig_fault jump = {RIG_FAULT_ENCODER_JUMP, 1, 100, 600, 10000.0};
+    const struct offline_fault jump = {OFFLINE_FAULT_ENCODER_JUMP, 1, 100, 600, 10000.0};
     run_with(&jump, 1);
     TEST_ASSERT_INT32_WITHIN(20, -1010000, faulty[TICK_0 + 699].act_counts[1]);
     TEST_ASSERT_INT32_WITHIN(20, -1000000, faulty[ROWS - 1].act_counts[1]);
@@ -255,7 +255,7 @@ static void test_faults_end(void)
 /* What is sent in tick 100 would be latched in tick 101: the drive stays with what it had. */
 static void test_setpoints_are_lost(void)
 {
-    const struct rig_fault lost = {RIG_FAULT_SETPOINT_LOST, 0, 100, 2, 0.0};
+    const struct offline_fault lost = {OFFLINE_FAULT_SETPOINT_LOST, 0, 100, 2, 0.0};
     struct drive alone;
     run_with(&lost, 1);
     TEST_ASSERT_EQUAL_INT(0, drive_init(&alone, &configs[0]));
@@ -271,17 +271,17 @@ static void test_setpoints_are_lost(void)
 
 static void test_faults_that_cannot_be(void)
 {
-    const struct rig_fault good = {RIG_FAULT_SATURATE, 0, 0, 1, 1.0};
-    struct rig_fault bad[] = {good, good, good, good, good};
+    const struct offline_fault good = {OFFLINE_FAULT_SATURATE, 0, 0, 1, 1.0};
+    struct offline_fault bad[] = {good, good, good, good, good};
     bad[0].axis = 2;
     bad[1].ticks = 0;
     bad[2].value = 0.0;
     bad[3].value = (double)NAN;
-    bad[4].kind = RIG_FAULT_KINDS;
+    bad[4].kind = OFFLINE_FAULT_KINDS;
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, rig_faults(&rig, &good, 1));
+    TEST_ASSERT_EQUAL_INT(0, offline_faults(&rig, &good, 1));
     for (int i = 0; i < 5; i++) {
-        TEST_ASSERT_EQUAL_INT(RIG_ERR_FAULT, rig_faults(&rig, &bad[i], 1));
+        TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_FAULT, offline_faults(&rig, &bad[i], 1));
     }
 }
 

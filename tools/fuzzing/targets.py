@@ -271,7 +271,7 @@ class Recording:
 
     def run(self, random: Random, folder: Path) -> None:
         """One case. Raises Finding."""
-        from hodograph.bus.listening.recordings import write_recording
+        from hodograph.bus.capture.recordings import write_recording
 
         path = _place(folder / "0", "fuzz.toml")
         if self._frames is None:
@@ -296,8 +296,8 @@ class Recording:
 
 def _recorded(path: Path, folder: Path) -> Any:
     from hodograph.bus.address import BUS_VARIABLE
+    from hodograph.bus.capture.recordings import read_recording
     from hodograph.bus.hub import LocalHub
-    from hodograph.bus.listening.recordings import read_recording
 
     file = folder / "base.log"
     with LocalHub() as hub:

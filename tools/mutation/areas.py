@@ -40,7 +40,7 @@ AREAS = (
     Area("canopen", ("firmware/canopen/*.c",)),
     Area("app", ("firmware/app/**/*.c",)),
     Area("plant", ("sim/plant/*.c",)),
-    Area("rig", ("sim/rig/*.c",)),
+    Area("rig", ("sim/offline/*.c",)),
     Area("node", ("sim/node/*.c",)),
     Area("injector", ("sim/injector/*.c", "sim/faults/*.c")),
     Area("hub", ("sim/hub/*.c",)),
@@ -52,7 +52,7 @@ AREAS = (
     Area(
         "bus",
         (
-            "host_tools/hodograph/bus/listening/*.py",
+            "host_tools/hodograph/bus/capture/*.py",
             "host_tools/hodograph/bus/analysis.py",
             "host_tools/hodograph/bus/status_text.py",
             "host_tools/hodograph/bus/goto.py",

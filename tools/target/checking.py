@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hodograph.chain import load_chain
+from hodograph.pipeline import load_pipeline
 from target.counting import Counter
 from target.emulator import TARGETS
 
@@ -17,7 +17,7 @@ CORES = ("an386", "microbit")
 
 def costs(build: Path) -> dict[str, Any]:
     """By core and example: instructions of limit_check_all, also by segment and piece, and of program_check."""
-    programs = {name: load_chain(ROOT / f"examples/{name}.toml") for name in NAMES}
+    programs = {name: load_pipeline(ROOT / f"examples/{name}.toml") for name in NAMES}
     out: dict[str, Any] = {}
     for core in CORES:
         proof, whole = (

@@ -35,7 +35,7 @@ RULES = (
     (r"core/interp\.\w:evaluate_feed", "feed"),
     (r"core/kernel_\w+\.\w:(set_|\w+_set$)", "search"),
     (r"core/feed_piece\.\w:\w+_(set|make)$", "search"),
-    (r"core/(ph_segment|prepared)\.\w:", "search"),
+    (r"core/(ph_segment|coefficients)\.\w:", "search"),
     (r"core/interp\.\w:(find_|load_)", "search"),
     (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),
     (r"core/kernel_\w+\.\w:\w+_at$", "position"),
@@ -43,7 +43,7 @@ RULES = (
     (r"app/machine/axis\.\w:(axis_setpoint|axis_sent)", "packing"),
     (r"canopen/(sync|pdo\w*|cob)\.\w:", "packing"),
     (r"app/tick\.\w:(send|find)_", "sending"),
-    (r"app/machine/(machine_|status_watch|answers|statistics)\w*\.\w:", "supervision"),
+    (r"app/machine/(machine_|statusword_monitor|answers|statistics)\w*\.\w:", "supervision"),
 )
 _RULES = tuple((re.compile(pattern), PARTS.index(part)) for pattern, part in RULES)
 _LABEL = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")

@@ -70,7 +70,7 @@ static int configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_ms
         return sdo_client_process(&boot->client, elapsed_us, out);
     }
     if (boot->client.status != SDO_CLIENT_IDLE) {
-        drive_boot_judge(boot);
+        drive_boot_response(boot);
     }
     if (boot->phase != DRIVE_BOOT_CONFIGURE || waits(boot, elapsed_us)) {
         return 0;

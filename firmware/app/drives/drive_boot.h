@@ -14,8 +14,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drives/drive_facts.h"
 #include "app/drives/drive_plan.h"
+#include "app/drives/drive_properties.h"
 #include "app/machine/config.h"
 #include "canopen/sdo_client.h"
 
@@ -46,7 +46,7 @@ struct drive_boot {
     struct config config;
     struct drive_plan plan;
     struct drive_op op;
-    struct drive_facts facts[AXES_MAX]; /* of the drives configured so far */
+    struct drive_properties facts[AXES_MAX]; /* of the drives configured so far */
     struct drive_trouble trouble;
     enum drive_boot_phase phase;
     uint32_t pause_us;

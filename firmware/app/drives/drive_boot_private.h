@@ -18,6 +18,6 @@ void drive_boot_give_up(struct drive_boot *boot, uint32_t abort_code, uint32_t v
 void drive_boot_advance(struct drive_boot *boot);
 
 /* The SDO transfer of the present object is over: decides what follows. */
-void drive_boot_judge(struct drive_boot *boot);
+void drive_boot_response(struct drive_boot *boot);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/drives/drive_pdo.h"
 
-#include "app/drives/drive_facts.h"
+#include "app/drives/drive_properties.h"
 
 #define MAPPING             0x200u /* from communication to mapping parameter */
 #define FIRST_TPDO          0x1800u

@@ -161,7 +161,7 @@ static void next_row(struct drive_plan *plan)
 }
 
 void drive_plan_begin(struct drive_plan *plan, const struct config *config, uint8_t axis,
-                      struct drive_facts *facts)
+                      struct drive_properties *facts)
 {
     memset(plan, 0, sizeof *plan);
     memset(facts, 0, sizeof *facts);
@@ -178,7 +178,7 @@ bool drive_plan_op(struct drive_plan *plan, struct drive_op *op)
             return true;
         }
         if (is_pdo(row) && concerns(plan, row->when)) {
-            drive_facts_learn(plan->facts, drive_pdos[row->argument].fact, 1);
+            drive_properties_read(plan->facts, drive_pdos[row->argument].fact, 1);
         }
         next_row(plan);
     }

@@ -14,8 +14,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drives/drive_facts.h"
 #include "app/drives/drive_pdo.h"
+#include "app/drives/drive_properties.h"
 #include "app/machine/config.h"
 
 /* The drive's heartbeat, and for how long it may miss the controller's (sent each 100 ms; checking a
@@ -25,7 +25,7 @@
 
 struct drive_plan {
     const struct config *config;
-    struct drive_facts *facts;
+    struct drive_properties *facts;
     uint8_t axis;
     uint8_t row;
     uint8_t item; /* of the row, when it is a PDO */
@@ -33,7 +33,7 @@ struct drive_plan {
 
 /* `config` and `facts` must stay; the facts are forgotten. */
 void drive_plan_begin(struct drive_plan *plan, const struct config *config, uint8_t axis,
-                      struct drive_facts *facts);
+                      struct drive_properties *facts);
 
 /* The present operation; false at the end. */
 bool drive_plan_op(struct drive_plan *plan, struct drive_op *op);

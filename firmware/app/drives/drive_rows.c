@@ -3,8 +3,8 @@
 
 #include <stddef.h>
 
-#include "app/drives/drive_facts.h"
 #include "app/drives/drive_plan.h"
+#include "app/drives/drive_properties.h"
 #include "app/machine/config.h"
 #include "canopen/cia402.h"
 #include "canopen/cob.h"

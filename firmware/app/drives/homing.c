@@ -32,7 +32,7 @@ static uint8_t next_axis(const struct machine *machine, uint8_t axis)
 }
 
 static enum machine_refusal drives_refusal(const struct machine *machine,
-                                           const struct drive_facts *facts)
+                                           const struct drive_properties *facts)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         if (wanted(machine, i) && !drive_supports(&facts[i], CIA402_MODE_HOMING)) {
@@ -44,7 +44,7 @@ static enum machine_refusal drives_refusal(const struct machine *machine,
 }
 
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
-                                  const struct drive_facts *facts)
+                                  const struct drive_properties *facts)
 {
     port_lock();
     enum machine_refusal refusal = machine_begin_homing(machine);

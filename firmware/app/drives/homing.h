@@ -18,7 +18,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drives/drive_facts.h"
+#include "app/drives/drive_properties.h"
 #include "app/drives/homing_mode.h"
 #include "app/machine/config.h"
 #include "app/machine/machine.h"
@@ -53,7 +53,7 @@ void homing_init(struct homing *homing);
 
 /* Begins, or says why not; `facts` of each axis. */
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
-                                  const struct drive_facts *facts);
+                                  const struct drive_properties *facts);
 
 /* True while it uses the SDO channels of the drives. */
 bool homing_busy(const struct homing *homing);

@@ -52,9 +52,9 @@ void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t n
 {
     take_status(axis, actual->statusword);
     axis->position_counts = actual->position_counts;
-    answers_take(&axis->answers, now_us);
+    tpdo_monitor_take(&axis->answers, now_us);
     if (axis_enabled(axis) && axis->goal == CIA402_GOAL_ENABLED) {
-        status_watch_take(&axis->watch, axis->statusword, !axis->by_itself);
+        statusword_monitor_take(&axis->watch, axis->statusword, !axis->by_itself);
     }
     axis->fit = axis_enabled(axis) && axis->watch.in_row <= STATUS_WATCH_TOLERATED;
 }
@@ -121,7 +121,7 @@ static void note_engaged(struct axis *axis)
         }
     } else if (axis->goal != CIA402_GOAL_QUICK_STOP && !axis_enabled(axis)) {
         axis->engaged = false;
-        status_watch_init(&axis->watch);
+        statusword_monitor_init(&axis->watch);
     }
 }
 
@@ -173,7 +173,7 @@ bool axis_dropped_out(const struct axis *axis)
 
 bool axis_obeys(const struct axis *axis)
 {
-    return axis_enabled(axis) && !axis->answers.lost && status_watch_obeys(&axis->watch);
+    return axis_enabled(axis) && !axis->answers.lost && statusword_monitor_follows(&axis->watch);
 }
 
 bool axis_moves(const struct axis *axis)

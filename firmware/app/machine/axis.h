@@ -11,8 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/machine/answers.h"
-#include "app/machine/status_watch.h"
+#include "app/machine/statusword_monitor.h"
+#include "app/machine/tpdo_monitor.h"
 #include "can/can_frame.h"
 #include "canopen/cia402_master.h"
 #include "canopen/pdo.h"
@@ -29,8 +29,8 @@ struct axis {
     uint8_t node;
     enum cia402_state state; /* that the statusword tells */
     bool fit; /* as of the last answer: Operation enabled, and the statusword tells no trouble */
-    struct answers answers;
-    struct status_watch watch;
+    struct tpdo_monitor answers;
+    struct statusword_monitor watch;
     uint16_t statusword;
     uint16_t statusword_before; /* the one before it */
     uint16_t controlword;       /* sent last */

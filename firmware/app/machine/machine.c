@@ -119,7 +119,7 @@ uint32_t machine_answer_wait_us(const struct machine *machine)
 static bool all_answered(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        const struct answers *answers = &machine->axes[i].answers;
+        const struct tpdo_monitor *answers = &machine->axes[i].answers;
         if (answers->count == 0u && !answers->lost) {
             return false;
         }

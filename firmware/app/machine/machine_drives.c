@@ -50,7 +50,7 @@ const struct axis *machine_not_arrived(const struct machine *machine)
     return NULL;
 }
 
-const struct axis *machine_straggler(const struct machine *machine)
+const struct axis *machine_late_drive(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];

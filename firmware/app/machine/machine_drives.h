@@ -21,7 +21,7 @@ const struct axis *machine_not_stopped(const struct machine *machine);
 const struct axis *machine_not_arrived(const struct machine *machine);
 
 /* The first drive that answers but is not yet where it shall be, or NULL. */
-const struct axis *machine_straggler(const struct machine *machine);
+const struct axis *machine_late_drive(const struct machine *machine);
 
 /* The drive's own emergency code, when it has sent one, else `code`. */
 uint16_t machine_code_of(const struct axis *axis, uint16_t code);

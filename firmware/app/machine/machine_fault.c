@@ -39,7 +39,7 @@ static bool stays_in_fault(const struct axis *axis)
  * tells what is wrong. */
 static void step_resetting(struct machine *machine)
 {
-    const struct axis *late = machine_straggler(machine);
+    const struct axis *late = machine_late_drive(machine);
     const bool unsent = machine->unsent_ticks > MACHINE_UNSENT_MAX;
     if (late != NULL && !machine_time_is_up(machine)) {
         return;

@@ -13,7 +13,7 @@ static uint16_t trouble_of(const struct axis *axis)
     if (axis_dropped_out(axis)) {
         return FAULT_DROPPED_OUT;
     }
-    const uint16_t trouble = status_watch_trouble(&axis->watch);
+    const uint16_t trouble = statusword_monitor_trouble(&axis->watch);
     return trouble == EMCY_NO_ERROR && axis->away ? FAULT_AWAY : trouble;
 }
 
@@ -34,15 +34,15 @@ static void supervise_axis(struct machine *machine, const struct axis *axis, uin
 }
 
 /* Where the SYNC itself did not leave, no answer is missing. */
-static void close_unanswered(struct machine *machine, struct answers *answers, uint32_t now_us)
+static void close_unanswered(struct machine *machine, struct tpdo_monitor *answers, uint32_t now_us)
 {
     if (!machine->sync_sent) {
         answers->count = 0;
         return;
     }
     const uint32_t missed =
-        answers_close_sync(answers, now_us, machine->sync_us, machine_answer_wait_us(machine),
-                           machine->config.missed_max);
+        tpdo_monitor_close_sync(answers, now_us, machine->sync_us, machine_answer_wait_us(machine),
+                                machine->config.missed_max);
     if (missed != 0u && machine_on_path(machine)) {
         machine->statistics.missed_tpdos += missed;
     }
@@ -68,7 +68,7 @@ static bool close_sync(struct machine *machine, uint32_t now_us)
         if (sent && axis->answers.count != 0u) {
             axis_compare(axis, machine->config.apart_counts[i], machine->config.apart_syncs[i]);
         }
-        if (!sent || !answers_close_answered(&axis->answers)) {
+        if (!sent || !tpdo_monitor_close_answered(&axis->answers)) {
             close_unanswered(machine, &axis->answers, now_us);
         }
         if (machine->sync_now) {

@@ -43,7 +43,7 @@ static void step_boot(struct machine *machine)
         return;
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        answers_restart(&machine->axes[i].answers);
+        tpdo_monitor_restart(&machine->axes[i].answers);
     }
     machine->silent_node = 0;
     machine->state = MACHINE_OFF;
@@ -52,7 +52,7 @@ static void step_boot(struct machine *machine)
 
 static void step_enabling(struct machine *machine)
 {
-    const struct axis *late = machine_straggler(machine);
+    const struct axis *late = machine_late_drive(machine);
     if (late == NULL) {
         machine->state = MACHINE_READY;
     } else if (machine_time_is_up(machine)) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * exchange: what the emulated board and the bridge (sim/bridge) say to each other on the two FIFOs, in turns: a request of
+ * exchange: what the emulated board and the bridge (sim/gateway) say to each other on the two FIFOs, in turns: a request of
  * the board, a reply of the bridge. Little-endian, as both are; a message is one write of at most 4096 bytes, which a pipe takes as a whole.
  *
  * docs/guides/target.md has the order of things.

@@ -13,9 +13,9 @@ from ..config import PLANE_AXES, Machine
 from ..errors import RunError
 from ..native import NativeProgram
 from ..simulate import Motion, analyse, settling_ticks
-from .listening.decode import RPDO1, SYNC_ID, Ticks, decode_ticks, unhomed_starts
-from .listening.frames import Frames
-from .listening.setpoint_check import require_no_jump, step_limits
+from .capture.decode import RPDO1, SYNC_ID, Ticks, decode_ticks, unhomed_starts
+from .capture.frames import Frames
+from .capture.setpoint_check import require_no_jump, step_limits
 
 REACHED_AFTER = 2
 """Setpoint k is reached at SYNC k+2 (docs/reference/protocol.md section 2)."""

@@ -6,10 +6,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..chain import axis_limits, controller_limits, plants, program_limits, stop_terms
 from ..config import Machine
 from ..errors import InputError, RefusedError
 from ..feed import FeedRequest, Limits, plan_path
+from ..pipeline import axis_limits, controller_limits, plants, program_limits, stop_terms
 from ..program import ProgramOptions, compile_path, encode
 from ..spline import line
 from .sdo.controller import Controller

@@ -15,10 +15,10 @@ from ..native import NativeProgram
 from ..simulate import settling_ticks
 from .address import BusAddress, check_raw, is_virtual
 from .analysis import REACHED_AFTER, BusRun, analyse_recording, first_tick, measured_pace
+from .capture.decode import unhomed_starts
+from .capture.recorder import Recorder
+from .capture.recordings import write_recording
 from .goto import goto
-from .listening.decode import unhomed_starts
-from .listening.recorder import Recorder
-from .listening.recordings import write_recording
 from .processes import Rig
 from .sdo.controller import DISABLE, READY, STATISTICS, Controller, connect
 from .sdo.follow import Follower

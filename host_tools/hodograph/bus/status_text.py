@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .listening.load import BusLoad
+from .capture.load import BusLoad
+from .diagnostics.texts import TIMINGS
 from .sdo.status import AxisStatus, LoadedProgram, Override, Statistics, Status
-from .words.texts import TIMINGS
 
 Row = tuple[str, str]
 

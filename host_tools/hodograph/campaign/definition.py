@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..chain import Chain
 from ..config import Machine, PathFile, load_machine, load_path_file, read_toml
 from ..config.table import Table
 from ..errors import InputError
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, PROFILES
 from ..names import KERNELS
 from ..native import native_file
+from ..pipeline import Pipeline
 from .design import Design, Plant
 from .fault_table import read_faults
 from .gain_table import read_gains
@@ -37,15 +37,15 @@ class Source:
     path: PathFile
     machine: Machine
 
-    def chain(self, profile: str | None, feed_mm_s: float | None) -> Chain:
+    def chain(self, profile: str | None, feed_mm_s: float | None) -> Pipeline:
         """The steps to a program, with another profile or feed than the file asks for (None: the file's)."""
-        feed = Chain(self.path).feed
+        feed = Pipeline(self.path).feed
         feed = replace(
             feed,
             profile=profile or feed.profile,
             nominal_mm_s=feed_mm_s or feed.nominal_mm_s,
         )
-        return Chain(replace(self.path, feed=feed), self.machine)
+        return Pipeline(replace(self.path, feed=feed), self.machine)
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
     for name in _list(root, raw, "paths", '["path.toml"]'):
         one = Table(root.file, "", {"paths": name}, ("paths",))
         path = load_path_file(one.present("paths"))
-        chain = Chain(path, machine)
+        chain = Pipeline(path, machine)
         chain.feed  # noqa: B018  (says what is missing)
         found.append(Source(path, chain.machine))
     return tuple(found)

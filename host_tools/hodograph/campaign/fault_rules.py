@@ -35,7 +35,7 @@ class Fault:
         self, seed: int, sample: int, nodes: tuple[int, int], period_us: int
     ) -> list[RigFault]:
         """The faults of one sample. Raises InputError: a rule that a run without a bus cannot have."""
-        return [rig_fault(line, nodes, period_us) for line in self.lines(seed, sample)]
+        return [offline_fault(line, nodes, period_us) for line in self.lines(seed, sample)]
 
     def lines(self, seed: int, sample: int) -> list[str]:
         """The rules of one sample as text: what `hodograph faults --seed` would draw for seed + sample."""
@@ -46,7 +46,7 @@ class Fault:
         ]
 
 
-def rig_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault:
+def offline_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault:
     """A line of rules, for the drives with these node numbers. Raises InputError."""
     kind, *words = rule.split()
     if kind not in _VALUES:

@@ -7,11 +7,11 @@ import io
 from argparse import Namespace
 from pathlib import Path
 
-from ..campaign.conduct import conduct, default_folder
 from ..campaign.definition import Campaign, load_campaign
 from ..campaign.engine import available_cores, engine
 from ..campaign.journal import journal
 from ..campaign.results import Results
+from ..campaign.runner import default_folder, run_campaign
 from ..campaign.summary import groups, text
 from ..campaign.table import write_csv
 from ..errors import InputError, RunError
@@ -37,7 +37,7 @@ def campaign(options: Namespace) -> None:
                 engine(workers, options.scheduler) as somewhere,
                 progress("campaign", "run", total) as bar,
             ):
-                conduct(asked, made, somewhere, bar)
+                run_campaign(asked, made, somewhere, bar)
         _write(asked, made.results, folder)
     _tell(asked, made.results, folder, json=options.json)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from ..bus.listening.recordings import read_recording
+from ..bus.capture.recordings import read_recording
 from ..config import load_machine
 from ..config.rewrite import rewritten
 from ..errors import RunError

@@ -8,9 +8,8 @@ from argparse import Namespace
 from pathlib import Path
 
 from ..bus.address import parse_address
-from ..bus.listening.frames import Frames
-from ..bus.listening.setpoint_check import step_limits
-from ..chain import load_chain
+from ..bus.capture.frames import Frames
+from ..bus.capture.setpoint_check import step_limits
 from ..config import Machine, load_machine
 from ..errors import InputError
 from ..monitor.decoder import nodes_in
@@ -18,6 +17,7 @@ from ..monitor.pump import Layout
 from ..monitor.security import make_token
 from ..monitor.session import Live, Place, Replay, Session
 from ..native import NativeProgram
+from ..pipeline import load_pipeline
 from .output import note
 from .path_commands import read_image
 from .targets import DEFAULT_BITRATE
@@ -83,7 +83,7 @@ def _image_and_machine(options: Namespace) -> tuple[bytes | None, Machine | None
     image = read_image(options.program)
     if image is not None:
         return image, machine
-    chain = load_chain(options.program, options.machine)
+    chain = load_pipeline(options.program, options.machine)
     return chain.image, chain.machine
 
 

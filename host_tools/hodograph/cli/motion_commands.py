@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from ..bus.address import BusAddress, parse_address
+from ..bus.capture.recordings import check_suffix
 from ..bus.goto import goto as goto_point
-from ..bus.listening.recordings import check_suffix
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.status import loaded_program
 from ..bustime import require_fit
-from ..chain import Chain, load_chain, program_limits
 from ..config import Machine, load_machine, read_toml
 from ..errors import BusError, InputError
 from ..native import NativeProgram
+from ..pipeline import Pipeline, load_pipeline, program_limits
 from ..simulate import write_trace
 from .bus_commands import reached, stopping
 from .output import note, print_json, print_rows, progress
@@ -35,7 +35,7 @@ def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
             program_limits(machine)
             require_fit(machine)
         return image, machine
-    chain = load_chain(options.file, options.machine)
+    chain = load_pipeline(options.file, options.machine)
     require_fit(chain.machine)
     image = chain.image
     print_notes(chain, chain.compilation.plan)
@@ -108,7 +108,7 @@ def machine_of(file: Path, given: Path | None) -> Machine:
         return load_machine(given)
     if "axis" in (data := read_toml(file)) or "path" not in data:
         return load_machine(file)
-    return load_chain(file).machine
+    return load_pipeline(file).machine
 
 
 def run(options: Namespace) -> None:
@@ -125,7 +125,7 @@ def run(options: Namespace) -> None:
         check_suffix(options.record)
         if len(options.files) > 1:
             raise InputError("--record: takes one FILE; run the others by themselves")
-    chains = [load_chain(file, options.machine) for file in options.files]
+    chains = [load_pipeline(file, options.machine) for file in options.files]
     for chain in chains:
         require_fit(chain.machine)
         chain.image  # noqa: B018  (all that can be wrong with the input shows before anything moves)
@@ -140,7 +140,7 @@ def run(options: Namespace) -> None:
     _print_runs(chains, runs, options.json)
 
 
-def _run_one(chain: Chain, address: BusAddress, options: Namespace) -> BusRun:
+def _run_one(chain: Pipeline, address: BusAddress, options: Namespace) -> BusRun:
     machine = chain.machine
     print_notes(chain, chain.compilation.plan)
     with (
@@ -159,7 +159,7 @@ def _run_one(chain: Chain, address: BusAddress, options: Namespace) -> BusRun:
         )
 
 
-def _print_runs(chains: list[Chain], runs: list[BusRun], as_json: bool) -> None:
+def _print_runs(chains: list[Pipeline], runs: list[BusRun], as_json: bool) -> None:
     if as_json:
         results: list[dict[str, Any]] = [run.summary() for run in runs]
         if len(results) == 1:

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bustime import require_fit
-from ..chain import Chain, load_chain
 from ..config import Machine
 from ..errors import HodographError, InputError
 from ..feed import Plan
 from ..native import NativeProgram
+from ..pipeline import Pipeline, load_pipeline
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.check import check
 from ..program.image import MAGIC
@@ -26,7 +26,7 @@ from .output import json_text, note, number, print_json, print_rows, progress, w
 
 def spline(options: Namespace) -> None:
     """hodograph spline."""
-    chain = load_chain(options.file)
+    chain = load_pipeline(options.file)
     found = chain.spline_result
     curve = found.spline
     for line in found.notes:
@@ -80,7 +80,7 @@ def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray
     return np.minimum(array, end)
 
 
-def print_notes(chain: Chain, plan: Plan) -> None:
+def print_notes(chain: Pipeline, plan: Plan) -> None:
     """The notes of a path, each with the file's name."""
     for line in chain.notes(plan):
         note(f"{chain.file.file.name}: {line}")
@@ -88,7 +88,7 @@ def print_notes(chain: Chain, plan: Plan) -> None:
 
 def feed(options: Namespace) -> None:
     """hodograph feed."""
-    chain = load_chain(options.file, options.machine)
+    chain = load_pipeline(options.file, options.machine)
     plan = chain.plan
     print_notes(chain, plan)
     result: dict[str, object] = {
@@ -142,7 +142,7 @@ def feed(options: Namespace) -> None:
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
 
 
-def _program_of(chain: Chain) -> Program | None:
+def _program_of(chain: Pipeline) -> Program | None:
     """The program, for what `feed` says of stops; None without a machine, or where `compile` would refuse it."""
     if chain.machine_or_none is None:
         return None
@@ -155,7 +155,7 @@ def _program_of(chain: Chain) -> Program | None:
 
 def compile_(options: Namespace) -> None:
     """hodograph compile."""
-    chain = load_chain(options.file, options.machine)
+    chain = load_pipeline(options.file, options.machine)
     require_fit(chain.machine)
     image = chain.image
     print_notes(chain, chain.compilation.plan)
@@ -213,7 +213,7 @@ def inspect(options: Namespace) -> None:
     """hodograph inspect."""
     image = read_image(options.file)
     if image is None:
-        program = load_chain(options.file, options.machine).program
+        program = load_pipeline(options.file, options.machine).program
     else:
         program = decode_file(options.file, image)
     try:
@@ -236,7 +236,7 @@ def _unsound(program: Program) -> str:
     return f"no program: {fault.code.text} ({fault.code.name}, code {fault.code}, {fault.place})"
 
 
-def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) -> Motion:
+def simulate_chain(chain: Pipeline, kernel: str | None, *, keep_rows: bool = True) -> Motion:
     """A run of a path without a bus. Without its rows (one a tick) it takes no memory to speak of."""
     machine = chain.machine
     image = chain.image
@@ -254,7 +254,7 @@ def simulate_chain(chain: Chain, kernel: str | None, *, keep_rows: bool = True) 
 
 def simulate_(options: Namespace) -> None:
     """hodograph simulate."""
-    chain = load_chain(options.file, options.machine)
+    chain = load_pipeline(options.file, options.machine)
     times = {"hold": options.hold_at, "stop": options.stop_at, "fault": options.fault_at}
     for kind, values in times.items():
         _within(f"--{kind}-at", values, last_tick_s(chain.program), "s")
@@ -284,7 +284,7 @@ def _shortest(value: float) -> str:
     return short if float(short) == value else repr(value)
 
 
-def _stopped(chain: Chain, kernel: str | None, kind: str, at_s: float) -> StoppedRun:
+def _stopped(chain: Pipeline, kernel: str | None, kind: str, at_s: float) -> StoppedRun:
     machine = chain.machine
     return simulate_stop(
         NativeProgram(chain.image),

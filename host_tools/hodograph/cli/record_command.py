@@ -7,13 +7,13 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from ..bus.address import BusAddress, check_raw, parse_address
+from ..bus.capture.decode import unhomed_starts
+from ..bus.capture.frames import Frames
+from ..bus.capture.recorder import Recorder
+from ..bus.capture.recordings import RecordingWriter, check_suffix
+from ..bus.capture.setpoint_check import Jump, Step, limits_at, step_limits
+from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.clock import REAL_CLOCK, Clock, VirtualClock
-from ..bus.listening.decode import unhomed_starts
-from ..bus.listening.frames import Frames
-from ..bus.listening.recorder import Recorder
-from ..bus.listening.recordings import RecordingWriter, check_suffix
-from ..bus.listening.setpoint_check import Jump, Step, limits_at, step_limits
-from ..bus.listening.setpoint_watch import SetpointWatch, jumps
 from ..bus.processes import virtual_clock
 from ..bus.sdo.configuration import configured_axis_limits, configured_limits, configured_nodes
 from ..bus.sdo.controller import connect

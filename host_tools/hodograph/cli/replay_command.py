@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from ..bus.listening.recordings import check_suffix, read_recording
+from ..bus.capture.recordings import check_suffix, read_recording
 from ..errors import InputError, RunError
 from .output import print_json
 
@@ -13,15 +13,15 @@ from .output import print_json
 def replay(options: Namespace) -> None:
     """hodograph replay."""
     from ..bus.analysis import replay as replay_frames
-    from ..chain import load_chain
     from ..config import load_machine
+    from ..pipeline import load_pipeline
     from ..simulate import write_trace
     from .motion_commands import print_run
     from .path_commands import print_notes, read_image
 
     check_suffix(options.recording)
     image = read_image(options.file)
-    chain = None if image is not None else load_chain(options.file, options.machine)
+    chain = None if image is not None else load_pipeline(options.file, options.machine)
     if chain is not None:
         image, machine = chain.image, chain.machine
         print_notes(chain, chain.compilation.plan)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from ..chain import load_chain
+from ..pipeline import load_pipeline
 from .output import print_json
 from .path_commands import print_notes, simulate_chain
 
@@ -14,7 +14,7 @@ def report(options: Namespace) -> None:
     """hodograph report."""
     from ..report import write_report
 
-    chains = [load_chain(file, options.machine) for file in options.files]
+    chains = [load_pipeline(file, options.machine) for file in options.files]
     cases = []
     for chain in chains:
         print_notes(chain, chain.plan)

@@ -12,8 +12,8 @@ from datetime import datetime
 from typing import Any
 
 from ..bus.address import BusAddress, parse_address
+from ..bus.capture.load import LEAST_LISTEN_S, BusLoad, LoadMeter
 from ..bus.clock import Clock
-from ..bus.listening.load import LEAST_LISTEN_S, BusLoad, LoadMeter
 from ..bus.sdo.controller import Controller, connect
 from ..bus.sdo.status import Status, snapshot
 from ..bus.status_text import Row, status_line, status_rows

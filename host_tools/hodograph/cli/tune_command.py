@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..bustime import require_fit
-from ..chain import load_chain
 from ..config import Machine, load_machine
 from ..config.axis_table import Feedforward
 from ..config.rewrite import rewritten
 from ..errors import InputError
+from ..pipeline import load_pipeline
 from .output import note, print_json, progress, write_files
 
 
@@ -23,7 +23,7 @@ def tune(options: Namespace) -> None:
 
     _check(options)
     machine = load_machine(options.file)
-    chains = [load_chain(file, options.file) for file in options.path or ()]
+    chains = [load_pipeline(file, options.file) for file in options.path or ()]
     asked = Asked(
         bandwidth_hz=options.bandwidth,
         damping=options.damping if options.damping is not None else 1.0,

@@ -7,10 +7,10 @@ from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
 
-from ..chain import Chain, controller_verdict, load_chain, proved_limits
 from ..config import PLANE_AXES, Drive, Machine
 from ..errors import InputError, LimitError
 from ..native.program import NativeFault, NativeProgram
+from ..pipeline import Pipeline, controller_verdict, load_pipeline, proved_limits
 from ..program import compile_program, encode
 from ..program.compiler import ProgramOptions
 from ..verify import (
@@ -34,7 +34,7 @@ _MOST_LINES = 20
 
 def verify(options: Namespace) -> None:
     """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
-    chain = load_chain(options.file, options.machine)
+    chain = load_pipeline(options.file, options.machine)
     machine = chain.machine_or_none
     native = _planned(chain) if options.program is None else _given(options.program)
     program = decode_file(options.program or options.file, native.image)
@@ -78,7 +78,7 @@ def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dic
     return {"controller": {"accepted": False} | refusal}
 
 
-def _planned(chain: Chain) -> NativeProgram:
+def _planned(chain: Pipeline) -> NativeProgram:
     print_notes(chain, chain.plan)
     if chain.machine_or_none is not None:
         return chain.accepted

@@ -5,16 +5,16 @@ from __future__ import annotations
 
 import zlib
 
+from ..bus.capture.recorder import Recorder
 from ..bus.clock import Clock
-from ..bus.listening.recorder import Recorder
+from ..bus.diagnostics.texts import STATES
 from ..bus.processes import Process
 from ..bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, Controller
 from ..bus.sdo.objects import ACTUAL, FAULT, MOVING, STATISTICS
-from ..bus.words.texts import STATES
 from ..errors import BusError, RunError
 from .actions import await_rest, drives_at, spawn_command
+from .bench import FaultBench
 from .record import LIMIT_S, LOOK_S, REST_TOLERANCE_COUNTS, Record
-from .stand import Stand
 from .uploads import disturb_upload
 
 QUIET_S = 0.25
@@ -25,7 +25,7 @@ _START_S = 120.0
 """For a command of its own to come up: on a busy machine it loads for longer than any case lasts."""
 
 
-def disturb(record: Record, stand: Stand, controller: Controller, control: Recorder) -> None:
+def disturb(record: Record, stand: FaultBench, controller: Controller, control: Recorder) -> None:
     """Runs the case's program, or its upload, with what its scenario does to it. Raises what the bus tools raise."""
     job, case = record.job, record.case
     controller.require(5.0)
@@ -58,7 +58,7 @@ def disturb(record: Record, stand: Stand, controller: Controller, control: Recor
 
 
 def _follow(
-    record: Record, stand: Stand, controller: Controller, process: Process | None
+    record: Record, stand: FaultBench, controller: Controller, process: Process | None
 ) -> int | None:
     """Until the controller is at rest again, acting on the way; its state, None when it was killed."""
     action, started, acted = record.case.scenario.action, False, False
@@ -80,7 +80,7 @@ def _follow(
         controller.clock.sleep(LOOK_S)
 
 
-def _act(record: Record, stand: Stand, clock: Clock, process: Process | None) -> bool:
+def _act(record: Record, stand: FaultBench, clock: Clock, process: Process | None) -> bool:
     """Does what the scenario asks of the host; whether there still is a controller."""
     action = record.case.scenario.action
     if action == "watch-drives":
@@ -101,7 +101,7 @@ def _act(record: Record, stand: Stand, clock: Clock, process: Process | None) ->
     return True
 
 
-def _watch_drives(record: Record, stand: Stand, clock: Clock) -> None:
+def _watch_drives(record: Record, stand: FaultBench, clock: Clock) -> None:
     machine = record.job.machine
     with drives_at(stand.drives_bus, machine.nodes, machine.bitrate) as clients:
         rest_s = await_rest(clients, clock, REST_TOLERANCE_COUNTS, LIMIT_S)

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..bus.listening.setpoint_check import find_jumps, find_rough_starts, step_limits
+from ..bus.capture.setpoint_check import find_jumps, find_rough_starts, step_limits
 from ..native import Contour, NativeProgram
-from .evidence import Emergency, Evidence
+from .case_record import CaseRecord, Emergency
 from .record import REST_TOLERANCE_COUNTS, Record
 
 CONTROLLER_KILLED = "kill-controller"
@@ -112,7 +112,7 @@ def judge(record: Record) -> Verdict:
     )
 
 
-def _reaction(record: Record, evidence: Evidence) -> tuple[list[int], Times, Times]:
+def _reaction(record: Record, evidence: CaseRecord) -> tuple[list[int], Times, Times]:
     """Fault codes, times from the injection to the fault and to rest."""
     found = _told(record, evidence)
     rest: Times
@@ -129,7 +129,7 @@ def _reaction(record: Record, evidence: Evidence) -> tuple[list[int], Times, Tim
     return codes, latency, rest
 
 
-def _told(record: Record, evidence: Evidence) -> list[Emergency]:
+def _told(record: Record, evidence: CaseRecord) -> list[Emergency]:
     """Faults since the injection: the controller's words, or, when it was killed, the drives'."""
     if record.case.scenario.action == CONTROLLER_KILLED:
         found = evidence.emergencies(evidence.drives, evidence.nodes)
@@ -138,12 +138,12 @@ def _told(record: Record, evidence: Evidence) -> list[Emergency]:
     return [emergency for emergency in found if emergency.time_us >= record.began_us]
 
 
-def _between(evidence: Evidence, from_us: int, to_us: int) -> tuple[int, float]:
+def _between(evidence: CaseRecord, from_us: int, to_us: int) -> tuple[int, float]:
     ticks = evidence.tick_at(to_us) - evidence.tick_at(from_us)
     return max(0, ticks), max(0.0, round((to_us - from_us) / 1000, 3))
 
 
-def _bad_setpoints(record: Record, evidence: Evidence) -> list[str]:
+def _bad_setpoints(record: Record, evidence: CaseRecord) -> list[str]:
     """Jumps, and setpoints away from the curve."""
     machine = record.job.machine
     limits = step_limits(machine, record.job.setpoints)
@@ -174,7 +174,7 @@ def _distance_mm(record: Record, points: np.ndarray[tuple[int, int], np.dtype[np
     return worst
 
 
-def _not_seen_at_rest(record: Record, evidence: Evidence, codes: list[int]) -> list[str]:
+def _not_seen_at_rest(record: Record, evidence: CaseRecord, codes: list[int]) -> list[str]:
     """A rest that nobody measured is none that was in time."""
     expect = record.case.scenario.expect
     if not codes or not expect.limits_rest or record.rest_us is not None:
@@ -186,7 +186,7 @@ def _not_seen_at_rest(record: Record, evidence: Evidence, codes: list[int]) -> l
     return [f"nobody saw when node {node} came to rest" for node in unknown]
 
 
-def _not_on_path(record: Record, evidence: Evidence) -> list[str]:
+def _not_on_path(record: Record, evidence: CaseRecord) -> list[str]:
     """Where the stop has to be on the path: what was late, or was broken off by a quick stop."""
     found = _told(record, evidence)
     if not record.case.scenario.expect.on_path or not found or not evidence.moved:

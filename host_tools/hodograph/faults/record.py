@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bus.listening.frames import Frames
-from ..chain import load_chain
+from ..bus.capture.frames import Frames
 from ..config import Machine
 from ..native import NativeProgram
+from ..pipeline import load_pipeline
 from ..simulate import Motion, simulate
-from .evidence import Evidence
+from .case_record import CaseRecord
 from .scenario import Case
 
 REST_TOLERANCE_COUNTS = 2000
@@ -46,7 +46,7 @@ class Record:
     case: Case
     job: Job
     injections: list[dict[str, object]] = field(default_factory=list)
-    evidence: Evidence | None = None
+    evidence: CaseRecord | None = None
     """Of the disturbed run."""
     control: Frames | None = None
     """The controller's bus from the beginning to the end, recovery included."""
@@ -70,7 +70,7 @@ class Record:
 @lru_cache(maxsize=8)
 def load_job(path: Path) -> Job:
     """The program of a path file; raises InputError, PlanError."""
-    chain = load_chain(path)
+    chain = load_pipeline(path)
     machine, image = chain.machine, chain.image
     _, setpoints = NativeProgram(image).setpoints("fixed", machine.counts_per_mm)
     clean = simulate(

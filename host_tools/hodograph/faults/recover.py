@@ -5,15 +5,15 @@ from __future__ import annotations
 
 from contextlib import suppress
 
+from ..bus.diagnostics.texts import STATES
 from ..bus.run import Station, run_program
 from ..bus.sdo.controller import FAULT_STATE, OFF, READY, RESET, CommandRefusedError, Controller
-from ..bus.words.texts import STATES
 from ..errors import RunError
+from .bench import FaultBench
 from .record import LIMIT_S, Record
-from .stand import Stand
 
 
-def recover(record: Record, stand: Stand, controller: Controller) -> None:
+def recover(record: Record, stand: FaultBench, controller: Controller) -> None:
     """Resets what is left of the fault, and runs the program again from its start."""
     job = record.job
     if stand.controller.ended():

@@ -6,17 +6,17 @@ from __future__ import annotations
 import time
 
 from ..bus.address import BusAddress
+from ..bus.capture.recorder import Recorder
 from ..bus.clock import Clock
 from ..bus.hub import LocalHub
-from ..bus.listening.recorder import Recorder
 from ..bus.sdo.controller import connect
 from ..errors import HodographError
+from .bench import FaultBench
+from .case_record import CaseRecord
 from .disturb import disturb
-from .evidence import Evidence
 from .record import Record, load_job
 from .recover import recover
 from .scenario import Case
-from .stand import Stand
 
 _TAKE_S = 0.05
 
@@ -42,7 +42,7 @@ def _run(case: Case, bus: BusAddress, drives_bus: BusAddress) -> Record:
     machine = record.job.machine
     apart = case.scenario.action == "kill-one-drive"
     with (
-        Stand(machine, bus, drives_bus, case.rules, apart=apart) as stand,
+        FaultBench(machine, bus, drives_bus, case.rules, apart=apart) as stand,
         connect(bus, machine.node, machine.bitrate) as controller,
         Recorder(bus, _TAKE_S) as control,
         Recorder(drives_bus, _TAKE_S) as drives,
@@ -63,10 +63,10 @@ def _run(case: Case, bus: BusAddress, drives_bus: BusAddress) -> Record:
 
 
 def _gather(
-    record: Record, stand: Stand, clock: Clock, control: Recorder, drives: Recorder
+    record: Record, stand: FaultBench, clock: Clock, control: Recorder, drives: Recorder
 ) -> None:
     record.injections = stand.injections()
-    record.evidence = Evidence(control.so_far(), drives.so_far(), record.job.machine.nodes)
+    record.evidence = CaseRecord(control.so_far(), drives.so_far(), record.job.machine.nodes)
     if control.dropped or drives.dropped:
         record.troubles.append("the kernel dropped frames of a recording")
     if record.injections and not record.began_us:

@@ -7,19 +7,21 @@ import zlib
 
 import numpy as np
 
+from ..bus.capture.recorder import Recorder
 from ..bus.clock import Clock
-from ..bus.listening.recorder import Recorder
 from ..bus.processes import Process
 from ..bus.sdo.controller import FAULT_STATE, READY, Controller
 from ..errors import BusError, RefusedError, RunError
 from .actions import cut_upload, spawn_command
+from .bench import FaultBench
 from .record import LIMIT_S, LOOK_S, Record, load_job
-from .stand import Stand
 
 _SDO_ASK = 0x600
 
 
-def disturb_upload(record: Record, stand: Stand, controller: Controller, control: Recorder) -> None:
+def disturb_upload(
+    record: Record, stand: FaultBench, controller: Controller, control: Recorder
+) -> None:
     """Breaks an upload of another program off; what was there must stay."""
     other = load_job(record.job.other).image
     record.began_us = controller.clock.stamp_ns() // 1000

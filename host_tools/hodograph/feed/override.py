@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .headroom import FACTOR_SHARE, RATE_SHARES, Room
 from .limits import ControllerLimits, Limits
 from .override_levels import (
     FACTOR_ONE_Q14,
@@ -21,7 +22,6 @@ from .override_levels import (
     second_codes,
     seconds_per_s2,
 )
-from .room import FACTOR_SHARE, RATE_SHARES, Room
 
 Real = NDArray[np.float64]
 Unsigned = NDArray[np.uint32]

@@ -9,14 +9,14 @@ from math import log
 
 from ..errors import PlanError
 from ..spline import PHSpline
-from .along import PathBounds
 from .bracket import highest
+from .kinematics import PathBounds
 from .limits import ControllerLimits, Limits
-from .obeying import Strain, strains
 from .plan import Excess, FeedPlan
 from .planning import plan_again, plan_feed
 from .plant import Plants, as_drives_limit
 from .request import LEAST_FEED_MM_S, FeedRequest
+from .usage import Strain, strains
 
 _CLOSE = 1e-4
 _HAIR = 1e-6

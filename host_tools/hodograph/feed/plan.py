@@ -12,7 +12,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .along import PathBounds, Pieces
+from .headroom import Room
+from .kinematics import PathBounds, Pieces
 from .limits import ControllerLimits, FeedCap, Limits
 from .override import override_bounds
 from .pattern_search import SearchStep
@@ -20,7 +21,6 @@ from .pieces import FeedPieces, derivative_peaks
 from .quantise import RawPieces, quantise
 from .ramp import ACCELERATION, JERK
 from .request import FeedRequest
-from .room import Room
 from .timeline import Timeline, timeline
 
 Real = NDArray[np.float64]

@@ -9,11 +9,11 @@ from math import isfinite
 
 from ..errors import InputError, PlanError
 from .limits import ControllerLimits, Limits
-from .lowering import Cap, choose
 from .pieces import derivative_peaks
 from .plan import Excess, FeedPlan
 from .quantise import RawPieces
 from .ramp import ACCELERATION, JERK, Ramp
+from .reduction import Cap, choose
 from .request import FeedRequest, check_period
 from .timeline import timeline
 

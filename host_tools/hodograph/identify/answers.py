@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bus.listening.decode import SYNC_ID, SYNC_OVERFLOW
-from ..bus.listening.frames import Frames
+from ..bus.capture.decode import SYNC_ID, SYNC_OVERFLOW
+from ..bus.capture.frames import Frames
 
 LATE_SYNCS = 100
 """Answers that are late are made up for within so many SYNCs; else a frame was lost."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bus.analysis import REACHED_AFTER, complete_ticks, runs_of
-from ..bus.listening.decode import (
+from ..bus.capture.decode import (
     RPDO1,
     SYNC_ID,
     TPDO1,
@@ -18,7 +18,7 @@ from ..bus.listening.decode import (
     decode_offsets,
     decode_ticks,
 )
-from ..bus.listening.frames import Frames
+from ..bus.capture.frames import Frames
 from ..errors import RunError
 from ..native import AxisInputs
 from .answers import answered, unbroken

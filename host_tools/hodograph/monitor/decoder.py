@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """From a stream of frames to samples, one a SYNC: what was set, what was answered.
 
-Unlike `bus.listening.decode`, which proves that a recording is whole, this one goes on whatever is missing: a value
+Unlike `bus.capture.decode`, which proves that a recording is whole, this one goes on whatever is missing: a value
 that did not come is NaN. An answer may come after the next SYNC (docs/reference/protocol.md section 2), so
 the last SYNCs are
 held back for a few ticks, and two answers between two SYNCs are the late one and the present one.
@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bus.listening.decode import RPDO1, SYNC_ID, SYNC_OVERFLOW, TPDO1
-from ..bus.listening.frames import Frames
+from ..bus.capture.decode import RPDO1, SYNC_ID, SYNC_OVERFLOW, TPDO1
+from ..bus.capture.frames import Frames
 
 HELD_BACK = 3
 """SYNCs that wait for late answers."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..bus.listening.frames import Frames
-from ..bus.words.texts import fault_words
+from ..bus.capture.frames import Frames
+from ..bus.diagnostics.texts import fault_words
 
 WINDOW_S = 1.0
 MOST_TOLD = 10

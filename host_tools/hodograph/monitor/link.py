@@ -20,11 +20,11 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoError
 
 from ..bus.address import BusAddress
 from ..bus.clock import Clock, VirtualClock
+from ..bus.diagnostics.texts import STATES
 from ..bus.sdo.controller import Controller
 from ..bus.sdo.network import open_network
 from ..bus.sdo.objects import MOTION, OVERRIDE, PROGRAM
 from ..bus.sdo.status import read_status
-from ..bus.words.texts import STATES
 from ..data import CONTROLLER_EDS
 from ..errors import BusError, HodographError, RefusedError
 from .pump import Publish

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The curve of a program: points to draw, and the distance from it (sim/rig/contour, docs/theory/numerics.md
+"""The curve of a program: points to draw, and the distance from it (sim/offline/contour, docs/theory/numerics.md
 section 14)."""
 
 from __future__ import annotations

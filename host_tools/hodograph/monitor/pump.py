@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ..bus.listening.load import Listener
-from ..bus.listening.setpoint_check import StepLimits
-from ..bus.listening.setpoint_watch import SetpointWatch, jumps
-from ..bus.words.texts import drive_state
+from ..bus.capture.load import Listener
+from ..bus.capture.setpoint_check import StepLimits
+from ..bus.capture.setpoint_watch import SetpointWatch, jumps
+from ..bus.diagnostics.texts import drive_state
 from ..errors import BusError, InputError
 from .decoder import Decoder, Samples
 from .derived import Derivation

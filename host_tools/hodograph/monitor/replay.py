@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..bus.listening.decode import SYNC_ID, SYNC_OVERFLOW
-from ..bus.listening.frames import Frames
-from ..bus.listening.recordings import read_recording
+from ..bus.capture.decode import SYNC_ID, SYNC_OVERFLOW
+from ..bus.capture.frames import Frames
+from ..bus.capture.recordings import read_recording
 from ..errors import InputError
 from .source import NO_FRAMES, Taken
 

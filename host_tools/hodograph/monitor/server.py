@@ -13,9 +13,9 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from ..errors import HodographError, InputError
+from .client_slots import ClientSlots
 from .hub import Client, Hub
 from .messages import encode
-from .seats import Seats
 from .security import HEADERS, Guard
 
 _MOST_REQUEST = 4096
@@ -44,7 +44,7 @@ class Server:
     def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], obey: Obey) -> None:
         self._guard, self._hub, self._greeting, self._obey = guard, hub, greeting, obey
         self._pages = _load_pages()
-        self._seats: Seats[web.WebSocketResponse] = Seats()
+        self._seats: ClientSlots[web.WebSocketResponse] = ClientSlots()
         self._closing: set[asyncio.Task[None]] = set()
         self.app = web.Application(middlewares=[self._check], client_max_size=_MOST_REQUEST)
         self.app.router.add_get("/ws", self._socket)

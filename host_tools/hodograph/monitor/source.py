@@ -14,9 +14,9 @@ import can
 import numpy as np
 
 from ..bus.address import BusAddress, check_raw
+from ..bus.capture.frame_batch import BATCH, FrameBatch, open_socket
+from ..bus.capture.frames import RECORD_DTYPE, Frames
 from ..bus.clock import has_virtual_time
-from ..bus.listening.frame_batch import BATCH, FrameBatch, open_socket
-from ..bus.listening.frames import RECORD_DTYPE, Frames
 from ..errors import BusError, one_line
 
 MOST_FRAMES = 65536

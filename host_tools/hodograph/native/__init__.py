@@ -10,6 +10,7 @@ from .axis_run import AxisInputs, run_axis
 from .contour import Contour
 from .drive import DriveModel
 from .library import library, native_file
+from .offline import FAULT_KINDS, FOR_EVER, ROW, Rig, RigFault
 from .program import (
     POINT,
     NativeFault,
@@ -18,7 +19,6 @@ from .program import (
     counts_from_q40_mm,
     kernel_code,
 )
-from .rig import FAULT_KINDS, FOR_EVER, ROW, Rig, RigFault
 
 __all__ = [
     "FAULT_KINDS",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One axis under given setpoints, before anything rounds what it does (sim/rig/axis_run.h)."""
+"""One axis under given setpoints, before anything rounds what it does (sim/offline/axis_run.h)."""
 
 from __future__ import annotations
 

@@ -22,11 +22,11 @@ HEADERS = (
     "core/interp.h",
     "core/feed_override.h",
     "plant/drive.h",
-    "rig/contour.h",
-    "rig/rig.h",
-    "rig/stop_search.h",
-    "rig/stop_trial.h",
-    "rig/axis_run.h",
+    "offline/contour.h",
+    "offline/offline.h",
+    "offline/stop_search.h",
+    "offline/stop_trial.h",
+    "offline/axis_run.h",
 )
 LIBRARIES = ("sim", "core")
 

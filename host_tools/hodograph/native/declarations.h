@@ -104,7 +104,7 @@ int32_t drive_position_counts(const struct drive *drive);
 int16_t drive_volts_mv(const struct drive *drive);
 bool drive_parked(const struct drive *drive);
 
-/* rig/contour.h */
+/* offline/contour.h */
 struct contour_segment {
     ...;
 };
@@ -117,23 +117,23 @@ double contour_distance_mm(struct contour *contour, double arc_length_mm, const 
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
                        const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um);
 
-/* rig/rig_fault.h */
-enum rig_fault_kind {
-    RIG_FAULT_ENCODER_FREEZE,
-    RIG_FAULT_ENCODER_JUMP,
-    RIG_FAULT_SATURATE,
-    RIG_FAULT_LOAD,
-    RIG_FAULT_SETPOINT_LOST,
+/* offline/offline_fault.h */
+enum offline_fault_kind {
+    OFFLINE_FAULT_ENCODER_FREEZE,
+    OFFLINE_FAULT_ENCODER_JUMP,
+    OFFLINE_FAULT_SATURATE,
+    OFFLINE_FAULT_LOAD,
+    OFFLINE_FAULT_SETPOINT_LOST,
     ...
 };
-struct rig_fault {
-    enum rig_fault_kind kind;
+struct offline_fault {
+    enum offline_fault_kind kind;
     uint32_t axis, at, ticks;
     double value;
 };
 
-/* rig/rig.h */
-struct rig_row {
+/* offline/offline.h */
+struct offline_row {
     int64_t arc_length_q40_mm;
     int64_t feed_q32_mm_s;
     int64_t cmd_q40_mm[2];
@@ -143,44 +143,44 @@ struct rig_row {
     int16_t volts_mv[2];
     uint32_t tick;
 };
-struct rig {
+struct offline {
     ...;
 };
-int rig_begin(struct rig *rig, const struct program *program, enum interp_kernel kernel,
+int offline_begin(struct offline *rig, const struct program *program, enum interp_kernel kernel,
               const struct drive_config drives[2], struct contour_segment *segments);
 struct feedforward_gains {
     uint32_t period_us, counts_per_mm, velocity_permille;
     int32_t torque_per_acceleration_q16, torque_per_velocity_q16;
 };
-void rig_feedforward(struct rig *rig, const struct feedforward_gains gains[2]);
-void rig_equip(struct rig *rig, int axis, double rated_torque_nm, double friction_volts);
-int rig_faults(struct rig *rig, const struct rig_fault *faults, uint32_t count);
-enum rig_order_kind {
-    RIG_ORDER_HOLD,
-    RIG_ORDER_RESUME,
-    RIG_ORDER_OVERRIDE,
-    RIG_ORDER_STOP,
-    RIG_ORDER_FAULT_STOP,
+void offline_feedforward(struct offline *rig, const struct feedforward_gains gains[2]);
+void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts);
+int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count);
+enum offline_order_kind {
+    OFFLINE_ORDER_HOLD,
+    OFFLINE_ORDER_RESUME,
+    OFFLINE_ORDER_OVERRIDE,
+    OFFLINE_ORDER_STOP,
+    OFFLINE_ORDER_FAULT_STOP,
     ...
 };
-struct rig_order {
-    enum rig_order_kind kind;
+struct offline_order {
+    enum offline_order_kind kind;
     uint32_t tick, percent;
 };
-struct rig_stop {
+struct offline_stop {
     uint32_t tick, rest_tick, bound_us;
     int64_t from_q40_mm, rest_q40_mm;
 };
-int rig_orders(struct rig *rig, const struct rig_order *orders, uint32_t count);
-void rig_stop_get(const struct rig *rig, struct rig_stop *stop);
-int rig_run(struct rig *rig, struct rig_row *rows, uint32_t n);
-int rig_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
+int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count);
+void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
+int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
+int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
                uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
-void rig_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
-void rig_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
-enum rig_error { RIG_ERR_KERNEL, RIG_ERR_PERIOD, RIG_ERR_COUNTS, RIG_ERR_FAULT, RIG_ERR_DRIVE, RIG_ERR_INTERP, ... };
+void offline_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
+void offline_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
+enum offline_error { OFFLINE_ERR_KERNEL, OFFLINE_ERR_PERIOD, OFFLINE_ERR_COUNTS, OFFLINE_ERR_FAULT, OFFLINE_ERR_DRIVE, OFFLINE_ERR_INTERP, ... };
 
-/* rig/stop_search.h */
+/* offline/stop_search.h */
 struct stop_row {
     double s_mm, tangent[2], curvature, slope, feed_mm_s;
 };
@@ -206,7 +206,7 @@ void stop_used(const struct program *p, const struct stop_limits *limits, const 
 void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
                  struct stop_found *found);
 
-/* rig/stop_trial.h */
+/* offline/stop_trial.h */
 struct stop_use {
     double velocity, acceleration, jerk, path_acceleration, path_jerk;
 };
@@ -226,7 +226,7 @@ struct stop_trial {
 int stop_trial_run(const struct program *p, struct stop_trial *trial);
 int stop_trial_again(const struct program *p, struct stop_trial *trial, uint32_t tick);
 
-/* rig/axis_run.h */
+/* offline/axis_run.h */
 struct axis_run {
     double rated_torque_nm, friction_volts;
     int32_t start_counts;

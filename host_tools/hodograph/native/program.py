@@ -130,7 +130,7 @@ class NativeProgram:
         ffi, lib = library()
         n = self.ticks - tick0 if count is None else count
         times = np.empty(n, dtype=np.uint64)
-        lib.rig_times(self.pointer, tick0, n, ffi.from_buffer("uint64_t[]", times))
+        lib.offline_times(self.pointer, tick0, n, ffi.from_buffer("uint64_t[]", times))
         return times
 
     def points(self, kernel: str, times_q42_s: NDArray[np.uint64]) -> NDArray[np.void]:
@@ -145,7 +145,7 @@ class NativeProgram:
         points = np.empty(times.size, dtype=POINT)
         interp = ffi.new("struct interp *")
         begun = lib.interp_begin(interp, self.pointer, code)
-        made = begun or lib.rig_points(
+        made = begun or lib.offline_points(
             interp,
             times.size,
             ffi.from_buffer("uint64_t[]", times),
@@ -171,7 +171,7 @@ def counts_from_q40_mm(q40_mm: NDArray[np.int64], counts_per_mm: int) -> NDArray
     ffi, lib = library()
     source = np.ascontiguousarray(q40_mm, dtype=np.int64)
     counts = np.empty(source.shape, dtype=np.int32)
-    lib.rig_counts(
+    lib.offline_counts(
         source.size,
         ffi.from_buffer("int64_t[]", source),
         counts_per_mm,

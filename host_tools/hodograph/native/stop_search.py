@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The numbers of stops, found in C (sim/rig/stop_search.h)."""
+"""The numbers of stops, found in C (sim/offline/stop_search.h)."""
 
 from __future__ import annotations
 

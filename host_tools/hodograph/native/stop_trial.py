@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random sequences of commands that end in a stop, beside limits and bounds (sim/rig/stop_trial.h)."""
+"""Random sequences of commands that end in a stop, beside limits and bounds (sim/offline/stop_trial.h)."""
 
 from __future__ import annotations
 

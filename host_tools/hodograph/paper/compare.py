@@ -6,11 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..chain import Chain, load_chain
 from ..data import EXAMPLES
 from ..errors import InputError
 from ..feed import FeedPlan, FeedRequest, plan_feed
 from ..feed.ramp import JERK, exponential_ramp
+from ..pipeline import Pipeline, load_pipeline
 from ..simulate import simulate
 from .dynamics import constant_feed_dynamics
 from .joints import joint_disturbance
@@ -43,7 +43,7 @@ def _compare_case(name: str) -> dict[str, Any]:
     file = EXAMPLES / f"{name}.toml"
     if not file.is_file():
         raise InputError(f"{file}: the examples did not come with this installation: reinstall")
-    chain = load_chain(file)
+    chain = load_pipeline(file)
     rows: dict[str, Any] = {}
 
     def row(key: str, unit: str, paper: float | None, ours: float | None) -> None:
@@ -56,7 +56,7 @@ def _compare_case(name: str) -> dict[str, Any]:
     return rows
 
 
-def plain_plan(chain: Chain) -> FeedPlan:
+def plain_plan(chain: Pipeline) -> FeedPlan:
     """The plain quintic profile with the same nominal feed and ramp time."""
     asked = chain.feed
     request = FeedRequest("quintic", asked.nominal_mm_s, asked.ramp_time_s)
@@ -69,7 +69,7 @@ def plain_plan(chain: Chain) -> FeedPlan:
     )
 
 
-def _feed_rows(chain: Chain, row: Any) -> None:
+def _feed_rows(chain: Pipeline, row: Any) -> None:
     plan, plain = chain.plan, plain_plan(chain)
     jerk, plain_jerk = plan.peak_jerk_mm_s3, plain.peak_jerk_mm_s3
     at_paper_n_c = exponential_ramp(plan.feed_mm_s, chain.feed.ramp_time_s, PAPER_N_C).peak(JERK)
@@ -89,7 +89,7 @@ def _feed_rows(chain: Chain, row: Any) -> None:
     row("peak_acceleration_mm_s2", "mm/s^2", None, plan.peak_acceleration_mm_s2)
 
 
-def _joint_rows(chain: Chain, printed: Printed, row: Any) -> None:
+def _joint_rows(chain: Pipeline, printed: Printed, row: Any) -> None:
     found = joint_disturbance(
         chain.spline_result.spline, chain.feed.nominal_mm_s, chain.plan.period_us / 1e6
     )
@@ -105,7 +105,7 @@ def _joint_rows(chain: Chain, printed: Printed, row: Any) -> None:
     row("chord_jerk_mm_s3", "mm/s^3", None, found.largest(jerk))
 
 
-def _contour_rows(chain: Chain, printed: Printed, row: Any) -> None:
+def _contour_rows(chain: Pipeline, printed: Printed, row: Any) -> None:
     machine = chain.machine
     motion = simulate(
         chain.image,
@@ -118,7 +118,7 @@ def _contour_rows(chain: Chain, printed: Printed, row: Any) -> None:
     row("max_volts", "V", None, motion.max_volts)
 
 
-def _dynamics_rows(chain: Chain, row: Any) -> None:
+def _dynamics_rows(chain: Pipeline, row: Any) -> None:
     found = constant_feed_dynamics(chain.spline_result.spline, chain.feed.nominal_mm_s)
     for key, limit, unit, maximum in (
         ("vector_acceleration_mm_s2", A_MAX_MM_S2, "mm/s^2", found.vector_acceleration),

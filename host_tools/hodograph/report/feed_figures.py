@@ -8,17 +8,17 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from ..chain import Chain
 from ..feed import Plan
 from ..feed.ramp import JERK, exponential_ramp
 from ..feed.shapes import N_C_HIGH, N_C_LOW
 from ..paper import plain_plan
+from ..pipeline import Pipeline
 from .style import BLUE, GREEN, GREY, ORANGE, RED, png
 
 _SAMPLES = 1600
 
 
-def feed_figure(chain: Chain, plan: Plan) -> bytes:
+def feed_figure(chain: Pipeline, plan: Plan) -> bytes:
     """Feed, acceleration and jerk of the profile used; whole run and first ramp, with the plain quintic beside it.
 
     Of profile `optimal`, which has no ramps: whole run and first quarter.

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ..bus.run import BusRun
-from ..chain import Chain, proved_limits
 from ..paper import compare, quantity_name, shown
 from ..paper.compare import CASES
+from ..pipeline import Pipeline, proved_limits
 from ..simulate import Motion
 from .feed_figures import feed_figure, search_figure
 from .joint_figures import joint_figure
@@ -19,7 +19,7 @@ from .path_figures import polygon_figure
 from .run_figures import contour_figure, drive_figure
 from .style import styled
 
-Case = tuple[Chain, Motion, BusRun | None]
+Case = tuple[Pipeline, Motion, BusRun | None]
 
 
 def write_report(cases: Sequence[Case], directory: Path) -> Path:
@@ -47,7 +47,7 @@ def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return shown_cases
 
 
-def _case(chain: Chain, motion: Motion, run: BusRun | None) -> dict[str, Any]:
+def _case(chain: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, Any]:
     plan = chain.compilation.plan
     source = "recorded on the bus" if run is not None else "simulated"
     figures = [

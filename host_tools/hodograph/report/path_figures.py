@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 
-from ..chain import Chain
+from ..pipeline import Pipeline
 from ..spline import PHSpline
 from .style import BLUE, GREEN, GREY, ORANGE, plan_axes, png
 
 _SAMPLES = 2000
 
 
-def polygon_figure(chain: Chain) -> bytes:
+def polygon_figure(chain: Pipeline) -> bytes:
     """Control polygon or given points, nodal points, PH curve, and the curvature along it."""
     spline = chain.spline_result.spline
     figure, (plane, curve) = pyplot.subplots(1, 2, figsize=(9.6, 4.4), width_ratios=(1.15, 1))
@@ -30,7 +30,7 @@ def polygon_figure(chain: Chain) -> bytes:
     return png(figure)
 
 
-def _plane(axes: Axes, chain: Chain) -> None:
+def _plane(axes: Axes, chain: Pipeline) -> None:
     path, spline = chain.file.path, chain.spline_result.spline
     given = path.points
     if not path.through:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 
-from ..chain import Chain
+from ..pipeline import Pipeline
 from ..simulate import Motion
 from .style import BLUE, GREEN, GREY, ORANGE, RED, SOFT, plan_axes, png
 
@@ -18,7 +18,7 @@ _ZOOM_FACTOR = 5.0
 _LEAST_ZOOM_UM = 5.0
 
 
-def contour_figure(chain: Chain, motion: Motion) -> bytes:
+def contour_figure(chain: Pipeline, motion: Motion) -> bytes:
     """Commanded and actual path, the worst place enlarged, contour error along the run."""
     figure = pyplot.figure(figsize=(9.6, 8.0))
     grid = figure.add_gridspec(2, 2, height_ratios=(1.35, 1))
@@ -31,7 +31,7 @@ def contour_figure(chain: Chain, motion: Motion) -> bytes:
     return png(figure)
 
 
-def _plane(axes: Axes, chain: Chain, motion: Motion, worst: int) -> None:
+def _plane(axes: Axes, chain: Pipeline, motion: Motion, worst: int) -> None:
     set_mm, act_mm = motion.cmd_mm, motion.act_mm
     axes.plot(set_mm[:, 0], set_mm[:, 1], color=GREY, linewidth=3.5, label="commanded")
     axes.plot(act_mm[:, 0], act_mm[:, 1], color=BLUE, linewidth=1.2, label="actual")
@@ -98,7 +98,7 @@ def _error(axes: Axes, motion: Motion, worst: int) -> None:
     axes.set_title("distance of the encoder position from the exact curve")
 
 
-def drive_figure(chain: Chain, motion: Motion) -> bytes:
+def drive_figure(chain: Pipeline, motion: Motion) -> bytes:
     """Following error and voltage of each axis."""
     figure, (following, volts) = pyplot.subplots(2, 1, figsize=(9.6, 4.8), sharex=True)
     for i, (axis, color) in enumerate(zip(chain.machine.plane, (BLUE, GREEN), strict=True)):

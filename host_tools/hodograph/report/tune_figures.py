@@ -10,7 +10,7 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from ..chain import Chain
+from ..pipeline import Pipeline
 from ..simulate import simulate
 from ..tune import Tuning
 from ..tune.loop import loop_of, offset_volts
@@ -90,7 +90,7 @@ def step_figure(axis: AxisResult) -> bytes:
     return png(figure)
 
 
-def contour_figure(tuning: Tuning, path: PathResult, chain: Chain) -> bytes:
+def contour_figure(tuning: Tuning, path: PathResult, chain: Pipeline) -> bytes:
     """Contour error along a path, as given and tuned, of the plant as modelled."""
     machine = tuning.machine
     figure, axes = pyplot.subplots(figsize=(9.6, 3.4))

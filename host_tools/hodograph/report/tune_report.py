@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ..chain import Chain
+from ..pipeline import Pipeline
 from ..tune import Tuning
 from ..tune.text import SATURATED, axis_table, case_table, poles_text
 from .page import Figure, file_name, render, write_page
@@ -14,7 +14,7 @@ from .style import styled
 from .tune_figures import contour_figure, frequency_figure, step_figure
 
 
-def write_tune_report(tuning: Tuning, chains: Sequence[Chain], directory: Path) -> Path:
+def write_tune_report(tuning: Tuning, chains: Sequence[Pipeline], directory: Path) -> Path:
     """Writes tune.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
     with styled():
         figures = list(_figures(tuning, chains))
@@ -30,7 +30,7 @@ def write_tune_report(tuning: Tuning, chains: Sequence[Chain], directory: Path) 
     return write_page(directory / "tune.html", text, ((one.name, one) for one in figures))
 
 
-def _figures(tuning: Tuning, chains: Sequence[Chain]) -> Iterator[Figure]:
+def _figures(tuning: Tuning, chains: Sequence[Pipeline]) -> Iterator[Figure]:
     for axis in tuning.axes:
         name = file_name(axis.name, "unnamed")
         yield Figure(

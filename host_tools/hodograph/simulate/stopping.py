@@ -15,7 +15,7 @@ from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import HodographError, InputError
 from ..native import ROW, NativeProgram, Rig
-from ..native.rig import RigOrder
+from ..native.offline import RigOrder
 from ..program import Program
 from .motion import Motion, Tally, settling_ticks
 

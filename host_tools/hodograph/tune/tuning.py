@@ -7,11 +7,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..chain import Chain
 from ..config import Machine
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import PlanError
+from ..pipeline import Pipeline
 from .cases import CASES, Drives, Forward, Outcome, outcomes
 from .design import Poles, feedforward_of, pole_for_stiffness, stiffness_n_um, with_poles
 from .loop import loop_of
@@ -40,7 +40,7 @@ class Asked:
 
 def tune(
     machine: Machine,
-    chains: Sequence[Chain],
+    chains: Sequence[Pipeline],
     asked: Asked,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Tuning:
@@ -104,7 +104,7 @@ def _side(drive: Drive, forward: Feedforward) -> Side:
     return Side(drive, forward, margins(loop), stiffness_n_um(drive))
 
 
-def _path(chain: Chain, tuning: Tuning, given: Drives) -> PathResult:
+def _path(chain: Pipeline, tuning: Tuning, given: Drives) -> PathResult:
     machine, image = tuning.machine, chain.image
 
     def runs(drives: Drives, forward: Forward) -> list[Outcome]:

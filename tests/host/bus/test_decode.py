@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hodograph.bus.listening.decode import Ticks, decode_ticks
-from hodograph.bus.listening.recorder import FRAME_DTYPE, Frames
+from hodograph.bus.capture.decode import Ticks, decode_ticks
+from hodograph.bus.capture.recorder import FRAME_DTYPE, Frames
 from hodograph.bus.run import first_tick
 from hodograph.errors import RunError
 

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from hodograph.bus.address import BusAddress
 from hodograph.bus.goto import SHORTEST_MOVE_MM, goto, legs, line_image
 from hodograph.bus.sdo.controller import connect
-from hodograph.chain import program_limits
 from hodograph.config import load_machine
 from hodograph.data import CONTROLLER_EDS
 from hodograph.errors import PlanError, RefusedError
 from hodograph.native import NativeLimits, NativeProgram
+from hodograph.pipeline import program_limits
 
 MACHINE = load_machine(
     Path(__file__).resolve().parents[3] / "examples" / "machines" / "paper_alpha.toml"

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
-from hodograph.bus.listening.load import LONGEST_S, Listener, bus_load
+from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
+from hodograph.bus.capture.load import LONGEST_S, Listener, bus_load
 from hodograph.bustime.frame_bits import EXTENDED, exact_bits
 
 

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
-from hodograph.bus.listening.recordings import RecordingWriter, read_recording, write_recording
+from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
+from hodograph.bus.capture.recordings import RecordingWriter, read_recording, write_recording
 from hodograph.bustime.frame_bits import ERROR, EXTENDED, REMOTE
 from hodograph.errors import InputError
 

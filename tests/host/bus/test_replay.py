@@ -11,11 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from hodograph.bus.analysis import complete_ticks, program_tick, replay, runs_of
-from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
-from hodograph.bus.listening.recordings import read_recording, write_recording
-from hodograph.chain import Chain, load_chain
+from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
+from hodograph.bus.capture.recordings import read_recording, write_recording
 from hodograph.cli.main import main
 from hodograph.errors import RunError
+from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import Motion, simulate
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -30,12 +30,12 @@ Counts = NDArray[np.int64]
 
 
 @pytest.fixture(scope="module")
-def chain() -> Chain:
-    return load_chain(ALPHA)
+def chain() -> Pipeline:
+    return load_pipeline(ALPHA)
 
 
 @pytest.fixture(scope="module")
-def motion(chain: Chain) -> Motion:
+def motion(chain: Pipeline) -> Motion:
     machine = chain.machine
     return simulate(
         chain.image,
@@ -94,7 +94,7 @@ def frames(motion: Motion) -> Frames:
 @pytest.mark.parametrize("suffix", [".log", ".asc", ".blf"])
 def test_the_figures_of_the_simulation(
     frames: Frames,
-    chain: Chain,
+    chain: Pipeline,
     motion: Motion,
     tmp_path: Path,
     suffix: str,
@@ -114,7 +114,7 @@ def test_the_figures_of_the_simulation(
     assert told["bus_load"]["kinds"]["SYNC"]["frames"] == len(motion.rows) + 2 * STANDING - 1
 
 
-def test_a_run_among_other_things(frames: Frames, chain: Chain, motion: Motion) -> None:
+def test_a_run_among_other_things(frames: Frames, chain: Pipeline, motion: Motion) -> None:
     """Booting (SYNCs alone), a move to the start, the run; then a second run that was stopped half-way."""
     booting = np.concatenate([frame(0x080, bytes([j % 240 + 1])) for j in range(500)])
     start = motion.rows["set_counts"][0].astype(np.int64)
@@ -129,7 +129,7 @@ def test_a_run_among_other_things(frames: Frames, chain: Chain, motion: Motion) 
     assert found.frames == whole.size
 
 
-def test_what_is_not_the_program(frames: Frames, chain: Chain, motion: Motion) -> None:
+def test_what_is_not_the_program(frames: Frames, chain: Pipeline, motion: Motion) -> None:
     targets, actual, volts = run_of(motion)
     targets = targets.copy()
     targets[STANDING + 400, 0] += 1

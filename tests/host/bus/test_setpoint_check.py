@@ -13,17 +13,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hodograph.bus.listening.recorder import FRAME_DTYPE, Frames
-from hodograph.bus.listening.setpoint_check import (
+from hodograph.bus.capture.recorder import FRAME_DTYPE, Frames
+from hodograph.bus.capture.setpoint_check import (
     StepLimits,
     find_jumps,
     find_rough_starts,
     require_no_jump,
     step_limits,
 )
-from hodograph.chain import load_chain
 from hodograph.errors import RunError
 from hodograph.native import NativeProgram
+from hodograph.pipeline import load_pipeline
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 NODES = (2, 3)
@@ -301,7 +301,7 @@ def streamed(setpoints: NDArray[np.int32]) -> Stream:
 
 @pytest.mark.parametrize("name", ["alpha", "heart", "star", "alpha_optimal", "heart_optimal"])
 def test_whole_programs_pass_and_each_jump_in_them_is_found(name: str) -> None:
-    chain = load_chain(EXAMPLES / f"{name}.toml")
+    chain = load_pipeline(EXAMPLES / f"{name}.toml")
     machine = chain.machine
     _, setpoints = NativeProgram(chain.image).setpoints("fixed", machine.counts_per_mm)
     limits = step_limits(machine, setpoints)

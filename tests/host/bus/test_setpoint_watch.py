@@ -8,9 +8,9 @@ import struct
 import numpy as np
 import pytest
 
-from hodograph.bus.listening.frames import FRAME_DTYPE, Frames
-from hodograph.bus.listening.setpoint_check import StepLimits, find_jumps
-from hodograph.bus.listening.setpoint_watch import WINDOW, SetpointWatch, jumps
+from hodograph.bus.capture.frames import FRAME_DTYPE, Frames
+from hodograph.bus.capture.setpoint_check import StepLimits, find_jumps
+from hodograph.bus.capture.setpoint_watch import WINDOW, SetpointWatch, jumps
 
 LIMITS = StepLimits(speed=1000.0, acceleration=100.0)
 NODES = (2, 3)

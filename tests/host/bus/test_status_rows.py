@@ -9,7 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hodograph.bus.listening.load import BusLoad, ClassLoad
+from hodograph.bus.capture.load import BusLoad, ClassLoad
+from hodograph.bus.diagnostics.boot_texts import boot_trouble
+from hodograph.bus.diagnostics.fault_texts import fault_words
 from hodograph.bus.sdo.status import (
     AxisStatus,
     Configured,
@@ -23,8 +25,6 @@ from hodograph.bus.sdo.status import (
     Status,
 )
 from hodograph.bus.status_text import status_line, status_rows
-from hodograph.bus.words.boot_texts import boot_trouble
-from hodograph.bus.words.fault_texts import fault_words
 
 ROOT = Path(__file__).resolve().parents[3]
 

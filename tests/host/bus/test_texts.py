@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from hodograph.bus.words.boot_texts import boot_trouble
-from hodograph.bus.words.drive_states import (
+from hodograph.bus.diagnostics.boot_texts import boot_trouble
+from hodograph.bus.diagnostics.drive_states import (
     DRIVE_STATES,
     inputs_on,
     state_of_number,
     state_of_statusword,
 )
-from hodograph.bus.words.fault_texts import detail_text, fault_words, known_code
-from hodograph.bus.words.texts import REFUSALS, STATES
+from hodograph.bus.diagnostics.fault_texts import detail_text, fault_words, known_code
+from hodograph.bus.diagnostics.texts import REFUSALS, STATES
 
 ROOT = Path(__file__).resolve().parents[3]
 FIRMWARE = ROOT / "firmware"

@@ -12,9 +12,9 @@ import pytest
 from canopen.sdo.exceptions import SdoCommunicationError
 
 from hodograph.bus.address import BusAddress
+from hodograph.bus.sdo.channel_lock import Turns
 from hodograph.bus.sdo.controller import connect
 from hodograph.bus.sdo.node import Node
-from hodograph.bus.sdo.turns import Turns
 from hodograph.errors import BusError
 
 BUS = BusAddress("virtual", f"turns-{os.getpid()}")
@@ -131,11 +131,11 @@ class _LateSdo:
         self._answers: list[bytes] = []
         self.responses = self
         self.asked: list[bytes] = []
-        self.answers_at_once = False
+        self.tpdo_monitor_at_once = False
 
     def send_request(self, request: bytearray) -> None:
         self.asked.append(bytes(request))
-        if self.answers_at_once:
+        if self.tpdo_monitor_at_once:
             self.answer(self.asked[-1])
 
     def answer(self, request: bytes) -> None:
@@ -169,7 +169,7 @@ def test_an_answer_to_nobody_that_is_late_is_not_taken_for_another(
     assert sdo.asked[0] != sdo.asked[1]
     sdo.answer(sdo.asked[0])
     sdo.answer(sdo.asked[1])
-    sdo.answers_at_once = True
+    sdo.tpdo_monitor_at_once = True
     with node.turn():
         assert sdo.empty(), "whatever came before the newest answer is gone"
     with node.turn():
@@ -186,7 +186,7 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(clock: SteppedC
     with pytest.raises(SdoCommunicationError), node.turn():
         raise SdoCommunicationError("No SDO response received")
     sdo.put(bytes.fromhex("4f02200003000000"))
-    sdo.answers_at_once = True
+    sdo.tpdo_monitor_at_once = True
     with node.turn():
         assert sdo.empty()
     node.close()

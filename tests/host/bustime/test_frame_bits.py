@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hodograph.bus.listening.recorder import FRAME_DTYPE, Frames
+from hodograph.bus.capture.recorder import FRAME_DTYPE, Frames
 from hodograph.bustime import exact_bits, generic_worst_bits, plain_bits, worst_bits
 from hodograph.bustime.frame_bits import ERROR, EXTENDED, REMOTE, crc15
 

@@ -14,16 +14,16 @@ import pytest
 from campaign_files import EXAMPLES, MACHINE, PATH, Write, table
 from filelock import lock_descriptor
 
-from hodograph.campaign import conduct as conducting
 from hodograph.campaign import engine as engines
-from hodograph.campaign.conduct import conduct
+from hodograph.campaign import runner
 from hodograph.campaign.definition import load_campaign
 from hodograph.campaign.engine import Here
 from hodograph.campaign.journal import NAME, journal
+from hodograph.campaign.runner import run_campaign
 from hodograph.campaign.table import write_csv
-from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.native import RigFault
+from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 
 MIXED = """
@@ -54,7 +54,7 @@ def test_rows_are_what_simulate_gives(write: Write, tmp_path: Path) -> None:
     rows = table(tmp_path / "out")
     assert [row["path"] for row in rows] == ["alpha", "alpha", "path", "path"]
     assert rows[0]["encoders_sha256"].startswith("81c8a7cb")
-    chain = load_chain(EXAMPLES / "alpha.toml")
+    chain = load_pipeline(EXAMPLES / "alpha.toml")
     drives = chain.machine.models(chain.machine.plane)
     for row, faults in (
         (rows[0], ()),
@@ -124,14 +124,14 @@ def test_goes_on_wherever_it_was_cut(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The journal cut at any byte, as when the process is killed or the machine stops: the same table."""
-    monkeypatch.setattr(conducting, "BATCH_TICKS", 1500)  # a few runs each
+    monkeypatch.setattr(runner, "BATCH_TICKS", 1500)  # a few runs each
     campaign, file = load_campaign(write(MIXED)), tmp_path / NAME
 
     def result() -> str:
         text = io.StringIO()
         design = campaign.design
         with journal(tmp_path, campaign.fingerprint, design.total, fresh=False) as made:
-            write_csv(design, conduct(campaign, made, Here(), lambda done: None), text)
+            write_csv(design, run_campaign(campaign, made, Here(), lambda done: None), text)
         return text.getvalue()
 
     whole, data = result(), file.read_bytes()
@@ -153,8 +153,8 @@ def test_what_is_done_is_not_done_again(
     def never(*_: object) -> None:
         raise AssertionError("nothing was left to do")
 
-    monkeypatch.setattr(conducting, "make_runs", never)
-    monkeypatch.setattr(conducting, "build", never)
+    monkeypatch.setattr(runner, "make_runs", never)
+    monkeypatch.setattr(runner, "build", never)
     assert run(file, folder) == 0
 
 
@@ -189,7 +189,7 @@ def test_machine_of_the_campaign(write: Write, tmp_path: Path) -> None:
     text = f'paths = ["path.toml"]\nmachine = "{EXAMPLES}/machines/paper_heart.toml"\n'
     text += f'[[gains]]\nname = "heart"\n[[gains]]\nname = "alpha"\nmachine = "{MACHINE}"\n'
     assert run(write(text), tmp_path / "out") == 0
-    chain = load_chain(tmp_path / "path.toml", EXAMPLES / "machines" / "paper_heart.toml")
+    chain = load_pipeline(tmp_path / "path.toml", EXAMPLES / "machines" / "paper_heart.toml")
     own = simulate(chain.image, chain.machine.models(chain.machine.plane))
     rows = table(tmp_path / "out")
     assert rows[0]["encoders_sha256"] == own.encoders_sha256

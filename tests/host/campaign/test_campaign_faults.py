@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from campaign_files import EXAMPLES
 
-from hodograph.campaign.fault_rules import Fault, rig_fault
+from hodograph.campaign.fault_rules import Fault, offline_fault
 from hodograph.errors import InputError
 from hodograph.faults.scenario import draw, load_scenario
 from hodograph.native import FOR_EVER, RigFault
@@ -48,13 +48,13 @@ BAD = [
 
 @pytest.mark.parametrize(("rule", "expected"), GOOD)
 def test_good_rules(rule: str, expected: RigFault) -> None:
-    assert rig_fault(rule, NODES, 2000) == expected
+    assert offline_fault(rule, NODES, 2000) == expected
 
 
 @pytest.mark.parametrize(("rule", "message"), BAD)
 def test_bad_rules(rule: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
-        rig_fault(rule, NODES, 1000)
+        offline_fault(rule, NODES, 1000)
     assert str(caught.value).startswith(f'rule "{rule}": ')
     assert not re.search(r"\n", str(caught.value))
 
@@ -69,4 +69,4 @@ def test_draws_are_those_of_the_faults_command() -> None:
     scenario = load_scenario(EXAMPLES / "faults" / "load.toml")
     rule = draw(scenario, 12).rules.strip()
     assert Fault("load", scenario).lines(5, 7) == [rule]
-    assert Fault("load", scenario).rules(5, 7, NODES, 1000) == [rig_fault(rule, NODES, 1000)]
+    assert Fault("load", scenario).rules(5, 7, NODES, 1000) == [offline_fault(rule, NODES, 1000)]

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.chain import load_chain
 from hodograph.config import load_path_file
 from hodograph.errors import InputError
 from hodograph.feed import AxisLimits, FeedCap
+from hodograph.pipeline import load_pipeline
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -96,7 +96,7 @@ def test_optimal_needs_no_nominal_feed(tmp_path: Path) -> None:
         with pytest.raises(
             InputError, match=r'profile "optimal" has no limit to obey: name a machine'
         ):
-            _ = load_chain(write(tmp_path, text)).plan
+            _ = load_pipeline(write(tmp_path, text)).plan
 
 
 def test_defaults(tmp_path: Path) -> None:
@@ -298,4 +298,4 @@ def test_a_closed_path_that_comes_back(tmp_path: Path, key: str, tail: list[list
 def test_a_machine_file_of_a_name_that_no_file_can_have(tmp_path: Path) -> None:
     text = GOOD + f'[machine]\nfile = "{"m" * 500}"\n'
     with pytest.raises(InputError, match="which is not there"):
-        load_chain(write(tmp_path, text)).program  # noqa: B018
+        load_pipeline(write(tmp_path, text)).program  # noqa: B018

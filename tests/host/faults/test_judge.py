@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
-from hodograph.faults.evidence import Evidence
+from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
+from hodograph.faults.case_record import CaseRecord
 from hodograph.faults.judge import Verdict, judge
 from hodograph.faults.record import Job, Record, load_job
 from hodograph.faults.scenario import Case, Expectation, Scenario
@@ -69,7 +69,7 @@ def record(recorded: Frames, expect: Expectation = EXPECT, *, at: int = 50) -> R
     )
     made = Record(Case(scenario, 0, {"seed": 1}), job())
     made.injections = list(INJECTED)
-    made.evidence = Evidence(recorded, recorded, (2, 3))
+    made.evidence = CaseRecord(recorded, recorded, (2, 3))
     made.began_us = BEGAN_US + 1000 * (5 + at)
     made.again = job().clean
     made.recovery_ms = 900.0

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.chain import Chain
 from hodograph.config import Machine, load_machine, load_path_file
 from hodograph.errors import PlanError
 from hodograph.feed import AxisLimits, Limits
 from hodograph.feed.limits import MACHINE_SHARE
 from hodograph.native.program import NativeFault, NativeLimits, NativeProgram
+from hodograph.pipeline import Pipeline
 from hodograph.verify import verify_program
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -36,11 +36,11 @@ def machine(**limits: float) -> Machine:
     return replace(found, axes=tuple(replace(axis, **limits) for axis in found.axes))
 
 
-def chain(folder: Path, points: str, profile: str, policy: str, on: Machine) -> Chain:
+def chain(folder: Path, points: str, profile: str, policy: str, on: Machine) -> Pipeline:
     file = folder / "path.toml"
     limits = f'[limits]\npolicy = "{policy}"\n'
     file.write_text(f"[path]\nclosed = false\nthrough = {points}\n[feed]\n{FEEDS[profile]}{limits}")
-    return Chain(load_path_file(file), on)
+    return Pipeline(load_path_file(file), on)
 
 
 @pytest.mark.parametrize("policy", ["respect", "report"])

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.chain import load_chain
 from hodograph.feed.optimal import OptimalPlan
+from hodograph.pipeline import load_pipeline
 from hodograph.program import check
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -17,7 +17,7 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 
 @pytest.mark.parametrize(("name", "share"), [("alpha", 0.7), ("heart", 0.5)])
 def test_examples_are_faster_than_the_paper_and_keep_every_limit(name: str, share: float) -> None:
-    paper, fast = (load_chain(EXAMPLES / f"{name}{kind}.toml") for kind in ("", "_optimal"))
+    paper, fast = (load_pipeline(EXAMPLES / f"{name}{kind}.toml") for kind in ("", "_optimal"))
     plan = fast.plan
     assert isinstance(plan, OptimalPlan)
     assert plan.duration_s < share * paper.plan.duration_s
@@ -26,7 +26,7 @@ def test_examples_are_faster_than_the_paper_and_keep_every_limit(name: str, shar
 
 
 def test_the_plan_and_its_pieces_agree() -> None:
-    chain = load_chain(EXAMPLES / "alpha_optimal.toml")
+    chain = load_pipeline(EXAMPLES / "alpha_optimal.toml")
     plan, pieces = chain.plan, chain.program.pieces
     start = np.concatenate(([0], np.cumsum(pieces.duration_q32_s))) * 2.0**-32
     assert np.abs(plan.arc_length(start[:-1]) - pieces.start_q40 * 2.0**-40).max() < 1e-11

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
-from hodograph.chain import Chain, load_chain
+from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
 from hodograph.config import Drive, load_machine
+from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import simulate
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -20,13 +20,13 @@ REST = 300
 FOLLOWS = 0x1237
 
 
-def chain_of(name: str, machine: str | None = None) -> Chain:
+def chain_of(name: str, machine: str | None = None) -> Pipeline:
     given = None if machine is None else EXAMPLES / "machines" / f"{machine}.toml"
-    return load_chain(EXAMPLES / f"{name}.toml", given)
+    return load_pipeline(EXAMPLES / f"{name}.toml", given)
 
 
 def recording(
-    chain: Chain,
+    chain: Pipeline,
     drives: tuple[Drive, Drive],
     seed: int,
     *,
@@ -62,7 +62,7 @@ def recording(
     return packed(frames)
 
 
-def _torques(chain: Chain, cmd_q40: NDArray[np.int64], ticks: int) -> NDArray[np.int64] | None:
+def _torques(chain: Pipeline, cmd_q40: NDArray[np.int64], ticks: int) -> NDArray[np.int64] | None:
     """Torque offsets by docs/reference/protocol.md section 3.2, in floating point: rounding may differ by
     one per mille."""
     forward = chain.machine.plane_feedforward

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.bus.listening.recordings import write_recording
+from hodograph.bus.capture.recordings import write_recording
 from hodograph.cli.main import main
 from hodograph.config import Drive, load_machine
 from hodograph.errors import RunError

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hodograph.bus.listening.frames import Frames
+from hodograph.bus.capture.frames import Frames
 from hodograph.monitor.decoder import HELD_BACK, Decoder, Samples, nodes_in
 from traffic import machine_frames
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hodograph.chain import load_chain
 from hodograph.errors import InputError
 from hodograph.monitor.decoder import Decoder
 from hodograph.monitor.derived import Derivation, Rows, derivative_weights
 from hodograph.monitor.path import ProgramPath
+from hodograph.pipeline import load_pipeline
 from hodograph.simulate import Motion, simulate
 from traffic import EXAMPLES, alpha
 
@@ -30,7 +30,7 @@ def rows_of(chunk: int, path: ProgramPath | None) -> Rows:
 
 
 def motion() -> Motion:
-    chain = load_chain(EXAMPLES / "alpha.toml", None)
+    chain = load_pipeline(EXAMPLES / "alpha.toml", None)
     drives = [axis.drive for axis in chain.machine.axes if axis.drive is not None]
     return simulate(chain.image, drives)
 

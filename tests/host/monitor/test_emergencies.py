@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hodograph.bus.listening.frames import RECORD_DTYPE, Frames
+from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
 from hodograph.monitor.emergencies import MOST_TOLD, Emergencies
 
 BEGIN_US = 946_684_800_000_000

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from hodograph.chain import Chain
 from hodograph.config import load_machine, load_path_file
 from hodograph.native import NativeProgram
 from hodograph.native.stop_search import StopSearch
 from hodograph.native.stop_trial import StopTrials, run_trials
+from hodograph.pipeline import Pipeline
 from hodograph.program.stop_planning import fault_limits, hold_limits
 from hodograph.program.stops import DECELERATION
 
@@ -20,17 +20,19 @@ ZIG_ZAG = """[[0.0, 0.0], [1.2, 2.7], [1.3, 0.0], [1.9, 2.7], [10.5, 0.0], [5.8,
 [5.2, 0.0], [17.7, 2.7], [23.0, 0.0], [28.3, 2.7], [10.3, 0.0], [20.7, 2.7], [13.9, 0.0], [25.7, 2.7]]"""
 
 
-def chain(folder: Path, points: str, feed: str, limits: str = "", stop_time_ms: int = 250) -> Chain:
+def chain(
+    folder: Path, points: str, feed: str, limits: str = "", stop_time_ms: int = 250
+) -> Pipeline:
     file = folder / "path.toml"
     file.write_text(
         f"[path]\nclosed = false\n{points}\n[feed]\n{feed}[limits]\nacceleration_mm_s2 = 2000\n"
         f'jerk_mm_s3 = 40000\n{limits}[machine]\nfile = "{MACHINE}"\n',
         encoding="utf-8",
     )
-    return Chain(load_path_file(file), replace(load_machine(MACHINE), stop_time_ms=stop_time_ms))
+    return Pipeline(load_path_file(file), replace(load_machine(MACHINE), stop_time_ms=stop_time_ms))
 
 
-def trials(made: Chain) -> StopTrials:
+def trials(made: Pipeline) -> StopTrials:
     program = NativeProgram(made.image)
     search = StopSearch(program)
     plan, terms = made.compilation.plan, made.stop_terms

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.chain import load_chain
 from hodograph.errors import PlanError
 from hodograph.native import NativeProgram
 from hodograph.native.stop_bounds import stop_bounds
+from hodograph.pipeline import load_pipeline
 from hodograph.program import decode, encode, inspect_dict
 from hodograph.program.check import check
 from hodograph.program.check_stops import bounds
@@ -24,7 +24,7 @@ EXAMPLES = ("alpha", "alpha_optimal", "heart_optimal", "star")
 
 @pytest.fixture(scope="module", params=EXAMPLES)
 def program(request):
-    return load_chain(ROOT / "examples" / f"{request.param}.toml").program
+    return load_pipeline(ROOT / "examples" / f"{request.param}.toml").program
 
 
 def test_codes_are_eighths_of_octaves() -> None:
@@ -118,6 +118,6 @@ def test_a_fault_stop_that_takes_too_long_is_refused_with_its_place(tmp_path) ->
     text = text.replace("../drives", str(ROOT / "examples/drives"))
     machine = tmp_path / "machine.toml"
     machine.write_text(text, encoding="utf-8")
-    chain = load_chain(ROOT / "examples/alpha_optimal.toml", machine)
+    chain = load_pipeline(ROOT / "examples/alpha_optimal.toml", machine)
     with pytest.raises(PlanError, match=r"fault stop at arc length .* stop_time_ms = 60"):
         _ = chain.program

@@ -30,10 +30,10 @@ def test_missing_module_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_records_have_the_size_of_the_c_structs() -> None:
     ffi, _ = library()
-    assert ffi.sizeof("struct rig_row") == ROW.itemsize
+    assert ffi.sizeof("struct offline_row") == ROW.itemsize
     assert ffi.sizeof("struct interp_point") == POINT.itemsize
     for name, field in ROW.fields.items():  # type: ignore[union-attr]
-        assert ffi.offsetof("struct rig_row", name) == field[1]
+        assert ffi.offsetof("struct offline_row", name) == field[1]
 
 
 @given(st.lists(st.integers(-(2**52), 2**52), min_size=1), st.sampled_from([1, 1000, 10**6, 10**7]))

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.chain import Chain, load_chain
 from hodograph.cli.main import main
 from hodograph.errors import HodographError
 from hodograph.native import NativeProgram
 from hodograph.native.stop_search import StopSearch
 from hodograph.native.stop_trial import StopTrials, run_trials
+from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program.stop_planning import fault_limits, hold_limits
 from hodograph.simulate import simulate, simulate_stop
 
@@ -23,7 +23,7 @@ BETWEEN = 0.01
 """Share of a limit by which a motion may pass it between the instants that the search looks at (0.5 % seen)."""
 
 
-def trials(chain: Chain, count: int, seed: int) -> StopTrials:
+def trials(chain: Pipeline, count: int, seed: int) -> StopTrials:
     """Random commands on a program, beside the limits that its stops were planned with."""
     program = NativeProgram(chain.image)
     search = StopSearch(program)
@@ -38,7 +38,7 @@ def trials(chain: Chain, count: int, seed: int) -> StopTrials:
 @pytest.mark.parametrize("file", [ALPHA, HEART], ids=["alpha", "heart"])
 @pytest.mark.parametrize("kind", ["hold", "stop", "fault"])
 def test_a_stop_rests_within_its_bound_and_limits(file, kind) -> None:
-    chain = load_chain(file)
+    chain = load_pipeline(file)
     program = NativeProgram(chain.image)
     axis, path = (2000.0, 50000.0), (2000.0, 50000.0)
     for at_s in np.linspace(0.0, chain.program.duration_s, 14)[:-1].tolist():
@@ -56,7 +56,7 @@ def test_a_stop_rests_within_its_bound_and_limits(file, kind) -> None:
 
 
 def test_until_the_stop_the_run_is_the_undisturbed_one() -> None:
-    chain = load_chain(ALPHA)
+    chain = load_pipeline(ALPHA)
     drives = chain.machine.models(chain.machine.plane)
     whole = simulate(chain.image, drives)
     found = simulate_stop(NativeProgram(chain.image), drives, "fault", 0.3)
@@ -179,7 +179,7 @@ def random_file(folder: Path, seed: int) -> Path:
 def check_random(folder: Path, seed: int, count: int) -> int:
     """Random commands on a random program; how many trials there were."""
     try:
-        chain = load_chain(random_file(folder, seed))
+        chain = load_pipeline(random_file(folder, seed))
         _ = chain.image
     except HodographError:
         return 0
@@ -191,7 +191,7 @@ def check_random(folder: Path, seed: int, count: int) -> int:
 
 @pytest.mark.parametrize("file", [ALPHA, HEART, ROOT / "examples/star.toml"], ids=lambda f: f.stem)
 def test_random_commands_on_the_examples(file) -> None:
-    found = trials(load_chain(file), 4000, 7)
+    found = trials(load_pipeline(file), 4000, 7)
     assert found.kept, found
 
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from hodograph.chain import load_chain
 from hodograph.cli.main import main
 from hodograph.config import Drive, Machine, load_machine
 from hodograph.errors import PlanError
+from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 from hodograph.tune import Asked, Wanted, search, tune
 from hodograph.tune.cases import CASES, NOMINAL, outcome
@@ -45,8 +45,8 @@ def test_the_example_machine_has_a_contour_error_of_its_encoder(
     name: str, paper_um: float, within: float
 ) -> None:
     """Asked for: 1 um at the paper's feed, 2 um at the optimal one."""
-    plain = load_chain(EXAMPLES / f"{name}.toml")
-    tuned = load_chain(EXAMPLES / f"{name}.toml", MACHINES / "tuned.toml")
+    plain = load_pipeline(EXAMPLES / f"{name}.toml")
+    tuned = load_pipeline(EXAMPLES / f"{name}.toml", MACHINES / "tuned.toml")
     assert plain.image == tuned.image
     errors = []
     for chain in (plain, tuned):
@@ -66,7 +66,7 @@ def test_the_example_machine_is_what_tune_finds(
     monkeypatch.setattr(search, "DAMPINGS", (0.85,))
     monkeypatch.setattr(search, "BANDWIDTHS", 1)
     monkeypatch.setattr(search, "SPAN", 1.0)
-    chain = load_chain(EXAMPLES / "alpha.toml", machine.file)
+    chain = load_pipeline(EXAMPLES / "alpha.toml", machine.file)
     found = tune(machine, [chain], Asked(interpolation="cubic"))
     example = load_machine(MACHINES / "tuned.toml")
     assert found.drives == example.models(example.plane)
@@ -81,7 +81,7 @@ def test_the_example_machine_is_what_tune_finds(
 def test_straight_lines_and_late_sensing_keep_the_goals_too(
     machine: Machine, name: str, most_um: float
 ) -> None:
-    chain = load_chain(EXAMPLES / f"{name}.toml")
+    chain = load_pipeline(EXAMPLES / f"{name}.toml")
     late = [
         replace(drive, speed="differences", delay_samples=1, interpolation="cubic")
         for drive in machine.models(machine.plane)
@@ -98,7 +98,7 @@ def test_straight_lines_and_late_sensing_keep_the_goals_too(
 
 
 def test_every_case_differs_from_the_model(drives: tuple[Drive, Drive]) -> None:
-    image = load_chain(EXAMPLES / "alpha.toml").image
+    image = load_pipeline(EXAMPLES / "alpha.toml").image
     nominal = outcome(image, 1_000_000, drives, None, NOMINAL)
     for case in CASES[1:]:
         found = outcome(image, 1_000_000, drives, None, case)
@@ -115,7 +115,7 @@ def test_volts_that_a_plan_leaves_are_for_weaker_plants(
     text = (EXAMPLES / "alpha_optimal.toml").read_text().replace("volts = 4.5", f"volts = {volts}")
     file = tmp_path / "alpha.toml"
     file.write_text(text)
-    chain = load_chain(file, MACHINES / "tuned.toml")
+    chain = load_pipeline(file, MACHINES / "tuned.toml")
     drives, forward = chain.machine.models(chain.machine.plane), chain.machine.plane_feedforward
     weak = next(case for case in CASES if case.name == "gain -20 %")
     found = outcome(chain.image, 1_000_000, (drives[0], drives[1]), forward, weak)
@@ -125,7 +125,7 @@ def test_volts_that_a_plan_leaves_are_for_weaker_plants(
 
 
 def test_saturation_is_seen(drives: tuple[Drive, Drive]) -> None:
-    chain = load_chain(EXAMPLES / "heart.toml")
+    chain = load_pipeline(EXAMPLES / "heart.toml")
     weak = next(c for c in CASES if c.name == "gain -20 %, time constant +20 %")
     assert outcome(chain.image, 1_000_000, drives, None, weak).saturated
     assert not outcome(chain.image, 1_000_000, drives, None, NOMINAL).saturated

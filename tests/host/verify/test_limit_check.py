@@ -18,9 +18,9 @@ import pytest
 from numpy.typing import NDArray
 from programs import random_program
 
-from hodograph.chain import load_chain
 from hodograph.feed.override_levels import FACTOR_ONE_Q14, FULL, LEVEL_RATES, LEVELS
 from hodograph.native.program import NativeFault, NativeLimits, NativeProgram
+from hodograph.pipeline import load_pipeline
 from hodograph.program import Program, encode
 from hodograph.program.codes import ProgramError
 from hodograph.verify.cells import curve_of, cut
@@ -110,7 +110,7 @@ def check(
 
 @cache
 def programs() -> tuple[Program, ...]:
-    shipped = [load_chain(EXAMPLES / f"{name}.toml").program for name in NAMES]
+    shipped = [load_pipeline(EXAMPLES / f"{name}.toml").program for name in NAMES]
     return (*shipped, *(random_program(seed) for seed in range(SEEDS)))
 
 

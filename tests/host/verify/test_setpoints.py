@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.chain import load_chain
 from hodograph.feed import Limits
+from hodograph.pipeline import load_pipeline
 from hodograph.verify import bus_noise, sampled, verify_program
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -15,7 +15,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
 @pytest.mark.parametrize("name", ["alpha", "heart"])
 def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str) -> None:
-    chain = load_chain(EXAMPLES / f"{name}.toml")
+    chain = load_pipeline(EXAMPLES / f"{name}.toml")
     found = {one.kernel: one for one in sampled(chain.accepted)}
     program = chain.accepted
     points = program.points("fixed", program.tick_times_q42_s())
@@ -38,7 +38,7 @@ def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str
 
 
 def test_long_programs_are_read_in_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
-    program = load_chain(EXAMPLES / "alpha.toml").accepted
+    program = load_pipeline(EXAMPLES / "alpha.toml").accepted
     whole = sampled(program)
     monkeypatch.setattr("hodograph.verify.setpoints._CHUNK", 37)
     assert sampled(program) == whole

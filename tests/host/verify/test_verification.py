@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from programs import random_program
 
-from hodograph.chain import load_chain
 from hodograph.config import load_drive
 from hodograph.errors import InputError
 from hodograph.feed import AxisLimits, FeedCap, Limits
+from hodograph.pipeline import load_pipeline
 from hodograph.program import Program
 from hodograph.verify import verify_program
 from hodograph.verify.cells import cut
@@ -25,7 +25,7 @@ DRIVES = tuple(load_drive(EXAMPLES / "drives" / f"alpha_{axis}.toml") for axis i
 
 @pytest.fixture(scope="module")
 def alpha() -> Program:
-    return load_chain(EXAMPLES / "alpha.toml").program
+    return load_pipeline(EXAMPLES / "alpha.toml").program
 
 
 @pytest.mark.parametrize("seed", range(9))

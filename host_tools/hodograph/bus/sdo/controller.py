@@ -17,8 +17,15 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from ...data import CONTROLLER_EDS
 from ...errors import BusError, RefusedError, RunError, one_line
 from ..address import BusAddress
-from ..words.boot_texts import BootTrouble, boot_trouble
-from ..words.texts import PROGRAM_STATES, REFUSALS, STATES, detail_text, fault_text, fault_words
+from ..diagnostics.boot_texts import BootTrouble, boot_trouble
+from ..diagnostics.texts import (
+    PROGRAM_STATES,
+    REFUSALS,
+    STATES,
+    detail_text,
+    fault_text,
+    fault_words,
+)
 from .configuration import configuration, configuration_crc32
 from .network import open_network
 from .node import IDENTITY_OBJECT, Node

@@ -17,8 +17,8 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from ...errors import BusError, BusyError, RefusedError, one_line
 from ..address import BusAddress
 from ..clock import REAL_CLOCK, Clock
+from .channel_lock import TURN_WAIT_S, Turns
 from .objects import COMMAND, STATE
-from .turns import TURN_WAIT_S, Turns
 
 IDENTITY_OBJECT = 0x1018
 IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..words.boot_texts import BootTrouble
-from ..words.drive_states import inputs_on, state_of_number
-from ..words.texts import (
+from ..diagnostics.boot_texts import BootTrouble
+from ..diagnostics.drive_states import inputs_on, state_of_number
+from ..diagnostics.texts import (
     CONFIGURED,
     REFUSALS,
     STATES,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...errors import BusError, RefusedError, one_line
-from ..words.texts import STATES
+from ..diagnostics.texts import STATES
 from .node import Node
 from .objects import PROGRAM, PROGRAM_MEMORY, STATE
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError, PlanError
 from ...spline import PHSpline
-from ..along import PathBounds
+from ..kinematics import PathBounds
 from ..limits import ControllerLimits, FeedCap, Limits
 from ..pattern_search import SearchStep
 from ..pieces import FeedPieces, derivative_peaks

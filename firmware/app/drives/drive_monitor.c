@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/drives/drive_monitor.h"
+
+#include <stddef.h>
+
+#include "canopen/cia402.h"
+#include "canopen/cob.h"
+#include "canopen/emcy.h"
+#include "port/port.h"
+
+static uint32_t time_of(uint8_t node, const uint32_t entries[AXES_MAX])
+{
+    for (uint8_t i = 0; i < AXES_MAX; ++i) {
+        struct heartbeat_consumer entry;
+        heartbeat_consumer_init_entry(&entry, entries[i]);
+        if (entry.node == node && entry.time_us != 0u) {
+            return entries[i] & 0xFFFFu;
+        }
+    }
+    return DRIVE_WATCH_HEARTBEAT_MS;
+}
+
+static bool is_drive(const struct config *config, uint8_t node)
+{
+    for (uint8_t i = 0; i < config->axis_count; ++i) {
+        if (config->node[i] == node) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void begin_others(struct drive_monitor *watch, const struct config *config,
+                         const uint32_t entries[AXES_MAX])
+{
+    watch->other_count = 0;
+    for (uint8_t i = 0; i < AXES_MAX; ++i) {
+        struct heartbeat_consumer entry;
+        heartbeat_consumer_init_entry(&entry, entries[i]);
+        if (entry.node != 0u && entry.time_us != 0u && !is_drive(config, entry.node)) {
+            watch->others[watch->other_count++] = entry;
+        }
+    }
+}
+
+void drive_monitor_begin(struct drive_monitor *watch, const struct config *config,
+                         const uint32_t entries[AXES_MAX])
+{
+    watch->count = config->axis_count;
+    for (uint8_t i = 0; i < watch->count; ++i) {
+        const uint8_t node = config->node[i];
+        heartbeat_consumer_init(&watch->consumers[i], node, (uint16_t)time_of(node, entries));
+    }
+    begin_others(watch, config, entries);
+}
+
+/* The zero of a drive counts as kept only while there is no gap in which it could have restarted. */
+static void note_silence(struct drive_monitor *watch, struct machine *machine, uint8_t i,
+                         uint32_t elapsed_us)
+{
+    const uint32_t time_us = watch->consumers[i].time_us;
+    const uint32_t zero_us = DRIVE_WATCH_ZERO_MS * 1000u;
+    const uint32_t limit_us = time_us < zero_us ? time_us : zero_us;
+    if (watch->silent_us[i] <= limit_us) {
+        watch->silent_us[i] += elapsed_us;
+    }
+    if (watch->silent_us[i] > limit_us) {
+        port_lock();
+        struct axis *axis = machine_axis(machine, watch->consumers[i].node);
+        if (axis != NULL) {
+            axis->homed = false;
+        }
+        port_unlock();
+    }
+}
+
+static bool is_heartbeat(const struct heartbeat_consumer *consumer, const struct can_msg *in)
+{
+    return in->id == COB_HEARTBEAT + consumer->node && in->len == 1u;
+}
+
+/* Drives that are off may come and go: they are found again. With power on it is a fault. */
+static void gone(struct machine *machine, uint16_t code, uint8_t node)
+{
+    const bool boots = machine->state == MACHINE_BOOT;
+    if (machine->state == MACHINE_OFF || (boots && machine->configured)) {
+        machine_enter_boot(machine);
+    } else if (!boots) {
+        machine_raise(machine, code, node, 0);
+    }
+}
+
+static void restarted(struct machine *machine, uint8_t node)
+{
+    struct axis *axis = machine_axis(machine, node);
+    if (axis != NULL) {
+        axis_restarted(axis);
+    }
+    if (machine->state == MACHINE_BOOT) { /* it has lost what was configured so far */
+        machine_enter_boot(machine);
+    } else {
+        gone(machine, FAULT_REBOOTED, node);
+    }
+}
+
+static void take_event(struct machine *machine, const struct heartbeat_consumer *consumer,
+                       enum heartbeat_event event)
+{
+    port_lock();
+    if (event == HEARTBEAT_BOOTED) {
+        restarted(machine, consumer->node);
+    } else if (event == HEARTBEAT_LOST) {
+        gone(machine, EMCY_HEARTBEAT, consumer->node);
+    }
+    port_unlock();
+}
+
+/* Nobody looks after the machine any more. With drives off there is nothing to bring to rest. */
+static void host_lost(struct machine *machine, uint8_t node)
+{
+    port_lock();
+    if (machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF) {
+        machine_raise(machine, EMCY_HEARTBEAT, node, 0);
+    }
+    port_unlock();
+}
+
+static void take_others(struct drive_monitor *watch, struct machine *machine,
+                        const struct can_msg *in)
+{
+    for (uint8_t i = 0; i < watch->other_count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->others[i];
+        const bool present = consumer->presence == HEARTBEAT_PRESENT;
+        if (heartbeat_consumer_receive(consumer, in) == HEARTBEAT_BOOTED && present) {
+            host_lost(machine, consumer->node);
+        }
+    }
+}
+
+void drive_monitor_receive(struct drive_monitor *watch, struct machine *machine,
+                           const struct can_msg *in)
+{
+    struct emcy emcy;
+    const uint8_t node = emcy_decode(in, &emcy);
+    if (node != 0u) {
+        port_lock();
+        machine_note_emergency(machine, node, emcy.code);
+        port_unlock();
+        return;
+    }
+    for (uint8_t i = 0; i < watch->count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->consumers[i];
+        if (is_heartbeat(consumer, in)) {
+            watch->silent_us[i] = 0;
+        }
+        take_event(machine, consumer, heartbeat_consumer_receive(consumer, in));
+    }
+    take_others(watch, machine, in);
+}
+
+void drive_monitor_process(struct drive_monitor *watch, struct machine *machine,
+                           uint32_t elapsed_us)
+{
+    for (uint8_t i = 0; i < watch->count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->consumers[i];
+        note_silence(watch, machine, i, elapsed_us);
+        take_event(machine, consumer, heartbeat_consumer_process(consumer, elapsed_us));
+    }
+    for (uint8_t i = 0; i < watch->other_count; ++i) {
+        struct heartbeat_consumer *consumer = &watch->others[i];
+        if (heartbeat_consumer_process(consumer, elapsed_us) == HEARTBEAT_LOST) {
+            host_lost(machine, consumer->node);
+        }
+    }
+}

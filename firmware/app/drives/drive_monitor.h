@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * drive_monitor: heartbeats and emergency messages of the drives, and what they mean for the zero of a homed axis: a drive that
+ * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody heard its boot-up
+ * message. Also heartbeats of the host, where 0x1016 names its node. Mainline; takes the port's lock where it touches the machine.
+ */
+#ifndef APP_DRIVES_DRIVE_WATCH_H
+#define APP_DRIVES_DRIVE_WATCH_H
+
+#include <stdint.h>
+
+#include "app/machine/machine.h"
+#include "canopen/heartbeat.h"
+
+/* Consumer time of a drive that has no entry in 0x1016; the drives send ten times as often. */
+#define DRIVE_WATCH_HEARTBEAT_MS 1000u
+
+/* So long a silence is enough for a drive to have been off and on again without anybody hearing its boot-up message; its
+ * heartbeats come five times as often. */
+#define DRIVE_WATCH_ZERO_MS 500u
+
+struct drive_monitor {
+    struct heartbeat_consumer consumers[AXES_MAX];
+    struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are no drives: a host */
+    uint32_t silent_us[AXES_MAX]; /* since the last heartbeat, whatever has begun anew since */
+    uint8_t count;
+    uint8_t other_count;
+};
+
+/* Begins to watch the drives of the configuration, all unknown: each from its first heartbeat on. `entries` as in
+ * 0x1016: bits 16 ... 23 node, 0 ... 15 time in ms. Other nodes in it are watched as well, likewise from their first
+ * heartbeat on: one that falls silent, or restarts, while drives are on is a fault, and its axes come to rest. */
+void drive_monitor_begin(struct drive_monitor *watch, const struct config *config,
+                         const uint32_t entries[AXES_MAX]);
+
+/* Takes any frame. A drive that restarts, or reports an error, makes a fault or a new boot. */
+void drive_monitor_receive(struct drive_monitor *watch, struct machine *machine,
+                           const struct can_msg *in);
+
+/* Lets time pass; a drive that has fallen silent likewise. */
+void drive_monitor_process(struct drive_monitor *watch, struct machine *machine,
+                           uint32_t elapsed_us);
+
+#endif

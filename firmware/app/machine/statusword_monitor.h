@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * statusword_monitor: bits of a drive's statusword beside those of the state, while it is in Operation enabled.
+ *
+ * Bits that have been set since the drive was enabled must stay: voltage (4), remote (9) and, in CSP, "follows the
+ * command value" (12). Following error (13, in CSP) must not come. A wrong bit is a trouble when it is wrong in more than
+ * STATUS_WATCH_TOLERATED answers in a row. The internal limit (11) is a warning, not watched here.
+ */
+#ifndef APP_MACHINE_STATUS_WATCH_H
+#define APP_MACHINE_STATUS_WATCH_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define STATUS_WATCH_TOLERATED 2u
+
+struct statusword_monitor {
+    uint16_t seen;  /* bits that have been set */
+    uint16_t wrong; /* bits wrong in the last answer */
+    uint8_t in_row; /* answers with wrong bits */
+};
+
+void statusword_monitor_init(struct statusword_monitor *watch);
+
+/* A statusword in Operation enabled; csp: bits 12 and 13 have their meaning of that mode. Receive. */
+void statusword_monitor_take(struct statusword_monitor *watch, uint16_t statusword, bool csp);
+
+/* What is wrong, as an error code of app/machine/fault.h or canopen/emcy.h; 0: nothing. Pure. */
+uint16_t statusword_monitor_trouble(const struct statusword_monitor *watch);
+
+/* Whether the drive, as far as the bits tell, obeys its controlword and follows its target: a following error alone
+ * does not keep it from that. Pure. */
+bool statusword_monitor_follows(const struct statusword_monitor *watch);
+
+#endif

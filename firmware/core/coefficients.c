@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/coefficients.h"
+
+#include <string.h>
+
+#include "core/ph_segment.h"
+
+static uint64_t pieces_size(const struct program *p, const struct kernel *kernel)
+{
+    return (uint64_t)p->header.piece_count * coefficients_piece_size(kernel);
+}
+
+uint64_t coefficients_size(const struct program *p, const struct kernel *kernel)
+{
+    return pieces_size(p, kernel) +
+           (uint64_t)p->header.segment_count * coefficients_segment_size(kernel);
+}
+
+static void look_ahead(struct program_override ahead[OVERRIDE_WINDOWS], const struct program *p,
+                       uint32_t i)
+{
+    for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
+        override_bounds_of(&ahead[k], p, i, override_window_pieces(k));
+    }
+}
+
+void coefficients_piece_make(struct coefficients_piece *out, const struct program *p,
+                             const struct kernel *kernel, uint32_t i, uint64_t start_q32_s)
+{
+    struct program_piece piece;
+    program_piece_get(p, i, &piece);
+    out->start_q32_s = start_q32_s;
+    out->end_q32_s = i + 1u == p->header.piece_count ? p->header.duration_q32_s
+                                                     : start_q32_s + piece.duration_q32_s;
+    kernel->piece_set(&out->feed, &piece);
+}
+
+void coefficients_segment_make(struct coefficients_segment *out, const struct program *p,
+                               const struct kernel *kernel, uint32_t i)
+{
+    struct program_segment segment;
+    struct ph_segment ph;
+    program_segment_get(p, i, &segment);
+    ph_segment_expand(&ph, &segment);
+    out->from_q40_mm = i == 0 ? INT64_MIN : segment.start_q40_mm;
+    out->to_q40_mm =
+        i + 1u == p->header.segment_count ? INT64_MAX : program_segment_start(p, i + 1u);
+    kernel->segment_set(&out->path, &ph);
+}
+
+int coefficients_make(const struct program *p, const struct kernel *kernel, coefficients_sink *sink,
+                      void *context)
+{
+    union {
+        struct coefficients_piece piece;
+        struct coefficients_segment segment;
+        uint8_t bytes[sizeof(struct coefficients_segment)];
+    } record;
+    uint64_t start_q32_s = 0;
+    int error = 0;
+    memset(&record, 0, sizeof record);
+    for (uint32_t i = 0; error == 0 && i < p->header.piece_count; i++) {
+        coefficients_piece_make(&record.piece, p, kernel, i, start_q32_s);
+        look_ahead(record.piece.ahead, p, i);
+        start_q32_s = record.piece.end_q32_s;
+        error = sink(context, record.bytes, coefficients_piece_size(kernel));
+    }
+    memset(&record, 0, sizeof record);
+    for (uint32_t i = 0; error == 0 && i < p->header.segment_count; i++) {
+        coefficients_segment_make(&record.segment, p, kernel, i);
+        error = sink(context, record.bytes, coefficients_segment_size(kernel));
+    }
+    return error;
+}
+
+void coefficients_attach(struct program *p, const struct kernel *kernel, const uint8_t *records)
+{
+    p->coefficients = records;
+    p->coefficients_for = kernel;
+}

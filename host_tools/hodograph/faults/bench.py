@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""The machine under test as processes: controller on one bus, drives on another, the injector between them."""
+
+from __future__ import annotations
+
+import json
+import signal
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..bus.address import BusAddress
+from ..bus.processes import (
+    Process,
+    controller_command,
+    drive_command,
+    find_program,
+    virtual_clock,
+)
+from ..config import Machine
+
+INJECTOR = "hodograph-injector"
+
+
+class FaultBench:
+    """Processes of one case; a context manager that ends them."""
+
+    def __init__(
+        self, machine: Machine, bus: BusAddress, drives_bus: BusAddress, rules: str, *, apart: bool
+    ) -> None:
+        """`apart`: each drive is a process of its own."""
+        self.machine, self.bus, self.drives_bus = machine, bus, drives_bus
+        self._apart = apart
+        self._folder = tempfile.TemporaryDirectory(prefix="hodograph-faults-")
+        self._rules = Path(self._folder.name) / "rules"
+        self._rules.write_text(rules)
+        self.drives: list[Process] = []
+        self._others: list[Process] = []
+        self._gone: list[Process] = []
+
+    def __enter__(self) -> FaultBench:
+        self.clock = virtual_clock(self.bus)
+        try:
+            self.injector = self._start(
+                "injector",
+                [
+                    str(find_program(INJECTOR)),
+                    *("--bus", self.bus.channel, "--bus", self.drives_bus.channel),
+                    *("--rules", str(self._rules), "--verbose"),
+                ],
+            )
+            self.start_drives(faulty=True)
+            self.start_controller()
+        except BaseException:
+            self.end()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def _start(self, name: str, command: list[str]) -> Process:
+        process = Process(name, command, self.clock)
+        self._others.append(process)
+        return process
+
+    def start_controller(self) -> None:
+        """A fresh controller."""
+        pace = "fast" if self.clock is None else "real-time"
+        command = controller_command(self.machine, self.bus, pace)
+        self.controller = self._start(f"controller-{self.machine.node}", command)
+
+    def start_drives(self, *, faulty: bool) -> None:
+        """Fresh drives, with the rules or without."""
+        more = ["--faults", str(self._rules)] if faulty else []
+        axes = self.machine.axes
+        groups = [(axis,) for axis in axes] if self._apart else [axes]
+        self._gone += self.drives
+        self.drives = [
+            Process(
+                f"drive-{group[0].node}",
+                drive_command(replace(self.machine, axes=group), self.drives_bus) + more,
+                self.clock,
+            )
+            for group in groups
+        ]
+
+    def injections(self) -> list[dict[str, Any]]:
+        """What injector and drives say they did (sim/faults/fault_log.h), in time."""
+        lines = []
+        for process in (self.injector, *self._gone, *self.drives):
+            lines += [line for line in process.text().splitlines() if line.startswith("{")]
+        return sorted((json.loads(line) for line in lines), key=lambda event: int(event["t_ns"]))
+
+    def complaints(self) -> list[str]:
+        """What a process said that ended by itself."""
+        return [
+            f"a process ended by itself (status {process.child.returncode}): {process.text()[-300:]}"
+            for process in (*self._others, *self.drives)
+            if process.ended() and process.child.returncode not in (0, -signal.SIGKILL)
+        ]
+
+    def end(self) -> None:
+        """Ends everything, the controller first."""
+        for process in (*reversed(self._others), *self.drives, *self._gone):
+            process.end()
+        if self.clock is not None:
+            self.clock.release()
+        self._folder.cleanup()

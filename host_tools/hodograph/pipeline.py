@@ -1,0 +1,372 @@
+# SPDX-License-Identifier: MIT
+"""From a path file to a program: the steps that all commands share, each computed once and when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+
+from .config import Drive, Machine, PathFile, is_there, load_machine, load_path_file
+from .errors import InputError, PlanError
+from .feed import AxisLimits, ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
+from .feed.ineffective_limits import ineffective_limits
+from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
+from .native.program import NativeFault, NativeLimits, NativeProgram
+from .program import (
+    Compilation,
+    Program,
+    ProgramLimits,
+    ProgramOptions,
+    StopTerms,
+    compile_path,
+    encode,
+    fit_plan,
+)
+from .program.codes import ProgramError
+from .spline import SplineResult, from_control_polygon, through_points
+
+
+def controller_limits(machine: Machine) -> ControllerLimits:
+    """The limits that a plan for this machine has to keep."""
+    return ControllerLimits(
+        feed_mm_s=machine.feed_mm_s,
+        acceleration_mm_s2=machine.acceleration_mm_s2,
+        jerk_mm_s3=machine.jerk_mm_s3,
+        reserve=machine.reserve,
+    )
+
+
+def axis_limits(machine: Machine) -> AxisLimits:
+    """The limits of the machine's axes x and y. Raises InputError: it has one axis only."""
+    x, y = machine.plane
+    return AxisLimits(
+        velocity_mm_s=(x.velocity_mm_s, y.velocity_mm_s),
+        acceleration_mm_s2=(x.acceleration_mm_s2, y.acceleration_mm_s2),
+        jerk_mm_s3=(x.jerk_mm_s3, y.jerk_mm_s3),
+    )
+
+
+def plants(machine: Machine | None, limits: Limits) -> tuple[Plant, Plant] | None:
+    """The plants of x and y with the volts that their drives have, or `limits` gives them; None where neither is known.
+
+    Raises InputError: volts are limited, and an axis has no drive file, or its friction takes them all.
+    """
+    known = machine is not None and all(axis.drive is not None for axis in machine.plane)
+    if limits.volts is None and not known:
+        return None
+    if machine is None:
+        raise InputError(
+            '[limits] volts needs a machine: add [machine] file = "..." or use --machine FILE'
+        )
+    x, y = (_plant(drive, limits.volts) for drive in machine.models(machine.plane))
+    return x, y
+
+
+def drive_plants(machine: Machine) -> tuple[Plant, Plant] | None:
+    """The plants of x and y with all the volts of their drives, None when one of them has no drive file, or no volts
+    left beside its friction.
+    """
+    known = [axis.drive for axis in machine.plane if axis.drive is not None]
+    if len(known) < len(machine.plane) or any(
+        drive.volts_limit <= (drive.equipment.friction_volts or 0.0) for drive in known
+    ):
+        return None
+    x, y = (_plant(drive, drive.volts_limit) for drive in known)
+    return x, y
+
+
+def stop_terms(machine: Machine, limits: Limits) -> StopTerms:
+    """What the stops of a program on a machine keep beside the limits of its plan, which are in `limits`."""
+    return StopTerms(
+        plants=plants(machine, limits),
+        drives=drive_plants(machine),
+        axis=axis_limits(machine),
+        stop_time_ms=machine.stop_time_ms,
+    )
+
+
+def _plant(drive: Drive, volts: float | None) -> Plant:
+    plant = Plant(
+        drive.gain_rad_s_v * drive.screw_mm_rad,
+        drive.time_constant_s,
+        drive.volts_limit if volts is None else min(volts, drive.volts_limit),
+        drive.equipment.friction_volts or 0.0,
+        drive.volts_limit,
+    )
+    if not plant.reach_mm_s > 0.0:
+        raise InputError(
+            f"{'drive file' if volts is None else f'[limits] volts {volts:g}'}: friction alone takes "
+            f"{plant.friction_volts:g} V of a drive, which has {drive.volts_limit:g}: "
+            "give more than that friction, or another drive"
+        )
+    return plant
+
+
+def program_limits(machine: Machine) -> ProgramLimits:
+    """What the controller of this machine checks a program against. Raises InputError: it has one axis only."""
+    low, high = (
+        tuple(round(mm * 2**40) for mm in ends)
+        for ends in (
+            [axis.travel_min_mm for axis in machine.plane],
+            [axis.travel_max_mm for axis in machine.plane],
+        )
+    )
+    return ProgramLimits(
+        period_us=machine.period_us,
+        feed_um_s=round(machine.feed_mm_s * 1000),
+        acceleration_um_s2=round(machine.acceleration_mm_s2 * 1000),
+        jerk_mm_s3=round(machine.jerk_mm_s3),
+        min_q40_mm=(low[0], low[1]),
+        max_q40_mm=(high[0], high[1]),
+        stop_time_ms=machine.stop_time_ms,
+        axis_velocity_um_s=_of_plane(machine, "velocity_mm_s", 1000),
+        axis_acceleration_um_s2=_of_plane(machine, "acceleration_mm_s2", 1000),
+        axis_jerk_mm_s3=_of_plane(machine, "jerk_mm_s3", 1),
+    )
+
+
+def _of_plane(machine: Machine, name: str, units: int) -> tuple[int, int]:
+    x, y = (round(getattr(axis, name) * units) for axis in machine.plane)
+    return x, y
+
+
+def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault | None:
+    """What the controller of this machine finds in a program; None: it accepts it."""
+    return program.check(NativeLimits(**asdict(program_limits(machine))))
+
+
+def proved_limits(machine: Machine) -> str:
+    """The limits that the controller of this machine has proved of each program that it accepts."""
+    x, y = machine.plane
+    return ", ".join(
+        f"{axis.name} {axis.velocity_mm_s:g} mm/s {axis.acceleration_mm_s2:g} mm/s^2 {axis.jerk_mm_s3:g} mm/s^3"
+        for axis in (x, y)
+    )
+
+
+_MORE_ROOM = (0.002, 0.01)
+"""Further shares of the machine's axis limits that are left free where the controller could not prove a plan."""
+_PROVED = (
+    ProgramError.AXIS_VELOCITY,
+    ProgramError.AXIS_ACCELERATION,
+    ProgramError.AXIS_JERK,
+    ProgramError.AXIS_STEP,
+)
+"""What more room may mend."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """A program, and what the controller finds in it."""
+
+    compilation: Compilation
+    native: NativeProgram
+    fault: NativeFault | None
+
+
+def _judge(compilation: Compilation, machine: Machine) -> _Judged:
+    native = NativeProgram(encode(compilation.program))
+    return _Judged(compilation, native, controller_verdict(native, machine))
+
+
+@dataclass(frozen=True, eq=False)
+class Pipeline:
+    """A path file and everything computed from it. Errors come when a step is first asked for."""
+
+    file: PathFile
+    given_machine: Path | Machine | None = None
+    """A machine, or its file, that replaces the one the path file names."""
+
+    @cached_property
+    def machine_or_none(self) -> Machine | None:
+        """The machine, None when none is named."""
+        if isinstance(self.given_machine, Machine):
+            return self.given_machine
+        if self.given_machine is not None:
+            return load_machine(self.given_machine)
+        name = self.file.machine_file
+        if name is None:
+            return None
+        if not is_there(name):
+            raise InputError(
+                f"{self.file.file}: [machine] file names {name}, which is not there: "
+                "correct it or use --machine FILE"
+            )
+        return load_machine(name)
+
+    @property
+    def machine(self) -> Machine:
+        """The machine; raises InputError when none is named."""
+        if self.machine_or_none is None:
+            raise InputError(
+                f'{self.file.file}: names no machine: add [machine] file = "..." or use --machine FILE'
+            )
+        return self.machine_or_none
+
+    @cached_property
+    def spline_result(self) -> SplineResult:
+        """The spline and how it was found."""
+        path = self.file.path
+        with _told_by(f"{self.file.file}: [path]"):
+            if not path.through:
+                return from_control_polygon(path.points, path.closed)
+            return through_points(
+                path.points,
+                path.closed,
+                ends=path.ends,
+                start_tangent=path.start_tangent,
+                end_tangent=path.end_tangent,
+            )
+
+    @property
+    def feed(self) -> FeedRequest:
+        """The feed asked for; raises InputError when the file has no section [feed]."""
+        if self.file.feed is None:
+            raise InputError(
+                f"{self.file.file}: the section [feed] is missing: add it with nominal_mm_s and ramp_time_s"
+            )
+        return self.file.feed
+
+    @property
+    def plan(self) -> Plan:
+        """The feed over the spline, before the program is made of it (`compilation.plan`)."""
+        return self._timed_plan[0]
+
+    @property
+    def planning_s(self) -> float:
+        """Wall time that planning took."""
+        return self._timed_plan[1]
+
+    @cached_property
+    def limits(self) -> Limits:
+        """What a plan keeps: the limits of the path file, and those of the machine's axes."""
+        machine = self.machine_or_none
+        if machine is None:
+            return self.file.limits
+        return replace(self.file.limits, machine=axis_limits(machine))
+
+    @cached_property
+    def peaks(self) -> dict[str, Peak]:
+        """Where every limited quantity of the plan comes nearest to its limit."""
+        plan, machine, limits = self.plan, self.machine_or_none, self.limits
+        controller = controller_limits(machine) if machine is not None else None
+        bounds = gather(self.feed, limits, controller, plants(machine, limits), plan.period_us)
+        spline = self.spline_result.spline
+        return find_peaks(spline, bounds, track_of(plan.raw, spline.length_mm))
+
+    @cached_property
+    def _timed_plan(self) -> tuple[Plan, float]:
+        begin = perf_counter()
+        plan = self._planned(self.limits)
+        return plan, perf_counter() - begin
+
+    def _planned(self, limits: Limits) -> Plan:
+        feed, machine = self.feed, self.machine_or_none
+        spline = self.spline_result.spline
+        controller = controller_limits(machine) if machine is not None else None
+        period_us = machine.period_us if machine is not None else 1000
+        with _told_by(f"{self.file.file}:"):
+            plan: Plan
+            make = plan_optimal if feed.optimal else plan_path
+            plan = make(
+                spline,
+                feed,
+                limits,
+                controller,
+                plants(machine, limits),
+                period_us=period_us,
+            )
+            return fit_plan(spline, plan)
+
+    @property
+    def compilation(self) -> Compilation:
+        """The program for the machine."""
+        return self._judged.compilation
+
+    @cached_property
+    def _judged(self) -> _Judged:
+        """The first program that the controller accepts; where it accepts none, the last one tried.
+
+        The controller's bounds of what lies between its samples may be too wide for a plan that uses a limit fully.
+        Such a plan is made again with more room.
+        """
+        machine, limits = self.machine, self.limits
+        judged = _judge(self._compiled(self.plan), machine)
+        for room in _MORE_ROOM:
+            if judged.fault is None or judged.fault.code not in _PROVED:
+                break
+            roomier = replace(limits, machine=limits.machine.scaled(1.0 - room))
+            judged = _judge(self._compiled(self._planned(roomier)), machine)
+        return judged
+
+    def _compiled(self, plan: Plan) -> Compilation:
+        machine = self.machine
+        limits = program_limits(machine)
+        spline = self.spline_result.spline
+        with _told_by(f"{self.file.file}:"):
+            return compile_path(
+                spline,
+                plan,
+                ProgramOptions(
+                    self.file.name,
+                    machine.offset_mm,
+                    limits,
+                    machine.period_us,
+                    self.stop_terms,
+                ),
+            )
+
+    @property
+    def stop_terms(self) -> StopTerms:
+        """What the stops of the program keep beside the limits of its plan."""
+        return stop_terms(self.machine, self.file.limits)
+
+    @property
+    def program(self) -> Program:
+        """The program for the machine."""
+        return self.compilation.program
+
+    @property
+    def image(self) -> bytes:
+        """The program's bytes. Raises PlanError: the controller could not prove that it keeps the machine's limits."""
+        return self.accepted.image
+
+    @property
+    def accepted(self) -> NativeProgram:
+        """The program as the controller accepts it; raises PlanError as `image` does."""
+        fault = self._judged.fault
+        if fault is not None:
+            at_mm = self.program.pieces.start_q40[fault.index] * 2.0**-40
+            raise PlanError(
+                f"{self.file.file}: the controller would refuse the program: {fault.text} (code {fault.code}) in the "
+                f"feed piece at {at_mm:.6g} mm: lower [limits] there, and please report this path"
+            )
+        return self._judged.native
+
+    def notes(self, plan: Plan) -> tuple[str, ...]:
+        """What the user should know about the spline and about a plan for it, one line each."""
+        excesses = tuple(f"feed: {excess}" for excess in plan.excesses)
+        limits = self.file.limits
+        length_mm = self.spline_result.spline.length_mm
+        idle = ineffective_limits(
+            limits, self.feed, length_mm, plants(self.machine_or_none, limits)
+        )
+        return (*self.spline_result.notes, *plan.notes, *excesses, *idle)
+
+
+@contextmanager
+def _told_by(place: str) -> Iterator[None]:
+    """Errors of the mathematics say first which file, or part of it, they are about."""
+    try:
+        yield
+    except (InputError, PlanError) as error:
+        raise type(error)(f"{place} {error}") from error
+
+
+def load_pipeline(file: Path, machine: Path | None = None) -> Pipeline:
+    """The chain that begins with a path file; raises InputError."""
+    return Pipeline(load_path_file(file), machine)

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
+#include "gateway/bus.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "port/linux/clock.h"
+
+enum { SEND_TRIES = 200 };
+
+static volatile sig_atomic_t signals;
+
+static void on_signal(int number)
+{
+    (void)number;
+    signals++;
+    clock_note_signal();
+}
+
+int bus_catch_signals(void)
+{
+    struct sigaction action;
+    memset(&action, 0, sizeof action); /* without SA_RESTART: who waits shall look */
+    action.sa_handler = on_signal;
+    (void)sigemptyset(&action.sa_mask);
+    (void)signal(SIGPIPE, SIG_IGN);
+    return sigaction(SIGTERM, &action, NULL) == 0 ? sigaction(SIGINT, &action, NULL) : -1;
+}
+
+void bus_heed_signals(void)
+{
+    sigset_t ends;
+    (void)sigemptyset(&ends);
+    (void)sigaddset(&ends, SIGINT);
+    (void)sigaddset(&ends, SIGTERM);
+    (void)sigprocmask(SIG_UNBLOCK, &ends, NULL);
+}
+
+unsigned bus_signals(void)
+{
+    return (unsigned)signals;
+}
+
+int bus_send(struct can_socket *socket, const struct can_msg *messages, size_t count)
+{
+    for (int tries = 0; count > 0 && tries < SEND_TRIES;) {
+        const int sent = can_socket_send_many(socket, messages, count);
+        if (sent > 0) {
+            messages += sent;
+            count -= (size_t)sent;
+        } else if (sent == -EAGAIN) {
+            struct pollfd writable = {.fd = socket->fd, .events = POLLOUT};
+            (void)poll(&writable, 1, 1);
+            tries++;
+        } else {
+            return sent;
+        }
+    }
+    return count == 0 ? 0 : -ENOBUFS;
+}
+
+int bus_complain(int status, const char *what, const char *why)
+{
+    (void)fprintf(stderr, "hodograph-bridge: %s: %s\n", what, why);
+    return status;
+}

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* gateway_options: the command line of hodograph-bridge. */
+#ifndef BRIDGE_BRIDGE_OPTIONS_H
+#define BRIDGE_BRIDGE_OPTIONS_H
+
+#include <stddef.h>
+
+struct gateway_options { /* all into argv */
+    const char *bus;
+    const char *out; /* both NULL where `slcan` is not */
+    const char *in;
+    const char *slcan;
+};
+
+enum gateway_options_result {
+    GATEWAY_OPTIONS_OK,
+    GATEWAY_OPTIONS_HELP, /* print gateway_options_help */
+    GATEWAY_OPTIONS_WRONG /* `reason` has one line that says what and what to do */
+};
+
+extern const char gateway_options_help[];
+
+enum gateway_options_result gateway_options_parse(struct gateway_options *options, int argc,
+                                                  char **argv, char *reason, size_t size);
+
+#endif

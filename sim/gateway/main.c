@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: MIT */
+/* hodograph-bridge: between a board that is emulated, or that has no CAN of Linux, and a CAN interface. */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <sched.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "gateway/bus.h"
+#include "gateway/fifo_side.h"
+#include "gateway/gateway_options.h"
+#include "gateway/slcan_side.h"
+#include "port/linux/clock.h"
+
+/* A batch thread is woken once for all answers of the drives, not by the first of them; nor by each character of a UART.
+ * Whoever has given us a real-time priority means that. */
+static void be_patient(void)
+{
+    if (sched_getscheduler(0) != SCHED_OTHER) {
+        return;
+    }
+    const struct sched_param none = {.sched_priority = 0};
+    (void)sched_setscheduler(0, SCHED_BATCH, &none);
+}
+
+static int run(const struct gateway_options *options)
+{
+    char reason[512];
+    struct can_socket socket;
+    if (bus_catch_signals() != 0) {
+        return bus_complain(BRIDGE_GONE, "cannot catch signals", strerror(errno));
+    }
+    (void)clock_join(options->bus,
+                     "bridge"); /* opening the socket says what is wrong with the bus */
+    bus_heed_signals();
+    if (can_socket_open(&socket, options->bus, reason, sizeof reason) != 0) {
+        return bus_complain(BRIDGE_BUS, options->bus, reason);
+    }
+    be_patient();
+    const int status = options->slcan != NULL ? slcan_side_run(&socket, options->slcan)
+                                              : fifo_side_run(&socket, options->out, options->in);
+    can_socket_close(&socket);
+    clock_leave();
+    return status;
+}
+
+int main(int argc, char **argv)
+{
+    char reason[512];
+    struct gateway_options options;
+    switch (gateway_options_parse(&options, argc, argv, reason, sizeof reason)) {
+    case GATEWAY_OPTIONS_OK:
+        return run(&options);
+    case GATEWAY_OPTIONS_HELP:
+        (void)fputs(gateway_options_help, stdout);
+        return 0;
+    default:
+        return bus_complain(BRIDGE_USAGE, "command line", reason);
+    }
+}

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT */
+#include "gateway/pacing.h"
+
+#define SLEEP_MAX_NS 100000000u /* how late a wish to end may be noticed */
+
+/* At lock step the board goes on by itself when all have answered. */
+static void begin_tick(struct pacing *turn, const struct exchange_header *request, uint64_t now_ns)
+{
+    struct schedule *schedule = &turn->schedule;
+    const uint64_t period_ns = 1000ull * request->period_us;
+    if (!turn->begun) {
+        schedule_begin(schedule, now_ns - period_ns, period_ns, false);
+        turn->begun = true;
+    }
+    if (!turn->started) {
+        (void)schedule_start(schedule, now_ns);
+    }
+    turn->started = false;
+    schedule->period_ns = period_ns;
+    schedule->lock_step = (request->flags & EXCHANGE_HURRY) != 0u;
+    if ((request->flags & EXCHANGE_AWAIT) != 0u) {
+        schedule_await(schedule, 1000ull * request->guard_us, schedule->lock_step);
+    }
+    schedule_finish(schedule, now_ns);
+}
+
+void pacing_request(struct pacing *turn, const struct exchange_header *request, uint64_t now_ns)
+{
+    if ((request->flags & EXCHANGE_TICK) != 0u) {
+        begin_tick(turn, request, now_ns);
+    } else if ((request->flags & EXCHANGE_READY) != 0u) {
+        schedule_ready(&turn->schedule, now_ns);
+    }
+    turn->at_once = (request->flags & (EXCHANGE_FILTER | EXCHANGE_END)) != 0u;
+    turn->awaiting = (request->flags & EXCHANGE_AWAIT) != 0u;
+}
+
+uint64_t pacing_wait_ns(const struct pacing *turn, uint64_t now_ns)
+{
+    const struct schedule *schedule = &turn->schedule;
+    if (turn->at_once || schedule->due_ns <= now_ns) {
+        return 0;
+    }
+    const uint64_t longest_ns = turn->awaiting ? SCHEDULE_SLICE_NS : SLEEP_MAX_NS;
+    const uint64_t wait_ns = schedule->due_ns - now_ns;
+    return wait_ns < longest_ns ? wait_ns : longest_ns;
+}
+
+bool pacing_over(struct pacing *turn, uint32_t frames, uint64_t now_ns,
+                 struct exchange_header *reply)
+{
+    reply->flags = 0;
+    reply->late_ns = 0;
+    if (turn->at_once) {
+        return true;
+    }
+    schedule_wait(&turn->schedule, now_ns);
+    if (turn->awaiting && frames > 0u) {
+        return true;
+    }
+    if (now_ns < turn->schedule.due_ns) {
+        return false;
+    }
+    turn->schedule.lock_step = false;
+    const uint64_t late_ns = schedule_start(&turn->schedule, now_ns);
+    turn->started = true;
+    reply->flags = EXCHANGE_DUE;
+    reply->late_ns = late_ns < UINT32_MAX ? (uint32_t)late_ns : UINT32_MAX;
+    return true;
+}

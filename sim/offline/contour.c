@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: MIT */
+#include "offline/contour.h"
+
+#include <math.h>
+
+#include "offline/contour_curve.h"
+
+/* A Newton step shorter than this ends the search; the distance is then wrong by about its square
+ * times the curvature. */
+static const double CONTOUR_STEP_MM = 1e-6;
+enum { CONTOUR_STEPS = 12, CONTOUR_SAMPLES = 64, CONTOUR_SECTIONS = 80 };
+static const double CONTOUR_WINDOW = 4.0;
+
+struct foot {
+    struct place place;
+    double moved_mm; /* along the curve from where the search began */
+    double distance_mm;
+    bool found;
+};
+
+/* Newton's iteration for the zero of offset . first. Where the distance is not convex (beyond the
+ * centre of curvature) the step is that of Gauss and Newton. */
+static struct foot contour_newton(const struct contour *c, struct place start,
+                                  const double point[2])
+{
+    struct foot foot = {start, 0.0, 0.0, false};
+    for (int k = 0; k < CONTOUR_STEPS; k++) {
+        struct view v;
+        contour_view(&c->segments[foot.place.segment], foot.place.xi, point, &v);
+        const double along = contour_dot(v.offset, v.first);
+        const double square = contour_dot(v.first, v.first);
+        const double full = square - contour_dot(v.offset, v.second);
+        const double step = along / (full > 0.25 * square ? full : square);
+        if (step * step * square < CONTOUR_STEP_MM * CONTOUR_STEP_MM) {
+            foot.distance_mm =
+                fabs(v.offset[0] * v.first[1] - v.offset[1] * v.first[0]) / sqrt(square);
+            foot.found = true;
+            return foot;
+        }
+        const double before = foot.place.xi;
+        foot.place.xi += step;
+        foot.moved_mm += step * sqrt(square);
+        if ((foot.place.xi > 1.0 || foot.place.xi < 0.0) && !contour_cross(c, &foot.place) &&
+            before == foot.place.xi) {
+            foot.distance_mm = sqrt(contour_dot(v.offset, v.offset));
+            foot.found = true;
+            return foot;
+        }
+    }
+    return foot;
+}
+
+static double contour_gap_at(const struct contour *c, double arc_length_mm, const double point[2])
+{
+    return contour_gap(c, contour_place(c, c->cursor, contour_wrap(c, arc_length_mm)), point);
+}
+
+/* Slow and sure: samples the window, then closes in on the best sample by golden sections. */
+static double contour_search(const struct contour *c, double arc_length_mm, double window_mm,
+                             const double point[2])
+{
+    const double golden = 0.61803398874989484820;
+    const double half =
+        c->closed && window_mm > 0.5 * c->length_mm ? 0.5 * c->length_mm : window_mm;
+    const double spacing = half / CONTOUR_SAMPLES;
+    double best = arc_length_mm;
+    double least = contour_gap_at(c, best, point);
+    for (int i = -CONTOUR_SAMPLES; i <= CONTOUR_SAMPLES; i++) {
+        const double gap = contour_gap_at(c, arc_length_mm + i * spacing, point);
+        if (gap < least) {
+            least = gap;
+            best = arc_length_mm + i * spacing;
+        }
+    }
+    double low = best - spacing;
+    double high = best + spacing;
+    for (int i = 0; i < CONTOUR_SECTIONS; i++) {
+        const double inner_low = high - golden * (high - low);
+        const double inner_high = low + golden * (high - low);
+        if (contour_gap_at(c, inner_low, point) < contour_gap_at(c, inner_high, point)) {
+            high = inner_high;
+        } else {
+            low = inner_low;
+        }
+    }
+    const double gap = contour_gap_at(c, 0.5 * (low + high), point);
+    return gap < least ? gap : least;
+}
+
+double contour_distance_mm(struct contour *c, double arc_length_mm, const double point[2])
+{
+    const double arc =
+        arc_length_mm > c->length_mm ? c->length_mm : (arc_length_mm >= 0.0 ? arc_length_mm : 0.0);
+    const struct place start = contour_place(c, c->cursor, arc);
+    c->cursor = start.segment;
+    const double gap = contour_gap(c, start, point);
+    const struct foot foot = contour_newton(c, start, point);
+    const double window = CONTOUR_WINDOW * gap + 0.001;
+    if (foot.found && foot.distance_mm <= gap + CONTOUR_STEP_MM && fabs(foot.moved_mm) <= window) {
+        return foot.distance_mm;
+    }
+    return contour_search(c, arc, window, point);
+}
+
+void contour_errors_um(struct contour *c, uint32_t n, const int64_t *arc_length_q40_mm,
+                       const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um)
+{
+    const double mm_per_count = 1.0 / (double)counts_per_mm;
+    for (uint32_t i = 0; i < n; i++) {
+        const double point[2] = {(double)act_counts[2 * i] * mm_per_count,
+                                 (double)act_counts[2 * i + 1] * mm_per_count};
+        errors_um[i] = 1000.0 * contour_distance_mm(c, contour_q40(arc_length_q40_mm[i]), point);
+    }
+}

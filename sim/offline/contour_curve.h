@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/* The curve behind contour.h: places on it, seen from a point. Private to sim/offline; pure functions. */
+#ifndef HODOGRAPH_RIG_CONTOUR_CURVE_H
+#define HODOGRAPH_RIG_CONTOUR_CURVE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "offline/contour.h"
+
+/* A place on the curve. */
+struct place {
+    uint32_t segment;
+    double xi;
+};
+
+/* The curve at a place, seen from a point: offset = point - curve, and the first two derivatives of
+ * the curve. */
+struct view {
+    double offset[2];
+    double first[2];
+    double second[2];
+};
+
+static inline double contour_q40(int64_t q40)
+{
+    return (double)q40 * (1.0 / 1099511627776.0);
+}
+
+static inline double contour_dot(const double a[2], const double b[2])
+{
+    return a[0] * b[0] + a[1] * b[1];
+}
+
+/* Brings an arc length into the program: modulo the length on a closed path, else clamped. */
+double contour_wrap(const struct contour *c, double arc_length_mm);
+
+/* About the place of an arc length within the program: good enough to start from; no result depends
+ * on it being exact. `hint` is the segment to look in first. */
+struct place contour_place(const struct contour *c, uint32_t hint, double arc_length_mm);
+
+/* The curve at xi of a segment, seen from a point. */
+void contour_view(const struct contour_segment *s, double xi, const double point[2],
+                  struct view *v);
+
+/* Distance of a point from a place. */
+double contour_gap(const struct contour *c, struct place place, const double point[2]);
+
+/* Takes a parameter that has left [0, 1] over into the neighbouring segment, beyond the start of a
+ * closed path too. False at the end of an open path: xi is clamped. */
+bool contour_cross(const struct contour *c, struct place *p);
+
+#endif

@@ -1,0 +1,331 @@
+/* SPDX-License-Identifier: MIT */
+#include "offline/offline.h"
+
+#include <stddef.h>
+
+#include "core/counts.h"
+
+typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 64 ? 1 : -1];
+
+static int offline_start_point(struct offline *rig, int32_t start[2])
+{
+    struct interp_point point;
+    if (interp_at(&rig->interp, 0, &point) < 0) {
+        return OFFLINE_ERR_INTERP;
+    }
+    start[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
+    start[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
+    return 0;
+}
+
+static int offline_drives(struct offline *rig, const struct program *program,
+                          const struct drive_config drives[2])
+{
+    for (int axis = 0; axis < 2; axis++) {
+        const int error = drive_init(&rig->drives[axis], &drives[axis]);
+        if (error != 0) {
+            return OFFLINE_ERR_DRIVE - 10 * axis + error;
+        }
+        if (drives[axis].period_us != program->header.period_us) {
+            return OFFLINE_ERR_PERIOD;
+        }
+    }
+    return drives[0].counts_per_mm == drives[1].counts_per_mm ? 0 : OFFLINE_ERR_COUNTS;
+}
+
+int offline_begin(struct offline *rig, const struct program *program, enum interp_kernel kernel,
+                  const struct drive_config drives[2], struct contour_segment *segments)
+{
+    const struct feedforward_gains without = {.period_us = drives[0].period_us};
+    int32_t start[2];
+    int error = offline_drives(rig, program, drives);
+    if (error != 0) {
+        return error;
+    }
+    rig->counts_per_mm = drives[0].counts_per_mm;
+    rig->tick = 0;
+    rig->influenced = false;
+    rig->faults = NULL;
+    rig->fault_count = 0;
+    rig->fault_tick = -1;
+    rig->program_ticks = program_ticks(program);
+    if (interp_begin(&rig->interp, program, kernel) != 0) {
+        return OFFLINE_ERR_KERNEL;
+    }
+    error = offline_start_point(rig, start);
+    if (error != 0) {
+        return error;
+    }
+    for (int axis = 0; axis < 2; axis++) {
+        drive_place(&rig->drives[axis], start[axis]);
+        rig->latched_counts[axis] = start[axis];
+        rig->configs[axis] = drives[axis];
+        rig->gains[axis] = without;
+        rig->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
+        influence_none(&rig->influences[axis], &drives[axis]);
+    }
+    feed_override_begin(&rig->feed, program, program->header.period_us, 0);
+    rig->orders = NULL;
+    rig->order_count = 0;
+    rig->next_order = 0;
+    rig->last_q40_mm = 0;
+    rig->stop = (struct offline_stop){UINT32_MAX, UINT32_MAX, 0, 0, 0};
+    contour_begin(&rig->contour, program, segments);
+    return 0;
+}
+
+void offline_feedforward(struct offline *rig, const struct feedforward_gains gains[2])
+{
+    for (int axis = 0; axis < 2; axis++) {
+        rig->gains[axis] = gains[axis];
+        rig->gains[axis].period_us = rig->configs[axis].period_us;
+        rig->gains[axis].counts_per_mm = rig->counts_per_mm;
+    }
+    rig->influenced = true;
+}
+
+void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts)
+{
+    rig->rated_torque_nm[axis] = rated_torque_nm;
+    rig->influences[axis].friction_volts = friction_volts;
+    rig->influenced = rig->influenced || friction_volts > 0.0;
+}
+
+int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        if (!offline_fault_ok(&faults[i])) {
+            return OFFLINE_ERR_FAULT;
+        }
+    }
+    rig->faults = faults;
+    rig->fault_count = count;
+    rig->influenced = rig->influenced || count > 0;
+    return 0;
+}
+
+int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const bool late = i > 0 && orders[i].tick < orders[i - 1].tick;
+        if ((int)orders[i].kind < 0 || orders[i].kind >= OFFLINE_ORDER_KINDS || late) {
+            return OFFLINE_ERR_FAULT;
+        }
+    }
+    rig->orders = orders;
+    rig->order_count = count;
+    return 0;
+}
+
+void offline_stop_get(const struct offline *rig, struct offline_stop *stop)
+{
+    *stop = rig->stop;
+}
+
+static bool offline_at_rest(const struct offline *rig)
+{
+    const enum feed_state state = feed_override_state(&rig->feed);
+    return state == FEED_HELD || state == FEED_STOPPED || state == FEED_ENDED;
+}
+
+static void offline_order_stop(struct offline *rig, enum program_stop_kind kind)
+{
+    rig->stop.tick = rig->tick;
+    rig->stop.rest_tick = UINT32_MAX;
+    rig->stop.bound_us = feed_override_bound_us(&rig->feed, kind);
+    rig->stop.from_q40_mm = rig->last_q40_mm;
+}
+
+static void offline_order(struct offline *rig, const struct offline_order *order)
+{
+    switch (order->kind) {
+    case OFFLINE_ORDER_HOLD:
+        offline_order_stop(rig, PROGRAM_STOP_HOLD);
+        feed_override_hold(&rig->feed);
+        break;
+    case OFFLINE_ORDER_STOP:
+        offline_order_stop(rig, PROGRAM_STOP_HOLD);
+        feed_override_stop(&rig->feed);
+        break;
+    case OFFLINE_ORDER_FAULT_STOP:
+        offline_order_stop(rig, PROGRAM_STOP_FAULT);
+        feed_override_fault_stop(&rig->feed);
+        break;
+    case OFFLINE_ORDER_RESUME:
+        feed_override_resume(&rig->feed);
+        break;
+    default:
+        feed_override_set(&rig->feed, order->percent);
+        break;
+    }
+}
+
+static int offline_point_next(struct offline *rig, struct interp_point *point)
+{
+    while (rig->next_order < rig->order_count && rig->orders[rig->next_order].tick <= rig->tick) {
+        offline_order(rig, &rig->orders[rig->next_order++]);
+    }
+    if (feed_override_next(&rig->feed, &rig->interp, point) != 0) {
+        return OFFLINE_ERR_INTERP;
+    }
+    rig->last_q40_mm = point->arc_length_q40_mm;
+    if (rig->stop.tick != UINT32_MAX && rig->stop.rest_tick == UINT32_MAX && offline_at_rest(rig)) {
+        rig->stop.rest_tick = rig->tick;
+        rig->stop.rest_q40_mm = point->arc_length_q40_mm;
+    }
+    return 0;
+}
+
+static int offline_command(struct offline *rig, struct offline_row *row)
+{
+    struct interp_point point;
+    if (offline_point_next(rig, &point) != 0) {
+        return OFFLINE_ERR_INTERP;
+    }
+    row->arc_length_q40_mm = point.arc_length_q40_mm;
+    row->feed_q32_mm_s = feed_override_feed_q32(&rig->feed);
+    row->cmd_q40_mm[0] = point.x_q40_mm;
+    row->cmd_q40_mm[1] = point.y_q40_mm;
+    row->set_counts[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
+    row->set_counts[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
+    row->tick = rig->tick++;
+    return 0;
+}
+
+/* As the controller sends it: from the program's first setpoint to its last, the first at rest. */
+static struct feedforward_offset offline_offset(struct offline *rig, const struct offline_row *row,
+                                                int axis)
+{
+    const struct feedforward_offset none = {0, 0};
+    if (row->tick == 0) {
+        feedforward_begin(&rig->feedforwards[axis], row->cmd_q40_mm[axis]);
+    }
+    return row->tick < rig->program_ticks
+               ? feedforward_next(&rig->feedforwards[axis], &rig->gains[axis],
+                                  row->cmd_q40_mm[axis])
+               : none;
+}
+
+static bool offline_arrives(const struct offline *rig, uint32_t axis)
+{
+    for (uint32_t i = 0; i < rig->fault_count; i++) {
+        if (rig->faults[i].axis == axis && offline_fault_loses(&rig->faults[i], rig->fault_tick)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Begins and ends faults, and latches what arrives. */
+static void offline_latch(struct offline *rig, const struct offline_row *row)
+{
+    const bool moves = row->set_counts[0] != rig->latched_counts[0] ||
+                       row->set_counts[1] != rig->latched_counts[1];
+    if (rig->fault_tick >= 0 || moves) {
+        rig->fault_tick++;
+    }
+    for (uint32_t i = 0; i < rig->fault_count; i++) {
+        const uint32_t axis = rig->faults[i].axis;
+        offline_fault_tick(&rig->faults[i], rig->fault_tick, &rig->influences[axis],
+                           &rig->drives[axis]);
+    }
+    for (uint32_t axis = 0; axis < 2; axis++) {
+        if (offline_arrives(rig, axis)) {
+            rig->latched_counts[axis] = row->set_counts[axis];
+        }
+    }
+}
+
+static void offline_move_forward(struct offline *rig, const struct offline_row *row)
+{
+    offline_latch(rig, row);
+    for (int axis = 0; axis < 2; axis++) {
+        struct influence *influence = &rig->influences[axis];
+        const struct feedforward_offset offset = offline_offset(rig, row, axis);
+        influence_offsets(influence, &rig->drives[axis], &rig->configs[axis],
+                          offset.velocity_counts_s, offset.torque_permille,
+                          rig->rated_torque_nm[axis]);
+        if (influence_acts(influence, &rig->drives[axis])) {
+            influence_period(influence, &rig->drives[axis], rig->latched_counts[axis]);
+        } else {
+            drive_period(&rig->drives[axis], rig->latched_counts[axis]);
+        }
+    }
+}
+
+static void offline_move(struct offline *rig, struct offline_row *row)
+{
+    if (rig->influenced) {
+        offline_move_forward(rig, row);
+    } else {
+        drive_period_pair(&rig->drives[0], &rig->drives[1], row->set_counts);
+    }
+    for (int axis = 0; axis < 2; axis++) {
+        row->act_counts[axis] = drive_position_counts(&rig->drives[axis]);
+        row->volts_mv[axis] = drive_volts_mv(&rig->drives[axis]);
+    }
+}
+
+int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        const int error = offline_command(rig, &rows[i]);
+        if (error != 0) {
+            return error;
+        }
+        offline_move(rig, &rows[i]);
+        contour_errors_um(&rig->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
+                          rig->counts_per_mm, &rows[i].contour_error_um);
+    }
+    return 0;
+}
+
+static int offline_point(struct interp *interp, uint64_t time_q42_s, struct interp_point *point)
+{
+    int result = interp_at_q42(interp, time_q42_s, point);
+    if (result == INTERP_ERR_JUMP && interp_seek(interp, time_q42_s >> 10) == 0) {
+        result = interp_at_q42(interp, time_q42_s, point);
+    }
+    return result < 0 ? OFFLINE_ERR_INTERP : 0;
+}
+
+int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
+                   uint32_t counts_per_mm, struct interp_point *points, int32_t *counts)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        if (offline_point(interp, time_q42_s[i], &points[i]) != 0) {
+            return OFFLINE_ERR_INTERP;
+        }
+        if (counts == NULL) {
+            continue;
+        }
+        counts[2 * i] = counts_from_q40_mm(points[i].x_q40_mm, counts_per_mm);
+        counts[2 * i + 1] = counts_from_q40_mm(points[i].y_q40_mm, counts_per_mm);
+    }
+    return 0;
+}
+
+/* round(tick * period * 2^42 / 10^6) = round(tick * period * 2^36 / 15625), in two parts against
+ * overflow. */
+static uint64_t offline_time(uint64_t microseconds)
+{
+    const uint64_t whole_s = microseconds / 1000000;
+    const uint64_t rest_us = microseconds % 1000000;
+    return (whole_s << 42) + ((rest_us << 37) + 15625) / 31250;
+}
+
+void offline_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s)
+{
+    const uint64_t duration = program->header.duration_q32_s << 10;
+    for (uint32_t i = 0; i < n; i++) {
+        const uint64_t time = offline_time(((uint64_t)tick0 + i) * program->header.period_us);
+        time_q42_s[i] = time < duration ? time : duration;
+    }
+}
+
+void offline_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        counts[i] = counts_from_q40_mm(q40_mm[i], counts_per_mm);
+    }
+}

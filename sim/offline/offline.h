@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: MIT */
+/* The whole chain in one process, without a bus: interpolator, rounding to counts, two simulated
+ * drives, contour error. Gives the same setpoints and encoder positions as a run on the bus, bit
+ * for bit.
+ *
+ * Timing (docs/reference/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
+ * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC
+ * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
+ * repeat its end point (settling), those behind a stop its place of rest.
+ *
+ * Use: offline_begin, then rig_run as often as wanted. No heap: the caller lends the segment array, and
+ * the program, its image and the segments must outlive the rig. Main loop only.
+ */
+#ifndef HODOGRAPH_RIG_RIG_H
+#define HODOGRAPH_RIG_RIG_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "core/feed_override.h"
+#include "core/feedforward.h"
+#include "core/interp.h"
+#include "core/program.h"
+#include "offline/contour.h"
+#include "offline/offline_fault.h"
+#include "plant/drive.h"
+#include "plant/influence.h"
+
+/* One tick; 64 bytes without holes. Python maps it as a numpy record. */
+struct offline_row {
+    int64_t arc_length_q40_mm;
+    int64_t feed_q32_mm_s; /* along the path */
+    int64_t cmd_q40_mm[2]; /* unrounded, from the kernel */
+    double contour_error_um;
+    int32_t set_counts[2];
+    int32_t act_counts[2];
+    int16_t volts_mv[2];
+    uint32_t tick;
+};
+
+enum offline_order_kind {
+    OFFLINE_ORDER_HOLD,
+    OFFLINE_ORDER_RESUME,
+    OFFLINE_ORDER_OVERRIDE, /* percent */
+    OFFLINE_ORDER_STOP,
+    OFFLINE_ORDER_FAULT_STOP,
+    OFFLINE_ORDER_KINDS
+};
+
+/* A command that takes effect from setpoint `tick` on, which is the first that may differ for it. */
+struct offline_order {
+    enum offline_order_kind kind;
+    uint32_t tick;
+    uint32_t percent;
+};
+
+/* The last hold, stop or fault stop. */
+struct offline_stop {
+    uint32_t tick;       /* of the order, */
+    uint32_t rest_tick;  /* and the first setpoint at rest; UINT32_MAX: there was none yet */
+    uint32_t bound_us;   /* what the stop table says, where it was ordered */
+    int64_t from_q40_mm; /* arc length of the last setpoint before the order, */
+    int64_t rest_q40_mm; /* and at rest */
+};
+
+enum offline_error {
+    OFFLINE_ERR_KERNEL = -100, /* no such kernel */
+    OFFLINE_ERR_PERIOD = -101, /* a drive's period is not the program's */
+    OFFLINE_ERR_COUNTS = -102, /* the drives' counts per mm differ */
+    OFFLINE_ERR_FAULT = -103,  /* a fault or an order that cannot be carried out */
+    OFFLINE_ERR_DRIVE = -200,  /* minus 10 * axis, plus the enum drive_error of that axis */
+    OFFLINE_ERR_INTERP = -300, /* the interpolator failed: the program was not checked */
+};
+
+/* Fields are private. */
+struct offline {
+    struct interp interp;
+    struct feed_override feed;
+    const struct offline_order *orders; /* borrowed */
+    uint32_t order_count;
+    uint32_t next_order;
+    struct offline_stop stop;
+    int64_t last_q40_mm;
+    struct contour contour;
+    struct drive drives[2];
+    struct drive_config configs[2];
+    struct influence influences[2];
+    struct feedforward feedforwards[2];
+    struct feedforward_gains gains[2];
+    double rated_torque_nm[2];
+    bool influenced;                    /* by feedforward, friction or faults */
+    const struct offline_fault *faults; /* borrowed */
+    uint32_t fault_count;
+    int64_t fault_tick;        /* of the faults; negative before the first motion */
+    int32_t latched_counts[2]; /* the last setpoint that arrived */
+    uint32_t program_ticks;
+    uint32_t counts_per_mm;
+    uint32_t tick;
+};
+
+/* Sets up for a program that passed program_check; segments has room for its segment_count. Returns
+ * 0 or an error. */
+int offline_begin(struct offline *rig, const struct program *program, enum interp_kernel kernel,
+                  const struct drive_config drives[2], struct contour_segment *segments);
+
+/* The controller's feedforward of both axes (0x2018 ... 0x201A), right after offline_begin; period and
+ * counts per mm in the gains are the rig's. */
+void offline_feedforward(struct offline *rig, const struct feedforward_gains gains[2]);
+
+/* Rated torque of an axis (0, 1; more than 0; drive_config_rated_torque_nm if this is not called), and
+ * Coulomb friction as volts (0 or more; none); right after offline_begin. */
+void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts);
+
+/* Faults of this run, right after offline_begin; they must outlive the rig. Positions and contour error stay
+ * those of the axis itself, whatever its encoder says. Of faults of one kind and axis one acts at a time.
+ * Returns 0 or OFFLINE_ERR_FAULT. */
+int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count);
+
+/* Commands of this run, by ascending tick, right after offline_begin; they must outlive the rig. Returns 0 or OFFLINE_ERR_FAULT. */
+int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count);
+
+/* What became of the last order to stop. */
+void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
+
+/* The next n ticks. Returns 0 or OFFLINE_ERR_INTERP. */
+int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
+
+/* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
+ * counts: x, y pairs, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */
+int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
+                   uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
+
+/* Program times of n ticks from tick0 on, as the controller's program clock gives them at override 1, in
+ * 2^-42 s. */
+void offline_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
+
+/* counts_from_q40_mm for n values. */
+void offline_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
+
+#endif

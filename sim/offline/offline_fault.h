@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/* Faults of a run without a bus: what a rule of docs/reference/protocol.md section 4 does to an axis, for the
+ * kinds that act on drive or setpoint alone. Nobody supervises here: an axis goes on under its fault
+ * where a controller would stop the machine.
+ *
+ * Ticks count as they do in the rules: tick 0 is the SYNC at which the first setpoint is latched
+ * that differs from the start point. Pure functions but for what they are given.
+ */
+#ifndef HODOGRAPH_RIG_RIG_FAULT_H
+#define HODOGRAPH_RIG_RIG_FAULT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "plant/drive.h"
+#include "plant/influence.h"
+
+#define OFFLINE_FAULT_FOR_EVER UINT32_MAX
+
+enum offline_fault_kind {
+    OFFLINE_FAULT_ENCODER_FREEZE, /* the position read stays */
+    OFFLINE_FAULT_ENCODER_JUMP,   /* value: bus counts, added to the position read */
+    OFFLINE_FAULT_SATURATE, /* value: voltage limit, V, more than 0; the drive's own if that is less */
+    OFFLINE_FAULT_LOAD,     /* value: load torque as the voltage it takes, V */
+    OFFLINE_FAULT_SETPOINT_LOST, /* setpoints do not arrive: the drive stays with the last one. Those of
+                                 a tick are sent in it and latched in the next */
+    OFFLINE_FAULT_KINDS
+};
+
+struct offline_fault {
+    enum offline_fault_kind kind;
+    uint32_t axis;  /* 0, 1 */
+    uint32_t at;    /* first tick */
+    uint32_t ticks; /* how many, 1 or more; OFFLINE_FAULT_FOR_EVER */
+    double value;
+};
+
+/* Tick number `tick` begins: the fault begins, ends, or nothing changes. Every tick from 0 on has to
+ * be told. */
+void offline_fault_tick(const struct offline_fault *fault, int64_t tick,
+                        struct influence *influence, const struct drive *drive);
+
+/* Whether the setpoint that would be latched in this tick is lost. */
+bool offline_fault_loses(const struct offline_fault *fault, int64_t tick);
+
+/* Whether a fault can be carried out: kind, axis, length and value are in range. */
+bool offline_fault_ok(const struct offline_fault *fault);
+
+#endif

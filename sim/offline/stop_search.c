@@ -1,0 +1,1001 @@
+/* SPDX-License-Identifier: MIT */
+#include "offline/stop_search.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/path_brake.h"
+
+#define EVEN_INSTANTS  129    /* of a piece, one as long after the other, */
+#define MOST_INSTANTS  1025   /* and with those at places of the path between them; */
+#define ROWS_EACH      4      /* of the path, for such an instant */
+#define INSTANT_S      0.004  /* between two of them at most, where these are enough, */
+#define CLOSE_S        0.0005 /* and in the last look at what was found */
+#define STEP_S         0.002  /* between two looks at a brake, */
+#define FINE_S         0.0005 /* and in the last look */
+#define BRAKE_EACH     5      /* ticks of a brake out of which another may begin, */
+#define BRAKE_INSTANTS 16u    /* and instants at which it has begun, about */
+#define GREATEST_CODE  255
+#define BESIDE         1e-6
+#define LEAST_MM_S     1e-4 /* slower is rest */
+#define NEVER_S        1e6
+#define LONGEST_SHARE  0.1
+#define TICKS_MORE     3.0 /* of a brake than of its continuous curve */
+#define FEWER 24 /* codes below the greatest: a brake with less than an eighth of a limit is none */
+#define LEAST_TICKS                                                                                \
+    6.0 /* of a brake that the jerks alone make: with more jerk the way of one tick would count */
+#define FAR_TICKS                                                                                  \
+    20.0 /* and twice the brake: so far from its end a program has room for a brake, */
+#define NO_BRAKE_S 10.0
+#define FASTER                                                                                     \
+    0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
+#define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
+#define WAIT_AS_GOOD 1.001 /* or such a one that could also take much longer */
+#define NEAR         1.05  /* so near to the least time without limits no other start is tried */
+
+/* What is looked at: one over the limits, less the margin; 0: none. */
+struct inverse {
+    double feed, acceleration, jerk;
+    double velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
+};
+
+/* A state on the path, at an instant of the program. */
+struct state {
+    double s, v, a;
+};
+
+/* One piece with the instants looked at. */
+struct piece {
+    struct state at[MOST_INSTANTS];
+    double at_s[MOST_INSTANTS];  /* since the start of the piece */
+    uint32_t row[MOST_INSTANTS]; /* of the path, before it */
+    uint32_t count;
+    double seconds;
+    int most[3];          /* greatest codes */
+    int before[3];        /* those of a brake out of which one may begin; 0: none */
+    double left_s;        /* of the program, behind the piece */
+    struct state fastest; /* of all rates: greatest speed and acceleration */
+    double factor;        /* greatest rate of program time; */
+    double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS],
+        second[PROGRAM_LEVELS]; /* bounds up to these rates */
+    uint32_t suspect;           /* the instant at which a limit was broken last */
+    struct piece *close;        /* the same piece with more instants */
+};
+
+struct search {
+    const struct stop_row *rows;
+    uint32_t row_count;
+    struct inverse inverse;     /* at the rate 1, */
+    struct inverse at_any_rate; /* and at others */
+    uint32_t rise_is_cut;
+    uint32_t period_us;
+    double period_s;
+    double length_mm;
+    double deceleration; /* greatest */
+    int most[3];         /* greatest codes */
+};
+
+/* --- Codes --- */
+
+/* The number of a code: jerk, deceleration, jerk for k = 0 ... 2; mm, s. */
+static double number_of(int k, int code)
+{
+    const double mantissa = floor(65536.0 * pow(2.0, (code & 7) / 8.0));
+    return ldexp(mantissa, (code >> 3) - (k == 1 ? 24 : 18));
+}
+
+/* --- The path --- */
+
+static double over(double limit)
+{
+    return 1.0 / (limit * (1.0 - STOP_MARGIN)); /* of HUGE_VAL 0 */
+}
+
+static void segment_row(const double w[3][2], double xi, struct stop_row *row)
+{
+    double value[2];
+    double first[2];
+    double second[2];
+    for (int k = 0; k < 2; k++) {
+        double up = w[1][k] - w[0][k];
+        double bend = w[2][k] - 2.0 * w[1][k] + w[0][k];
+        value[k] = w[0][k] + xi * (2.0 * up + xi * bend);
+        first[k] = 2.0 * (up + xi * bend);
+        second[k] = 2.0 * bend;
+    }
+    double sigma = value[0] * value[0] + value[1] * value[1];
+    double along = value[0] * first[0] + value[1] * first[1];
+    double turn = value[0] * first[1] - value[1] * first[0];
+    double turn2 = value[0] * second[1] - value[1] * second[0];
+    row->tangent[0] = (value[0] * value[0] - value[1] * value[1]) / sigma;
+    row->tangent[1] = 2.0 * value[0] * value[1] / sigma;
+    row->curvature = 2.0 * turn / (sigma * sigma);
+    row->slope = (2.0 * turn2 - 8.0 * turn * along / sigma) / (sigma * sigma * sigma);
+}
+
+/* Arc length from the start of the segment: the integral of |w|^2. */
+static double way_to(const double w[3][2], double xi)
+{
+    double b[5] = {0};
+    for (int k = 0; k < 2; k++) {
+        b[0] += w[0][k] * w[0][k];
+        b[1] += w[0][k] * w[1][k];
+        b[2] += (2.0 * w[1][k] * w[1][k] + w[0][k] * w[2][k]) / 3.0;
+        b[3] += w[1][k] * w[2][k];
+        b[4] += w[2][k] * w[2][k];
+    }
+    /* in powers of xi */
+    double c1 = 4.0 * (b[1] - b[0]);
+    double c2 = 6.0 * (b[2] - 2.0 * b[1] + b[0]);
+    double c3 = 4.0 * (b[3] - 3.0 * b[2] + 3.0 * b[1] - b[0]);
+    double c4 = b[4] - 4.0 * b[3] + 6.0 * b[2] - 4.0 * b[1] + b[0];
+    return xi * (b[0] + xi * (c1 / 2.0 + xi * (c2 / 3.0 + xi * (c3 / 4.0 + xi * c4 / 5.0))));
+}
+
+static double feed_here(const struct stop_limits *limits, const struct stop_row *row)
+{
+    double feed = limits->feed;
+    for (uint32_t i = 0; i < limits->cap_count; i++) {
+        const struct stop_cap *cap = &limits->caps[i];
+        if (row->s_mm >= cap->from_mm && row->s_mm <= cap->to_mm && cap->feed_mm_s < feed) {
+            feed = cap->feed_mm_s;
+        }
+    }
+    double bend = fabs(row->curvature);
+    double most = bend > 0.0 ? sqrt(limits->centripetal / bend) : HUGE_VAL;
+    return most < feed ? most : feed;
+}
+
+void stop_rows(const struct program *p, const struct stop_limits *limits, struct stop_row *rows)
+{
+    for (uint32_t i = 0; i < p->header.segment_count; i++) {
+        struct program_segment segment;
+        double w[3][2];
+        program_segment_get(p, i, &segment);
+        for (int k = 0; k < 3; k++) {
+            w[k][0] = ldexp((double)segment.u_q44[k], -44);
+            w[k][1] = ldexp((double)segment.v_q44[k], -44);
+        }
+        for (uint32_t k = 0; k < STOP_ROWS; k++) {
+            struct stop_row *row = &rows[i * STOP_ROWS + k];
+            double xi = (double)k / (STOP_ROWS - 1u);
+            segment_row((const double (*)[2])w, xi, row);
+            row->s_mm =
+                ldexp((double)segment.start_q40_mm, -40) + way_to((const double (*)[2])w, xi);
+            row->feed_mm_s = feed_here(limits, row);
+        }
+    }
+}
+
+/* The last row at or before an arc length. */
+static uint32_t row_at(const struct search *search, double s)
+{
+    uint32_t low = 0;
+    uint32_t high = search->row_count - 1u;
+    while (high - low > 1u) {
+        uint32_t middle = low + (high - low) / 2u;
+        if (search->rows[middle].s_mm <= s) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+/* --- What a motion asks of the limits --- */
+
+static double greater(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static double between(double a, double b, double share)
+{
+    return a + (b - a) * share;
+}
+
+/* The motion of both axes: velocity, acceleration, jerk by axis. */
+struct axes {
+    double velocity[2], acceleration[2], jerk[2];
+};
+
+static void axes_of(const struct stop_row *low, double share, const struct state *at, double j,
+                    struct axes *out)
+{
+    const struct stop_row *high = low + 1;
+    double kappa = between(low->curvature, high->curvature, share);
+    double slope = between(low->slope, high->slope, share);
+    double normal = kappa * at->v * at->v;
+    double jerk_along = j - kappa * normal * at->v;
+    double jerk_across = (3.0 * kappa * at->a + slope * at->v * at->v) * at->v;
+    double tx = between(low->tangent[0], high->tangent[0], share);
+    double ty = between(low->tangent[1], high->tangent[1], share);
+    out->velocity[0] = at->v * tx;
+    out->velocity[1] = at->v * ty;
+    out->acceleration[0] = at->a * tx - normal * ty;
+    out->acceleration[1] = at->a * ty + normal * tx;
+    out->jerk[0] = jerk_along * tx - jerk_across * ty;
+    out->jerk[1] = jerk_along * ty + jerk_across * tx;
+}
+
+static double share_of(const struct stop_row *low, double s)
+{
+    double way = low[1].s_mm - low->s_mm;
+    double share = way > 0.0 ? (s - low->s_mm) / way : 1.0;
+    return share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
+}
+
+/* The greatest share of a limit that the motion uses. */
+static double strain(const struct inverse *inverse, const struct stop_row *low,
+                     const struct state *at, double j)
+{
+    struct axes axes;
+    double share = share_of(low, at->s);
+    axes_of(low, share, at, j, &axes);
+    double most = at->v * (1.0 - 1e-9) / between(low->feed_mm_s, low[1].feed_mm_s, share);
+    most = low->feed_mm_s < NEVER_S * NEVER_S && low[1].feed_mm_s < NEVER_S * NEVER_S ? most : 0.0;
+    for (int k = 0; k < 2; k++) {
+        most = greater(most, fabs(axes.velocity[k]) * inverse->velocity[k]);
+        most = greater(most, fabs(axes.acceleration[k]) * inverse->axis_acceleration[k]);
+        most = greater(most, fabs(axes.jerk[k]) * inverse->axis_jerk[k]);
+        double pull = axes.velocity[k] + inverse->time_constant[k] * axes.acceleration[k];
+        most = greater(most, fabs(pull) * inverse->reach[k]);
+    }
+    return most;
+}
+
+/* --- The brake --- */
+
+/* The one that the controller would make, at arc length 0; 0 where none fits. */
+static int brake_begin(struct path_brake *brake, const struct state *from,
+                       const struct path_brake_numbers *numbers, double period_s)
+{
+    const struct path_state state = {
+        .speed_q56 = (int64_t)ldexp(from->v * period_s, 56),
+        .acceleration_q56 = (int64_t)ldexp(from->a * period_s * period_s, 56),
+    };
+    return path_brake_begin(brake, &state, numbers);
+}
+
+/* How long it takes: the continuous curve, and what whole ticks take more on the mean. */
+static double brake_time(const struct state *from, const struct path_brake_numbers *numbers,
+                         double period_s)
+{
+    double tick3 = ldexp(1.0, -56) / (period_s * period_s * period_s);
+    double down = (double)numbers->jerk_down_q56 * tick3;
+    double up = (double)numbers->jerk_up_q56 * tick3;
+    double most = (double)numbers->deceleration_q56 * tick3 * period_s;
+    double square = from->a * from->a / down;
+    double depth = fmin(sqrt((2.0 * from->v + square) / (1.0 / down + 1.0 / up)), most);
+    double change = from->a + depth > 0.0 ? down : -down;
+    double speed = from->v + (from->a * from->a - depth * depth) / (2.0 * change);
+    double even_s = greater(speed / depth - depth / (2.0 * up), 0.0);
+    return fabs(from->a + depth) / down + even_s + depth / up + TICKS_MORE * period_s;
+}
+
+static struct state state_of(const struct path_brake *brake, double from_mm, double period_s)
+{
+    struct state out = {
+        .s = from_mm + ldexp((double)brake->at.arc_length_q40_mm, -40),
+        .v = ldexp((double)brake->at.speed_q56, -56) / period_s,
+        .a = ldexp((double)brake->at.acceleration_q56, -56) / (period_s * period_s),
+    };
+    return out;
+}
+
+static struct state moved(const struct state *from, double j, double t)
+{
+    struct state to = {
+        .s = from->s + t * (from->v + t * (from->a / 2.0 + t * j / 6.0)),
+        .v = from->v + t * (from->a + t * j / 2.0),
+        .a = from->a + t * j,
+    };
+    return to;
+}
+
+/* 1 while one tick keeps the limits, looked at in `parts` places. */
+static int tick_keeps(const struct search *search, const struct inverse *inverse,
+                      const struct state *from, const struct state *to, uint32_t *row, int parts)
+{
+    double j = (to->a - from->a) / search->period_s;
+    for (int k = 0; k < parts; k++) {
+        struct state at = moved(from, j, search->period_s * k / parts);
+        while (*row + 2u < search->row_count && search->rows[*row + 1u].s_mm <= at.s) {
+            (*row)++;
+        }
+        if (strain(inverse, &search->rows[*row], &at, j) > 1.0) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* 1 while the brake keeps the limits all the way. */
+static int brake_keeps(const struct search *search, const struct inverse *inverse,
+                       const struct path_brake *brake, double from_mm, uint32_t row, double step_s)
+{
+    struct path_brake tick = *brake;
+    struct state before = state_of(&tick, from_mm, search->period_s);
+    int parts = (int)ceil(search->period_s / step_s);
+    int ticks = (int)greater(step_s / search->period_s, 1.0);
+    for (int k = 0; !path_brake_rests(&tick); k++) {
+        if (k == 0) {
+            path_brake_first(&tick);
+        } else {
+            path_brake_step(&tick);
+        }
+        struct state at = state_of(&tick, from_mm, search->period_s);
+        if (k % ticks == 0 && !tick_keeps(search, inverse, &before, &at, &row, parts)) {
+            return 0;
+        }
+        before = at;
+    }
+    return 1;
+}
+
+/* --- Pieces --- */
+
+static double piece_value(const double c[8], double u, int order)
+{
+    double sum = 0.0;
+    for (int k = 7; k >= order; k--) {
+        double factor = 1.0;
+        for (int i = 0; i < order; i++) {
+            factor *= k - i;
+        }
+        sum = sum * u + factor * c[k];
+    }
+    return sum;
+}
+
+/* Powers of u = 0 ... 1 over the piece, mm; returns its duration. */
+static double piece_powers(const struct program_piece *from, double c[8])
+{
+    double seconds = ldexp((double)from->duration_q32_s, -32);
+    double unit = ldexp(seconds, -program_piece_exponent(from->duration_q32_s));
+    double power = 1.0;
+    c[0] = ldexp((double)from->start_q40_mm, -40);
+    for (int k = 1; k <= 7; k++) {
+        power *= unit;
+        c[k] = ldexp((double)from->c_q40_mm[k - 1], -40) * power;
+    }
+    return seconds;
+}
+
+/* Adds an instant, u = 0 ... 1 over the piece, in ascending order; 0: there are too many. */
+static int add_instant(const struct search *search, const double c[8], double u,
+                       struct piece *piece)
+{
+    if (piece->count >= MOST_INSTANTS) {
+        return 0;
+    }
+    struct state *at = &piece->at[piece->count];
+    at->s = piece_value(c, u, 0);
+    at->v = greater(piece_value(c, u, 1) / piece->seconds, 0.0);
+    at->a = piece_value(c, u, 2) / (piece->seconds * piece->seconds);
+    piece->at_s[piece->count] = u * piece->seconds;
+    piece->row[piece->count] = row_at(search, at->s);
+    piece->fastest.v = greater(piece->fastest.v, at->v);
+    piece->fastest.a = greater(piece->fastest.a, at->a);
+    piece->count++;
+    return 1;
+}
+
+/* Adds those of a stretch, from the last one to u = high, at which every `each`-th row of the path is passed, no closer
+ * to each other than step_s: a bend may be narrower than the even instants are apart. */
+static int add_rows(const struct search *search, const double c[8], double high, uint32_t each,
+                    double step_s, struct piece *piece)
+{
+    const double low = piece->at_s[piece->count - 1u] / piece->seconds;
+    const double from = piece->at[piece->count - 1u].s;
+    const double way = piece_value(c, high, 0) - from;
+    uint32_t row = piece->row[piece->count - 1u] + 1u;
+    for (; row < search->row_count && search->rows[row].s_mm < from + way; row += each) {
+        const double u = low + (high - low) * greater(search->rows[row].s_mm - from, 0.0) / way;
+        const double last_s = piece->at_s[piece->count - 1u];
+        if (u * piece->seconds >= last_s + step_s &&
+            high * piece->seconds >= last_s + 2.0 * step_s && !add_instant(search, c, u, piece)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* 0: too many. */
+static int add_instants(const struct search *search, const double c[8], uint32_t each,
+                        double step_s, struct piece *piece)
+{
+    const double parts = fmin(greater(ceil(piece->seconds / step_s), 2.0), EVEN_INSTANTS - 1);
+    int fits = 1;
+    piece->count = 0;
+    piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
+    for (int k = 0; k <= (int)parts && fits; k++) {
+        if (k > 0 && piece->seconds > 2.0 * parts * step_s) {
+            fits = add_rows(search, c, k / parts, each, step_s, piece);
+        }
+        fits = fits && add_instant(search, c, k / parts, piece);
+    }
+    return fits;
+}
+
+/* The greatest codes of a piece: no less than a stop within LEAST_TICKS from its greatest speed needs, and beyond that only
+ * what takes a quarter of the path left behind it in as many ticks. */
+static void piece_most(const struct search *search, struct piece *piece)
+{
+    const double span_s = LEAST_TICKS * search->period_s;
+    const double left_mm = greater(search->length_mm - piece->at[piece->count - 1u].s, 0.0);
+    const double acceleration =
+        greater(8.0 * greater(piece->fastest.v, LEAST_MM_S), left_mm / (4.0 * span_s)) / span_s;
+    for (int k = 0; k < 3; k++) {
+        const double most = k == 1 ? acceleration : acceleration / (2.0 * span_s);
+        piece->most[k] = search->most[k];
+        while (piece->most[k] > 1 && number_of(k, piece->most[k]) > most) {
+            piece->most[k]--;
+        }
+    }
+}
+
+static void piece_look(const struct search *search, const struct program *p, uint32_t i,
+                       double left_s, double step_s, struct piece *piece)
+{
+    struct program_piece from;
+    double c[8];
+    program_piece_get(p, i, &from);
+    piece->seconds = piece_powers(&from, c);
+    piece->suspect = 0;
+    piece->left_s = left_s;
+    piece->factor = ldexp((double)from.override_factor_q24, -24);
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        piece->level[k] =
+            k == PROGRAM_LEVEL_FULL ? piece->factor : ldexp((double)program_level_q9(k), -9);
+        piece->slope[k] = ldexp((double)program_number(from.override.rate[k]), -32);
+        piece->second[k] = ldexp((double)program_number(from.override.second[k]), -24);
+    }
+    uint32_t each = ROWS_EACH;
+    while (!add_instants(search, c, each, step_s, piece)) {
+        each *= 2u;
+    }
+    piece_most(search, piece);
+    double little = search->rise_is_cut ? 0.25 * search->deceleration : HUGE_VAL;
+    double most = 0.0;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        double rate = piece->level[k];
+        double slope = fmin(piece->slope[k], sqrt(rate * piece->second[k])) * piece->fastest.v;
+        most = greater(most, piece->fastest.a * rate * rate + fmin(slope, little));
+    }
+    piece->fastest.v *= piece->factor;
+    piece->fastest.a = most;
+}
+
+/* Greatest slope at a rate of program time, of a rise (sign 1) or a fall (-1): it came from a rest, and can come to one
+ * within the level. */
+static double slope_at(const struct piece *piece, double rate, int sign)
+{
+    double most = 0.0;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        if (rate <= piece->level[k]) {
+            double room = sign > 0 ? fmin(rate, piece->level[k] - rate) : rate;
+            most = greater(most, fmin(piece->slope[k], sqrt(2.0 * room * piece->second[k])));
+        }
+    }
+    return most;
+}
+
+/* --- The search --- */
+
+/* 0: the controller takes no such numbers. */
+static int numbers_of(const struct search *search, const int codes[3],
+                      struct path_brake_numbers *numbers)
+{
+    const struct program_stop stop = {
+        .jerk_down = (uint8_t)codes[0],
+        .deceleration = (uint8_t)codes[1],
+        .jerk_up = (uint8_t)codes[2],
+    };
+    return path_brake_numbers_of(numbers, &stop, search->period_us);
+}
+
+/* Times to rest from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
+struct times {
+    double mean_s, worst_s, first_s;
+    double longest_s;          /* brake at any rate */
+    double cost_s;             /* the mean, and a share of the longest */
+    int brakes[MOST_INSTANTS]; /* 0: the plan goes on */
+};
+
+/* Half the time from the instant before to the one behind. */
+static double weight_s(const struct piece *piece, uint32_t i)
+{
+    const uint32_t last = piece->count - 1u;
+    return 0.5 * (piece->at_s[i < last ? i + 1u : last] - piece->at_s[i > 0u ? i - 1u : 0u]);
+}
+
+/* Whether the controller would find room for the brake. */
+static int has_room(const struct search *search, const struct state *at,
+                    const struct path_brake_numbers *numbers)
+{
+    const struct path_state state = {
+        .speed_q56 = (int64_t)ldexp(at->v * search->period_s, 56),
+        .acceleration_q56 = (int64_t)ldexp(at->a * search->period_s * search->period_s, 56),
+    };
+    return path_brake_fits(&state, numbers, (int64_t)ldexp(search->length_mm - at->s, 40));
+}
+
+/* after_s: the time to rest from the end of the piece. Returns 0 where the controller would not begin a brake although the
+ * program still has far to go. */
+static int times_of(const struct search *search, const struct piece *piece,
+                    const struct path_brake_numbers *numbers, double after_s, struct times *times)
+{
+    struct path_brake brake;
+    double sum = 0.0;
+    times->first_s = after_s;
+    times->worst_s = 0.0;
+    for (uint32_t i = piece->count; i > 0; i--) {
+        const struct state *at = &piece->at[i - 1u];
+        double next_s = i == piece->count ? piece->seconds : piece->at_s[i];
+        double wait = times->first_s + (next_s - piece->at_s[i - 1u]);
+        double left = piece->left_s + (piece->seconds - piece->at_s[i - 1u]);
+        /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not counted,
+         * or the worst numbers would be the best. */
+        int begins = brake_begin(&brake, at, numbers, search->period_s);
+        double total_s = begins ? brake_time(at, numbers, search->period_s) : NEVER_S;
+        if (begins && at->v * piece->factor > 0.5 * piece->fastest.v &&
+            left > 2.0 * total_s + FAR_TICKS * search->period_s && !has_room(search, at, numbers)) {
+            return 0;
+        }
+        times->brakes[i - 1u] = total_s < left;
+        times->first_s = total_s < left ? total_s : begins ? left : wait;
+        times->worst_s = greater(times->worst_s, times->first_s);
+        sum += times->first_s * weight_s(piece, i - 1u);
+    }
+    times->mean_s = sum / piece->seconds;
+    times->longest_s = brake_begin(&brake, &piece->fastest, numbers, search->period_s)
+                           ? brake_time(&piece->fastest, numbers, search->period_s)
+                           : NO_BRAKE_S;
+    times->cost_s = times->mean_s + LONGEST_SHARE * times->longest_s;
+    return 1;
+}
+
+/* Whether these brakes keep the limits; the instant that broke one last is looked at first. */
+static int all_keep(const struct search *search, struct piece *piece, const struct times *times,
+                    const struct path_brake_numbers *numbers)
+{
+    for (uint32_t n = 0; n < piece->count; n++) {
+        uint32_t i = (n + piece->suspect) % piece->count;
+        struct path_brake brake;
+        if (times->brakes[i] && brake_begin(&brake, &piece->at[i], numbers, search->period_s) &&
+            !brake_keeps(search, &search->inverse, &brake, piece->at[i].s, piece->row[i], STEP_S)) {
+            piece->suspect = i;
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Whether the state has so little speed left, for its deceleration, that no brake need fit: the plan may go on. */
+static int may_wait(const struct search *search, const struct state *at,
+                    const struct path_brake_numbers *numbers)
+{
+    double period_s = search->period_s;
+    double up = ldexp((double)numbers->jerk_up_q56, -56) / (period_s * period_s * period_s);
+    return at->v < LEAST_MM_S ||
+           (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - 3.0 * at->a * period_s);
+}
+
+/* Whether a brake fits and keeps the limits, or need not fit. */
+static int state_keeps(const struct search *search, const struct inverse *inverse,
+                       const struct state *at, uint32_t row,
+                       const struct path_brake_numbers *numbers)
+{
+    struct path_brake brake;
+    if (!brake_begin(&brake, at, numbers, search->period_s)) {
+        return may_wait(search, at, numbers);
+    }
+    return brake_keeps(search, inverse, &brake, at->s, row, FINE_S);
+}
+
+/* The same limits at other rates of program time, also while the rate changes. */
+static int rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
+{
+    static const double rates[] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
+                                   488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
+                                   0.5,         0.25,        0.1};
+    const size_t count = sizeof rates / sizeof rates[0];
+    struct path_brake_numbers numbers;
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
+    double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers.deceleration_q56, -56) /
+                                              (search->period_s * search->period_s)
+                                        : HUGE_VAL;
+    for (uint32_t i = 0; i < piece->count; i++) {
+        for (size_t r = 0; r < 2 * count; r++) {
+            double rate = r < count ? rates[r] : piece->factor * rates[r - count];
+            if (r >= count && rate <= 1.0) {
+                break;
+            }
+            for (int slope = -1; slope <= 1; slope++) {
+                struct state from = piece->at[i];
+                double change = slope_at(piece, rate, slope) * from.v;
+                from.a = rate * rate * from.a + (slope < 0   ? -change
+                                                 : slope > 0 ? fmin(change, little)
+                                                             : 0.0);
+                from.v *= rate;
+                int possible = slope <= 0 || rate < piece->factor;
+                possible = possible && strain(&search->at_any_rate, &search->rows[piece->row[i]],
+                                              &from, 0.0) <= 1.0;
+                if (possible &&
+                    !state_keeps(search, &search->at_any_rate, &from, piece->row[i], &numbers)) {
+                    return 0;
+                }
+            }
+        }
+    }
+    return 1;
+}
+
+/* The same at the rate 1 from instants close to each other. */
+static int close_keep(const struct search *search, const struct piece *close, const int codes[3])
+{
+    struct path_brake_numbers numbers;
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
+    for (uint32_t i = 0; i < close->count; i++) {
+        if (!state_keeps(search, &search->inverse, &close->at[i], close->row[i], &numbers)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Whether a brake out of one that has begun with the numbers `before` keeps the limits. */
+static int out_of_brake_keeps(const struct search *search, const struct piece *piece, uint32_t i,
+                              const struct path_brake_numbers *before,
+                              const struct path_brake_numbers *numbers)
+{
+    struct path_brake first;
+    struct path_brake second;
+    if (!brake_begin(&first, &piece->at[i], before, search->period_s)) {
+        return 1;
+    }
+    path_brake_first(&first);
+    for (uint32_t k = 1; !path_brake_rests(&first); k++) {
+        if (k % BRAKE_EACH == 0u && path_brake_begin(&second, &first.at, numbers) &&
+            !brake_keeps(search, &search->at_any_rate, &second, piece->at[i].s, piece->row[i],
+                         FINE_S)) {
+            return 0;
+        }
+        path_brake_step(&first);
+    }
+    return 1;
+}
+
+static int brakes_keep(const struct search *search, const struct piece *piece, const int codes[3])
+{
+    struct path_brake_numbers numbers;
+    struct path_brake_numbers before;
+    if (piece->before[1] == 0 || !numbers_of(search, piece->before, &before)) {
+        return 1;
+    }
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
+    const uint32_t each = 1u + piece->count / BRAKE_INSTANTS;
+    for (uint32_t i = 0; i < piece->count; i += each) {
+        if (!out_of_brake_keeps(search, piece, i, &before, &numbers)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int within(const struct piece *piece, const int codes[3])
+{
+    for (int k = 0; k < 3; k++) {
+        if (codes[k] < 1 || codes[k] < piece->most[k] - FEWER || codes[k] > piece->most[k]) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+struct choice {
+    int codes[3];
+    double cost_s, longest_s, mean_s, worst_s, first_s;
+};
+
+static int strictly(const struct search *search, const struct piece *piece, const int codes[3])
+{
+    return close_keep(search, piece->close, codes) && rates_keep(search, piece, codes) &&
+           brakes_keep(search, piece, codes);
+}
+
+/* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
+static int better(const struct search *search, struct piece *piece, const int codes[3],
+                  double after_s, int strict, struct choice *best)
+{
+    struct path_brake_numbers numbers;
+    struct times times;
+    if (!within(piece, codes) || !numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
+    if (!times_of(search, piece, &numbers, after_s, &times) || times.cost_s >= best->cost_s ||
+        !all_keep(search, piece, &times, &numbers) || (strict && !strictly(search, piece, codes))) {
+        return 0;
+    }
+    memcpy(best->codes, codes, sizeof best->codes);
+    best->cost_s = times.cost_s;
+    best->longest_s = times.longest_s;
+    best->mean_s = times.mean_s;
+    best->worst_s = times.worst_s;
+    best->first_s = times.first_s;
+    return 1;
+}
+
+static void climb(const struct search *search, struct piece *piece, double after_s, int strict,
+                  int first, struct choice *best)
+{
+    static const int8_t ways[][3] = {{1, 1, 1},  {0, 1, 0},  {0, 0, 1},  {1, 0, 0},  {0, 1, 1},
+                                     {1, 1, 0},  {1, 0, 1},  {1, -1, 0}, {-1, 1, 0}, {0, 1, -1},
+                                     {0, -1, 1}, {1, 0, -1}, {-1, 0, 1}};
+    for (int step = first; step >= 1; step /= 2) {
+        for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+            int codes[3];
+            int taken = 1;
+            while (taken) {
+                for (int k = 0; k < 3; k++) {
+                    codes[k] = best->codes[k] + step * ways[i][k];
+                    codes[k] = codes[k] > piece->most[k] && ways[i][k] > 0 &&
+                                       best->codes[k] < piece->most[k]
+                                   ? piece->most[k]
+                                   : codes[k];
+                }
+                taken = better(search, piece, codes, after_s, strict, best);
+            }
+        }
+    }
+}
+
+/* Lowers all codes until the limits are kept at all rates; 0: they never are. */
+static int lowered(const struct search *search, struct piece *piece, const int start[3],
+                   double after_s, struct choice *best)
+{
+    for (int down = 0; down <= GREATEST_CODE; down += down < 32 ? 2 : 8) {
+        int codes[3];
+        for (int k = 0; k < 3; k++) {
+            codes[k] = start[k] - down;
+        }
+        best->cost_s = NEVER_S;
+        if (!within(piece, codes)) {
+            return 0;
+        }
+        if (better(search, piece, codes, after_s, 1, best)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Starting points all over the codes. */
+static void scan(const struct search *search, struct piece *piece, double after_s, int strict,
+                 struct choice *best)
+{
+    for (int a = 0; a <= FEWER; a += 6) {
+        for (int j1 = 0; j1 <= FEWER; j1 += 6) {
+            for (int j2 = 0; j2 <= FEWER; j2 += 6) {
+                int codes[3] = {piece->most[0] - j1, piece->most[1] - a, piece->most[2] - j2};
+                (void)better(search, piece, codes, after_s, strict, best);
+            }
+        }
+    }
+}
+
+/* Cost of the greatest codes, whatever limits they break. */
+static double least_time(const struct search *search, const struct piece *piece, double after_s)
+{
+    struct path_brake_numbers numbers;
+    struct times times;
+    return numbers_of(search, piece->most, &numbers) &&
+                   times_of(search, piece, &numbers, after_s, &times)
+               ? times.cost_s
+               : 0.0;
+}
+
+static void search_piece(const struct search *search, struct piece *piece, const int warm[3],
+                         double after_s, struct choice *best)
+{
+    const struct choice none = {{0, 0, 0}, NEVER_S, NEVER_S, NEVER_S, NEVER_S, NEVER_S};
+    struct choice rough = none;
+    (void)better(search, piece, piece->most, after_s, 0, &rough);
+    int near[3];
+    for (int k = 0; k < 3; k++) {
+        near[k] = warm[k] < piece->most[k] ? warm[k] : piece->most[k];
+    }
+    (void)better(search, piece, near, after_s, 0, &rough);
+    if (rough.cost_s < NEVER_S) {
+        climb(search, piece, after_s, 0, 4, &rough);
+    }
+    if (rough.cost_s > NEAR * least_time(search, piece, after_s)) {
+        scan(search, piece, after_s, 0, &rough);
+    }
+    *best = none;
+    if (rough.cost_s < NEVER_S || lowered(search, piece, piece->most, after_s, &rough)) {
+        climb(search, piece, after_s, 0, 8, &rough);
+        if (strictly(search, piece, rough.codes)) {
+            *best = rough;
+            return;
+        }
+        if (!lowered(search, piece, rough.codes, after_s, best) &&
+            !lowered(search, piece, piece->most, after_s, best)) {
+            *best = none;
+        }
+    }
+    if (best->cost_s >= NEVER_S) {
+        scan(search, piece, after_s, 1, best);
+    }
+    if (best->cost_s < NEVER_S) {
+        climb(search, piece, after_s, 1, 4, best);
+    }
+}
+
+/* --- All of it --- */
+
+static void invert(struct inverse *inverse, const struct stop_limits *limits)
+{
+    inverse->feed = over(limits->feed);
+    inverse->acceleration = over(limits->acceleration);
+    inverse->jerk = over(limits->jerk);
+    for (int k = 0; k < 2; k++) {
+        inverse->velocity[k] = over(limits->axis_velocity[k]);
+        inverse->axis_acceleration[k] = over(limits->axis_acceleration[k]);
+        inverse->axis_jerk[k] = over(limits->axis_jerk[k]);
+        inverse->reach[k] = over(limits->reach[k]);
+        inverse->time_constant[k] = limits->time_constant[k];
+    }
+}
+
+static void begin(struct search *search, const struct program *p, const struct stop_limits *limits,
+                  const struct stop_row *rows)
+{
+    search->rows = rows;
+    search->row_count = p->header.segment_count * STOP_ROWS;
+    search->period_us = p->header.period_us;
+    search->period_s = 1e-6 * p->header.period_us;
+    search->length_mm = ldexp((double)p->header.length_q40_mm, -40);
+    search->rise_is_cut = limits->rise_is_cut;
+    search->deceleration = limits->acceleration;
+    invert(&search->inverse, limits);
+    search->at_any_rate = search->inverse;
+    for (int k = 0; k < 2; k++) {
+        search->at_any_rate.velocity[k] /= 1.0 + FASTER;
+        search->at_any_rate.reach[k] *= limits->reach_at_pace != 0u ? 0.0 : 1.0;
+    }
+    for (int k = 0; k < 3; k++) {
+        const double *axis = k == 1 ? limits->axis_acceleration : limits->axis_jerk;
+        double limit = fmin(k == 1 ? limits->acceleration : limits->jerk, hypot(axis[0], axis[1]));
+        search->most[k] = 0;
+        for (int c = 1; c <= GREATEST_CODE; c++) {
+            search->most[k] = number_of(k, c) <= limit ? c : search->most[k];
+        }
+    }
+}
+
+/* A piece without a brake: the plan goes on into the next. */
+static void wait_for_next(const struct piece *piece, double after_s, struct choice *out)
+{
+    double seconds = piece->seconds;
+    memset(out, 0, sizeof *out);
+    out->first_s = out->worst_s = after_s + seconds;
+    out->mean_s = after_s + 0.5 * seconds;
+}
+
+/* Codes that are given. */
+static void known_choice(const struct search *search, const struct piece *piece,
+                         const struct stop_found *found, double after_s, struct choice *out)
+{
+    struct path_brake_numbers numbers;
+    struct times times;
+    wait_for_next(piece, after_s, out);
+    if (found->codes[1] == 0u) {
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        out->codes[k] = found->codes[k];
+    }
+    if (!numbers_of(search, out->codes, &numbers) ||
+        !times_of(search, piece, &numbers, after_s, &times)) {
+        return;
+    }
+    out->mean_s = times.mean_s;
+    out->worst_s = times.worst_s;
+    out->first_s = times.first_s;
+}
+
+/* The numbers of a piece, or none where waiting for the next is about as good. */
+static void choose(const struct search *search, struct piece *piece, const int warm[3],
+                   double after_s, struct choice *best)
+{
+    struct choice none;
+    search_piece(search, piece, warm, after_s, best);
+    wait_for_next(piece, after_s, &none);
+    if (none.mean_s < WAIT_BETTER * best->mean_s ||
+        (none.mean_s < WAIT_AS_GOOD * best->mean_s && best->longest_s > 2.0 * none.worst_s)) {
+        *best = none;
+    }
+}
+
+void stop_search(const struct program *p, const struct stop_limits *limits,
+                 const struct stop_row *rows, struct stop_found *found)
+{
+    struct search search;
+    struct piece piece;
+    struct piece close;
+    double after_s = 0.0;
+    double left_s = 0.0;
+    begin(&search, p, limits, rows);
+    int warm[3] = {search.most[0], search.most[1], search.most[2]};
+    for (uint32_t i = p->header.piece_count; i > 0; i--) {
+        struct choice best;
+        piece_look(&search, p, i - 1u, left_s, INSTANT_S, &piece);
+        if (found[i - 1u].known != 0u) {
+            known_choice(&search, &piece, &found[i - 1u], after_s, &best);
+        } else {
+            piece_look(&search, p, i - 1u, left_s, CLOSE_S, &close);
+            for (int k = 0; k < 3; k++) {
+                piece.before[k] = found[i - 1u].before[k];
+            }
+            piece.close = &close;
+            choose(&search, &piece, warm, after_s, &best);
+        }
+        for (int k = 0; k < 3; k++) {
+            found[i - 1u].codes[k] = (uint8_t)best.codes[k];
+            warm[k] = best.codes[k] > 0 ? best.codes[k] : warm[k];
+        }
+        found[i - 1u].worst_s = best.worst_s;
+        found[i - 1u].mean_s = best.mean_s;
+        after_s = best.first_s;
+        left_s += piece.seconds;
+    }
+}
+
+static void most_of(double *most, double value)
+{
+    *most = greater(*most, fabs(value));
+}
+
+void stop_used(const struct program *p, const struct stop_limits *limits,
+               const struct stop_row *rows, struct stop_limits *used)
+{
+    struct search search;
+    begin(&search, p, limits, rows);
+    memset(used, 0, sizeof *used);
+    for (uint32_t i = 0; i < p->header.piece_count; i++) {
+        struct program_piece from;
+        double c[8];
+        program_piece_get(p, i, &from);
+        double seconds = piece_powers(&from, c);
+        int parts = (int)fmin(greater(ceil(seconds / INSTANT_S), 4.0), 256.0);
+        for (int k = 0; k <= parts; k++) {
+            double u = BESIDE + (1.0 - 2.0 * BESIDE) * k / parts; /* jerks jump at joints */
+            struct state at = {piece_value(c, u, 0), piece_value(c, u, 1) / seconds,
+                               piece_value(c, u, 2) / (seconds * seconds)};
+            double j = piece_value(c, u, 3) / (seconds * seconds * seconds);
+            const struct stop_row *row = &rows[row_at(&search, at.s)];
+            struct axes axes;
+            axes_of(row, share_of(row, at.s), &at, j, &axes);
+            most_of(&used->feed, at.v);
+            most_of(&used->acceleration, at.a);
+            most_of(&used->jerk, j);
+            most_of(&used->centripetal, row->curvature * at.v * at.v);
+            for (int axis = 0; axis < 2; axis++) {
+                most_of(&used->axis_velocity[axis], axes.velocity[axis]);
+                most_of(&used->axis_acceleration[axis], axes.acceleration[axis]);
+                most_of(&used->axis_jerk[axis], axes.jerk[axis]);
+                most_of(&used->reach[axis], axes.velocity[axis] + limits->time_constant[axis] *
+                                                                      axes.acceleration[axis]);
+            }
+        }
+    }
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Random sequences of hold, resume, override, stop and fault stop from all over a program, and what becomes of them
+ * beside the limits and the bounds of its stop table. Setpoints only, no drives.
+ *
+ * A trial begins at a tick of the program at override 100 %, gives up to four commands with up to 60 ticks between them,
+ * then a hold, stop or fault stop, and goes on to rest. What is looked at are the setpoints' own differences: first to
+ * third, over the period to their power. No heap. Main loop of a host.
+ */
+#ifndef HODOGRAPH_RIG_STOP_TRIAL_H
+#define HODOGRAPH_RIG_STOP_TRIAL_H
+
+#include <stdint.h>
+
+#include "core/kernel.h"
+#include "core/program.h"
+#include "offline/stop_search.h"
+
+/* Greatest shares of limits: of the axes' velocity, acceleration and jerk, and of acceleration and jerk along the path. */
+struct stop_use {
+    double velocity, acceleration, jerk, path_acceleration, path_jerk;
+};
+
+/* A trial again: its seed, and its first tick. */
+struct stop_case {
+    uint64_t seed;
+    uint32_t tick;
+};
+
+struct stop_trial {
+    uint64_t seed;
+    uint32_t trials;
+    uint32_t kernel; /* enum interp_kernel */
+    struct stop_limits
+        hold; /* program's limits: for everything but fault stops, those along the path for brakes only */
+    struct stop_limits fault; /* machine's */
+    struct stop_use of_hold;  /* found: in brakes of hold and stop and in all other motion, */
+    struct stop_use of_fault; /* and in fault stops */
+    double of_bound[2];       /* greatest time to rest over the bound, by enum program_stop_kind */
+    double longest_s[2];
+    uint32_t measured
+        [2]; /* stops whose time was compared: those that were asked for while the program ran */
+    uint32_t late;            /* stops past their deadline */
+    uint32_t failures;        /* of the interpolator, and stops that did not end */
+    struct stop_case most;    /* of the trial with the greatest share of a limit, */
+    struct stop_case longest; /* of a bound, */
+    struct stop_case failed;  /* and of the last that failed */
+};
+
+/* Spreads the trials over the program's ticks; the inputs are seed ... fault, the rest is set. Returns 0 or an error of the
+ * interpolator. */
+int stop_trial_run(const struct program *p, struct stop_trial *trial);
+
+/* A single one: `seed` is its seed, `tick` its first tick. */
+int stop_trial_again(const struct program *p, struct stop_trial *trial, uint32_t tick);
+
+#endif

@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: MIT */
+/* A program with coefficient records gives the bits of one without, at any rate and in any order of times. */
+#include "core/coefficients.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/interp.h"
+#include "core/override_plan.h"
+#include "golden.h"
+#include "unity.h"
+
+static const char *const names[] = {"alpha_exponential.hdgp", "heart_minimax.hdgp",
+                                    "star_minimax.hdgp",      "line_tiny.hdgp",
+                                    "line_slow.hdgp",         "alpha_offset.hdgp"};
+#define NAMES (sizeof names / sizeof names[0])
+
+struct buffer {
+    uint8_t *bytes;
+    uint32_t used;
+    uint32_t room;
+};
+
+static struct program plain, ready;
+static struct buffer records;
+static uint64_t seed = 3;
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+static int append(void *context, const uint8_t *bytes, uint32_t size)
+{
+    struct buffer *buffer = context;
+    if (buffer->used + size > buffer->room) {
+        return -7;
+    }
+    memcpy(buffer->bytes + buffer->used, bytes, size);
+    buffer->used += size;
+    return 0;
+}
+
+static void begin(const char *name, enum interp_kernel kernel)
+{
+    golden_open(&plain, name);
+    const struct kernel *made_for = kernel_find((uint32_t)kernel);
+    records.room = (uint32_t)coefficients_size(&plain, made_for);
+    records.bytes = malloc(records.room);
+    records.used = 0;
+    TEST_ASSERT_EQUAL_INT(0, coefficients_make(&plain, made_for, append, &records));
+    TEST_ASSERT_EQUAL_UINT32(records.room, records.used);
+    ready = plain;
+    coefficients_attach(&ready, made_for, records.bytes);
+}
+
+static void end(void)
+{
+    free(records.bytes);
+    golden_close(&plain);
+}
+
+static void same(struct interp *a, struct interp *b, uint64_t time_q42_s)
+{
+    struct interp_point p, q;
+    memset(&p, 0, sizeof p);
+    memset(&q, 0, sizeof q);
+    TEST_ASSERT_EQUAL_INT(interp_at_q42(a, time_q42_s, &p), interp_at_q42(b, time_q42_s, &q));
+    TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
+}
+
+static void run(void)
+{
+    const uint64_t period = (uint64_t)plain.header.period_us * 4398046u;
+    const uint64_t duration = plain.header.duration_q32_s << 10 | 1u;
+    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
+        struct interp a, b;
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &plain, (enum interp_kernel)kernel));
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready, (enum interp_kernel)kernel));
+        for (uint64_t time = 0; time < duration; time += golden_random(&seed) % (2u * period)) {
+            same(&a, &b, time);
+        }
+        same(&a, &b, duration);
+        for (int i = 0; i < 300; i++) {
+            const uint64_t time = golden_random(&seed) % duration;
+            interp_seek(&a, time >> 10);
+            interp_seek(&b, time >> 10);
+            same(&a, &b, time);
+        }
+        same(&a, &b, golden_random(&seed) % duration); /* mostly a jump: both refuse */
+    }
+}
+
+static void test_same_bits_as_expanded(void)
+{
+    for (size_t i = 0; i < NAMES; i++) {
+        for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
+            begin(names[i], (enum interp_kernel)kernel); /* the others go without */
+            run();
+            end();
+        }
+    }
+}
+
+/* What a tick of the controller does: the piece is looked for by the program clock only. */
+static void test_the_piece_of_the_clock_is_the_one(void)
+{
+    for (size_t i = 0; i < NAMES; i++) {
+        struct program_clock clock;
+        struct override_plan plan;
+        struct interp a, b;
+        struct interp_point p, q;
+        begin(names[i], INTERP_FIXED);
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &plain, INTERP_FIXED));
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready, INTERP_FIXED));
+        program_clock_begin(&clock, &ready, ready.header.period_us, 0);
+        override_plan_begin(&plan, &ready);
+        override_plan_set(&plan, 200);
+        for (int result = INTERP_OK; result == INTERP_OK;) {
+            const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
+            memset(&p, 0, sizeof p);
+            memset(&q, 0, sizeof q);
+            result = interp_at_q42(&a, time_q42_s, &p);
+            TEST_ASSERT_EQUAL_INT(result, interp_at_piece(&b, clock.record, time_q42_s, &q));
+            TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
+        }
+        TEST_ASSERT_EQUAL_UINT64(clock.duration_q42_s, clock.time_q42_s);
+        end();
+    }
+}
+
+/* An image that program_check would refuse: pieces so short that a tick crosses more ends than it may. */
+static void test_a_tick_that_crosses_three_ends_is_refused(void)
+{
+    for (uint64_t ends = 2; ends <= 3; ends++) {
+        struct program_clock clock;
+        struct override_plan plan;
+        struct interp it;
+        struct interp_point point, before;
+        begin("alpha_exponential.hdgp", INTERP_FIXED);
+        const uint64_t tick_q32_s = (uint64_t)ready.header.period_us * 4294967296u / 1000000u;
+        struct coefficients_piece *piece = (void *)records.bytes;
+        for (uint64_t k = 1; k <= ends; k++) { /* all between the second tick and the third */
+            const uint64_t end_q32_s = tick_q32_s + tick_q32_s * k / (ends + 1u);
+            piece->end_q32_s = end_q32_s;
+            piece = (void *)((uint8_t *)piece + coefficients_piece_size(ready.coefficients_for));
+            piece->start_q32_s = end_q32_s;
+        }
+        TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &ready, INTERP_FIXED));
+        program_clock_begin(&clock, &ready, ready.header.period_us, 0);
+        override_plan_begin(&plan, &ready);
+        clock.piece_end_q42_s = clock.record->end_q32_s << 10; /* as if from the image */
+        for (int k = 0; k < 2; k++) {
+            const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
+            TEST_ASSERT_EQUAL_INT(INTERP_OK,
+                                  interp_at_piece(&it, clock.record, time_q42_s, &point));
+        }
+        memcpy(&before, &point, sizeof point);
+        const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
+        const int result = interp_at_piece(&it, clock.record, time_q42_s, &point);
+        TEST_ASSERT_EQUAL_INT(ends == 2 ? INTERP_OK : INTERP_ERR_JUMP, result);
+        TEST_ASSERT_EQUAL_INT(ends == 2 ? 1 : 0, memcmp(&before, &point, sizeof point) != 0);
+        end();
+    }
+}
+
+static void test_windows_hold_the_least_of_their_pieces(void)
+{
+    const struct kernel *fixed = kernel_find(INTERP_FIXED);
+    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    for (uint32_t i = 0; i < plain.header.piece_count; i++) {
+        const struct coefficients_piece *piece = coefficients_piece_at(&ready, fixed, i);
+        for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
+            struct program_override least;
+            memset(&least, 0xFF, sizeof least);
+            for (uint32_t j = i; j < i + (1u << k) && j < plain.header.piece_count; j++) {
+                struct program_override own;
+                program_piece_override(&plain, j, &own);
+                least.factor_q14 =
+                    own.factor_q14 < least.factor_q14 ? own.factor_q14 : least.factor_q14;
+                for (uint32_t n = 0; n < PROGRAM_LEVELS; n++) {
+                    least.rate[n] = own.rate[n] < least.rate[n] ? own.rate[n] : least.rate[n];
+                    least.second[n] =
+                        own.second[n] < least.second[n] ? own.second[n] : least.second[n];
+                }
+            }
+            TEST_ASSERT_EQUAL_MEMORY(&least, &piece->ahead[k], sizeof least);
+        }
+    }
+    end();
+}
+
+/* The override too, whatever is commanded. */
+static void test_same_override_as_without_records(void)
+{
+    static struct program_clock a, b;
+    static struct override_plan c, d;
+    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    for (int n = 0; n < 100; n++) {
+        program_clock_begin(&a, &plain, plain.header.period_us, 0);
+        program_clock_begin(&b, &ready, plain.header.period_us, 0);
+        override_plan_begin(&c, &plain);
+        override_plan_begin(&d, &ready);
+        for (int k = 0; k < 3000; k++) {
+            if (golden_random(&seed) % 64u == 0) {
+                const uint32_t percent = (uint32_t)(golden_random(&seed) % 201u);
+                override_plan_set(&c, percent);
+                override_plan_set(&d, percent);
+            }
+            TEST_ASSERT_TRUE(override_plan_tick(&c, &a) == override_plan_tick(&d, &b));
+        }
+    }
+    end();
+}
+
+static void test_an_error_of_the_sink_is_passed_on(void)
+{
+    begin("alpha_offset.hdgp", INTERP_FIXED);
+    for (uint32_t room = 0; room < records.used; room += 57u) {
+        struct buffer small = {records.bytes, 0, room};
+        TEST_ASSERT_EQUAL_INT(-7,
+                              coefficients_make(&plain, kernel_find(INTERP_FIXED), append, &small));
+    }
+    end();
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_same_bits_as_expanded);
+    RUN_TEST(test_the_piece_of_the_clock_is_the_one);
+    RUN_TEST(test_a_tick_that_crosses_three_ends_is_refused);
+    RUN_TEST(test_windows_hold_the_least_of_their_pieces);
+    RUN_TEST(test_same_override_as_without_records);
+    RUN_TEST(test_an_error_of_the_sink_is_passed_on);
+    return UNITY_END();
+}
