@@ -43,7 +43,7 @@ RULES = (
     (r"app/machine/axis\.\w:(axis_setpoint|axis_sent)", "packing"),
     (r"canopen/(sync|pdo\w*|cob)\.\w:", "packing"),
     (r"app/tick\.\w:(send|find)_", "sending"),
-    (r"app/machine/(machine_|statusword_monitor|answers|statistics)\w*\.\w:", "supervision"),
+    (r"app/machine/(machine_|statusword_monitor|tpdo_monitor|statistics)\w*\.\w:", "supervision"),
 )
 _RULES = tuple((re.compile(pattern), PARTS.index(part)) for pattern, part in RULES)
 _LABEL = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
