@@ -27,6 +27,10 @@
 #define FAR_TICKS                                                                                  \
     20.0 /* and twice the brake: so far from its end a program has room for a brake, */
 #define NO_BRAKE_S 10.0
+#define SPARE_SHARE                                                                                \
+    1e-4 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes; */
+#define SPARE_TIME  1.25 /* of brake_time, */
+#define SPARE_TICKS 10.0 /* and ticks more */
 #define FASTER                                                                                     \
     0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
@@ -58,7 +62,8 @@ struct piece {
     double factor;        /* greatest rate of program time; */
     double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS],
         second[PROGRAM_LEVELS]; /* bounds up to these rates */
-    uint32_t suspect;           /* the instant at which a limit was broken last */
+    uint32_t suspect;           /* the instant at which a limit was broken last, */
+    uint32_t suspect_rates;     /* and the same at other rates */
     struct piece *close;        /* the same piece with more instants */
 };
 
@@ -311,10 +316,82 @@ static int tick_keeps(const struct search *search, const struct inverse *inverse
     return 1;
 }
 
+/* What a brake does not pass, on its whole way. */
+struct extent {
+    double speed, acceleration, jerk;
+    double curvature, slope; /* of the path */
+    double feed_mm_s;        /* least feed of the path */
+};
+
+/* The path up to an arc length, from a row on. */
+static void extend(const struct search *search, uint32_t row, double to_mm, struct extent *extent)
+{
+    const struct stop_row *at = &search->rows[row];
+    const struct stop_row *last = &search->rows[search->row_count - 1u];
+    double curvature = fabs(at->curvature);
+    double slope = fabs(at->slope);
+    double feed_mm_s = at->feed_mm_s;
+    do {
+        at++;
+        curvature = greater(curvature, fabs(at->curvature));
+        slope = greater(slope, fabs(at->slope));
+        feed_mm_s = at->feed_mm_s < feed_mm_s ? at->feed_mm_s : feed_mm_s;
+    } while (at < last && at->s_mm <= to_mm);
+    extent->curvature = curvature;
+    extent->slope = slope;
+    extent->feed_mm_s = feed_mm_s;
+}
+
+/* 1: no limit is passed anywhere within the extent. */
+static int extent_keeps(const struct inverse *inverse, const struct extent *extent)
+{
+    const double normal = extent->curvature * extent->speed * extent->speed;
+    const double bent = extent->slope * extent->speed * extent->speed;
+    const double acceleration = hypot(extent->acceleration, normal);
+    const double jerk =
+        hypot(extent->jerk + extent->curvature * normal * extent->speed,
+              (3.0 * extent->curvature * extent->acceleration + bent) * extent->speed);
+    double most = extent->speed / extent->feed_mm_s;
+    for (int k = 0; k < 2; k++) {
+        const double pull = extent->speed + inverse->time_constant[k] * acceleration;
+        most = greater(most, extent->speed * inverse->velocity[k]);
+        most = greater(most, acceleration * inverse->axis_acceleration[k]);
+        most = greater(most, jerk * inverse->axis_jerk[k]);
+        most = greater(most, pull * inverse->reach[k]);
+    }
+    return most * (1.0 + SPARE_SHARE) <= 1.0;
+}
+
+/* 1: the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
+ * limits, and to follow each of them would take nearly all of the time of a search. */
+static int surely_keeps(const struct search *search, const struct inverse *inverse,
+                        const struct path_brake *brake, double from_mm, uint32_t row)
+{
+    const double period_s = search->period_s;
+    const double tick2 = ldexp(1.0, -56) / (period_s * period_s);
+    const struct path_brake_numbers *numbers = &brake->numbers;
+    const struct state from = state_of(brake, from_mm, period_s);
+    const double rise = greater(from.a, 0.0);
+    const double down = (double)numbers->jerk_down_q56 * tick2 / period_s;
+    const double up = (double)numbers->jerk_up_q56 * tick2 / period_s;
+    struct extent extent = {
+        .speed = from.v + rise * (rise / (2.0 * down) + SPARE_TICKS * period_s),
+        .acceleration = greater(fabs(from.a), (double)numbers->deceleration_q56 * tick2),
+        .jerk = greater(down, up),
+    };
+    const double most_s =
+        SPARE_TIME * brake_time(&from, numbers, period_s) + SPARE_TICKS * period_s;
+    extend(search, row, from.s + extent.speed * most_s, &extent);
+    return extent_keeps(inverse, &extent);
+}
+
 /* 1 while the brake keeps the limits all the way. */
 static int brake_keeps(const struct search *search, const struct inverse *inverse,
                        const struct path_brake *brake, double from_mm, uint32_t row, double step_s)
 {
+    if (surely_keeps(search, inverse, brake, from_mm, row)) {
+        return 1;
+    }
     struct path_brake tick = *brake;
     struct state before = state_of(&tick, from_mm, search->period_s);
     int parts = (int)ceil(search->period_s / step_s);
@@ -444,6 +521,7 @@ static void piece_look(const struct search *search, const struct program *p, uin
     program_piece_get(p, i, &from);
     piece->seconds = piece_powers(&from, c);
     piece->suspect = 0;
+    piece->suspect_rates = 0;
     piece->left_s = left_s;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
@@ -596,7 +674,7 @@ static int state_keeps(const struct search *search, const struct inverse *invers
 }
 
 /* The same limits at other rates of program time, also while the rate changes. */
-static int rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
+static int rates_keep(const struct search *search, struct piece *piece, const int codes[3])
 {
     static const double rates[] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
                                    488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
@@ -609,7 +687,8 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
     double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers.deceleration_q56, -56) /
                                               (search->period_s * search->period_s)
                                         : HUGE_VAL;
-    for (uint32_t i = 0; i < piece->count; i++) {
+    for (uint32_t n = 0; n < piece->count; n++) {
+        uint32_t i = (n + piece->suspect_rates) % piece->count;
         for (size_t r = 0; r < 2 * count; r++) {
             double rate = r < count ? rates[r] : piece->factor * rates[r - count];
             if (r >= count && rate <= 1.0) {
@@ -627,6 +706,7 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
                                               &from, 0.0) <= 1.0;
                 if (possible &&
                     !state_keeps(search, &search->at_any_rate, &from, piece->row[i], &numbers)) {
+                    piece->suspect_rates = i;
                     return 0;
                 }
             }
@@ -636,14 +716,16 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
 }
 
 /* The same at the rate 1 from instants close to each other. */
-static int close_keep(const struct search *search, const struct piece *close, const int codes[3])
+static int close_keep(const struct search *search, struct piece *close, const int codes[3])
 {
     struct path_brake_numbers numbers;
     if (!numbers_of(search, codes, &numbers)) {
         return 0;
     }
-    for (uint32_t i = 0; i < close->count; i++) {
+    for (uint32_t n = 0; n < close->count; n++) {
+        uint32_t i = (n + close->suspect) % close->count;
         if (!state_keeps(search, &search->inverse, &close->at[i], close->row[i], &numbers)) {
+            close->suspect = i;
             return 0;
         }
     }
@@ -706,7 +788,7 @@ struct choice {
     double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
-static int strictly(const struct search *search, const struct piece *piece, const int codes[3])
+static int strictly(const struct search *search, struct piece *piece, const int codes[3])
 {
     return close_keep(search, piece->close, codes) && rates_keep(search, piece, codes) &&
            brakes_keep(search, piece, codes);
