@@ -59,6 +59,7 @@ struct piece {
     int before[3];        /* those of a brake out of which one may begin; 0: none */
     double left_s;        /* of the program, behind the piece */
     struct state fastest; /* of all rates: greatest speed and acceleration */
+    struct state extreme; /* of the rate 1: greatest speed and acceleration of either sign */
     double factor;        /* greatest rate of program time; */
     double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS],
         second[PROGRAM_LEVELS]; /* bounds up to these rates */
@@ -362,26 +363,34 @@ static int extent_keeps(const struct inverse *inverse, const struct extent *exte
     return most * (1.0 + SPARE_SHARE) <= 1.0;
 }
 
+/* Of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`, that begin on the path
+ * between a row and an arc length. */
+static void extent_of(const struct search *search, const struct path_brake_numbers *numbers,
+                      const struct state *most, double fall, uint32_t row, struct extent *extent)
+{
+    const double period_s = search->period_s;
+    const double tick2 = ldexp(1.0, -56) / (period_s * period_s);
+    const double down = (double)numbers->jerk_down_q56 * tick2 / period_s;
+    const double up = (double)numbers->jerk_up_q56 * tick2 / period_s;
+    const double most_s = SPARE_TIME * brake_time(most, numbers, period_s) + fall / down +
+                          SPARE_TICKS * period_s;
+    extent->speed = most->v + most->a * (most->a / (2.0 * down) + SPARE_TICKS * period_s);
+    extent->acceleration =
+        greater(greater(most->a, fall), (double)numbers->deceleration_q56 * tick2);
+    extent->jerk = greater(down, up);
+    extend(search, row, most->s + extent->speed * most_s, extent);
+}
+
 /* 1: the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
  * limits, and to follow each of them would take nearly all of the time of a search. */
 static int surely_keeps(const struct search *search, const struct inverse *inverse,
                         const struct path_brake *brake, double from_mm, uint32_t row)
 {
-    const double period_s = search->period_s;
-    const double tick2 = ldexp(1.0, -56) / (period_s * period_s);
-    const struct path_brake_numbers *numbers = &brake->numbers;
-    const struct state from = state_of(brake, from_mm, period_s);
-    const double rise = greater(from.a, 0.0);
-    const double down = (double)numbers->jerk_down_q56 * tick2 / period_s;
-    const double up = (double)numbers->jerk_up_q56 * tick2 / period_s;
-    struct extent extent = {
-        .speed = from.v + rise * (rise / (2.0 * down) + SPARE_TICKS * period_s),
-        .acceleration = greater(fabs(from.a), (double)numbers->deceleration_q56 * tick2),
-        .jerk = greater(down, up),
-    };
-    const double most_s =
-        SPARE_TIME * brake_time(&from, numbers, period_s) + SPARE_TICKS * period_s;
-    extend(search, row, from.s + extent.speed * most_s, &extent);
+    struct state most = state_of(brake, from_mm, search->period_s);
+    const double fall = greater(-most.a, 0.0);
+    struct extent extent;
+    most.a = greater(most.a, 0.0);
+    extent_of(search, &brake->numbers, &most, fall, row, &extent);
     return extent_keeps(inverse, &extent);
 }
 
@@ -455,6 +464,8 @@ static int add_instant(const struct search *search, const double c[8], double u,
     piece->row[piece->count] = row_at(search, at->s);
     piece->fastest.v = greater(piece->fastest.v, at->v);
     piece->fastest.a = greater(piece->fastest.a, at->a);
+    piece->extreme.v = greater(piece->extreme.v, at->v);
+    piece->extreme.a = greater(piece->extreme.a, fabs(at->a));
     piece->count++;
     return 1;
 }
@@ -487,6 +498,7 @@ static int add_instants(const struct search *search, const double c[8], uint32_t
     int fits = 1;
     piece->count = 0;
     piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
+    piece->extreme = piece->fastest;
     for (int k = 0; k <= (int)parts && fits; k++) {
         if (k > 0 && piece->seconds > 2.0 * parts * step_s) {
             fits = add_rows(search, c, k / parts, each, step_s, piece);
@@ -661,8 +673,39 @@ static int may_wait(const struct search *search, const struct state *at,
            (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - 3.0 * at->a * period_s);
 }
 
+/* Greatest slope of the rate of program time. */
+static double greatest_slope(const struct piece *piece)
+{
+    double most = 0.0;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        most = greater(most,
+                       fmin(piece->slope[k], sqrt(2.0 * piece->level[k] * piece->second[k])));
+    }
+    return most;
+}
+
+/* Of all brakes that begin in the piece, at any rate. */
+static void piece_extent(const struct search *search, const struct piece *piece,
+                         const struct path_brake_numbers *numbers, struct extent *extent)
+{
+    const struct piece *close = piece->close;
+    const double rate = greater(piece->factor, 1.0);
+    const double v = greater(piece->extreme.v, close->extreme.v);
+    const double a = greater(piece->extreme.a, close->extreme.a) * rate * rate;
+    const double change = greatest_slope(piece) * v;
+    const double little = search->rise_is_cut ? 0.25 * search->deceleration : HUGE_VAL;
+    const struct state most = {piece->at[piece->count - 1u].s, v * rate, a + fmin(change, little)};
+    extent_of(search, numbers, &most, a + change, piece->row[0], extent);
+}
+
+/* What a brake has to keep; `surely`: it does. */
+struct keeping {
+    const struct inverse *inverse;
+    int surely;
+};
+
 /* Whether a brake fits and keeps the limits, or need not fit. */
-static int state_keeps(const struct search *search, const struct inverse *inverse,
+static int state_keeps(const struct search *search, const struct keeping *keeping,
                        const struct state *at, uint32_t row,
                        const struct path_brake_numbers *numbers)
 {
@@ -670,21 +713,21 @@ static int state_keeps(const struct search *search, const struct inverse *invers
     if (!brake_begin(&brake, at, numbers, search->period_s)) {
         return may_wait(search, at, numbers);
     }
-    return brake_keeps(search, inverse, &brake, at->s, row, FINE_S);
+    return keeping->surely ||
+           brake_keeps(search, keeping->inverse, &brake, at->s, row, FINE_S);
 }
 
 /* The same limits at other rates of program time, also while the rate changes. */
-static int rates_keep(const struct search *search, struct piece *piece, const int codes[3])
+static int rates_keep(const struct search *search, struct piece *piece,
+                      const struct path_brake_numbers *numbers, const struct extent *extent)
 {
     static const double rates[] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
                                    488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
                                    0.5,         0.25,        0.1};
     const size_t count = sizeof rates / sizeof rates[0];
-    struct path_brake_numbers numbers;
-    if (!numbers_of(search, codes, &numbers)) {
-        return 0;
-    }
-    double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers.deceleration_q56, -56) /
+    const struct inverse *inverse = &search->at_any_rate;
+    const struct keeping keeping = {inverse, extent_keeps(inverse, extent)};
+    double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers->deceleration_q56, -56) /
                                               (search->period_s * search->period_s)
                                         : HUGE_VAL;
     for (uint32_t n = 0; n < piece->count; n++) {
@@ -702,10 +745,10 @@ static int rates_keep(const struct search *search, struct piece *piece, const in
                                                              : 0.0);
                 from.v *= rate;
                 int possible = slope <= 0 || rate < piece->factor;
-                possible = possible && strain(&search->at_any_rate, &search->rows[piece->row[i]],
-                                              &from, 0.0) <= 1.0;
-                if (possible &&
-                    !state_keeps(search, &search->at_any_rate, &from, piece->row[i], &numbers)) {
+                const struct stop_row *row = &search->rows[piece->row[i]];
+                possible =
+                    possible && (keeping.surely || strain(inverse, row, &from, 0.0) <= 1.0);
+                if (possible && !state_keeps(search, &keeping, &from, piece->row[i], numbers)) {
                     piece->suspect_rates = i;
                     return 0;
                 }
@@ -716,15 +759,13 @@ static int rates_keep(const struct search *search, struct piece *piece, const in
 }
 
 /* The same at the rate 1 from instants close to each other. */
-static int close_keep(const struct search *search, struct piece *close, const int codes[3])
+static int close_keep(const struct search *search, struct piece *close,
+                      const struct path_brake_numbers *numbers, const struct extent *extent)
 {
-    struct path_brake_numbers numbers;
-    if (!numbers_of(search, codes, &numbers)) {
-        return 0;
-    }
+    const struct keeping keeping = {&search->inverse, extent_keeps(&search->inverse, extent)};
     for (uint32_t n = 0; n < close->count; n++) {
         uint32_t i = (n + close->suspect) % close->count;
-        if (!state_keeps(search, &search->inverse, &close->at[i], close->row[i], &numbers)) {
+        if (!state_keeps(search, &keeping, &close->at[i], close->row[i], numbers)) {
             close->suspect = i;
             return 0;
         }
@@ -790,8 +831,14 @@ struct choice {
 
 static int strictly(const struct search *search, struct piece *piece, const int codes[3])
 {
-    return close_keep(search, piece->close, codes) && rates_keep(search, piece, codes) &&
-           brakes_keep(search, piece, codes);
+    struct path_brake_numbers numbers;
+    struct extent extent;
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
+    piece_extent(search, piece, &numbers, &extent);
+    return close_keep(search, piece->close, &numbers, &extent) &&
+           rates_keep(search, piece, &numbers, &extent) && brakes_keep(search, piece, codes);
 }
 
 /* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
