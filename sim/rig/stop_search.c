@@ -29,6 +29,8 @@
 #define NO_BRAKE_S 10.0
 #define SPARE_SHARE                                                                                \
     1e-4 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes; */
+#define SURE_EACH                                                                                  \
+    12 /* ticks of a brake between two looks whether the rest of it surely keeps the limits */
 #define SPARE_TIME  1.25 /* of brake_time, */
 #define SPARE_TICKS 10.0 /* and ticks more */
 #define FASTER                                                                                     \
@@ -372,8 +374,8 @@ static void extent_of(const struct search *search, const struct path_brake_numbe
     const double tick2 = ldexp(1.0, -56) / (period_s * period_s);
     const double down = (double)numbers->jerk_down_q56 * tick2 / period_s;
     const double up = (double)numbers->jerk_up_q56 * tick2 / period_s;
-    const double most_s = SPARE_TIME * brake_time(most, numbers, period_s) + fall / down +
-                          SPARE_TICKS * period_s;
+    const double most_s =
+        SPARE_TIME * brake_time(most, numbers, period_s) + fall / down + SPARE_TICKS * period_s;
     extent->speed = most->v + most->a * (most->a / (2.0 * down) + SPARE_TICKS * period_s);
     extent->acceleration =
         greater(greater(most->a, fall), (double)numbers->deceleration_q56 * tick2);
@@ -381,7 +383,7 @@ static void extent_of(const struct search *search, const struct path_brake_numbe
     extend(search, row, most->s + extent->speed * most_s, extent);
 }
 
-/* 1: the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
+/* 1: the rest of the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
  * limits, and to follow each of them would take nearly all of the time of a search. */
 static int surely_keeps(const struct search *search, const struct inverse *inverse,
                         const struct path_brake *brake, double from_mm, uint32_t row)
@@ -398,14 +400,14 @@ static int surely_keeps(const struct search *search, const struct inverse *inver
 static int brake_keeps(const struct search *search, const struct inverse *inverse,
                        const struct path_brake *brake, double from_mm, uint32_t row, double step_s)
 {
-    if (surely_keeps(search, inverse, brake, from_mm, row)) {
-        return 1;
-    }
     struct path_brake tick = *brake;
     struct state before = state_of(&tick, from_mm, search->period_s);
     int parts = (int)ceil(search->period_s / step_s);
     int ticks = (int)greater(step_s / search->period_s, 1.0);
     for (int k = 0; !path_brake_rests(&tick); k++) {
+        if (k % SURE_EACH == 0 && surely_keeps(search, inverse, &tick, from_mm, row)) {
+            return 1;
+        }
         if (k == 0) {
             path_brake_first(&tick);
         } else {
@@ -678,8 +680,7 @@ static double greatest_slope(const struct piece *piece)
 {
     double most = 0.0;
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
-        most = greater(most,
-                       fmin(piece->slope[k], sqrt(2.0 * piece->level[k] * piece->second[k])));
+        most = greater(most, fmin(piece->slope[k], sqrt(2.0 * piece->level[k] * piece->second[k])));
     }
     return most;
 }
@@ -713,8 +714,7 @@ static int state_keeps(const struct search *search, const struct keeping *keepin
     if (!brake_begin(&brake, at, numbers, search->period_s)) {
         return may_wait(search, at, numbers);
     }
-    return keeping->surely ||
-           brake_keeps(search, keeping->inverse, &brake, at->s, row, FINE_S);
+    return keeping->surely || brake_keeps(search, keeping->inverse, &brake, at->s, row, FINE_S);
 }
 
 /* The same limits at other rates of program time, also while the rate changes. */
@@ -746,8 +746,7 @@ static int rates_keep(const struct search *search, struct piece *piece,
                 from.v *= rate;
                 int possible = slope <= 0 || rate < piece->factor;
                 const struct stop_row *row = &search->rows[piece->row[i]];
-                possible =
-                    possible && (keeping.surely || strain(inverse, row, &from, 0.0) <= 1.0);
+                possible = possible && (keeping.surely || strain(inverse, row, &from, 0.0) <= 1.0);
                 if (possible && !state_keeps(search, &keeping, &from, piece->row[i], numbers)) {
                     piece->suspect_rates = i;
                     return 0;
