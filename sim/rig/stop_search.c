@@ -319,14 +319,14 @@ static int tick_keeps(const struct search *search, const struct inverse *inverse
     return 1;
 }
 
-/* What a brake does not pass, on its whole way. */
+/* Upper bounds of what a brake does and meets on its whole way. */
 struct extent {
     double speed, acceleration, jerk;
     double curvature, slope; /* of the path */
     double feed_mm_s;        /* least feed of the path */
 };
 
-/* The path up to an arc length, from a row on. */
+/* Fills the bounds of the path, from a row up to an arc length. */
 static void extend(const struct search *search, uint32_t row, double to_mm, struct extent *extent)
 {
     const struct stop_row *at = &search->rows[row];
@@ -345,7 +345,7 @@ static void extend(const struct search *search, uint32_t row, double to_mm, stru
     extent->feed_mm_s = feed_mm_s;
 }
 
-/* 1: no limit is passed anywhere within the extent. */
+/* 1: no limit is passed anywhere within these bounds. */
 static int extent_keeps(const struct inverse *inverse, const struct extent *extent)
 {
     const double normal = extent->curvature * extent->speed * extent->speed;
@@ -365,7 +365,7 @@ static int extent_keeps(const struct inverse *inverse, const struct extent *exte
     return most * (1.0 + SPARE_SHARE) <= 1.0;
 }
 
-/* Of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`, that begin on the path
+/* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`, that begin on the path
  * between a row and an arc length. */
 static void extent_of(const struct search *search, const struct path_brake_numbers *numbers,
                       const struct state *most, double fall, uint32_t row, struct extent *extent)
@@ -685,7 +685,7 @@ static double greatest_slope(const struct piece *piece)
     return most;
 }
 
-/* Of all brakes that begin in the piece, at any rate. */
+/* Bounds of all brakes that begin in the piece, at any rate. */
 static void piece_extent(const struct search *search, const struct piece *piece,
                          const struct path_brake_numbers *numbers, struct extent *extent)
 {
