@@ -27,6 +27,12 @@
 #define FAR_TICKS                                                                                  \
     20.0 /* and twice the brake: so far from its end a program has room for a brake, */
 #define NO_BRAKE_S 10.0
+#define SPARE_SHARE                                                                                \
+    1e-4 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes; */
+#define SURE_EACH                                                                                  \
+    12 /* ticks of a brake between two looks whether the rest of it surely keeps the limits */
+#define SPARE_TIME  1.25 /* of brake_time, */
+#define SPARE_TICKS 10.0 /* and ticks more */
 #define FASTER                                                                                     \
     0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
@@ -55,10 +61,12 @@ struct piece {
     int before[3];        /* those of a brake out of which one may begin; 0: none */
     double left_s;        /* of the program, behind the piece */
     struct state fastest; /* of all rates: greatest speed and acceleration */
+    struct state extreme; /* of the rate 1: greatest speed and acceleration of either sign */
     double factor;        /* greatest rate of program time; */
     double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS],
         second[PROGRAM_LEVELS]; /* bounds up to these rates */
-    uint32_t suspect;           /* the instant at which a limit was broken last */
+    uint32_t suspect;           /* the instant at which a limit was broken last, */
+    uint32_t suspect_rates;     /* and the same at other rates */
     struct piece *close;        /* the same piece with more instants */
 };
 
@@ -311,6 +319,83 @@ static int tick_keeps(const struct search *search, const struct inverse *inverse
     return 1;
 }
 
+/* Upper bounds of what a brake does and meets on its whole way. */
+struct extent {
+    double speed, acceleration, jerk;
+    double curvature, slope; /* of the path */
+    double feed_mm_s;        /* least feed of the path */
+};
+
+/* Fills the bounds of the path, from a row up to an arc length. */
+static void extend(const struct search *search, uint32_t row, double to_mm, struct extent *extent)
+{
+    const struct stop_row *at = &search->rows[row];
+    const struct stop_row *last = &search->rows[search->row_count - 1u];
+    double curvature = fabs(at->curvature);
+    double slope = fabs(at->slope);
+    double feed_mm_s = at->feed_mm_s;
+    do {
+        at++;
+        curvature = greater(curvature, fabs(at->curvature));
+        slope = greater(slope, fabs(at->slope));
+        feed_mm_s = at->feed_mm_s < feed_mm_s ? at->feed_mm_s : feed_mm_s;
+    } while (at < last && at->s_mm <= to_mm);
+    extent->curvature = curvature;
+    extent->slope = slope;
+    extent->feed_mm_s = feed_mm_s;
+}
+
+/* 1: no limit is passed anywhere within these bounds. */
+static int extent_keeps(const struct inverse *inverse, const struct extent *extent)
+{
+    const double normal = extent->curvature * extent->speed * extent->speed;
+    const double bent = extent->slope * extent->speed * extent->speed;
+    const double acceleration = hypot(extent->acceleration, normal);
+    const double jerk =
+        hypot(extent->jerk + extent->curvature * normal * extent->speed,
+              (3.0 * extent->curvature * extent->acceleration + bent) * extent->speed);
+    double most = extent->speed / extent->feed_mm_s;
+    for (int k = 0; k < 2; k++) {
+        const double pull = extent->speed + inverse->time_constant[k] * acceleration;
+        most = greater(most, extent->speed * inverse->velocity[k]);
+        most = greater(most, acceleration * inverse->axis_acceleration[k]);
+        most = greater(most, jerk * inverse->axis_jerk[k]);
+        most = greater(most, pull * inverse->reach[k]);
+    }
+    return most * (1.0 + SPARE_SHARE) <= 1.0;
+}
+
+/* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`, that begin on the path
+ * between a row and an arc length. */
+static void extent_of(const struct search *search, const struct path_brake_numbers *numbers,
+                      const struct state *most, double fall, uint32_t row, struct extent *extent)
+{
+    const double period_s = search->period_s;
+    const double tick2 = ldexp(1.0, -56) / (period_s * period_s);
+    const double down = (double)numbers->jerk_down_q56 * tick2 / period_s;
+    const double up = (double)numbers->jerk_up_q56 * tick2 / period_s;
+    const double most_s =
+        SPARE_TIME * brake_time(most, numbers, period_s) + fall / down + SPARE_TICKS * period_s;
+    extent->speed = most->v + most->a * (most->a / (2.0 * down) + SPARE_TICKS * period_s);
+    extent->acceleration =
+        greater(greater(most->a, fall), (double)numbers->deceleration_q56 * tick2);
+    extent->jerk = greater(down, up);
+    extend(search, row, most->s + extent->speed * most_s, extent);
+}
+
+/* 1: the rest of the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
+ * limits, and to follow each of them would take nearly all of the time of a search. */
+static int surely_keeps(const struct search *search, const struct inverse *inverse,
+                        const struct path_brake *brake, double from_mm, uint32_t row)
+{
+    struct state most = state_of(brake, from_mm, search->period_s);
+    const double fall = greater(-most.a, 0.0);
+    struct extent extent;
+    most.a = greater(most.a, 0.0);
+    extent_of(search, &brake->numbers, &most, fall, row, &extent);
+    return extent_keeps(inverse, &extent);
+}
+
 /* 1 while the brake keeps the limits all the way. */
 static int brake_keeps(const struct search *search, const struct inverse *inverse,
                        const struct path_brake *brake, double from_mm, uint32_t row, double step_s)
@@ -320,6 +405,9 @@ static int brake_keeps(const struct search *search, const struct inverse *invers
     int parts = (int)ceil(search->period_s / step_s);
     int ticks = (int)greater(step_s / search->period_s, 1.0);
     for (int k = 0; !path_brake_rests(&tick); k++) {
+        if (k % SURE_EACH == 0 && surely_keeps(search, inverse, &tick, from_mm, row)) {
+            return 1;
+        }
         if (k == 0) {
             path_brake_first(&tick);
         } else {
@@ -378,6 +466,8 @@ static int add_instant(const struct search *search, const double c[8], double u,
     piece->row[piece->count] = row_at(search, at->s);
     piece->fastest.v = greater(piece->fastest.v, at->v);
     piece->fastest.a = greater(piece->fastest.a, at->a);
+    piece->extreme.v = greater(piece->extreme.v, at->v);
+    piece->extreme.a = greater(piece->extreme.a, fabs(at->a));
     piece->count++;
     return 1;
 }
@@ -410,6 +500,7 @@ static int add_instants(const struct search *search, const double c[8], uint32_t
     int fits = 1;
     piece->count = 0;
     piece->fastest.s = piece->fastest.v = piece->fastest.a = 0.0;
+    piece->extreme = piece->fastest;
     for (int k = 0; k <= (int)parts && fits; k++) {
         if (k > 0 && piece->seconds > 2.0 * parts * step_s) {
             fits = add_rows(search, c, k / parts, each, step_s, piece);
@@ -444,6 +535,7 @@ static void piece_look(const struct search *search, const struct program *p, uin
     program_piece_get(p, i, &from);
     piece->seconds = piece_powers(&from, c);
     piece->suspect = 0;
+    piece->suspect_rates = 0;
     piece->left_s = left_s;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
@@ -583,8 +675,38 @@ static int may_wait(const struct search *search, const struct state *at,
            (at->a < 0.0 && at->v < at->a * at->a / (2.0 * up) - 3.0 * at->a * period_s);
 }
 
+/* Greatest slope of the rate of program time. */
+static double greatest_slope(const struct piece *piece)
+{
+    double most = 0.0;
+    for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
+        most = greater(most, fmin(piece->slope[k], sqrt(2.0 * piece->level[k] * piece->second[k])));
+    }
+    return most;
+}
+
+/* Bounds of all brakes that begin in the piece, at any rate. */
+static void piece_extent(const struct search *search, const struct piece *piece,
+                         const struct path_brake_numbers *numbers, struct extent *extent)
+{
+    const struct piece *close = piece->close;
+    const double rate = greater(piece->factor, 1.0);
+    const double v = greater(piece->extreme.v, close->extreme.v);
+    const double a = greater(piece->extreme.a, close->extreme.a) * rate * rate;
+    const double change = greatest_slope(piece) * v;
+    const double little = search->rise_is_cut ? 0.25 * search->deceleration : HUGE_VAL;
+    const struct state most = {piece->at[piece->count - 1u].s, v * rate, a + fmin(change, little)};
+    extent_of(search, numbers, &most, a + change, piece->row[0], extent);
+}
+
+/* What a brake has to keep; `surely`: it does. */
+struct keeping {
+    const struct inverse *inverse;
+    int surely;
+};
+
 /* Whether a brake fits and keeps the limits, or need not fit. */
-static int state_keeps(const struct search *search, const struct inverse *inverse,
+static int state_keeps(const struct search *search, const struct keeping *keeping,
                        const struct state *at, uint32_t row,
                        const struct path_brake_numbers *numbers)
 {
@@ -592,24 +714,24 @@ static int state_keeps(const struct search *search, const struct inverse *invers
     if (!brake_begin(&brake, at, numbers, search->period_s)) {
         return may_wait(search, at, numbers);
     }
-    return brake_keeps(search, inverse, &brake, at->s, row, FINE_S);
+    return keeping->surely || brake_keeps(search, keeping->inverse, &brake, at->s, row, FINE_S);
 }
 
 /* The same limits at other rates of program time, also while the rate changes. */
-static int rates_keep(const struct search *search, const struct piece *piece, const int codes[3])
+static int rates_keep(const struct search *search, struct piece *piece,
+                      const struct path_brake_numbers *numbers, const struct extent *extent)
 {
     static const double rates[] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
                                    488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
                                    0.5,         0.25,        0.1};
     const size_t count = sizeof rates / sizeof rates[0];
-    struct path_brake_numbers numbers;
-    if (!numbers_of(search, codes, &numbers)) {
-        return 0;
-    }
-    double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers.deceleration_q56, -56) /
+    const struct inverse *inverse = &search->at_any_rate;
+    const struct keeping keeping = {inverse, extent_keeps(inverse, extent)};
+    double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers->deceleration_q56, -56) /
                                               (search->period_s * search->period_s)
                                         : HUGE_VAL;
-    for (uint32_t i = 0; i < piece->count; i++) {
+    for (uint32_t n = 0; n < piece->count; n++) {
+        uint32_t i = (n + piece->suspect_rates) % piece->count;
         for (size_t r = 0; r < 2 * count; r++) {
             double rate = r < count ? rates[r] : piece->factor * rates[r - count];
             if (r >= count && rate <= 1.0) {
@@ -623,10 +745,10 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
                                                              : 0.0);
                 from.v *= rate;
                 int possible = slope <= 0 || rate < piece->factor;
-                possible = possible && strain(&search->at_any_rate, &search->rows[piece->row[i]],
-                                              &from, 0.0) <= 1.0;
-                if (possible &&
-                    !state_keeps(search, &search->at_any_rate, &from, piece->row[i], &numbers)) {
+                const struct stop_row *row = &search->rows[piece->row[i]];
+                possible = possible && (keeping.surely || strain(inverse, row, &from, 0.0) <= 1.0);
+                if (possible && !state_keeps(search, &keeping, &from, piece->row[i], numbers)) {
+                    piece->suspect_rates = i;
                     return 0;
                 }
             }
@@ -636,14 +758,14 @@ static int rates_keep(const struct search *search, const struct piece *piece, co
 }
 
 /* The same at the rate 1 from instants close to each other. */
-static int close_keep(const struct search *search, const struct piece *close, const int codes[3])
+static int close_keep(const struct search *search, struct piece *close,
+                      const struct path_brake_numbers *numbers, const struct extent *extent)
 {
-    struct path_brake_numbers numbers;
-    if (!numbers_of(search, codes, &numbers)) {
-        return 0;
-    }
-    for (uint32_t i = 0; i < close->count; i++) {
-        if (!state_keeps(search, &search->inverse, &close->at[i], close->row[i], &numbers)) {
+    const struct keeping keeping = {&search->inverse, extent_keeps(&search->inverse, extent)};
+    for (uint32_t n = 0; n < close->count; n++) {
+        uint32_t i = (n + close->suspect) % close->count;
+        if (!state_keeps(search, &keeping, &close->at[i], close->row[i], numbers)) {
+            close->suspect = i;
             return 0;
         }
     }
@@ -706,10 +828,16 @@ struct choice {
     double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
-static int strictly(const struct search *search, const struct piece *piece, const int codes[3])
+static int strictly(const struct search *search, struct piece *piece, const int codes[3])
 {
-    return close_keep(search, piece->close, codes) && rates_keep(search, piece, codes) &&
-           brakes_keep(search, piece, codes);
+    struct path_brake_numbers numbers;
+    struct extent extent;
+    if (!numbers_of(search, codes, &numbers)) {
+        return 0;
+    }
+    piece_extent(search, piece, &numbers, &extent);
+    return close_keep(search, piece->close, &numbers, &extent) &&
+           rates_keep(search, piece, &numbers, &extent) && brakes_keep(search, piece, codes);
 }
 
 /* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
