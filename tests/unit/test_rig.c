@@ -41,9 +41,8 @@ static void make_program(void)
     put(piece + 16 + 8 * 2, 40 * mm);
     put(piece + 16 + 8 * 3, -60 * mm);
     put(piece + 16 + 8 * 4, 24 * mm);
-    piece[72 + 3] = 1; /* factor 1.0 */
-    piece[76 + 2] = 1;
-    piece[80 + 1] = 1;
+    piece[72 + 1] = 0x40; /* factor 1.0; then codes of override bounds */
+    memset(piece + 74, 128, 2u * PROGRAM_LEVELS);
     memset(&program, 0, sizeof program);
     program.image = image;
     program.size = sizeof image;
