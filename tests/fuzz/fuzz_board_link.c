@@ -44,18 +44,18 @@ static void characters(struct fuzz_input *in)
     }
 }
 
-/* The bridge waits as turn_wait_ns says; `frames` come at the given round. */
-static void request(struct fuzz_input *in, struct turn *turn, uint64_t *now_ns)
+/* The bridge waits as pacing_wait_ns says; `frames` come at the given round. */
+static void request(struct fuzz_input *in, struct pacing *pacing, uint64_t *now_ns)
 {
     const uint8_t how = fuzz_byte(in);
     const struct exchange_header header = {.flags = fuzz_byte(in) & 63u,
                                            .period_us = fuzz_number(in, 3) % 1000000u,
                                            .guard_us = fuzz_number(in, 3) % 10000000u};
     struct exchange_header reply;
-    turn_request(turn, &header, *now_ns);
+    pacing_request(pacing, &header, *now_ns);
     unsigned rounds = 0;
-    while (!turn_over(turn, how >= 0x80u && rounds > (how & 7u) ? 1u : 0u, *now_ns, &reply)) {
-        const uint64_t wait_ns = turn_wait_ns(turn, *now_ns);
+    while (!pacing_over(pacing, how >= 0x80u && rounds > (how & 7u) ? 1u : 0u, *now_ns, &reply)) {
+        const uint64_t wait_ns = pacing_wait_ns(pacing, *now_ns);
         FUZZ_CHECK(wait_ns > 0u);
         FUZZ_CHECK(++rounds < ROUNDS_MAX);
         *now_ns += wait_ns;
@@ -65,12 +65,12 @@ static void request(struct fuzz_input *in, struct turn *turn, uint64_t *now_ns)
 
 static void harness(struct fuzz_input *in)
 {
-    struct turn turn;
+    struct pacing pacing;
     uint64_t now_ns = 1000000000u;
     const uint8_t count = fuzz_byte(in);
-    memset(&turn, 0, sizeof turn);
+    memset(&pacing, 0, sizeof pacing);
     for (uint8_t i = 0; i < count && i < REQUESTS_MAX; ++i) {
-        request(in, &turn, &now_ns);
+        request(in, &pacing, &now_ns);
     }
     characters(in);
 }
