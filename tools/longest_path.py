@@ -36,7 +36,7 @@ NOT_PLAIN = {
     ),
     "override": ("feed_override_stop_tick", "path_brake_step", "interp_at_arc_length"),
 }
-# Beside them, and not in the table: the tick in which a brake is planned, which has no goal yet.
+# Any tick, also of a stop.
 STOP: tuple[str, ...] = ()
 
 
@@ -49,8 +49,10 @@ def motion_part(build: Path, target: str, kernel: str, kind: str = "override") -
 
 
 def counted_at_most(counts: dict[str, Any], kind: str) -> int:
-    """Of the scenarios without override, or of all: the bound with override covers both."""
-    rows = (row for name, row in counts.items() if kind == "override" or name.startswith(kind))
+    """Of the scenarios without override, or of all, which have stops; 0: nobody counts ticks with override alone."""
+    if kind == "override":
+        return 0
+    rows = (row for name, row in counts.items() if kind == "stop" or name.startswith(kind))
     return int(max(row["whole"][2] for row in rows))
 
 
@@ -64,11 +66,17 @@ def table(build: Path) -> str:
     for target in emulator.TARGETS.values():
         for kernel in target.kernels:
             name = f"{target.core} ({target.name}) {kernel}"
-            for kind in NOT_PLAIN:
+            own = counted[f"{target.name} {kernel}"]
+            for kind in (*NOT_PLAIN, "stop"):
                 path = motion_part(build, target.name, kernel, kind).of(ENTRY)
-                most = counted_at_most(counted[f"{target.name} {kernel}"], kind)
-                goal = tables.goal_text("motion", target.name, kernel, kind, path)
-                rows.append(f"| {name} | {kind} | {path} | {most} | {path / most:.2f} | {goal} |")
+                most = counted_at_most(own, kind)
+                seen = f"{most} | {path / most:.2f}" if most else " | "
+                goal = (
+                    ""
+                    if kind == "stop"
+                    else tables.goal_text("motion", target.name, kernel, kind, path)
+                )
+                rows.append(f"| {name} | {kind} | {path} | {seen} | {goal} |")
                 name = ""
     return "".join(f"{row}\n" for row in rows)
 

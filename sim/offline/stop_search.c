@@ -511,13 +511,13 @@ static int add_instants(const struct search *search, const double c[8], uint32_t
 }
 
 /* The greatest codes of a piece: no less than a stop within LEAST_TICKS from its greatest speed needs, and beyond that only
- * what takes a quarter of the path left behind it in as many ticks. */
+ * what takes the path that is left after it in as many ticks. */
 static void piece_most(const struct search *search, struct piece *piece)
 {
     const double span_s = LEAST_TICKS * search->period_s;
     const double left_mm = greater(search->length_mm - piece->at[piece->count - 1u].s, 0.0);
     const double acceleration =
-        greater(8.0 * greater(piece->fastest.v, LEAST_MM_S), left_mm / (4.0 * span_s)) / span_s;
+        greater(8.0 * greater(piece->fastest.v, LEAST_MM_S), left_mm / span_s) / span_s;
     for (int k = 0; k < 3; k++) {
         const double most = k == 1 ? acceleration : acceleration / (2.0 * span_s);
         piece->most[k] = search->most[k];

@@ -30,12 +30,12 @@ PAIRS = [(t.name, k) for t in TARGETS.values() for k in t.kernels]
 COUNTS = json.loads((ROOT / "tests/data/counts.json").read_text(encoding="utf-8"))["motion"]
 
 
-@pytest.mark.parametrize("kind", NOT_PLAIN)
+@pytest.mark.parametrize(("kind", "ratio"), [("plain", 1.3), ("stop", 1.6)])
 @pytest.mark.parametrize(("target", "kernel"), PAIRS)
-def test_nothing_counted_is_longer(target: str, kernel: str, kind: str) -> None:
+def test_nothing_counted_is_longer(target: str, kernel: str, kind: str, ratio: float) -> None:
     longest = motion_part(ROOT / "build", target, kernel, kind).of(ENTRY)
     most = counted_at_most(COUNTS[f"{target} {kernel}"], kind)
-    assert most <= longest <= 1.3 * most
+    assert most <= longest <= ratio * most
 
 
 @pytest.mark.parametrize(
@@ -46,9 +46,15 @@ def test_nothing_counted_is_longer(target: str, kernel: str, kind: str) -> None:
             "float",
             "plain",
             600,
-            marks=pytest.mark.xfail(reason="624: docs/validation/wcet.md"),
+            marks=pytest.mark.xfail(reason="623: docs/validation/wcet.md"),
         ),
-        ("an386", "float", "override", 900),
+        pytest.param(
+            "an386",
+            "float",
+            "override",
+            900,
+            marks=pytest.mark.xfail(reason="987: docs/validation/wcet.md"),
+        ),
         ("an385", "fixed", "plain", 1500),
         ("an385", "fixed", "override", 2250),
         ("microbit", "fixed", "override", 6000),
@@ -60,13 +66,13 @@ def test_goals_are_kept_by_construction(target: str, kernel: str, kind: str, goa
 
 @pytest.mark.parametrize("name", ["alpha", "heart_optimal"])
 def test_plain_ticks_call_nothing_that_plain_excludes(name: str) -> None:
-    """At 100 % and without commands; and what is never called in a tick is called in none."""
+    """At 100 % and without commands, after the first tick; and what is never called in a tick is called in none."""
     counter = Counter(ROOT / "build", TARGETS["an386"], functions=True)
     counts = counter.count("float", EXAMPLES[name].read_bytes())
     never = Bounds.read(ROOT / "firmware/targets/loops.toml", *NOT_PLAIN["plain"]).never
-    called = {n for n, column in zip(counter.names, counts.T, strict=True) if column.any()}
+    called = {n for n, column in zip(counter.names, counts.T, strict=True) if column[1:].any()}
     assert "motion_step" in called
-    assert "timebase_change" in counter.names
+    assert "override_plan_change" in counter.names
     assert not called & never
 
 
