@@ -67,7 +67,7 @@ def test_a_tick_does_one_thing_with_the_override() -> None:
     counts = counter.count("float", programs, adversary.restless())
     columns = [counter.names.index(KINDS[kind]) for kind in ("moves", "looks", "begins")]
     moves, looks, begins = (counts[:, columns] > 0).T
-    assert moves.any() and looks.any() and begins.any()
+    assert all(kind.any() for kind in (moves, looks, begins))
     assert not (begins & (moves | looks)).any()
 
 
