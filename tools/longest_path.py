@@ -103,7 +103,7 @@ def update(build: Path) -> None:
 
 
 def show(longest: Longest) -> None:
-    """Each function on the longest path, the dearest first."""
+    """Each function on the longest path, the most expensive first."""
     longest.of(ENTRY)
     for function, count in sorted(longest.known.items(), key=lambda item: -item[1]):
         if count > 0:
@@ -115,7 +115,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("target", nargs="?", choices=emulator.TARGETS, default="an386")
     parser.add_argument("kernel", nargs="?", choices=emulator.KERNELS, default="float")
-    parser.add_argument("--plain", action="store_true", help="of a tick in which no rate changes")
+    parser.add_argument(
+        "--plain", action="store_true", help="of a tick in which the override does not change"
+    )
     parser.add_argument(
         "--stop", action="store_true", help="of any tick, also one that plans a brake"
     )

@@ -93,7 +93,7 @@ bool controller_shut_down(struct controller *controller);
 /* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
 bool controller_configured(const struct controller *controller);
 
-/* A life sign from inside long work of a round: the heartbeat, when it is due. `self`: the controller. */
+/* Sends the heartbeat if it is due: for long work of the main loop, such as the check of a program. `self`: the controller. */
 void controller_beat(void *self);
 
 /* Part of the round: tells of faults (EMCY), states and limits. */

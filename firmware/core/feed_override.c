@@ -11,16 +11,17 @@ enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 /* Whether a brake would rest before the end of the path: found out a tick before it begins. */
 enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 
-#define TICK_Q30       ((int64_t)1 << 30)
-#define SPARE_TICKS    2  /* of the deadline: rounding */
-#define END_TICKS      2u /* until a command counts, and until the end is a setpoint */
-#define SEARCH_STEPS   2  /* in a tick at rest */
-#define NO_NUMBERS     2u
-#define MOST_FEED_Q32  ((int64_t)1 << 45)
-#define MOST_SLOPE_Q56 (((int64_t)1 << 57) - 1)
-#define MS_Q40         1099511628u /* 2^40 / 1000 */
-#define UM_Q40_BITS    30          /* 2^-10 mm is less than */
-#define US_Q42_BITS    22          /* */
+#define TICK_Q30      ((int64_t)1 << 30)
+#define SPARE_TICKS   2  /* of the deadline: rounding */
+#define END_TICKS     2u /* until a command counts, and until the end is a setpoint */
+#define SEARCH_STEPS  2  /* in a tick at rest */
+#define NO_NUMBERS    2u
+#define MOST_FEED_Q32 ((int64_t)1 << 45)
+#define MOST_SLOPE_Q56                                                                             \
+    (((int64_t)1 << 57) - 1)    /* 2^57, the greatest, less a unit: it is made an int32_t */
+#define MS_Q40      1099511628u /* 2^40 / 1000 */
+#define UM_Q40_BITS 30          /* 2^30 of 2^-40 mm are less than a micrometre */
+#define US_Q42_BITS 22          /* 2^22 of 2^-42 s are less than a microsecond */
 
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)

@@ -33,8 +33,6 @@ enum feed_state {
     FEED_HELD = 5,     /* at rest until resumed */
 };
 
-#define FEED_MOST_PERCENT OVERRIDE_PERCENT
-
 /* Contents private: use the functions. */
 struct feed_override {
     struct program_clock clock;

@@ -47,7 +47,7 @@ void override_plan_rest(struct override_plan *plan)
 
 void override_plan_set(struct override_plan *plan, uint32_t percent)
 {
-    const uint32_t used = percent < OVERRIDE_PERCENT ? percent : OVERRIDE_PERCENT;
+    const uint32_t used = percent < OVERRIDE_MOST_PERCENT ? percent : OVERRIDE_MOST_PERCENT;
     plan->commanded_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
     plan->steady = 0;
 }

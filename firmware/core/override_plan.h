@@ -80,7 +80,7 @@ void override_plan_rest(struct override_plan *plan);
 
 /* --- Commands: take effect in the next tick, or when the ramp under way may be cut. --- */
 
-/* The override wanted, in per cent; more than OVERRIDE_PERCENT counts as that. */
+/* The override wanted, in per cent; more than OVERRIDE_MOST_PERCENT counts as that. */
 void override_plan_set(struct override_plan *plan, uint32_t percent);
 
 /* To override 0, and there until it is released. */

@@ -18,9 +18,9 @@
 
 #include "core/program.h"
 
-#define OVERRIDE_ONE     ((int64_t)1 << 57)
-#define OVERRIDE_MOST    (2 * OVERRIDE_ONE)
-#define OVERRIDE_PERCENT 200u /* the same */
+#define OVERRIDE_ONE          ((int64_t)1 << 57)
+#define OVERRIDE_MOST         (2 * OVERRIDE_ONE)
+#define OVERRIDE_MOST_PERCENT 200u /* OVERRIDE_MOST in per cent */
 /* 10^-6: what a ramp may leave of its change, but for bounds next to nothing. */
 #define OVERRIDE_SPARE ((int64_t)1 << 37)
 

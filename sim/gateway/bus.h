@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* bus: the CAN side of the bridge, and its wish to end. */
-#ifndef BRIDGE_BUS_H
-#define BRIDGE_BUS_H
+#ifndef GATEWAY_BUS_H
+#define GATEWAY_BUS_H
 
 #include <stdbool.h>
 #include <stddef.h>

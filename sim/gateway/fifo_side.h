@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). */
-#ifndef BRIDGE_FIFO_SIDE_H
-#define BRIDGE_FIFO_SIDE_H
+#ifndef GATEWAY_FIFO_SIDE_H
+#define GATEWAY_FIFO_SIDE_H
 
 #include "port/linux/can_socket.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* gateway_options: the command line of hodograph-bridge. */
-#ifndef BRIDGE_BRIDGE_OPTIONS_H
-#define BRIDGE_BRIDGE_OPTIONS_H
+#ifndef GATEWAY_GATEWAY_OPTIONS_H
+#define GATEWAY_GATEWAY_OPTIONS_H
 
 #include <stddef.h>
 

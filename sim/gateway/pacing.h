@@ -5,8 +5,8 @@
  *
  * The board's clock stands still while it waits for the reply to a tick's request; so the reply is what makes its next tick due.
  */
-#ifndef BRIDGE_TURN_H
-#define BRIDGE_TURN_H
+#ifndef GATEWAY_PACING_H
+#define GATEWAY_PACING_H
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* slcan_side: a stream of SLCAN lines (can/slcan.h) on a socket. */
-#ifndef BRIDGE_SLCAN_SIDE_H
-#define BRIDGE_SLCAN_SIDE_H
+#ifndef GATEWAY_SLCAN_SIDE_H
+#define GATEWAY_SLCAN_SIDE_H
 
 #include "port/linux/can_socket.h"
 

@@ -9,8 +9,8 @@
  *
  * No I/O, no heap. All functions in one context.
  */
-#ifndef INJECTOR_BRIDGE_H
-#define INJECTOR_BRIDGE_H
+#ifndef INJECTOR_FORWARDER_H
+#define INJECTOR_FORWARDER_H
 
 #include "faults/fault_rule.h"
 #include "faults/fault_watch.h"

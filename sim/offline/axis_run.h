@@ -2,8 +2,8 @@
 /* One axis under given setpoints and offsets, for fits of its plant: what the motor does in the
  * model, before encoder and bus round it. The drive computes as it always does, with its encoder.
  */
-#ifndef HODOGRAPH_RIG_AXIS_RUN_H
-#define HODOGRAPH_RIG_AXIS_RUN_H
+#ifndef HODOGRAPH_OFFLINE_AXIS_RUN_H
+#define HODOGRAPH_OFFLINE_AXIS_RUN_H
 
 #include <stdint.h>
 

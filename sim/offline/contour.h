@@ -13,8 +13,8 @@
  * same bits on every IEEE 754 target. No heap: the caller lends the array of segments. Main loop
  * only.
  */
-#ifndef HODOGRAPH_RIG_CONTOUR_H
-#define HODOGRAPH_RIG_CONTOUR_H
+#ifndef HODOGRAPH_OFFLINE_CONTOUR_H
+#define HODOGRAPH_OFFLINE_CONTOUR_H
 
 #include <stdbool.h>
 #include <stdint.h>

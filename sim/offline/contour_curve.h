@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The curve behind contour.h: places on it, seen from a point. Private to sim/offline; pure functions. */
-#ifndef HODOGRAPH_RIG_CONTOUR_CURVE_H
-#define HODOGRAPH_RIG_CONTOUR_CURVE_H
+#ifndef HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
+#define HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -11,8 +11,8 @@
  * Use: offline_begin, then rig_run as often as wanted. No heap: the caller lends the segment array, and
  * the program, its image and the segments must outlive the rig. Main loop only.
  */
-#ifndef HODOGRAPH_RIG_RIG_H
-#define HODOGRAPH_RIG_RIG_H
+#ifndef HODOGRAPH_OFFLINE_OFFLINE_H
+#define HODOGRAPH_OFFLINE_OFFLINE_H
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -6,8 +6,8 @@
  * Ticks count as they do in the rules: tick 0 is the SYNC at which the first setpoint is latched
  * that differs from the start point. Pure functions but for what they are given.
  */
-#ifndef HODOGRAPH_RIG_RIG_FAULT_H
-#define HODOGRAPH_RIG_RIG_FAULT_H
+#ifndef HODOGRAPH_OFFLINE_OFFLINE_FAULT_H
+#define HODOGRAPH_OFFLINE_OFFLINE_FAULT_H
 
 #include <stdbool.h>
 #include <stdint.h>

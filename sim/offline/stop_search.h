@@ -7,8 +7,8 @@
  * for what lies between the instants. Derivation: docs/theory/numerics.md section 7. No heap: the caller lends all arrays.
  * Main loop of a host.
  */
-#ifndef HODOGRAPH_RIG_STOP_SEARCH_H
-#define HODOGRAPH_RIG_STOP_SEARCH_H
+#ifndef HODOGRAPH_OFFLINE_STOP_SEARCH_H
+#define HODOGRAPH_OFFLINE_STOP_SEARCH_H
 
 #include <stdint.h>
 

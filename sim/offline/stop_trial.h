@@ -7,8 +7,8 @@
  * then a hold, stop or fault stop, and goes on to rest. What is looked at are the setpoints' own differences: first to
  * third, over the period to their power. No heap. Main loop of a host.
  */
-#ifndef HODOGRAPH_RIG_STOP_TRIAL_H
-#define HODOGRAPH_RIG_STOP_TRIAL_H
+#ifndef HODOGRAPH_OFFLINE_STOP_TRIAL_H
+#define HODOGRAPH_OFFLINE_STOP_TRIAL_H
 
 #include <stdint.h>
 

@@ -12,7 +12,7 @@
  * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
  * mutant: core/override_plan.c: behind < left ? behind : left => behind
  * mutant: core/override_plan.c: last + 1u - clock->piece => last - clock->piece
- * mutant: core/override_plan.c: percent < OVERRIDE_PERCENT ? percent => percent < 2 * OVERRIDE_PERCENT ? percent
+ * mutant: core/override_plan.c: percent < OVERRIDE_MOST_PERCENT ? percent => percent < 2 * OVERRIDE_MOST_PERCENT ? percent
  * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
 #include "core/override_plan.h"

@@ -140,12 +140,12 @@ static void test_more_than_can_be_remembered_are_missed(void)
     wait_us = 100000;
     missed_max = 100;
     (void)sync(1);
-    for (unsigned i = 0; i < ANSWERS_UNSETTLED; ++i) {
+    for (unsigned i = 0; i < TPDO_MONITOR_UNSETTLED; ++i) {
         TEST_ASSERT_EQUAL_UINT32(0, sync(0));
     }
     TEST_ASSERT_EQUAL_UINT32(1, sync(0));
     TEST_ASSERT_EQUAL_UINT32(1, sync(0));
-    (void)sync(1u + ANSWERS_UNSETTLED);
+    (void)sync(1u + TPDO_MONITOR_UNSETTLED);
     for (unsigned i = 0; i < 200; ++i) {
         (void)sync(1);
     }

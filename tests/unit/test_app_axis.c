@@ -216,7 +216,7 @@ static void test_well_ends_with_a_restart_with_a_loss_and_with_trouble_that_stay
     TEST_ASSERT_TRUE(axis_well(&axis));
     axis.answers.lost = true;
     TEST_ASSERT_FALSE(axis_well(&axis));
-    for (uint32_t k = 0; k < STATUS_WATCH_TOLERATED; ++k) {
+    for (uint32_t k = 0; k < STATUSWORD_MONITOR_TOLERATED; ++k) {
         axis_receive(&axis, &unfed, 0);
         TEST_ASSERT_TRUE(axis_well(&axis));
     }

@@ -322,7 +322,7 @@ static void lose_bits(uint16_t bits, uint16_t code, enum machine_fault_phase pha
 {
     run_some(250);
     drive(1)->state.flags &= (uint16_t)~bits;
-    app_bench_periods(&bench, STATUS_WATCH_TOLERATED + 1u);
+    app_bench_periods(&bench, STATUSWORD_MONITOR_TOLERATED + 1u);
     TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
     app_bench_period(&bench);
     expect_fault(code, 3);
@@ -351,7 +351,7 @@ static void test_following_error(void)
 {
     run_some(250);
     drive(0)->state.flags |= CIA402_STATUS_FOLLOWING_ERROR;
-    app_bench_periods(&bench, STATUS_WATCH_TOLERATED + 2u);
+    app_bench_periods(&bench, STATUSWORD_MONITOR_TOLERATED + 2u);
     expect_fault(EMCY_FOLLOWING_ERROR, 2);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
 }

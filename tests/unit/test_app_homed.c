@@ -230,7 +230,7 @@ static void away(uint32_t periods)
 static void test_a_drive_that_was_away_loses_it(void)
 {
     home();
-    away(DRIVE_WATCH_ZERO_MS + 150u);
+    away(DRIVE_MONITOR_ZERO_MS + 150u);
     boot();
     TEST_ASSERT_FALSE(homed(1));
 }
@@ -243,7 +243,7 @@ static void test_a_drive_that_was_away_in_boot_loses_it(void)
     (void)app_bench_until(&bench, MACHINE_BOOT, 3000);
     app_bench_periods(&bench, 3000);
     TEST_ASSERT_TRUE_MESSAGE(homed(1), "it has been heard all the time");
-    away(DRIVE_WATCH_ZERO_MS + 150u);
+    away(DRIVE_MONITOR_ZERO_MS + 150u);
     bench.drives[1].dead = false;
     boot();
     TEST_ASSERT_FALSE(homed(1));

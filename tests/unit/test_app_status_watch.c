@@ -22,7 +22,7 @@ void tearDown(void)
 /* The trouble after so many answers with this statusword, one by one. */
 static void expect_trouble(unsigned statusword, uint16_t code, bool obeys)
 {
-    for (unsigned i = 0; i < STATUS_WATCH_TOLERATED; ++i) {
+    for (unsigned i = 0; i < STATUSWORD_MONITOR_TOLERATED; ++i) {
         statusword_monitor_take(&watch, (uint16_t)statusword, true);
         TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, statusword_monitor_trouble(&watch));
         TEST_ASSERT_TRUE(statusword_monitor_follows(&watch));
@@ -54,7 +54,7 @@ static void test_limit_and_warning_are_no_trouble(void)
 static void test_good_answers_in_between_start_the_count_anew(void)
 {
     for (unsigned i = 0; i < 20; ++i) {
-        for (unsigned k = 0; k < STATUS_WATCH_TOLERATED; ++k) {
+        for (unsigned k = 0; k < STATUSWORD_MONITOR_TOLERATED; ++k) {
             statusword_monitor_take(&watch, GOOD & (uint16_t)~CIA402_STATUS_REMOTE, true);
         }
         statusword_monitor_take(&watch, GOOD, true);
@@ -73,7 +73,7 @@ static void test_while_homing_bits_12_and_13_mean_something_else(void)
 {
     const uint16_t homing =
         (uint16_t)((GOOD & ~CIA402_STATUS_FOLLOWS) | CIA402_STATUS_FOLLOWING_ERROR);
-    for (unsigned i = 0; i < 2u * STATUS_WATCH_TOLERATED; ++i) {
+    for (unsigned i = 0; i < 2u * STATUSWORD_MONITOR_TOLERATED; ++i) {
         statusword_monitor_take(&watch, homing, false);
     }
     TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, statusword_monitor_trouble(&watch));

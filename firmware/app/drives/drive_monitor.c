@@ -17,7 +17,7 @@ static uint32_t time_of(uint8_t node, const uint32_t entries[AXES_MAX])
             return entries[i] & 0xFFFFu;
         }
     }
-    return DRIVE_WATCH_HEARTBEAT_MS;
+    return DRIVE_MONITOR_HEARTBEAT_MS;
 }
 
 static bool is_drive(const struct config *config, uint8_t node)
@@ -59,7 +59,7 @@ static void note_silence(struct drive_monitor *watch, struct machine *machine, u
                          uint32_t elapsed_us)
 {
     const uint32_t time_us = watch->consumers[i].time_us;
-    const uint32_t zero_us = DRIVE_WATCH_ZERO_MS * 1000u;
+    const uint32_t zero_us = DRIVE_MONITOR_ZERO_MS * 1000u;
     const uint32_t limit_us = time_us < zero_us ? time_us : zero_us;
     if (watch->silent_us[i] <= limit_us) {
         watch->silent_us[i] += elapsed_us;

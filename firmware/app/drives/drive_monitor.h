@@ -4,8 +4,8 @@
  * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody heard its boot-up
  * message. Also heartbeats of the host, where 0x1016 names its node. Mainline; takes the port's lock where it touches the machine.
  */
-#ifndef APP_DRIVES_DRIVE_WATCH_H
-#define APP_DRIVES_DRIVE_WATCH_H
+#ifndef APP_DRIVES_DRIVE_MONITOR_H
+#define APP_DRIVES_DRIVE_MONITOR_H
 
 #include <stdint.h>
 
@@ -13,11 +13,11 @@
 #include "canopen/heartbeat.h"
 
 /* Consumer time of a drive that has no entry in 0x1016; the drives send ten times as often. */
-#define DRIVE_WATCH_HEARTBEAT_MS 1000u
+#define DRIVE_MONITOR_HEARTBEAT_MS 1000u
 
 /* So long a silence is enough for a drive to have been off and on again without anybody hearing its boot-up message; its
  * heartbeats come five times as often. */
-#define DRIVE_WATCH_ZERO_MS 500u
+#define DRIVE_MONITOR_ZERO_MS 500u
 
 struct drive_monitor {
     struct heartbeat_consumer consumers[AXES_MAX];

@@ -12,7 +12,7 @@
 void drive_polling_init(struct drive_polling *look)
 {
     memset(look, 0, sizeof *look);
-    sdo_client_init(&look->client, DRIVE_LOOK_SDO_TIMEOUT_US);
+    sdo_client_init(&look->client, DRIVE_POLLING_SDO_TIMEOUT_US);
 }
 
 int drive_polling_receive(struct drive_polling *look, const struct can_msg *in, struct can_msg *out)
@@ -44,7 +44,7 @@ static int look_at_next(struct drive_polling *look, const struct machine *machin
 {
     const uint8_t count = machine->config.axis_count;
     look->turn = (uint8_t)((look->turn + 1u) % (count * OBJECTS));
-    look->pause_us = DRIVE_LOOK_US / count;
+    look->pause_us = DRIVE_POLLING_US / count;
     const uint8_t axis = (uint8_t)(look->turn % count);
     const bool inputs = look->turn >= count;
     if (inputs && !inputs_polled(&facts[axis])) {

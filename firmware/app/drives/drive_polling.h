@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_polling: reads now and then what no PDO tells: following error (0x60F4) and, where a drive has no TPDO3 for
- * them, digital inputs (0x60FD). Axis after axis by SDO, each about DRIVE_LOOK_US apart.
+ * drive_polling: reads a few times a second what no PDO carries: following error (0x60F4) and, where a drive has no TPDO3 for
+ * them, digital inputs (0x60FD). Axis after axis by SDO, each about DRIVE_POLLING_US apart.
  *
  * Mainline; takes the port's lock where it touches the machine.
  */
-#ifndef APP_DRIVES_DRIVE_LOOK_H
-#define APP_DRIVES_DRIVE_LOOK_H
+#ifndef APP_DRIVES_DRIVE_POLLING_H
+#define APP_DRIVES_DRIVE_POLLING_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -15,8 +15,8 @@
 #include "app/machine/machine.h"
 #include "canopen/sdo_client.h"
 
-#define DRIVE_LOOK_US             250000u
-#define DRIVE_LOOK_SDO_TIMEOUT_US 100000u
+#define DRIVE_POLLING_US             250000u
+#define DRIVE_POLLING_SDO_TIMEOUT_US 100000u
 
 struct drive_polling {
     struct sdo_client client;

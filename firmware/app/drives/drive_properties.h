@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_properties: what a drive said about itself while it was configured. Mainline. */
-#ifndef APP_DRIVES_DRIVE_FACTS_H
-#define APP_DRIVES_DRIVE_FACTS_H
+#ifndef APP_DRIVES_DRIVE_PROPERTIES_H
+#define APP_DRIVES_DRIVE_PROPERTIES_H
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -56,7 +56,7 @@ void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t n
     if (axis_enabled(axis) && axis->goal == CIA402_GOAL_ENABLED) {
         statusword_monitor_take(&axis->watch, axis->statusword, !axis->by_itself);
     }
-    axis->fit = axis_enabled(axis) && axis->watch.in_row <= STATUS_WATCH_TOLERATED;
+    axis->fit = axis_enabled(axis) && axis->watch.in_row <= STATUSWORD_MONITOR_TOLERATED;
 }
 
 void axis_restarted(struct axis *axis)

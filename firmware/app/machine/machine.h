@@ -74,7 +74,7 @@ enum machine_refusal {
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
 #define MACHINE_ANSWER_TICKS 5000u /* time for configured drives to answer a SYNC */
 #define MACHINE_UNSENT_MAX                                                                         \
-    3u /* so many ticks in a row the port may refuse frames, or not be rid of them */
+    3u /* ticks in a row in which the port may refuse frames, or still have those of the tick before */
 
 /* With the mainline at a standstill nobody takes a stop, and heartbeats stay away: before the drives stop by these, or a
  * watchdog restarts the processor, the axes are stopped on the path. */

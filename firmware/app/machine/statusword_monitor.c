@@ -29,7 +29,7 @@ void statusword_monitor_take(struct statusword_monitor *watch, uint16_t statuswo
 
 uint16_t statusword_monitor_trouble(const struct statusword_monitor *watch)
 {
-    if (watch->in_row <= STATUS_WATCH_TOLERATED) {
+    if (watch->in_row <= STATUSWORD_MONITOR_TOLERATED) {
         return EMCY_NO_ERROR;
     }
     if ((watch->wrong & CIA402_STATUS_VOLTAGE) != 0u) {
@@ -44,6 +44,6 @@ uint16_t statusword_monitor_trouble(const struct statusword_monitor *watch)
 
 bool statusword_monitor_follows(const struct statusword_monitor *watch)
 {
-    return watch->in_row <= STATUS_WATCH_TOLERATED ||
+    return watch->in_row <= STATUSWORD_MONITOR_TOLERATED ||
            (watch->wrong & (unsigned)~CIA402_STATUS_FOLLOWING_ERROR) == 0u;
 }

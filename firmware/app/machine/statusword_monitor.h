@@ -4,15 +4,15 @@
  *
  * Bits that have been set since the drive was enabled must stay: voltage (4), remote (9) and, in CSP, "follows the
  * command value" (12). Following error (13, in CSP) must not come. A wrong bit is a trouble when it is wrong in more than
- * STATUS_WATCH_TOLERATED answers in a row. The internal limit (11) is a warning, not watched here.
+ * STATUSWORD_MONITOR_TOLERATED answers in a row. The internal limit (11) is a warning, not watched here.
  */
-#ifndef APP_MACHINE_STATUS_WATCH_H
-#define APP_MACHINE_STATUS_WATCH_H
+#ifndef APP_MACHINE_STATUSWORD_MONITOR_H
+#define APP_MACHINE_STATUSWORD_MONITOR_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#define STATUS_WATCH_TOLERATED 2u
+#define STATUSWORD_MONITOR_TOLERATED 2u
 
 struct statusword_monitor {
     uint16_t seen;  /* bits that have been set */

@@ -29,18 +29,18 @@ void tpdo_monitor_restart(struct tpdo_monitor *answers)
 /* The oldest absent one turns out to be late, or missed. */
 static void settle(struct tpdo_monitor *answers)
 {
-    answers->first = (uint8_t)((answers->first + 1u) % ANSWERS_UNSETTLED);
+    answers->first = (uint8_t)((answers->first + 1u) % TPDO_MONITOR_UNSETTLED);
     answers->unsettled--;
 }
 
 static uint32_t note_absent(struct tpdo_monitor *answers, uint32_t sync_us)
 {
     uint32_t missed = 0;
-    if (answers->unsettled == ANSWERS_UNSETTLED) {
+    if (answers->unsettled == TPDO_MONITOR_UNSETTLED) {
         settle(answers);
         missed = 1;
     }
-    answers->absent_us[(answers->first + answers->unsettled) % ANSWERS_UNSETTLED] = sync_us;
+    answers->absent_us[(answers->first + answers->unsettled) % TPDO_MONITOR_UNSETTLED] = sync_us;
     answers->unsettled++;
     if (answers->absent_in_row < UINT32_MAX) {
         answers->absent_in_row++;

@@ -8,14 +8,14 @@
  *
  * Guarded by the port's lock; times are port_time_us(), which wraps.
  */
-#ifndef APP_MACHINE_ANSWERS_H
-#define APP_MACHINE_ANSWERS_H
+#ifndef APP_MACHINE_TPDO_MONITOR_H
+#define APP_MACHINE_TPDO_MONITOR_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
 /* When more are absent at once the oldest counts as missed. */
-#define ANSWERS_UNSETTLED 8u
+#define TPDO_MONITOR_UNSETTLED 8u
 
 struct tpdo_monitor {
     bool present;           /* has answered a SYNC since tpdo_monitor_init */
@@ -24,10 +24,10 @@ struct tpdo_monitor {
     uint32_t last_us;       /* time of the last one */
     uint32_t absent_in_row; /* SYNCs in a row without one */
     uint32_t absent_us
-        [ANSWERS_UNSETTLED]; /* a ring: SYNCs not answered, and not known yet whether late or missed */
-    uint8_t first;           /* the oldest of these */
-    uint8_t unsettled;       /* how many */
-    uint32_t missed;         /* all in all */
+        [TPDO_MONITOR_UNSETTLED]; /* a ring: SYNCs not answered, and not known yet whether late or missed */
+    uint8_t first;                /* the oldest of these */
+    uint8_t unsettled;            /* how many */
+    uint32_t missed;              /* all in all */
 };
 
 void tpdo_monitor_init(struct tpdo_monitor *answers);
