@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""Stops beside the least time to rest on the same path under the same limits: feed hold and fault stop, at instants
+spread over each program.
+
+    python benchmarks/stops.py [--json OUT] [--only NAME…] [--instants N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "benchmarks/support"), str(ROOT / "host_tools")]
+
+from least_stop import LeastStop, State  # noqa: E402
+
+from hodograph.native import NativeProgram  # noqa: E402
+from hodograph.native.stop_search import StopSearch  # noqa: E402
+from hodograph.pipeline import Pipeline, load_pipeline, stop_terms  # noqa: E402
+from hodograph.program.stop_planning import fault_limits, hold_limits  # noqa: E402
+from hodograph.simulate import simulate_stop  # noqa: E402
+
+CASES = ("alpha_optimal", "heart_optimal", "alpha", "heart")
+LIMITS = {"hold": hold_limits, "fault": fault_limits}
+STARTS = (1.0, 0.7)
+"""Durations of the starts, as shares of the stop's own."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A stop: when it was commanded, its time to standstill, and the least time (None: not found)."""
+
+    at_s: float
+    rest_after_s: float
+    least_s: float | None
+
+    @property
+    def of_least(self) -> float | None:
+        """Its time over the least."""
+        return None if self.least_s is None else self.rest_after_s / self.least_s
+
+
+def stops_of(chain: Pipeline, kind: str, instants: int) -> list[Compared]:
+    """One stop at each instant, with the least time to rest from the state that the plan has there."""
+    image, plan, machine = NativeProgram(chain.image), chain.plan, chain.machine
+    own = LIMITS[kind](plan, stop_terms(machine, chain.file.limits))
+    least = LeastStop(chain.spline_result.spline, own.raised(StopSearch(image).used(own)))
+    period_s = machine.period_us * 1e-6
+    out = []
+    for share in np.arange(1, instants + 1) / (instants + 1):
+        tick = int(np.ceil(share * plan.duration_s / period_s))
+        run = simulate_stop(image, machine.models(machine.plane), kind, tick * period_s)
+        before_s = (tick - 1) * period_s
+        motion = (plan.arc_length, plan.feed, plan.acceleration)
+        state = State(*(float(quantity(before_s)) for quantity in motion))
+        starts_s = tuple(start * run.rest_after_s for start in STARTS)
+        least_s = least.time_s(state, starts_s)
+        if least_s is not None:  # the program itself ends in a rest
+            least_s = min(least_s, plan.duration_s - before_s)
+        out.append(Compared(tick * period_s, run.rest_after_s, least_s))
+    return out
+
+
+def measure(name: str, instants: int, listed: bool) -> dict[str, Any]:
+    """Figures of one program."""
+    chain = load_pipeline(ROOT / f"examples/{name}.toml")
+    out: dict[str, Any] = {}
+    for kind in LIMITS:
+        stops = stops_of(chain, kind, instants)
+        ratios = np.array([one.of_least for one in stops if one.of_least is not None])
+        out[kind] = {
+            "stops": len(stops),
+            "compared": len(ratios),
+            "median_of_least": float(np.median(ratios)),
+            "worst_of_least": float(ratios.max()),
+            "within_1_3_percent": 100.0 * float(np.mean(ratios <= 1.3)),
+            "worst_s": max(one.rest_after_s for one in stops),
+        }
+        if listed:
+            for one in stops:
+                print(
+                    f"  {kind:<6} {one.at_s:7.3f} {one.rest_after_s:7.4f} {one.least_s} {one.of_least}"
+                )
+    return out
+
+
+def main() -> int:
+    """Exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--only", nargs="*", help="programs by name")
+    parser.add_argument("--instants", type=int, default=40)
+    parser.add_argument("--list", action="store_true", help="one line for each stop")
+    options = parser.parse_args()
+    results = {}
+    print(
+        f"{'program':<16} {'stop':<6} {'compared':>8} {'median':>7} {'worst':>7} {'<= 1.3, %':>9} {'longest s':>9}"
+    )
+    for name in options.only or CASES:
+        results[name] = measure(name, options.instants, options.list)
+        for kind, found in results[name].items():
+            print(
+                f"{name:<16} {kind:<6} {found['compared']:>8} {found['median_of_least']:>7.2f} "
+                f"{found['worst_of_least']:>7.2f} {found['within_1_3_percent']:>9.0f} {found['worst_s']:>9.3f}",
+                flush=True,
+            )
+    if options.json is not None:
+        options.json.write_text(json.dumps(results) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
