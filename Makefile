@@ -120,7 +120,7 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c check test test-all unit unit-plain pytest run til faults lint format soak bench figures options mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c dist check test test-all unit unit-plain pytest run til faults lint format soak bench figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -190,6 +190,12 @@ figures: build ## draw the figures of the manual anew (docs/images)
 options: build ## write docs/reference/options.md anew from the command line
 	@$(PY) tools/list_options.py
 
+# PLATFORM: of the wheel, where CC and AR build for another platform (docs/guides/install.md)
+DIST     ?= dist
+PLATFORM ?=
+dist: $(VENV)/.editable ## source distribution and wheel in dist/, the same bytes from the same commit
+	@$(PY) tools/dist/make_release.py $(DIST) $(if $(PLATFORM),--platform $(PLATFORM))
+
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/bench.py --build $(BUILD)
 
@@ -244,8 +250,8 @@ venv: $(VENV)/.editable
 $(VENV)/.ready: requirements.lock tools/make_venv.sh | $(READY)/packages
 	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(VENV) requirements.lock
 
-$(VENV)/.editable: host_tools/pyproject.toml $(VENV)/.ready
-	@$(PY) -m pip install --quiet --no-deps --no-build-isolation --no-index -e host_tools
+$(VENV)/.editable: pyproject.toml setup.py $(VENV)/.ready
+	@HODOGRAPH_BUILT_BY_MAKE=1 $(PY) -m pip install --quiet --no-deps --no-build-isolation --no-index -e .
 	@touch $@
 
 lock: $(READY)/uv/bin/uv ## write requirements.lock anew from requirements.in (newest versions)
@@ -355,7 +361,7 @@ include tests/target/target.mk
 ## ---- lint ------------------------------------------------------------------------------------------
 
 C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/target/*.c)
-PY_TREES   := $(wildcard host_tools tools tests benchmarks)
+PY_TREES   := $(wildcard host_tools tools tests benchmarks setup.py)
 JS_FILES   := $(wildcard host_tools/hodograph/monitor/page/*.js)
 SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)
 LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC)

@@ -84,7 +84,8 @@ def _check_socketcan(address: BusAddress) -> None:
         ) from None
     except OSError:
         raise BusError(
-            f"{address}: this kernel has no CAN: put tools/with-vcan in front of the command"
+            f"{address}: this kernel has no CAN: `hodograph rig FILE` serves a local bus, which other commands find "
+            "(or put tools/with-vcan in front of the command)"
         ) from None
     with probe:
         try:

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import BusError
@@ -17,7 +18,7 @@ HUB = "hodograph-hub"
 _LOOK_S = 0.002
 
 
-def _is_served(path: Path) -> bool:
+def is_served(path: Path) -> bool:
     """Whether a hub listens there: the socket is there a moment before."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
         return probe.connect_ex(str(path)) == 0
@@ -26,10 +27,18 @@ def _is_served(path: Path) -> bool:
 class LocalHub:
     """Serves `buses` local buses while its context is open; their addresses are in `addresses`."""
 
-    def __init__(self, *, virtual: bool = True, buses: int = 1, speed: float | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        virtual: bool = True,
+        buses: int = 1,
+        speed: float | None = None,
+        paths: Sequence[Path] | None = None,
+    ) -> None:
         """`virtual`: its time is virtual, and goes on `speed` times as fast as real time at most (None: as fast as
-        it can).
+        it can). `paths`: where the buses are served, instead of in a new folder for temporary files.
         """
+        self._paths = paths
         self._words = ["--time", "virtual" if virtual else "real"]
         if speed is not None:
             self._words += ["--speed", f"{speed:g}"]
@@ -44,12 +53,12 @@ class LocalHub:
 
     def __enter__(self) -> LocalHub:
         self._folder = tempfile.TemporaryDirectory(prefix="hodograph-")
-        paths = [Path(self._folder.name) / name for name in self._names]
+        paths = self._paths or [Path(self._folder.name) / name for name in self._names]
         command = [str(find_program(HUB)), *self._words, *map(str, paths)]
         child = self.child = subprocess.Popen(
             guarded(command), stdin=subprocess.DEVNULL, start_new_session=True
         )
-        while not all(_is_served(path) for path in paths):
+        while not all(is_served(path) for path in paths):
             if child.poll() is not None:
                 self._folder.cleanup()
                 raise BusError(f"{HUB} ended by itself (status {child.returncode})")

@@ -25,17 +25,23 @@ if TYPE_CHECKING:
 CONTROLLER, DRIVE = "hodograph-controller", "hodograph-drive"
 END_S = 8.0
 """For a process to end: a controller stops the axes and switches them off in 6 s at most."""
-_REPOSITORY = Path(__file__).resolve().parents[3]
+_PACKAGE = Path(__file__).resolve().parents[1]
+_REPOSITORY = _PACKAGE.parents[1]
 
 
 def find_program(name: str) -> Path:
-    """An executable of the build, or of $PATH. Raises BusError when there is none."""
-    built = _REPOSITORY / "build" / "bin" / name
-    if os.access(built, os.X_OK):
-        return built
+    """An executable that was installed with this package, or of the build, or of $PATH. Raises BusError when there is
+    none.
+    """
+    for folder in (_PACKAGE / "bin", _REPOSITORY / "build" / "bin"):
+        if os.access(folder / name, os.X_OK):
+            return folder / name
     found = shutil.which(name)
     if found is None:
-        raise BusError(f"{name} is not built (looked for {built} and in PATH): run make build")
+        raise BusError(
+            f"{name} is not there (looked for {_REPOSITORY / 'build' / 'bin' / name} and in PATH): "
+            "install the package, or run make build in the source tree"
+        )
     return Path(found)
 
 

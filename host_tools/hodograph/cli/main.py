@@ -24,6 +24,7 @@ _MODULES = {
     **dict.fromkeys(("spline", "feed", "compile", "inspect", "simulate"), "path_commands"),
     **dict.fromkeys(("upload", "goto", "run", "rig"), "motion_commands"),
     **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
+    "demo": "demo_command",
     "verify": "verify_command",
     "status": "status_command",
     "record": "record_command",

@@ -12,6 +12,7 @@ from typing import Any
 from ..bus.address import BusAddress, parse_address
 from ..bus.capture.recordings import check_suffix
 from ..bus.goto import goto as goto_point
+from ..bus.own_bus import opened_bus
 from ..bus.run import BusRun, rig_until_interrupted, run_program, station
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.status import loaded_program
@@ -113,7 +114,11 @@ def machine_of(file: Path, given: Path | None) -> Machine:
 
 def run(options: Namespace) -> None:
     """hodograph run."""
-    address = parse_address(options.bus)
+    with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
+        _run_all(options, address)
+
+
+def _run_all(options: Namespace, address: BusAddress) -> None:
     if not address.is_raw:
         raise BusError(
             f"{address}: run records at full bus load, which takes SocketCAN: use socketcan:CHANNEL "
@@ -198,11 +203,11 @@ def print_run(title: str, result: BusRun) -> None:
 
 def rig(options: Namespace) -> None:
     """hodograph rig."""
-    address = parse_address(options.bus)
     machine = machine_of(options.file, None)
     require_fit(machine)
     kernel = options.kernel or machine.kernel
-    rig_until_interrupted(machine, address, options.pace, kernel, note, options.controller)
+    with opened_bus(options.bus, note) as address:
+        rig_until_interrupted(machine, address, options.pace, kernel, note, options.controller)
 
 
 COMMANDS = {

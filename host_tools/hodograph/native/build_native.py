@@ -4,13 +4,15 @@
     python build_native.py [--build DIR]
 
 Links DIR/host/libhodograph_{sim,core}.a (DIR: `build` at the root of the tree), which `make c` makes,
-and puts `_native.abi3.so` beside this file. The Makefile calls it.
+and puts `_native.abi3.so` beside this file. The Makefile calls it. For `pip install`, setup.py takes `extension`, which
+compiles the sources itself.
 """
 
 import argparse
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 from cffi import FFI
 
@@ -29,11 +31,42 @@ HEADERS = (
     "offline/axis_run.h",
 )
 LIBRARIES = ("sim", "core")
+SOURCES = ("firmware/core", "sim/plant", "sim/offline")
+"""Folders whose sources these libraries are made of."""
+CFLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 
 
 def declarations() -> str:
     """The C declarations that the module offers to Python."""
     return (PACKAGE / "declarations.h").read_text(encoding="utf-8")
+
+
+def _ffi(**options: Any) -> FFI:
+    """The declarations of the module and how it is compiled; `options` go to set_source."""
+    ffi = FFI()
+    ffi.cdef(declarations())
+    includes = "".join(f'#include "{header}"\n' for header in HEADERS)
+    ffi.set_source(
+        "hodograph.native._native",
+        "#include <stdbool.h>\n" + includes,
+        extra_compile_args=list(CFLAGS),
+        libraries=["m"],
+        py_limited_api=True,
+        **options,
+    )
+    return ffi
+
+
+def extension(root: Path) -> Any:
+    """The module as an extension for setuptools, from all sources below `root`, the current folder."""
+    sources = sorted(
+        str(file.relative_to(root)) for folder in SOURCES for file in (root / folder).glob("*.c")
+    )
+    ffi = _ffi(sources=sources, include_dirs=["firmware", "sim"], extra_link_args=["-s"])
+    own: Any = ffi.distutils_extension(tmpdir="build/native")
+    own.py_limited_api = True
+    own.define_macros.append(("Py_LIMITED_API", "0x030b0000"))
+    return own
 
 
 def build(build_dir: Path) -> Path:
@@ -42,16 +75,9 @@ def build(build_dir: Path) -> Path:
     for archive in archives:
         if not archive.is_file():
             raise FileNotFoundError(f"{archive} is missing: run `make c` first")
-    ffi = FFI()
-    ffi.cdef(declarations())
-    ffi.set_source(
-        "hodograph.native._native",
-        "#include <stdbool.h>\n" + "".join(f'#include "{header}"\n' for header in HEADERS),
+    ffi = _ffi(
         include_dirs=[str(ROOT / "firmware"), str(ROOT / "sim")],
         extra_objects=[str(archive) for archive in archives],
-        extra_compile_args=["-std=c99", "-O2", "-ffp-contract=off"],
-        libraries=["m"],
-        py_limited_api=True,
     )
     work = build_dir / "native"
     work.mkdir(parents=True, exist_ok=True)

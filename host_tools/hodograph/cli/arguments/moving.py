@@ -39,7 +39,7 @@ def _run(command: Command) -> None:
     options.file(run, many=True)
     options.unhomed(run)
     options.machine(run)
-    options.bus(run)
+    options.bus(run, can_serve=True)
     options.kernel(run)
     options.json(run)
     run.add_argument(
@@ -60,15 +60,32 @@ def _run(command: Command) -> None:
     )
 
 
+def _demo(command: Command) -> None:
+    demo = command(
+        "demo", "run the paper's alpha on a simulated machine, with live page and report"
+    )
+    demo.add_argument(
+        "--output",
+        type=Path,
+        default=Path("hodograph-demo"),
+        metavar="DIR",
+        help="folder of the report (default hodograph-demo)",
+    )
+    demo.add_argument(
+        "--no-browser", action="store_true", help="print the address of the live page only, and end"
+    )
+    options.json(demo)
+
+
 def _rig(command: Command) -> None:
     rig = command("rig", "bring up a simulated machine on a virtual bus until Ctrl-C")
     rig.add_argument(
         "file", metavar="FILE", type=Path, help="machine file, or a path file that names one"
     )
-    options.bus(rig)
+    options.bus(rig, can_serve=True)
     options.kernel(rig)
     rig.add_argument("--pace", choices=PACES, default="real-time")
     options.controller(rig)
 
 
-ALL = (_upload, _goto, _run, _rig)
+ALL = (_upload, _goto, _run, _demo, _rig)

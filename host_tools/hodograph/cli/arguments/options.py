@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Callable
 from pathlib import Path
 
 from ...bus.address import BUS_VARIABLE, DEFAULT_BUS
+from ...bus.own_bus import usual_bus
 from ...names import KERNELS
 from ..values import finite, node_number, seconds
 
@@ -16,19 +16,20 @@ Command = Callable[[str, str], argparse.ArgumentParser]
 """Makes the parser of a command: its name, what it does."""
 
 
-def bus_name(parser: argparse.ArgumentParser) -> None:
-    """--bus."""
+def bus_name(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> None:
+    """--bus. `can_serve`: the command serves a local bus where there is none."""
+    where = "a local bus of its own" if can_serve else "the local bus of hodograph run or rig"
     parser.add_argument(
         "--bus",
-        default=os.environ.get(BUS_VARIABLE) or DEFAULT_BUS,
+        default=None if can_serve else usual_bus(),
         metavar="INTERFACE:CHANNEL",
-        help=f"as python-can has it (default ${BUS_VARIABLE}, else {DEFAULT_BUS})",
+        help=f"as python-can has it (default ${BUS_VARIABLE}, else {DEFAULT_BUS}, else {where})",
     )
 
 
-def bus(parser: argparse.ArgumentParser) -> None:
+def bus(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> None:
     """--bus, --wait."""
-    bus_name(parser)
+    bus_name(parser, can_serve=can_serve)
     parser.add_argument(
         "--wait", type=finite, default=2.0, metavar="S", help="how long to wait for the controller"
     )

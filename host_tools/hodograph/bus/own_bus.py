@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""The bus of commands that are not given one.
+
+$HODOGRAPH_BUS, else vcan0 where the kernel has it, else the local bus of this user: `hodograph run` and `hodograph rig`
+serve it while they run, at a path that all commands know, so that `hodograph status` and the others find it.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import BusError
+from .address import BUS_VARIABLE, DEFAULT_BUS, BusAddress, check_raw, parse_address
+from .hub import LocalHub, is_served
+
+
+def own_path() -> Path:
+    """Where the local bus of this user is served: below $XDG_RUNTIME_DIR, else below the folder for temporary files."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    if runtime and os.access(runtime, os.W_OK):
+        return Path(runtime) / "hodograph" / "bus"
+    return Path(tempfile.gettempdir()) / f"hodograph-{os.getuid()}" / "bus"
+
+
+def usual_bus() -> str:
+    """The bus of a command without --bus, which starts nothing."""
+    given = os.environ.get(BUS_VARIABLE)
+    if given:
+        return given
+    path = own_path()
+    return f"local:{path}" if is_served(path) and not _has_vcan() else DEFAULT_BUS
+
+
+@contextmanager
+def opened_bus(
+    given: str | None, note: Callable[[str], None], speed: float | None = 1.0
+) -> Iterator[BusAddress]:
+    """The bus of a command that can start a simulated machine: the one given, else the usual one; where there is none,
+    the local bus of this user, served until the end of the context in virtual time, `speed` times as fast as real time
+    at most (None: as fast as it can).
+    """
+    address = parse_address(given or usual_bus())
+    if given or os.environ.get(BUS_VARIABLE) or address.is_local or _has_vcan():
+        yield address
+        return
+    path = own_path()
+    _make_private(path.parent)
+    with LocalHub(paths=[path], speed=speed) as hub:
+        note(f"this kernel has no {DEFAULT_BUS}: using the local bus {hub.address}")
+        yield hub.address
+
+
+def _has_vcan() -> bool:
+    try:
+        check_raw(parse_address(DEFAULT_BUS))
+    except BusError:
+        return False
+    return True
+
+
+def _make_private(folder: Path) -> None:
+    """Makes the folder of the bus, for this user alone. Raises BusError where it belongs to somebody else."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        owner = folder.stat().st_uid
+    except OSError as error:
+        raise BusError(f"{folder}: cannot be made: {error.strerror}: give --bus") from None
+    if owner != os.getuid() or folder.is_symlink():
+        raise BusError(f"{folder}: belongs to another user: give --bus")

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""What pyproject.toml cannot say: the package holds a native module and programs, which are compiled here.
+
+Where `make` builds both (HODOGRAPH_BUILT_BY_MAKE=1), nothing is compiled: the module lies beside its sources then, and
+the programs in build/bin.
+"""
+
+import os
+import shutil
+import sys
+import zipfile
+from pathlib import Path
+
+from setuptools import setup
+from setuptools.command.bdist_wheel import bdist_wheel
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import FileError
+
+ROOT = Path(__file__).resolve().parent
+sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "host_tools/hodograph/native")]
+
+from build_native import extension  # noqa: E402
+
+from dist.programs import PROGRAMS, build_programs  # noqa: E402
+
+BY_MAKE = os.environ.get("HODOGRAPH_BUILT_BY_MAKE") == "1"
+NEEDED = (
+    "hodograph/data/controller.eds",
+    "hodograph/data/examples/*.toml",
+    "hodograph/data/examples/machines/*.toml",
+    "hodograph/data/examples/drives/*.toml",
+    "hodograph/monitor/page/index.html",
+    "hodograph/monitor/page/page.js",
+    "hodograph/monitor/page/style.css",
+    "hodograph/native/_native.abi3.so",
+    *(f"hodograph/bin/{name}" for name in PROGRAMS),
+)
+
+
+class BuildAll(build_ext):
+    """The native module, and then the programs, which lie in the package's folder `bin`."""
+
+    def run(self) -> None:
+        """Compiles both; an installation for editing gets the programs in build/bin, where `make` puts them."""
+        super().run()
+        work = Path(self.build_temp) / "programs"
+        if self.inplace or self.editable_mode:
+            build_programs(ROOT, work, ROOT / "build/bin")
+        else:
+            build_programs(ROOT, work, Path(self.build_lib) / "hodograph/bin")
+
+    def get_outputs(self) -> list[str]:
+        """Files of the wheel."""
+        programs = Path(self.build_lib) / "hodograph/bin"
+        return [*super().get_outputs(), *(str(programs / name) for name in PROGRAMS)]
+
+
+class NothingToBuild(build_ext):
+    """`make` has built all of it."""
+
+    def run(self) -> None:
+        """Nothing."""
+
+    def get_outputs(self) -> list[str]:
+        """None of ours."""
+        return []
+
+
+class CompleteWheel(bdist_wheel):
+    """A wheel with all its data, module and programs, or none."""
+
+    def run(self) -> None:
+        """Makes the wheel, and takes it back with a FileError when something is missing."""
+        super().run()
+        wheel = Path(self.distribution.dist_files[-1][2])
+        with zipfile.ZipFile(wheel) as archive:
+            names = [Path(name) for name in archive.namelist()]
+        missing = [needed for needed in NEEDED if not any(name.match(needed) for name in names)]
+        if missing:
+            wheel.unlink()
+            raise FileError(f"the wheel would lack {', '.join(missing)}")
+
+
+def remove_stale_build() -> None:
+    """setuptools packs what lies in build/lib, also from an older build: begin without."""
+    shutil.rmtree(ROOT / "build/lib", ignore_errors=True)
+
+
+remove_stale_build()
+setup(
+    ext_modules=[extension(ROOT)],
+    cmdclass={"bdist_wheel": CompleteWheel, "build_ext": NothingToBuild if BY_MAKE else BuildAll},
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+)

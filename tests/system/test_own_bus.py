@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""Commands without --bus: the local bus of this user where the kernel has no vcan0; and `hodograph demo`."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hodograph.bus import own_bus
+from hodograph.bus.hub import is_served
+from hodograph.errors import BusError
+
+ROOT = Path(__file__).resolve().parents[2]
+ALPHA = ROOT / "examples/alpha.toml"
+HANGS_S = 300.0
+
+
+@pytest.fixture
+def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
+    """A user without $HODOGRAPH_BUS, with a folder of their own."""
+    monkeypatch.delenv("HODOGRAPH_BUS", raising=False)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return dict(os.environ)
+
+
+def hodograph(environment: Mapping[str, str], *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "hodograph", *words]
+    return subprocess.run(
+        command,
+        env=dict(environment),
+        capture_output=True,
+        text=True,
+        timeout=HANGS_S,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+
+
+@contextmanager
+def simulated_machine(environment: Mapping[str, str]) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", "hodograph", "rig", str(ALPHA)]
+    with subprocess.Popen(
+        command, env=dict(environment), stderr=subprocess.PIPE, text=True
+    ) as machine:
+        try:
+            assert machine.stderr is not None
+            for line in machine.stderr:
+                if "Ctrl-C ends them" in line:
+                    break
+            yield machine
+        finally:
+            machine.send_signal(signal.SIGINT)
+
+
+def setpoints(kernel_run: subprocess.CompletedProcess[str]) -> str:
+    assert kernel_run.returncode == 0, kernel_run.stderr
+    return str(json.loads(kernel_run.stdout)["setpoints_sha256"])
+
+
+def test_run_serves_a_bus_of_its_own_and_says_so(environment: Mapping[str, str]) -> None:
+    run = hodograph(environment, "run", str(ALPHA), "--json", "--pace", "fast")
+    simulated = hodograph(environment, "simulate", str(ALPHA), "--json")
+    assert setpoints(run) == setpoints(simulated)
+    assert "using the local bus local:" in run.stderr
+
+
+def test_other_commands_find_the_bus_of_a_simulated_machine(
+    environment: Mapping[str, str],
+) -> None:
+    with simulated_machine(environment) as machine:
+        status = hodograph(environment, "status", "--json")
+        run = hodograph(environment, "run", str(ALPHA), "--json")
+    assert machine.returncode in (0, 130)
+    assert status.returncode == 0, status.stderr
+    assert setpoints(run)
+    after = hodograph(environment, "status")
+    assert after.returncode == 4
+    assert "hodograph rig FILE" in after.stderr
+    assert "Traceback" not in after.stderr
+
+
+def test_a_given_bus_that_is_not_there_is_an_error(environment: Mapping[str, str]) -> None:
+    run = hodograph(environment, "run", str(ALPHA), "--bus", "socketcan:vcan97")
+    assert run.returncode == 4
+    assert "local bus local:" not in run.stderr
+
+
+def test_a_folder_of_another_user_is_refused(
+    environment: Mapping[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.getuid
+    (tmp_path / "hodograph").mkdir()
+    monkeypatch.setattr(os, "getuid", lambda: real() + 1)
+    with pytest.raises(BusError, match="another user"), own_bus.opened_bus(None, print):
+        pass
+
+
+def test_the_hub_ends_with_the_command(
+    environment: Mapping[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with own_bus.opened_bus(None, print) as address:
+        assert is_served(Path(address.channel))
+        assert own_bus.usual_bus() == str(address)
+    assert not is_served(Path(address.channel))
+    assert str(address) in capsys.readouterr().out
+
+
+def test_demo(environment: Mapping[str, str], tmp_path: Path) -> None:
+    """Live page, run and report, with the setpoints of `simulate`."""
+    demo = hodograph(
+        environment, "demo", "--no-browser", "--json", "--output", str(tmp_path / "out")
+    )
+    simulated = hodograph(environment, "simulate", str(ALPHA), "--json")
+    assert setpoints(demo) == setpoints(simulated)
+    told = json.loads(demo.stdout)
+    assert told["page"].startswith("http://127.0.0.1:")
+    assert Path(told["report"]).stat().st_size > 100_000
+    assert told["page"] in demo.stderr

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: MIT
+"""The source distribution and the wheel: complete, the same bytes twice, and enough to run a program."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from dist.make_release import make_release
+from dist.programs import PROGRAMS
+
+ROOT = Path(__file__).resolve().parents[2]
+HANGS_S = 600.0
+
+
+def unpacked(wheel: Path, folder: Path) -> dict[str, str]:
+    """Installs a wheel into an empty folder; the environment of a user who has nothing else."""
+    target = folder / "site"
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index"]
+    subprocess.run([*pip, "--target", str(target), str(wheel)], check=True, timeout=HANGS_S)
+    return {"PATH": str(folder), "HOME": str(folder), "PYTHONPATH": str(target)}
+
+
+def python(environment: dict[str, str], folder: Path, *words: str) -> str:
+    done = subprocess.run(
+        [sys.executable, *words],
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=HANGS_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_wheel_alone_runs_the_demo(tmp_path: Path) -> None:
+    """Built once for all that is to be seen in it: a build takes long."""
+    source, wheel = make_release(tmp_path / "dist", None)
+    check_source(source)
+    check_wheel(wheel)
+    environment = unpacked(wheel, tmp_path)
+    where = "import hodograph.bus.processes as p; print(p.find_program('hodograph-hub'))"
+    found = python(environment, tmp_path, "-c", where)
+    assert found.startswith(environment["PYTHONPATH"])
+    demo = python(environment, tmp_path, "-m", "hodograph", "demo", "--no-browser", "--json")
+    assert json.loads(demo)["ticks"] > 1000
+    assert (tmp_path / "hodograph-demo/report.html").exists()
+
+
+def check_wheel(wheel: Path) -> None:
+    """All programs may be executed, and no path of this computer is in it."""
+    with zipfile.ZipFile(wheel) as archive:
+        for name in PROGRAMS:
+            mode = archive.getinfo(f"hodograph/bin/{name}").external_attr >> 16
+            assert mode & 0o111 == 0o111, name
+        for name in archive.namelist():
+            data = archive.read(name)
+            assert str(ROOT).encode() not in data, name
+            assert b"hodograph-dist-" not in data, name
+
+
+def check_source(source: Path) -> None:
+    """It has all that the package is built from, and names neither a user nor a time of this computer."""
+    with tarfile.open(source) as archive:
+        members = archive.getmembers()
+    assert {(m.uid, m.gid, m.uname, m.gname) for m in members} == {(0, 0, "", "")}
+    assert len({m.mtime for m in members}) == 1
+    names = {m.name.partition("/")[2] for m in members}
+    assert {"firmware/core/program.c", "sim/hub/main.c", "LICENSE", "CHANGELOG.md"} <= names
+
+
+@pytest.mark.long
+def test_the_same_bytes_twice(tmp_path: Path) -> None:
+    first, second = (make_release(tmp_path / name, None) for name in ("a", "b"))
+    assert [file.read_bytes() for file in first] == [file.read_bytes() for file in second]
+
+
+@pytest.mark.long
+def test_a_compiler_that_fails_leaves_no_wheel(tmp_path: Path) -> None:
+    environment = os.environ | {"CC": "false"}
+    script = str(ROOT / "tools/dist/make_release.py")
+    made = subprocess.run(
+        [sys.executable, script, str(tmp_path)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=HANGS_S,
+        check=False,
+    )
+    assert made.returncode != 0
+    assert not list(tmp_path.glob("*.whl"))

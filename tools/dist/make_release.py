@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""make_release.py: the source distribution and the wheel, the same bytes from the same commit: `make dist`.
+
+    make_release.py OUT [--platform TAG]
+
+The wheel is built from the unpacked source distribution, so that nothing which that lacks can get into it. Times in both
+are SOURCE_DATE_EPOCH, or that of the last commit. `--platform` names the platform of the wheel, for compilers ($CC, $AR)
+that build for another one than this computer's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import hashlib
+import os
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+_BUILD = "from setuptools.build_meta import {what}; {what}({out!r})"
+
+
+def epoch_s() -> int:
+    """The time that all files get."""
+    given = os.environ.get("SOURCE_DATE_EPOCH")
+    if given:
+        return int(given)
+    command = ["git", "-C", str(ROOT), "log", "-1", "--format=%ct"]
+    return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def backend(what: str, tree: Path, out: Path, time_s: int) -> None:
+    """Calls build_sdist or build_wheel of the build backend in a tree; raises CalledProcessError."""
+    environment = os.environ | {"SOURCE_DATE_EPOCH": str(time_s), "HODOGRAPH_BUILT_BY_MAKE": ""}
+    command = [sys.executable, "-c", _BUILD.format(what=what, out=str(out))]
+    subprocess.run(command, check=True, cwd=tree, env=environment, stdout=subprocess.DEVNULL)
+
+
+def checked_out(folder: Path) -> Path:
+    """A copy of the files that git knows, as they are now."""
+    listed = subprocess.run(
+        ["git", "-C", str(ROOT), "ls-files", "-co", "--exclude-standard", "-z"],
+        check=True,
+        capture_output=True,
+    ).stdout
+    tree = folder / "tree"
+    for name in filter(None, listed.decode().split("\0")):
+        source = ROOT / name
+        if not source.exists():
+            continue  # removed, and not yet committed
+        target = tree / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if source.is_symlink():
+            target.symlink_to(os.readlink(source))
+        else:
+            target.write_bytes(source.read_bytes())
+            target.chmod(source.stat().st_mode)
+    return tree
+
+
+def normalised(archive: Path, out: Path, time_s: int) -> Path:
+    """The same archive with its members in order, of nobody, at one time."""
+    target = out / archive.name
+    with (
+        tarfile.open(archive) as source,
+        target.open("wb") as raw,
+        gzip.GzipFile(filename="", fileobj=raw, mode="wb", mtime=time_s) as packed,
+        tarfile.open(fileobj=packed, mode="w", format=tarfile.PAX_FORMAT) as made,
+    ):
+        for member in sorted(source.getmembers(), key=lambda member: member.name):
+            member.mtime, member.uid, member.gid = time_s, 0, 0
+            member.uname = member.gname = ""
+            member.mode = 0o755 if member.isdir() or member.mode & 0o100 else 0o644
+            member.pax_headers = {}
+            made.addfile(member, source.extractfile(member) if member.isfile() else None)
+    return target
+
+
+def make_release(out: Path, platform: str | None) -> list[Path]:
+    """Source distribution and wheel in `out`."""
+    out.mkdir(parents=True, exist_ok=True)
+    time_s = epoch_s()
+    with tempfile.TemporaryDirectory(prefix="hodograph-dist-") as folder:
+        work = Path(folder)
+        backend("build_sdist", checked_out(work), work, time_s)
+        source = normalised(next(work.glob("hodograph-*.tar.gz")), out, time_s)
+        with tarfile.open(source) as archive:
+            archive.extractall(work / "source", filter="data")
+        (tree,) = (work / "source").iterdir()
+        if platform is not None:
+            with (tree / "setup.cfg").open("a", encoding="ascii") as settings:
+                settings.write(f"\n[bdist_wheel]\nplat_name = {platform}\n")
+        backend("build_wheel", tree, work, time_s)
+        wheel = next(work.glob("hodograph-*.whl"))
+        target = out / wheel.name
+        target.write_bytes(wheel.read_bytes())
+    return [source, target]
+
+
+def main() -> int:
+    """Exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--platform", metavar="TAG", help="as in manylinux2014_aarch64")
+    options = parser.parse_args()
+    for file in make_release(options.out.resolve(), options.platform):
+        data = file.read_bytes()
+        print(f"{hashlib.sha256(data).hexdigest()}  {file.name}  {len(data) / 1e6:.2f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
