@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* node_faults: carries out the fault rules that are about drives (docs/reference/protocol.md section 4) on
- * the drives of this process. */
+/* node_faults: faults injected into simulated drives: carries out the fault rules that are about drives
+ * (docs/reference/protocol.md section 4) on the drives of this process.
+ *
+ * Each rule is independent of the others. A fault stays until its rule ends; a restart of the drive ends none: a broken
+ * encoder stays broken. Same context as drive_node_receive, between two frames.
+ */
 #ifndef NODE_NODE_FAULTS_H
 #define NODE_NODE_FAULTS_H
 
@@ -32,5 +36,18 @@ void node_faults_receive(struct node_faults *faults, const struct can_msg *in, u
 
 /* Wall time passes: what lasts for ms ends. */
 void node_faults_process(struct node_faults *faults, uint64_t now_ns);
+
+/* Begins (on) or ends the fault of one rule, which is about drives, on one drive; fault_parse has checked its figures:
+ *     stop             on: no power: sends and receives nothing, the axis is on its brake. Off: the drive boots
+ *     restart          on: power lost and back at once
+ *     heartbeat-stop   sends no heartbeats
+ *     encoder-freeze   the position read stays as it is now. Off: the true one again
+ *     encoder-jump     bus counts, added to the position read. Off: subtracted again
+ *     encoder-fault    the drive notices that its encoder fails: EMCY 0x7305. Off: a fault reset has effect again
+ *     saturate         the voltage limit, V; below a tenth of the drive's own the supply has failed: EMCY 0x3220
+ *     load             load torque as the voltage that it takes, V; positive pushes in the negative direction
+ *     limit-switch     the input of this switch comes on. Off: the switch itself decides again
+ *     fault            on: to Fault with this EMCY code */
+void node_faults_carry_out(struct drive_node *node, const struct fault_rule *rule, bool on);
 
 #endif

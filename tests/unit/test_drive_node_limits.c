@@ -4,7 +4,6 @@
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 #include "drive_bench.h"
-#include "node/node_fault.h"
 #include "unity.h"
 
 void setUp(void)
@@ -18,7 +17,7 @@ void tearDown(void)
 
 static enum cia402_state state(void)
 {
-    return bench.node.device.state;
+    return bench.node.servo.device.state;
 }
 
 static void put(uint16_t index, uint8_t sub, int64_t value)
@@ -32,11 +31,6 @@ static void move(int periods, int32_t counts)
         bench.target += counts;
         drive_bench_run(1);
     }
-}
-
-static void fault(enum node_fault kind, double value, bool on)
-{
-    TEST_ASSERT_EQUAL_INT(0, drive_node_fault(&bench.node, kind, value, on));
 }
 
 /* Fault reset has no effect while the cause is there; then it helps. */
@@ -56,7 +50,7 @@ static void test_following_error(void)
     drive_bench_enable();
     move(500, 10000);
     TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
-    fault(NODE_FAULT_ENCODER_FREEZE, 0, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FREEZE}, true);
     int periods = 0;
     while (state() == CIA402_OPERATION_ENABLED && periods < 100) {
         move(1, 10000);
@@ -66,7 +60,7 @@ static void test_following_error(void)
     drive_bench_expect_emcy(EMCY_FOLLOWING_ERROR, EMCY_REGISTER_PROFILE | EMCY_REGISTER_GENERIC);
     drive_bench_run(1);
     TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_FOLLOWING_ERROR) != 0);
-    fault(NODE_FAULT_ENCODER_FREEZE, 0, false);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FREEZE}, false);
     drive_bench_run(1500);
     TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
     reset(CIA402_SWITCH_ON_DISABLED);
@@ -78,38 +72,36 @@ static void test_a_jump_of_the_encoder(void)
 {
     put(0x6065, 0, 100000);
     drive_bench_enable();
-    fault(NODE_FAULT_ENCODER_JUMP, 200000, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_JUMP, .counts = 200000}, true);
     drive_bench_run(1);
     TEST_ASSERT_INT32_WITHIN(20, 1200000, drive_bench_position());
     drive_bench_run(1);
     TEST_ASSERT_EQUAL_HEX16(EMCY_FOLLOWING_ERROR, drive_bench_read(0x603F, 0));
-    TEST_ASSERT_EQUAL_INT(NODE_FAULT_ERR_VALUE,
-                          drive_node_fault(&bench.node, NODE_FAULT_ENCODER_JUMP, 1e12, true));
 }
 
 static void test_an_encoder_that_fails(void)
 {
     drive_bench_enable();
     move(300, 50000);
-    fault(NODE_FAULT_ENCODER_FAULT, 0, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FAULT}, true);
     TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state()); /* nothing to stop with */
     drive_bench_expect_emcy(EMCY_POSITION_SENSOR_1, EMCY_REGISTER_PROFILE | EMCY_REGISTER_GENERIC);
     drive_bench_run(100);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.axis));
+    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
     reset(CIA402_FAULT);
-    fault(NODE_FAULT_ENCODER_FAULT, 0, false);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FAULT}, false);
     reset(CIA402_SWITCH_ON_DISABLED);
 }
 
 static void test_undervoltage(void)
 {
     drive_bench_enable();
-    fault(NODE_FAULT_SATURATE, 0.4, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_SATURATE, .volts = 0.4}, true);
     TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
     drive_bench_expect_emcy(EMCY_DC_UNDERVOLTAGE, EMCY_REGISTER_VOLTAGE | EMCY_REGISTER_GENERIC);
     TEST_ASSERT_EQUAL_HEX16(0, drive_bench_read(0x6041, 0) & CIA402_STATUS_VOLTAGE);
     reset(CIA402_FAULT);
-    fault(NODE_FAULT_SATURATE, 0, false);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_SATURATE}, false);
     reset(CIA402_SWITCH_ON_DISABLED);
     TEST_ASSERT_TRUE((drive_bench_read(0x6041, 0) & CIA402_STATUS_VOLTAGE) != 0);
 }
@@ -120,7 +112,7 @@ static void test_overload(void)
 {
     put(0x6067, 0, 1000000);
     drive_bench_enable();
-    fault(NODE_FAULT_LOAD, 4.5, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_LOAD, .volts = 4.5}, true);
     drive_bench_run(2000);
     TEST_ASSERT_INT_WITHIN(5, 1800, (int)drive_bench_read(0x6077, 0));
     TEST_ASSERT_INT_WITHIN(5, 1800, (int)drive_bench_read(0x6078, 0));
@@ -137,7 +129,7 @@ static void test_overload(void)
     TEST_ASSERT_EQUAL_HEX16(EMCY_OVERLOAD, drive_bench_read(0x603F, 0));
     TEST_ASSERT_EQUAL_HEX8(EMCY_REGISTER_CURRENT | EMCY_REGISTER_GENERIC,
                            drive_bench_read(0x1001, 0));
-    fault(NODE_FAULT_LOAD, 0, false);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_LOAD}, false);
     reset(CIA402_FAULT);
     drive_bench_run(6000); /* cools by 1 s a second, to 80 % of 30 s */
     reset(CIA402_SWITCH_ON_DISABLED);
@@ -182,15 +174,15 @@ static void test_limit_switch(void)
 static void test_a_switch_that_is_forced(void)
 {
     drive_bench_enable();
-    fault(NODE_FAULT_LIMIT_SWITCH, -1, true);
+    drive_bench_fault(
+        (struct fault_rule){.kind = FAULT_KIND_LIMIT_SWITCH, .side = FAULT_SIDE_NEGATIVE}, true);
     move(20, 10000);
     TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
     move(2, -10000);
     TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
-    fault(NODE_FAULT_LIMIT_SWITCH, -1, false);
+    drive_bench_fault(
+        (struct fault_rule){.kind = FAULT_KIND_LIMIT_SWITCH, .side = FAULT_SIDE_NEGATIVE}, false);
     TEST_ASSERT_EQUAL_HEX32(0, drive_bench_read(0x60FD, 0));
-    TEST_ASSERT_EQUAL_INT(NODE_FAULT_ERR_VALUE,
-                          drive_node_fault(&bench.node, NODE_FAULT_LIMIT_SWITCH, 0, true));
 }
 
 static void test_software_limits(void)
@@ -273,10 +265,10 @@ static void test_the_mapping_of_a_pdo_that_is_on_stays(void)
 static void test_torque_that_leaves_its_object(void)
 {
     drive_bench_enable();
-    bench.node.load_per_volt = 1e9;
-    bench.node.axis.drive.state.volts = 1.0;
+    bench.node.servo.supervision.load_per_volt = 1e9;
+    bench.node.servo.axis.drive.state.volts = 1.0;
     TEST_ASSERT_EQUAL_INT64(INT16_MAX, drive_bench_read(0x6077, 0));
-    bench.node.axis.drive.state.volts = -1.0;
+    bench.node.servo.axis.drive.state.volts = -1.0;
     TEST_ASSERT_EQUAL_INT64(INT16_MIN, drive_bench_read(0x6077, 0));
 }
 
@@ -303,14 +295,14 @@ static void test_scaling(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x608F, 2, 2));
     TEST_ASSERT_EQUAL_INT64(9990265, drive_bench_read(0x6092, 1));
     put(0x6092, 1, 9990265); /* what it has: nothing is rounded */
-    TEST_ASSERT_TRUE(bench.node.axis.drive.counts_per_mm == 1e6);
+    TEST_ASSERT_TRUE(bench.node.servo.axis.drive.counts_per_mm == 1e6);
     put(0x6092, 1, 99903);
     TEST_ASSERT_INT32_WITHIN(1, 10000, (int32_t)drive_bench_read(0x6064, 0));
     put(0x6091, 1, 2); /* two turns of the motor for one of the shaft: half the counts */
     TEST_ASSERT_INT32_WITHIN(1, 5000, (int32_t)drive_bench_read(0x6064, 0));
     put(0x6091, 2, 2);
     put(0x6092, 1, 9990265);
-    TEST_ASSERT_TRUE(bench.node.axis.drive.counts_per_mm == 1e6);
+    TEST_ASSERT_TRUE(bench.node.servo.axis.drive.counts_per_mm == 1e6);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x6092, 1, 1));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_LOW, drive_bench_write(0x6092, 1, 0));
     drive_bench_enable();
@@ -326,7 +318,7 @@ static void test_a_scaled_axis_moves(void)
     move(1000, 20);
     drive_bench_run(300);
     TEST_ASSERT_INT32_WITHIN(1, 30000, drive_bench_position());
-    TEST_ASSERT_DOUBLE_WITHIN(0.001, 3.0, axis_motion_place_mm(&bench.node.axis));
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, 3.0, axis_motion_place_mm(&bench.node.servo.axis));
 }
 
 static void test_feedforward_objects(void)
@@ -342,16 +334,18 @@ static void test_feedforward_objects(void)
     put(0x60B1, 0, 1590000); /* 1 rad/s of the screw of 1.59 mm/rad */
     put(0x60B2, 0, 400);     /* of half of 5 V */
     drive_bench_sync();
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, bench.node.axis.influence.speed_offset_rad_s);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, bench.node.axis.influence.volts_offset);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, bench.node.servo.axis.influence.speed_offset_rad_s);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, bench.node.servo.axis.influence.volts_offset);
     put(0x60B1, 0, 0);
     put(0x60B2, 0, 0);
     drive_bench_sync();
-    TEST_ASSERT_FALSE(influence_acts(&bench.node.axis.influence, &bench.node.axis.drive));
+    TEST_ASSERT_FALSE(
+        influence_acts(&bench.node.servo.axis.influence, &bench.node.servo.axis.drive));
     put(0x60B2, 0, 400);
     put(0x6040, 0, CIA402_DISABLE_VOLTAGE);
     drive_bench_sync();
-    TEST_ASSERT_FALSE(influence_acts(&bench.node.axis.influence, &bench.node.axis.drive));
+    TEST_ASSERT_FALSE(
+        influence_acts(&bench.node.servo.axis.influence, &bench.node.servo.axis.drive));
 }
 
 static void test_digital_inputs_on_change(void)
@@ -361,7 +355,8 @@ static void test_digital_inputs_on_change(void)
     TEST_ASSERT_NOT_NULL(drive_bench_newest(0x380));
     drive_bench_run(20);
     TEST_ASSERT_NULL(drive_bench_newest(0x380));
-    fault(NODE_FAULT_LIMIT_SWITCH, 1, true);
+    drive_bench_fault(
+        (struct fault_rule){.kind = FAULT_KIND_LIMIT_SWITCH, .side = FAULT_SIDE_POSITIVE}, true);
     drive_bench_run(1);
     TEST_ASSERT_NOT_NULL(drive_bench_newest(0x380));
     TEST_ASSERT_EQUAL_HEX64(EQUIPMENT_INPUT_POSITIVE, cob_get(drive_bench_newest(0x380)->data, 4));
@@ -376,7 +371,7 @@ static void test_sync_counter(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x1019, 0, 1));
     put(0x1019, 0, 10);
     put(0x1006, 0, 2000);
-    TEST_ASSERT_EQUAL_UINT32(32, bench.node.axis.drive.samples);
+    TEST_ASSERT_EQUAL_UINT32(32, bench.node.servo.axis.drive.samples);
 }
 
 static void test_identity_and_ratings(void)

@@ -108,6 +108,8 @@ static void test_what_is_wrong_is_said_with_its_line(void)
     refused("limit-switch at=1 node=2 side=drives", "'side=drives'");
     refused("encoder-jump at=1 node=2 counts=2147483648", "counts=2147483648");
     refused("saturate at=1 node=2 volts=0", "'volts=0'");
+    refused("encoder-jump at=1 node=2 counts=-2147483649", "counts=-2147483649");
+    refused("fault at=1 node=2 code=0", "'code=0'");
     refused("stop at=1 node=0", "'node=0'");
     refused("restart at=1 node=2 for=2", "no key 'for'");
 }
