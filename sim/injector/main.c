@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "faults/fault_file.h"
 #include "faults/fault_log.h"
+#include "faults/fault_rules.h"
 #include "injector/forwarder.h"
 #include "injector/injector_options.h"
 #include "injector/outbox.h"
@@ -53,11 +53,11 @@ static void flush_both(struct injector *injector)
     }
 }
 
-static void note(void *context, const struct fault_watch *watch, enum fault_side from,
+static void note(void *context, const struct fault_trigger *trigger, enum fault_side from,
                  const struct can_msg *frame, bool on)
 {
     const struct injector *injector = context;
-    const struct fault_event event = {watch->rule, injector->now_ns,
+    const struct fault_event event = {trigger->rule, injector->now_ns,
                                       injector->forwarder.ticks.tick};
     if (!injector->verbose) {
         return;
@@ -135,7 +135,7 @@ static int start(struct injector *injector, const struct injector_options *optio
     const struct sched_param priority = {.sched_priority = PRIORITY};
     const int signals = end_signals_open();
     if (options->rules != NULL &&
-        fault_file_read(&injector->rules, options->rules, reason, sizeof reason) != 0) {
+        fault_rules_read(&injector->rules, options->rules, reason, sizeof reason) != 0) {
         return complain(EXIT_USAGE, reason);
     }
     if (signals < 0) {

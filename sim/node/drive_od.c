@@ -129,11 +129,15 @@ static uint32_t interpolation_period_us(uint32_t value, int32_t exponent)
 static uint32_t interpolation_period_check(struct drive_node *node,
                                            const struct od_request *request)
 {
-    const uint32_t value = node->values.interpolation_time_period.interpolation_time_period_value;
-    const int32_t exponent = node->values.interpolation_time_period.interpolation_time_index;
-    return set_period(node, request->entry->sub == 1
-                                ? interpolation_period_us(request->number, exponent)
-                                : interpolation_period_us(value, (int32_t)signed_number(request)));
+    const struct od_drive *v = &node->values;
+    if (request->entry->sub == 1) {
+        return set_period(
+            node, interpolation_period_us(request->number,
+                                          v->interpolation_time_period.interpolation_time_index));
+    }
+    return set_period(
+        node, interpolation_period_us(v->interpolation_time_period.interpolation_time_period_value,
+                                      (int32_t)signed_number(request)));
 }
 
 static void controlword_changed(struct drive_node *node, const struct od_entry *entry)

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "faults/fault_file.h"
+#include "faults/fault_rules.h"
 #include "node/drives.h"
 #include "node/node_options.h"
 #include "port/linux/clock.h"
@@ -79,7 +79,7 @@ static int start(struct drives *drives, const struct node_options *options)
     uint8_t node = 0;
     const int signals = end_signals_open();
     if (options->faults != NULL &&
-        fault_file_read(&drives->rules, options->faults, reason, sizeof reason) != 0) {
+        fault_rules_read(&drives->rules, options->faults, reason, sizeof reason) != 0) {
         return complain(EXIT_USAGE, reason);
     }
     const int error = drives_init(drives, options, &node);

@@ -15,9 +15,9 @@ void node_faults_init(struct node_faults *faults, const struct fault_rules *rule
     faults->nodes = nodes;
     faults->node_count = node_count;
     faults->note = note;
-    tick_count_init(&faults->ticks);
+    fault_ticks_init(&faults->ticks);
     for (uint32_t i = 0; i < rules->count; i++) {
-        fault_watch_init(&faults->watches[i], &rules->rules[i]);
+        fault_trigger_init(&faults->triggers[i], &rules->rules[i]);
     }
 }
 
@@ -127,7 +127,7 @@ static void follow(struct node_faults *faults, uint64_t now_ns)
 {
     for (uint32_t i = 0; i < faults->rules->count; i++) {
         const struct fault_rule *rule = &faults->rules->rules[i];
-        const bool acts = fault_watch_acts(&faults->watches[i], faults->ticks.tick, now_ns);
+        const bool acts = fault_trigger_acts(&faults->triggers[i], faults->ticks.tick, now_ns);
         if (!fault_kind_is_drives(rule->kind) || acts == faults->acts[i]) {
             continue;
         }
@@ -143,7 +143,7 @@ static void follow(struct node_faults *faults, uint64_t now_ns)
 
 void node_faults_receive(struct node_faults *faults, const struct can_msg *in, uint64_t now_ns)
 {
-    if (tick_count_receive(&faults->ticks, in)) {
+    if (fault_ticks_receive(&faults->ticks, in)) {
         follow(faults, now_ns);
     }
 }

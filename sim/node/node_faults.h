@@ -8,9 +8,8 @@
 #ifndef NODE_NODE_FAULTS_H
 #define NODE_NODE_FAULTS_H
 
-#include "faults/fault_rule.h"
-#include "faults/fault_watch.h"
-#include "faults/tick_count.h"
+#include "faults/fault_rules.h"
+#include "faults/fault_trigger.h"
 #include "node/drive_node.h"
 
 /* A rule begins or ends. */
@@ -19,9 +18,9 @@ typedef void node_faults_note(const struct fault_rule *rule, uint64_t now_ns, in
 
 struct node_faults {
     const struct fault_rules *rules;
-    struct fault_watch watches[FAULT_RULES_MAX]; /* by rule; those of the injector are not used */
+    struct fault_trigger triggers[FAULT_RULES_MAX]; /* by rule; not used: the injector's */
     bool acts[FAULT_RULES_MAX];
-    struct tick_count ticks;
+    struct fault_ticks ticks;
     struct drive_node *nodes; /* borrowed */
     size_t node_count;
     node_faults_note *note;
@@ -37,7 +36,7 @@ void node_faults_receive(struct node_faults *faults, const struct can_msg *in, u
 /* Wall time passes: what lasts for ms ends. */
 void node_faults_process(struct node_faults *faults, uint64_t now_ns);
 
-/* Begins (on) or ends the fault of one rule, which is about drives, on one drive; fault_parse has checked its figures:
+/* Begins (on) or ends the fault of one rule, which is about drives, on one drive; fault_rules_parse has checked its figures:
  *     stop             on: no power: sends and receives nothing, the axis is on its brake. Off: the drive boots
  *     restart          on: power lost and back at once
  *     heartbeat-stop   sends no heartbeats

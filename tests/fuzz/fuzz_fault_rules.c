@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "drive_bench.h"
-#include "faults/fault_parse.h"
+#include "faults/fault_rules.h"
 #include "fuzz.h"
 #include "injector/forwarder.h"
 #include "node/node_faults.h"
@@ -35,14 +35,14 @@ static void from_bridge(void *context, enum fault_side to, const struct can_msg 
     check_frame(frame);
 }
 
-static void noted(void *context, const struct fault_watch *watch, enum fault_side from,
+static void noted(void *context, const struct fault_trigger *trigger, enum fault_side from,
                   const struct can_msg *frame, bool on)
 {
     (void)context;
     (void)from;
     (void)frame;
     (void)on;
-    FUZZ_CHECK(watch->rule->line > 0u);
+    FUZZ_CHECK(trigger->rule->line > 0u);
 }
 
 static void from_drive(void *context, const struct can_msg *frame)
@@ -68,7 +68,7 @@ static bool parse(struct fuzz_input *in)
         text[length++] = (char)byte;
         byte = fuzz_byte(in);
     }
-    const int result = fault_parse(&rules, text, length, reason, sizeof reason);
+    const int result = fault_rules_parse(&rules, text, length, reason, sizeof reason);
     FUZZ_CHECK(result == 0 || (reason[0] != '\0' && strchr(reason, '\n') == NULL));
     FUZZ_CHECK(rules.count <= FAULT_RULES_MAX);
     return result == 0;

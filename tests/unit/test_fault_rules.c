@@ -6,11 +6,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "faults/fault_file.h"
 #include "faults/fault_log.h"
-#include "faults/fault_parse.h"
-#include "faults/fault_watch.h"
-#include "faults/tick_count.h"
+#include "faults/fault_rules.h"
+#include "faults/fault_trigger.h"
 #include "unity.h"
 
 static struct fault_rules rules;
@@ -28,14 +26,14 @@ void tearDown(void)
 
 static void parse(const char *text)
 {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, fault_parse(&rules, text, strlen(text), reason, sizeof reason),
-                                  reason);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(
+        0, fault_rules_parse(&rules, text, strlen(text), reason, sizeof reason), reason);
 }
 
 static void refused(const char *text, const char *part)
 {
-    TEST_ASSERT_EQUAL_INT(FAULT_PARSE_WRONG,
-                          fault_parse(&rules, text, strlen(text), reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(FAULT_RULES_WRONG,
+                          fault_rules_parse(&rules, text, strlen(text), reason, sizeof reason));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, part), reason);
     TEST_ASSERT_NULL(strchr(reason, '\n'));
 }
@@ -129,14 +127,14 @@ static void test_bounds_of_text(void)
     line[FAULT_LINE_MAX] = '\0';
     parse(line);
     static const char nul[] = "drop at=1 id=1\n\0drop";
-    TEST_ASSERT_EQUAL_INT(FAULT_PARSE_WRONG,
-                          fault_parse(&rules, nul, sizeof nul - 1u, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(FAULT_RULES_WRONG,
+                          fault_rules_parse(&rules, nul, sizeof nul - 1u, reason, sizeof reason));
     TEST_ASSERT_NOT_NULL(strstr(reason, "line 2"));
 }
 
 static void test_a_file_that_is_not_there(void)
 {
-    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, "/no/such/rules", reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(-1, fault_rules_read(&rules, "/no/such/rules", reason, sizeof reason));
     TEST_ASSERT_EQUAL_STRING("/no/such/rules: No such file or directory", reason);
 }
 
@@ -157,16 +155,16 @@ static void test_a_file_of_rules(void)
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, opened);
     TEST_ASSERT_EQUAL_INT(0, close(opened));
     write_file(path, "# two\ndrop at=5 id=0x182\nstop at=4 node=2\n", 1);
-    TEST_ASSERT_EQUAL_INT(0, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(0, fault_rules_read(&rules, path, reason, sizeof reason));
     TEST_ASSERT_EQUAL_UINT32(2, rules.count);
     TEST_ASSERT_EQUAL_UINT32(3, rules.rules[1].line);
     write_file(path, "drop at=5\n", 1);
-    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(-1, fault_rules_read(&rules, path, reason, sizeof reason));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, ": line 1: drop needs id="), reason);
     write_file(path, "# 16 characters\n", FAULT_FILE_MAX / 16u);
-    TEST_ASSERT_EQUAL_INT(0, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(0, fault_rules_read(&rules, path, reason, sizeof reason));
     write_file(path, "# 17 characters!\n", FAULT_FILE_MAX / 16u);
-    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(-1, fault_rules_read(&rules, path, reason, sizeof reason));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, "longer than 16384 bytes"), reason);
     TEST_ASSERT_EQUAL_INT(0, remove(path));
 }
@@ -193,44 +191,44 @@ static void test_lines_of_the_log(void)
 
 static void test_ticks_and_frames_of_a_rule(void)
 {
-    struct fault_watch watch;
+    struct fault_trigger trigger;
     const struct can_msg frame = {.id = 0x182}, other = {.id = 0x183};
     parse("drop at=5 id=0x182 for=10 count=2");
-    fault_watch_init(&watch, &rules.rules[0]);
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, -1, 1));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 4, 1));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 5, 1));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 14, 1));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 15, 1));
-    TEST_ASSERT_FALSE(fault_watch_takes(&watch, &other));
-    TEST_ASSERT_TRUE(fault_watch_takes(&watch, &frame));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 6, 1));
-    TEST_ASSERT_TRUE(fault_watch_takes(&watch, &frame));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 6, 1));
+    fault_trigger_init(&trigger, &rules.rules[0]);
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, -1, 1));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 4, 1));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 5, 1));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 14, 1));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 15, 1));
+    TEST_ASSERT_FALSE(fault_trigger_takes(&trigger, &other));
+    TEST_ASSERT_TRUE(fault_trigger_takes(&trigger, &frame));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 6, 1));
+    TEST_ASSERT_TRUE(fault_trigger_takes(&trigger, &frame));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 6, 1));
 }
 
 static void test_wall_time_of_a_rule(void)
 {
-    struct fault_watch watch;
+    struct fault_trigger trigger;
     parse("bus-off at=5 side=drives for_ms=20");
-    fault_watch_init(&watch, &rules.rules[0]);
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 4, 1000000));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 5, 2000000));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 500, 21999999));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 5, 22000000));
+    fault_trigger_init(&trigger, &rules.rules[0]);
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 4, 1000000));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 5, 2000000));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 500, 21999999));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 5, 22000000));
 }
 
 static void test_probability_is_met_and_repeats(void)
 {
-    struct fault_watch watch, again;
+    struct fault_trigger trigger, again;
     const struct can_msg frame = {.id = 0x182};
     unsigned hits = 0;
     parse("drop at=0 id=0x182 for=1000000 p=0.3 seed=42");
-    fault_watch_init(&watch, &rules.rules[0]);
-    fault_watch_init(&again, &rules.rules[0]);
+    fault_trigger_init(&trigger, &rules.rules[0]);
+    fault_trigger_init(&again, &rules.rules[0]);
     for (unsigned i = 0; i < 10000; i++) {
-        const bool hit = fault_watch_takes(&watch, &frame);
-        TEST_ASSERT_EQUAL(hit, fault_watch_takes(&again, &frame));
+        const bool hit = fault_trigger_takes(&trigger, &frame);
+        TEST_ASSERT_EQUAL(hit, fault_trigger_takes(&again, &frame));
         hits += hit ? 1u : 0u;
     }
     TEST_ASSERT_UINT_WITHIN(150, 3000, hits); /* more than three deviations of 46 */
@@ -240,13 +238,13 @@ static void test_probability_is_met_and_repeats(void)
 static void test_which_frames_a_seed_takes(void)
 {
     static const unsigned expected[] = {1, 5, 8, 10, 21, 26, 31, 36, 38, 39};
-    struct fault_watch watch;
+    struct fault_trigger trigger;
     const struct can_msg frame = {.id = 0x182};
     unsigned hits = 0;
     parse("drop at=0 id=0x182 for=100 p=0.25 seed=7");
-    fault_watch_init(&watch, &rules.rules[0]);
+    fault_trigger_init(&trigger, &rules.rules[0]);
     for (unsigned i = 0; i < 40u; i++) {
-        if (fault_watch_takes(&watch, &frame)) {
+        if (fault_trigger_takes(&trigger, &frame)) {
             TEST_ASSERT_LESS_THAN_UINT(sizeof expected / sizeof expected[0], hits);
             TEST_ASSERT_EQUAL_UINT(expected[hits], i);
             hits++;
@@ -255,22 +253,22 @@ static void test_which_frames_a_seed_takes(void)
     TEST_ASSERT_EQUAL_UINT(sizeof expected / sizeof expected[0], hits);
 }
 
-static bool sync(struct tick_count *count, uint8_t counter)
+static bool sync(struct fault_ticks *count, uint8_t counter)
 {
     const struct can_msg in = {.id = 0x80, .len = 1, .data = {counter}};
-    return tick_count_receive(count, &in);
+    return fault_ticks_receive(count, &in);
 }
 
-static void setpoint(struct tick_count *count, uint8_t node, uint8_t control, uint8_t target)
+static void setpoint(struct fault_ticks *count, uint8_t node, uint8_t control, uint8_t target)
 {
     const struct can_msg in = {.id = 0x200u + node, .len = 6, .data = {control, 0, target}};
-    TEST_ASSERT_FALSE(tick_count_receive(count, &in));
+    TEST_ASSERT_FALSE(fault_ticks_receive(count, &in));
 }
 
 static void test_tick_0_is_the_sync_after_the_first_step(void)
 {
-    struct tick_count count;
-    tick_count_init(&count);
+    struct fault_ticks count;
+    fault_ticks_init(&count);
     setpoint(&count, 2, 0x06, 1); /* not enabled: the target follows the axis */
     setpoint(&count, 2, 0x0F, 2);
     TEST_ASSERT_FALSE(sync(&count, 7));
@@ -288,8 +286,8 @@ static void test_tick_0_is_the_sync_after_the_first_step(void)
 
 static void test_ticks_go_by_the_counter(void)
 {
-    struct tick_count count;
-    tick_count_init(&count);
+    struct fault_ticks count;
+    fault_ticks_init(&count);
     setpoint(&count, 2, 0x0F, 1);
     setpoint(&count, 2, 0x0F, 2);
     (void)sync(&count, 238);
@@ -299,7 +297,7 @@ static void test_ticks_go_by_the_counter(void)
     TEST_ASSERT_TRUE(sync(&count, 1));
     TEST_ASSERT_EQUAL_INT64(3, count.tick);
     const struct can_msg plain = {.id = 0x80}; /* a SYNC without a counter */
-    TEST_ASSERT_TRUE(tick_count_receive(&count, &plain));
+    TEST_ASSERT_TRUE(fault_ticks_receive(&count, &plain));
     TEST_ASSERT_EQUAL_INT64(4, count.tick);
 }
 

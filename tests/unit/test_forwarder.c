@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "faults/fault_parse.h"
+#include "faults/fault_rules.h"
 #include "injector/injector_options.h"
 #include "unity.h"
 
@@ -26,11 +26,11 @@ static void take(void *context, enum fault_side to, const struct can_msg *frame)
     sent[sent_count++] = *frame;
 }
 
-static void note(void *context, const struct fault_watch *watch, enum fault_side from,
+static void note(void *context, const struct fault_trigger *trigger, enum fault_side from,
                  const struct can_msg *frame, bool on)
 {
     (void)context;
-    (void)watch;
+    (void)trigger;
     (void)from;
     (void)frame;
     note_count++;
@@ -65,8 +65,8 @@ static void begin(const char *text)
 {
     char reason[200] = "";
     const struct forwarder_port port = {take, note, NULL};
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, fault_parse(&rules, text, strlen(text), reason, sizeof reason),
-                                  reason);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(
+        0, fault_rules_parse(&rules, text, strlen(text), reason, sizeof reason), reason);
     forwarder_init(&forwarder, &rules, port);
     struct can_msg setpoint = {.id = 0x202, .len = 6, .data = {0x0F, 0, 1}};
     forwarder_receive(&forwarder, FAULT_SIDE_CONTROLLER, &setpoint, now_ns);

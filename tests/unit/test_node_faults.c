@@ -5,7 +5,7 @@
 
 #include "canopen/cob.h"
 #include "drive_bench.h"
-#include "faults/fault_parse.h"
+#include "faults/fault_rules.h"
 #include "unity.h"
 
 static const struct drive_config figures = {
@@ -68,8 +68,8 @@ static void frame(uint16_t id, uint8_t first, uint8_t target)
 static void begin(const char *text)
 {
     char reason[200] = "";
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, fault_parse(&rules, text, strlen(text), reason, sizeof reason),
-                                  reason);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(
+        0, fault_rules_parse(&rules, text, strlen(text), reason, sizeof reason), reason);
     node_faults_init(&faults, &rules, nodes, 2, note);
     frame(0x203, 0x0F, 1);
     frame(0x203, 0x0F, 2);

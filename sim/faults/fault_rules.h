@@ -1,13 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_rule: one scripted fault, as docs/reference/protocol.md section 4 writes it in a line of text. */
-#ifndef FAULTS_FAULT_RULE_H
-#define FAULTS_FAULT_RULE_H
+/* fault_rules: scripted faults, one a line of text (docs/reference/protocol.md section 4): the rules as structs, and their
+ * parser. Pure, but for fault_rules_read and the text of an error.
+ */
+#ifndef FAULTS_FAULT_RULES_H
+#define FAULTS_FAULT_RULES_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #define FAULT_RULES_MAX 64u
 #define FAULT_FOR_EVER  UINT32_MAX
+#define FAULT_LINE_MAX  200u   /* characters of a line */
+#define FAULT_FILE_MAX  16384u /* bytes of a file */
 
 enum fault_kind {
     FAULT_KIND_DROP, /* from here on: the injector's */
@@ -38,7 +43,7 @@ enum fault_side {
     FAULT_SIDE_POSITIVE
 };
 
-/* What a rule says; fields that its kind does not have are 0. */
+/* One rule; fields that its kind does not have are 0. */
 struct fault_rule {
     enum fault_kind kind;
     uint32_t line;      /* in the file, from 1 */
@@ -71,5 +76,15 @@ const char *fault_kind_name(enum fault_kind kind);
 
 /* Whether a drive acts by this kind, and not the injector. */
 bool fault_kind_is_drives(enum fault_kind kind);
+
+#define FAULT_RULES_WRONG (-1)
+
+/* `length` bytes of text. Returns 0, or FAULT_RULES_WRONG with one line in `reason`: which line, what is wrong and what
+ * would be right. */
+int fault_rules_parse(struct fault_rules *rules, const char *text, size_t length, char *reason,
+                      size_t size);
+
+/* The same from a file; the reason names it. */
+int fault_rules_read(struct fault_rules *rules, const char *path, char *reason, size_t size);
 
 #endif
