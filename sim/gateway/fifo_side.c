@@ -90,6 +90,9 @@ static int send_frames(void)
     const size_t count = self.request.header.count;
     for (size_t i = 0; i < count; ++i) {
         exchange_unpack(&messages[i], &self.request.frames[i]);
+        if (messages[i].id > CAN_ID_MAX || messages[i].len > CAN_DATA_MAX) {
+            return -EINVAL; /* other identifiers are the hub's (port/linux/local_bus.h) */
+        }
         if (self.request.frames[i].of_tick != 0u) {
             (void)can_socket_track(self.socket, (uint16_t)messages[i].id);
         }
@@ -157,36 +160,44 @@ static int serve(void)
     return error;
 }
 
-static int run(void)
+struct fifo_side_end fifo_side_serve(struct can_socket *socket, int out, int in)
 {
+    memset(&self, 0, sizeof self);
+    self.socket = socket;
+    self.out = out;
+    self.in = in;
     while (read_request()) {
         const int error = serve();
         if (error != 0) {
-            return bus_complain(BRIDGE_BUS, "the bus failed", strerror(-error));
+            return (struct fifo_side_end){BRIDGE_BUS, "the bus failed", strerror(-error)};
         }
         if (!write_reply()) {
-            return bus_complain(BRIDGE_GONE, gone, strerror(errno));
+            return (struct fifo_side_end){BRIDGE_GONE, gone, strerror(errno)};
         }
         if ((self.request.header.flags & EXCHANGE_END) != 0u) {
-            return BRIDGE_OK;
+            return (struct fifo_side_end){.status = BRIDGE_OK};
         }
     }
-    return bus_complain(BRIDGE_GONE, gone, "it closed its FIFO without a word");
+    return (struct fifo_side_end){BRIDGE_GONE, gone, "it closed its FIFO without a word"};
+}
+
+static int serve_and_report(struct can_socket *socket, int out, int in)
+{
+    const struct fifo_side_end end = fifo_side_serve(socket, out, in);
+    return end.status == BRIDGE_OK ? BRIDGE_OK : bus_complain((int)end.status, end.what, end.why);
 }
 
 int fifo_side_run(struct can_socket *socket, const char *out, const char *in)
 {
-    memset(&self, 0, sizeof self);
-    self.socket = socket;
-    self.out = open_fifo(out, O_RDONLY);
-    self.in = self.out < 0 ? -1 : open_fifo(in, O_WRONLY);
+    const int out_fd = open_fifo(out, O_RDONLY);
+    const int in_fd = out_fd < 0 ? -1 : open_fifo(in, O_WRONLY);
     int status = bus_signals() > 0u ? BRIDGE_OK : BRIDGE_GONE;
-    if (self.in >= 0) {
-        status = run();
-        (void)close(self.in);
+    if (in_fd >= 0) {
+        status = serve_and_report(socket, out_fd, in_fd);
+        (void)close(in_fd);
     }
-    if (self.out >= 0) {
-        (void)close(self.out);
+    if (out_fd >= 0) {
+        (void)close(out_fd);
     }
     return status;
 }
