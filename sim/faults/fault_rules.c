@@ -408,9 +408,9 @@ int fault_rules_read(struct fault_rules *rules, const char *path, char *reason, 
         return refuse_file(reason, size, path, strerror(errno));
     }
     const size_t length = fread(text, 1, sizeof text, file);
-    const int failed = ferror(file);
+    const bool failed = ferror(file) != 0;
     (void)fclose(file);
-    if (failed != 0) {
+    if (failed) {
         return refuse_file(reason, size, path, "cannot be read");
     }
     if (length > FAULT_FILE_MAX) {

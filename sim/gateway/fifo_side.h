@@ -6,12 +6,12 @@
 #include "gateway/bus.h"
 #include "port/linux/can_socket.h"
 
-/* Until the board ends or is gone. Returns an exit status; unless 0, a line on stderr has said why. */
+/* Until the board ends or is gone. Returns an exit status; unless 0, a line on stderr has the reason. */
 int fifo_side_run(struct can_socket *socket, const char *out, const char *in);
 
-/* How serving has ended; unless BRIDGE_OK with two texts: what has failed, and why. */
+/* How serving has ended; unless GATEWAY_OK with two texts: what has failed, and why. */
 struct fifo_side_end {
-    enum bridge_status status;
+    enum gateway_status status;
     const char *what;
     const char *why;
 };

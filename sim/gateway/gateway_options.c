@@ -17,7 +17,7 @@ const char gateway_options_help[] =
     "  --bus INTERFACE  a CAN interface that is up, such as vcan0, or the path of a hodograph-hub\n"
     "  --out FIFO       what the board writes: the FIFO must be there\n"
     "  --in FIFO        what it reads\n"
-    "  --slcan SOCKET   SLCAN instead: a UNIX socket (a path) or HOST:PORT on which somebody "
+    "  --slcan SOCKET   SLCAN instead: a UNIX socket (a path) or HOST:PORT on which the board "
     "listens,\n"
     "                   or fd:N, a connected socket that the bridge is started with\n"
     "\n"
@@ -31,7 +31,7 @@ static enum gateway_options_result check(const struct gateway_options *options,
     const bool fifos = options->out != NULL && options->in != NULL;
     const bool any_fifo = options->out != NULL || options->in != NULL;
     if (options->bus == NULL) {
-        (void)long_options_wrong(line, "name the CAN interface behind", "--bus");
+        (void)long_options_wrong(line, "name the CAN interface after", "--bus");
         return GATEWAY_OPTIONS_WRONG;
     }
     if (options->slcan != NULL ? any_fifo : !fifos) {

@@ -52,7 +52,7 @@ static void send(struct forwarder *forwarder, enum fault_side to, const struct c
     }
 }
 
-/* The frame behind overtakes the one that waited for it. */
+/* The later frame overtakes the one that waited for it. */
 static void pass_on(struct forwarder *forwarder, enum fault_side from, const struct can_msg *frame)
 {
     struct forwarder_held *held = &forwarder->held[from];
@@ -125,24 +125,24 @@ static void deliver(struct forwarder *forwarder, enum fault_side from,
     }
 }
 
-/* Other traffic: eight bytes that tell the frames apart. It is on the wire, so only who is off does not hear it. */
+/* Other traffic: eight bytes that tell the frames apart. It is on the wire, so only a side that is off does not receive it. */
 static void flood(struct forwarder *forwarder, struct fault_trigger *trigger)
 {
-    const bool heard[2] = {!is_off(forwarder, FAULT_SIDE_CONTROLLER),
-                           !is_off(forwarder, FAULT_SIDE_DRIVES)};
+    const bool receives[2] = {!is_off(forwarder, FAULT_SIDE_CONTROLLER),
+                              !is_off(forwarder, FAULT_SIDE_DRIVES)};
     for (uint32_t i = 0; i < trigger->rule->per_tick; i++) {
         struct can_msg frame = {.id = trigger->rule->id, .len = 8};
         const uint32_t number = trigger->used++;
         memcpy(frame.data, &number, sizeof number);
         for (unsigned side = 0; side < 2u; side++) {
-            if (heard[side]) {
+            if (receives[side]) {
                 forwarder->port.send(forwarder->port.context, (enum fault_side)side, &frame);
             }
         }
     }
 }
 
-/* Rules that are on for a while and want no frame. */
+/* Rules that act for a time and not on a frame. */
 static void follow_states(struct forwarder *forwarder, uint64_t now_ns, bool tick_begins)
 {
     for (uint32_t i = 0; i < forwarder->count; i++) {

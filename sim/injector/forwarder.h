@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* bridge: stands between the controller's bus and the drives', passes every frame on, and does to
- * some what the fault rules say (docs/reference/protocol.md section 4).
+/* forwarder: passes every frame between the controller's bus and the drives', and injects the faults of the fault rules
+ * (docs/reference/protocol.md section 4).
  *
  * Rules act on a frame in the order of the file. A frame that changes places with the next one of
  * its direction waits for it for 20 ms at most. While a side is off the bus nothing passes, frames that were held or
@@ -20,7 +20,7 @@ struct forwarder_port {
     /* A frame to one side. */
     void (*send)(void *context, enum fault_side to, const struct can_msg *frame);
     /* Something was done to `frame` as it came (NULL: a rule without a frame of its own begins or
-     * ends, as `on` says). */
+     * ends, by `on`). */
     void (*note)(void *context, const struct fault_trigger *trigger, enum fault_side from,
                  const struct can_msg *frame, bool on);
     void *context;

@@ -8,7 +8,7 @@
 const char injector_options_help[] =
     "usage: hodograph-injector --bus CONTROLLER --bus DRIVES [--rules FILE] [--verbose]\n"
     "\n"
-    "Stands between two CAN buses, passes every frame on, and does to some what fault rules say.\n"
+    "Passes every frame between two CAN buses, and injects the faults of fault rules.\n"
     "\n"
     "  --bus INTERFACE  twice: first the controller's bus, then the drives'\n"
     "  --rules FILE     fault rules, one a line (docs/reference/protocol.md section 4)\n"
@@ -20,7 +20,7 @@ static enum injector_options_result check(const struct injector_options *options
                                           const struct long_options *line)
 {
     if (options->bus[1] == NULL) {
-        (void)long_options_wrong(line, "two buses are needed, each behind", "--bus");
+        (void)long_options_wrong(line, "two buses are needed, each after", "--bus");
         return INJECTOR_OPTIONS_WRONG;
     }
     if (strcmp(options->bus[0], options->bus[1]) == 0) {

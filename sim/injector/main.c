@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-injector: a bridge between two SocketCAN buses that injects faults. One thread: it
+/* hodograph-injector: joins two SocketCAN buses and injects faults. One thread: it
  * sleeps until frames or a signal come, or a delayed frame is due. */
 #define _GNU_SOURCE
 #include <errno.h>
@@ -32,7 +32,7 @@ struct injector {
     bool verbose;
 };
 
-static int complain(int status, const char *reason)
+static int fail(int status, const char *reason)
 {
     (void)fprintf(stderr, "hodograph-injector: %s\n", reason);
     return status;
@@ -136,16 +136,16 @@ static int start(struct injector *injector, const struct injector_options *optio
     const int signals = end_signals_open();
     if (options->rules != NULL &&
         fault_rules_read(&injector->rules, options->rules, reason, sizeof reason) != 0) {
-        return complain(EXIT_USAGE, reason);
+        return fail(EXIT_USAGE, reason);
     }
     if (signals < 0) {
-        return complain(EXIT_BUS, strerror(errno));
+        return fail(EXIT_BUS, strerror(errno));
     }
-    (void)clock_join(options->bus[0], "injector"); /* opening the sockets says what is wrong */
+    (void)clock_join(options->bus[0], "injector"); /* opening the sockets reports what is wrong */
     for (unsigned side = 0; side < 2u; side++) {
         if (can_socket_open(&injector->sockets[side], options->bus[side], reason, sizeof reason) !=
             0) {
-            return complain(EXIT_BUS, reason);
+            return fail(EXIT_BUS, reason);
         }
     }
     injector->verbose = options->verbose;
@@ -165,7 +165,7 @@ int main(int argc, char **argv)
         (void)fputs(injector_options_help, stdout);
         return EXIT_OK;
     case INJECTOR_OPTIONS_WRONG:
-        return complain(EXIT_USAGE, reason);
+        return fail(EXIT_USAGE, reason);
     default:
         break;
     }

@@ -177,7 +177,7 @@ void drive_node_receive(struct drive_node *node, const struct can_msg *in)
     }
 }
 
-/* What has passed since the last call may lie before a heartbeat that came meanwhile: it counts for nothing then. */
+/* The time since the last call may have passed before a heartbeat that came meanwhile: then it does not count. */
 static void process_master(struct drive_node *node, uint32_t elapsed_us)
 {
     const uint32_t without_us = node->master_seen ? 0u : elapsed_us;

@@ -51,8 +51,8 @@ struct drive_node {
     uint8_t id;
 };
 
-/* id: 1 ... 127. The first period is that of the configuration, until 0x1006 or 0x60C2 says
- * otherwise. Returns 0 or an enum drive_error. The boot-up frame leaves with the first
+/* id: 1 ... 127. The first period is that of the configuration, until 0x1006 or 0x60C2 sets
+ * another one. Returns 0 or an enum drive_error. The boot-up frame leaves with the first
  * drive_node_process. */
 int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_config *config,
                     int32_t position_counts, struct drive_node_port port);

@@ -45,7 +45,7 @@ void drive_od_reset_communication(struct drive_node *node)
 
 /* ---- handlers: _check before the value is stored, _changed after it ---- */
 
-/* What a handler has to know of a write. */
+/* A write, for the checks. */
 struct od_request {
     const struct od_entry *entry;
     const uint8_t *bytes;

@@ -57,7 +57,7 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
     return 0;
 }
 
-/* What waits for SYNC need not wake the process before it; fault rules look at each frame as it comes. */
+/* Synchronous RPDOs need not wake the process before SYNC; fault rules act on each frame as it comes. */
 static int drives_defer(struct drives *drives)
 {
     struct can_match frames[DRIVE_PDOS * NODE_OPTIONS_AXES];

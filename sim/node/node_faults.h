@@ -26,7 +26,7 @@ struct node_faults {
     node_faults_note *note;
 };
 
-/* `rules` and `nodes` are borrowed; rules about other nodes do nothing, but are noted too. */
+/* `rules` and `nodes` are borrowed; rules about other nodes do nothing, but are noted, too. */
 void node_faults_init(struct node_faults *faults, const struct fault_rules *rules,
                       struct drive_node *nodes, size_t node_count, node_faults_note *note);
 
@@ -42,7 +42,7 @@ void node_faults_process(struct node_faults *faults, uint64_t now_ns);
  *     heartbeat-stop   sends no heartbeats
  *     encoder-freeze   the position read stays as it is now. Off: the true one again
  *     encoder-jump     bus counts, added to the position read. Off: subtracted again
- *     encoder-fault    the drive notices that its encoder fails: EMCY 0x7305. Off: a fault reset has effect again
+ *     encoder-fault    the drive detects that its encoder fails: EMCY 0x7305. Off: a fault reset has effect again
  *     saturate         the voltage limit, V; below a tenth of the drive's own the supply has failed: EMCY 0x3220
  *     load             load torque as the voltage that it takes, V; positive pushes in the negative direction
  *     limit-switch     the input of this switch comes on. Off: the switch itself decides again

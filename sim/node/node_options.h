@@ -27,8 +27,8 @@ struct node_options {
 
 enum node_options_result {
     NODE_OPTIONS_OK,
-    NODE_OPTIONS_HELP, /* asked for help: print node_options_help */
-    NODE_OPTIONS_WRONG /* `reason` has one line that says what and what to do */
+    NODE_OPTIONS_HELP, /* help requested: print node_options_help */
+    NODE_OPTIONS_WRONG /* `reason` has one line: what is wrong and what to do */
 };
 
 extern const char node_options_help[];

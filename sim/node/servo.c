@@ -53,8 +53,8 @@ void servo_fail(struct servo *servo, uint16_t code)
     }
 }
 
-/* There is nothing to stop with: the brake has to do it. In a fault already it is one more error, which the master shall
- * know of too. */
+/* There is nothing to stop with: the brake has to do it. In a fault already it is one more error, which is reported
+ * to the master, too. */
 void servo_fail_powerless(struct servo *servo, uint16_t code)
 {
     const int16_t reaction = servo->device.options.fault_reaction;

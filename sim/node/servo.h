@@ -58,7 +58,7 @@ bool servo_mode_may_change(const struct servo *servo);
 /* Takes 0x6060 over into 0x6061 when the axis permits it. */
 void servo_take_mode(struct servo *servo);
 
-/* One period of the axis, as state and mode ask. */
+/* One period of the axis, by state and mode. */
 void servo_step(struct servo *servo);
 
 /* Results in the object dictionary, up to date: the switches; the few that each SYNC needs; all. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* supervision: what a simulated drive supervises in each period: the following error, the overload of its motor;
- * and what injected faults have done to switches, encoder and supply. Reports conditions; the servo decides what follows. All in one context.
+/* supervision: what a simulated drive supervises in each period: the following error, and the overload of its motor; and
+ * what injected faults have done to switches, encoder and supply. It reports conditions; the servo decides what follows.
+ * All in one context.
  */
 #ifndef NODE_SUPERVISION_H
 #define NODE_SUPERVISION_H

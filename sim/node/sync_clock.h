@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* sync_clock: the time base of a simulated drive: SYNC, or the wall clock while SYNC stays away. It says how many
+/* sync_clock: the time base of a simulated drive: SYNC, or the wall clock while SYNC is missing. It returns how many
  * periods pass; the caller computes them. All in one context.
  */
 #ifndef NODE_SYNC_CLOCK_H

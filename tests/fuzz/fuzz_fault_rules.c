@@ -28,7 +28,7 @@ static void check_frame(const struct can_msg *frame)
     FUZZ_CHECK(frame->id <= CAN_ID_MAX && frame->len <= CAN_DATA_MAX);
 }
 
-static void from_bridge(void *context, enum fault_side to, const struct can_msg *frame)
+static void from_forwarder(void *context, enum fault_side to, const struct can_msg *frame)
 {
     (void)context;
     FUZZ_CHECK(to == FAULT_SIDE_CONTROLLER || to == FAULT_SIDE_DRIVES);
@@ -110,7 +110,7 @@ static void pass_time(uint32_t us)
 static void harness(struct fuzz_input *in)
 {
     const struct drive_node_port port = {from_drive, NULL};
-    const struct forwarder_port sides = {from_bridge, noted, NULL};
+    const struct forwarder_port sides = {from_forwarder, noted, NULL};
     memset(&rules, 0, sizeof rules);
     now_ns = 1000000000u;
     if (!parse(in)) {

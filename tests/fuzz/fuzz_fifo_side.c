@@ -182,7 +182,7 @@ static void harness(struct fuzz_input *in)
     }
     FUZZ_CHECK(shutdown(self.board, SHUT_WR) == 0);
     const struct fifo_side_end end = fifo_side_serve(&socket, fifos[0], fifos[0]);
-    FUZZ_CHECK(end.status == BRIDGE_OK || (end.what != NULL && end.why != NULL));
+    FUZZ_CHECK(end.status == GATEWAY_OK || (end.what != NULL && end.why != NULL));
     check_replies();
     check_bus();
     for (int i = 0; i < 2; ++i) {
