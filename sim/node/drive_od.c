@@ -172,7 +172,7 @@ static void target_changed(struct drive_node *node, const struct od_entry *entry
 static uint32_t homing_method_check(struct drive_node *node, const struct od_request *request)
 {
     (void)node;
-    return homing_supports((int8_t)signed_number(request)) ? SDO_OK : SDO_ABORT_VALUE;
+    return drive_homing_supports((int8_t)signed_number(request)) ? SDO_OK : SDO_ABORT_VALUE;
 }
 
 static uint32_t encoder_check(struct drive_node *node, const struct od_request *request)

@@ -34,7 +34,7 @@ void servo_power_on(struct servo *servo)
     (void)cia402_device_ready(&servo->device);
     (void)axis_motion_set_scale(&servo->axis, 0.0);
     axis_motion_offsets(&servo->axis, 0, 0);
-    homing_leave(&servo->homing);
+    drive_homing_leave(&servo->homing);
     axis_stop_reset(&servo->stop);
     servo->supervision.following_us = 0;
     servo->enabled_now = false;
@@ -151,9 +151,9 @@ void servo_control(struct servo *servo, uint16_t controlword)
     if (changed && !was_enabled && cia402_device_action(device) == CIA402_FOLLOW) {
         begin_operation(servo);
     }
-    homing_control(&servo->homing, (controlword & CONTROL_HOMING_START) != 0,
-                   homes(servo) && cia402_device_action(device) == CIA402_FOLLOW,
-                   servo->values->homing_method, &servo->axis);
+    drive_homing_control(&servo->homing, (controlword & CONTROL_HOMING_START) != 0,
+                         homes(servo) && cia402_device_action(device) == CIA402_FOLLOW,
+                         servo->values->homing_method, &servo->axis);
 }
 
 bool servo_mode_may_change(const struct servo *servo)
@@ -163,7 +163,7 @@ bool servo_mode_may_change(const struct servo *servo)
     case CIA402_HOLD:
         return true;
     case CIA402_FOLLOW:
-        return servo->axis.speed_counts_period == 0 && !homing_busy(&servo->homing);
+        return servo->axis.speed_counts_period == 0 && !drive_homing_busy(&servo->homing);
     default:
         return false;
     }
@@ -178,7 +178,7 @@ void servo_take_mode(struct servo *servo)
         !servo_mode_may_change(servo)) {
         return;
     }
-    homing_leave(&servo->homing);
+    drive_homing_leave(&servo->homing);
     v->modes_of_operation_display = requested;
     if (!servo->setpoint_fresh) {
         v->target_position = servo->axis.target_counts;
@@ -234,9 +234,9 @@ static bool follow_setpoint(struct servo *servo)
 
 static void home(struct servo *servo)
 {
-    const bool steady = homing_move(&servo->homing, &servo->axis, servo->values);
+    const bool steady = drive_homing_move(&servo->homing, &servo->axis, servo->values);
     servo_refresh_inputs(servo);
-    if (homing_evaluate(&servo->homing, &servo->axis, servo->values, steady)) {
+    if (drive_homing_evaluate(&servo->homing, &servo->axis, servo->values, steady)) {
         servo->values->target_position = servo->axis.target_counts;
     }
 }
@@ -322,11 +322,11 @@ static uint16_t homing_flags(const struct servo *servo)
     const uint16_t reached =
         servo->axis.speed_counts_period == 0 ? CIA402_STATUS_TARGET_REACHED : 0;
     switch (servo->homing.phase) {
-    case HOMING_IDLE:
+    case DRIVE_HOMING_IDLE:
         return servo->homing.homed ? reached | CIA402_STATUS_FOLLOWS : reached;
-    case HOMING_DONE:
+    case DRIVE_HOMING_DONE:
         return CIA402_STATUS_FOLLOWS | CIA402_STATUS_TARGET_REACHED;
-    case HOMING_FAILED:
+    case DRIVE_HOMING_FAILED:
         return CIA402_STATUS_FOLLOWING_ERROR | reached;
     default:
         return 0;

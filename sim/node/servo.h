@@ -15,8 +15,8 @@
 #include "node/axis_motion.h"
 #include "node/axis_stop.h"
 #include "node/drive_errors.h"
+#include "node/drive_homing.h"
 #include "node/equipment.h"
-#include "node/homing.h"
 #include "node/supervision.h"
 #include "od_drive.h"
 
@@ -26,7 +26,7 @@ struct servo {
     struct cia402_device device;
     struct axis_motion axis;
     struct equipment equipment;
-    struct homing homing;
+    struct drive_homing homing;
     struct axis_stop stop;
     struct supervision supervision;
     struct drive_errors errors;

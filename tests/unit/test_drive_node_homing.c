@@ -189,6 +189,22 @@ static void test_modes_change_at_rest_only(void)
     TEST_ASSERT_EQUAL_INT64(CIA402_MODE_CSP, drive_bench_read(0x6061, 0));
 }
 
+/* A drive that follows moving setpoints keeps its mode. */
+static void test_no_homing_while_setpoints_move(void)
+{
+    drive_bench_enable();
+    bench.target += 1000;
+    drive_bench_run(2);
+    for (int k = 0; k < 5; k++) {
+        bench.target += 1000;
+        drive_bench_run(1);
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, drive_bench_write(0x6060, 0, CIA402_MODE_HOMING));
+    }
+    drive_bench_run(3);
+    TEST_ASSERT_EQUAL_HEX32(0, drive_bench_write(0x6060, 0, CIA402_MODE_HOMING));
+    TEST_ASSERT_EQUAL_INT64(CIA402_MODE_HOMING, drive_bench_read(0x6061, 0));
+}
+
 /* By SDO alone and without any SYNC: the drive goes by its own clock. */
 static void test_without_sync(void)
 {
@@ -236,6 +252,7 @@ int main(void)
     RUN_TEST(test_halt_holds_homing_up);
     RUN_TEST(test_disabled_on_the_way);
     RUN_TEST(test_modes_change_at_rest_only);
+    RUN_TEST(test_no_homing_while_setpoints_move);
     RUN_TEST(test_without_sync);
     RUN_TEST(test_methods_that_exist);
     return UNITY_END();

@@ -68,6 +68,38 @@ static void test_following_error(void)
     TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_FOLLOWING_ERROR);
 }
 
+/* In its first period out of the window the error has lasted for one period; the fault comes when it has lasted longer
+ * than the time-out. */
+static void test_the_time_of_a_following_error_is_exact(void)
+{
+    put(0x6065, 0, 1000);
+    put(0x6066, 0, 20);
+    drive_bench_enable();
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_JUMP, .counts = 50000}, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FREEZE}, true);
+    drive_bench_run(20);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    drive_bench_run(1);
+    TEST_ASSERT_EQUAL_INT(CIA402_FAULT_REACTION_ACTIVE, state());
+}
+
+/* The time starts again when the error was within the window for a period. */
+static void test_the_time_of_a_following_error_starts_again(void)
+{
+    put(0x6065, 0, 1000);
+    put(0x6066, 0, 20);
+    drive_bench_enable();
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FREEZE}, true);
+    const int32_t begin = bench.target;
+    for (int k = 0; k < 5; k++) {
+        bench.target = begin + 2000;
+        drive_bench_run(20);
+        bench.target = begin;
+        drive_bench_run(2);
+        TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    }
+}
+
 static void test_a_jump_of_the_encoder(void)
 {
     put(0x6065, 0, 100000);
@@ -209,7 +241,7 @@ static void test_a_short_frame_is_not_processed(void)
     TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
 }
 
-static void test_short_frames_are_told_once_until_a_good_one(void)
+static void test_short_frames_are_reported_once_until_a_good_one(void)
 {
     struct can_msg frame;
     drive_bench_enable();
@@ -270,6 +302,52 @@ static void test_torque_that_leaves_its_object(void)
     TEST_ASSERT_EQUAL_INT64(INT16_MAX, drive_bench_read(0x6077, 0));
     bench.node.servo.axis.drive.state.volts = -1.0;
     TEST_ASSERT_EQUAL_INT64(INT16_MIN, drive_bench_read(0x6077, 0));
+}
+
+/* RPDO2 with a controlword alone is no setpoint: the drive that it enables stays where it is. */
+static void test_a_controlword_is_no_setpoint(void)
+{
+    const uint8_t words[] = {CIA402_SHUTDOWN, CIA402_SWITCH_ON, CIA402_ENABLE_OPERATION};
+    put(0x1400, 1, 0x80000200 + DRIVE_BENCH_ID);
+    put(0x1601, 0, 0);
+    put(0x1601, 1, 0x60400010);
+    put(0x1601, 0, 1);
+    put(0x1401, 2, 255);
+    put(0x1401, 1, 0x300 + DRIVE_BENCH_ID);
+    put(0x607A, 0, 9000000);
+    drive_bench_sync();
+    for (int i = 0; i < 3; i++) {
+        const struct can_msg frame = {.id = 0x300 + DRIVE_BENCH_ID, .len = 2, .data = {words[i]}};
+        drive_node_receive(&bench.node, &frame);
+    }
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    TEST_ASSERT_INT32_WITHIN(20, 1000000, bench.node.values.target_position);
+    put(0x1401, 1, 0x80000300 + DRIVE_BENCH_ID);
+    put(0x1601, 0, 0);
+    put(0x1601, 1, 0x607A0020);
+    put(0x1601, 0, 1);
+    put(0x1401, 1, 0x300 + DRIVE_BENCH_ID);
+    const struct can_msg target = {.id = 0x300 + DRIVE_BENCH_ID, .len = 4};
+    drive_node_receive(&bench.node, &target);
+    TEST_ASSERT_TRUE(bench.node.servo.setpoint_fresh);
+}
+
+/* What a TPDO maps is up to date at its SYNC, whatever it is. */
+static void test_every_mapped_value_is_up_to_date(void)
+{
+    drive_bench_enable();
+    put(0x1801, 1, 0x80000280 + DRIVE_BENCH_ID);
+    put(0x1A01, 0, 0);
+    put(0x1A01, 1, 0x60620020);
+    put(0x1A01, 0, 1);
+    put(0x1801, 1, 0x280 + DRIVE_BENCH_ID);
+    for (int k = 0; k < 3; k++) {
+        move(1, 1000);
+        drive_bench_sync();
+        const struct can_msg *frame = drive_bench_newest(COB_TPDO2);
+        TEST_ASSERT_NOT_NULL(frame);
+        TEST_ASSERT_EQUAL_UINT32(bench.target, cob_get(frame->data, 4));
+    }
 }
 
 /* SYNC goes on, setpoints do not: 0x1400 sub 5. */
@@ -374,6 +452,14 @@ static void test_sync_counter(void)
     TEST_ASSERT_EQUAL_UINT32(32, bench.node.servo.axis.drive.samples);
 }
 
+static void test_encoder_resolution(void)
+{
+    struct drive_config config = drive_bench_config;
+    config.encoder_counts_per_rev = 4096;
+    drive_bench_begin_with(&config);
+    TEST_ASSERT_EQUAL_INT64(4096, drive_bench_read(0x608F, 1));
+}
+
 static void test_identity_and_ratings(void)
 {
     struct equipment equipment;
@@ -393,6 +479,8 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_following_error);
+    RUN_TEST(test_the_time_of_a_following_error_is_exact);
+    RUN_TEST(test_the_time_of_a_following_error_starts_again);
     RUN_TEST(test_a_jump_of_the_encoder);
     RUN_TEST(test_an_encoder_that_fails);
     RUN_TEST(test_undervoltage);
@@ -402,16 +490,19 @@ int main(void)
     RUN_TEST(test_a_switch_that_is_forced);
     RUN_TEST(test_software_limits);
     RUN_TEST(test_a_short_frame_is_not_processed);
-    RUN_TEST(test_short_frames_are_told_once_until_a_good_one);
+    RUN_TEST(test_short_frames_are_reported_once_until_a_good_one);
     RUN_TEST(test_a_short_frame_of_another_pdo);
     RUN_TEST(test_the_mapping_of_a_pdo_that_is_on_stays);
     RUN_TEST(test_torque_that_leaves_its_object);
+    RUN_TEST(test_a_controlword_is_no_setpoint);
+    RUN_TEST(test_every_mapped_value_is_up_to_date);
     RUN_TEST(test_setpoints_that_stay_away);
     RUN_TEST(test_scaling);
     RUN_TEST(test_a_scaled_axis_moves);
     RUN_TEST(test_feedforward_objects);
     RUN_TEST(test_digital_inputs_on_change);
     RUN_TEST(test_sync_counter);
+    RUN_TEST(test_encoder_resolution);
     RUN_TEST(test_identity_and_ratings);
     return UNITY_END();
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "node/homing.h"
+#include "node/drive_homing.h"
 
 #include <stddef.h>
 
@@ -36,46 +36,46 @@ static const struct method *find_method(int8_t number)
     return NULL;
 }
 
-bool homing_supports(int8_t method)
+bool drive_homing_supports(int8_t method)
 {
     return find_method(method) != NULL;
 }
 
-bool homing_busy(const struct homing *homing)
+bool drive_homing_busy(const struct drive_homing *homing)
 {
-    return homing->phase >= HOMING_SEARCH && homing->phase <= HOMING_STOP;
+    return homing->phase >= DRIVE_HOMING_SEARCH && homing->phase <= DRIVE_HOMING_STOP;
 }
 
-void homing_leave(struct homing *homing)
+void drive_homing_leave(struct drive_homing *homing)
 {
-    homing->phase = HOMING_IDLE;
+    homing->phase = DRIVE_HOMING_IDLE;
     homing->start_bit = false;
 }
 
-static void interrupt(struct homing *homing)
+static void interrupt(struct drive_homing *homing)
 {
-    if (homing_busy(homing)) {
-        homing->phase = HOMING_IDLE;
+    if (drive_homing_busy(homing)) {
+        homing->phase = DRIVE_HOMING_IDLE;
     }
 }
 
-static void begin(struct homing *homing, int8_t number, const struct axis_motion *axis)
+static void begin(struct drive_homing *homing, int8_t number, const struct axis_motion *axis)
 {
     const struct method *method = find_method(number);
     homing->homed = false;
     homing->edge_counts = axis_motion_position(axis);
     if (method == NULL) {
-        homing->phase = HOMING_FAILED;
+        homing->phase = DRIVE_HOMING_FAILED;
         return;
     }
     homing->inputs_switch = method->inputs_switch;
     homing->direction = method->direction;
     homing->entering = method->entering;
-    homing->phase = method->direction == 0 ? HOMING_STOP : HOMING_SEARCH;
+    homing->phase = method->direction == 0 ? DRIVE_HOMING_STOP : DRIVE_HOMING_SEARCH;
 }
 
-void homing_control(struct homing *homing, bool start_bit, bool permitted, int8_t method,
-                    const struct axis_motion *axis)
+void drive_homing_control(struct drive_homing *homing, bool start_bit, bool permitted,
+                          int8_t method, const struct axis_motion *axis)
 {
     const bool rises = start_bit && !homing->start_bit;
     homing->start_bit = start_bit && permitted;
@@ -87,78 +87,79 @@ void homing_control(struct homing *homing, bool start_bit, bool permitted, int8_
 }
 
 /* Counts a period, with sign. */
-static int64_t phase_speed(const struct homing *homing, const struct axis_motion *axis,
+static int64_t phase_speed(const struct drive_homing *homing, const struct axis_motion *axis,
                            const struct od_drive *values)
 {
-    const bool search = homing->phase == HOMING_SEARCH;
-    const bool back = homing->phase == HOMING_BACK;
+    const bool search = homing->phase == DRIVE_HOMING_SEARCH;
+    const bool back = homing->phase == DRIVE_HOMING_BACK;
     const int64_t counts_s = values->homing_speeds[search ? FAST : SLOW];
     const int64_t speed = counts_s * axis->config.period_us / 1000000;
-    if (!(search || back || homing->phase == HOMING_APPROACH) ||
+    if (!(search || back || homing->phase == DRIVE_HOMING_APPROACH) ||
         (values->controlword & CIA402_CONTROL_HALT) != 0) {
         return 0;
     }
     return (speed > 0 ? speed : 1) * (back ? -homing->direction : homing->direction);
 }
 
-bool homing_move(const struct homing *homing, struct axis_motion *axis,
-                 const struct od_drive *values)
+bool drive_homing_move(const struct drive_homing *homing, struct axis_motion *axis,
+                       const struct od_drive *values)
 {
     return axis_motion_ramp(axis, phase_speed(homing, axis, values), values->homing_acceleration);
 }
 
 /* Against a limit switch that is not the method's own: the home switch is not where it should be. */
-static bool at_wrong_end(const struct homing *homing, uint32_t inputs)
+static bool at_wrong_end(const struct drive_homing *homing, uint32_t inputs)
 {
-    const bool back = homing->phase == HOMING_BACK;
+    const bool back = homing->phase == DRIVE_HOMING_BACK;
     const bool positive = (homing->direction > 0) != back;
     const uint32_t end = positive ? EQUIPMENT_INPUT_POSITIVE : EQUIPMENT_INPUT_NEGATIVE;
     return (inputs & end) != 0 && end != homing->inputs_switch;
 }
 
 /* The phase that follows when the method's switch is on or off. */
-static enum homing_phase next_phase(const struct homing *homing, bool on)
+static enum drive_homing_phase next_phase(const struct drive_homing *homing, bool on)
 {
     switch (homing->phase) {
-    case HOMING_SEARCH:
-        return on ? HOMING_BACK : HOMING_SEARCH;
-    case HOMING_BACK:
-        return on ? HOMING_BACK : (homing->entering ? HOMING_APPROACH : HOMING_STOP);
+    case DRIVE_HOMING_SEARCH:
+        return on ? DRIVE_HOMING_BACK : DRIVE_HOMING_SEARCH;
+    case DRIVE_HOMING_BACK:
+        return on ? DRIVE_HOMING_BACK
+                  : (homing->entering ? DRIVE_HOMING_APPROACH : DRIVE_HOMING_STOP);
     default:
-        return on ? HOMING_STOP : HOMING_APPROACH;
+        return on ? DRIVE_HOMING_STOP : DRIVE_HOMING_APPROACH;
     }
 }
 
-static void evaluate_switches(struct homing *homing, const struct axis_motion *axis,
+static void evaluate_switches(struct drive_homing *homing, const struct axis_motion *axis,
                               uint32_t inputs)
 {
-    if (homing->phase < HOMING_SEARCH || homing->phase > HOMING_APPROACH) {
+    if (homing->phase < DRIVE_HOMING_SEARCH || homing->phase > DRIVE_HOMING_APPROACH) {
         return;
     }
     if (at_wrong_end(homing, inputs)) {
-        homing->phase = HOMING_FAILED;
+        homing->phase = DRIVE_HOMING_FAILED;
         return;
     }
     homing->phase = next_phase(homing, (inputs & homing->inputs_switch) != 0);
-    if (homing->phase == HOMING_STOP) {
+    if (homing->phase == DRIVE_HOMING_STOP) {
         homing->edge_counts = axis_motion_position(axis);
     }
 }
 
-bool homing_evaluate(struct homing *homing, struct axis_motion *axis, const struct od_drive *values,
-                     bool steady)
+bool drive_homing_evaluate(struct drive_homing *homing, struct axis_motion *axis,
+                           const struct od_drive *values, bool steady)
 {
     evaluate_switches(homing, axis, values->digital_inputs);
-    if (homing_busy(homing) &&
+    if (drive_homing_busy(homing) &&
         (axis->target_counts == INT32_MAX || axis->target_counts == INT32_MIN)) {
-        homing->phase = HOMING_FAILED;
+        homing->phase = DRIVE_HOMING_FAILED;
     }
-    if (homing->phase != HOMING_STOP || !steady ||
+    if (homing->phase != DRIVE_HOMING_STOP || !steady ||
         !axis_motion_settled(axis, values->position_window)) {
         return false;
     }
     axis_motion_shift(axis, homing->edge_counts, values->home_offset);
-    homing->phase = HOMING_DONE;
+    homing->phase = DRIVE_HOMING_DONE;
     homing->homed = true;
     return true;
 }
