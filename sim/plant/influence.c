@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "plant/influence.h"
 
-#include "plant/drive_private.h"
-
 void influence_none(struct influence *influence, const struct drive_config *config)
 {
     const struct influence none = {.volts_limit = config->plant.volts_limit};
