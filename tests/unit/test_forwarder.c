@@ -112,10 +112,10 @@ static void test_rules_of_both_kinds(void)
 
 static void test_as_many_rules_as_there_may_be(void)
 {
-    static char text[FAULT_RULES_MAX * 20u];
-    text[0] = '\0';
+    static const char line[] = "drop at=0 id=0x182\n";
+    static char text[FAULT_RULES_MAX * sizeof line];
     for (unsigned i = 0; i < FAULT_RULES_MAX; i++) {
-        (void)strcat(text, "drop at=0 id=0x182\n");
+        memcpy(text + i * (sizeof line - 1u), line, sizeof line);
     }
     begin(text);
     TEST_ASSERT_EQUAL_UINT(FAULT_RULES_MAX, forwarder.count);
