@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -197,6 +198,61 @@ static void test_filters_are_what_the_drives_want(void)
     TEST_ASSERT_FALSE(drives.nodes[0].pdos.moved || drives.nodes[1].pdos.moved);
 }
 
+static void put(struct drive_node *node, uint16_t index, uint8_t sub, uint32_t value)
+{
+    const struct od_entry *entry = od_find(&node->od, index, sub);
+    uint8_t bytes[4];
+    TEST_ASSERT_NOT_NULL(entry);
+    cob_put(bytes, value, entry->size);
+    TEST_ASSERT_EQUAL_HEX32(0, od_write(&node->od, entry, bytes, entry->size));
+}
+
+/* As many drives as there may be, each with all PDOs. */
+static void most_drives(void)
+{
+    options.axis_count = NODE_OPTIONS_AXES;
+    for (uint8_t i = 0; i < NODE_OPTIONS_AXES; i++) {
+        options.axes[i] = axis_of((uint8_t)(FIRST + i), 0.0);
+    }
+    TEST_ASSERT_EQUAL_INT(0, init());
+    for (uint8_t i = 0; i < NODE_OPTIONS_AXES; i++) {
+        for (uint8_t k = 1; k < DRIVE_PDOS; k++) {
+            put(&drives.nodes[i], (uint16_t)(0x1400 + k), 1, COB_RPDO1 + 0x100u * k + FIRST + i);
+        }
+    }
+}
+
+static void test_the_most_filters(void)
+{
+    most_drives();
+    drives.rules.count = 1;
+    TEST_ASSERT_EQUAL_INT(0, drives_filter(&drives));
+    TEST_ASSERT_EQUAL_UINT(4 + 5 * NODE_OPTIONS_AXES, drives.socket.filter_count);
+    expect_match(&drives.socket.filters[drives.socket.filter_count - 1u],
+                 COB_RPDO1 + 0x300 + FIRST + NODE_OPTIONS_AXES - 1, CAN_ID_MAX);
+}
+
+static void test_filters_that_fail_are_a_failure_of_the_bus(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, shutdown(drives.socket.fd, SHUT_WR));
+    give_sync(1);
+    (void)drives_receive(&drives);
+    TEST_ASSERT_EQUAL_INT(-EPIPE, drives.failed);
+}
+
+/* A failure stays until the next drives_init, whatever succeeds after it. */
+static void test_a_failure_stays(void)
+{
+    drives.failed = -ENODEV;
+    drives_process(&drives, 0);
+    TEST_ASSERT_EQUAL_INT(1, frames_with(COB_HEARTBEAT + SECOND));
+    give_sync(1);
+    (void)drives_receive(&drives);
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drives.failed);
+    TEST_ASSERT_EQUAL_INT(0, init());
+    TEST_ASSERT_EQUAL_INT(0, drives.failed);
+}
+
 /* Ticks are counted by the setpoints of all drives. */
 static void test_fault_rules_want_all_setpoints(void)
 {
@@ -213,22 +269,28 @@ static void test_a_bus_that_takes_no_filters(void)
     TEST_ASSERT_EQUAL_INT(-EBADF, drives_filter(&drives));
 }
 
-/* What waits for SYNC does not wake the process in virtual time; but fault rules act on each frame. */
+/* In virtual time synchronous setpoints do not wake the process; but fault rules act on each frame. */
 static void test_synchronous_setpoints_are_deferred(void)
 {
     hub_thread_begin((struct hub_options){.is_virtual = true, .bitrate = 1000000});
     TEST_ASSERT_EQUAL(0, clock_join(hub_thread_paths[0], "drives"));
     TEST_ASSERT_TRUE(clock_is_virtual());
-    TEST_ASSERT_EQUAL_HEX32(0,
-                            od_write(&drives.nodes[0].od, od_find(&drives.nodes[0].od, 0x1400, 2),
-                                     (uint8_t[]){255}, 1));
     TEST_ASSERT_EQUAL_INT(0, drives_filter(&drives));
-    const struct local_bus_filters deferred = next_filters(LOCAL_BUS_DEFER);
+    struct local_bus_filters deferred = next_filters(LOCAL_BUS_DEFER);
+    TEST_ASSERT_EQUAL_UINT16(2, deferred.count);
+    TEST_ASSERT_EQUAL_HEX32(COB_RPDO1 + FIRST, deferred.filters[0].can_id);
+    put(&drives.nodes[0], 0x1400, 2, 255);
+    TEST_ASSERT_EQUAL_INT(0, drives_filter(&drives));
+    deferred = next_filters(LOCAL_BUS_DEFER);
     TEST_ASSERT_EQUAL_UINT16(1, deferred.count);
     TEST_ASSERT_EQUAL_HEX32(COB_RPDO1 + SECOND, deferred.filters[0].can_id);
     drives.rules.count = 1;
     TEST_ASSERT_EQUAL_INT(0, drives_filter(&drives));
     TEST_ASSERT_EQUAL_UINT16(0, next_filters(LOCAL_BUS_DEFER).count);
+    drives.rules.count = 0;
+    most_drives();
+    TEST_ASSERT_EQUAL_INT(0, drives_filter(&drives));
+    TEST_ASSERT_EQUAL_UINT16(4 * NODE_OPTIONS_AXES, next_filters(LOCAL_BUS_DEFER).count);
 }
 
 static void test_boot_up_and_answers(void)
@@ -287,9 +349,12 @@ static void test_a_moved_pdo_moves_the_filters(void)
     TEST_ASSERT_TRUE(drives_receive(&drives));
     TEST_ASSERT_EQUAL_UINT(7, drives.socket.filter_count);
     expect_match(&drives.socket.filters[6], 0x345, CAN_ID_MAX);
+    (void)frames_with(0); /* all that has been sent so far */
     give_setpoint(0x345, 0, 0);
     TEST_ASSERT_FALSE(drives_receive(&drives));
     TEST_ASSERT_EQUAL_INT(0, drives.failed);
+    uint8_t packet;
+    TEST_ASSERT_EQUAL_INT(-1, recv(bus, &packet, sizeof packet, MSG_DONTWAIT));
 }
 
 static void test_the_end_of_the_bus(void)
@@ -302,8 +367,7 @@ static void test_the_end_of_the_bus(void)
     TEST_ASSERT_EQUAL_INT(-EPIPE, drives.failed);
 }
 
-/* A queue that stays full is a bus that is off: the frames are lost. */
-static void test_a_full_queue_loses_frames_but_is_no_failure(void)
+static void fill_queue(void)
 {
     const int bytes = 1;
     const struct can_frame any = {.can_id = 1};
@@ -313,9 +377,42 @@ static void test_a_full_queue_loses_frames_but_is_no_failure(void)
         taken++;
     }
     TEST_ASSERT_GREATER_THAN(0, taken);
+}
+
+/* A queue that stays full is a bus that is off: the frames are lost. */
+static void test_a_full_queue_loses_frames_but_is_no_failure(void)
+{
+    fill_queue();
     drives_process(&drives, 0);
     TEST_ASSERT_EQUAL_INT(0, drives.failed);
     TEST_ASSERT_EQUAL_INT(0, frames_with(COB_HEARTBEAT + FIRST));
+}
+
+/* Makes room for the frames while the drives wait for it: after some of their tries. */
+static void *empty_queue(void *unused)
+{
+    struct can_frame frame;
+    (void)unused;
+    (void)usleep(20000);
+    (void)next_frame(COB_HEARTBEAT + FIRST, &frame);
+    return NULL;
+}
+
+/* Several attempts, since a busy machine may let the thread wait for longer than the drives do. */
+static void test_a_full_queue_is_waited_for(void)
+{
+    int sent = 0;
+    drives_process(&drives, 0);
+    for (int attempt = 0; attempt < 20 && sent == 0; attempt++) {
+        pthread_t thread;
+        fill_queue();
+        TEST_ASSERT_EQUAL(0, pthread_create(&thread, NULL, empty_queue, NULL));
+        drives_process(&drives, 100000);
+        TEST_ASSERT_EQUAL(0, pthread_join(thread, NULL));
+        sent = frames_with(COB_HEARTBEAT + SECOND);
+    }
+    TEST_ASSERT_EQUAL_INT(1, sent);
+    TEST_ASSERT_EQUAL_INT(0, drives.failed);
 }
 
 /* A line for the beginning and one for the end, which the wall clock brings without a frame. */
@@ -398,6 +495,9 @@ int main(void)
     RUN_TEST(test_a_wrong_drive_is_named);
     RUN_TEST(test_equipment_reaches_its_drive);
     RUN_TEST(test_filters_are_what_the_drives_want);
+    RUN_TEST(test_the_most_filters);
+    RUN_TEST(test_filters_that_fail_are_a_failure_of_the_bus);
+    RUN_TEST(test_a_failure_stays);
     RUN_TEST(test_fault_rules_want_all_setpoints);
     RUN_TEST(test_a_bus_that_takes_no_filters);
     RUN_TEST(test_synchronous_setpoints_are_deferred);
@@ -407,6 +507,7 @@ int main(void)
     RUN_TEST(test_a_moved_pdo_moves_the_filters);
     RUN_TEST(test_the_end_of_the_bus);
     RUN_TEST(test_a_full_queue_loses_frames_but_is_no_failure);
+    RUN_TEST(test_a_full_queue_is_waited_for);
     RUN_TEST(test_fault_rules_act_and_are_printed);
     RUN_TEST(test_only_a_long_pile_is_forgotten);
     return UNITY_END();
