@@ -448,6 +448,11 @@ static void test_sync_counter(void)
     put(0x1006, 0, 0);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, drive_bench_write(0x1019, 0, 1));
     put(0x1019, 0, 10);
+    for (uint8_t k = 0; k < 20; k++) {
+        bench.counter = (uint8_t)(k % 10);
+        drive_bench_sync();
+    }
+    TEST_ASSERT_EQUAL_INT64(0, drive_bench_read(0x2101, OD_DRIVE_SIMULATION_LOST_SYNCS));
     put(0x1006, 0, 2000);
     TEST_ASSERT_EQUAL_UINT32(32, bench.node.servo.axis.drive.samples);
 }

@@ -360,6 +360,7 @@ static void test_a_moved_pdo_moves_the_filters(void)
 static void test_the_end_of_the_bus(void)
 {
     (void)close(bus);
+    bus = -1;
     TEST_ASSERT_TRUE(drives_receive(&drives));
     TEST_ASSERT_EQUAL_INT(-ENETDOWN, drives.failed);
     TEST_ASSERT_EQUAL_INT(0, init());

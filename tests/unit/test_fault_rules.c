@@ -284,6 +284,36 @@ static void test_tick_0_is_the_sync_after_the_first_step(void)
     TEST_ASSERT_EQUAL_INT64(1, count.tick);
 }
 
+/* A step of the target in any of its bytes, by any drive's RPDO1 and no other frame. */
+static void test_every_byte_of_a_target_counts(void)
+{
+    for (unsigned at = 2; at < 6; at++) {
+        struct fault_ticks count;
+        struct can_msg in = {.id = 0x27F, .len = 6, .data = {0x0F, 0, 1, 1, 1, 1}};
+        fault_ticks_init(&count);
+        (void)fault_ticks_receive(&count, &in);
+        (void)fault_ticks_receive(&count, &in);
+        TEST_ASSERT_FALSE(sync(&count, 1));
+        in.data[at] = 0x81;
+        (void)fault_ticks_receive(&count, &in);
+        TEST_ASSERT_TRUE(sync(&count, 2));
+    }
+}
+
+static void test_frames_that_are_no_setpoints(void)
+{
+    static const uint32_t others[] = {0x200, 0x280, 0x182};
+    struct fault_ticks count;
+    fault_ticks_init(&count);
+    for (unsigned i = 0; i < sizeof others / sizeof others[0]; i++) {
+        struct can_msg in = {.id = others[i], .len = 6, .data = {0x0F, 0, 1}};
+        (void)fault_ticks_receive(&count, &in);
+        in.data[2] = 2;
+        (void)fault_ticks_receive(&count, &in);
+        TEST_ASSERT_FALSE(sync(&count, (uint8_t)(i + 1u)));
+    }
+}
+
 static void test_ticks_go_by_the_counter(void)
 {
     struct fault_ticks count;
@@ -315,6 +345,8 @@ int main(void)
     RUN_TEST(test_probability_is_met_and_repeats);
     RUN_TEST(test_which_frames_a_seed_takes);
     RUN_TEST(test_tick_0_is_the_sync_after_the_first_step);
+    RUN_TEST(test_every_byte_of_a_target_counts);
+    RUN_TEST(test_frames_that_are_no_setpoints);
     RUN_TEST(test_ticks_go_by_the_counter);
     return UNITY_END();
 }
