@@ -41,26 +41,28 @@ bool fault_kind_is_drives(enum fault_kind kind)
     return kind >= FAULT_KIND_STOP;
 }
 
-/* Keys, each a bit. */
-enum {
-    AT = 1 << 0,
-    FOR = 1 << 1,
-    FOR_MS = 1 << 2,
-    COUNT = 1 << 3,
-    P = 1 << 4,
-    SEED = 1 << 5,
-    ID = 1 << 6,
-    NODE = 1 << 7,
-    US = 1 << 8,
-    BYTE = 1 << 9,
-    XOR = 1 << 10,
-    LEN = 1 << 11,
-    PER_TICK = 1 << 12,
-    SIDE = 1 << 13,
-    COUNTS = 1 << 14,
-    VOLTS = 1 << 15,
-    CODE = 1 << 16
+enum key_index {
+    KEY_AT,
+    KEY_FOR,
+    KEY_FOR_MS,
+    KEY_COUNT,
+    KEY_P,
+    KEY_SEED,
+    KEY_ID,
+    KEY_NODE,
+    KEY_US,
+    KEY_BYTE,
+    KEY_XOR,
+    KEY_LEN,
+    KEY_PER_TICK,
+    KEY_SIDE,
+    KEY_COUNTS,
+    KEY_VOLTS,
+    KEY_CODE,
+    KEYS
 };
+
+#define BIT(key) (UINT32_C(1) << KEY_##key)
 
 enum field_type {
     FIELD_U8,
@@ -80,56 +82,55 @@ struct key {
 
 #define IN(member) offsetof(struct fault_rule, member)
 
-/* In the order of the bits. An hour of ticks is enough for any scenario. */
-static const struct key keys[] = {
-    {"at", IN(at), 0, 4e6, FIELD_U32},
-    {"for", IN(for_ticks), 1, 4e6, FIELD_U32},
-    {"for_ms", IN(for_ms), 1, 4e6, FIELD_U32},
-    {"count", IN(count), 1, 4e6, FIELD_U32},
-    {"p", IN(p), 0, 1, FIELD_NUMBER},
-    {"seed", IN(seed), 0, 4294967295.0, FIELD_U32},
-    {"id", IN(id), 0, 0x7FF, FIELD_U16},
-    {"node", IN(node), 1, 127, FIELD_U8},
-    {"us", IN(delay_us), 1, 10e6, FIELD_U32},
-    {"byte", IN(byte), 0, 7, FIELD_U8},
-    {"xor", IN(mask), 1, 0xFF, FIELD_U8},
-    {"len", IN(len), 0, 7, FIELD_U8},
-    {"per_tick", IN(per_tick), 1, 100, FIELD_U32},
-    {"side", IN(side), 0, 0, FIELD_SIDE},
-    {"counts", IN(counts), -2147483648.0, 2147483647.0, FIELD_I32},
-    {"volts", IN(volts), -1000, 1000, FIELD_NUMBER},
-    {"code", IN(code), 1, 0xFFFF, FIELD_U16},
+/* An hour of ticks is enough for any scenario. */
+static const struct key keys[KEYS] = {
+    [KEY_AT] = {"at", IN(at), 0, 4e6, FIELD_U32},
+    [KEY_FOR] = {"for", IN(for_ticks), 1, 4e6, FIELD_U32},
+    [KEY_FOR_MS] = {"for_ms", IN(for_ms), 1, 4e6, FIELD_U32},
+    [KEY_COUNT] = {"count", IN(count), 1, 4e6, FIELD_U32},
+    [KEY_P] = {"p", IN(p), 0, 1, FIELD_NUMBER},
+    [KEY_SEED] = {"seed", IN(seed), 0, 4294967295.0, FIELD_U32},
+    [KEY_ID] = {"id", IN(id), 0, 0x7FF, FIELD_U16},
+    [KEY_NODE] = {"node", IN(node), 1, 127, FIELD_U8},
+    [KEY_US] = {"us", IN(delay_us), 1, 10e6, FIELD_U32},
+    [KEY_BYTE] = {"byte", IN(byte), 0, 7, FIELD_U8},
+    [KEY_XOR] = {"xor", IN(mask), 1, 0xFF, FIELD_U8},
+    [KEY_LEN] = {"len", IN(len), 0, 7, FIELD_U8},
+    [KEY_PER_TICK] = {"per_tick", IN(per_tick), 1, 100, FIELD_U32},
+    [KEY_SIDE] = {"side", IN(side), 0, 0, FIELD_SIDE},
+    [KEY_COUNTS] = {"counts", IN(counts), -2147483648.0, 2147483647.0, FIELD_I32},
+    [KEY_VOLTS] = {"volts", IN(volts), -1000, 1000, FIELD_NUMBER},
+    [KEY_CODE] = {"code", IN(code), 1, 0xFFFF, FIELD_U16},
 };
 
-enum { KEYS = sizeof keys / sizeof keys[0], TIMES = AT | FOR | FOR_MS };
+#define TIMES  (BIT(AT) | BIT(FOR) | BIT(FOR_MS))
+#define FRAMES (TIMES | BIT(COUNT) | BIT(P) | BIT(SEED) | BIT(ID))
 
-enum { FRAMES = TIMES | COUNT | P | SEED | ID };
-
-/* Keys of a kind. */
+/* Keys of a kind, as bits. */
 struct needs {
     uint32_t allowed; /* beside the required ones */
     uint32_t required;
 };
 
 static const struct needs kinds[FAULT_KINDS] = {
-    [FAULT_KIND_DROP] = {FRAMES, AT | ID},
-    [FAULT_KIND_DUPLICATE] = {FRAMES, AT | ID},
-    [FAULT_KIND_DELAY] = {FRAMES, AT | ID | US},
-    [FAULT_KIND_REORDER] = {FRAMES, AT | ID},
-    [FAULT_KIND_CORRUPT] = {FRAMES, AT | ID | BYTE | XOR},
-    [FAULT_KIND_SHORT] = {FRAMES, AT | ID | LEN},
-    [FAULT_KIND_FLOOD] = {TIMES | COUNT, AT | ID | PER_TICK},
-    [FAULT_KIND_BUS_OFF] = {TIMES, AT | SIDE},
-    [FAULT_KIND_STOP] = {TIMES, AT | NODE},
-    [FAULT_KIND_RESTART] = {0, AT | NODE},
-    [FAULT_KIND_HEARTBEAT_STOP] = {TIMES, AT | NODE},
-    [FAULT_KIND_ENCODER_FREEZE] = {TIMES, AT | NODE},
-    [FAULT_KIND_ENCODER_JUMP] = {TIMES, AT | NODE | COUNTS},
-    [FAULT_KIND_ENCODER_FAULT] = {TIMES, AT | NODE},
-    [FAULT_KIND_SATURATE] = {TIMES, AT | NODE | VOLTS},
-    [FAULT_KIND_LOAD] = {TIMES, AT | NODE | VOLTS},
-    [FAULT_KIND_LIMIT_SWITCH] = {TIMES, AT | NODE | SIDE},
-    [FAULT_KIND_FAULT] = {0, AT | NODE | CODE},
+    [FAULT_KIND_DROP] = {FRAMES, BIT(AT) | BIT(ID)},
+    [FAULT_KIND_DUPLICATE] = {FRAMES, BIT(AT) | BIT(ID)},
+    [FAULT_KIND_DELAY] = {FRAMES, BIT(AT) | BIT(ID) | BIT(US)},
+    [FAULT_KIND_REORDER] = {FRAMES, BIT(AT) | BIT(ID)},
+    [FAULT_KIND_CORRUPT] = {FRAMES, BIT(AT) | BIT(ID) | BIT(BYTE) | BIT(XOR)},
+    [FAULT_KIND_SHORT] = {FRAMES, BIT(AT) | BIT(ID) | BIT(LEN)},
+    [FAULT_KIND_FLOOD] = {TIMES | BIT(COUNT), BIT(AT) | BIT(ID) | BIT(PER_TICK)},
+    [FAULT_KIND_BUS_OFF] = {TIMES, BIT(AT) | BIT(SIDE)},
+    [FAULT_KIND_STOP] = {TIMES, BIT(AT) | BIT(NODE)},
+    [FAULT_KIND_RESTART] = {0, BIT(AT) | BIT(NODE)},
+    [FAULT_KIND_HEARTBEAT_STOP] = {TIMES, BIT(AT) | BIT(NODE)},
+    [FAULT_KIND_ENCODER_FREEZE] = {TIMES, BIT(AT) | BIT(NODE)},
+    [FAULT_KIND_ENCODER_JUMP] = {TIMES, BIT(AT) | BIT(NODE) | BIT(COUNTS)},
+    [FAULT_KIND_ENCODER_FAULT] = {TIMES, BIT(AT) | BIT(NODE)},
+    [FAULT_KIND_SATURATE] = {TIMES, BIT(AT) | BIT(NODE) | BIT(VOLTS)},
+    [FAULT_KIND_LOAD] = {TIMES, BIT(AT) | BIT(NODE) | BIT(VOLTS)},
+    [FAULT_KIND_LIMIT_SWITCH] = {TIMES, BIT(AT) | BIT(NODE) | BIT(SIDE)},
+    [FAULT_KIND_FAULT] = {0, BIT(AT) | BIT(NODE) | BIT(CODE)},
 };
 
 /* ---- values ---- */
@@ -189,36 +190,24 @@ static void store_value(unsigned char *field, enum field_type type, double numbe
 
 /* ---- keys of a rule ---- */
 
-/* The bit of a key, 0: there is none of that name. */
-static uint32_t find_key(const char *name)
+/* KEYS: there is none of that name. */
+static unsigned find_key(const char *name)
 {
-    for (unsigned i = 0; i < KEYS; i++) {
-        if (strcmp(name, keys[i].name) == 0) {
-            return 1u << i;
-        }
+    unsigned key = 0;
+    while (key < KEYS && strcmp(name, keys[key].name) != 0) {
+        key++;
     }
-    return 0;
-}
-
-/* The key of a bit. */
-static const struct key *key_of(uint32_t key)
-{
-    unsigned i = 0;
-    while (i < KEYS && key != 1u << i) {
-        i++;
-    }
-    assert(i < KEYS);
-    return &keys[i];
+    return key;
 }
 
 /* Fills in how long a rule lasts, from the keys that were given. False: they exclude each other. */
 static bool settle_duration(struct fault_rule *rule, uint32_t seen)
 {
-    const uint32_t given = seen & (FOR | FOR_MS);
-    if (given == (FOR | FOR_MS)) {
+    const uint32_t given = seen & (BIT(FOR) | BIT(FOR_MS));
+    if (given == (BIT(FOR) | BIT(FOR_MS))) {
         return false;
     }
-    if (given == FOR_MS) {
+    if (given == BIT(FOR_MS)) {
         rule->for_ticks = 0;
     } else if (given == 0u) {
         rule->for_ticks = rule->kind == FAULT_KIND_ENCODER_JUMP ? FAULT_FOR_EVER : 1u;
@@ -241,9 +230,9 @@ static bool store_side(struct fault_rule *rule, const char *value)
 }
 
 /* Puts a value into its field; false: not a value of that key, or out of range. */
-static bool store_key(struct fault_rule *rule, uint32_t key, const char *value)
+static bool store_key(struct fault_rule *rule, unsigned key, const char *value)
 {
-    const struct key *it = key_of(key);
+    const struct key *it = &keys[key];
     double number = 0.0;
     if (it->type == FIELD_SIDE) {
         return store_side(rule, value);
@@ -251,7 +240,7 @@ static bool store_key(struct fault_rule *rule, uint32_t key, const char *value)
     if (!read_value(value, it->type, &number) || number < it->low || number > it->high) {
         return false;
     }
-    if (key == VOLTS && rule->kind == FAULT_KIND_SATURATE && number <= 0.0) {
+    if (key == KEY_VOLTS && rule->kind == FAULT_KIND_SATURATE && number <= 0.0) {
         return false;
     }
     store_value((unsigned char *)rule + it->offset, it->type, number);
@@ -273,10 +262,15 @@ static int wrong(const struct place *at, const char *what, const char *name)
     return FAULT_RULES_WRONG;
 }
 
+/* The first of the missing keys. */
 static int lacks(const struct place *at, enum fault_kind kind, uint32_t missing)
 {
+    unsigned key = 0;
+    while ((missing >> key & 1u) == 0u) {
+        key++;
+    }
     (void)snprintf(at->reason, at->size, "line %u: %s needs %s=", (unsigned)at->line,
-                   fault_kind_name(kind), key_of(missing)->name);
+                   fault_kind_name(kind), keys[key].name);
     return FAULT_RULES_WRONG;
 }
 
@@ -299,18 +293,18 @@ static int take_pair(struct fault_rule *rule, uint32_t *seen, char *word, const 
         return wrong(at, "key=value is needed, not", word);
     }
     *value++ = '\0';
-    const uint32_t key = find_key(word);
-    if (key == 0u) {
+    const unsigned key = find_key(word);
+    if (key == KEYS) {
         return wrong(at, "there is no key", word);
     }
     const struct needs *needs = &kinds[rule->kind];
-    if (((needs->allowed | needs->required) & key) == 0u) {
+    if (((needs->allowed | needs->required) >> key & 1u) == 0u) {
         return wrong(at, "this kind of fault has no key", word);
     }
-    if ((*seen & key) != 0u) {
+    if ((*seen >> key & 1u) != 0u) {
         return wrong(at, "given twice:", word);
     }
-    *seen |= key;
+    *seen |= UINT32_C(1) << key;
     if (!store_key(rule, key, value)) {
         value[-1] = '=';
         return wrong(at, "no value of this key, or out of its range:", word);
@@ -322,7 +316,7 @@ static int check_rule(struct fault_rule *rule, uint32_t seen, const struct place
 {
     const uint32_t missing = kinds[rule->kind].required & ~seen;
     if (missing != 0u) {
-        return lacks(at, rule->kind, missing & (~missing + 1u));
+        return lacks(at, rule->kind, missing);
     }
     if (!settle_duration(rule, seen)) {
         return wrong(at, "either for= or for_ms=, not both, in", fault_kind_name(rule->kind));
