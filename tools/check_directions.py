@@ -64,6 +64,7 @@ C_RULES: dict[str, set[str]] = {
         "firmware/port/linux/can_socket.h",  # a Linux program: socket and clock are those of the port
         "firmware/port/linux/clock.h",
         "firmware/port/linux/end_signals.h",
+        "firmware/port/linux/long_options.h",
         "sim/plant",
         "sim/faults",
         "generated",
@@ -74,6 +75,7 @@ C_RULES: dict[str, set[str]] = {
         "firmware/port/linux/can_socket.h",
         "firmware/port/linux/clock.h",
         "firmware/port/linux/end_signals.h",
+        "firmware/port/linux/long_options.h",
         "sim/faults",
     },
     "sim/hub": {"firmware/port/linux/end_signals.h", "firmware/port/linux/local_bus.h"},
@@ -81,6 +83,7 @@ C_RULES: dict[str, set[str]] = {
         "firmware/can",
         "firmware/port/linux/can_socket.h",
         "firmware/port/linux/clock.h",
+        "firmware/port/linux/long_options.h",
         "firmware/port/linux/schedule.h",  # the emulated board's ticks come as the Linux port's do
         "firmware/port/mps2/exchange.h",
     },

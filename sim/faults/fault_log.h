@@ -10,7 +10,7 @@
 #include <stdio.h>
 
 #include "can/can_frame.h"
-#include "faults/fault_rule.h"
+#include "faults/fault_rules.h"
 
 struct fault_event {
     const struct fault_rule *rule;

@@ -24,14 +24,14 @@ static void on_signal(int number)
 int bus_catch_signals(void)
 {
     struct sigaction action;
-    memset(&action, 0, sizeof action); /* without SA_RESTART: who waits shall look */
+    memset(&action, 0, sizeof action); /* without SA_RESTART: a wait ends */
     action.sa_handler = on_signal;
     (void)sigemptyset(&action.sa_mask);
     (void)signal(SIGPIPE, SIG_IGN);
     return sigaction(SIGTERM, &action, NULL) == 0 ? sigaction(SIGINT, &action, NULL) : -1;
 }
 
-void bus_heed_signals(void)
+void bus_unblock_signals(void)
 {
     sigset_t ends;
     (void)sigemptyset(&ends);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* bus: the CAN side of the bridge, and its wish to end. */
+/* bus: the CAN side of the gateway, its signals and its errors. */
 #ifndef GATEWAY_BUS_H
 #define GATEWAY_BUS_H
 
@@ -9,14 +9,14 @@
 
 #include "port/linux/can_socket.h"
 
-enum bridge_status { BRIDGE_OK = 0, BRIDGE_GONE = 1, BRIDGE_USAGE = 2, BRIDGE_BUS = 4 };
+enum gateway_status { GATEWAY_OK = 0, GATEWAY_GONE = 1, GATEWAY_USAGE = 2, GATEWAY_BUS = 4 };
 
-/* SIGTERM and SIGINT from now on only say so here. */
+/* From now on SIGTERM and SIGINT are only counted. 0, or -1 with errno set. */
 int bus_catch_signals(void);
 unsigned bus_signals(void); /* how many have come */
 
-/* They come at any time, while the board is waited for as well: clock_join() puts them off. */
-void bus_heed_signals(void);
+/* Undoes that clock_join() blocks them: they come while the gateway waits for the board, too. */
+void bus_unblock_signals(void);
 
 /* Sends all of them; waits while the queue of the interface is full. Returns 0, or a negative errno. */
 int bus_send(struct can_socket *socket, const struct can_msg *messages, size_t count);

@@ -18,29 +18,29 @@ static struct {
     struct can_socket *socket;
     int out; /* as the board sees it */
     int in;
-    struct pacing turn;
+    struct pacing pacing;
     struct exchange_message request;
     struct exchange_message reply;
 } self;
 
 static const char gone[] = "the emulated board is gone";
 
-/* Waits until the board opens its end. */
+/* Waits until the board opens its end. A negative number: it did not; a line on stderr has the reason. */
 static int open_fifo(const char *path, int flags)
 {
     struct stat found;
     if (stat(path, &found) != 0 || !S_ISFIFO(found.st_mode)) {
-        (void)bus_complain(BRIDGE_GONE, path, "no FIFO of this name: make it with mkfifo");
+        (void)bus_complain(GATEWAY_GONE, path, "no FIFO of this name: make it with mkfifo");
         return -1;
     }
     const int fd = open(path, flags | O_CLOEXEC);
     if (fd < 0 && bus_signals() == 0u) {
-        (void)bus_complain(BRIDGE_GONE, path, strerror(errno));
+        (void)bus_complain(GATEWAY_GONE, path, strerror(errno));
     }
     return fd;
 }
 
-/* False when the board is gone, or will not say what it began to. */
+/* False when the board is gone, or its request is none. */
 static bool read_request(void)
 {
     size_t got = 0;
@@ -90,6 +90,9 @@ static int send_frames(void)
     const size_t count = self.request.header.count;
     for (size_t i = 0; i < count; ++i) {
         exchange_unpack(&messages[i], &self.request.frames[i]);
+        if (messages[i].id > CAN_ID_MAX || messages[i].len > CAN_DATA_MAX) {
+            return -EINVAL; /* other identifiers are the hub's (port/linux/local_bus.h) */
+        }
         if (self.request.frames[i].of_tick != 0u) {
             (void)can_socket_track(self.socket, (uint16_t)messages[i].id);
         }
@@ -97,7 +100,7 @@ static int send_frames(void)
     return bus_send(self.socket, messages, count);
 }
 
-/* What lies in the socket; what has no room in the reply stays there. 0 or a negative errno. */
+/* Takes the waiting frames; those that have no room in the reply stay in the socket. 0 or a negative errno. */
 static int take_frames(void)
 {
     struct can_msg messages[CAN_SOCKET_BATCH];
@@ -114,26 +117,26 @@ static int take_frames(void)
     return 0;
 }
 
-/* At lock step the processor belongs to those who are to answer: so no look at the socket before they can have. Nor at the clock
- * when they have, which is a system call where the kernel itself is a process: guard times begin anew with the next request. */
-static int wait_for_turn(uint64_t now_ns)
+/* At lock step the processor belongs to the drives, which are to answer: the socket is not read before they can have done
+ * so. Nor is the clock when they have, since that may cost a system call: guard times begin anew with the next request. */
+static int wait_until_due(uint64_t now_ns)
 {
     bool over = false;
     int error = 0;
     self.reply.header = (struct exchange_header){.count = 0};
     while (!over && error == 0 && bus_signals() < 2u) {
-        const uint64_t wait_ns = pacing_wait_ns(&self.turn, now_ns);
-        struct pollfd wait = {.fd = self.turn.awaiting ? self.socket->fd : -1, .events = POLLIN};
+        const uint64_t wait_ns = pacing_wait_ns(&self.pacing, now_ns);
+        struct pollfd wait = {.fd = self.pacing.awaiting ? self.socket->fd : -1, .events = POLLIN};
         if (wait_ns > 0u) {
             const int ready = clock_poll(&wait, 1, 1, wait_ns);
-            now_ns = ready > 0 && self.turn.schedule.lock_step ? now_ns : clock_ns();
+            now_ns = ready > 0 && self.pacing.schedule.lock_step ? now_ns : clock_ns();
             error = ready < 0 && ready != -EINTR ? ready : 0;
         }
         if (error != 0) {
             break;
         }
-        error = self.turn.at_once ? 0 : take_frames();
-        over = pacing_over(&self.turn, self.reply.header.count, now_ns, &self.reply.header);
+        error = self.pacing.at_once ? 0 : take_frames();
+        over = pacing_over(&self.pacing, self.reply.header.count, now_ns, &self.reply.header);
     }
     return error;
 }
@@ -143,10 +146,10 @@ static int serve(void)
 {
     const uint16_t flags = self.request.header.flags;
     const uint64_t now_ns = clock_ns();
-    pacing_request(&self.turn, &self.request.header, now_ns);
+    pacing_request(&self.pacing, &self.request.header, now_ns);
     int error = (flags & EXCHANGE_FILTER) != 0u ? set_filters() : send_frames();
     if (error == 0) {
-        error = wait_for_turn(now_ns);
+        error = wait_until_due(now_ns);
     }
     if (can_socket_waiting(self.socket) > 0u) {
         self.reply.header.flags |= EXCHANGE_WAITING;
@@ -157,36 +160,44 @@ static int serve(void)
     return error;
 }
 
-static int run(void)
+struct fifo_side_end fifo_side_serve(struct can_socket *socket, int out, int in)
 {
+    memset(&self, 0, sizeof self);
+    self.socket = socket;
+    self.out = out;
+    self.in = in;
     while (read_request()) {
         const int error = serve();
         if (error != 0) {
-            return bus_complain(BRIDGE_BUS, "the bus failed", strerror(-error));
+            return (struct fifo_side_end){GATEWAY_BUS, "the bus failed", strerror(-error)};
         }
         if (!write_reply()) {
-            return bus_complain(BRIDGE_GONE, gone, strerror(errno));
+            return (struct fifo_side_end){GATEWAY_GONE, gone, strerror(errno)};
         }
         if ((self.request.header.flags & EXCHANGE_END) != 0u) {
-            return BRIDGE_OK;
+            return (struct fifo_side_end){.status = GATEWAY_OK};
         }
     }
-    return bus_complain(BRIDGE_GONE, gone, "it closed its FIFO without a word");
+    return (struct fifo_side_end){GATEWAY_GONE, gone, "it closed its FIFO without a word"};
+}
+
+static int serve_and_report(struct can_socket *socket, int out, int in)
+{
+    const struct fifo_side_end end = fifo_side_serve(socket, out, in);
+    return end.status == GATEWAY_OK ? GATEWAY_OK : bus_complain((int)end.status, end.what, end.why);
 }
 
 int fifo_side_run(struct can_socket *socket, const char *out, const char *in)
 {
-    memset(&self, 0, sizeof self);
-    self.socket = socket;
-    self.out = open_fifo(out, O_RDONLY);
-    self.in = self.out < 0 ? -1 : open_fifo(in, O_WRONLY);
-    int status = bus_signals() > 0u ? BRIDGE_OK : BRIDGE_GONE;
-    if (self.in >= 0) {
-        status = run();
-        (void)close(self.in);
+    const int out_fd = open_fifo(out, O_RDONLY);
+    const int in_fd = out_fd < 0 ? -1 : open_fifo(in, O_WRONLY);
+    int status = bus_signals() > 0u ? GATEWAY_OK : GATEWAY_GONE;
+    if (in_fd >= 0) {
+        status = serve_and_report(socket, out_fd, in_fd);
+        (void)close(in_fd);
     }
-    if (self.out >= 0) {
-        (void)close(self.out);
+    if (out_fd >= 0) {
+        (void)close(out_fd);
     }
     return status;
 }

@@ -15,7 +15,7 @@ struct gateway_options { /* all into argv */
 enum gateway_options_result {
     GATEWAY_OPTIONS_OK,
     GATEWAY_OPTIONS_HELP, /* print gateway_options_help */
-    GATEWAY_OPTIONS_WRONG /* `reason` has one line that says what and what to do */
+    GATEWAY_OPTIONS_WRONG /* `reason` has one line: what is wrong and what to do */
 };
 
 extern const char gateway_options_help[];

@@ -12,9 +12,9 @@
 #include "gateway/slcan_side.h"
 #include "port/linux/clock.h"
 
-/* A batch thread is woken once for all answers of the drives, not by the first of them; nor by each character of a UART.
- * Whoever has given us a real-time priority means that. */
-static void be_patient(void)
+/* A batch thread is woken once for all answers of the drives, not by the first of them; nor by each character of a UART. A
+ * real-time priority that the process was started with stays. */
+static void use_batch_scheduling(void)
 {
     if (sched_getscheduler(0) != SCHED_OTHER) {
         return;
@@ -28,15 +28,15 @@ static int run(const struct gateway_options *options)
     char reason[512];
     struct can_socket socket;
     if (bus_catch_signals() != 0) {
-        return bus_complain(BRIDGE_GONE, "cannot catch signals", strerror(errno));
+        return bus_complain(GATEWAY_GONE, "cannot catch signals", strerror(errno));
     }
     (void)clock_join(options->bus,
-                     "bridge"); /* opening the socket says what is wrong with the bus */
-    bus_heed_signals();
+                     "bridge"); /* opening the socket reports what is wrong with the bus */
+    bus_unblock_signals();
     if (can_socket_open(&socket, options->bus, reason, sizeof reason) != 0) {
-        return bus_complain(BRIDGE_BUS, options->bus, reason);
+        return bus_complain(GATEWAY_BUS, options->bus, reason);
     }
-    be_patient();
+    use_batch_scheduling();
     const int status = options->slcan != NULL ? slcan_side_run(&socket, options->slcan)
                                               : fifo_side_run(&socket, options->out, options->in);
     can_socket_close(&socket);
@@ -55,6 +55,6 @@ int main(int argc, char **argv)
         (void)fputs(gateway_options_help, stdout);
         return 0;
     default:
-        return bus_complain(BRIDGE_USAGE, "command line", reason);
+        return bus_complain(GATEWAY_USAGE, "command line", reason);
     }
 }

@@ -1,21 +1,22 @@
 /* SPDX-License-Identifier: MIT */
 #include "gateway/pacing.h"
 
-#define SLEEP_MAX_NS 100000000u /* how late a wish to end may be noticed */
+#define SLEEP_MAX_NS 100000000u /* latest check for signals */
 
 /* At lock step the board goes on by itself when all have answered. */
-static void begin_tick(struct pacing *turn, const struct exchange_header *request, uint64_t now_ns)
+static void begin_tick(struct pacing *pacing, const struct exchange_header *request,
+                       uint64_t now_ns)
 {
-    struct schedule *schedule = &turn->schedule;
+    struct schedule *schedule = &pacing->schedule;
     const uint64_t period_ns = 1000ull * request->period_us;
-    if (!turn->begun) {
+    if (!pacing->begun) {
         schedule_begin(schedule, now_ns - period_ns, period_ns, false);
-        turn->begun = true;
+        pacing->begun = true;
     }
-    if (!turn->started) {
+    if (!pacing->started) {
         (void)schedule_start(schedule, now_ns);
     }
-    turn->started = false;
+    pacing->started = false;
     schedule->period_ns = period_ns;
     schedule->lock_step = (request->flags & EXCHANGE_HURRY) != 0u;
     if ((request->flags & EXCHANGE_AWAIT) != 0u) {
@@ -24,46 +25,46 @@ static void begin_tick(struct pacing *turn, const struct exchange_header *reques
     schedule_finish(schedule, now_ns);
 }
 
-void pacing_request(struct pacing *turn, const struct exchange_header *request, uint64_t now_ns)
+void pacing_request(struct pacing *pacing, const struct exchange_header *request, uint64_t now_ns)
 {
     if ((request->flags & EXCHANGE_TICK) != 0u) {
-        begin_tick(turn, request, now_ns);
+        begin_tick(pacing, request, now_ns);
     } else if ((request->flags & EXCHANGE_READY) != 0u) {
-        schedule_ready(&turn->schedule, now_ns);
+        schedule_ready(&pacing->schedule, now_ns);
     }
-    turn->at_once = (request->flags & (EXCHANGE_FILTER | EXCHANGE_END)) != 0u;
-    turn->awaiting = (request->flags & EXCHANGE_AWAIT) != 0u;
+    pacing->at_once = (request->flags & (EXCHANGE_FILTER | EXCHANGE_END)) != 0u;
+    pacing->awaiting = (request->flags & EXCHANGE_AWAIT) != 0u;
 }
 
-uint64_t pacing_wait_ns(const struct pacing *turn, uint64_t now_ns)
+uint64_t pacing_wait_ns(const struct pacing *pacing, uint64_t now_ns)
 {
-    const struct schedule *schedule = &turn->schedule;
-    if (turn->at_once || schedule->due_ns <= now_ns) {
+    const struct schedule *schedule = &pacing->schedule;
+    if (pacing->at_once || schedule->due_ns <= now_ns) {
         return 0;
     }
-    const uint64_t longest_ns = turn->awaiting ? SCHEDULE_SLICE_NS : SLEEP_MAX_NS;
+    const uint64_t longest_ns = pacing->awaiting ? SCHEDULE_SLICE_NS : SLEEP_MAX_NS;
     const uint64_t wait_ns = schedule->due_ns - now_ns;
     return wait_ns < longest_ns ? wait_ns : longest_ns;
 }
 
-bool pacing_over(struct pacing *turn, uint32_t frames, uint64_t now_ns,
+bool pacing_over(struct pacing *pacing, uint32_t frames, uint64_t now_ns,
                  struct exchange_header *reply)
 {
     reply->flags = 0;
     reply->late_ns = 0;
-    if (turn->at_once) {
+    if (pacing->at_once) {
         return true;
     }
-    schedule_wait(&turn->schedule, now_ns);
-    if (turn->awaiting && frames > 0u) {
+    schedule_wait(&pacing->schedule, now_ns);
+    if (pacing->awaiting && frames > 0u) {
         return true;
     }
-    if (now_ns < turn->schedule.due_ns) {
+    if (now_ns < pacing->schedule.due_ns) {
         return false;
     }
-    turn->schedule.lock_step = false;
-    const uint64_t late_ns = schedule_start(&turn->schedule, now_ns);
-    turn->started = true;
+    pacing->schedule.lock_step = false;
+    const uint64_t late_ns = schedule_start(&pacing->schedule, now_ns);
+    pacing->started = true;
     reply->flags = EXCHANGE_DUE;
     reply->late_ns = late_ns < UINT32_MAX ? (uint32_t)late_ns : UINT32_MAX;
     return true;

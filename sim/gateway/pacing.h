@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * turn: when a request of the emulated board is answered, so that its ticks come as those of the Linux port do (port/linux/schedule.h).
- * Pure arithmetic on monotonic nanoseconds.
+ * pacing: when a request of the emulated board is answered, so that its ticks come as those of the Linux port do
+ * (port/linux/schedule.h). Pure arithmetic on monotonic nanoseconds.
  *
  * The board's clock stands still while it waits for the reply to a tick's request; so the reply is what makes its next tick due.
  */
@@ -18,19 +18,19 @@
 struct pacing {
     struct schedule schedule;
     bool begun;    /* there has been a tick */
-    bool started;  /* the board has been told that the next tick is due */
+    bool started;  /* a reply has reported that the next tick is due */
     bool at_once;  /* nothing is waited for: a request that belongs to no tick */
     bool awaiting; /* frames end the wait, too */
 };
 
-/* The board has asked. */
-void pacing_request(struct pacing *turn, const struct exchange_header *request, uint64_t now_ns);
+/* A request of the board. */
+void pacing_request(struct pacing *pacing, const struct exchange_header *request, uint64_t now_ns);
 
-/* How long to wait for a frame at most, then ask pacing_over(). 0: do not wait. */
-uint64_t pacing_wait_ns(const struct pacing *turn, uint64_t now_ns);
+/* How long to wait for a frame at most, then call pacing_over(). 0: do not wait. */
+uint64_t pacing_wait_ns(const struct pacing *pacing, uint64_t now_ns);
 
-/* True when it is time to reply, with the `frames` that have come: fills in what else the reply's header says. */
-bool pacing_over(struct pacing *turn, uint32_t frames, uint64_t now_ns,
+/* True when it is time to reply, with the `frames` that have come: fills in the rest of the reply's header. */
+bool pacing_over(struct pacing *pacing, uint32_t frames, uint64_t now_ns,
                  struct exchange_header *reply);
 
 #endif

@@ -17,7 +17,7 @@
 #include "gateway/bus.h"
 
 #define TEXT_SIZE      4096u
-#define SIGNAL_LOOK_MS 100 /* how late a wish to end may be noticed on a silent bus */
+#define SIGNAL_POLL_MS 100 /* latest check for signals on a bus without frames */
 
 static int connect_unix(const char *path)
 {
@@ -94,7 +94,7 @@ static int connect_stream(const char *address)
                                                         : connect_unix(address);
 }
 
-/* Of datagrams: the board's emulator does not listen yet; once it has been asked to end, any more. */
+/* Of datagrams: the board's emulator does not listen yet; after a signal to end it no longer does. */
 static bool passes_over(int error)
 {
     return error == EINTR || error == EAGAIN || (error == ECONNREFUSED && bus_signals() == 0u);
@@ -171,7 +171,7 @@ static int pass_on(struct can_socket *socket, int stream, struct slcan_decoder *
     struct pollfd wait[2] = {{.fd = stream, .events = POLLIN},
                              {.fd = socket->fd, .events = POLLIN}};
     int result = 0;
-    if (poll(wait, 2, SIGNAL_LOOK_MS) < 0) {
+    if (poll(wait, 2, SIGNAL_POLL_MS) < 0) {
         return 0; /* a signal */
     }
     if (wait[0].revents != 0) {
@@ -180,7 +180,7 @@ static int pass_on(struct can_socket *socket, int stream, struct slcan_decoder *
     return wait[1].revents != 0 && result == 0 ? to_stream(socket, stream) : result;
 }
 
-/* Asks the board to end; it stops the axes and switches the drives off, over the bus, before it closes. */
+/* Requests the board to end; it stops the axes and switches the drives off, over the bus, before it closes. */
 static int end_board(struct can_socket *socket, int stream, struct slcan_decoder *decoder)
 {
     int result = write_all(stream, "C\r", 2) ? 0 : 1;
@@ -189,9 +189,9 @@ static int end_board(struct can_socket *socket, int stream, struct slcan_decoder
         result = pass_on(socket, stream, decoder);
     }
     if (result == 0 && !decoder->closed) {
-        return bus_complain(BRIDGE_GONE, "told twice to end", "the board had not closed yet");
+        return bus_complain(GATEWAY_GONE, "second signal to end", "the board had not closed yet");
     }
-    return result < 0 ? result : BRIDGE_OK;
+    return result < 0 ? result : GATEWAY_OK;
 }
 
 static int run(struct can_socket *socket, int stream)
@@ -203,17 +203,17 @@ static int run(struct can_socket *socket, int stream)
         result = pass_on(socket, stream, &decoder);
     }
     if (result > 0) {
-        return bus_complain(BRIDGE_GONE, "the board is gone", "its stream has ended");
+        return bus_complain(GATEWAY_GONE, "the board is gone", "its stream has ended");
     }
     result = result == 0 ? end_board(socket, stream, &decoder) : result;
-    return result < 0 ? bus_complain(BRIDGE_BUS, "the bus failed", strerror(-result)) : result;
+    return result < 0 ? bus_complain(GATEWAY_BUS, "the bus failed", strerror(-result)) : result;
 }
 
 int slcan_side_run(struct can_socket *socket, const char *address)
 {
     const int stream = connect_stream(address);
     if (stream < 0) {
-        return bus_complain(BRIDGE_GONE, address, strerror(errno));
+        return bus_complain(GATEWAY_GONE, address, strerror(errno));
     }
     const int status = run(socket, stream);
     (void)close(stream);

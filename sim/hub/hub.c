@@ -14,7 +14,7 @@
 
 #include "hub/frame_bits.h"
 
-enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, LOOK_MS = 20 };
+enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, POLL_ALL_MS = 20 };
 
 #define NS_PER_S 1000000000u
 
@@ -106,7 +106,7 @@ static void take_connection(struct hub *hub, unsigned bus)
     }
     struct hub_connection *fresh = &hub->connections[at];
     fresh->fd = fd;
-    fresh->role = HUB_STRANGER;
+    fresh->role = HUB_UNKNOWN;
     fresh->bus = bus;
     fresh->number = 0;
     fresh->filter_count = 0;
@@ -115,7 +115,7 @@ static void take_connection(struct hub *hub, unsigned bus)
     fresh->queue.count = 0;
 }
 
-/* Whether the packet has left: who has gone is dropped in its turn. In virtual time nothing is lost, so a process that
+/* Whether the packet has left: a connection that has ended is dropped later. In virtual time nothing is lost, so a process that
  * does not take its frames is waited for. */
 static bool send_packet(const struct hub *hub, int fd, const void *packet, size_t size)
 {
@@ -154,8 +154,8 @@ static const struct hub_connection *participant_connection(const struct hub *hub
     return NULL;
 }
 
-/* Tells those who watch; a leave ends their wait, too. */
-static void tell(struct hub *hub, uint16_t kind, const struct participant *about)
+/* Notifies the participants that watch; a leave ends their wait, too. */
+static void notify(struct hub *hub, uint16_t kind, const struct participant *about)
 {
     for (size_t i = 0; i < hub->time.count; ++i) {
         const struct participant *each = &hub->time.participants[i];
@@ -190,7 +190,7 @@ static void drop_connection(struct hub *hub, struct hub_connection *gone)
         take_sent(hub, gone->number);
         const struct participant *about = virtual_time_find(&hub->time, gone->number);
         if (about != NULL) {
-            tell(hub, LOCAL_BUS_LEFT, about);
+            notify(hub, LOCAL_BUS_LEFT, about);
         }
         virtual_time_leave(&hub->time, gone->number);
     }
@@ -243,7 +243,7 @@ static void deliver(struct hub *hub, size_t sender, const struct can_frame *fram
     }
 }
 
-/* Tells its sender that it has left, where that wants to know. It finds it when it wakes for something else. */
+/* Back to its sender, if that tracks it, which finds it when it wakes for something else. */
 static void deliver_back(struct hub *hub, size_t sender, const struct can_frame *frame)
 {
     const struct hub_connection *to = &hub->connections[sender];
@@ -342,8 +342,8 @@ static uint64_t next_event_ns(struct hub *hub)
     return next_ns;
 }
 
-/* Who reacts to a frame takes some time for that: so a frame that waits already goes first, whatever its identifier. Else two
- * that answer each other at once would keep the bus from all that is less urgent. */
+/* A reaction to a frame takes some time: so a frame that waits already goes first, whatever its identifier. Else two
+ * processes that answer each other at once would keep the bus from all that is less urgent. */
 static void end_transmissions(struct hub *hub)
 {
     for (unsigned i = 0; i < hub->bus_count; ++i) {
@@ -359,7 +359,7 @@ static void end_transmissions(struct hub *hub)
     }
 }
 
-/* Milliseconds of real time until this instant may come; 0: it may come now. A simulation that is behind does not hurry. */
+/* Milliseconds of real time until this instant may come; 0: it may come now. A simulation that is late does not catch up. */
 static int pace_ms(struct hub *hub, uint64_t next_ns)
 {
     const uint64_t real_ns = clock_of(CLOCK_MONOTONIC);
@@ -417,7 +417,7 @@ static int go_on(struct hub *hub)
     return -1;
 }
 
-/* --- What processes say --- */
+/* --- Messages of processes --- */
 
 static void greet(struct hub *hub, struct hub_connection *from,
                   const struct local_bus_control *hello)
@@ -431,12 +431,12 @@ static void greet(struct hub *hub, struct hub_connection *from,
     if (hub->options.is_virtual) {
         from->number =
             virtual_time_join(&hub->time, hello->name, (hello->flags & LOCAL_BUS_WATCHES) != 0u);
-        from->role = from->number != 0u ? HUB_PARTICIPANT : HUB_STRANGER;
+        from->role = from->number != 0u ? HUB_PARTICIPANT : HUB_UNKNOWN;
         if (from->number == 0u) {
             drop_connection(hub, from);
             return;
         }
-        tell(hub, LOCAL_BUS_JOINED, virtual_time_find(&hub->time, from->number));
+        notify(hub, LOCAL_BUS_JOINED, virtual_time_find(&hub->time, from->number));
     }
     send_control(hub, from->fd, LOCAL_BUS_WELCOME, from->number, NULL);
 }
@@ -449,14 +449,14 @@ static void take_wait(struct hub *hub, const struct hub_connection *from,
     }
     if (virtual_time_wait(&hub->time, from->number, wait->number, wait->time_ns)) {
         const struct participant *interrupted = virtual_time_find(&hub->time, from->number);
-        tell(hub, LOCAL_BUS_INTERRUPTED, interrupted);
+        notify(hub, LOCAL_BUS_INTERRUPTED, interrupted);
     }
 }
 
 static bool take_control(struct hub *hub, struct hub_connection *from,
                          const struct local_bus_control *control)
 {
-    if (from->role == HUB_STRANGER) {
+    if (from->role == HUB_UNKNOWN) {
         greet(hub, from, control);
         return true;
     }
@@ -478,27 +478,27 @@ static bool take_control(struct hub *hub, struct hub_connection *from,
     return true;
 }
 
-static void take_filters(struct hub_connection *from, const struct local_bus_filters *told,
+static void take_filters(struct hub_connection *from, const struct local_bus_filters *message,
                          size_t size)
 {
-    const size_t bytes = told->count * sizeof told->filters[0];
-    if (told->count > LOCAL_BUS_FILTERS ||
+    const size_t bytes = message->count * sizeof message->filters[0];
+    if (message->count > LOCAL_BUS_FILTERS ||
         size != offsetof(struct local_bus_filters, filters) + bytes) {
         return;
     }
-    if (told->kind == LOCAL_BUS_FILTER) {
-        memcpy(from->filters, told->filters, bytes);
-        from->filter_count = told->count;
-    } else if (told->kind == LOCAL_BUS_TRACK) {
-        memcpy(from->tracked, told->filters, bytes);
-        from->tracked_count = told->count;
+    if (message->kind == LOCAL_BUS_FILTER) {
+        memcpy(from->filters, message->filters, bytes);
+        from->filter_count = message->count;
+    } else if (message->kind == LOCAL_BUS_TRACK) {
+        memcpy(from->tracked, message->filters, bytes);
+        from->tracked_count = message->count;
     } else {
-        memcpy(from->deferred, told->filters, bytes);
-        from->deferred_count = told->count;
+        memcpy(from->deferred, message->filters, bytes);
+        from->deferred_count = message->count;
     }
 }
 
-/* False: nobody that we know talks like this. */
+/* False: no packet of the protocol. */
 static bool take_packet(struct hub *hub, struct hub_connection *from, const union packet *packet,
                         size_t size)
 {
@@ -534,13 +534,13 @@ static void take_packets(struct hub *hub, struct hub_connection *from, size_t mo
         if (size <= 0 || !take_packet(hub, from, &packet, (size_t)size)) {
             drop_connection(hub, from);
         }
-        over = from->role == HUB_PARTICIPANT; /* mostly it says one thing, then waits */
+        over = from->role == HUB_PARTICIPANT; /* mostly it sends one message, then waits */
     }
 }
 
 /* --- The hub --- */
 
-/* What participants have sent is taken when they wait. Until then their members are looked at only now and then (`all`), so
+/* What participants have sent is taken when they wait. Until then their members are read only now and then (`all`), so
  * that one that sends very much finds room. */
 static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *who, bool all)
 {
@@ -566,13 +566,13 @@ bool hub_turn(struct hub *hub, int end)
     size_t who[1u + HUB_BUSES + HUB_CONNECTIONS];
     const int limit_ms = hub->options.is_virtual ? go_on(hub) : -1;
     const bool held = hub->options.is_virtual && virtual_time_is_held(&hub->time);
-    const bool all = !held || hub->look_at_all;
+    const bool all = !held || hub->poll_all;
     const size_t count = fill(hub, end, wait, who, all);
-    const int ready = poll(wait, count, all ? limit_ms : LOOK_MS);
+    const int ready = poll(wait, count, all ? limit_ms : POLL_ALL_MS);
     if (ready < 0) {
         return errno == EINTR;
     }
-    hub->look_at_all = ready == 0 && !all;
+    hub->poll_all = ready == 0 && !all;
     for (size_t i = 1u + hub->bus_count; i < count; ++i) {
         struct hub_connection *each = &hub->connections[who[i]];
         if (wait[i].revents != 0 && each->fd == wait[i].fd) {

@@ -2,10 +2,11 @@
 /*
  * hub: CAN buses for the processes of one machine, whose kernel need not have CAN, in real or in virtual time.
  *
- * What a process says to it is in port/linux/local_bus.h. Each frame that a member sends goes to all other members of its bus, in one order.
+ * The messages between processes and hub are in port/linux/local_bus.h. Each frame that a member sends goes to all other
+ * members of its bus, in one order.
  *
  * In real time it goes at once. A member that does not take its frames loses those for which its buffer of some megabytes
- * has no room; nobody waits for it.
+ * has no room; the others do not wait for it.
  *
  * In virtual time a frame takes its bits (frame_bits.h) on a bus that carries one at a time. Of the frames that wait, the lowest identifier
  * goes first (CAN arbitration), also among those of one member, as in the mailboxes of a CAN controller; equal identifiers keep their
@@ -39,7 +40,7 @@ struct hub_queue {
     size_t count;
 };
 
-enum hub_role { HUB_STRANGER, HUB_MEMBER, HUB_PARTICIPANT }; /* a stranger has said nothing yet */
+enum hub_role { HUB_UNKNOWN, HUB_MEMBER, HUB_PARTICIPANT }; /* unknown: no hello yet */
 
 struct hub_connection {
     int fd; /* -1: not in use */
@@ -48,9 +49,9 @@ struct hub_connection {
     uint32_t number; /* member: of the participant that it wakes; participant: its own; 0: none */
     struct can_filter filters[LOCAL_BUS_FILTERS]; /* none: all frames pass */
     size_t filter_count;
-    struct can_filter deferred[LOCAL_BUS_FILTERS]; /* what wakes nobody */
+    struct can_filter deferred[LOCAL_BUS_FILTERS]; /* frames that do not wake its participant */
     size_t deferred_count;
-    struct can_filter tracked[LOCAL_BUS_FILTERS]; /* what comes back to it */
+    struct can_filter tracked[LOCAL_BUS_FILTERS]; /* frames of its own that come back to it */
     size_t tracked_count;
     struct hub_queue queue;
 };
@@ -72,7 +73,7 @@ struct hub {
     struct virtual_time time;
     uint64_t pace_real_ns;    /* where speed is limited: an instant of real time, */
     uint64_t pace_virtual_ns; /* and that of virtual time which may not come before it */
-    bool look_at_all;         /* at members of participants that compute, too */
+    bool poll_all;            /* members of participants that compute, too */
     uint64_t lost;            /* frames that found no room */
 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * virtual_time: who takes part in virtual time, and whose turn it is: conservative co-simulation. No I/O.
+ * virtual_time: the participants of virtual time, and which of them computes next: conservative co-simulation. No I/O.
  *
  * A participant is active from its grant to its next wait, and time stands still meanwhile. When none is active, the next grant
  * goes to one that is due or was woken: of several, in the order of their names, and among equal names of their coming. When none is, time goes on to the
@@ -50,7 +50,7 @@ void virtual_time_leave(struct virtual_time *time, uint32_t number);
 struct participant *virtual_time_find(struct virtual_time *time, uint32_t number);
 struct participant *virtual_time_named(struct virtual_time *time, const char *name);
 
-/* The participant has finished its turn. A wait with the number of an older grant is out of date, and changes nothing. A second one
+/* The participant waits. A wait with the number of an older grant is out of date, and changes nothing. A second one
  * for the same grant ends the wait before its time: true. */
 bool virtual_time_wait(struct virtual_time *time, uint32_t number, uint32_t grant,
                        uint64_t until_ns);
@@ -58,7 +58,7 @@ bool virtual_time_wait(struct virtual_time *time, uint32_t number, uint32_t gran
 /* It is due now; one that is active will be as soon as it waits. Without effect on one that is not there. */
 void virtual_time_wake(struct virtual_time *time, uint32_t number);
 
-/* A frame has come for it, which its next grant tells. */
+/* A frame has come for it: its next grant has LOCAL_BUS_FRAMES. */
 void virtual_time_note_frame(struct virtual_time *time, uint32_t number);
 
 bool virtual_time_is_held(const struct virtual_time *time); /* one is active */

@@ -4,7 +4,7 @@
 #define INJECTOR_DELAY_QUEUE_H
 
 #include "can/can_frame.h"
-#include "faults/fault_rule.h"
+#include "faults/fault_rules.h"
 
 #define DELAY_QUEUE_FRAMES 256u
 

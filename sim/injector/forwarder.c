@@ -18,10 +18,10 @@ void forwarder_init(struct forwarder *forwarder, const struct fault_rules *rules
 {
     memset(forwarder, 0, sizeof *forwarder);
     forwarder->port = port;
-    tick_count_init(&forwarder->ticks);
+    fault_ticks_init(&forwarder->ticks);
     for (uint32_t i = 0; i < rules->count; i++) {
         if (!fault_kind_is_drives(rules->rules[i].kind)) {
-            fault_watch_init(&forwarder->watches[forwarder->count++], &rules->rules[i]);
+            fault_trigger_init(&forwarder->triggers[forwarder->count++], &rules->rules[i]);
         }
     }
 }
@@ -35,9 +35,9 @@ static enum fault_side other(enum fault_side side)
 static bool is_off(struct forwarder *forwarder, enum fault_side side)
 {
     for (uint32_t i = 0; i < forwarder->count; i++) {
-        struct fault_watch *watch = &forwarder->watches[i];
-        if (watch->rule->kind == FAULT_KIND_BUS_OFF && watch->rule->side == side &&
-            fault_watch_acts(watch, forwarder->ticks.tick, forwarder->now_ns)) {
+        struct fault_trigger *trigger = &forwarder->triggers[i];
+        if (trigger->rule->kind == FAULT_KIND_BUS_OFF && trigger->rule->side == side &&
+            fault_trigger_acts(trigger, forwarder->ticks.tick, forwarder->now_ns)) {
             return true;
         }
     }
@@ -52,7 +52,7 @@ static void send(struct forwarder *forwarder, enum fault_side to, const struct c
     }
 }
 
-/* The frame behind overtakes the one that waited for it. */
+/* The later frame overtakes the one that waited for it. */
 static void pass_on(struct forwarder *forwarder, enum fault_side from, const struct can_msg *frame)
 {
     struct forwarder_held *held = &forwarder->held[from];
@@ -94,15 +94,15 @@ static void judge(struct forwarder *forwarder, enum fault_side from, struct verd
 {
     const struct can_msg before = verdict->frame;
     for (uint32_t i = 0; i < forwarder->count; i++) {
-        struct fault_watch *watch = &forwarder->watches[i];
-        if (!fault_watch_acts(watch, forwarder->ticks.tick, now_ns)) {
+        struct fault_trigger *trigger = &forwarder->triggers[i];
+        if (!fault_trigger_acts(trigger, forwarder->ticks.tick, now_ns)) {
             continue;
         }
-        const enum fault_kind kind = watch->rule->kind;
+        const enum fault_kind kind = trigger->rule->kind;
         if (kind != FAULT_KIND_BUS_OFF && kind != FAULT_KIND_FLOOD &&
-            fault_watch_takes(watch, &before)) {
-            apply(watch->rule, verdict);
-            forwarder->port.note(forwarder->port.context, watch, from, &before, true);
+            fault_trigger_takes(trigger, &before)) {
+            apply(trigger->rule, verdict);
+            forwarder->port.note(forwarder->port.context, trigger, from, &before, true);
         }
     }
 }
@@ -125,39 +125,40 @@ static void deliver(struct forwarder *forwarder, enum fault_side from,
     }
 }
 
-/* Other traffic: eight bytes that tell the frames apart. It is on the wire, so only who is off does not hear it. */
-static void flood(struct forwarder *forwarder, struct fault_watch *watch)
+/* Other traffic: eight bytes that tell the frames apart. It is on the wire, so only a side that is off does not receive it. */
+static void flood(struct forwarder *forwarder, struct fault_trigger *trigger)
 {
-    const bool heard[2] = {!is_off(forwarder, FAULT_SIDE_CONTROLLER),
-                           !is_off(forwarder, FAULT_SIDE_DRIVES)};
-    for (uint32_t i = 0; i < watch->rule->per_tick; i++) {
-        struct can_msg frame = {.id = watch->rule->id, .len = 8};
-        const uint32_t number = watch->used++;
+    const bool receives[2] = {!is_off(forwarder, FAULT_SIDE_CONTROLLER),
+                              !is_off(forwarder, FAULT_SIDE_DRIVES)};
+    for (uint32_t i = 0; i < trigger->rule->per_tick; i++) {
+        struct can_msg frame = {.id = trigger->rule->id, .len = 8};
+        const uint32_t number = trigger->used++;
         memcpy(frame.data, &number, sizeof number);
         for (unsigned side = 0; side < 2u; side++) {
-            if (heard[side]) {
+            if (receives[side]) {
                 forwarder->port.send(forwarder->port.context, (enum fault_side)side, &frame);
             }
         }
     }
 }
 
-/* Rules that are on for a while and want no frame. */
+/* Rules that act for a time and not on a frame. */
 static void follow_states(struct forwarder *forwarder, uint64_t now_ns, bool tick_begins)
 {
     for (uint32_t i = 0; i < forwarder->count; i++) {
-        struct fault_watch *watch = &forwarder->watches[i];
-        const enum fault_kind kind = watch->rule->kind;
-        const bool acts = fault_watch_acts(watch, forwarder->ticks.tick, now_ns);
+        struct fault_trigger *trigger = &forwarder->triggers[i];
+        const enum fault_kind kind = trigger->rule->kind;
+        const bool acts = fault_trigger_acts(trigger, forwarder->ticks.tick, now_ns);
         if (kind != FAULT_KIND_FLOOD && kind != FAULT_KIND_BUS_OFF) {
             continue;
         }
         if (acts != forwarder->acts[i]) {
             forwarder->acts[i] = acts;
-            forwarder->port.note(forwarder->port.context, watch, FAULT_SIDE_CONTROLLER, NULL, acts);
+            forwarder->port.note(forwarder->port.context, trigger, FAULT_SIDE_CONTROLLER, NULL,
+                                 acts);
         }
         if (acts && kind == FAULT_KIND_FLOOD && tick_begins) {
-            flood(forwarder, watch);
+            flood(forwarder, trigger);
         }
     }
 }
@@ -168,7 +169,7 @@ void forwarder_receive(struct forwarder *forwarder, enum fault_side from,
     struct verdict verdict = {.frame = *frame, .copies = 1};
     forwarder->now_ns = now_ns;
     const bool tick_begins =
-        from == FAULT_SIDE_CONTROLLER && tick_count_receive(&forwarder->ticks, frame);
+        from == FAULT_SIDE_CONTROLLER && fault_ticks_receive(&forwarder->ticks, frame);
     judge(forwarder, from, &verdict, now_ns);
     deliver(forwarder, from, &verdict, now_ns);
     follow_states(forwarder, now_ns, tick_begins);
@@ -185,7 +186,7 @@ uint64_t forwarder_due_ns(const struct forwarder *forwarder)
     }
     for (uint32_t i = 0; i < forwarder->count; i++) {
         const uint64_t end_ns =
-            forwarder->acts[i] ? fault_watch_end_ns(&forwarder->watches[i]) : UINT64_MAX;
+            forwarder->acts[i] ? fault_trigger_end_ns(&forwarder->triggers[i]) : UINT64_MAX;
         due_ns = end_ns < due_ns ? end_ns : due_ns;
     }
     return due_ns;

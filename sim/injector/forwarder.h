@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* bridge: stands between the controller's bus and the drives', passes every frame on, and does to
- * some what the fault rules say (docs/reference/protocol.md section 4).
+/* forwarder: passes every frame between the controller's bus and the drives', and injects the faults of the fault rules
+ * (docs/reference/protocol.md section 4).
  *
  * Rules act on a frame in the order of the file. A frame that changes places with the next one of
  * its direction waits for it for 20 ms at most. While a side is off the bus nothing passes, frames that were held or
@@ -12,17 +12,16 @@
 #ifndef INJECTOR_FORWARDER_H
 #define INJECTOR_FORWARDER_H
 
-#include "faults/fault_rule.h"
-#include "faults/fault_watch.h"
-#include "faults/tick_count.h"
+#include "faults/fault_rules.h"
+#include "faults/fault_trigger.h"
 #include "injector/delay_queue.h"
 
 struct forwarder_port {
     /* A frame to one side. */
     void (*send)(void *context, enum fault_side to, const struct can_msg *frame);
     /* Something was done to `frame` as it came (NULL: a rule without a frame of its own begins or
-     * ends, as `on` says). */
-    void (*note)(void *context, const struct fault_watch *watch, enum fault_side from,
+     * ends, by `on`). */
+    void (*note)(void *context, const struct fault_trigger *trigger, enum fault_side from,
                  const struct can_msg *frame, bool on);
     void *context;
 };
@@ -35,10 +34,10 @@ struct forwarder_held {
 };
 
 struct forwarder {
-    struct fault_watch watches[FAULT_RULES_MAX]; /* the bus-level rules only */
-    bool acts[FAULT_RULES_MAX];                  /* flood, bus-off: as last noted */
+    struct fault_trigger triggers[FAULT_RULES_MAX]; /* the bus-level rules only */
+    bool acts[FAULT_RULES_MAX];                     /* flood, bus-off: as last noted */
     uint32_t count;
-    struct tick_count ticks;
+    struct fault_ticks ticks;
     uint64_t now_ns; /* of the last call */
     struct delay_queue delayed;
     struct forwarder_held held[2]; /* by the side it came from */

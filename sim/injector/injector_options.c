@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-#define _GNU_SOURCE
 #include "injector/injector_options.h"
 
-#include <getopt.h>
-#include <stdio.h>
 #include <string.h>
+
+#include "port/linux/long_options.h"
 
 const char injector_options_help[] =
     "usage: hodograph-injector --bus CONTROLLER --bus DRIVES [--rules FILE] [--verbose]\n"
     "\n"
-    "Stands between two CAN buses, passes every frame on, and does to some what fault rules say.\n"
+    "Passes every frame between two CAN buses, and injects the faults of fault rules.\n"
     "\n"
     "  --bus INTERFACE  twice: first the controller's bus, then the drives'\n"
     "  --rules FILE     fault rules, one a line (docs/reference/protocol.md section 4)\n"
@@ -17,64 +16,52 @@ const char injector_options_help[] =
     "\n"
     "SIGTERM or SIGINT ends it. Exit status: 0 ended as asked, 2 wrong usage, 4 bus not usable.\n";
 
-struct reason {
-    char *text;
-    size_t size;
-};
-
-static enum injector_options_result wrong(struct reason reason, const char *what, const char *name)
-{
-    (void)snprintf(reason.text, reason.size, "%s %s (see --help)", what, name);
-    return INJECTOR_OPTIONS_WRONG;
-}
-
 static enum injector_options_result check(const struct injector_options *options,
-                                          struct reason reason)
+                                          const struct long_options *line)
 {
     if (options->bus[1] == NULL) {
-        return wrong(reason, "two buses are needed, each behind", "--bus");
+        (void)long_options_wrong(line, "two buses are needed, each after", "--bus");
+        return INJECTOR_OPTIONS_WRONG;
     }
     if (strcmp(options->bus[0], options->bus[1]) == 0) {
-        return wrong(reason, "two different buses are needed, not twice", options->bus[0]);
+        (void)long_options_wrong(line, "two different buses are needed, not twice",
+                                 options->bus[0]);
+        return INJECTOR_OPTIONS_WRONG;
     }
     return INJECTOR_OPTIONS_OK;
 }
 
 enum injector_options_result injector_options_parse(struct injector_options *options, int argc,
-                                                    char **argv, char *reason_text, size_t size)
+                                                    char **argv, char *reason, size_t size)
 {
     static const struct option known[] = {{"help", no_argument, NULL, 'h'},
                                           {"bus", required_argument, NULL, 'b'},
                                           {"rules", required_argument, NULL, 'r'},
                                           {"verbose", no_argument, NULL, 'v'},
                                           {NULL, 0, NULL, 0}};
-    const struct reason reason = {reason_text, size};
+    struct long_options line = long_options_begin(argc, argv, known, reason, size);
     memset(options, 0, sizeof *options);
-    optind = 0; /* from the start, in a second call too */
     for (;;) {
-        const int at = optind > 0 ? optind : 1;
-        switch (getopt_long(argc, argv, "+:", known, NULL)) {
-        case -1:
-            return optind < argc ? wrong(reason, "unknown option", argv[optind])
-                                 : check(options, reason);
+        switch (long_options_next(&line)) {
+        case LONG_OPTIONS_END:
+            return check(options, &line);
         case 'h':
             return INJECTOR_OPTIONS_HELP;
         case 'v':
             options->verbose = true;
             break;
         case 'r':
-            options->rules = optarg;
+            options->rules = line.value;
             break;
         case 'b':
             if (options->bus[1] != NULL) {
-                return wrong(reason, "two buses are enough, not a third", optarg);
+                (void)long_options_wrong(&line, "two buses are enough, not a third", line.value);
+                return INJECTOR_OPTIONS_WRONG;
             }
-            options->bus[options->bus[0] != NULL ? 1 : 0] = optarg;
+            options->bus[options->bus[0] != NULL ? 1 : 0] = line.value;
             break;
-        case ':':
-            return wrong(reason, "a value must follow the option", argv[at]);
         default:
-            return wrong(reason, "unknown option", argv[at]);
+            return INJECTOR_OPTIONS_WRONG;
         }
     }
 }

@@ -15,7 +15,7 @@ struct injector_options {
 enum injector_options_result {
     INJECTOR_OPTIONS_OK,
     INJECTOR_OPTIONS_HELP, /* print injector_options_help */
-    INJECTOR_OPTIONS_WRONG /* `reason` has one line that says what and what to do */
+    INJECTOR_OPTIONS_WRONG /* `reason` has one line: what is wrong and what to do */
 };
 
 extern const char injector_options_help[];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-injector: a bridge between two SocketCAN buses that injects faults. One thread: it
+/* hodograph-injector: joins two SocketCAN buses and injects faults. One thread: it
  * sleeps until frames or a signal come, or a delayed frame is due. */
 #define _GNU_SOURCE
 #include <errno.h>
@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "faults/fault_file.h"
 #include "faults/fault_log.h"
+#include "faults/fault_rules.h"
 #include "injector/forwarder.h"
 #include "injector/injector_options.h"
 #include "injector/outbox.h"
@@ -32,7 +32,7 @@ struct injector {
     bool verbose;
 };
 
-static int complain(int status, const char *reason)
+static int fail(int status, const char *reason)
 {
     (void)fprintf(stderr, "hodograph-injector: %s\n", reason);
     return status;
@@ -53,11 +53,11 @@ static void flush_both(struct injector *injector)
     }
 }
 
-static void note(void *context, const struct fault_watch *watch, enum fault_side from,
+static void note(void *context, const struct fault_trigger *trigger, enum fault_side from,
                  const struct can_msg *frame, bool on)
 {
     const struct injector *injector = context;
-    const struct fault_event event = {watch->rule, injector->now_ns,
+    const struct fault_event event = {trigger->rule, injector->now_ns,
                                       injector->forwarder.ticks.tick};
     if (!injector->verbose) {
         return;
@@ -135,17 +135,17 @@ static int start(struct injector *injector, const struct injector_options *optio
     const struct sched_param priority = {.sched_priority = PRIORITY};
     const int signals = end_signals_open();
     if (options->rules != NULL &&
-        fault_file_read(&injector->rules, options->rules, reason, sizeof reason) != 0) {
-        return complain(EXIT_USAGE, reason);
+        fault_rules_read(&injector->rules, options->rules, reason, sizeof reason) != 0) {
+        return fail(EXIT_USAGE, reason);
     }
     if (signals < 0) {
-        return complain(EXIT_BUS, strerror(errno));
+        return fail(EXIT_BUS, strerror(errno));
     }
-    (void)clock_join(options->bus[0], "injector"); /* opening the sockets says what is wrong */
+    (void)clock_join(options->bus[0], "injector"); /* opening the sockets reports what is wrong */
     for (unsigned side = 0; side < 2u; side++) {
         if (can_socket_open(&injector->sockets[side], options->bus[side], reason, sizeof reason) !=
             0) {
-            return complain(EXIT_BUS, reason);
+            return fail(EXIT_BUS, reason);
         }
     }
     injector->verbose = options->verbose;
@@ -165,7 +165,7 @@ int main(int argc, char **argv)
         (void)fputs(injector_options_help, stdout);
         return EXIT_OK;
     case INJECTOR_OPTIONS_WRONG:
-        return complain(EXIT_USAGE, reason);
+        return fail(EXIT_USAGE, reason);
     default:
         break;
     }

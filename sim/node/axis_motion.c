@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "node/axis_motion.h"
 
-#include <stddef.h>
+#include <stdlib.h>
 
 static void axis_motion_rest(struct axis_motion *axis)
 {
@@ -154,6 +154,13 @@ double axis_motion_place_mm(const struct axis_motion *axis)
 bool axis_motion_at_rest(const struct axis_motion *axis)
 {
     return axis->drive.state.motor.speed_rad_s == 0.0;
+}
+
+bool axis_motion_settled(const struct axis_motion *axis, uint32_t window_counts)
+{
+    const int64_t distance =
+        (int64_t)axis->target_counts - influence_read_counts(&axis->influence, &axis->drive);
+    return llabs(distance) <= (int64_t)window_counts;
 }
 
 int32_t axis_motion_speed(const struct axis_motion *axis)

@@ -17,7 +17,7 @@
 struct axis_motion {
     struct drive_config config;
     struct drive drive;
-    struct influence influence; /* set by axis_motion_influence, and the faults */
+    struct influence influence; /* feedforward and injected faults */
     double rated_torque_nm;
     double brake_volts;          /* of the holding brake, as friction; more than 0 */
     double machine_mm;           /* place of the drive's zero in the machine: moved by homing */
@@ -64,6 +64,9 @@ bool axis_motion_ramp(struct axis_motion *axis, int64_t speed_counts_period,
 int32_t axis_motion_position(const struct axis_motion *axis);
 double axis_motion_place_mm(const struct axis_motion *axis);
 bool axis_motion_at_rest(const struct axis_motion *axis);
+
+/* Whether the position is within `window_counts` of the last target. */
+bool axis_motion_settled(const struct axis_motion *axis, uint32_t window_counts);
 
 /* Speed of the motor, counts/s, rounded and saturated. */
 int32_t axis_motion_speed(const struct axis_motion *axis);

@@ -57,14 +57,14 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
     return 0;
 }
 
-/* What waits for SYNC need not wake the process before it; fault rules look at each frame as it comes. */
+/* Synchronous RPDOs need not wake the process before SYNC; fault rules act on each frame as it comes. */
 static int drives_defer(struct drives *drives)
 {
-    struct can_match frames[DRIVE_NODE_PDOS * NODE_OPTIONS_AXES];
+    struct can_match frames[DRIVE_PDOS * NODE_OPTIONS_AXES];
     size_t n = 0;
     for (size_t i = 0; i < drives->count && drives->rules.count == 0; i++) {
-        for (int k = 0; k < DRIVE_NODE_PDOS; k++) {
-            const struct pdo_map *map = &drives->nodes[i].rpdos[k];
+        for (int k = 0; k < DRIVE_PDOS; k++) {
+            const struct pdo_map *map = &drives->nodes[i].pdos.rpdos[k];
             if (map->valid && !pdo_map_event_driven(map)) {
                 frames[n++] = (struct can_match){map->cob_id, CAN_ID_MAX};
             }
@@ -75,7 +75,7 @@ static int drives_defer(struct drives *drives)
 
 int drives_filter(struct drives *drives)
 {
-    struct can_match filters[4 + (1 + DRIVE_NODE_PDOS) * NODE_OPTIONS_AXES] = {
+    struct can_match filters[4 + (1 + DRIVE_PDOS) * NODE_OPTIONS_AXES] = {
         {COB_NMT, CAN_ID_MAX}, {COB_SYNC, CAN_ID_MAX}, {COB_HEARTBEAT, 0x780}};
     size_t n = 3;
     if (drives->rules.count > 0) {
@@ -84,12 +84,12 @@ int drives_filter(struct drives *drives)
     for (size_t i = 0; i < drives->count; i++) {
         struct drive_node *node = &drives->nodes[i];
         filters[n++] = (struct can_match){(uint16_t)(COB_SDO_ASK + node->id), CAN_ID_MAX};
-        for (int k = 0; k < DRIVE_NODE_PDOS; k++) {
-            if (node->rpdos[k].valid) {
-                filters[n++] = (struct can_match){node->rpdos[k].cob_id, CAN_ID_MAX};
+        for (int k = 0; k < DRIVE_PDOS; k++) {
+            if (node->pdos.rpdos[k].valid) {
+                filters[n++] = (struct can_match){node->pdos.rpdos[k].cob_id, CAN_ID_MAX};
             }
         }
-        node->pdos_moved = false;
+        node->pdos.moved = false;
     }
     const int error = can_socket_filter(&drives->socket, filters, n);
     return error != 0 ? error : drives_defer(drives);
@@ -102,8 +102,8 @@ static bool drives_cyclic(const struct drives *drives, const struct can_msg *fra
         return true;
     }
     for (size_t i = 0; i < drives->count; i++) {
-        for (int k = 0; k < DRIVE_NODE_PDOS; k++) {
-            const struct pdo_map *map = &drives->nodes[i].rpdos[k];
+        for (int k = 0; k < DRIVE_PDOS; k++) {
+            const struct pdo_map *map = &drives->nodes[i].pdos.rpdos[k];
             if (map->valid && frame->id == map->cob_id) {
                 return true;
             }
@@ -120,7 +120,7 @@ static void drives_take(struct drives *drives, const struct can_msg *frame)
     }
     for (size_t i = 0; i < drives->count; i++) {
         drive_node_receive(&drives->nodes[i], frame);
-        moved = moved || drives->nodes[i].pdos_moved;
+        moved = moved || drives->nodes[i].pdos.moved;
     }
     if (moved) {
         const int error = drives_filter(drives);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* drives: the simulated drives of one process on one SocketCAN bus.
  *
- * All in one thread. Bus errors are kept in `failed`; the caller looks at it. Frames that the interface has no room for
+ * All in one thread. Bus errors are kept in `failed`; the caller checks it. Frames that the interface has no room for
  * are lost.
  */
 #ifndef NODE_DRIVES_H
@@ -31,17 +31,17 @@ struct drives {
  * drive_error with `*node` the drive whose figures are wrong. */
 int drives_init(struct drives *drives, const struct node_options *options, uint8_t *node);
 
-/* Only what the drives want wakes the process; again when a drive's PDOs were moved. Returns 0 or a
+/* Only frames that the drives receive wake the process; again when a drive's PDOs were moved. Returns 0 or a
  * negative errno. */
 int drives_filter(struct drives *drives);
 
 /* Hands waiting frames to the drives, a bounded number: the wall clock (drives_process) must go on
- * in a flood, too. Returns true when one of them was acyclic (NMT, SDO, heartbeat): it wants
+ * in a flood, too. Returns true when one of them was acyclic (NMT, SDO, heartbeat): call
  * drives_process at once. */
 bool drives_receive(struct drives *drives);
 
 /* After a long sleep: when so much has piled up meanwhile that working it off would take as long again, all of it is
- * forgotten, as a drive does that was not there. A stall of the whole machine leaves a few frames only, which stay. */
+ * dropped, as for a drive that was not there. A stall of the whole machine leaves a few frames only, which stay. */
 void drives_wake(struct drives *drives);
 
 /* Lets wall time pass. */

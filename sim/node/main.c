@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "faults/fault_file.h"
+#include "faults/fault_rules.h"
 #include "node/drives.h"
 #include "node/node_options.h"
 #include "port/linux/clock.h"
@@ -20,10 +20,10 @@
 
 enum { EXIT_OK = 0, EXIT_USAGE = 2, EXIT_BUS = 4, WAKE_NS = 10000000, ASLEEP_US = 1000000 };
 
-/* Looking at the real clock costs a system call, as much as a frame: within a run every fourth wake is enough. */
-enum { WAKES_PER_LOOK = 4 };
+/* Reading the real clock costs a system call, as much as a frame: within a run every fourth wake is enough. */
+enum { WAKES_PER_CLOCK = 4 };
 
-static int complain(int status, const char *reason)
+static int fail(int status, const char *reason)
 {
     (void)fprintf(stderr, "hodograph-drive: %s\n", reason);
     return status;
@@ -54,10 +54,10 @@ static bool run(struct drives *drives, int signals)
         } else if (ready > 0 && wait[1].revents != 0) {
             return true;
         } else if (ready > 0 && drives_receive(drives)) {
-            wakes = WAKES_PER_LOOK;
+            wakes = WAKES_PER_CLOCK;
         }
         wakes++;
-        if (ready <= 0 || wakes >= WAKES_PER_LOOK || clock_is_virtual()) {
+        if (ready <= 0 || wakes >= WAKES_PER_CLOCK || clock_is_virtual()) {
             process(drives, &last_ns);
             wakes = 0;
         }
@@ -65,7 +65,7 @@ static bool run(struct drives *drives, int signals)
     return false;
 }
 
-/* Real drives answer within a fraction of the period; where that is not permitted, the host's scheduler decides. */
+/* Real drives answer within a fraction of the period; where a priority is not permitted, the host's scheduler decides. */
 static void ask_for_priority(void)
 {
     const struct sched_param priority = {.sched_priority = PRIORITY};
@@ -79,34 +79,35 @@ static int start(struct drives *drives, const struct node_options *options)
     uint8_t node = 0;
     const int signals = end_signals_open();
     if (options->faults != NULL &&
-        fault_file_read(&drives->rules, options->faults, reason, sizeof reason) != 0) {
-        return complain(EXIT_USAGE, reason);
+        fault_rules_read(&drives->rules, options->faults, reason, sizeof reason) != 0) {
+        return fail(EXIT_USAGE, reason);
     }
     const int error = drives_init(drives, options, &node);
     if (error != 0) {
         (void)snprintf(reason, sizeof reason, "--axis of node %u: %s", node,
                        error == DRIVES_ERR_EQUIPMENT ? equipment_rule : drive_error_text(error));
-        return complain(EXIT_USAGE, reason);
+        return fail(EXIT_USAGE, reason);
     }
     if (signals < 0) {
-        return complain(EXIT_BUS, strerror(errno));
+        return fail(EXIT_BUS, strerror(errno));
     }
     (void)snprintf(name, sizeof name, "drive-%u", drives->nodes[0].id);
-    (void)clock_join(options->bus, name); /* opening the socket says what is wrong with the bus */
+    (void)clock_join(options->bus,
+                     name); /* opening the socket reports what is wrong with the bus */
     if (can_socket_open(&drives->socket, options->bus, reason, sizeof reason) != 0) {
-        return complain(EXIT_BUS, reason);
+        return fail(EXIT_BUS, reason);
     }
     const int filtered = drives_filter(drives);
     ask_for_priority();
     if (filtered != 0) {
-        return complain(EXIT_BUS, strerror(-filtered));
+        return fail(EXIT_BUS, strerror(-filtered));
     }
     if (run(drives, signals)) {
         return EXIT_OK;
     }
     (void)snprintf(reason, sizeof reason, "the bus failed: %s: check the interface and start again",
                    strerror(-drives->failed));
-    return complain(EXIT_BUS, reason);
+    return fail(EXIT_BUS, reason);
 }
 
 int main(int argc, char **argv)
@@ -119,7 +120,7 @@ int main(int argc, char **argv)
         (void)fputs(node_options_help, stdout);
         return EXIT_OK;
     case NODE_OPTIONS_WRONG:
-        return complain(EXIT_USAGE, reason);
+        return fail(EXIT_USAGE, reason);
     default:
         break;
     }

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-#define _GNU_SOURCE
 #include "node/node_options.h"
 
 #include <errno.h>
-#include <getopt.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "port/linux/long_options.h"
 
 const char node_options_help[] =
     "usage: hodograph-drive --bus INTERFACE --axis KEY=VALUE,... [--axis ...] [--faults FILE]\n"
@@ -38,14 +38,11 @@ const char node_options_help[] =
     "\n"
     "SIGTERM or SIGINT ends it. Exit status: 0 ended as asked, 2 wrong usage, 4 bus not usable.\n";
 
-struct reason {
-    char *text;
-    size_t size;
-};
-
-static enum node_options_result wrong(struct reason reason, const char *what, const char *value)
+/* What is at fault, and in which word. */
+static enum node_options_result wrong(const struct long_options *line, const char *text,
+                                      const char *word)
 {
-    (void)snprintf(reason.text, reason.size, "%s '%s' (see --help)", what, value);
+    (void)long_options_wrong(line, text, word);
     return NODE_OPTIONS_WRONG;
 }
 
@@ -147,24 +144,24 @@ static const struct key *find_key(const char *name)
 
 /* One KEY=VALUE; cuts `item` in two. */
 static enum node_options_result set_item(struct node_options_axis *axis, char *item, bool *seen,
-                                         struct reason reason)
+                                         const struct long_options *line)
 {
     char *value = strchr(item, '=');
     if (value == NULL) {
-        return wrong(reason, "--axis takes KEY=VALUE,..., not", item);
+        return wrong(line, "--axis takes KEY=VALUE,..., not", item);
     }
     *value++ = '\0';
     const struct key *key = find_key(item);
     if (key == NULL) {
-        return wrong(reason, "--axis has no key", item);
+        return wrong(line, "--axis has no key", item);
     }
     if (seen[key - keys]) {
-        return wrong(reason, "--axis gives twice the key", item);
+        return wrong(line, "--axis gives twice the key", item);
     }
     seen[key - keys] = true;
     if (!store(axis, key, value)) {
         value[-1] = '=';
-        return wrong(reason, "--axis has a value that is no number or out of range:", item);
+        return wrong(line, "--axis has a value that is no number or out of range:", item);
     }
     return NODE_OPTIONS_OK;
 }
@@ -186,20 +183,20 @@ static void equip(struct node_options_axis *axis, const bool *seen)
 }
 
 static enum node_options_result check_axis(const struct node_options *options, const bool *seen,
-                                           struct reason reason)
+                                           const struct long_options *line)
 {
     const struct node_options_axis *axis = &options->axes[options->axis_count];
     for (size_t i = 0; i < KEYS; i++) {
         if (keys[i].required && !seen[i]) {
-            return wrong(reason, "--axis lacks the key", keys[i].name);
+            return wrong(line, "--axis lacks the key", keys[i].name);
         }
     }
     if (axis->node < 2) {
-        return wrong(reason, "--axis needs a node from 2 to 127, not", axis->node == 1 ? "1" : "0");
+        return wrong(line, "--axis needs a node from 2 to 127, not", axis->node == 1 ? "1" : "0");
     }
     for (size_t i = 0; i < options->axis_count; i++) {
         if (options->axes[i].node == axis->node) {
-            return wrong(reason, "--axis: two drives have the same", "node");
+            return wrong(line, "--axis: two drives have the same", "node");
         }
     }
     return NODE_OPTIONS_OK;
@@ -207,11 +204,11 @@ static enum node_options_result check_axis(const struct node_options *options, c
 
 /* Takes KEY=VALUE,... as another drive; cuts `spec` to pieces. */
 static enum node_options_result add_axis(struct node_options *options, char *spec,
-                                         struct reason reason)
+                                         const struct long_options *line)
 {
     bool seen[KEYS] = {false};
     if (options->axis_count == NODE_OPTIONS_AXES) {
-        return wrong(reason, "too many --axis: at most", "6");
+        return wrong(line, "too many --axis: at most", "6");
     }
     struct node_options_axis *axis = &options->axes[options->axis_count];
     memset(axis, 0, sizeof *axis);
@@ -224,66 +221,63 @@ static enum node_options_result add_axis(struct node_options *options, char *spe
         if (next != NULL) {
             *next++ = '\0';
         }
-        if (set_item(axis, item, seen, reason) != NODE_OPTIONS_OK) {
+        if (set_item(axis, item, seen, line) != NODE_OPTIONS_OK) {
             return NODE_OPTIONS_WRONG;
         }
         item = next;
     }
     equip(axis, seen);
-    if (check_axis(options, seen, reason) != NODE_OPTIONS_OK) {
+    if (check_axis(options, seen, line) != NODE_OPTIONS_OK) {
         return NODE_OPTIONS_WRONG;
     }
     options->axis_count++;
     return NODE_OPTIONS_OK;
 }
 
-static enum node_options_result check(const struct node_options *options, struct reason reason)
+static enum node_options_result check(const struct node_options *options,
+                                      const struct long_options *line)
 {
     if (options->bus == NULL) {
-        return wrong(reason, "the option is missing:", "--bus");
+        return wrong(line, "the option is missing:", "--bus");
     }
     if (options->axis_count == 0) {
-        return wrong(reason, "the option is missing:", "--axis");
+        return wrong(line, "the option is missing:", "--axis");
     }
     return NODE_OPTIONS_OK;
 }
 
 enum node_options_result node_options_parse(struct node_options *options, int argc, char **argv,
-                                            char *reason_text, size_t size)
+                                            char *reason, size_t size)
 {
     static const struct option known[] = {{"help", no_argument, NULL, 'h'},
                                           {"bus", required_argument, NULL, 'b'},
                                           {"faults", required_argument, NULL, 'f'},
                                           {"axis", required_argument, NULL, 'a'},
                                           {NULL, 0, NULL, 0}};
-    const struct reason reason = {reason_text, size};
+    struct long_options line = long_options_begin(argc, argv, known, reason, size);
+    line.quoted = true;
     options->bus = NULL;
     options->faults = NULL;
     options->axis_count = 0;
-    optind = 0; /* from the start, in a second call too */
     for (;;) {
-        const int at = optind > 0 ? optind : 1;
-        switch (getopt_long(argc, argv, "+:", known, NULL)) {
-        case -1:
-            return optind < argc ? wrong(reason, "unknown option", argv[optind])
-                                 : check(options, reason);
+        switch (long_options_next(&line)) {
+        case LONG_OPTIONS_END:
+            return check(options, &line);
         case 'h':
             return NODE_OPTIONS_HELP;
         case 'b':
-            options->bus = optarg;
+            options->bus = line.value;
             break;
         case 'f':
-            options->faults = optarg;
+            options->faults = line.value;
             break;
         case 'a':
-            if (add_axis(options, optarg, reason) != NODE_OPTIONS_OK) {
+            if (add_axis(options, line.value, &line) != NODE_OPTIONS_OK) {
                 return NODE_OPTIONS_WRONG;
             }
             break;
-        case ':':
-            return wrong(reason, "a value must follow the option", argv[at]);
         default:
-            return wrong(reason, "unknown option", argv[at]);
+            return NODE_OPTIONS_WRONG;
         }
     }
 }

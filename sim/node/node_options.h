@@ -27,8 +27,8 @@ struct node_options {
 
 enum node_options_result {
     NODE_OPTIONS_OK,
-    NODE_OPTIONS_HELP, /* asked for help: print node_options_help */
-    NODE_OPTIONS_WRONG /* `reason_text` has one line that says what and what to do */
+    NODE_OPTIONS_HELP, /* help requested: print node_options_help */
+    NODE_OPTIONS_WRONG /* `reason` has one line: what is wrong and what to do */
 };
 
 extern const char node_options_help[];
@@ -36,6 +36,6 @@ extern const char node_options_help[];
 /* Reads the command line. Checks form, ranges of the whole numbers, and that no node appears twice;
  * the figures of a drive are checked by drive_init. */
 enum node_options_result node_options_parse(struct node_options *options, int argc, char **argv,
-                                            char *reason_text, size_t size);
+                                            char *reason, size_t size);
 
 #endif

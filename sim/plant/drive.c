@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "plant/drive.h"
 
-#include "plant/drive_private.h"
-
 static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
 {
     const double step_s = 1.0 / (double)c->loop_rate_hz;

@@ -52,7 +52,7 @@ enum drive_error {
 /* 0, or the first enum drive_error that applies. */
 int drive_config_check(const struct drive_config *config);
 
-/* Rated torque of a motor of which nothing else is said: half of what the voltage limit gives, N m. */
+/* Rated torque of a motor for which none is given: half of what the voltage limit gives, N m. */
 double drive_config_rated_torque_nm(const struct drive_config *config);
 
 /* Servo samples per period; 0 when they are no whole number or too many. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Encoder on the motor shaft: rounds the position to the nearest of its increments (ties to even).
  *
- * An increment is 2 pi screw / counts_per_rev mm of table position. The electrical zero lies half
+ * An increment is 2 pi screw / counts_per_rev mm of table position. The electrical zero is half
  * an increment before the table's zero, so that rounding is to nearest and a table standing at 0
  * reads 0.
  */

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "plant/influence.h"
 
-#include "plant/drive_private.h"
-
 void influence_none(struct influence *influence, const struct drive_config *config)
 {
     const struct influence none = {.volts_limit = config->plant.volts_limit};
@@ -46,7 +44,7 @@ int32_t influence_read_counts(const struct influence *in, const struct drive *dr
 }
 
 /* Motor, load and dry friction over one sample: friction works against the motion, or holds the
- * axis where it stands. It can stop a motion but not turn it round. */
+ * axis where it stands. It can stop a motion but not reverse it. */
 static void influence_move(const struct motor *motor, struct motor_state *state, double volts,
                            double friction_volts)
 {
@@ -112,7 +110,7 @@ bool influence_coast(const struct influence *in, struct drive *d, double brake_v
     return motor.speed_rad_s == 0.0 && held;
 }
 
-/* Volts against the motion act as friction does, which stops a motion but does not turn it round. */
+/* Volts against the motion act as friction does, which stops a motion but does not reverse it. */
 bool influence_brake(const struct influence *in, struct drive *d, double volts)
 {
     const double most = volts < in->volts_limit ? volts : in->volts_limit;

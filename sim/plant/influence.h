@@ -27,7 +27,7 @@ struct influence {
 /* Nothing: the drive as configured. */
 void influence_none(struct influence *influence, const struct drive_config *config);
 
-/* Whether anything acts that drive_period does not know. */
+/* Whether anything acts that drive_period does not compute. */
 bool influence_acts(const struct influence *influence, const struct drive *drive);
 
 /* The feedforward of the periods that follow: 0x60B1 in bus counts a second, 0x60B2 in per mille of

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "drive_bench.h"
-#include "faults/fault_parse.h"
+#include "faults/fault_rules.h"
 #include "fuzz.h"
 #include "injector/forwarder.h"
 #include "node/node_faults.h"
@@ -28,21 +28,21 @@ static void check_frame(const struct can_msg *frame)
     FUZZ_CHECK(frame->id <= CAN_ID_MAX && frame->len <= CAN_DATA_MAX);
 }
 
-static void from_bridge(void *context, enum fault_side to, const struct can_msg *frame)
+static void from_forwarder(void *context, enum fault_side to, const struct can_msg *frame)
 {
     (void)context;
     FUZZ_CHECK(to == FAULT_SIDE_CONTROLLER || to == FAULT_SIDE_DRIVES);
     check_frame(frame);
 }
 
-static void noted(void *context, const struct fault_watch *watch, enum fault_side from,
+static void noted(void *context, const struct fault_trigger *trigger, enum fault_side from,
                   const struct can_msg *frame, bool on)
 {
     (void)context;
     (void)from;
     (void)frame;
     (void)on;
-    FUZZ_CHECK(watch->rule->line > 0u);
+    FUZZ_CHECK(trigger->rule->line > 0u);
 }
 
 static void from_drive(void *context, const struct can_msg *frame)
@@ -68,7 +68,7 @@ static bool parse(struct fuzz_input *in)
         text[length++] = (char)byte;
         byte = fuzz_byte(in);
     }
-    const int result = fault_parse(&rules, text, length, reason, sizeof reason);
+    const int result = fault_rules_parse(&rules, text, length, reason, sizeof reason);
     FUZZ_CHECK(result == 0 || (reason[0] != '\0' && strchr(reason, '\n') == NULL));
     FUZZ_CHECK(rules.count <= FAULT_RULES_MAX);
     return result == 0;
@@ -110,7 +110,7 @@ static void pass_time(uint32_t us)
 static void harness(struct fuzz_input *in)
 {
     const struct drive_node_port port = {from_drive, NULL};
-    const struct forwarder_port sides = {from_bridge, noted, NULL};
+    const struct forwarder_port sides = {from_forwarder, noted, NULL};
     memset(&rules, 0, sizeof rules);
     now_ns = 1000000000u;
     if (!parse(in)) {

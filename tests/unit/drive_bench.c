@@ -97,7 +97,12 @@ void drive_bench_enable(void)
         bench.word = words[i];
         drive_bench_run(1);
     }
-    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.node.servo.device.state);
+}
+
+void drive_bench_fault(struct fault_rule rule, bool on)
+{
+    node_faults_carry_out(&bench.node, &rule, on);
 }
 
 static struct pdo_actual drive_bench_actual(void)

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "node/drive_node.h"
+#include "node/node_faults.h"
 
 enum { DRIVE_BENCH_ID = 3, DRIVE_BENCH_SENT = 256 };
 
@@ -44,6 +45,9 @@ void drive_bench_run(int periods);
 
 /* To Operation enabled, the target where the axis stands. */
 void drive_bench_enable(void);
+
+/* Begins or ends an injected fault. */
+void drive_bench_fault(struct fault_rule rule, bool on);
 
 /* From the TPDOs of the last SYNC. */
 uint16_t drive_bench_statusword(void);

@@ -43,6 +43,31 @@ static void test_stop_is_a_ramp_of_the_deceleration(void)
     TEST_ASSERT_EQUAL_INT64(0, axis.speed_counts_period);
 }
 
+/* A ramp ends at the ends of the coordinates. */
+static void test_targets_saturate(void)
+{
+    static const int32_t ends[2] = {INT32_MAX, INT32_MIN};
+    for (int i = 0; i < 2; i++) {
+        axis_motion_follow(&axis, ends[i] - (i == 0 ? 1500 : -1500));
+        axis.speed_counts_period = 0;
+        for (int k = 0; k < 3; k++) {
+            (void)axis_motion_ramp(&axis, i == 0 ? 1000 : -1000, 2000000000u);
+        }
+        TEST_ASSERT_EQUAL_INT32(ends[i], axis.target_counts);
+    }
+}
+
+static void test_settled_is_within_the_window(void)
+{
+    TEST_ASSERT_TRUE(axis_motion_settled(&axis, 0));
+    axis.target_counts += 100;
+    TEST_ASSERT_TRUE(axis_motion_settled(&axis, 100));
+    TEST_ASSERT_FALSE(axis_motion_settled(&axis, 99));
+    axis.target_counts -= 200;
+    TEST_ASSERT_TRUE(axis_motion_settled(&axis, 100));
+    TEST_ASSERT_FALSE(axis_motion_settled(&axis, 99));
+}
+
 static void test_stop_works_both_ways(void)
 {
     for (int k = 1; k <= 10; k++) {
@@ -157,6 +182,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_begins_parked_at_its_position);
     RUN_TEST(test_stop_is_a_ramp_of_the_deceleration);
+    RUN_TEST(test_targets_saturate);
+    RUN_TEST(test_settled_is_within_the_window);
     RUN_TEST(test_stop_works_both_ways);
     RUN_TEST(test_stop_ends_with_the_smallest_deceleration);
     RUN_TEST(test_without_power_the_brake_stops_the_motor);

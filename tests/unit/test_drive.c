@@ -7,7 +7,6 @@
 
 #include "drive_bench.h"
 #include "offline/axis_run.h"
-#include "plant/drive_private.h"
 #include "unity.h"
 
 enum { TICKS = 400 };

@@ -122,7 +122,7 @@ static void enable(void)
         setpoint(words[i], 1000000);
         (void)sync();
     }
-    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, node.servo.device.state);
 }
 
 static void test_boots_and_beats(void)
@@ -157,10 +157,10 @@ static void test_reports_the_instant_of_sync(void)
 static void test_timing_and_bits_of_the_model(void)
 {
     enum { TICKS = 300 };
-    struct drive model = node.axis.drive;
+    struct drive model = node.servo.axis.drive;
     int32_t expected[TICKS + 2];
     enable();
-    model = node.axis.drive;
+    model = node.servo.axis.drive;
     for (int k = 0; k < TICKS; k++) {
         const struct pdo_actual actual = sync();
         if (k >= 2) {
@@ -179,7 +179,7 @@ static void test_timing_and_bits_of_the_model(void)
 static void test_lost_syncs_are_periods_with_the_old_target(void)
 {
     enable();
-    struct drive model = node.axis.drive;
+    struct drive model = node.servo.axis.drive;
     setpoint(CIA402_ENABLE_OPERATION, 1002000);
     (void)sync();
     counter = (uint8_t)(counter + 2);
@@ -201,11 +201,12 @@ static void test_repeated_sync_is_answered_without_a_period(void)
     (void)sync();
     struct pdo_actual again;
     sync_number(counter);
-    const struct drive before = node.axis.drive;
+    const struct drive before = node.servo.axis.drive;
     sync_number(counter);
     TEST_ASSERT_EQUAL_INT(ID, pdo_decode_actual(&sent[0], &again));
     TEST_ASSERT_EQUAL_INT32(drive_position_counts(&before), again.position_counts);
-    TEST_ASSERT_TRUE(before.state.motor.position_mm == node.axis.drive.state.motor.position_mm);
+    TEST_ASSERT_TRUE(before.state.motor.position_mm ==
+                     node.servo.axis.drive.state.motor.position_mm);
     TEST_ASSERT_EQUAL_INT64(2, read_object(0x2101, OD_DRIVE_SIMULATION_REPEATED_SYNCS));
 }
 
@@ -240,7 +241,7 @@ static void test_silence_stops_the_drive(void)
     TEST_ASSERT_EQUAL_HEX16(EMCY_SYNC_LOST, emcy.code);
     TEST_ASSERT_EQUAL_HEX64(EMCY_SYNC_LOST, read_object(0x603F, 0));
     TEST_ASSERT_EQUAL_INT64(0, read_object(0x2101, OD_DRIVE_SIMULATION_REPRODUCIBLE));
-    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.servo.device.state);
     /* SYNC comes back, with any number */
     counter = 77;
     const struct pdo_actual actual = sync();
@@ -261,7 +262,7 @@ static void test_a_sleeping_process_is_no_silence(void)
     drive_node_process(&node, 0);
     drive_node_process(&node, 900000);
     drive_node_process(&node, 900000);
-    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, node.servo.device.state);
 }
 
 static void test_leaving_operational_stops_the_drive(void)
@@ -271,7 +272,7 @@ static void test_leaving_operational_stops_the_drive(void)
     for (int i = 0; i < 60; i++) {
         drive_node_process(&node, 10000);
     }
-    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.servo.device.state);
     nmt(NMT_START);
     sent_count = 0;
     (void)sync();
@@ -293,7 +294,7 @@ static void test_lost_master_stops_the_drive(void)
     struct emcy emcy;
     TEST_ASSERT_EQUAL_UINT8(ID, emcy_decode(newest(COB_EMCY + ID), &emcy));
     TEST_ASSERT_EQUAL_HEX16(EMCY_HEARTBEAT, emcy.code);
-    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, node.servo.device.state);
 }
 
 static void test_software_limits_bind(void)
@@ -312,11 +313,11 @@ static void test_software_limits_bind(void)
 static void test_period_by_sdo(void)
 {
     write_object(0x60C2, 1, 4, 1);
-    TEST_ASSERT_EQUAL_UINT32(64, node.axis.drive.samples);
+    TEST_ASSERT_EQUAL_UINT32(64, node.servo.axis.drive.samples);
     write_object(0x1006, 0, 2000, 4);
-    TEST_ASSERT_EQUAL_UINT32(32, node.axis.drive.samples);
+    TEST_ASSERT_EQUAL_UINT32(32, node.servo.axis.drive.samples);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, refusal(0x1006, 0, 1001, 4));
-    TEST_ASSERT_EQUAL_UINT32(32, node.axis.drive.samples);
+    TEST_ASSERT_EQUAL_UINT32(32, node.servo.axis.drive.samples);
     enable();
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, refusal(0x1006, 0, 1000, 4));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, refusal(0x60C2, 1, 1, 1));
@@ -366,7 +367,7 @@ static void test_controlword_by_sdo_after_pdo(void)
     enable();
     write_object(0x6040, 0, CIA402_DISABLE_VOLTAGE, 2);
     (void)sync();
-    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.servo.device.state);
 }
 
 static void test_reset_node_is_power_on(void)
@@ -376,7 +377,7 @@ static void test_reset_node_is_power_on(void)
     sent_count = 0;
     nmt(NMT_RESET_NODE);
     TEST_ASSERT_EQUAL_HEX8(NMT_INITIALISING, newest(COB_HEARTBEAT + ID)->data[0]);
-    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.servo.device.state);
     TEST_ASSERT_EQUAL_INT64(INT32_MAX, (int32_t)read_object(0x607D, 2));
 }
 

@@ -4,7 +4,6 @@
 #include "canopen/cia402.h"
 #include "canopen/sdo_abort.h"
 #include "drive_bench.h"
-#include "node/node_fault.h"
 #include "unity.h"
 
 /* The axis stands at 1 mm of the machine; switches at -4, 6 and 3 ... 5 mm. */
@@ -47,7 +46,7 @@ static void prepare(int8_t method, int32_t offset)
     TEST_ASSERT_EQUAL_HEX32(0, drive_bench_write(0x6099, 1, 50000000));
     TEST_ASSERT_EQUAL_HEX32(0, drive_bench_write(0x6099, 2, 1000000));
     drive_bench_enable();
-    TEST_ASSERT_EQUAL_HEX16(bench.node.homed ? DONE : NOT_STARTED,
+    TEST_ASSERT_EQUAL_HEX16(bench.node.servo.homing.homed ? DONE : NOT_STARTED,
                             drive_bench_statusword() & HOMING_BITS);
 }
 
@@ -71,9 +70,9 @@ static void homes(int8_t method, int32_t offset, double place_mm)
 {
     prepare(method, offset);
     TEST_ASSERT_EQUAL_HEX16(DONE, home());
-    const double read_mm = 1e-6 * axis_motion_position(&bench.node.axis);
+    const double read_mm = 1e-6 * axis_motion_position(&bench.node.servo.axis);
     const double home_mm =
-        axis_motion_place_mm(&bench.node.axis) - (read_mm - 1e-6 * (double)offset);
+        axis_motion_place_mm(&bench.node.servo.axis) - (read_mm - 1e-6 * (double)offset);
     TEST_ASSERT_DOUBLE_WITHIN(0.002, place_mm, home_mm);
 }
 
@@ -133,7 +132,7 @@ static void test_the_wrong_end_is_an_error(void)
     drive_bench_run(50);
     prepare(19, 0);
     TEST_ASSERT_EQUAL_HEX16(ERROR_AT_REST, home());
-    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.node.servo.device.state);
     bench.word = CIA402_ENABLE_OPERATION; /* another method helps */
     drive_bench_run(2);
     TEST_ASSERT_EQUAL_HEX32(0, drive_bench_write(0x6098, 0, 21));
@@ -173,7 +172,7 @@ static void test_disabled_on_the_way(void)
     bench.word = CIA402_DISABLE_VOLTAGE;
     drive_bench_run(100);
     TEST_ASSERT_EQUAL_HEX16(NOT_STARTED, drive_bench_statusword() & HOMING_BITS);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.axis));
+    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
 }
 
 static void test_modes_change_at_rest_only(void)
@@ -190,6 +189,22 @@ static void test_modes_change_at_rest_only(void)
     TEST_ASSERT_EQUAL_INT64(CIA402_MODE_CSP, drive_bench_read(0x6061, 0));
 }
 
+/* A drive that follows moving setpoints keeps its mode. */
+static void test_no_homing_while_setpoints_move(void)
+{
+    drive_bench_enable();
+    bench.target += 1000;
+    drive_bench_run(2);
+    for (int k = 0; k < 5; k++) {
+        bench.target += 1000;
+        drive_bench_run(1);
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, drive_bench_write(0x6060, 0, CIA402_MODE_HOMING));
+    }
+    drive_bench_run(3);
+    TEST_ASSERT_EQUAL_HEX32(0, drive_bench_write(0x6060, 0, CIA402_MODE_HOMING));
+    TEST_ASSERT_EQUAL_INT64(CIA402_MODE_HOMING, drive_bench_read(0x6061, 0));
+}
+
 /* By SDO alone and without any SYNC: the drive goes by its own clock. */
 static void test_without_sync(void)
 {
@@ -204,7 +219,7 @@ static void test_without_sync(void)
         drive_node_process(&bench.node, 10000);
     }
     TEST_ASSERT_EQUAL_HEX16(DONE, drive_bench_read(0x6041, 0) & HOMING_BITS);
-    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.node.device.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.node.servo.device.state);
     TEST_ASSERT_EQUAL_INT64(0, drive_bench_read(0x603F, 0));
 }
 
@@ -237,6 +252,7 @@ int main(void)
     RUN_TEST(test_halt_holds_homing_up);
     RUN_TEST(test_disabled_on_the_way);
     RUN_TEST(test_modes_change_at_rest_only);
+    RUN_TEST(test_no_homing_while_setpoints_move);
     RUN_TEST(test_without_sync);
     RUN_TEST(test_methods_that_exist);
     return UNITY_END();

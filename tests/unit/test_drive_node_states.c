@@ -5,7 +5,6 @@
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 #include "drive_bench.h"
-#include "node/node_fault.h"
 #include "unity.h"
 
 enum { SPEED = 50000 }; /* counts a period: 50 mm/s */
@@ -21,7 +20,7 @@ void tearDown(void)
 
 static enum cia402_state state(void)
 {
-    return bench.node.device.state;
+    return bench.node.servo.device.state;
 }
 
 static void move(int periods)
@@ -41,13 +40,13 @@ static void put(uint16_t index, int64_t value)
 static int32_t way;
 static int leave(enum cia402_state from)
 {
-    const int32_t begin = axis_motion_position(&bench.node.axis);
+    const int32_t begin = axis_motion_position(&bench.node.servo.axis);
     int periods = 0;
     while (state() == from && periods < 2000) {
         drive_bench_run(1);
         periods++;
     }
-    way = axis_motion_position(&bench.node.axis) - begin;
+    way = axis_motion_position(&bench.node.servo.axis) - begin;
     return periods;
 }
 
@@ -56,7 +55,7 @@ static void bring(enum cia402_state to)
 {
     drive_bench_begin();
     if (to == CIA402_FAULT) {
-        (void)drive_node_fault(&bench.node, NODE_FAULT_CODE, 0x1000, true);
+        drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_FAULT, .code = 0x1000}, true);
         return;
     }
     const uint16_t words[] = {CIA402_SHUTDOWN, CIA402_SWITCH_ON, CIA402_ENABLE_OPERATION};
@@ -132,14 +131,14 @@ static void test_quick_stop_codes(void)
         }
         TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
         TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_TARGET_REACHED);
-        const int32_t from = axis_motion_position(&bench.node.axis);
+        const int32_t from = axis_motion_position(&bench.node.servo.axis);
         drive_bench_run(700);
         TEST_ASSERT_EQUAL_INT(rows[i].end, state());
         TEST_ASSERT_INT32_WITHIN(rows[i].way / 10 + 150000, rows[i].way,
-                                 axis_motion_position(&bench.node.axis) - from);
+                                 axis_motion_position(&bench.node.servo.axis) - from);
         if (rows[i].code >= 5) {
             TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_TARGET_REACHED) != 0);
-            bench.target = axis_motion_position(&bench.node.axis);
+            bench.target = axis_motion_position(&bench.node.servo.axis);
             bench.word = CIA402_ENABLE_OPERATION; /* transition 16 */
             drive_bench_run(1);
             TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
@@ -175,19 +174,19 @@ static void test_quick_stop_at_the_motors_limits(void)
         put(0x605A, rows[i].code);
         drive_bench_enable();
         move(400);
-        const double speed_mm_s = (double)axis_motion_speed(&bench.node.axis) * 1e-6;
-        const int32_t from = axis_motion_position(&bench.node.axis);
+        const double speed_mm_s = (double)axis_motion_speed(&bench.node.servo.axis) * 1e-6;
+        const int32_t from = axis_motion_position(&bench.node.servo.axis);
         bench.word = CIA402_QUICK_STOP;
         drive_bench_run(1);
         TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
         TEST_ASSERT_INT_WITHIN(1, (int)(-1000.0 * rows[i].volts),
-                               drive_volts_mv(&bench.node.axis.drive));
+                               drive_volts_mv(&bench.node.servo.axis.drive));
         drive_bench_run(1500);
-        const double way_mm = (double)(axis_motion_position(&bench.node.axis) - from) * 1e-6;
+        const double way_mm = (double)(axis_motion_position(&bench.node.servo.axis) - from) * 1e-6;
         /* half a servo sample at speed, and the encoder's increment */
         TEST_ASSERT_DOUBLE_WITHIN(0.005, braking_way_mm(speed_mm_s, rows[i].volts), way_mm);
         TEST_ASSERT_EQUAL_INT(rows[i].end, state());
-        TEST_ASSERT_EQUAL_INT32(0, axis_motion_speed(&bench.node.axis));
+        TEST_ASSERT_EQUAL_INT32(0, axis_motion_speed(&bench.node.servo.axis));
     }
 }
 
@@ -201,10 +200,10 @@ static void test_a_quick_stop_that_stays_can_be_left_and_repeated(void)
         move(300);
         bench.word = CIA402_QUICK_STOP;
         drive_bench_run(1);
-        TEST_ASSERT_INT_WITHIN(1, -5000, drive_volts_mv(&bench.node.axis.drive));
+        TEST_ASSERT_INT_WITHIN(1, -5000, drive_volts_mv(&bench.node.servo.axis.drive));
         drive_bench_run(1500);
         TEST_ASSERT_TRUE((drive_bench_statusword() & CIA402_STATUS_TARGET_REACHED) != 0);
-        bench.target = axis_motion_position(&bench.node.axis);
+        bench.target = axis_motion_position(&bench.node.servo.axis);
         bench.word = CIA402_ENABLE_OPERATION;
         drive_bench_run(1);
         TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
@@ -253,7 +252,7 @@ static void test_a_stop_called_off(void)
     bench.word = CIA402_SWITCH_ON;
     drive_bench_run(10);
     TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
-    bench.target = bench.node.axis.target_counts;
+    bench.target = bench.node.servo.axis.target_counts;
     bench.word = CIA402_ENABLE_OPERATION;
     drive_bench_run(300);
     TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
@@ -269,7 +268,7 @@ static void test_fault_reaction_codes(void)
         put(0x6085, 1000000000);
         drive_bench_enable();
         move(200);
-        (void)drive_node_fault(&bench.node, NODE_FAULT_CODE, 0x6100, true);
+        drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_FAULT, .code = 0x6100}, true);
         TEST_ASSERT_EQUAL_INT(code == 0 ? CIA402_FAULT : CIA402_FAULT_REACTION_ACTIVE, state());
         (void)leave(CIA402_FAULT_REACTION_ACTIVE);
         TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
@@ -285,16 +284,16 @@ static void test_a_stop_ends_when_the_motor_stands(void)
     put(0x6085, 2000000000);
     drive_bench_enable();
     move(400);
-    (void)drive_node_fault(&bench.node, NODE_FAULT_SATURATE, 0.9, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_SATURATE, .volts = 0.9}, true);
     bench.word = CIA402_QUICK_STOP;
     const int reference = 25; /* periods of the ramp: 50 mm/s by 2000 mm/s^2 */
     drive_bench_run(reference + 10);
     TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
-    TEST_ASSERT_EQUAL_INT64(0, bench.node.axis.speed_counts_period);
-    TEST_ASSERT_FALSE(axis_motion_at_rest(&bench.node.axis));
+    TEST_ASSERT_EQUAL_INT64(0, bench.node.servo.axis.speed_counts_period);
+    TEST_ASSERT_FALSE(axis_motion_at_rest(&bench.node.servo.axis));
     (void)leave(CIA402_QUICK_STOP_ACTIVE);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
-    TEST_ASSERT_INT32_WITHIN(1000000, 0, axis_motion_speed(&bench.node.axis));
+    TEST_ASSERT_INT32_WITHIN(1000000, 0, axis_motion_speed(&bench.node.servo.axis));
 }
 
 /* A motor that never comes to rest is left to its brake after a second. */
@@ -302,8 +301,8 @@ static void test_patience_ends(void)
 {
     put(0x605A, 6);
     drive_bench_enable();
-    (void)drive_node_fault(&bench.node, NODE_FAULT_SATURATE, 0.9, true);
-    (void)drive_node_fault(&bench.node, NODE_FAULT_LOAD, 3.0, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_SATURATE, .volts = 0.9}, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_LOAD, .volts = 3.0}, true);
     put(0x605A, 2);
     bench.word = CIA402_QUICK_STOP;
     TEST_ASSERT_INT_WITHIN(5, 1002,
@@ -316,18 +315,18 @@ static void test_power_off_is_the_brake(void)
     drive_bench_enable();
     move(400);
     bench.word = CIA402_DISABLE_VOLTAGE;
-    const int32_t from = axis_motion_position(&bench.node.axis);
+    const int32_t from = axis_motion_position(&bench.node.servo.axis);
     drive_bench_run(1);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
     drive_bench_run(50);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.axis));
-    TEST_ASSERT_INT32_WITHIN(150000, 360000, axis_motion_position(&bench.node.axis) - from);
+    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_INT32_WITHIN(150000, 360000, axis_motion_position(&bench.node.servo.axis) - from);
 }
 
 static void test_reset_says_no_error(void)
 {
     drive_bench_enable();
-    (void)drive_node_fault(&bench.node, NODE_FAULT_CODE, 0x4210, true);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_FAULT, .code = 0x4210}, true);
     drive_bench_run(50);
     bench.word = CIA402_FAULT_RESET;
     drive_bench_run(1);

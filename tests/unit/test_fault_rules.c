@@ -6,11 +6,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "faults/fault_file.h"
 #include "faults/fault_log.h"
-#include "faults/fault_parse.h"
-#include "faults/fault_watch.h"
-#include "faults/tick_count.h"
+#include "faults/fault_rules.h"
+#include "faults/fault_trigger.h"
 #include "unity.h"
 
 static struct fault_rules rules;
@@ -28,14 +26,14 @@ void tearDown(void)
 
 static void parse(const char *text)
 {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, fault_parse(&rules, text, strlen(text), reason, sizeof reason),
-                                  reason);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(
+        0, fault_rules_parse(&rules, text, strlen(text), reason, sizeof reason), reason);
 }
 
 static void refused(const char *text, const char *part)
 {
-    TEST_ASSERT_EQUAL_INT(FAULT_PARSE_WRONG,
-                          fault_parse(&rules, text, strlen(text), reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(FAULT_RULES_WRONG,
+                          fault_rules_parse(&rules, text, strlen(text), reason, sizeof reason));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, part), reason);
     TEST_ASSERT_NULL(strchr(reason, '\n'));
 }
@@ -108,6 +106,8 @@ static void test_what_is_wrong_is_said_with_its_line(void)
     refused("limit-switch at=1 node=2 side=drives", "'side=drives'");
     refused("encoder-jump at=1 node=2 counts=2147483648", "counts=2147483648");
     refused("saturate at=1 node=2 volts=0", "'volts=0'");
+    refused("encoder-jump at=1 node=2 counts=-2147483649", "counts=-2147483649");
+    refused("fault at=1 node=2 code=0", "'code=0'");
     refused("stop at=1 node=0", "'node=0'");
     refused("restart at=1 node=2 for=2", "no key 'for'");
 }
@@ -127,14 +127,14 @@ static void test_bounds_of_text(void)
     line[FAULT_LINE_MAX] = '\0';
     parse(line);
     static const char nul[] = "drop at=1 id=1\n\0drop";
-    TEST_ASSERT_EQUAL_INT(FAULT_PARSE_WRONG,
-                          fault_parse(&rules, nul, sizeof nul - 1u, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(FAULT_RULES_WRONG,
+                          fault_rules_parse(&rules, nul, sizeof nul - 1u, reason, sizeof reason));
     TEST_ASSERT_NOT_NULL(strstr(reason, "line 2"));
 }
 
 static void test_a_file_that_is_not_there(void)
 {
-    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, "/no/such/rules", reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(-1, fault_rules_read(&rules, "/no/such/rules", reason, sizeof reason));
     TEST_ASSERT_EQUAL_STRING("/no/such/rules: No such file or directory", reason);
 }
 
@@ -155,16 +155,16 @@ static void test_a_file_of_rules(void)
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, opened);
     TEST_ASSERT_EQUAL_INT(0, close(opened));
     write_file(path, "# two\ndrop at=5 id=0x182\nstop at=4 node=2\n", 1);
-    TEST_ASSERT_EQUAL_INT(0, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(0, fault_rules_read(&rules, path, reason, sizeof reason));
     TEST_ASSERT_EQUAL_UINT32(2, rules.count);
     TEST_ASSERT_EQUAL_UINT32(3, rules.rules[1].line);
     write_file(path, "drop at=5\n", 1);
-    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(-1, fault_rules_read(&rules, path, reason, sizeof reason));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, ": line 1: drop needs id="), reason);
     write_file(path, "# 16 characters\n", FAULT_FILE_MAX / 16u);
-    TEST_ASSERT_EQUAL_INT(0, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(0, fault_rules_read(&rules, path, reason, sizeof reason));
     write_file(path, "# 17 characters!\n", FAULT_FILE_MAX / 16u);
-    TEST_ASSERT_EQUAL_INT(-1, fault_file_read(&rules, path, reason, sizeof reason));
+    TEST_ASSERT_EQUAL_INT(-1, fault_rules_read(&rules, path, reason, sizeof reason));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, "longer than 16384 bytes"), reason);
     TEST_ASSERT_EQUAL_INT(0, remove(path));
 }
@@ -191,44 +191,44 @@ static void test_lines_of_the_log(void)
 
 static void test_ticks_and_frames_of_a_rule(void)
 {
-    struct fault_watch watch;
+    struct fault_trigger trigger;
     const struct can_msg frame = {.id = 0x182}, other = {.id = 0x183};
     parse("drop at=5 id=0x182 for=10 count=2");
-    fault_watch_init(&watch, &rules.rules[0]);
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, -1, 1));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 4, 1));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 5, 1));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 14, 1));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 15, 1));
-    TEST_ASSERT_FALSE(fault_watch_takes(&watch, &other));
-    TEST_ASSERT_TRUE(fault_watch_takes(&watch, &frame));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 6, 1));
-    TEST_ASSERT_TRUE(fault_watch_takes(&watch, &frame));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 6, 1));
+    fault_trigger_init(&trigger, &rules.rules[0]);
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, -1, 1));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 4, 1));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 5, 1));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 14, 1));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 15, 1));
+    TEST_ASSERT_FALSE(fault_trigger_takes(&trigger, &other));
+    TEST_ASSERT_TRUE(fault_trigger_takes(&trigger, &frame));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 6, 1));
+    TEST_ASSERT_TRUE(fault_trigger_takes(&trigger, &frame));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 6, 1));
 }
 
 static void test_wall_time_of_a_rule(void)
 {
-    struct fault_watch watch;
+    struct fault_trigger trigger;
     parse("bus-off at=5 side=drives for_ms=20");
-    fault_watch_init(&watch, &rules.rules[0]);
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 4, 1000000));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 5, 2000000));
-    TEST_ASSERT_TRUE(fault_watch_acts(&watch, 500, 21999999));
-    TEST_ASSERT_FALSE(fault_watch_acts(&watch, 5, 22000000));
+    fault_trigger_init(&trigger, &rules.rules[0]);
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 4, 1000000));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 5, 2000000));
+    TEST_ASSERT_TRUE(fault_trigger_acts(&trigger, 500, 21999999));
+    TEST_ASSERT_FALSE(fault_trigger_acts(&trigger, 5, 22000000));
 }
 
 static void test_probability_is_met_and_repeats(void)
 {
-    struct fault_watch watch, again;
+    struct fault_trigger trigger, again;
     const struct can_msg frame = {.id = 0x182};
     unsigned hits = 0;
     parse("drop at=0 id=0x182 for=1000000 p=0.3 seed=42");
-    fault_watch_init(&watch, &rules.rules[0]);
-    fault_watch_init(&again, &rules.rules[0]);
+    fault_trigger_init(&trigger, &rules.rules[0]);
+    fault_trigger_init(&again, &rules.rules[0]);
     for (unsigned i = 0; i < 10000; i++) {
-        const bool hit = fault_watch_takes(&watch, &frame);
-        TEST_ASSERT_EQUAL(hit, fault_watch_takes(&again, &frame));
+        const bool hit = fault_trigger_takes(&trigger, &frame);
+        TEST_ASSERT_EQUAL(hit, fault_trigger_takes(&again, &frame));
         hits += hit ? 1u : 0u;
     }
     TEST_ASSERT_UINT_WITHIN(150, 3000, hits); /* more than three deviations of 46 */
@@ -238,13 +238,13 @@ static void test_probability_is_met_and_repeats(void)
 static void test_which_frames_a_seed_takes(void)
 {
     static const unsigned expected[] = {1, 5, 8, 10, 21, 26, 31, 36, 38, 39};
-    struct fault_watch watch;
+    struct fault_trigger trigger;
     const struct can_msg frame = {.id = 0x182};
     unsigned hits = 0;
     parse("drop at=0 id=0x182 for=100 p=0.25 seed=7");
-    fault_watch_init(&watch, &rules.rules[0]);
+    fault_trigger_init(&trigger, &rules.rules[0]);
     for (unsigned i = 0; i < 40u; i++) {
-        if (fault_watch_takes(&watch, &frame)) {
+        if (fault_trigger_takes(&trigger, &frame)) {
             TEST_ASSERT_LESS_THAN_UINT(sizeof expected / sizeof expected[0], hits);
             TEST_ASSERT_EQUAL_UINT(expected[hits], i);
             hits++;
@@ -253,22 +253,22 @@ static void test_which_frames_a_seed_takes(void)
     TEST_ASSERT_EQUAL_UINT(sizeof expected / sizeof expected[0], hits);
 }
 
-static bool sync(struct tick_count *count, uint8_t counter)
+static bool sync(struct fault_ticks *count, uint8_t counter)
 {
     const struct can_msg in = {.id = 0x80, .len = 1, .data = {counter}};
-    return tick_count_receive(count, &in);
+    return fault_ticks_receive(count, &in);
 }
 
-static void setpoint(struct tick_count *count, uint8_t node, uint8_t control, uint8_t target)
+static void setpoint(struct fault_ticks *count, uint8_t node, uint8_t control, uint8_t target)
 {
     const struct can_msg in = {.id = 0x200u + node, .len = 6, .data = {control, 0, target}};
-    TEST_ASSERT_FALSE(tick_count_receive(count, &in));
+    TEST_ASSERT_FALSE(fault_ticks_receive(count, &in));
 }
 
 static void test_tick_0_is_the_sync_after_the_first_step(void)
 {
-    struct tick_count count;
-    tick_count_init(&count);
+    struct fault_ticks count;
+    fault_ticks_init(&count);
     setpoint(&count, 2, 0x06, 1); /* not enabled: the target follows the axis */
     setpoint(&count, 2, 0x0F, 2);
     TEST_ASSERT_FALSE(sync(&count, 7));
@@ -284,10 +284,40 @@ static void test_tick_0_is_the_sync_after_the_first_step(void)
     TEST_ASSERT_EQUAL_INT64(1, count.tick);
 }
 
+/* A step of the target in any of its bytes, by any drive's RPDO1 and no other frame. */
+static void test_every_byte_of_a_target_counts(void)
+{
+    for (unsigned at = 2; at < 6; at++) {
+        struct fault_ticks count;
+        struct can_msg in = {.id = 0x27F, .len = 6, .data = {0x0F, 0, 1, 1, 1, 1}};
+        fault_ticks_init(&count);
+        (void)fault_ticks_receive(&count, &in);
+        (void)fault_ticks_receive(&count, &in);
+        TEST_ASSERT_FALSE(sync(&count, 1));
+        in.data[at] = 0x81;
+        (void)fault_ticks_receive(&count, &in);
+        TEST_ASSERT_TRUE(sync(&count, 2));
+    }
+}
+
+static void test_frames_that_are_no_setpoints(void)
+{
+    static const uint32_t others[] = {0x200, 0x280, 0x182};
+    struct fault_ticks count;
+    fault_ticks_init(&count);
+    for (unsigned i = 0; i < sizeof others / sizeof others[0]; i++) {
+        struct can_msg in = {.id = others[i], .len = 6, .data = {0x0F, 0, 1}};
+        (void)fault_ticks_receive(&count, &in);
+        in.data[2] = 2;
+        (void)fault_ticks_receive(&count, &in);
+        TEST_ASSERT_FALSE(sync(&count, (uint8_t)(i + 1u)));
+    }
+}
+
 static void test_ticks_go_by_the_counter(void)
 {
-    struct tick_count count;
-    tick_count_init(&count);
+    struct fault_ticks count;
+    fault_ticks_init(&count);
     setpoint(&count, 2, 0x0F, 1);
     setpoint(&count, 2, 0x0F, 2);
     (void)sync(&count, 238);
@@ -297,7 +327,7 @@ static void test_ticks_go_by_the_counter(void)
     TEST_ASSERT_TRUE(sync(&count, 1));
     TEST_ASSERT_EQUAL_INT64(3, count.tick);
     const struct can_msg plain = {.id = 0x80}; /* a SYNC without a counter */
-    TEST_ASSERT_TRUE(tick_count_receive(&count, &plain));
+    TEST_ASSERT_TRUE(fault_ticks_receive(&count, &plain));
     TEST_ASSERT_EQUAL_INT64(4, count.tick);
 }
 
@@ -315,6 +345,8 @@ int main(void)
     RUN_TEST(test_probability_is_met_and_repeats);
     RUN_TEST(test_which_frames_a_seed_takes);
     RUN_TEST(test_tick_0_is_the_sync_after_the_first_step);
+    RUN_TEST(test_every_byte_of_a_target_counts);
+    RUN_TEST(test_frames_that_are_no_setpoints);
     RUN_TEST(test_ticks_go_by_the_counter);
     return UNITY_END();
 }

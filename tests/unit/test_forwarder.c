@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "faults/fault_parse.h"
+#include "faults/fault_rules.h"
 #include "injector/injector_options.h"
 #include "unity.h"
 
@@ -26,11 +26,11 @@ static void take(void *context, enum fault_side to, const struct can_msg *frame)
     sent[sent_count++] = *frame;
 }
 
-static void note(void *context, const struct fault_watch *watch, enum fault_side from,
+static void note(void *context, const struct fault_trigger *trigger, enum fault_side from,
                  const struct can_msg *frame, bool on)
 {
     (void)context;
-    (void)watch;
+    (void)trigger;
     (void)from;
     (void)frame;
     note_count++;
@@ -60,13 +60,13 @@ static void sync(uint8_t counter)
     forwarder_receive(&forwarder, FAULT_SIDE_CONTROLLER, &frame, now_ns);
 }
 
-/* A bridge with these rules, in motion: the next SYNC is tick 1 with counter 11. */
+/* A forwarder with these rules, in motion: the next SYNC is tick 1 with counter 11. */
 static void begin(const char *text)
 {
     char reason[200] = "";
     const struct forwarder_port port = {take, note, NULL};
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, fault_parse(&rules, text, strlen(text), reason, sizeof reason),
-                                  reason);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(
+        0, fault_rules_parse(&rules, text, strlen(text), reason, sizeof reason), reason);
     forwarder_init(&forwarder, &rules, port);
     struct can_msg setpoint = {.id = 0x202, .len = 6, .data = {0x0F, 0, 1}};
     forwarder_receive(&forwarder, FAULT_SIDE_CONTROLLER, &setpoint, now_ns);
@@ -96,6 +96,45 @@ static void test_without_rules_everything_passes(void)
     expect(2, DRIVES, 0x80, 11);
     TEST_ASSERT_EQUAL_UINT(0, note_count);
     TEST_ASSERT_TRUE(forwarder_due_ns(&forwarder) == UINT64_MAX);
+}
+
+/* Those of the drives are passed over wherever they stand in the file. */
+static void test_rules_of_both_kinds(void)
+{
+    begin("drop at=0 for=9 id=0x182\nstop at=0 node=2\nduplicate at=0 for=9 id=0x183\n");
+    frame_from(DRIVES, 0x182, 1);
+    frame_from(DRIVES, 0x183, 2);
+    TEST_ASSERT_EQUAL_UINT(2, sent_count);
+    expect(0, CONTROLLER, 0x183, 2);
+    TEST_ASSERT_EQUAL_UINT(2, note_count);
+    TEST_ASSERT_EQUAL_UINT(2, on_count);
+}
+
+static void test_as_many_rules_as_there_may_be(void)
+{
+    static const char line[] = "drop at=0 id=0x182\n";
+    static char text[FAULT_RULES_MAX * sizeof line];
+    for (unsigned i = 0; i < FAULT_RULES_MAX; i++) {
+        memcpy(text + i * (sizeof line - 1u), line, sizeof line);
+    }
+    begin(text);
+    TEST_ASSERT_EQUAL_UINT(FAULT_RULES_MAX, forwarder.count);
+    TEST_ASSERT_TRUE(forwarder_due_ns(&forwarder) == UINT64_MAX);
+    frame_from(DRIVES, 0x182, 1);
+    TEST_ASSERT_EQUAL_UINT(FAULT_RULES_MAX, note_count);
+    TEST_ASSERT_EQUAL_UINT(0, sent_count);
+}
+
+static void test_nothing_acts_before_motion(void)
+{
+    const struct forwarder_port port = {take, note, NULL};
+    begin("drop at=0 id=0x182");
+    forwarder_init(&forwarder, &rules, port);
+    frame_from(DRIVES, 0x182, 1);
+    sync(20);
+    frame_from(DRIVES, 0x182, 2);
+    TEST_ASSERT_EQUAL_UINT(3, sent_count);
+    TEST_ASSERT_EQUAL_UINT(0, note_count);
 }
 
 static void test_drop_in_its_ticks(void)
@@ -188,6 +227,9 @@ static void test_reorder_changes_places_with_the_next_of_its_direction(void)
     expect(0, DRIVES, 0x202, 2);
     expect(1, CONTROLLER, 0x282, 3);
     expect(2, CONTROLLER, 0x182, 1);
+    TEST_ASSERT_TRUE(forwarder_due_ns(&forwarder) == UINT64_MAX);
+    frame_from(DRIVES, 0x282, 4);
+    TEST_ASSERT_EQUAL_UINT(4, sent_count);
 }
 
 static void test_reorder_does_not_wait_for_ever(void)
@@ -202,6 +244,16 @@ static void test_reorder_does_not_wait_for_ever(void)
     TEST_ASSERT_TRUE(forwarder_due_ns(&forwarder) == UINT64_MAX);
 }
 
+static void test_reorder_of_the_controllers_frames(void)
+{
+    begin("reorder at=0 id=0x202");
+    frame_from(CONTROLLER, 0x202, 1);
+    TEST_ASSERT_TRUE(forwarder_due_ns(&forwarder) == now_ns + 20000000u);
+    forwarder_process(&forwarder, now_ns + 20000000u);
+    TEST_ASSERT_EQUAL_UINT(1, sent_count);
+    expect(0, DRIVES, 0x202, 1);
+}
+
 static void test_flood_on_both_sides_in_its_ticks(void)
 {
     begin("flood at=1 for=2 id=0x7A0 per_tick=3");
@@ -214,8 +266,28 @@ static void test_flood_on_both_sides_in_its_ticks(void)
     expect(2, DRIVES, 0x7A0, 0);
     expect(6, DRIVES, 0x7A0, 2);
     expect(8, CONTROLLER, 0x7A0, 3);
+    TEST_ASSERT_EQUAL_UINT8(8, sent[8].len);
     TEST_ASSERT_EQUAL_UINT(2, note_count); /* on, off */
     TEST_ASSERT_EQUAL_UINT(1, on_count);
+}
+
+static void test_time_alone_brings_no_flood(void)
+{
+    begin("flood at=1 for=2 id=0x7A0 per_tick=3");
+    sync(11);
+    forwarder_process(&forwarder, now_ns + 500000u);
+    TEST_ASSERT_EQUAL_UINT(1 + 2 * 3, sent_count);
+}
+
+static void test_what_is_due_after_a_bus_off_is_sent(void)
+{
+    begin("delay at=0 id=0x182 us=9000\nbus-off at=1 side=controller for_ms=5");
+    frame_from(DRIVES, 0x182, 1);
+    sync(11);
+    TEST_ASSERT_EQUAL_UINT(0, sent_count);
+    forwarder_process(&forwarder, now_ns + 9000000u);
+    TEST_ASSERT_EQUAL_UINT(1, sent_count);
+    expect(0, CONTROLLER, 0x182, 1);
 }
 
 static void test_bus_off_for_a_time(void)
@@ -292,6 +364,9 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_without_rules_everything_passes);
+    RUN_TEST(test_rules_of_both_kinds);
+    RUN_TEST(test_as_many_rules_as_there_may_be);
+    RUN_TEST(test_nothing_acts_before_motion);
     RUN_TEST(test_drop_in_its_ticks);
     RUN_TEST(test_a_dropped_sync_begins_its_tick);
     RUN_TEST(test_duplicate_and_short);
@@ -300,7 +375,10 @@ int main(void)
     RUN_TEST(test_a_full_queue_delays_no_more_but_loses_nothing);
     RUN_TEST(test_reorder_changes_places_with_the_next_of_its_direction);
     RUN_TEST(test_reorder_does_not_wait_for_ever);
+    RUN_TEST(test_reorder_of_the_controllers_frames);
     RUN_TEST(test_flood_on_both_sides_in_its_ticks);
+    RUN_TEST(test_time_alone_brings_no_flood);
+    RUN_TEST(test_what_is_due_after_a_bus_off_is_sent);
     RUN_TEST(test_bus_off_for_a_time);
     RUN_TEST(test_bus_off_takes_what_was_held_or_delayed);
     RUN_TEST(test_a_flood_reaches_the_side_that_is_on);

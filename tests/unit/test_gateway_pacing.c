@@ -33,7 +33,7 @@ static bool over(uint32_t frames)
     return pacing_over(&turn, frames, now_ns, &reply);
 }
 
-/* Waits as the bridge does, without frames. Returns for how long. */
+/* Waits as the gateway does, without frames. Returns for how long. */
 static uint64_t wait_out(void)
 {
     const uint64_t began_ns = now_ns;

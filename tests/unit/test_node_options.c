@@ -95,6 +95,9 @@ static void test_equipment_that_cannot_be(void)
                           parse("node=2," FIGURES ",overload_s=0,friction_volts=0", NULL));
     const struct equipment good = options.axes[0].equipment;
     TEST_ASSERT_TRUE(equipment_ok(&good));
+    struct equipment small = good;
+    small.rated_torque_nm = small.rated_current_a = small.brake_volts = 1e-9;
+    TEST_ASSERT_TRUE(equipment_ok(&small));
     struct equipment bad[6];
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         bad[i] = good;

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-#define _GNU_SOURCE
 #include "port/linux/options.h"
 
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "port/linux/long_options.h"
+
+enum { REASON_SIZE = 4096 };
 
 static const char help[] =
     "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--store "
@@ -37,33 +39,57 @@ static const char help[] =
     "not usable,\n"
     "             6 the axes did not stop or the drives did not switch off in time\n";
 
-static enum options_result wrong(const char *what, const char *value)
-{
-    (void)fprintf(stderr, "hodograph-controller: %s '%s' (see --help)\n", what, value);
-    return OPTIONS_WRONG;
-}
-
-static enum options_result set_node(struct options *options, const char *value)
+static int set_node(struct options *options, const struct long_options *line)
 {
     char *end = NULL;
-    const long node = strtol(value, &end, 10);
-    if (end == value || *end != '\0' || node < 1 || node > 127) {
-        return wrong("--node takes a number from 1 to 127, not", value);
+    const long node = strtol(line->value, &end, 10);
+    if (end == line->value || *end != '\0' || node < 1 || node > 127) {
+        return long_options_wrong(line, "--node takes a number from 1 to 127, not", line->value);
     }
     options->node = (uint8_t)node;
-    return OPTIONS_OK;
+    return LONG_OPTIONS_END;
 }
 
-static enum options_result set_pace(struct options *options, const char *value)
+static int set_pace(struct options *options, const struct long_options *line)
 {
-    if (strcmp(value, "real-time") == 0) {
+    if (strcmp(line->value, "real-time") == 0) {
         options->pace = OPTIONS_REAL_TIME;
-    } else if (strcmp(value, "fast") == 0) {
+    } else if (strcmp(line->value, "fast") == 0) {
         options->pace = OPTIONS_FAST;
     } else {
-        return wrong("--pace takes real-time or fast, not", value);
+        return long_options_wrong(line, "--pace takes real-time or fast, not", line->value);
     }
-    return OPTIONS_OK;
+    return LONG_OPTIONS_END;
+}
+
+/* Takes over one option. LONG_OPTIONS_WRONG: its value is. */
+static int set_option(struct options *options, int option, const struct long_options *line)
+{
+    switch (option) {
+    case 'b':
+        options->bus = line->value;
+        break;
+    case 'n':
+        return set_node(options, line);
+    case 'p':
+        return set_pace(options, line);
+    case 's':
+        options->store = line->value;
+        break;
+    case 'r':
+        options->no_realtime = true;
+        break;
+    default:
+        options->verbose = true;
+        break;
+    }
+    return LONG_OPTIONS_END;
+}
+
+static enum options_result complain(const struct long_options *line)
+{
+    (void)fprintf(stderr, "hodograph-controller: %s\n", line->reason);
+    return OPTIONS_WRONG;
 }
 
 enum options_result options_parse(struct options *options, int argc, char **argv)
@@ -73,44 +99,22 @@ enum options_result options_parse(struct options *options, int argc, char **argv
         {"node", required_argument, NULL, 'n'},  {"pace", required_argument, NULL, 'p'},
         {"store", required_argument, NULL, 's'}, {"no-realtime", no_argument, NULL, 'r'},
         {"verbose", no_argument, NULL, 'v'},     {NULL, 0, NULL, 0}};
+    char reason[REASON_SIZE];
+    struct long_options line = long_options_begin(argc, argv, known, reason, sizeof reason);
+    line.quoted = true;
+    line.no_value = "a value is missing after";
+    line.unknown = "unknown argument";
     *options = (struct options){.bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME};
-    enum options_result result = OPTIONS_OK;
-    optind = 0; /* from the start, in a second call too */
-    while (result == OPTIONS_OK) {
-        const int at = optind > 0 ? optind : 1;
-        switch (getopt_long(argc, argv, "+:", known, NULL)) {
-        case -1:
-            if (optind < argc) {
-                return wrong("unknown argument", argv[optind]);
-            }
-            return options->bus != NULL ? OPTIONS_OK
-                                        : wrong("name the CAN interface with", "--bus");
-        case 'h':
-            (void)fputs(help, stdout);
-            return OPTIONS_HELP;
-        case 'b':
-            options->bus = optarg;
-            break;
-        case 'n':
-            result = set_node(options, optarg);
-            break;
-        case 'p':
-            result = set_pace(options, optarg);
-            break;
-        case 's':
-            options->store = optarg;
-            break;
-        case 'r':
-            options->no_realtime = true;
-            break;
-        case 'v':
-            options->verbose = true;
-            break;
-        case ':':
-            return wrong("a value is missing after", argv[at]);
-        default:
-            return wrong("unknown argument", argv[at]);
-        }
+    int option = long_options_next(&line);
+    while (option > 0 && option != 'h' && set_option(options, option, &line) == LONG_OPTIONS_END) {
+        option = long_options_next(&line);
     }
-    return result;
+    if (option == 'h') {
+        (void)fputs(help, stdout);
+        return OPTIONS_HELP;
+    }
+    if (option == LONG_OPTIONS_END && options->bus == NULL) {
+        option = long_options_wrong(&line, "name the CAN interface with", "--bus");
+    }
+    return option == LONG_OPTIONS_END ? OPTIONS_OK : complain(&line);
 }

@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: MIT */
+/* fault_rules: scripted faults, one a line of text (docs/reference/protocol.md section 4): the rules as structs, and their
+ * parser. Pure, but for fault_rules_read and the text of an error.
+ */
+#ifndef FAULTS_FAULT_RULES_H
+#define FAULTS_FAULT_RULES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define FAULT_RULES_MAX 64u
+#define FAULT_FOR_EVER  UINT32_MAX
+#define FAULT_LINE_MAX  200u   /* characters of a line */
+#define FAULT_FILE_MAX  16384u /* bytes of a file */
+
+enum fault_kind {
+    FAULT_KIND_DROP, /* from here on: the injector's */
+    FAULT_KIND_DUPLICATE,
+    FAULT_KIND_DELAY,
+    FAULT_KIND_REORDER,
+    FAULT_KIND_CORRUPT,
+    FAULT_KIND_SHORT,
+    FAULT_KIND_FLOOD,
+    FAULT_KIND_BUS_OFF,
+    FAULT_KIND_STOP, /* from here on: the drives' */
+    FAULT_KIND_RESTART,
+    FAULT_KIND_HEARTBEAT_STOP,
+    FAULT_KIND_ENCODER_FREEZE,
+    FAULT_KIND_ENCODER_JUMP,
+    FAULT_KIND_ENCODER_FAULT,
+    FAULT_KIND_SATURATE,
+    FAULT_KIND_LOAD,
+    FAULT_KIND_LIMIT_SWITCH,
+    FAULT_KIND_FAULT,
+    FAULT_KINDS
+};
+
+enum fault_side {
+    FAULT_SIDE_CONTROLLER,
+    FAULT_SIDE_DRIVES,
+    FAULT_SIDE_NEGATIVE,
+    FAULT_SIDE_POSITIVE
+};
+
+/* One rule; fields that its kind does not have are 0. */
+struct fault_rule {
+    enum fault_kind kind;
+    uint32_t line;      /* in the file, from 1 */
+    uint32_t at;        /* first tick */
+    uint32_t for_ticks; /* 0 where for_ms is given; or FAULT_FOR_EVER */
+    uint32_t for_ms;
+    uint32_t count; /* most frames; 0: any number */
+    double p;       /* of each frame */
+    uint32_t seed;
+    uint16_t id;
+    uint8_t node;
+    uint32_t delay_us;
+    uint8_t byte;
+    uint8_t mask;      /* xor */
+    uint8_t len;       /* bytes left */
+    uint32_t per_tick; /* frames of a flood */
+    enum fault_side side;
+    int32_t counts;
+    double volts;
+    uint16_t code; /* EMCY */
+};
+
+struct fault_rules {
+    struct fault_rule rules[FAULT_RULES_MAX];
+    uint32_t count;
+};
+
+/* The word of the grammar. */
+const char *fault_kind_name(enum fault_kind kind);
+
+/* Whether a drive acts by this kind, and not the injector. */
+bool fault_kind_is_drives(enum fault_kind kind);
+
+#define FAULT_RULES_WRONG (-1)
+
+/* `length` bytes of text. Returns 0, or FAULT_RULES_WRONG with one line in `reason`: which line, what is wrong and what
+ * would be right. */
+int fault_rules_parse(struct fault_rules *rules, const char *text, size_t length, char *reason,
+                      size_t size);
+
+/* The same from a file; the reason names it. */
+int fault_rules_read(struct fault_rules *rules, const char *path, char *reason, size_t size);
+
+#endif

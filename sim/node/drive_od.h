@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/* drive_od: the object dictionary of a simulated drive beside its table (drive.eds): values that follow from the model,
+ * checks of writes, and what a write does. One row for each object that has a handler. All in one context.
+ */
+#ifndef NODE_DRIVE_OD_H
+#define NODE_DRIVE_OD_H
+
+#include "node/drive_node.h"
+
+/* Their context is a struct drive_node. */
+extern const struct od_hooks drive_od_hooks;
+
+/* Values that follow from model, equipment and node number, after defaults have been set. */
+void drive_od_fill(struct drive_node *node);
+
+/* Communication objects (0x1000 ... 0x1FFF) to their defaults. */
+void drive_od_reset_communication(struct drive_node *node);
+
+#endif
