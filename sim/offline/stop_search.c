@@ -33,15 +33,16 @@
     12 /* ticks of a brake between two looks whether the rest of it surely keeps the limits */
 #define SPARE_TIME  1.25 /* of brake_time, */
 #define SPARE_TICKS 10.0 /* and ticks more */
+#define FEED_ROUNDING 1e-9 /* share of a feed that the plan may be above it */
 #define FASTER                                                                                     \
-    0.03 /* of the velocity of an axis: at other rates states are looked at that look-ahead excludes */
+    0.03 /* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
 #define WAIT_AS_GOOD 1.001 /* or such a one that could also take much longer */
 #define NEAR         1.05  /* so near to the least time without limits no other start is tried */
 
 /* What is looked at: one over the limits, less the margin; 0: none. */
 struct inverse {
-    double feed, acceleration, jerk;
+    double feed; /* share of the path's feed that counts: less than 1 where a little more is allowed */
     double velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
 };
 
@@ -241,7 +242,7 @@ static double strain(const struct inverse *inverse, const struct stop_row *low,
     struct axes axes;
     double share = share_of(low, at->s);
     axes_of(low, share, at, j, &axes);
-    double most = at->v * (1.0 - 1e-9) / between(low->feed_mm_s, low[1].feed_mm_s, share);
+    double most = at->v * inverse->feed / between(low->feed_mm_s, low[1].feed_mm_s, share);
     most = low->feed_mm_s < NEVER_S * NEVER_S && low[1].feed_mm_s < NEVER_S * NEVER_S ? most : 0.0;
     for (int k = 0; k < 2; k++) {
         most = greater(most, fabs(axes.velocity[k]) * inverse->velocity[k]);
@@ -354,7 +355,7 @@ static int extent_keeps(const struct inverse *inverse, const struct extent *exte
     const double jerk =
         hypot(extent->jerk + extent->curvature * normal * extent->speed,
               (3.0 * extent->curvature * extent->acceleration + bent) * extent->speed);
-    double most = extent->speed / extent->feed_mm_s;
+    double most = extent->speed * inverse->feed / extent->feed_mm_s;
     for (int k = 0; k < 2; k++) {
         const double pull = extent->speed + inverse->time_constant[k] * acceleration;
         most = greater(most, extent->speed * inverse->velocity[k]);
@@ -972,9 +973,7 @@ static void search_piece(const struct search *search, struct piece *piece, const
 
 static void invert(struct inverse *inverse, const struct stop_limits *limits)
 {
-    inverse->feed = over(limits->feed);
-    inverse->acceleration = over(limits->acceleration);
-    inverse->jerk = over(limits->jerk);
+    inverse->feed = 1.0 - FEED_ROUNDING;
     for (int k = 0; k < 2; k++) {
         inverse->velocity[k] = over(limits->axis_velocity[k]);
         inverse->axis_acceleration[k] = over(limits->axis_acceleration[k]);
@@ -996,6 +995,7 @@ static void begin(struct search *search, const struct program *p, const struct s
     search->deceleration = limits->acceleration;
     invert(&search->inverse, limits);
     search->at_any_rate = search->inverse;
+    search->at_any_rate.feed /= 1.0 + FASTER;
     for (int k = 0; k < 2; k++) {
         search->at_any_rate.velocity[k] /= 1.0 + FASTER;
         search->at_any_rate.reach[k] *= limits->reach_at_pace != 0u ? 0.0 : 1.0;
