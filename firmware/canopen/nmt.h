@@ -52,8 +52,8 @@ void nmt_slave_init(struct nmt_slave *slave, uint8_t node, const struct nmt_hook
 bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in);
 
 /* Carries out resets, tells hooks->changed, and, from INITIALISING, gives the boot-up frame and
- * enters PRE-OPERATIONAL. Returns 1 when *out is to be sent, else 0. Mainline. */
-int nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
+ * enters PRE-OPERATIONAL. Returns true when *out is to be sent. Mainline. */
+bool nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
 
 /* A communication error (heartbeat of the master lost, bus off): what 0x1029 sub 1 says. 0: from
  * OPERATIONAL to PRE-OPERATIONAL; 1: nothing; 2: to STOPPED; other values as 1. Mainline. */

@@ -55,7 +55,7 @@ static int begin_op(struct drive_boot *boot, struct can_msg *out)
                          ? sdo_client_read_number(&boot->client, node, op->index, op->sub, out)
                          : sdo_client_write_number(&boot->client, node, op->index, op->sub,
                                                    op->value, op->size, out);
-    return sent > 0 ? 1 : 0;
+    return sent == 0 ? 1 : 0;
 }
 
 static bool waits(struct drive_boot *boot, uint32_t elapsed_us)

@@ -54,7 +54,7 @@ static int look_at_next(struct drive_polling *look, const struct machine *machin
     const uint16_t index = inputs ? DIGITAL_INPUTS : FOLLOWING_ERROR;
     const int sent =
         sdo_client_read_number(&look->client, machine->config.node[axis], index, 0, out);
-    return sent > 0 ? 1 : 0;
+    return sent == 0 ? 1 : 0;
 }
 
 int drive_polling_process(struct drive_polling *look, struct machine *machine,

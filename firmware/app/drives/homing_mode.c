@@ -27,7 +27,7 @@ static int ask(struct homing_mode *mode, uint8_t node, uint8_t wanted, struct ca
         mode->checking
             ? sdo_client_read_number(client, node, MODE_OF_OPERATION_DISPLAY, 0, out)
             : sdo_client_write_number(client, node, MODE_OF_OPERATION, 0, wanted, 1, out);
-    return sent > 0 ? 1 : 0;
+    return sent == 0 ? 1 : 0;
 }
 
 /* The mode has been written, or read. */
