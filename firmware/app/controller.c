@@ -4,9 +4,7 @@
 #include <string.h>
 
 #include "app/controller_reset.h"
-#include "app/od_program.h"
-#include "app/od_read.h"
-#include "app/od_write.h"
+#include "app/objects.h"
 #include "canopen/cob.h"
 #include "port/port.h"
 
@@ -15,23 +13,10 @@
 #define SEND_TRIES         40u
 #define SEND_PAUSE_US      500u
 
-static const struct od_hooks od_hooks = {
-    .read = od_read_hook,
-    .write = od_write_hook,
-    .urgent = od_urgent_hook,
-    .written = od_written_hook,
-    .domain_begin = od_program_begin,
-    .domain_write = od_program_write,
-    .domain_end = od_program_end,
-    .domain_abort = od_program_abort,
-    .domain_size = od_program_size,
-    .domain_read = od_program_read,
-};
-
 /* The node number is itself a parameter that is restored; a new one holds from the next power-on. */
 static void init_values(struct controller *controller, uint8_t port_node)
 {
-    od_init(&controller->od, &od_controller_table, &controller->values, &od_hooks, controller);
+    od_init(&controller->od, &od_controller_table, &controller->values, &objects_hooks, controller);
     parameter_store_find(&controller->store, &controller->od);
     controller->node = port_node;
     controller_reset_values(controller);

@@ -204,10 +204,11 @@ static void feed(struct fdcan *can)
     for (;;) {
         const uint32_t status = get(FDCAN_TXFQS);
         struct fdcan_queue *queue = next_queue(can, reg_get(status, FDCAN_TXFQS_TFFL));
-        if (queue == NULL) {
+        const struct can_msg *message = queue == NULL ? NULL : queue_front(queue);
+        if (message == NULL) {
             return;
         }
-        transmit(status, queue_front(queue));
+        transmit(status, message);
         can->mainline_last = queue == &can->ordinary;
         queue_drop(queue);
     }

@@ -1,7 +1,79 @@
 /* SPDX-License-Identifier: MIT */
-#include "app/od_read_program.h"
+#include "app/objects_program.h"
 
-#include <stdbool.h>
+#include <string.h>
+
+#include "canopen/sdo_abort.h"
+#include "port/port.h"
+
+/* ---- Sub 1: the image ---- */
+
+static bool moving(struct controller *controller)
+{
+    port_lock();
+    const bool result = machine_moving(&controller->machine);
+    port_unlock();
+    return result;
+}
+
+uint32_t object_program_begin(void *context, const struct od_entry *entry, uint32_t size)
+{
+    struct controller *controller = context;
+    (void)entry;
+    if (moving(controller)) {
+        controller->refusal = MACHINE_MOVING;
+        return SDO_ABORT_STATE;
+    }
+    return program_slot_begin(&controller->slot, size) == 0 ? SDO_OK : SDO_ABORT_MEMORY;
+}
+
+uint32_t object_program_write(void *context, const struct od_entry *entry, uint32_t offset,
+                              const uint8_t *data, uint32_t size)
+{
+    struct controller *controller = context;
+    (void)entry;
+    return program_slot_write(&controller->slot, offset, data, size) == 0 ? SDO_OK
+                                                                          : SDO_ABORT_MEMORY;
+}
+
+/* One SDO channel serves commands and upload, so nothing can have been started since the beginning.
+ */
+uint32_t object_program_end(void *context, const struct od_entry *entry, uint32_t size)
+{
+    struct controller *controller = context;
+    (void)entry;
+    const int result = program_slot_finish(&controller->slot, size, &controller->config);
+    return result == 0 ? SDO_OK : SDO_ABORT_VALUE;
+}
+
+void object_program_abort(void *context, const struct od_entry *entry)
+{
+    struct controller *controller = context;
+    (void)entry;
+    program_slot_abandon(&controller->slot);
+}
+
+uint32_t object_program_size(void *context, const struct od_entry *entry, uint32_t *size)
+{
+    const struct controller *controller = context;
+    (void)entry;
+    if (!controller->slot.present) {
+        return SDO_ABORT_NO_DATA;
+    }
+    *size = controller->slot.program.header.image_size;
+    return SDO_OK;
+}
+
+uint32_t object_program_read(void *context, const struct od_entry *entry, uint32_t offset,
+                             uint8_t *data, uint32_t size)
+{
+    const struct controller *controller = context;
+    (void)entry;
+    memcpy(data, controller->slot.program.image + offset, size);
+    return SDO_OK;
+}
+
+/* ---- From sub 2 on: state of the upload, what the program says of itself ---- */
 
 static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 {
@@ -76,8 +148,9 @@ static uint64_t place_number(struct controller *controller, uint8_t sub)
     return (uint64_t)(int64_t)counts[sub & 1u];
 }
 
-uint64_t od_read_program(struct controller *controller, uint8_t sub)
+uint64_t object_read_program(struct controller *controller, const struct od_entry *entry)
 {
+    const uint8_t sub = entry->sub;
     const struct program_slot *slot = &controller->slot;
     switch (sub) {
     case 2:
