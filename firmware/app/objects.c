@@ -308,7 +308,7 @@ static uint32_t object_write_consumer(struct controller *controller, const struc
 
 static void object_written_consumer(struct controller *controller)
 {
-    drive_monitor_begin(&controller->watch, &controller->config,
+    drive_monitor_begin(&controller->monitor, &controller->config,
                         controller->values.consumer_heartbeat_time);
 }
 

@@ -66,7 +66,8 @@ static void test_boot_configures_each_drive_then_starts_it(void)
 {
     app_bench_settle(&bench);
     TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
-    TEST_ASSERT_EQUAL_UINT32(DRIVE_POLLING_SDO_TIMEOUT_US, bench.controller.look.client.timeout_us);
+    TEST_ASSERT_EQUAL_UINT32(DRIVE_POLLING_SDO_TIMEOUT_US,
+                             bench.controller.polling.client.timeout_us);
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     TEST_ASSERT_EQUAL_UINT32(2, bench.starts);
     for (uint32_t i = 0; i < BENCH_DRIVES; ++i) {

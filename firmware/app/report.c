@@ -1,19 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* What the controller tells of itself: emergency messages, NMT state after its own errors, lines for a human. */
-#include "app/controller.h"
-
-#include <stddef.h>
+#include "app/report.h"
 
 #include "canopen/cia402.h"
 #include "canopen/sdo_abort.h"
 #include "port/port.h"
-
-void controller_start_itself(struct controller *controller)
-{
-    struct can_msg start;
-    nmt_master_command(NMT_START, controller->node, &start);
-    (void)nmt_slave_receive(&controller->nmt, &start);
-}
 
 static void tell_fault(struct controller *controller, const struct fault *fault)
 {
@@ -123,12 +113,12 @@ static bool bus_takes_frames(const struct controller *controller)
 static void send_emergencies(struct controller *controller)
 {
     struct can_msg out;
-    while (bus_takes_frames(controller) && emcy_producer_process(&controller->emcy, &out) != 0) {
+    while (bus_takes_frames(controller) && emcy_producer_process(&controller->emcy, &out)) {
         controller_send(&out);
     }
 }
 
-void controller_report(struct controller *controller)
+void report_changes(struct controller *controller)
 {
     report_fault(controller);
     send_emergencies(controller);
