@@ -407,6 +407,7 @@ void controller_beat(void *self)
     const uint32_t now_us = port_time_us();
     poll_heartbeat(controller, now_us - controller->polled_us);
     controller->polled_us = now_us;
+    port_progress();
 }
 
 void controller_poll(struct controller *controller)

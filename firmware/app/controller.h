@@ -93,7 +93,8 @@ bool controller_shut_down(struct controller *controller);
 /* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
 bool controller_configured(const struct controller *controller);
 
-/* Sends the heartbeat if it is due: for long work of the main loop, such as the check of a program. `self`: the controller. */
+/* A sign of life in long work of the main loop, such as the check of a program, at each step: sends the heartbeat if it is due
+ * and tells the port (port_progress). `self`: the controller. */
 void controller_beat(void *self);
 
 /* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
