@@ -93,10 +93,10 @@ bool nmt_slave_process(struct nmt_slave *slave, struct can_msg *out)
 
 void nmt_slave_error(struct nmt_slave *slave, uint8_t behaviour)
 {
-    if (behaviour == 0 && slave->state == NMT_OPERATIONAL) {
+    if (behaviour == (uint8_t)NMT_ERROR_PRE_OPERATIONAL && slave->state == NMT_OPERATIONAL) {
         slave->state = NMT_PRE_OPERATIONAL;
     }
-    if (behaviour == 2 && slave->state != NMT_INITIALISING) {
+    if (behaviour == (uint8_t)NMT_ERROR_STOPPED && slave->state != NMT_INITIALISING) {
         slave->state = NMT_STOPPED;
     }
 }

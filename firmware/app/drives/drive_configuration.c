@@ -6,6 +6,7 @@
 
 #include "canopen/cia402.h"
 #include "canopen/cob.h"
+#include "canopen/nmt.h"
 #include "canopen/sdo_abort.h"
 
 /* ---- The table: which object of a drive gets which value, in order ---- */
@@ -87,7 +88,6 @@ struct drive_pdo {
 #define ON_CHANGE     255u
 #define INHIBIT_MS    10u
 
-enum { NO_CHANGE = 1 };      /* 0x1029: stays operational, so that its TPDOs tell what it does */
 enum { QUICK_STOP = 3 };     /* 0x6007: what it does then */
 enum { QUICK_STOP_OFF = 2 }; /* 0x605A, 0x605E: by 0x6085, then off, then Fault */
 enum { MINUS_THREE = 0xFD }; /* 0x60C2 sub 2: the time is sub 1 * 10^-3 s */
@@ -172,7 +172,8 @@ static const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
     {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_SILENT_MS},
-    {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NO_CHANGE},
+    /* it stays operational, so that its TPDOs tell what it does */
+    {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NMT_ERROR_NO_CHANGE},
     {WHEN_ALWAYS, ROW_MAY, 0x6007, 0, 2, FROM_ROW, QUICK_STOP},
     /* process data */
     {WHEN_TORQUE, ROW_PDO_OFFSET, 0, 0, 0, FROM_ROW, RPDO1_TORQUE},
