@@ -26,17 +26,21 @@ static int prepare(struct controller *controller, int64_t from_q40_mm, struct mo
     return result;
 }
 
-/* Everything that takes long (program check, reading all pieces) happens before the lock. */
-static enum machine_refusal prepare_start(struct controller *controller, int64_t from_q40_mm)
+/* What keeps the program from being started. Costs a check of it where it was not checked under this configuration: apart from
+ * the start, so that the stack never holds the check and a prepared motion. */
+static enum machine_refusal program_refusal(struct controller *controller)
 {
     struct program_slot *slot = &controller->slot;
     if (!slot->present) {
         return MACHINE_NO_PROGRAM;
     }
     program_slot_refresh(slot, &controller->config);
-    if (!slot->acceptable) {
-        return MACHINE_OUTSIDE_LIMITS;
-    }
+    return slot->acceptable ? MACHINE_ACCEPTED : MACHINE_OUTSIDE_LIMITS;
+}
+
+/* Reading all pieces takes long, so it happens before the lock. */
+static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
+{
     struct motion prepared;
     int32_t start_counts[PLANE_AXES];
     if (prepare(controller, from_q40_mm, &prepared, start_counts) != 0) {
@@ -47,14 +51,6 @@ static enum machine_refusal prepare_start(struct controller *controller, int64_t
     const enum machine_refusal refusal =
         machine_start(&controller->machine, &prepared, start_counts);
     port_unlock();
-    return refusal;
-}
-
-/* What allows a start without homing is for one attempt. */
-static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
-{
-    const enum machine_refusal refusal = prepare_start(controller, from_q40_mm);
-    controller->values.start_without_homing.allowed = 0;
     if (refusal == MACHINE_ACCEPTED && controller->machine.unhomed_axes != 0u) {
         port_log(PORT_WARNING, "started without homing, axes (bit 0: the first)",
                  controller->machine.unhomed_axes);
@@ -62,11 +58,15 @@ static enum machine_refusal start(struct controller *controller, int64_t from_q4
     return refusal;
 }
 
+static bool starts_program(enum command command)
+{
+    return command == COMMAND_START || command == COMMAND_START_FROM;
+}
+
 /* Wants a configuration, and a controller that stays. */
 static bool begins_something(enum command command)
 {
-    return command == COMMAND_ENABLE || command == COMMAND_HOME || command == COMMAND_START ||
-           command == COMMAND_START_FROM;
+    return command == COMMAND_ENABLE || command == COMMAND_HOME || starts_program(command);
 }
 
 /* Real drives take no late SYNCs: they are not switched on where the operating system may make them late. */
@@ -91,15 +91,18 @@ static enum machine_refusal home(struct controller *controller)
                : homing_begin(&controller->homing, &controller->machine, controller->boot.facts);
 }
 
+/* What keeps the controller from beginning anything. */
+static enum machine_refusal controller_refusal(const struct controller *controller)
+{
+    if (controller->ending) {
+        return MACHINE_ENDING;
+    }
+    return controller_configured(controller) ? MACHINE_ACCEPTED : MACHINE_NOT_CONFIGURED;
+}
+
 static enum machine_refusal dispatch(struct controller *controller, enum command command)
 {
     struct machine *machine = &controller->machine;
-    if (begins_something(command) && controller->ending) {
-        return MACHINE_ENDING;
-    }
-    if (begins_something(command) && !controller_configured(controller)) {
-        return MACHINE_NOT_CONFIGURED;
-    }
     switch (command) {
     case COMMAND_ENABLE:
         return enable(controller);
@@ -125,8 +128,30 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     }
 }
 
+/* What allows a start without homing is for one attempt. */
+static enum machine_refusal attempt_start(struct controller *controller, enum command command)
+{
+    enum machine_refusal refusal = program_refusal(controller);
+    if (refusal == MACHINE_ACCEPTED) {
+        refusal = dispatch(controller, command);
+    }
+    controller->values.start_without_homing.allowed = 0;
+    return refusal;
+}
+
+static enum machine_refusal execute(struct controller *controller, enum command command)
+{
+    const enum machine_refusal refusal =
+        begins_something(command) ? controller_refusal(controller) : MACHINE_ACCEPTED;
+    if (refusal != MACHINE_ACCEPTED) {
+        return refusal;
+    }
+    return starts_program(command) ? attempt_start(controller, command)
+                                   : dispatch(controller, command);
+}
+
 enum machine_refusal commands_execute(struct controller *controller, enum command command)
 {
-    controller->refusal = dispatch(controller, command);
+    controller->refusal = execute(controller, command);
     return controller->refusal;
 }

@@ -1,49 +1,126 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/controller.h"
 
+#include <stddef.h>
 #include <string.h>
 
-#include "app/controller_reset.h"
-#include "app/od_program.h"
-#include "app/od_read.h"
-#include "app/od_write.h"
+#include "app/commands.h"
+#include "app/objects.h"
+#include "app/report.h"
 #include "canopen/cob.h"
 #include "port/port.h"
 
-#define SDO_TIMEOUT_US     2000000u
-#define SDO_BLOCK_SEGMENTS 127u
-#define SEND_TRIES         40u
-#define SEND_PAUSE_US      500u
-
-static const struct od_hooks od_hooks = {
-    .read = od_read_hook,
-    .write = od_write_hook,
-    .urgent = od_urgent_hook,
-    .written = od_written_hook,
-    .domain_begin = od_program_begin,
-    .domain_write = od_program_write,
-    .domain_end = od_program_end,
-    .domain_abort = od_program_abort,
-    .domain_size = od_program_size,
-    .domain_read = od_program_read,
-};
-
-/* The node number is itself a parameter that is restored; a new one holds from the next power-on. */
-static void init_values(struct controller *controller, uint8_t port_node)
-{
-    od_init(&controller->od, &od_controller_table, &controller->values, &od_hooks, controller);
-    parameter_store_find(&controller->store, &controller->od);
-    controller->node = port_node;
-    controller_reset_values(controller);
-    if (controller->values.node_number != 0u) {
-        controller->node = controller->values.node_number;
-        controller_reset_values(controller);
-    }
-}
+#define SDO_TIMEOUT_US            2000000u
+#define SDO_BLOCK_SEGMENTS        127u
+#define SEND_TRIES                40u
+#define SEND_PAUSE_US             500u
+#define FIRST_MANUFACTURER_OBJECT 0x2000u
+#define LAST_OBJECT               0xFFFFu
+#define OFF_TIME_US               1000000u
+#define STOP_BOUND_MOST_US        60000000u
 
 bool controller_configured(const struct controller *controller)
 {
     return controller->configured.known && controller->configured.crc32 == controller->config.crc32;
+}
+
+void controller_send(const struct can_msg *message)
+{
+    for (unsigned i = 0; i < SEND_TRIES && port_can_send(message) != 0; ++i) {
+        port_wait(SEND_PAUSE_US);
+    }
+}
+
+void controller_start_itself(struct controller *controller)
+{
+    struct can_msg start;
+    nmt_master_command(NMT_START, controller->node, &start);
+    (void)nmt_slave_receive(&controller->nmt, &start);
+}
+
+/* ---- Values at power-on and at a reset ---- */
+
+/* At power-on, and at the NMT services reset node and reset communication (CiA 301, 7.3.2.2), all objects, or those below
+ * 0x2000, get their stored values (0x1010) or else their defaults. The program stays: it is no parameter. The resets come while
+ * the machine is configurable only. */
+
+/* The whole configuration anew from the objects; the drives have to hear of it. */
+static void take_configuration(struct controller *controller)
+{
+    config_read(&controller->config, &controller->od);
+    port_lock();
+    machine_configure(&controller->machine, &controller->config, true);
+    machine_override(&controller->machine, controller->values.override.percent);
+    port_tick_period(controller->config.period_us);
+    port_unlock();
+}
+
+static void forget_errors(struct controller *controller)
+{
+    struct od_controller *values = &controller->values;
+    emcy_producer_init(&controller->emcy, controller->node, &values->error_register,
+                       values->predefined_error_field, &values->predefined_error_field_count,
+                       (uint8_t)(sizeof values->predefined_error_field /
+                                 sizeof values->predefined_error_field[0]));
+    controller->reported_serial--; /* a fault that is still there is told again */
+}
+
+/* All values to the stored ones or their defaults, for this node; no errors. */
+static void reset_values(struct controller *controller)
+{
+    controller->values = od_controller_defaults;
+    const bool restored =
+        parameter_store_restore(&controller->store, &controller->od, 0, LAST_OBJECT);
+    controller->configured = (struct configured){.known = restored && controller->store.confirmed,
+                                                 .restored = restored,
+                                                 .crc32 = controller->store.config_crc32};
+    od_controller_set_node(&controller->values, controller->node);
+    forget_errors(controller);
+}
+
+static void reset_node(void *self)
+{
+    struct controller *controller = self;
+    reset_values(controller);
+    take_configuration(controller);
+}
+
+static void reset_communication(void *self)
+{
+    struct controller *controller = self;
+    const struct od_table *table = controller->od.table;
+    for (uint16_t i = 0; i < table->entry_count; i++) {
+        const struct od_entry *entry = &table->entries[i];
+        if (entry->index < FIRST_MANUFACTURER_OBJECT && entry->size > 0u) {
+            memcpy(controller->od.storage + entry->offset,
+                   (const uint8_t *)&od_controller_defaults + entry->offset, entry->size);
+        }
+    }
+    (void)parameter_store_restore(&controller->store, &controller->od, 0,
+                                  FIRST_MANUFACTURER_OBJECT - 1u);
+    od_controller_set_node(&controller->values, controller->node);
+    forget_errors(controller);
+    take_configuration(controller);
+}
+
+static const struct nmt_hooks reset_hooks = {
+    .reset_node = reset_node,
+    .reset_communication = reset_communication,
+};
+
+/* ---- Power-on ---- */
+
+/* The node number is itself a parameter that is restored; a new one holds from the next power-on. */
+static void init_values(struct controller *controller, uint8_t port_node)
+{
+    od_init(&controller->od, &od_controller_table, &controller->values, &objects_hooks, controller);
+    parameter_store_find(&controller->store, &controller->od);
+    controller->node = port_node;
+    reset_values(controller);
+    if (controller->values.node_number != 0u) {
+        controller->node = controller->values.node_number;
+        reset_values(controller);
+    }
 }
 
 void controller_init(struct controller *controller, uint8_t node)
@@ -59,15 +136,17 @@ void controller_init(struct controller *controller, uint8_t node)
     controller->slot.attend = controller_beat;
     controller->slot.self = controller;
     drive_boot_init(&controller->boot);
-    drive_polling_init(&controller->look);
+    drive_polling_init(&controller->polling);
     homing_init(&controller->homing);
-    drive_monitor_begin(&controller->watch, &controller->config,
+    drive_monitor_begin(&controller->monitor, &controller->config,
                         controller->values.consumer_heartbeat_time);
     sdo_server_init(&controller->server, &controller->od, controller->node, SDO_TIMEOUT_US,
                     SDO_BLOCK_SEGMENTS);
-    nmt_slave_init(&controller->nmt, controller->node, &controller_reset_hooks, controller);
+    nmt_slave_init(&controller->nmt, controller->node, &reset_hooks, controller);
     heartbeat_producer_init(&controller->heartbeat, controller->node);
 }
+
+/* ---- Interrupts ---- */
 
 /* TPDO3, or what looks like one. */
 static void take_inputs(struct machine *machine, int node, uint32_t inputs)
@@ -136,9 +215,309 @@ int controller_start(struct controller *controller)
     return result != 0 ? result : port_start(&handlers, controller->config.period_us);
 }
 
-void controller_send(const struct can_msg *message)
+/* ---- Main loop: one round of all protocol objects ---- */
+
+/* The node is its own NMT master: it enters OPERATIONAL by itself, and obeys resets from outside
+ * while its drives are off. */
+static bool nmt_obeyed(struct controller *controller, const struct can_msg *in)
 {
-    for (unsigned i = 0; i < SEND_TRIES && port_can_send(message) != 0; ++i) {
-        port_wait(SEND_PAUSE_US);
+    const bool reset = in->len >= 2u && (in->data[0] == (uint8_t)NMT_RESET_NODE ||
+                                         in->data[0] == (uint8_t)NMT_RESET_COMMUNICATION);
+    port_lock();
+    const bool idle = machine_configurable(&controller->machine);
+    port_unlock();
+    return reset && idle;
+}
+
+static void take_nmt(struct controller *controller, const struct can_msg *in)
+{
+    if (!nmt_obeyed(controller, in) || !nmt_slave_receive(&controller->nmt, in)) {
+        return;
     }
+    sdo_server_reset(&controller->server);
+    port_lock();
+    if (controller->machine.state == MACHINE_OFF) {
+        machine_enter_boot(&controller->machine);
+    }
+    port_unlock();
+}
+
+/* One of the three asks at a time. */
+static void take_answer(struct controller *controller, const struct can_msg *in)
+{
+    struct can_msg out;
+    if (drive_boot_receive(&controller->boot, in, &out) ||
+        homing_receive(&controller->homing, in, &out) ||
+        drive_polling_receive(&controller->polling, in, &out)) {
+        controller_send(&out);
+    }
+}
+
+static void take_frame(struct controller *controller, const struct can_msg *in)
+{
+    struct can_msg out;
+    if (in->id == 0u) {
+        take_nmt(controller, in);
+    } else if (sdo_server_wants(&controller->server, in)) {
+        if (sdo_server_receive(&controller->server, in, &out)) {
+            controller_send(&out);
+        }
+    } else {
+        take_answer(controller, in);
+        drive_monitor_receive(&controller->monitor, &controller->machine, in);
+    }
+}
+
+static bool next_frame(struct controller *controller, struct can_msg *in)
+{
+    port_lock();
+    machine_attend(&controller->machine);
+    const bool got = frame_queue_take(&controller->queue, in);
+    port_unlock();
+    return got;
+}
+
+static void poll_heartbeat(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    if (heartbeat_producer_process(&controller->heartbeat,
+                                   controller->values.producer_heartbeat_time,
+                                   controller->nmt.state, elapsed_us, &out)) {
+        controller_send(&out);
+    }
+}
+
+static void poll_nmt(struct controller *controller)
+{
+    struct can_msg out;
+    if (nmt_slave_process(&controller->nmt, &out)) {
+        controller_send(&out);
+        controller_start_itself(controller);
+    }
+}
+
+static void poll_server(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    bool due = sdo_server_process(&controller->server, elapsed_us, &out);
+    while (due) {
+        controller_send(&out);
+        due = sdo_server_process(&controller->server, 0, &out);
+    }
+}
+
+static bool boot_requested(struct machine *machine)
+{
+    port_lock();
+    const bool due = machine->boot_due;
+    machine->boot_due = false;
+    port_unlock();
+    return due;
+}
+
+/* Of a drive that is about to be started: what it maps, and its inputs, since TPDO3 tells changes only. */
+static void note_facts(struct controller *controller, const struct can_msg *command)
+{
+    if (command->id != COB_NMT || command->data[0] != (uint8_t)NMT_START) {
+        return;
+    }
+    port_lock();
+    struct axis *axis = machine_axis(&controller->machine, command->data[1]);
+    if (axis != NULL) {
+        const uint32_t i = (uint32_t)(axis - controller->machine.axes);
+        const struct drive_properties *facts = &controller->boot.facts[i];
+        axis->digital_inputs = facts->value[DRIVE_INPUTS];
+        axis->torque_mapped = facts->known[DRIVE_TORQUE_MAPPED];
+        axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
+        if (facts->known[DRIVE_POSITION]) {
+            axis_found(axis, (int32_t)facts->value[DRIVE_POSITION],
+                       MACHINE_KEPT_MM * controller->config.counts_per_mm);
+        } else {
+            axis->homed = false;
+        }
+    }
+    port_unlock();
+}
+
+static void note_silence(struct controller *controller)
+{
+    port_lock();
+    const uint8_t node = controller->machine.silent_node;
+    port_unlock();
+    drive_boot_silent(&controller->boot, node);
+}
+
+static void poll_boot(struct controller *controller, uint32_t elapsed_us)
+{
+    if (boot_requested(&controller->machine)) {
+        port_tick_urgent(false);
+        drive_boot_begin(&controller->boot, &controller->config);
+        drive_monitor_begin(&controller->monitor, &controller->config,
+                            controller->values.consumer_heartbeat_time);
+    }
+    struct can_msg out;
+    bool due = drive_boot_process(&controller->boot, elapsed_us, &out);
+    while (due) {
+        note_facts(controller, &out);
+        controller_send(&out);
+        due = drive_boot_process(&controller->boot, 0, &out);
+    }
+    if (drive_boot_finished(&controller->boot)) {
+        port_tick_urgent(!controller->boot.simulated);
+        port_lock();
+        if (!controller->machine.boot_due) {
+            machine_drives_configured(&controller->machine, controller->boot.simulated);
+        }
+        port_unlock();
+    }
+    note_silence(controller);
+}
+
+static void poll_homing(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    if (homing_process(&controller->homing, &controller->machine, elapsed_us, &out)) {
+        controller_send(&out);
+    }
+}
+
+/* On the way out nothing is asked any more: an answer that comes behind the end would be taken for one to the next client. */
+static void poll_drives(struct controller *controller, uint32_t elapsed_us)
+{
+    port_lock();
+    const bool found = controller->machine.state != MACHINE_BOOT;
+    port_unlock();
+    struct can_msg out;
+    const bool allowed = found && !controller->ending && !homing_busy(&controller->homing);
+    if (drive_polling_process(&controller->polling, &controller->machine, controller->boot.facts,
+                              allowed, elapsed_us, &out)) {
+        controller_send(&out);
+    }
+}
+
+static uint32_t counted_us(uint32_t elapsed_us)
+{
+    return elapsed_us < CONTROLLER_ELAPSED_MAX_US ? elapsed_us : CONTROLLER_ELAPSED_MAX_US;
+}
+
+/* The time of the work counts for nobody else: what the others have sent meanwhile has not been looked at. */
+void controller_beat(void *self)
+{
+    struct controller *controller = self;
+    const uint32_t now_us = port_time_us();
+    poll_heartbeat(controller, now_us - controller->polled_us);
+    controller->polled_us = now_us;
+    port_progress();
+}
+
+void controller_poll(struct controller *controller)
+{
+    struct can_msg in;
+    while (next_frame(controller, &in)) {
+        take_frame(controller, &in);
+    }
+    const uint32_t now_us = port_time_us();
+    const uint32_t elapsed_us = counted_us(now_us - controller->polled_us);
+    controller->polled_us = now_us;
+    poll_nmt(controller);
+    poll_heartbeat(controller, elapsed_us);
+    poll_server(controller, elapsed_us);
+    poll_boot(controller, elapsed_us);
+    poll_homing(controller, elapsed_us);
+    poll_drives(controller, elapsed_us);
+    drive_monitor_process(&controller->monitor, &controller->machine, elapsed_us);
+    report_changes(controller);
+}
+
+/* ---- The way out: stop along the path, switch off, leave the drives pre-operational ---- */
+
+static bool at_rest(const struct machine *machine)
+{
+    return !machine_moving(machine);
+}
+
+static bool switched_off(const struct machine *machine)
+{
+    if (machine->state == MACHINE_BOOT) {
+        return true;
+    }
+    for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
+        const struct axis *axis = &machine->axes[i];
+        if (!axis_left(axis)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool reached_now(struct controller *controller, bool (*reached)(const struct machine *))
+{
+    port_lock();
+    const bool done = reached(&controller->machine);
+    port_unlock();
+    return done;
+}
+
+/* Goes on with the mainline until it is so or the time is over, or, where that counts, somebody insists. */
+static bool wait_until(struct controller *controller, bool (*reached)(const struct machine *),
+                       uint32_t time_us, bool until_insisted)
+{
+    const uint32_t began_us = port_time_us();
+    for (;;) {
+        const bool done = reached_now(controller, reached);
+        const bool insisted = until_insisted && port_stop_insisted();
+        if (done || insisted || port_time_us() - began_us > time_us) {
+            return done;
+        }
+        port_wait(CONTROLLER_POLL_US);
+        controller_poll(controller);
+    }
+}
+
+static void leave_pre_operational(const struct controller *controller)
+{
+    for (uint8_t i = 0; i < controller->config.axis_count; ++i) {
+        struct can_msg command;
+        nmt_master_command(NMT_ENTER_PRE_OPERATIONAL, controller->config.node[i], &command);
+        controller_send(&command);
+    }
+}
+
+/* As long as the machine itself gives its quick stops, which then end in one way or another. */
+static uint32_t quick_time_us(const struct controller *controller)
+{
+    return (MACHINE_QUICK_TICKS + AXIS_STANDSTILL_SYNCS) * controller->config.period_us;
+}
+
+/* The machine itself gives a stop up at its deadline, a fifth beyond its bound, or, near the end of a program, beyond twice
+ * that at most; then the axes settle and arrive. This is for a machine whose ticks do not come. */
+static uint32_t path_time_us(const struct controller *controller)
+{
+    const struct program_slot *slot = &controller->slot;
+    const uint32_t told_us = slot->present ? slot->program.header.hold_worst_us : 0u;
+    const uint32_t bound_us = told_us < STOP_BOUND_MOST_US ? told_us : STOP_BOUND_MOST_US;
+    return 3u * bound_us + (MACHINE_SETTLE_TICKS + MACHINE_ARRIVE_TICKS + AXIS_STANDSTILL_SYNCS) *
+                               controller->config.period_us;
+}
+
+/* Where the path is not left in time, or somebody insists, the drives stop by their own ramps. */
+static bool come_to_rest(struct controller *controller)
+{
+    (void)commands_execute(controller, COMMAND_STOP);
+    if (wait_until(controller, at_rest, path_time_us(controller), true)) {
+        return true;
+    }
+    (void)commands_execute(controller, COMMAND_QUICK_STOP);
+    return wait_until(controller, at_rest, quick_time_us(controller), false);
+}
+
+bool controller_shut_down(struct controller *controller)
+{
+    controller->ending = true;
+    const bool stopped = come_to_rest(controller);
+    (void)commands_execute(controller, COMMAND_DISABLE);
+    (void)wait_until(controller, at_rest, quick_time_us(controller), false);
+    const bool off = wait_until(controller, switched_off, OFF_TIME_US, false);
+    leave_pre_operational(controller);
+    return stopped && off;
 }

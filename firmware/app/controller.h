@@ -56,8 +56,8 @@ struct controller {
     struct parameter_store store;
     struct program_slot slot;
     struct drive_boot boot;
-    struct drive_monitor watch;
-    struct drive_polling look;
+    struct drive_monitor monitor;
+    struct drive_polling polling;
     struct homing homing;
     struct od od;
     struct od_controller values;
@@ -93,11 +93,9 @@ bool controller_shut_down(struct controller *controller);
 /* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
 bool controller_configured(const struct controller *controller);
 
-/* Sends the heartbeat if it is due: for long work of the main loop, such as the check of a program. `self`: the controller. */
+/* A sign of life in long work of the main loop, such as the check of a program, at each step: sends the heartbeat if it is due
+ * and tells the port (port_progress). `self`: the controller. */
 void controller_beat(void *self);
-
-/* Part of the round: tells of faults (EMCY), states and limits. */
-void controller_report(struct controller *controller);
 
 /* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
 void controller_start_itself(struct controller *controller);

@@ -23,9 +23,7 @@ enum cia402_state {
 #define CIA402_STATES 8
 
 /* Modes of operation, 0x6060 and 0x6061. */
-#define CIA402_MODE_NONE   0
-#define CIA402_MODE_HOMING 6
-#define CIA402_MODE_CSP    8
+enum cia402_mode { CIA402_MODE_NONE = 0, CIA402_MODE_HOMING = 6, CIA402_MODE_CSP = 8 };
 
 /* Bit of 0x6502 (supported drive modes) for a mode 1 ... 32. */
 #define CIA402_SUPPORTS(mode) (UINT32_C(1) << ((mode) - 1))

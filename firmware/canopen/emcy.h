@@ -78,8 +78,8 @@ void emcy_producer_clear(struct emcy_producer *producer, uint8_t bits);
 /* The client wrote 0 to 0x1003 sub 0 (CiA 301: other values are refused with SDO_ABORT_VALUE). */
 void emcy_producer_forget(struct emcy_producer *producer);
 
-/* Returns 1 when *out is to be sent, else 0. */
-int emcy_producer_process(struct emcy_producer *producer, struct can_msg *out);
+/* Returns true when *out is to be sent. */
+bool emcy_producer_process(struct emcy_producer *producer, struct can_msg *out);
 
 /* Consumer: node (1 ... 127) and content of an EMCY frame, or 0 when `in` is none. Pure, any
  * context. */

@@ -17,18 +17,18 @@ void heartbeat_producer_init(struct heartbeat_producer *producer, uint8_t node)
     producer->node = node;
 }
 
-int heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
-                               enum nmt_state state, uint32_t elapsed_us, struct can_msg *out)
+bool heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
+                                enum nmt_state state, uint32_t elapsed_us, struct can_msg *out)
 {
     uint32_t period_us = period_ms * US_PER_MS;
 
     if (period_us == 0 || state == NMT_INITIALISING) {
         producer->waited_us = 0;
-        return 0;
+        return false;
     }
     producer->waited_us = add_saturating(producer->waited_us, elapsed_us);
     if (producer->waited_us < period_us) {
-        return 0;
+        return false;
     }
     producer->waited_us -= period_us;
     if (producer->waited_us >= period_us) {
@@ -36,7 +36,7 @@ int heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t per
     }
     cob_frame(out, COB_HEARTBEAT + producer->node, 1);
     out->data[0] = (uint8_t)state;
-    return 1;
+    return true;
 }
 
 void heartbeat_consumer_init(struct heartbeat_consumer *consumer, uint8_t node, uint16_t time_ms)

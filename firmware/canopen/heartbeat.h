@@ -18,10 +18,10 @@ struct heartbeat_producer {
 void heartbeat_producer_init(struct heartbeat_producer *producer, uint8_t node);
 
 /* Lets time pass. `period_ms` is the present value of 0x1017, 0 switches off; nothing is sent in
- * INITIALISING. Returns 1 when *out is to be sent. Late calls give one frame, not several. Mainline
+ * INITIALISING. Returns true when *out is to be sent. Late calls give one frame, not several. Mainline
  * or timer, one of them. */
-int heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
-                               enum nmt_state state, uint32_t elapsed_us, struct can_msg *out);
+bool heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
+                                enum nmt_state state, uint32_t elapsed_us, struct can_msg *out);
 
 enum heartbeat_event {
     HEARTBEAT_NOTHING,

@@ -78,25 +78,25 @@ static void tell(struct nmt_slave *slave)
     }
 }
 
-int nmt_slave_process(struct nmt_slave *slave, struct can_msg *out)
+bool nmt_slave_process(struct nmt_slave *slave, struct can_msg *out)
 {
     tell(slave);
     if (slave->state != NMT_INITIALISING) {
-        return 0;
+        return false;
     }
     carry_out_reset(slave);
     cob_frame(out, COB_HEARTBEAT + slave->node, 1);
     slave->state = NMT_PRE_OPERATIONAL;
     tell(slave);
-    return 1;
+    return true;
 }
 
 void nmt_slave_error(struct nmt_slave *slave, uint8_t behaviour)
 {
-    if (behaviour == 0 && slave->state == NMT_OPERATIONAL) {
+    if (behaviour == (uint8_t)NMT_ERROR_PRE_OPERATIONAL && slave->state == NMT_OPERATIONAL) {
         slave->state = NMT_PRE_OPERATIONAL;
     }
-    if (behaviour == 2 && slave->state != NMT_INITIALISING) {
+    if (behaviour == (uint8_t)NMT_ERROR_STOPPED && slave->state != NMT_INITIALISING) {
         slave->state = NMT_STOPPED;
     }
 }

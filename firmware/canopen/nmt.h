@@ -25,6 +25,13 @@ enum nmt_command {
     NMT_RESET_COMMUNICATION = 0x82
 };
 
+/* Values of 0x1029 sub 1: what a communication error does. */
+enum nmt_error_behaviour {
+    NMT_ERROR_PRE_OPERATIONAL = 0, /* from OPERATIONAL */
+    NMT_ERROR_NO_CHANGE = 1,       /* other values as well */
+    NMT_ERROR_STOPPED = 2
+};
+
 /* All are called from nmt_slave_process; each may be NULL. */
 struct nmt_hooks {
     void (*reset_node)(void *context); /* all values back to power-on, then communication */
@@ -52,11 +59,11 @@ void nmt_slave_init(struct nmt_slave *slave, uint8_t node, const struct nmt_hook
 bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in);
 
 /* Carries out resets, tells hooks->changed, and, from INITIALISING, gives the boot-up frame and
- * enters PRE-OPERATIONAL. Returns 1 when *out is to be sent, else 0. Mainline. */
-int nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
+ * enters PRE-OPERATIONAL. Returns true when *out is to be sent. Mainline. */
+bool nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
 
-/* A communication error (heartbeat of the master lost, bus off): what 0x1029 sub 1 says. 0: from
- * OPERATIONAL to PRE-OPERATIONAL; 1: nothing; 2: to STOPPED; other values as 1. Mainline. */
+/* A communication error (heartbeat of the master lost, bus off): `behaviour` is the value of
+ * 0x1029 sub 1, enum nmt_error_behaviour. Mainline. */
 void nmt_slave_error(struct nmt_slave *slave, uint8_t behaviour);
 
 /* Which services a state permits (CiA 301, table 39). Pure. */

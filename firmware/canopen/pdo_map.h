@@ -33,12 +33,17 @@
 
 #include "can/can_frame.h"
 #include "canopen/od.h"
-#include "canopen/pdo_field.h"
 
 #define PDO_MAP_ENTRIES 8u
 
 /* Bit 31 of the COB-ID: the PDO does not exist. */
 #define PDO_MAP_OFF UINT32_C(0x80000000)
+
+/* A mapped object, without a search: where its value is in the od's storage. */
+struct pdo_field {
+    uint8_t *value;
+    uint8_t size; /* bytes: 1, 2, 4, 8 */
+};
 
 /* Read `valid`, `cob_id`, `type` and `length`; the rest is private. */
 struct pdo_map {
@@ -91,12 +96,12 @@ bool pdo_map_overdue(struct pdo_map *map, uint32_t elapsed_us);
  * sent begin anew (on leaving or entering OPERATIONAL). */
 void pdo_map_rest(struct pdo_map *map);
 
-/* Sent PDOs, at SYNC, fields up to date: returns 1 when *out is to be sent, else 0. */
-int pdo_map_sync(struct pdo_map *map, struct can_msg *out);
+/* Sent PDOs, at SYNC, fields up to date: returns true when *out is to be sent. */
+bool pdo_map_sync(struct pdo_map *map, struct can_msg *out);
 
 /* Sent PDOs of types 254 and 255: lets time pass; sends on change, within the inhibit time, and when
- * the event timer runs out. Fields up to date. Returns 1 when *out is to be sent. */
-int pdo_map_process(struct pdo_map *map, uint32_t elapsed_us, struct can_msg *out);
+ * the event timer runs out. Fields up to date. Returns true when *out is to be sent. */
+bool pdo_map_process(struct pdo_map *map, uint32_t elapsed_us, struct can_msg *out);
 
 /* Whether pdo_map_process could send: its fields are worth bringing up to date. */
 bool pdo_map_event_driven(const struct pdo_map *map);

@@ -5,10 +5,33 @@
 
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
-#include "canopen/sdo_client_private.h"
 
-#define ASK_DOWNLOAD 0x20u
-#define ASK_UPLOAD   0x40u
+#define SDO_BYTES       8u
+#define SEGMENT_BYTES   7u
+#define EXPEDITED_BYTES 4u
+
+/* Bits of first bytes. */
+#define TOGGLE       0x10u
+#define LAST_SEGMENT 0x01u
+#define SIZE_GIVEN   0x01u
+#define EXPEDITED    0x02u
+#define ABORT        0x80u
+
+/* First bytes of requests: command specifiers. */
+#define ASK_DOWNLOAD         0x20u
+#define ASK_DOWNLOAD_SEGMENT 0x00u
+#define ASK_UPLOAD           0x40u
+#define ASK_UPLOAD_SEGMENT   0x60u
+
+/* Command specifiers of answers, bits 5 ... 7. */
+#define SPECIFIER               0xE0u
+#define ANSWER_DOWNLOAD         0x60u
+#define ANSWER_DOWNLOAD_SEGMENT 0x20u
+#define ANSWER_UPLOAD           0x40u
+#define ANSWER_UPLOAD_SEGMENT   0x00u
+
+/* Read: more empty segments than this in a row end the transfer. */
+#define EMPTY_SEGMENTS_MAX 8u
 
 void sdo_client_init(struct sdo_client *client, uint32_t timeout_us)
 {
@@ -17,7 +40,8 @@ void sdo_client_init(struct sdo_client *client, uint32_t timeout_us)
     client->status = SDO_CLIENT_IDLE;
 }
 
-void sdo_client_ask(const struct sdo_client *client, uint8_t command, struct can_msg *out)
+/* An empty request with this first byte. */
+static void ask(const struct sdo_client *client, uint8_t command, struct can_msg *out)
 {
     cob_frame(out, COB_SDO_ASK + client->node, SDO_BYTES);
     out->data[0] = command;
@@ -25,7 +49,7 @@ void sdo_client_ask(const struct sdo_client *client, uint8_t command, struct can
 
 static void ask_about_object(const struct sdo_client *client, uint8_t command, struct can_msg *out)
 {
-    sdo_client_ask(client, command, out);
+    ask(client, command, out);
     cob_put(out->data + 1, client->index, 2);
     out->data[3] = client->sub;
 }
@@ -48,7 +72,7 @@ static int begin(struct sdo_client *client, uint8_t node, uint16_t index, uint8_
     client->moved = 0;
     client->toggle = 0;
     client->empty_segments = 0;
-    return 1;
+    return 0;
 }
 
 int sdo_client_write(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
@@ -70,7 +94,7 @@ int sdo_client_write(struct sdo_client *client, uint8_t node, uint16_t index, ui
     } else {
         cob_put(out->data + 4, size, 4);
     }
-    return 1;
+    return 0;
 }
 
 int sdo_client_read(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
@@ -86,7 +110,7 @@ int sdo_client_read(struct sdo_client *client, uint8_t node, uint16_t index, uin
     client->size = 0;
     client->step = SDO_CLIENT_UPLOAD;
     ask_about_object(client, ASK_UPLOAD, out);
-    return 1;
+    return 0;
 }
 
 int sdo_client_write_number(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
@@ -118,25 +142,171 @@ int64_t sdo_client_signed(const struct sdo_client *client)
     return cob_signed(sdo_client_unsigned(client), client->size);
 }
 
-int sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg *out)
+bool sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg *out)
 {
     if (client->status != SDO_CLIENT_BUSY) {
-        return 0;
+        return false;
     }
     client->status = SDO_CLIENT_FAILED;
     client->abort_code = code;
     ask_about_object(client, ABORT, out);
     cob_put(out->data + 4, code, 4);
-    return 1;
+    return true;
 }
 
-int sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct can_msg *out)
+bool sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct can_msg *out)
 {
     if (client->status != SDO_CLIENT_BUSY) {
-        return 0;
+        return false;
     }
     client->silence_us += elapsed_us < client->timeout_us ? elapsed_us : client->timeout_us;
-    return client->silence_us >= client->timeout_us
-               ? sdo_client_cancel(client, SDO_ABORT_TIMEOUT, out)
-               : 0;
+    return client->silence_us >= client->timeout_us &&
+           sdo_client_cancel(client, SDO_ABORT_TIMEOUT, out);
+}
+
+static bool done(struct sdo_client *client)
+{
+    client->status = SDO_CLIENT_DONE;
+    return false;
+}
+
+/* The next segment of a write, or the end of it. */
+static bool send_segment(struct sdo_client *client, struct can_msg *out)
+{
+    uint32_t left = client->size - client->moved;
+    uint32_t size = left < SEGMENT_BYTES ? left : SEGMENT_BYTES;
+
+    if (left == 0) {
+        return done(client);
+    }
+    ask(client,
+        (uint8_t)(ASK_DOWNLOAD_SEGMENT | client->toggle | ((SEGMENT_BYTES - size) << 1) |
+                  (size == left ? LAST_SEGMENT : 0u)),
+        out);
+    memcpy(out->data + 1, client->source + client->moved, size);
+    client->moved += size;
+    client->step = SDO_CLIENT_DOWNLOAD_SEGMENT;
+    return true;
+}
+
+static bool ask_segment(struct sdo_client *client, struct can_msg *out)
+{
+    client->step = SDO_CLIENT_UPLOAD_SEGMENT;
+    ask(client, (uint8_t)(ASK_UPLOAD_SEGMENT | client->toggle), out);
+    return true;
+}
+
+static bool take(struct sdo_client *client, const uint8_t *data, uint32_t size, struct can_msg *out)
+{
+    if (size > client->capacity - client->moved) {
+        return sdo_client_cancel(client, SDO_ABORT_MEMORY, out);
+    }
+    memcpy(client->target + client->moved, data, size);
+    client->moved += size;
+    client->size = client->moved;
+    return false;
+}
+
+static bool answer_upload(struct sdo_client *client, const uint8_t *data, struct can_msg *out)
+{
+    if ((data[0] & EXPEDITED) == 0) {
+        return ask_segment(client, out);
+    }
+    uint32_t unused = (data[0] & SIZE_GIVEN) != 0 ? (data[0] >> 2) & 3u : 0;
+    return take(client, data + 4, EXPEDITED_BYTES - unused, out) || done(client);
+}
+
+static bool answer_upload_segment(struct sdo_client *client, const uint8_t *data,
+                                  struct can_msg *out)
+{
+    const uint32_t size = SEGMENT_BYTES - ((data[0] >> 1) & 7u);
+
+    if (take(client, data + 1, size, out)) {
+        return true;
+    }
+    if ((data[0] & LAST_SEGMENT) != 0) {
+        return client->size == 0 ? sdo_client_cancel(client, SDO_ABORT_NO_DATA, out) : done(client);
+    }
+    client->empty_segments = size == 0u ? (uint8_t)(client->empty_segments + 1u) : 0u;
+    if (client->empty_segments > EMPTY_SEGMENTS_MAX) {
+        return sdo_client_cancel(client, SDO_ABORT_NO_DATA, out);
+    }
+    client->toggle ^= TOGGLE;
+    return ask_segment(client, out);
+}
+
+static bool is_about_object(const struct sdo_client *client, const uint8_t *data)
+{
+    return cob_get(data + 1, 2) == client->index && data[3] == client->sub;
+}
+
+static uint8_t specifier_due(enum sdo_client_step step)
+{
+    switch (step) {
+    case SDO_CLIENT_DOWNLOAD:
+        return ANSWER_DOWNLOAD;
+    case SDO_CLIENT_DOWNLOAD_SEGMENT:
+        return ANSWER_DOWNLOAD_SEGMENT;
+    case SDO_CLIENT_UPLOAD:
+        return ANSWER_UPLOAD;
+    default:
+        return ANSWER_UPLOAD_SEGMENT;
+    }
+}
+
+/* An abort code when `data` is not the answer that is due. */
+static uint32_t check(const struct sdo_client *client, const uint8_t *data)
+{
+    const bool segment =
+        client->step == SDO_CLIENT_DOWNLOAD_SEGMENT || client->step == SDO_CLIENT_UPLOAD_SEGMENT;
+
+    if ((data[0] & SPECIFIER) != specifier_due(client->step)) {
+        return SDO_ABORT_COMMAND;
+    }
+    return !segment || (data[0] & TOGGLE) == client->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
+}
+
+/* Late words about an earlier transfer. Aborts of object 0 come from servers that do not know it.
+ */
+static bool is_stale(const struct sdo_client *client, const uint8_t *data)
+{
+    bool names_object = client->step == SDO_CLIENT_DOWNLOAD || client->step == SDO_CLIENT_UPLOAD;
+
+    if (data[0] == ABORT) {
+        return !is_about_object(client, data) && cob_get(data + 1, 2) != 0;
+    }
+    return names_object && !is_about_object(client, data);
+}
+
+static bool go_on(struct sdo_client *client, const uint8_t *data, struct can_msg *out)
+{
+    switch (client->step) {
+    case SDO_CLIENT_UPLOAD:
+        return answer_upload(client, data, out);
+    case SDO_CLIENT_UPLOAD_SEGMENT:
+        return answer_upload_segment(client, data, out);
+    case SDO_CLIENT_DOWNLOAD_SEGMENT:
+        client->toggle ^= TOGGLE;
+        return send_segment(client, out);
+    default:
+        return send_segment(client, out);
+    }
+}
+
+bool sdo_client_receive(struct sdo_client *client, const struct can_msg *in, struct can_msg *out)
+{
+    uint32_t code;
+
+    if (client->status != SDO_CLIENT_BUSY || in->id != COB_SDO_ANSWER + client->node ||
+        in->len != SDO_BYTES || is_stale(client, in->data)) {
+        return false;
+    }
+    if (in->data[0] == ABORT) {
+        client->status = SDO_CLIENT_REFUSED;
+        client->abort_code = (uint32_t)cob_get(in->data + 4, 4);
+        return false;
+    }
+    client->silence_us = 0;
+    code = check(client, in->data);
+    return code != SDO_OK ? sdo_client_cancel(client, code, out) : go_on(client, in->data, out);
 }

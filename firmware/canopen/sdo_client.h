@@ -57,7 +57,7 @@ struct sdo_client {
 
 void sdo_client_init(struct sdo_client *client, uint32_t timeout_us);
 
-/* Begin a transfer: fill *out with the request and return 1 (send it), or a negative error with
+/* Begin a transfer: fill *out with the request, which is to be sent, and return 0; or a negative error with
  * nothing changed: a transfer is under way, node not 1 ... 127, size 0. `data` and `buffer` must
  * stay until status is not BUSY. */
 int sdo_client_write(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
@@ -76,15 +76,15 @@ int sdo_client_read_number(struct sdo_client *client, uint8_t node, uint16_t ind
 uint64_t sdo_client_unsigned(const struct sdo_client *client);
 int64_t sdo_client_signed(const struct sdo_client *client);
 
-/* Takes a frame; others, and late answers about another object, are ignored. Returns 1 when *out is
- * to be sent, else 0. */
-int sdo_client_receive(struct sdo_client *client, const struct can_msg *in, struct can_msg *out);
+/* Takes a frame; others, and late answers about another object, are ignored. Returns true when *out is
+ * to be sent. */
+bool sdo_client_receive(struct sdo_client *client, const struct can_msg *in, struct can_msg *out);
 
-/* Lets time pass. Returns 1 when *out (an abort after a timeout) is to be sent, else 0. */
-int sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct can_msg *out);
+/* Lets time pass. Returns true when *out (an abort after a timeout) is to be sent. */
+bool sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct can_msg *out);
 
-/* Gives the transfer up: status FAILED with `code`. Returns 1 when *out (the abort) is to be sent;
- * 0 when there was none. */
-int sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg *out);
+/* Gives the transfer up: status FAILED with `code`. Returns true when *out (the abort) is to be sent;
+ * false when there was none. */
+bool sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg *out);
 
 #endif

@@ -2,11 +2,15 @@
 #include "canopen/sdo_server.h"
 
 #include <assert.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
-#include "canopen/sdo_server_private.h"
+
+#define SDO_BYTES       8u
+#define SEGMENT_BYTES   7u
+#define EXPEDITED_BYTES 4u
 
 /* Command specifiers of a client, bits 5 ... 7 of the first byte. */
 enum client_command {
@@ -19,17 +23,437 @@ enum client_command {
     CLIENT_BLOCK_DOWNLOAD = 6
 };
 
-/* Within CLIENT_BLOCK_...: initiate has these bits 0. */
-#define BLOCK_UPLOAD_SUBCOMMAND   0x03u
-#define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
+/* First bytes: bits of segments. */
+#define TOGGLE        0x10u
+#define LAST_SEGMENT  0x01u /* segmented transfer */
+#define LAST_IN_BLOCK 0x80u
 
-#define EXPEDITED_BYTE 0x2Fu /* initiate download: expedited, one byte */
+/* First bytes of the client: bits within a command. Those of a subcommand are 0 where a block transfer is initiated. */
+#define ASK_EXPEDITED             0x02u
+#define ASK_SIZE_GIVEN            0x01u
+#define EXPEDITED_BYTE            0x2Fu /* initiate download: expedited, one byte */
+#define CRC_SUPPORTED             0x04u
+#define ASK_BLOCK_SIZE_GIVEN      0x02u
+#define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
+#define ASK_DOWNLOAD_END          0x01u
+#define BLOCK_UPLOAD_SUBCOMMAND   0x03u
+#define ASK_UPLOAD_END            0x01u
+#define ASK_UPLOAD_ACKNOWLEDGE    0x02u
+#define ASK_UPLOAD_START          0x03u
+
+/* First bytes of the server. */
+#define ABORT_BYTE                0x80u
+#define DOWNLOADED_BYTE           0x60u /* answer to an initiated, or expedited, download */
+#define ANSWER_DOWNLOAD_SEGMENT   0x20u
+#define ANSWER_UPLOAD_EXPEDITED   0x43u /* size given */
+#define ANSWER_UPLOAD_SIZE        0x41u
+#define ANSWER_BLOCK_DOWNLOAD     0xA0u
+#define ANSWER_BLOCK_RECEIVED     0xA2u
+#define ANSWER_BLOCK_DOWNLOAD_END 0xA1u
+#define ANSWER_BLOCK_UPLOAD       0xC2u /* size given */
+#define ANSWER_BLOCK_UPLOAD_END   0xC1u
+
+#define CRC_POLYNOMIAL 0x1021u
+
+/* Functions that give a frame return true when *out is to be sent; those that return uint32_t give an abort code. */
+
+/* Tells the hooks and becomes idle. */
+static void drop(struct sdo_server *s)
+{
+    od_transfer_drop(&s->object);
+    s->state = SDO_SERVER_IDLE;
+}
+
+static uint32_t begin_write(struct sdo_server *s, uint32_t announced)
+{
+    return od_transfer_begin_write(&s->object, s->index, s->sub, announced);
+}
+
+static uint32_t begin_read(struct sdo_server *s)
+{
+    return od_transfer_begin_read(&s->object, s->index, s->sub);
+}
+
+static void frame(const struct sdo_server *s, uint8_t command, struct can_msg *out)
+{
+    cob_frame(out, COB_SDO_ANSWER + s->node, SDO_BYTES);
+    out->data[0] = command;
+}
+
+static void frame_with_object(const struct sdo_server *s, uint8_t command, struct can_msg *out)
+{
+    frame(s, command, out);
+    cob_put(out->data + 1, s->index, 2);
+    out->data[3] = s->sub;
+}
+
+/* Drops the transfer: *out is the abort. */
+static bool fail(struct sdo_server *s, uint32_t code, struct can_msg *out)
+{
+    drop(s);
+    frame_with_object(s, ABORT_BYTE, out);
+    cob_put(out->data + 4, code, 4);
+    return true;
+}
+
+/* ---- Expedited and segmented ---- */
+
+static uint32_t download_expedited(struct sdo_server *s, const uint8_t *data)
+{
+    uint32_t size = EXPEDITED_BYTES - ((data[0] >> 2) & 3u);
+    uint32_t code = begin_write(s, 0);
+
+    if (code != SDO_OK) {
+        return code;
+    }
+    if ((data[0] & ASK_SIZE_GIVEN) == 0) {
+        /* The client leaves it to the dictionary how many of the four bytes count. */
+        size = s->object.entry->size > 0 && s->object.entry->size < EXPEDITED_BYTES
+                   ? s->object.entry->size
+                   : EXPEDITED_BYTES;
+    }
+    code = od_transfer_put(&s->object, data + 4, size);
+    return code != SDO_OK ? code : od_transfer_finish_write(&s->object);
+}
+
+static bool download_initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    bool expedited = (data[0] & ASK_EXPEDITED) != 0;
+    uint32_t code;
+
+    if (expedited) {
+        code = download_expedited(s, data);
+    } else {
+        code = begin_write(s, (data[0] & ASK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0);
+    }
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    s->state = expedited ? SDO_SERVER_IDLE : SDO_SERVER_DOWNLOAD;
+    frame_with_object(s, DOWNLOADED_BYTE, out);
+    return true;
+}
+
+static bool download_segment(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint32_t size = SEGMENT_BYTES - ((data[0] >> 1) & 7u);
+    bool last = (data[0] & LAST_SEGMENT) != 0;
+    uint32_t code = (data[0] & TOGGLE) == s->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
+
+    if (code == SDO_OK) {
+        code = od_transfer_put(&s->object, data + 1, size);
+    }
+    if (code == SDO_OK && last) {
+        code = od_transfer_finish_write(&s->object);
+    }
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    frame(s, (uint8_t)(ANSWER_DOWNLOAD_SEGMENT | s->toggle), out);
+    s->toggle ^= TOGGLE;
+    if (last) {
+        s->state = SDO_SERVER_IDLE;
+    }
+    return true;
+}
+
+static bool upload_initiate(struct sdo_server *s, struct can_msg *out)
+{
+    uint32_t code = begin_read(s);
+    bool expedited = s->object.size > 0 && s->object.size <= EXPEDITED_BYTES;
+
+    frame_with_object(s, ANSWER_UPLOAD_SIZE, out);
+    if (code == SDO_OK && expedited) {
+        out->data[0] =
+            (uint8_t)(ANSWER_UPLOAD_EXPEDITED | ((EXPEDITED_BYTES - s->object.size) << 2));
+        code = od_transfer_get(&s->object, 0, out->data + 4, s->object.size);
+    } else {
+        cob_put(out->data + 4, s->object.size, 4);
+    }
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    s->state = expedited ? SDO_SERVER_IDLE : SDO_SERVER_UPLOAD;
+    return true;
+}
+
+static bool upload_segment(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint32_t left = s->object.size - s->object.moved;
+    uint32_t size = left < SEGMENT_BYTES ? left : SEGMENT_BYTES;
+    uint32_t code = (data[0] & TOGGLE) == s->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
+
+    frame(s, (uint8_t)(s->toggle | ((SEGMENT_BYTES - size) << 1)), out);
+    if (code == SDO_OK) {
+        code = od_transfer_get(&s->object, s->object.moved, out->data + 1, size);
+    }
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    s->object.moved += size;
+    s->toggle ^= TOGGLE;
+    if (size == left) {
+        out->data[0] |= LAST_SEGMENT;
+        s->state = SDO_SERVER_IDLE;
+    }
+    return true;
+}
+
+/* ---- Block download ---- */
+
+static uint16_t crc_byte(uint16_t crc, uint8_t byte)
+{
+    uint32_t shifted = (uint32_t)crc ^ ((uint32_t)byte << 8);
+
+    for (int bit = 0; bit < 8; bit++) {
+        shifted <<= 1;
+        if ((shifted & 0x10000u) != 0) {
+            shifted ^= 0x10000u | CRC_POLYNOMIAL;
+        }
+    }
+    return (uint16_t)shifted;
+}
+
+uint16_t sdo_block_crc(uint16_t crc, const uint8_t *data, uint32_t size)
+{
+    for (uint32_t i = 0; i < size; i++) {
+        crc = crc_byte(crc, data[i]);
+    }
+    return crc;
+}
+
+static bool block_download_initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint32_t size = (data[0] & ASK_BLOCK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0;
+    uint32_t code = begin_write(s, size);
+
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    s->state = SDO_SERVER_BLOCK_DOWNLOAD;
+    s->use_crc = (data[0] & CRC_SUPPORTED) != 0;
+    s->crc = 0;
+    s->held = 0;
+    s->heard = 0;
+    s->sequence = 0;
+    s->block_limit = s->block_size;
+    s->acknowledged_early = false;
+    frame_with_object(s, ANSWER_BLOCK_DOWNLOAD | CRC_SUPPORTED, out);
+    out->data[4] = s->block_size;
+    return true;
+}
+
+/* Gives the held segment's first `size` bytes to the object. */
+static uint32_t release_held(struct sdo_server *s, uint32_t size)
+{
+    if (s->held == 0) {
+        return SDO_OK;
+    }
+    s->held = 0;
+    s->crc = sdo_block_crc(s->crc, s->last, size);
+    return od_transfer_put(&s->object, s->last, size);
+}
+
+static bool block_download_acknowledge(struct sdo_server *s, struct can_msg *out)
+{
+    frame(s, ANSWER_BLOCK_RECEIVED, out);
+    out->data[1] = s->sequence;
+    out->data[2] = s->block_size;
+    s->sequence = 0;
+    s->block_limit = s->block_size;
+    return true;
+}
+
+static bool block_download_segment(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
+    bool last = (data[0] & LAST_IN_BLOCK) != 0;
+    bool in_order = sequence == s->sequence + 1;
+    bool block_ends = last || sequence == s->block_limit;
+
+    if (sequence != 0 && sequence == s->sequence) {
+        /* Doubled on the bus, or one of the two is somebody else's. */
+        return memcmp(s->last, data + 1, SEGMENT_BYTES) != 0 && fail(s, SDO_ABORT_SEQUENCE, out);
+    }
+    s->heard = block_ends ? 0 : sequence;
+    if (sequence == 0 || sequence > s->block_limit) {
+        return fail(s, SDO_ABORT_SEQUENCE, out);
+    }
+    if (in_order) {
+        uint32_t code = release_held(s, SEGMENT_BYTES);
+        if (code != SDO_OK) {
+            return fail(s, code, out);
+        }
+        memcpy(s->last, data + 1, SEGMENT_BYTES);
+        s->held = SEGMENT_BYTES;
+        s->sequence = sequence;
+        s->acknowledged_early = false;
+    }
+    if (!block_ends) {
+        return false;
+    }
+    if (!in_order && s->acknowledged_early) {
+        return false; /* the rest of a block that paused: it has its answer */
+    }
+    if (in_order && last) {
+        s->state = SDO_SERVER_BLOCK_DOWNLOAD_END;
+    }
+    return block_download_acknowledge(s, out);
+}
+
+/* While idle: true for each segment that is left of a block whose transfer the server broke off. */
+static bool block_download_straggler(struct sdo_server *s, const uint8_t *data)
+{
+    uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
+    bool straggler = s->heard != 0 && sequence == s->heard + 1;
+    bool more = straggler && sequence == data[0];
+
+    s->heard = more ? sequence : 0;
+    return straggler;
+}
+
+static bool block_download_end(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint32_t unused = (data[0] >> 2) & 7u;
+    uint32_t code = (data[0] & ASK_DOWNLOAD_END) != 0 ? SDO_OK : SDO_ABORT_COMMAND;
+
+    if (code == SDO_OK) {
+        code = release_held(s, SEGMENT_BYTES - unused);
+    }
+    if (code == SDO_OK && s->use_crc && cob_get(data + 1, 2) != s->crc) {
+        code = SDO_ABORT_CRC;
+    }
+    if (code == SDO_OK) {
+        code = od_transfer_finish_write(&s->object);
+    }
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    s->state = SDO_SERVER_IDLE;
+    frame(s, ANSWER_BLOCK_DOWNLOAD_END, out);
+    return true;
+}
+
+/* ---- Block upload ---- */
+
+static bool block_size_is_valid(uint8_t segments)
+{
+    return segments >= 1 && segments <= SDO_BLOCK_SEGMENTS_MAX;
+}
+
+static bool block_upload_initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint32_t code = begin_read(s);
+
+    if (code == SDO_OK && !block_size_is_valid(data[4])) {
+        code = SDO_ABORT_BLOCK_SIZE;
+    }
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    s->state = SDO_SERVER_BLOCK_UPLOAD_READY;
+    s->use_crc = (data[0] & CRC_SUPPORTED) != 0;
+    s->crc = 0;
+    s->sequence = 0;
+    s->block_start = 0;
+    s->block_limit = data[4];
+    frame_with_object(s, ANSWER_BLOCK_UPLOAD | CRC_SUPPORTED, out);
+    cob_put(out->data + 4, s->object.size, 4);
+    return true;
+}
+
+/* Repeated segments count once: `moved` says how far the CRC has come. */
+static void add_to_crc(struct sdo_server *s, uint32_t offset, const uint8_t *data, uint32_t size)
+{
+    if (offset == s->object.moved) {
+        s->crc = sdo_block_crc(s->crc, data, size);
+        s->object.moved += size;
+    }
+}
+
+static bool block_upload_send(struct sdo_server *s, struct can_msg *out)
+{
+    uint32_t offset = s->block_start + s->sequence * SEGMENT_BYTES;
+    uint32_t left = s->object.size - offset;
+    uint32_t size = left < SEGMENT_BYTES ? left : SEGMENT_BYTES;
+    uint32_t code;
+
+    s->sequence++;
+    frame(s, s->sequence, out);
+    code = od_transfer_get(&s->object, offset, out->data + 1, size);
+    if (code != SDO_OK) {
+        return fail(s, code, out);
+    }
+    add_to_crc(s, offset, out->data + 1, size);
+    if (size == left) {
+        out->data[0] |= LAST_IN_BLOCK;
+    }
+    if (size == left || s->sequence == s->block_limit) {
+        s->state = SDO_SERVER_BLOCK_UPLOAD_ACK;
+    }
+    return true;
+}
+
+static bool block_upload_end(struct sdo_server *s, struct can_msg *out)
+{
+    uint32_t in_last = s->object.size % SEGMENT_BYTES;
+    uint32_t unused = in_last == 0 && s->object.size > 0 ? 0 : SEGMENT_BYTES - in_last;
+
+    s->state = SDO_SERVER_BLOCK_UPLOAD_END;
+    frame(s, (uint8_t)(ANSWER_BLOCK_UPLOAD_END | (unused << 2)), out);
+    cob_put(out->data + 1, s->use_crc ? s->crc : 0, 2);
+    return true;
+}
+
+static bool block_upload_acknowledged(struct sdo_server *s, const uint8_t *data,
+                                      struct can_msg *out)
+{
+    uint8_t good = data[1];
+
+    if (good > s->sequence) {
+        return fail(s, SDO_ABORT_SEQUENCE, out);
+    }
+    if (!block_size_is_valid(data[2])) {
+        return fail(s, SDO_ABORT_BLOCK_SIZE, out);
+    }
+    if (good == s->sequence && s->object.moved == s->object.size &&
+        s->object.size - s->block_start <= good * SEGMENT_BYTES) {
+        return block_upload_end(s, out);
+    }
+    s->block_start += good * SEGMENT_BYTES;
+    s->block_limit = data[2];
+    s->sequence = 0;
+    s->state = SDO_SERVER_BLOCK_UPLOAD;
+    return block_upload_send(s, out);
+}
+
+static bool block_upload_command(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+{
+    uint8_t subcommand = data[0] & BLOCK_UPLOAD_SUBCOMMAND;
+
+    if (s->state == SDO_SERVER_BLOCK_UPLOAD_READY && subcommand == ASK_UPLOAD_START) {
+        s->state = SDO_SERVER_BLOCK_UPLOAD;
+        return block_upload_send(s, out);
+    }
+    /* A client that sees a gap may answer before the block is complete. */
+    if ((s->state == SDO_SERVER_BLOCK_UPLOAD_ACK || s->state == SDO_SERVER_BLOCK_UPLOAD) &&
+        subcommand == ASK_UPLOAD_ACKNOWLEDGE) {
+        return block_upload_acknowledged(s, data, out);
+    }
+    if (s->state == SDO_SERVER_BLOCK_UPLOAD_END && subcommand == ASK_UPLOAD_END) {
+        s->state = SDO_SERVER_IDLE;
+        return false;
+    }
+    return fail(s, SDO_ABORT_COMMAND, out);
+}
+
+/* ---- Requests, and who may make them ---- */
 
 void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uint32_t timeout_us,
                      uint8_t block_segments)
 {
     memset(server, 0, sizeof *server);
-    server->od = od;
+    od_transfer_init(&server->object, od);
     server->node = node;
     server->timeout_us = timeout_us;
     assert(block_segments >= 1 && block_segments <= SDO_BLOCK_SEGMENTS_MAX);
@@ -39,7 +463,7 @@ void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uin
 
 void sdo_server_reset(struct sdo_server *server)
 {
-    sdo_server_drop(server);
+    drop(server);
 }
 
 bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
@@ -50,7 +474,7 @@ bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
 /* Forgets a transfer under way and notes the object of the new one. */
 static void begin(struct sdo_server *s, const uint8_t *data)
 {
-    sdo_server_drop(s);
+    drop(s);
     s->index = (uint16_t)cob_get(data + 1, 2);
     s->sub = data[3];
     s->toggle = 0;
@@ -71,45 +495,45 @@ static bool is_initiate(const uint8_t *data)
     }
 }
 
-static int initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+static bool initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
     begin(s, data);
     switch (data[0] >> 5) {
     case CLIENT_DOWNLOAD:
-        return sdo_server_download_initiate(s, data, out);
+        return download_initiate(s, data, out);
     case CLIENT_UPLOAD:
-        return sdo_server_upload_initiate(s, out);
+        return upload_initiate(s, out);
     case CLIENT_BLOCK_UPLOAD:
-        return sdo_server_block_upload_initiate(s, data, out);
+        return block_upload_initiate(s, data, out);
     default:
-        return sdo_server_block_download_initiate(s, data, out);
+        return block_download_initiate(s, data, out);
     }
 }
 
-static int go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+static bool go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
     uint8_t command = data[0] >> 5;
 
     switch (s->state) {
     case SDO_SERVER_DOWNLOAD:
-        return command == CLIENT_DOWNLOAD_SEGMENT ? sdo_server_download_segment(s, data, out)
-                                                  : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+        return command == CLIENT_DOWNLOAD_SEGMENT ? download_segment(s, data, out)
+                                                  : fail(s, SDO_ABORT_COMMAND, out);
     case SDO_SERVER_UPLOAD:
-        return command == CLIENT_UPLOAD_SEGMENT ? sdo_server_upload_segment(s, data, out)
-                                                : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+        return command == CLIENT_UPLOAD_SEGMENT ? upload_segment(s, data, out)
+                                                : fail(s, SDO_ABORT_COMMAND, out);
     case SDO_SERVER_BLOCK_DOWNLOAD_END:
-        return command == CLIENT_BLOCK_DOWNLOAD ? sdo_server_block_download_end(s, data, out)
-                                                : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+        return command == CLIENT_BLOCK_DOWNLOAD ? block_download_end(s, data, out)
+                                                : fail(s, SDO_ABORT_COMMAND, out);
     case SDO_SERVER_BLOCK_UPLOAD_READY:
     case SDO_SERVER_BLOCK_UPLOAD:
     case SDO_SERVER_BLOCK_UPLOAD_ACK:
     case SDO_SERVER_BLOCK_UPLOAD_END:
-        return command == CLIENT_BLOCK_UPLOAD ? sdo_server_block_upload_command(s, data, out)
-                                              : sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+        return command == CLIENT_BLOCK_UPLOAD ? block_upload_command(s, data, out)
+                                              : fail(s, SDO_ABORT_COMMAND, out);
     default:
         s->index = 0;
         s->sub = 0;
-        return sdo_server_fail(s, SDO_ABORT_COMMAND, out);
+        return fail(s, SDO_ABORT_COMMAND, out);
     }
 }
 
@@ -120,14 +544,14 @@ static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
     const bool expedited = (first & 0xF3u) == 0x23u || first == 0x22u;
     const bool known = expedited || first == 0x20u || first == 0x21u || first == 0x40u ||
                        first == 0xA0u || first == 0xA4u || (first & 0xF9u) == 0xC0u;
-    return known && od_find(s->od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
+    return known && od_find(s->object.od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
 }
 
 /* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if its
  * bytes are those of a request.) */
 static bool is_strange(const struct sdo_server *s, const uint8_t *data)
 {
-    const uint8_t sequence = data[0] & (uint8_t)~SDO_LAST_IN_BLOCK;
+    const uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
     const bool doubled = sequence == s->sequence && sequence != 0u;
     const bool next = sequence == s->heard + 1u || sequence == s->heard + 2u; /* one may be lost */
     return !next && !doubled && is_sound_initiate(s, data);
@@ -141,7 +565,7 @@ static bool same_object(const struct sdo_server *s, const uint8_t *data)
 /* The client of this transfer has lost the answer to its first request. */
 static bool begins_again(const struct sdo_server *s, const uint8_t *data)
 {
-    return same_object(s, data) && s->moved == 0 && s->held == 0;
+    return same_object(s, data) && s->object.moved == 0 && s->held == 0;
 }
 
 /* The same within a block, where a segment may look like it. */
@@ -150,35 +574,35 @@ static bool restarts(const struct sdo_server *s, const uint8_t *data)
     return begins_again(s, data) && is_strange(s, data);
 }
 
-static int refuse_stranger(const struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+static bool refuse_stranger(const struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
-    sdo_server_frame(s, SDO_ABORT_COMMAND_BYTE, out);
+    frame(s, ABORT_BYTE, out);
     memcpy(out->data + 1, data + 1, 3);
     cob_put(out->data + 4, SDO_ABORT_LOCAL, 4);
-    return 1;
+    return true;
 }
 
 /* The entry of a write that waits for nobody; NULL: it is another frame. */
 static const struct od_entry *urgent_entry(const struct sdo_server *s, const uint8_t *data)
 {
     const bool whole = data[5] == 0u && data[6] == 0u && data[7] == 0u;
-    if (s->od->hooks->urgent == NULL || data[0] != EXPEDITED_BYTE || !whole) {
+    if (s->object.od->hooks->urgent == NULL || data[0] != EXPEDITED_BYTE || !whole) {
         return NULL;
     }
-    const struct od_entry *entry = od_find(s->od, (uint16_t)cob_get(data + 1, 2), data[3]);
+    const struct od_entry *entry = od_find(s->object.od, (uint16_t)cob_get(data + 1, 2), data[3]);
     const bool taken = entry != NULL && entry->size == 1u && (entry->access & OD_WRITE) != 0u;
-    return taken && s->od->hooks->urgent(entry, data[4]) ? entry : NULL;
+    return taken && s->object.od->hooks->urgent(entry, data[4]) ? entry : NULL;
 }
 
 /* Beside the transfer under way, which is not touched. */
-static int write_beside(const struct sdo_server *s, const struct od_entry *entry,
-                        const uint8_t *data, struct can_msg *out)
+static bool write_beside(const struct sdo_server *s, const struct od_entry *entry,
+                         const uint8_t *data, struct can_msg *out)
 {
-    const uint32_t code = od_write(s->od, entry, data + 4, 1);
-    sdo_server_frame(s, code == SDO_OK ? SDO_DOWNLOADED_BYTE : SDO_ABORT_COMMAND_BYTE, out);
+    const uint32_t code = od_write(s->object.od, entry, data + 4, 1);
+    frame(s, code == SDO_OK ? DOWNLOADED_BYTE : ABORT_BYTE, out);
     memcpy(out->data + 1, data + 1, 3);
     cob_put(out->data + 4, code, 4);
-    return 1;
+    return true;
 }
 
 static bool from_stranger(const struct sdo_server *s, const uint8_t *data)
@@ -186,7 +610,7 @@ static bool from_stranger(const struct sdo_server *s, const uint8_t *data)
     if (s->state == SDO_SERVER_IDLE || begins_again(s, data)) {
         return false;
     }
-    if (data[0] == SDO_ABORT_COMMAND_BYTE) {
+    if (data[0] == ABORT_BYTE) {
         return false;
     }
     return s->state == SDO_SERVER_BLOCK_DOWNLOAD ? is_strange(s, data) : is_initiate(data);
@@ -197,15 +621,15 @@ static void take_abort(struct sdo_server *s, const uint8_t *data)
 {
     const bool named = cob_get(data + 1, 2) != 0u;
     if (s->state == SDO_SERVER_IDLE || !named || same_object(s, data)) {
-        sdo_server_drop(s);
+        drop(s);
         s->heard = 0;
     }
 }
 
-int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out)
+bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out)
 {
     if (!sdo_server_wants(server, in)) {
-        return 0;
+        return false;
     }
     const struct od_entry *urgent =
         server->state == SDO_SERVER_IDLE ? NULL : urgent_entry(server, in->data);
@@ -217,15 +641,15 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
     }
     server->silence_us = 0;
     /* A whole byte: within a block, 0x81 ... 0xFF are last segments. */
-    if (in->data[0] == SDO_ABORT_COMMAND_BYTE) {
+    if (in->data[0] == ABORT_BYTE) {
         take_abort(server, in->data);
-        return 0;
+        return false;
     }
     if (server->state == SDO_SERVER_BLOCK_DOWNLOAD && !restarts(server, in->data)) {
-        return sdo_server_block_download_segment(server, in->data, out);
+        return block_download_segment(server, in->data, out);
     }
-    if (server->state == SDO_SERVER_IDLE && sdo_server_block_download_straggler(server, in->data)) {
-        return 0;
+    if (server->state == SDO_SERVER_IDLE && block_download_straggler(server, in->data)) {
+        return false;
     }
     if (is_initiate(in->data)) {
         return initiate(server, in->data, out);
@@ -235,30 +659,30 @@ int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, stru
 
 /* A block whose last segment was lost is answered before the client gives up, once. Not when no
  * segment of it has come: a client that only paused would then send the whole block twice. */
-static int acknowledge_early(struct sdo_server *s, struct can_msg *out)
+static bool acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
     const bool begun = s->sequence != 0 || (s->heard != 0 && !s->acknowledged_early);
 
     if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || !begun || s->silence_us < s->timeout_us / 2) {
-        return 0;
+        return false;
     }
     s->acknowledged_early = true;
-    return sdo_server_block_download_acknowledge(s, out);
+    return block_download_acknowledge(s, out);
 }
 
-int sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out)
+bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out)
 {
     if (server->state == SDO_SERVER_IDLE) {
-        return 0;
+        return false;
     }
     if (server->state == SDO_SERVER_BLOCK_UPLOAD) {
         server->silence_us = 0; /* it is the server that talks */
-        return sdo_server_block_upload_send(server, out);
+        return block_upload_send(server, out);
     }
     server->silence_us =
         elapsed_us > UINT32_MAX - server->silence_us ? UINT32_MAX : server->silence_us + elapsed_us;
     if (server->silence_us >= server->timeout_us) {
-        return sdo_server_fail(server, SDO_ABORT_TIMEOUT, out);
+        return fail(server, SDO_ABORT_TIMEOUT, out);
     }
     return acknowledge_early(server, out);
 }

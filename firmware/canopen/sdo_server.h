@@ -2,9 +2,7 @@
 /* sdo_server: gives an object dictionary to one SDO client (CiA 301, 7.2.4).
  *
  * Download (client writes): expedited, segmented, block with CRC and retransmission. Upload (client
- * reads): expedited, segmented, block. Values other than DOMAIN are collected first and written in
- * one piece at the end, so an aborted transfer changes nothing; DOMAIN data goes to the od hooks as
- * it comes.
+ * reads): expedited, segmented, block. How the bytes come to the object and from it: canopen/od_transfer.h.
  *
  * One transfer at a time, of one client. While it is under way an initiate request is refused with SDO_ABORT_LOCAL and
  * its own object, and the transfer goes on: it comes from somebody else. Only a client that has moved nothing yet may
@@ -37,11 +35,9 @@
 #include <stdint.h>
 
 #include "can/can_frame.h"
-#include "canopen/od.h"
+#include "canopen/od_transfer.h"
 
 #define SDO_BLOCK_SEGMENTS_MAX 127u
-/* Longest value that is not a DOMAIN, in bytes. */
-#define SDO_VALUE_MAX 64u
 
 enum sdo_server_state {
     SDO_SERVER_IDLE,
@@ -56,13 +52,10 @@ enum sdo_server_state {
 };
 
 struct sdo_server {
-    struct od *od;
-    const struct od_entry *entry; /* of the transfer under way */
+    struct od_transfer object; /* of the transfer under way */
     enum sdo_server_state state;
     uint32_t timeout_us;
     uint32_t silence_us;  /* since the last frame of this transfer */
-    uint32_t announced;   /* size said by the client, 0: none; upload: size of the whole */
-    uint32_t moved;       /* bytes given to, or taken from, the object so far */
     uint32_t block_start; /* block upload: offset of the present block's first segment */
     uint16_t index;       /* of the transfer, for abort frames */
     uint16_t crc;
@@ -75,10 +68,8 @@ struct sdo_server {
     uint8_t held;        /* block download: bytes in `last` */
     uint8_t heard;       /* newest segment of a block that goes on or was broken off; else 0 */
     bool use_crc;
-    bool domain_open;        /* domain_begin succeeded, domain_end or domain_abort still due */
     bool acknowledged_early; /* the answer after half of the timeout is the last thing said */
     uint8_t last[7]; /* block download: the newest segment: its padding is known only at the end */
-    uint8_t value[SDO_VALUE_MAX];
 };
 
 /* `timeout_us`: silence of the client after which a transfer is aborted; `block_segments` (1 ...
@@ -92,12 +83,16 @@ void sdo_server_reset(struct sdo_server *server);
 /* True for frames that sdo_server_receive wants. Any context. */
 bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in);
 
-/* Takes one frame; other frames are ignored. Returns 1 when *out is to be sent, else 0. */
-int sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out);
+/* Takes one frame; other frames are ignored. Returns true when *out is to be sent. */
+bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out);
 
 /* Lets time pass and gives frames that are due by themselves (timeouts, segments of a block
- * upload). Returns 1 when *out is to be sent: then call again with elapsed_us 0 as long as the port
+ * upload). Returns true when *out is to be sent: then call again with elapsed_us 0 as long as the port
  * takes frames. */
-int sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out);
+bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out);
+
+/* The CRC of block transfers (CiA 301, 7.2.4.3.16): polynomial x^16 + x^12 + x^5 + 1, initial value 0, not reflected; check
+ * value of "123456789": 0x31C3. Goes on from `crc` (0 at the beginning) over `size` bytes. Pure, any context. */
+uint16_t sdo_block_crc(uint16_t crc, const uint8_t *data, uint32_t size);
 
 #endif

@@ -122,6 +122,10 @@ void port_unlock(void);
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 
+/* Work that is longer than usual has got further: the mainline goes on, though it does not wait. A port with a watchdog feeds
+ * it, provided that ticks go on as well; others have nothing to do. Mainline. */
+void port_progress(void);
+
 /* --- Store: two banks for programs, two for parameters, so that what breaks off leaves the other one whole. Mainline --- */
 
 #define PORT_STORE_BANKS      2u /* 0 and 1: programs, as large as there is room for */

@@ -70,7 +70,7 @@ TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interp.c feed
             firmware/app/machine/motion.c
 
 # In one function with all that it calls, the check of the limits would be longer than a Cortex-M0 can jump, and it needs
-# the most stack of all.
+# the most stack of all. So would be the SDO server.
 
 target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
 
@@ -86,6 +86,7 @@ $(BUILD)/firmware/$(1)/obj/%.o: %.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $
 	$$(Q)$($(1)_CROSS)gcc --specs=picolibc.specs $($(1)_CPU) $$(TARGET_CFLAGS) $$(TICK_CFLAGS) -MMD -MP -c -o $$@ $$<
 $(call target_object,$(1),$(TICK_SRC) $(if $(findstring float,$($(1)_KERNELS)),firmware/core/kernel_float.c)): TICK_CFLAGS := -O3
 $(call target_object,$(1),firmware/core/limit_check.c): TICK_CFLAGS := -Os
+$(call target_object,$(1),firmware/canopen/sdo_server.c): TICK_CFLAGS := -Os -fno-inline-functions-called-once
 $(BUILD)/firmware/$(1)/libhodograph.a: $(call target_object,$(1),$(TARGET_SRC)) $(BUILD)/firmware/$(1)/obj/list
 	@rm -f $$@
 	@$($(1)_CROSS)ar rcs $$@ $$(filter %.o,$$^)

@@ -2,8 +2,9 @@
 /*
  * The whole controller on the fake port, with two fake drives, a host, and a neighbour that sends what it likes; frames
  * are lost and refused, ticks are late, the power goes. Rules: those of port.h (the fake port checks them); no setpoint of
- * an axis on the path is farther from the one before than its velocity limit allows; and where the configuration is still
- * the first one, a sound bus and a reset lead out of everything.
+ * an axis on the path is farther from the one before than its velocity limit allows; a program that a block transfer has
+ * brought, or taken, is the one that was sent, whatever came between its frames; and where the configuration is still the
+ * first one, a sound bus and a reset lead out of everything.
  *
  * Input: one byte says what happens next.
  */
@@ -25,6 +26,8 @@
 #define PERIODS_MAX         3000u
 #define BACK_PERIODS        12000u /* time that the way out of everything may take */
 #define BEAT_PERIODS        50u
+#define BLOCKS_MAX          20u /* of a transfer, repeated ones included */
+#define SEGMENT_BYTES       7u
 #define SDO_SIZE_CODE(size) (0x23u | ((4u - (size)) << 2))
 
 static struct {
@@ -37,6 +40,19 @@ static struct {
     uint32_t periods;
     uint32_t lost; /* so many of the next frames on the bus are lost */
 } self;
+
+/* The client of a block transfer of the program (object 0x2000 sub 1). */
+static struct {
+    uint8_t answer[8];
+    uint8_t expected; /* answer[0], but size and CRC bits; 0: none */
+    bool answered;
+    bool aborted;
+    bool reading; /* segments come */
+    bool complete;
+    uint32_t block_start;
+    uint8_t good; /* last segment of the block that came in order */
+    uint8_t data[APP_IMAGE_SIZE + SEGMENT_BYTES];
+} client;
 
 static void to_controller(const struct can_msg *frame)
 {
@@ -85,6 +101,34 @@ static void check_setpoint(const struct can_msg *frame)
     }
 }
 
+static void take_segment(const struct can_msg *frame)
+{
+    const uint8_t sequence = frame->data[0] & 0x7Fu;
+    const uint32_t offset = client.block_start + client.good * SEGMENT_BYTES;
+    if (sequence == client.good + 1u && offset + SEGMENT_BYTES <= sizeof client.data) {
+        memcpy(client.data + offset, frame->data + 1, SEGMENT_BYTES);
+        client.good = sequence;
+        client.complete = (frame->data[0] & 0x80u) != 0u;
+    }
+}
+
+/* Answers to others name another object; that of a command to stop is no block's. */
+static void to_client(const struct can_msg *frame)
+{
+    static const uint8_t object[3] = {0x00, 0x20, 0x01};
+    if (frame->id != COB_SDO_ANSWER + self.controller.node || frame->len != 8u) {
+        return;
+    }
+    if (frame->data[0] == 0x80u) {
+        client.aborted = client.aborted || memcmp(frame->data + 1, object, sizeof object) == 0;
+    } else if (client.reading) {
+        take_segment(frame);
+    } else if (client.expected != 0u && (frame->data[0] & 0xE3u) == client.expected) {
+        memcpy(client.answer, frame->data, sizeof client.answer);
+        client.answered = true;
+    }
+}
+
 static bool pass_frames(void)
 {
     struct can_msg frame;
@@ -94,6 +138,7 @@ static bool pass_frames(void)
         if (self.lost > 0u) {
             self.lost--;
         } else {
+            to_client(&frame);
             to_drives(&frame);
         }
         any = true;
@@ -274,6 +319,164 @@ static void neighbour(struct fuzz_input *in, uint8_t what)
     settle();
 }
 
+/* ---- Block transfers of the program ---- */
+
+static void send_request(const uint8_t request[8])
+{
+    struct can_msg frame;
+    cob_frame(&frame, COB_SDO_ASK + self.controller.node, 8);
+    memcpy(frame.data, request, 8);
+    to_controller(&frame);
+}
+
+/* Whether the answer `expected` has come. */
+static bool ask(const uint8_t request[8], uint8_t expected)
+{
+    client.expected = expected;
+    client.answered = false;
+    client.aborted = false;
+    send_request(request);
+    settle();
+    client.expected = 0;
+    return client.answered && !client.aborted;
+}
+
+/* What comes between two frames of the client; false: its own next frame is lost. */
+static bool disturb(struct fuzz_input *in)
+{
+    const uint8_t what = fuzz_byte(in);
+    const unsigned more = what < 0xC0u ? 0u : fuzz_byte(in);
+    if (what < 0xC0u) {
+        return true;
+    }
+    switch (what & 7u) {
+    case 0:
+        period(0);
+        return true;
+    case 1:
+        write(0x2001, 0, COMMAND_STOP, 1);
+        return true;
+    case 2:
+    case 3:
+        neighbour(in, what);
+        return true;
+    case 4:
+        self.lost += 1u + (more & 3u);
+        return true;
+    case 5:
+        for (unsigned i = 0; i <= more && self.periods < PERIODS_MAX; ++i) {
+            period(0);
+        }
+        return true;
+    default:
+        return false;
+    }
+}
+
+/* Segments of one block from `offset` on; returns how many of them the controller has taken. */
+static uint8_t send_block(struct fuzz_input *in, const uint8_t *image, uint32_t size,
+                          uint32_t offset, uint8_t segments)
+{
+    uint8_t request[8];
+    uint8_t sequence = 0;
+    bool last = false;
+    client.answered = false;
+    client.expected = 0xA2;
+    while (!last && sequence < segments) {
+        const uint32_t left = size - offset;
+        last = left <= SEGMENT_BYTES;
+        sequence++;
+        memset(request, 0, sizeof request);
+        request[0] = (uint8_t)(sequence | (last ? 0x80u : 0u));
+        memcpy(request + 1, image + offset, last ? left : SEGMENT_BYTES);
+        offset += SEGMENT_BYTES;
+        if (disturb(in)) {
+            send_request(request);
+            settle();
+        }
+    }
+    for (unsigned i = 0; i < 2000u && !client.answered && !client.aborted; ++i) {
+        period(0);
+    }
+    client.expected = 0;
+    return client.answered && client.answer[1] <= segments ? client.answer[1] : 0u;
+}
+
+static bool download_ends(const uint8_t *image, uint32_t size)
+{
+    const uint32_t unused = (SEGMENT_BYTES - size % SEGMENT_BYTES) % SEGMENT_BYTES;
+    uint8_t request[8] = {(uint8_t)(0xC1u | (unused << 2))};
+    cob_put(request + 1, sdo_block_crc(0, image, size), 2);
+    return ask(request, 0xA1);
+}
+
+static void block_download(struct fuzz_input *in)
+{
+    uint8_t image[APP_IMAGE_SIZE];
+    uint8_t request[8] = {0xC6, 0x00, 0x20, 0x01};
+    uint32_t offset = 0;
+    app_image_make(image, (int32_t)(fuzz_byte(in) % 20u), -5);
+    cob_put(request + 4, sizeof image, 4);
+    if (!ask(request, 0xA0)) {
+        return;
+    }
+    for (unsigned i = 0; i < BLOCKS_MAX && offset < sizeof image && !client.aborted; ++i) {
+        offset += SEGMENT_BYTES * send_block(in, image, sizeof image, offset, client.answer[4]);
+        client.answer[4] = client.answer[2];
+    }
+    if (offset >= sizeof image && !client.aborted && download_ends(image, sizeof image)) {
+        const struct program_slot *slot = &self.controller.slot;
+        FUZZ_CHECK(slot->present && slot->program.header.image_size == sizeof image);
+        FUZZ_CHECK(memcmp(slot->program.image, image, sizeof image) == 0);
+    }
+}
+
+/* Acknowledges what came in order until all has come; false: it does not. */
+static bool take_blocks(struct fuzz_input *in)
+{
+    uint8_t request[8] = {0xA3};
+    for (unsigned i = 0; i < BLOCKS_MAX && !client.aborted; ++i) {
+        client.reading = true;
+        client.good = 0;
+        client.complete = false;
+        send_request(request);
+        settle();
+        client.reading = false;
+        const bool complete = client.complete;
+        request[0] = 0xA2;
+        request[1] = client.good;
+        request[2] = (uint8_t)(127u - fuzz_byte(in) % 127u);
+        if (complete) {
+            return ask(request, 0xC1);
+        }
+        client.block_start += SEGMENT_BYTES * client.good;
+        (void)disturb(in);
+    }
+    return false;
+}
+
+static void block_upload(struct fuzz_input *in)
+{
+    const struct program_slot *slot = &self.controller.slot;
+    const uint8_t first = (uint8_t)(127u - fuzz_byte(in) % 127u);
+    const uint8_t request[8] = {0xA4, 0x00, 0x20, 0x01, first};
+    const uint8_t done[8] = {0xA1};
+    client.block_start = 0;
+    if (!ask(request, 0xC2)) {
+        return;
+    }
+    const uint32_t size = (uint32_t)cob_get(client.answer + 4, 4);
+    FUZZ_CHECK(slot->present && size == slot->program.header.image_size);
+    if (take_blocks(in)) {
+        const uint16_t crc = (uint16_t)cob_get(client.answer + 1, 2);
+        FUZZ_CHECK(crc == sdo_block_crc(0, client.data, size));
+        FUZZ_CHECK(memcmp(client.data, slot->program.image, size) == 0);
+        send_request(done);
+        settle();
+        FUZZ_CHECK(self.controller.server.state == SDO_SERVER_IDLE);
+    }
+}
+
 static void refuse(struct fuzz_input *in)
 {
     struct can_match match;
@@ -309,7 +512,13 @@ static void step(struct fuzz_input *in)
         }
         break;
     case 6:
-        upload(in, what < 0xA0u ? 0u : fuzz_byte(in) & 7u);
+        if (what < 0xC0u) {
+            upload(in, what < 0xA0u ? 0u : fuzz_byte(in) & 7u);
+        } else if (what < 0xE0u) {
+            block_download(in);
+        } else {
+            block_upload(in);
+        }
         break;
     case 7:
         misbehave(&self.drives[what >> 7], in);

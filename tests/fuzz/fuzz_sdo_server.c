@@ -102,7 +102,7 @@ static void step(struct fuzz_input *in)
         fuzz_frame(in, &frame);
         (void)sdo_server_receive(&talk.server, &frame, &talk.answer);
     }
-    FUZZ_CHECK(talk.small.open == talk.server.domain_open);
+    FUZZ_CHECK(talk.small.open == talk.server.object.open);
     FUZZ_CHECK(sdo_talk_busy(&talk) || !talk.small.open);
     FUZZ_CHECK(talk.small.begun ==
                talk.small.ended + talk.small.aborted + (talk.small.open ? 1 : 0));

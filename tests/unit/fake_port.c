@@ -29,6 +29,7 @@ static struct {
     bool urgent;
     enum port_timing timing;
     unsigned wakes;
+    unsigned progress;
     uint32_t sent_head;
     uint32_t sent_tail;
     struct can_msg sent[SENT_MAX];
@@ -114,6 +115,11 @@ void fake_port_refuse(const struct can_match *refused, uint32_t times)
 {
     self.refused = *refused;
     self.refusals = times;
+}
+
+unsigned fake_port_progress(void)
+{
+    return self.progress;
 }
 
 unsigned fake_port_wakes(void)
@@ -310,6 +316,12 @@ void port_wait(uint32_t timeout_us)
     if (self.wait_hook != NULL) {
         self.wait_hook(self.wait_context);
     }
+}
+
+void port_progress(void)
+{
+    TEST_ASSERT_FALSE_MESSAGE(self.locked, "long work inside a critical section");
+    self.progress++;
 }
 
 void port_wake(void)

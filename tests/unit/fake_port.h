@@ -31,6 +31,7 @@ bool fake_port_hurry(void);          /* and in a hurry */
 bool fake_port_urgent(void);         /* port_tick_urgent, last */
 bool fake_port_ready(void);          /* port_tick_ready since the last tick */
 unsigned fake_port_wakes(void);
+unsigned fake_port_progress(void); /* calls of port_progress */
 
 /* What port_timing() says from now on. */
 void fake_port_set_timing(enum port_timing timing);

@@ -66,7 +66,8 @@ static void test_boot_configures_each_drive_then_starts_it(void)
 {
     app_bench_settle(&bench);
     TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
-    TEST_ASSERT_EQUAL_UINT32(DRIVE_POLLING_SDO_TIMEOUT_US, bench.controller.look.client.timeout_us);
+    TEST_ASSERT_EQUAL_UINT32(DRIVE_POLLING_SDO_TIMEOUT_US,
+                             bench.controller.polling.client.timeout_us);
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     TEST_ASSERT_EQUAL_UINT32(2, bench.starts);
     for (uint32_t i = 0; i < BENCH_DRIVES; ++i) {
@@ -311,7 +312,7 @@ static void test_the_active_image_can_be_read_back(void)
     static uint8_t back[APP_IMAGE_SIZE];
     struct can_msg out;
     load();
-    TEST_ASSERT_EQUAL_INT(1, sdo_client_read(&bench.host, 1, 0x2000, 1, back, sizeof back, &out));
+    TEST_ASSERT_EQUAL_INT(0, sdo_client_read(&bench.host, 1, 0x2000, 1, back, sizeof back, &out));
     fake_port_receive(&out);
     app_bench_settle(&bench);
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
@@ -438,7 +439,7 @@ static void test_a_busy_mainline_ends_no_transfer(void)
 {
     struct can_msg frame;
     app_bench_settle(&bench);
-    TEST_ASSERT_EQUAL_INT(1,
+    TEST_ASSERT_EQUAL_INT(0,
                           sdo_client_write(&bench.host, 1, 0x2000, 1, image, sizeof image, &frame));
     fake_port_receive(&frame);
     controller_poll(&bench.controller);
@@ -447,6 +448,20 @@ static void test_a_busy_mainline_ends_no_transfer(void)
     TEST_ASSERT_TRUE(bench.controller.server.state != SDO_SERVER_IDLE);
     app_bench_settle(&bench);
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
+}
+
+/* A watchdog lives on it: at each of both stops of the one piece, and, with limits of an axis, at the piece itself. */
+static void test_a_check_tells_the_port_of_its_progress(void)
+{
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    const unsigned before = fake_port_progress();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
+    TEST_ASSERT_EQUAL_UINT(before + 2u, fake_port_progress());
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_UINT(before + 2u, fake_port_progress());
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2030, 1, 20000, 4));
+    (void)app_bench_read(&bench, 0x2000, 12); /* checks it anew */
+    TEST_ASSERT_EQUAL_UINT(before + 2u + 3u, fake_port_progress());
 }
 
 static void test_simulated_drives_are_awaited_and_hurried_while_something_moves(void)
@@ -686,6 +701,7 @@ int main(void)
     RUN_TEST(test_a_drive_that_restarts_while_off_is_configured_again);
     RUN_TEST(test_a_drive_that_is_gone_while_off_is_looked_for_again);
     RUN_TEST(test_a_busy_mainline_ends_no_transfer);
+    RUN_TEST(test_a_check_tells_the_port_of_its_progress);
     RUN_TEST(test_simulated_drives_are_awaited_and_hurried_while_something_moves);
     RUN_TEST(test_real_drives_are_never_awaited);
     RUN_TEST(test_late_ticks_of_a_run_are_counted);

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "app/commands.h"
-#include "app/od_write.h"
+#include "app/objects.h"
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 
@@ -853,7 +853,8 @@ static void test_a_fault_in_the_middle_of_a_write(void)
     const uint8_t value = 9;
     const struct od_entry *entry = od_find(&bench.controller.od, 0x2005, 1);
     fake_port_on_unlock(fails_now, NULL);
-    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, od_write_hook(&bench.controller, entry, &value, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE,
+                            objects_hooks.write(&bench.controller, entry, &value, 1));
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, machine()->state);
     TEST_ASSERT_EQUAL_INT(before, app_bench_read(&bench, 0x2005, 1));
     TEST_ASSERT_EQUAL_UINT8(before, bench.controller.config.node[0]);

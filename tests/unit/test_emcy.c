@@ -26,7 +26,7 @@ static void test_begins_without_errors(void)
 {
     TEST_ASSERT_EQUAL_HEX8(0, error_register);
     TEST_ASSERT_EQUAL_UINT8(0, count);
-    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_FALSE(emcy_producer_process(&producer, &out));
 }
 
 static void test_message_on_the_wire(void)
@@ -36,11 +36,11 @@ static void test_message_on_the_wire(void)
 
     emcy_producer_raise(&producer, EMCY_FOLLOWING_ERROR, EMCY_REGISTER_PROFILE, detail);
     TEST_ASSERT_EQUAL_HEX8(0x21, error_register);
-    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
     TEST_ASSERT_EQUAL_HEX32(0x086, out.id);
     TEST_ASSERT_EQUAL_UINT8(8, out.len);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, out.data, 8);
-    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_FALSE(emcy_producer_process(&producer, &out));
 }
 
 static void test_history_has_the_newest_first(void)
@@ -70,7 +70,7 @@ static void test_messages_keep_their_order(void)
         emcy_producer_raise(&producer, code, 0, NULL);
     }
     for (uint16_t code = 1; code <= 3; code++) {
-        TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+        TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
         TEST_ASSERT_EQUAL_UINT8(6, emcy_decode(&out, &got));
         TEST_ASSERT_EQUAL_UINT16(code, got.code);
     }
@@ -84,7 +84,7 @@ static void test_a_full_queue_keeps_the_newest(void)
         emcy_producer_raise(&producer, code, 0, NULL);
     }
     TEST_ASSERT_EQUAL_HEX32(10, history[0]);
-    while (emcy_producer_process(&producer, &out) == 1) {
+    while (emcy_producer_process(&producer, &out)) {
         frames++;
     }
     TEST_ASSERT_EQUAL_INT(4, frames);
@@ -100,15 +100,15 @@ static void test_a_flood_of_one_code_does_not_push_out_another(void)
     for (int i = 0; i < 5; i++) {
         emcy_producer_raise(&producer, 2, 0, NULL);
     }
-    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
     TEST_ASSERT_EQUAL_UINT8(1, out.data[0]);
-    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
     TEST_ASSERT_EQUAL_UINT8(3, out.data[0]);
-    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
     TEST_ASSERT_EQUAL_UINT8(2, out.data[0]);
-    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
     TEST_ASSERT_EQUAL_UINT8(2, out.data[0]);
-    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_FALSE(emcy_producer_process(&producer, &out));
 }
 
 /* Also where that is the first of the queue, and another of its code is behind it. */
@@ -121,10 +121,10 @@ static void test_of_a_repeated_code_the_oldest_goes(void)
         emcy_producer_raise(&producer, raised[i], 0, NULL);
     }
     for (size_t i = 0; i < sizeof sent; i++) {
-        TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+        TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
         TEST_ASSERT_EQUAL_UINT8(sent[i], out.data[0]);
     }
-    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_FALSE(emcy_producer_process(&producer, &out));
 }
 
 static void test_no_error_when_the_last_one_is_gone(void)
@@ -137,15 +137,15 @@ static void test_no_error_when_the_last_one_is_gone(void)
     emcy_producer_process(&producer, &out);
     emcy_producer_clear(&producer, EMCY_REGISTER_CURRENT);
     TEST_ASSERT_EQUAL_HEX8(EMCY_REGISTER_COMMUNICATION | EMCY_REGISTER_GENERIC, error_register);
-    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_FALSE(emcy_producer_process(&producer, &out));
     emcy_producer_clear(&producer, EMCY_REGISTER_COMMUNICATION);
     TEST_ASSERT_EQUAL_HEX8(0, error_register);
-    TEST_ASSERT_EQUAL_INT(1, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_TRUE(emcy_producer_process(&producer, &out));
     emcy_decode(&out, &got);
     TEST_ASSERT_EQUAL_HEX16(0, got.code);
     TEST_ASSERT_EQUAL_HEX8(0, got.error_register);
     emcy_producer_clear(&producer, 0xFF);
-    TEST_ASSERT_EQUAL_INT(0, emcy_producer_process(&producer, &out));
+    TEST_ASSERT_FALSE(emcy_producer_process(&producer, &out));
     TEST_ASSERT_EQUAL_UINT8(2, count);
 }
 

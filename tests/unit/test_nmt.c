@@ -52,7 +52,7 @@ static bool command(enum nmt_command code, uint8_t node)
 
 static void boot(void)
 {
-    TEST_ASSERT_EQUAL_INT(1, nmt_slave_process(&slave, &out));
+    TEST_ASSERT_TRUE(nmt_slave_process(&slave, &out));
 }
 
 static void test_boots_with_one_frame(void)
@@ -65,7 +65,7 @@ static void test_boots_with_one_frame(void)
     TEST_ASSERT_EQUAL_HEX8(NMT_PRE_OPERATIONAL, slave.state);
     TEST_ASSERT_EQUAL_INT(1, changes);
     TEST_ASSERT_EQUAL_HEX8(NMT_PRE_OPERATIONAL, last_state);
-    TEST_ASSERT_EQUAL_INT(0, nmt_slave_process(&slave, &out));
+    TEST_ASSERT_FALSE(nmt_slave_process(&slave, &out));
     TEST_ASSERT_EQUAL_INT(0, node_resets + communication_resets);
 }
 

@@ -211,7 +211,7 @@ static void test_sent_with_every_so_many_syncs(void)
     struct can_msg out;
     values.statusword = 0x1234;
     values.position_actual_value = -2;
-    TEST_ASSERT_EQUAL_INT(1, pdo_map_sync(&tpdo, &out));
+    TEST_ASSERT_TRUE(pdo_map_sync(&tpdo, &out));
     TEST_ASSERT_EQUAL_HEX32(0x185, out.id);
     TEST_ASSERT_EQUAL_UINT8(6, out.len);
     TEST_ASSERT_EQUAL_HEX64(0xFFFFFFFE1234u, cob_get(out.data, 6));
@@ -225,32 +225,32 @@ static void test_sent_with_sync_on_change(void)
 {
     struct can_msg out;
     put(0x1800, 2, 0);
-    TEST_ASSERT_EQUAL_INT(1, pdo_map_sync(&tpdo, &out));
-    TEST_ASSERT_EQUAL_INT(0, pdo_map_sync(&tpdo, &out));
+    TEST_ASSERT_TRUE(pdo_map_sync(&tpdo, &out));
+    TEST_ASSERT_FALSE(pdo_map_sync(&tpdo, &out));
     values.statusword = 1;
-    TEST_ASSERT_EQUAL_INT(1, pdo_map_sync(&tpdo, &out));
-    TEST_ASSERT_EQUAL_INT(0, pdo_map_process(&tpdo, 1000000, &out));
+    TEST_ASSERT_TRUE(pdo_map_sync(&tpdo, &out));
+    TEST_ASSERT_FALSE(pdo_map_process(&tpdo, 1000000, &out));
 }
 
 static void test_sent_on_change(void)
 {
     struct can_msg out;
-    TEST_ASSERT_EQUAL_INT(0, pdo_map_process(&tpdo3, 1000000, &out)); /* off */
+    TEST_ASSERT_FALSE(pdo_map_process(&tpdo3, 1000000, &out)); /* off */
     put(0x1802, 1, 0x385);
-    TEST_ASSERT_EQUAL_INT(1, pdo_map_process(&tpdo3, 0, &out));
+    TEST_ASSERT_TRUE(pdo_map_process(&tpdo3, 0, &out));
     TEST_ASSERT_EQUAL_UINT8(4, out.len);
-    TEST_ASSERT_EQUAL_INT(0, pdo_map_sync(&tpdo3, &out));
-    TEST_ASSERT_EQUAL_INT(0, pdo_map_process(&tpdo3, 1000000, &out));
+    TEST_ASSERT_FALSE(pdo_map_sync(&tpdo3, &out));
+    TEST_ASSERT_FALSE(pdo_map_process(&tpdo3, 1000000, &out));
     values.digital_inputs = 1;
-    TEST_ASSERT_EQUAL_INT(1, pdo_map_process(&tpdo3, 0, &out));
+    TEST_ASSERT_TRUE(pdo_map_process(&tpdo3, 0, &out));
     values.digital_inputs = 2; /* 10 ms of inhibit time */
-    TEST_ASSERT_EQUAL_INT(0, pdo_map_process(&tpdo3, 9999, &out));
-    TEST_ASSERT_EQUAL_INT(1, pdo_map_process(&tpdo3, 1, &out));
+    TEST_ASSERT_FALSE(pdo_map_process(&tpdo3, 9999, &out));
+    TEST_ASSERT_TRUE(pdo_map_process(&tpdo3, 1, &out));
     TEST_ASSERT_EQUAL_HEX8(2, out.data[0]);
     put(0x1802, 5, 50);
     (void)pdo_map_process(&tpdo3, 0, &out);
-    TEST_ASSERT_EQUAL_INT(0, pdo_map_process(&tpdo3, 49999, &out));
-    TEST_ASSERT_EQUAL_INT(1, pdo_map_process(&tpdo3, 1, &out));
+    TEST_ASSERT_FALSE(pdo_map_process(&tpdo3, 49999, &out));
+    TEST_ASSERT_TRUE(pdo_map_process(&tpdo3, 1, &out));
 }
 
 int main(void)

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "canopen/cob.h"
-#include "canopen/crc16.h"
 #include "canopen/sdo_abort.h"
 #include "sdo_talk.h"
 #include "unity.h"
@@ -79,8 +78,7 @@ static uint32_t send_block(uint32_t at, uint32_t size, bool (*lost)(uint32_t), u
         }
     }
     if (!answered) {
-        TEST_ASSERT_EQUAL_INT(1,
-                              sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
+        TEST_ASSERT_TRUE(sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
     }
     TEST_ASSERT_EQUAL_HEX8(0xA2, talk.answer.data[0]);
     TEST_ASSERT_EQUAL_UINT8(TALK_BLOCK, talk.answer.data[2]);
@@ -107,7 +105,7 @@ static void download(uint32_t size, bool (*lost)(uint32_t))
         at += 7 * send_block(at, size, lost, &sent);
         TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(10000, sent, "the transfer does not come to an end");
     }
-    finish(size, crc16_update(0, image, size));
+    finish(size, sdo_block_crc(0, image, size));
     TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
     TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     TEST_ASSERT_EQUAL_UINT32(size, talk.small.domain_size);
@@ -117,9 +115,9 @@ static void download(uint32_t size, bool (*lost)(uint32_t))
 
 static void test_crc_check_value(void)
 {
-    TEST_ASSERT_EQUAL_HEX16(0x31C3, crc16_update(0, (const uint8_t *)"123456789", 9));
-    TEST_ASSERT_EQUAL_HEX16(crc16_update(0, image, 100),
-                            crc16_update(crc16_update(0, image, 33), image + 33, 67));
+    TEST_ASSERT_EQUAL_HEX16(0x31C3, sdo_block_crc(0, (const uint8_t *)"123456789", 9));
+    TEST_ASSERT_EQUAL_HEX16(sdo_block_crc(0, image, 100),
+                            sdo_block_crc(sdo_block_crc(0, image, 33), image + 33, 67));
 }
 
 static void test_download_of_every_size(void)
@@ -172,7 +170,7 @@ static void test_download_of_a_value(void)
     TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0xC6, 0x2003, 0, 4));
     sdo_talk_segment(&talk, 0x81, image, 4);
     TEST_ASSERT_EQUAL_HEX32(0, talk.small.values.word);
-    finish(4, crc16_update(0, image, 4));
+    finish(4, sdo_block_crc(0, image, 4));
     TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
     TEST_ASSERT_EQUAL_HEX32(cob_get(image, 4), talk.small.values.word);
 }
@@ -207,7 +205,7 @@ static void test_wrong_crc(void)
 
     initiate(20);
     send_block(0, 20, never, &sent);
-    finish(20, (uint16_t)(crc16_update(0, image, 20) ^ 1u));
+    finish(20, (uint16_t)(sdo_block_crc(0, image, 20) ^ 1u));
     expect_abort(SDO_ABORT_CRC);
     TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
     TEST_ASSERT_EQUAL_INT(0, talk.small.ended);
@@ -219,11 +217,11 @@ static void test_size_that_was_not_announced(void)
 
     initiate(20);
     send_block(0, 21, never, &sent);
-    finish(21, crc16_update(0, image, 21));
+    finish(21, sdo_block_crc(0, image, 21));
     expect_abort(SDO_ABORT_TOO_LONG);
     initiate(20);
     send_block(0, 19, never, &sent);
-    finish(19, crc16_update(0, image, 19));
+    finish(19, sdo_block_crc(0, image, 19));
     expect_abort(SDO_ABORT_TOO_SHORT);
     initiate(8);
     sdo_talk_segment(&talk, 1, image, 7);
@@ -308,7 +306,7 @@ static void test_a_second_client_inside_a_block(void)
         sdo_talk_segment(&talk, (uint8_t)(sequence | (sequence == 15 ? 0x80u : 0u)), image + at,
                          at + 7 <= 100 ? 7 : 100 - at);
     }
-    finish(100, crc16_update(0, image, 100));
+    finish(100, sdo_block_crc(0, image, 100));
     TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
     TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, 100);
 }
@@ -335,7 +333,7 @@ static void test_a_segment_doubled_on_the_bus_is_taken_once(void)
     sdo_talk_segment(&talk, 1, image, 7);
     TEST_ASSERT_FALSE(sdo_talk_segment(&talk, 1, image, 7));
     sdo_talk_segment(&talk, 0x82, image + 7, 7);
-    finish(14, crc16_update(0, image, 14));
+    finish(14, sdo_block_crc(0, image, 14));
     TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
 }
 
@@ -356,7 +354,7 @@ static void test_a_pause_inside_a_block_is_no_loss(void)
     initiate(100);
     sdo_talk_segment(&talk, 1, image, 7);
     sdo_talk_segment(&talk, 2, image + 7, 7);
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
     TEST_ASSERT_EQUAL_UINT8(2, talk.answer.data[1]);
     for (uint8_t sequence = 3; sequence <= 15; sequence++) {
         uint8_t first = (uint8_t)(sequence | (sequence == 15 ? 0x80u : 0u));
@@ -369,7 +367,7 @@ static void test_a_pause_inside_a_block_is_no_loss(void)
     }
     TEST_ASSERT_EQUAL_HEX8(0xA2, talk.answer.data[0]);
     TEST_ASSERT_EQUAL_UINT8(13, talk.answer.data[1]);
-    finish(100, crc16_update(0, image, 100));
+    finish(100, sdo_block_crc(0, image, 100));
     TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
     TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, 100);
 }
@@ -377,8 +375,8 @@ static void test_a_pause_inside_a_block_is_no_loss(void)
 static void test_no_early_answer_before_the_first_segment(void)
 {
     initiate(100);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, 1, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, 1, &talk.answer));
     expect_abort(SDO_ABORT_TIMEOUT);
 }
 
@@ -386,10 +384,10 @@ static void test_silence_inside_a_block(void)
 {
     initiate(100);
     sdo_talk_segment(&talk, 1, image, 7);
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
     TEST_ASSERT_EQUAL_UINT8(1, talk.answer.data[1]);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, 1, &talk.answer));
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, 1, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, TALK_TIMEOUT_US / 2, &talk.answer));
     expect_abort(SDO_ABORT_TIMEOUT);
 }
 
@@ -435,7 +433,7 @@ static uint8_t take_block(uint8_t *to, uint32_t room, bool (*lost)(uint32_t), ui
             good++;
             *last = (data[0] & 0x80) != 0;
         }
-    } while (sdo_server_process(&talk.server, 0, &talk.answer) == 1);
+    } while (sdo_server_process(&talk.server, 0, &talk.answer));
     return good;
 }
 
@@ -456,7 +454,7 @@ static void upload(uint32_t size, uint8_t segments, bool (*lost)(uint32_t))
     }
     TEST_ASSERT_EQUAL_HEX8(0xC1, talk.answer.data[0] & 0xE3);
     TEST_ASSERT_EQUAL_UINT32(size, at - ((talk.answer.data[0] >> 2) & 7u));
-    TEST_ASSERT_EQUAL_HEX16(crc16_update(0, image, size), cob_get(talk.answer.data + 1, 2));
+    TEST_ASSERT_EQUAL_HEX16(sdo_block_crc(0, image, size), cob_get(talk.answer.data + 1, 2));
     TEST_ASSERT_FALSE(sdo_talk_send(&talk, finished));
     TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
     if (size > 0) {
@@ -490,7 +488,7 @@ static void test_upload_refusals(void)
     sdo_talk_ask(&talk, 0xA4, 0x2002, 0, 4);
     expect_abort(SDO_ABORT_WRITE_ONLY);
     start_upload(100, 4);
-    while (sdo_server_process(&talk.server, 0, &talk.answer) == 1) {
+    while (sdo_server_process(&talk.server, 0, &talk.answer)) {
     }
     TEST_ASSERT_TRUE(acknowledge(5, 4));
     expect_abort(SDO_ABORT_SEQUENCE);
@@ -502,9 +500,9 @@ static void test_upload_refusals(void)
 static void test_upload_times_out(void)
 {
     start_upload(100, 4);
-    while (sdo_server_process(&talk.server, 0, &talk.answer) == 1) {
+    while (sdo_server_process(&talk.server, 0, &talk.answer)) {
     }
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, TALK_TIMEOUT_US, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, TALK_TIMEOUT_US, &talk.answer));
     expect_abort(SDO_ABORT_TIMEOUT);
 }
 
@@ -531,7 +529,7 @@ static void test_an_urgent_write_beside_a_block_download(void)
     }
     TEST_ASSERT_EQUAL_UINT8(127, talk.answer.data[1]);
     urgent();
-    finish(127 * 7, crc16_update(0, image, 127 * 7));
+    finish(127 * 7, sdo_block_crc(0, image, 127 * 7));
     TEST_ASSERT_EQUAL_INT(1, talk.small.ended);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(image, talk.small.domain, 127 * 7);
 }

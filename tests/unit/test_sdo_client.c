@@ -26,22 +26,23 @@ void tearDown(void)
 }
 
 /* Carries frames between client and server until both are silent. */
-static void run(int to_send)
+static void run(int begun)
 {
     struct can_msg answer;
+    bool to_send = true;
 
-    for (int rounds = 0; to_send == 1; rounds++) {
+    TEST_ASSERT_EQUAL_INT(0, begun);
+    for (int rounds = 0; to_send; rounds++) {
         TEST_ASSERT_LESS_THAN_INT(1000, rounds);
-        if (sdo_server_receive(&talk.server, &frame, &answer) == 0) {
+        if (!sdo_server_receive(&talk.server, &frame, &answer)) {
             return;
         }
         to_send = sdo_client_receive(&client, &answer, &frame);
     }
-    TEST_ASSERT_EQUAL_INT(0, to_send);
 }
 
 /* An answer of the server, as raw bytes. */
-static int hear(const uint8_t data[8])
+static bool hear(const uint8_t data[8])
 {
     struct can_msg in;
 
@@ -113,14 +114,14 @@ static void test_a_value_that_does_not_fit_is_given_up(void)
 static void test_timeout(void)
 {
     sdo_client_read_number(&client, TALK_NODE, 0x2003, 0, &frame);
-    TEST_ASSERT_EQUAL_INT(0, sdo_client_process(&client, CLIENT_TIMEOUT_US - 1, &frame));
+    TEST_ASSERT_FALSE(sdo_client_process(&client, CLIENT_TIMEOUT_US - 1, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
-    TEST_ASSERT_EQUAL_INT(1, sdo_client_process(&client, 1, &frame));
+    TEST_ASSERT_TRUE(sdo_client_process(&client, 1, &frame));
     TEST_ASSERT_EQUAL_HEX32(COB_SDO_ASK + TALK_NODE, frame.id);
     TEST_ASSERT_EQUAL_HEX8(0x80, frame.data[0]);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TIMEOUT, cob_get(frame.data + 4, 4));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
-    TEST_ASSERT_EQUAL_INT(0, sdo_client_process(&client, UINT32_MAX, &frame));
+    TEST_ASSERT_FALSE(sdo_client_process(&client, UINT32_MAX, &frame));
 }
 
 static void test_arguments(void)
@@ -136,7 +137,7 @@ static void test_arguments(void)
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_ERR_ARGUMENT,
                           sdo_client_write_number(&client, 5, 0x2003, 0, 1, 9, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_IDLE, client.status);
-    TEST_ASSERT_EQUAL_INT(1, sdo_client_read_number(&client, 5, 0x2003, 0, &frame));
+    TEST_ASSERT_EQUAL_INT(0, sdo_client_read_number(&client, 5, 0x2003, 0, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_ERR_BUSY,
                           sdo_client_write_number(&client, 5, 0x2003, 0, 1, 4, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_ERR_BUSY,
@@ -152,14 +153,14 @@ static void test_ignores_late_and_foreign_frames(void)
     struct can_msg foreign;
 
     sdo_client_read_number(&client, TALK_NODE, 0x2003, 0, &frame);
-    TEST_ASSERT_EQUAL_INT(0, hear(about_another));
-    TEST_ASSERT_EQUAL_INT(0, hear(abort_of_another));
-    TEST_ASSERT_EQUAL_INT(0, hear(abort_of_0x6000));
+    TEST_ASSERT_FALSE(hear(about_another));
+    TEST_ASSERT_FALSE(hear(abort_of_another));
+    TEST_ASSERT_FALSE(hear(abort_of_0x6000));
     cob_frame(&foreign, COB_SDO_ANSWER + TALK_NODE + 1, 8);
     foreign.data[0] = 0x80;
-    TEST_ASSERT_EQUAL_INT(0, sdo_client_receive(&client, &foreign, &frame));
+    TEST_ASSERT_FALSE(sdo_client_receive(&client, &foreign, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
-    TEST_ASSERT_EQUAL_INT(0, hear(abort_of_none)); /* of a server that does not know the object */
+    TEST_ASSERT_FALSE(hear(abort_of_none)); /* of a server that does not know the object */
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_REFUSED, client.status);
 }
 
@@ -171,12 +172,12 @@ static void test_wrong_answers_end_the_transfer(void)
     uint8_t buffer[20];
 
     sdo_client_read(&client, TALK_NODE, 0x2006, 0, buffer, sizeof buffer, &frame);
-    TEST_ASSERT_EQUAL_INT(1, hear(download_answer));
+    TEST_ASSERT_TRUE(hear(download_answer));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_COMMAND, client.abort_code);
     sdo_client_read(&client, TALK_NODE, 0x2006, 0, buffer, sizeof buffer, &frame);
-    TEST_ASSERT_EQUAL_INT(1, hear(upload_answer));
+    TEST_ASSERT_TRUE(hear(upload_answer));
     TEST_ASSERT_EQUAL_HEX8(0x60, frame.data[0]);
-    TEST_ASSERT_EQUAL_INT(1, hear(wrong_toggle));
+    TEST_ASSERT_TRUE(hear(wrong_toggle));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOGGLE, client.abort_code);
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
 }
@@ -188,13 +189,13 @@ static void test_a_server_that_sends_nothing_for_ever_is_given_up(void)
     uint8_t buffer[20];
 
     sdo_client_read(&client, TALK_NODE, 0x2006, 0, buffer, sizeof buffer, &frame);
-    TEST_ASSERT_EQUAL_INT(1, hear(upload_answer));
+    TEST_ASSERT_TRUE(hear(upload_answer));
     for (int i = 0; i < 8; i++) {
-        TEST_ASSERT_EQUAL_INT(1, hear(empty_segment));
+        TEST_ASSERT_TRUE(hear(empty_segment));
         TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
         empty_segment[0] ^= 0x10;
     }
-    TEST_ASSERT_EQUAL_INT(1, hear(empty_segment));
+    TEST_ASSERT_TRUE(hear(empty_segment));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_NO_DATA, client.abort_code);
     TEST_ASSERT_EQUAL_HEX8(0x80, frame.data[0]);
@@ -202,9 +203,9 @@ static void test_a_server_that_sends_nothing_for_ever_is_given_up(void)
 
 static void test_cancel(void)
 {
-    TEST_ASSERT_EQUAL_INT(0, sdo_client_cancel(&client, SDO_ABORT_GENERAL, &frame));
+    TEST_ASSERT_FALSE(sdo_client_cancel(&client, SDO_ABORT_GENERAL, &frame));
     sdo_client_read_number(&client, TALK_NODE, 0x2003, 0, &frame);
-    TEST_ASSERT_EQUAL_INT(1, sdo_client_cancel(&client, SDO_ABORT_GENERAL, &frame));
+    TEST_ASSERT_TRUE(sdo_client_cancel(&client, SDO_ABORT_GENERAL, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
 }
 

@@ -154,10 +154,10 @@ static void test_ignores_what_is_not_for_it(void)
 
     cob_frame(&in, COB_SDO_ASK + TALK_NODE + 1, 8);
     in.data[0] = 0x40;
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_receive(&talk.server, &in, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_receive(&talk.server, &in, &talk.answer));
     cob_frame(&in, COB_SDO_ASK + TALK_NODE, 7);
     in.data[0] = 0x40;
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_receive(&talk.server, &in, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_receive(&talk.server, &in, &talk.answer));
     TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2003, 0, SDO_ABORT_GENERAL));
 }
 
@@ -337,7 +337,7 @@ static void test_an_urgent_write_is_done_beside_a_transfer(void)
     const uint8_t data[7] = {0};
     sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
     sdo_talk_segment(&talk, 0x00, data, 7);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
     TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 0, SMALL_URGENT));
     expect_frame(expected);
     TEST_ASSERT_EQUAL_UINT8(SMALL_URGENT, talk.small.values.limited);
@@ -361,9 +361,9 @@ static void test_an_urgent_write_is_done_beside_a_transfer(void)
 static void test_an_urgent_write_does_not_keep_a_transfer_alive(void)
 {
     sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
     TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x2F, 0x2000, 0, SMALL_URGENT));
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, 1, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, 1, &talk.answer));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TIMEOUT, sdo_talk_abort_code(&talk));
 }
 
@@ -372,9 +372,9 @@ static void test_a_transfer_that_is_left_times_out_all_the_same(void)
 {
     sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
     sdo_talk_segment(&talk, 0x00, (const uint8_t[7]){0}, 7);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
     sdo_talk_ask(&talk, 0x40, 0x2003, 0, 0);
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, 1, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, 1, &talk.answer));
     expect_abort(SDO_ABORT_TIMEOUT);
 }
 
@@ -394,11 +394,11 @@ static void test_a_lost_answer_to_the_first_request_is_asked_for_again(void)
 static void test_timeout(void)
 {
     sdo_talk_ask(&talk, 0x21, 0x2005, 0, 10);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
-    TEST_ASSERT_EQUAL_INT(1, sdo_server_process(&talk.server, 1, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, 1, &talk.answer));
     expect_abort(SDO_ABORT_TIMEOUT);
     TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, UINT32_MAX, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, UINT32_MAX, &talk.answer));
 }
 
 static void test_each_frame_restarts_the_timeout(void)
@@ -408,7 +408,7 @@ static void test_each_frame_restarts_the_timeout(void)
     sdo_talk_ask(&talk, 0x21, 0x2005, 0, 21);
     sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer);
     sdo_talk_segment(&talk, 0x00, data, 7);
-    TEST_ASSERT_EQUAL_INT(0, sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
+    TEST_ASSERT_FALSE(sdo_server_process(&talk.server, TALK_TIMEOUT_US - 1, &talk.answer));
     TEST_ASSERT_TRUE(sdo_talk_busy(&talk));
 }
 

@@ -21,6 +21,7 @@
 #define port_unlock         board_unlock
 #define port_wait           board_wait
 #define port_wake           board_wake
+#define port_progress       board_progress
 #define port_store_size     board_store_size
 #define port_store_erase    board_store_erase
 #define port_store_write    board_store_write
@@ -213,6 +214,21 @@ static void test_the_watchdog_lives_on_ticks_and_mainline(void)
     TEST_ASSERT_EQUAL_UINT_MESSAGE(fed + 2u, chip_writes(IWDG), "fed though ticks stand still");
 }
 
+/* As in the check of a program: seconds without a wait. */
+static void test_the_watchdog_lives_through_long_work(void)
+{
+    start();
+    port_wait(2000);
+    const unsigned fed = chip_writes(IWDG);
+    sleep_a_little();
+    sleep_a_little();
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(fed, chip_writes(IWDG), "fed by a tick alone");
+    port_progress();
+    TEST_ASSERT_EQUAL_UINT(fed + 1u, chip_writes(IWDG));
+    port_progress();
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(fed + 1u, chip_writes(IWDG), "fed though ticks stand still");
+}
+
 static void test_spoiled_words_are_taken_before_the_start_only(void)
 {
     TEST_ASSERT_EQUAL_INT(0, port_begin(0, NULL));
@@ -295,6 +311,7 @@ int main(void)
     RUN_TEST(test_the_context_decides_whose_turn_it_is);
     RUN_TEST(test_the_lock_holds_off_both);
     RUN_TEST(test_the_watchdog_lives_on_ticks_and_mainline);
+    RUN_TEST(test_the_watchdog_lives_through_long_work);
     RUN_TEST(test_spoiled_words_are_taken_before_the_start_only);
     RUN_TEST(test_a_spoiled_word_of_the_code_is_the_end_at_any_time);
     RUN_TEST(test_the_store_is_the_flash);

@@ -3,11 +3,45 @@
 
 #include <string.h>
 
-#include "app/drives/drive_boot_private.h"
 #include "canopen/nmt.h"
 #include "canopen/sdo_abort.h"
 
 #define AXIS_NODE 0x2005u
+
+/* The next attempt begins after a pause. */
+static void pause_for(struct drive_boot *boot, uint32_t pause_us)
+{
+    boot->phase = DRIVE_BOOT_PAUSE;
+    boot->pause_us = pause_us;
+    sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
+}
+
+/* Node of the axis that is being configured. */
+static uint8_t present_node(const struct drive_boot *boot)
+{
+    return boot->config.node[boot->axis];
+}
+
+/* This attempt has failed at the present object: noted as trouble. */
+static void give_up(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
+{
+    boot->trouble = (struct drive_trouble){
+        .node = present_node(boot),
+        .object = ((uint32_t)boot->op.index << 8) + boot->op.sub,
+        .abort_code = abort_code,
+        .value = value,
+    };
+    pause_for(boot, DRIVE_BOOT_RETRY_US);
+}
+
+/* To the next object of the drive. */
+static void advance(struct drive_boot *boot)
+{
+    boot->client.status = SDO_CLIENT_IDLE;
+    boot->reading_back = false;
+    boot->reads = 0;
+    drive_configuration_advance(&boot->configuration);
+}
 
 void drive_boot_init(struct drive_boot *boot)
 {
@@ -19,12 +53,76 @@ void drive_boot_begin(struct drive_boot *boot, const struct config *config)
 {
     boot->config = *config;
     memset(&boot->trouble, 0, sizeof boot->trouble);
-    drive_boot_pause(boot, DRIVE_BOOT_PAUSE_US);
+    pause_for(boot, DRIVE_BOOT_PAUSE_US);
 }
+
+/* ---- What the answers of a drive mean: go on, read back, ask again, or give up ---- */
+
+static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
+{
+    boot->client.status = SDO_CLIENT_IDLE;
+    boot->reading_back = false;
+    if (!drive_configuration_refused(&boot->configuration, abort_code)) {
+        give_up(boot, abort_code, value);
+    }
+}
+
+static bool as_wanted(const struct drive_op *op, uint32_t value)
+{
+    return ((value ^ op->value) & op->mask) == 0u;
+}
+
+/* What a write should have made so, or what only the drive knows. */
+static void judge_read(struct drive_boot *boot)
+{
+    const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
+    if (as_wanted(&boot->op, value)) {
+        drive_properties_read(boot->configuration.facts, boot->op.fact, value);
+        advance(boot);
+    } else if (boot->reading_back) {
+        refused(boot, boot->refused_code, value);
+    } else if (++boot->reads < DRIVE_BOOT_READS) {
+        boot->client.status = SDO_CLIENT_IDLE;
+        boot->pause_us = DRIVE_BOOT_READ_AGAIN_US;
+    } else {
+        refused(boot, SDO_OK, value);
+    }
+}
+
+static void judge_refusal(struct drive_boot *boot, uint32_t abort_code)
+{
+    const bool missing = abort_code == SDO_ABORT_NO_OBJECT || abort_code == SDO_ABORT_NO_SUB;
+    if (boot->op.kind == DRIVE_OP_PREPARE || (boot->op.optional && missing)) {
+        advance(boot);
+    } else if (boot->op.kind == DRIVE_OP_WRITE && !missing && !boot->reading_back) {
+        boot->client.status = SDO_CLIENT_IDLE;
+        boot->reading_back = true;
+        boot->refused_code = abort_code;
+    } else {
+        refused(boot, boot->reading_back ? boot->refused_code : abort_code, 0);
+    }
+}
+
+/* The SDO transfer of the present object is over: decides what follows. */
+static void take_response(struct drive_boot *boot)
+{
+    if (boot->client.status == SDO_CLIENT_FAILED) {
+        give_up(boot, boot->client.abort_code, 0);
+    } else if (boot->client.status == SDO_CLIENT_REFUSED) {
+        judge_refusal(boot, boot->client.abort_code);
+    } else if (boot->op.kind == DRIVE_OP_READ || boot->reading_back) {
+        judge_read(boot);
+    } else {
+        advance(boot);
+    }
+}
+
+/* ---- One drive after the other ---- */
 
 static void begin_drive(struct drive_boot *boot)
 {
-    drive_plan_begin(&boot->plan, &boot->config, boot->axis, &boot->facts[boot->axis]);
+    drive_configuration_begin(&boot->configuration, &boot->config, boot->axis,
+                              &boot->facts[boot->axis]);
     boot->reading_back = false;
     boot->reads = 0;
 }
@@ -42,20 +140,20 @@ static void finish_drive(struct drive_boot *boot)
     }
 }
 
-static int begin_op(struct drive_boot *boot, struct can_msg *out)
+static bool begin_op(struct drive_boot *boot, struct can_msg *out)
 {
     const struct drive_op *op = &boot->op;
-    const uint8_t node = drive_boot_node(boot);
+    const uint8_t node = present_node(boot);
     if (op->kind == DRIVE_OP_NMT_PRE_OPERATIONAL) {
         nmt_master_command(NMT_ENTER_PRE_OPERATIONAL, node, out);
-        drive_boot_advance(boot);
-        return 1;
+        advance(boot);
+        return true;
     }
-    const int sent = op->kind == DRIVE_OP_READ || boot->reading_back
-                         ? sdo_client_read_number(&boot->client, node, op->index, op->sub, out)
-                         : sdo_client_write_number(&boot->client, node, op->index, op->sub,
-                                                   op->value, op->size, out);
-    return sent > 0 ? 1 : 0;
+    const int begun = op->kind == DRIVE_OP_READ || boot->reading_back
+                          ? sdo_client_read_number(&boot->client, node, op->index, op->sub, out)
+                          : sdo_client_write_number(&boot->client, node, op->index, op->sub,
+                                                    op->value, op->size, out);
+    return begun == 0;
 }
 
 static bool waits(struct drive_boot *boot, uint32_t elapsed_us)
@@ -64,35 +162,35 @@ static bool waits(struct drive_boot *boot, uint32_t elapsed_us)
     return boot->pause_us > 0u;
 }
 
-static int configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
+static bool configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
 {
     if (boot->client.status == SDO_CLIENT_BUSY) {
         return sdo_client_process(&boot->client, elapsed_us, out);
     }
     if (boot->client.status != SDO_CLIENT_IDLE) {
-        drive_boot_response(boot);
+        take_response(boot);
     }
     if (boot->phase != DRIVE_BOOT_CONFIGURE || waits(boot, elapsed_us)) {
-        return 0;
+        return false;
     }
-    while (!drive_plan_op(&boot->plan, &boot->op)) {
+    while (!drive_configuration_op(&boot->configuration, &boot->op)) {
         finish_drive(boot);
         if (boot->phase != DRIVE_BOOT_CONFIGURE) {
-            return 0;
+            return false;
         }
     }
     return begin_op(boot, out);
 }
 
-static int start_next(struct drive_boot *boot, struct can_msg *out)
+static bool start_next(struct drive_boot *boot, struct can_msg *out)
 {
-    nmt_master_command(NMT_START, drive_boot_node(boot), out);
+    nmt_master_command(NMT_START, present_node(boot), out);
     boot->axis++;
     if (boot->axis == boot->config.axis_count) {
         boot->phase = DRIVE_BOOT_DONE;
         memset(&boot->trouble, 0, sizeof boot->trouble);
     }
-    return 1;
+    return true;
 }
 
 /* Two axes at one node, or one at the controller's own: nothing may be sent there. */
@@ -112,7 +210,7 @@ static bool nodes_clash(struct drive_boot *boot)
             boot->axis = i;
             boot->op.index = AXIS_NODE;
             boot->op.sub = (uint8_t)(i + 1u);
-            drive_boot_give_up(boot, SDO_ABORT_INCOMPATIBLE, drive_boot_node(boot));
+            give_up(boot, SDO_ABORT_INCOMPATIBLE, present_node(boot));
             return true;
         }
     }
@@ -130,23 +228,23 @@ static void begin_attempt(struct drive_boot *boot)
     begin_drive(boot);
 }
 
-int drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out)
+bool drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out)
 {
-    return boot->phase == DRIVE_BOOT_CONFIGURE ? sdo_client_receive(&boot->client, in, out) : 0;
+    return boot->phase == DRIVE_BOOT_CONFIGURE && sdo_client_receive(&boot->client, in, out);
 }
 
-int drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
+bool drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
 {
     if (boot->phase == DRIVE_BOOT_PAUSE && !waits(boot, elapsed_us)) {
         begin_attempt(boot);
     }
     if (boot->phase == DRIVE_BOOT_CONFIGURE) {
-        const int sent = configure(boot, elapsed_us, out);
-        if (sent != 0 || boot->phase != DRIVE_BOOT_START) {
+        const bool sent = configure(boot, elapsed_us, out);
+        if (sent || boot->phase != DRIVE_BOOT_START) {
             return sent;
         }
     }
-    return boot->phase == DRIVE_BOOT_START ? start_next(boot, out) : 0;
+    return boot->phase == DRIVE_BOOT_START && start_next(boot, out);
 }
 
 void drive_boot_silent(struct drive_boot *boot, uint8_t node)

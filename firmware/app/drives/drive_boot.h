@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_boot: finds the drives, configures them by SDO (drive_plan) and starts them (NMT), one after
+ * drive_boot: finds the drives, configures them by SDO (drive_configuration) and starts them (NMT), one after
  * the other, and begins again from the first when one does not answer or refuses.
  *
  * A write that is refused is fine when the object reads back as wanted: so a drive with a fixed
@@ -14,7 +14,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drives/drive_plan.h"
+#include "app/drives/drive_configuration.h"
 #include "app/drives/drive_properties.h"
 #include "app/machine/config.h"
 #include "canopen/sdo_client.h"
@@ -28,7 +28,7 @@
 enum drive_boot_phase {
     DRIVE_BOOT_IDLE,
     DRIVE_BOOT_PAUSE,     /* before the first drive, or before the next attempt */
-    DRIVE_BOOT_CONFIGURE, /* the drive of `plan` */
+    DRIVE_BOOT_CONFIGURE, /* the drive of `configuration` */
     DRIVE_BOOT_START,     /* all are configured; `axis` is to be started next */
     DRIVE_BOOT_DONE,
 };
@@ -44,7 +44,7 @@ struct drive_trouble {
 struct drive_boot {
     struct sdo_client client;
     struct config config;
-    struct drive_plan plan;
+    struct drive_configuration configuration;
     struct drive_op op;
     struct drive_properties facts[AXES_MAX]; /* of the drives configured so far */
     struct drive_trouble trouble;
@@ -62,11 +62,11 @@ void drive_boot_init(struct drive_boot *boot);
 /* Begins, also in the middle of an attempt. */
 void drive_boot_begin(struct drive_boot *boot, const struct config *config);
 
-/* Takes a frame; others than SDO answers are ignored. Returns 1 when *out is to be sent, else 0. */
-int drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out);
+/* Takes a frame; others than SDO answers are ignored. Returns true when *out is to be sent. */
+bool drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out);
 
-/* Lets time pass. Returns 1 when *out is to be sent: then call again with elapsed_us 0; else 0. */
-int drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out);
+/* Lets time pass. Returns true when *out is to be sent: then call again with elapsed_us 0. */
+bool drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out);
 
 /* Names a drive that was configured and started but gives no process data: trouble of object 0 until
  * the next attempt begins; node 0: no trouble. Only between attempts; else nothing happens. */

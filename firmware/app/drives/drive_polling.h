@@ -21,18 +21,18 @@
 struct drive_polling {
     struct sdo_client client;
     uint32_t pause_us;
-    uint8_t turn; /* counts axes and their two objects */
+    uint8_t poll_index; /* counts axes and their two objects */
 };
 
-void drive_polling_init(struct drive_polling *look);
+void drive_polling_init(struct drive_polling *polling);
 
-/* Takes a frame; others than SDO answers are ignored. 1 when *out is to be sent, else 0. */
-int drive_polling_receive(struct drive_polling *look, const struct can_msg *in,
-                          struct can_msg *out);
+/* Takes a frame; others than SDO answers are ignored. True when *out is to be sent. */
+bool drive_polling_receive(struct drive_polling *polling, const struct can_msg *in,
+                           struct can_msg *out);
 
-/* Lets time pass. `allowed`: nobody else uses the SDO channels of the drives. 1 when *out is to be sent, else 0. */
-int drive_polling_process(struct drive_polling *look, struct machine *machine,
-                          const struct drive_properties *facts, bool allowed, uint32_t elapsed_us,
-                          struct can_msg *out);
+/* Lets time pass. `allowed`: nobody else uses the SDO channels of the drives. True when *out is to be sent. */
+bool drive_polling_process(struct drive_polling *polling, struct machine *machine,
+                           const struct drive_properties *facts, bool allowed, uint32_t elapsed_us,
+                           struct can_msg *out);
 
 #endif

@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-#include "app/drives/homing_private.h"
 #include "canopen/cia402.h"
 #include "port/port.h"
 
@@ -17,6 +16,93 @@ bool homing_busy(const struct homing *homing)
 {
     return homing->phase != HOMING_IDLE;
 }
+
+/* ---- One drive on its way: what its statusword says, and how long it may take ---- */
+
+uint32_t homing_time_s(const struct config *config, uint8_t axis)
+{
+    const struct config_axis *settings = &config->axis[axis];
+    const uint32_t travel_counts =
+        (uint32_t)config->travel_max_counts[axis] - (uint32_t)config->travel_min_counts[axis];
+    const uint64_t time_s = (uint64_t)travel_counts / settings->homing_speed_towards_counts_s +
+                            travel_counts / settings->homing_speed_away_counts_s + HOMING_SPARE_S;
+    return time_s < HOMING_MAX_S ? (uint32_t)time_s : HOMING_MAX_S;
+}
+
+/* The next phase, which begins now. */
+static void enter(struct homing *homing, const struct machine *machine, enum homing_phase phase)
+{
+    homing->phase = phase;
+    homing->began_syncs = machine->statistics.syncs;
+    homing_mode_begin(&homing->mode);
+}
+
+/* True when the phase has lasted longer. Under the lock. */
+static bool over(const struct homing *homing, const struct machine *machine, uint64_t time_us)
+{
+    const uint32_t syncs = machine->statistics.syncs - homing->began_syncs;
+    return (uint64_t)syncs * machine->config.period_us > time_us;
+}
+
+/* CiA 402-2: bit 13 error, bits 12 and 10 together: attained. Returns a fault code or 0. */
+static uint16_t judge_move(struct homing *homing, struct machine *machine)
+{
+    struct axis *axis = &machine->axes[homing->axis];
+    const uint16_t attained = CIA402_STATUS_HOMING_ATTAINED | CIA402_STATUS_TARGET_REACHED;
+    const uint64_t time_us = UINT64_C(1000000) * homing_time_s(&machine->config, homing->axis);
+    if (machine->statistics.syncs - homing->began_syncs < HOMING_SYNCS_BEFORE_ANSWER) {
+        return 0;
+    }
+    if ((axis->statusword & CIA402_STATUS_HOMING_ERROR) != 0u) {
+        return FAULT_HOMING_FAILED;
+    }
+    if ((axis->statusword & attained) == attained) {
+        axis->homed = true;
+        axis->control_extra = 0;
+        axis->goal = CIA402_GOAL_OFF;
+        enter(homing, machine, HOMING_DISABLE);
+        return 0;
+    }
+    return over(homing, machine, time_us) ? FAULT_HOMING_LATE : 0u;
+}
+
+static uint16_t step_enable(struct homing *homing, struct machine *machine)
+{
+    struct axis *axis = &machine->axes[homing->axis];
+    axis->goal = CIA402_GOAL_ENABLED;
+    if (axis_enabled(axis)) {
+        axis->control_extra = CIA402_CONTROL_START_HOMING;
+        axis->homed = false; /* from here on the drive may have moved its zero */
+        enter(homing, machine, HOMING_MOVE);
+    }
+    return over(homing, machine, HOMING_SWITCH_US) ? FAULT_NOT_ENABLED : 0u;
+}
+
+/* Until the drive is off; then to the phase `next`. */
+static uint16_t step_off(struct homing *homing, struct machine *machine, enum homing_phase next)
+{
+    if (cia402_master_reached(CIA402_GOAL_OFF, machine->axes[homing->axis].statusword)) {
+        enter(homing, machine, next);
+    }
+    return over(homing, machine, HOMING_SWITCH_US) ? FAULT_HOMING_LATE : 0u;
+}
+
+/* In the phases OFF, ENABLE, MOVE and DISABLE: what the statusword leads to. A fault code, or 0. Under the lock. */
+static uint16_t follow_drive(struct homing *homing, struct machine *machine)
+{
+    switch (homing->phase) {
+    case HOMING_ENABLE:
+        return step_enable(homing, machine);
+    case HOMING_MOVE:
+        return judge_move(homing, machine);
+    case HOMING_OFF:
+        return step_off(homing, machine, HOMING_MODE);
+    default:
+        return step_off(homing, machine, HOMING_MODE_BACK);
+    }
+}
+
+/* ---- From axis to axis ---- */
 
 static bool wanted(const struct machine *machine, uint8_t axis)
 {
@@ -57,7 +143,7 @@ enum machine_refusal homing_begin(struct homing *homing, struct machine *machine
     if (refusal == MACHINE_ACCEPTED) {
         homing_init(homing);
         homing->axis = next_axis(machine, 0);
-        homing_enter(homing, machine, HOMING_OFF);
+        enter(homing, machine, HOMING_OFF);
     }
     port_unlock();
     return refusal;
@@ -76,7 +162,7 @@ static void step_drive(struct homing *homing, struct machine *machine)
 {
     port_lock();
     const uint16_t statusword = machine->axes[homing->axis].statusword;
-    const uint16_t code = homing_drive_step(homing, machine);
+    const uint16_t code = follow_drive(homing, machine);
     port_unlock();
     if (code != 0u) {
         fail(homing, machine, code, statusword);
@@ -87,11 +173,11 @@ static void mode_done(struct homing *homing, struct machine *machine)
 {
     port_lock();
     if (homing->phase == HOMING_MODE) {
-        homing_enter(homing, machine, HOMING_ENABLE);
+        enter(homing, machine, HOMING_ENABLE);
     } else {
         homing->axis = next_axis(machine, (uint8_t)(homing->axis + 1u));
         if (homing->axis < machine->config.axis_count) {
-            homing_enter(homing, machine, HOMING_OFF);
+            enter(homing, machine, HOMING_OFF);
         } else {
             homing->phase = HOMING_IDLE;
             machine_end_homing(machine);
@@ -108,19 +194,19 @@ static bool still_homing(const struct machine *machine)
     return result;
 }
 
-int homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out)
+bool homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out)
 {
-    return homing_busy(homing) ? sdo_client_receive(&homing->mode.client, in, out) : 0;
+    return homing_busy(homing) && sdo_client_receive(&homing->mode.client, in, out);
 }
 
 /* Brings the drive into a mode. */
-static int step_mode(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
-                     struct can_msg *out)
+static bool step_mode(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
+                      struct can_msg *out)
 {
     const uint8_t mode = homing->phase == HOMING_MODE ? CIA402_MODE_HOMING : CIA402_MODE_CSP;
     const uint8_t node = machine->config.node[homing->axis];
     enum homing_mode_result result = HOMING_MODE_PENDING;
-    const int sent = homing_mode_process(&homing->mode, node, mode, elapsed_us, out, &result);
+    const bool sent = homing_mode_process(&homing->mode, node, mode, elapsed_us, out, &result);
     if (result == HOMING_MODE_SET) {
         mode_done(homing, machine);
     } else if (result == HOMING_MODE_REFUSED) {
@@ -129,8 +215,8 @@ static int step_mode(struct homing *homing, struct machine *machine, uint32_t el
     return sent;
 }
 
-int homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
-                   struct can_msg *out)
+bool homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
+                    struct can_msg *out)
 {
     if (homing_busy(homing) && !still_homing(machine)) {
         homing->phase = HOMING_IDLE;
@@ -141,5 +227,5 @@ int homing_process(struct homing *homing, struct machine *machine, uint32_t elap
     if (homing_busy(homing)) {
         step_drive(homing, machine);
     }
-    return 0;
+    return false;
 }

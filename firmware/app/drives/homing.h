@@ -58,12 +58,12 @@ enum machine_refusal homing_begin(struct homing *homing, struct machine *machine
 /* True while it uses the SDO channels of the drives. */
 bool homing_busy(const struct homing *homing);
 
-/* Takes a frame; others than SDO answers are ignored. 1 when *out is to be sent, else 0. */
-int homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out);
+/* Takes a frame; others than SDO answers are ignored. True when *out is to be sent. */
+bool homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out);
 
-/* Lets time pass. 1 when *out is to be sent: then call again with elapsed_us 0; else 0. */
-int homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
-                   struct can_msg *out);
+/* Lets time pass. True when *out is to be sent: then call again with elapsed_us 0. */
+bool homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
+                    struct can_msg *out);
 
 /* How long the drive may seek its zero, s: the whole travel at both speeds, and some. Pure. */
 uint32_t homing_time_s(const struct config *config, uint8_t axis);

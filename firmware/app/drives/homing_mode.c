@@ -20,14 +20,14 @@ void homing_mode_begin(struct homing_mode *mode)
     mode->client.status = SDO_CLIENT_IDLE;
 }
 
-static int ask(struct homing_mode *mode, uint8_t node, uint8_t wanted, struct can_msg *out)
+static bool ask(struct homing_mode *mode, uint8_t node, uint8_t wanted, struct can_msg *out)
 {
     struct sdo_client *client = &mode->client;
-    const int sent =
+    const int begun =
         mode->checking
             ? sdo_client_read_number(client, node, MODE_OF_OPERATION_DISPLAY, 0, out)
             : sdo_client_write_number(client, node, MODE_OF_OPERATION, 0, wanted, 1, out);
-    return sent > 0 ? 1 : 0;
+    return begun == 0;
 }
 
 /* The mode has been written, or read. */
@@ -53,8 +53,8 @@ static bool waits(struct homing_mode *mode, uint32_t elapsed_us)
     return mode->pause_us > 0u;
 }
 
-int homing_mode_process(struct homing_mode *mode, uint8_t node, uint8_t wanted, uint32_t elapsed_us,
-                        struct can_msg *out, enum homing_mode_result *result)
+bool homing_mode_process(struct homing_mode *mode, uint8_t node, uint8_t wanted,
+                         uint32_t elapsed_us, struct can_msg *out, enum homing_mode_result *result)
 {
     *result = HOMING_MODE_PENDING;
     switch (mode->client.status) {
@@ -73,7 +73,7 @@ int homing_mode_process(struct homing_mode *mode, uint8_t node, uint8_t wanted, 
         break;
     }
     if (*result != HOMING_MODE_PENDING || waits(mode, elapsed_us)) {
-        return 0;
+        return false;
     }
     return ask(mode, node, wanted, out);
 }

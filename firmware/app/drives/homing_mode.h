@@ -40,8 +40,8 @@ void homing_mode_init(struct homing_mode *mode);
 /* Another mode, or another drive: a transfer that is under way is forgotten. */
 void homing_mode_begin(struct homing_mode *mode);
 
-/* Lets time pass. Returns 1 when *out is to be sent, else 0. */
-int homing_mode_process(struct homing_mode *mode, uint8_t node, uint8_t wanted, uint32_t elapsed_us,
-                        struct can_msg *out, enum homing_mode_result *result);
+/* Lets time pass. Returns true when *out is to be sent. */
+bool homing_mode_process(struct homing_mode *mode, uint8_t node, uint8_t wanted,
+                         uint32_t elapsed_us, struct can_msg *out, enum homing_mode_result *result);
 
 #endif

@@ -9,6 +9,31 @@
 #include "core/kernel.h"
 #include "core/qmath.h"
 
+/* Objects of the configuration, beside those in the table of axis fields. */
+enum {
+    PERIOD = 0x1006,
+    CONFIGURATION = 0x2004,
+    NODE = 0x2005,
+    TRAVEL_MIN = 0x2006,
+    TRAVEL_MAX = 0x2007
+};
+
+/* Sub-indices of CONFIGURATION. */
+enum {
+    SUB_AXIS_COUNT = 1,
+    SUB_FEED_LIMIT = 2,
+    SUB_ACCELERATION_LIMIT = 3,
+    SUB_JERK_LIMIT = 4,
+    SUB_KERNEL = 5,
+    SUB_START_TOLERANCE = 6,
+    SUB_COUNTS_PER_MM = 7,
+    SUB_ANSWER_WAIT = 8,
+    SUB_MISSED_MAX = 9,
+    SUB_SETPOINT_TIMEOUT = 10,
+    SUB_FEEDFORWARD = 11,
+    SUB_STOP_TIME = 12,
+};
+
 struct axis_field {
     uint16_t index;
     uint16_t offset; /* in struct config_axis */
@@ -74,7 +99,7 @@ static bool is_axis_field(uint16_t index)
 
 static bool is_by_axis(uint16_t index)
 {
-    return (index >= 0x2005 && index <= 0x2007) || is_axis_field(index);
+    return index == NODE || index == TRAVEL_MIN || index == TRAVEL_MAX || is_axis_field(index);
 }
 
 /* What axes beyond the last one hold is left over from another machine and means nothing. */
@@ -122,25 +147,25 @@ static void read_window(struct config *config, uint8_t axis)
 
 void config_read(struct config *config, const struct od *od)
 {
-    config->period_us = (uint32_t)number(od, 0x1006, 0);
+    config->period_us = (uint32_t)number(od, PERIOD, 0);
     config->own_node = (uint8_t)(number(od, 0x1200, 1) & NODE_ID_MAX);
-    config->axis_count = (uint8_t)number(od, 0x2004, 1);
-    config->feed_limit_um_s = (uint32_t)number(od, 0x2004, 2);
-    config->acceleration_limit_um_s2 = (uint32_t)number(od, 0x2004, 3);
-    config->jerk_limit_mm_s3 = (uint32_t)number(od, 0x2004, 4);
-    config->kernel = (uint8_t)number(od, 0x2004, 5);
-    config->start_tolerance_counts = (uint32_t)number(od, 0x2004, 6);
-    config->counts_per_mm = (uint32_t)number(od, 0x2004, 7);
-    config->answer_wait_ms = (uint16_t)number(od, 0x2004, 8);
-    config->missed_max = (uint8_t)number(od, 0x2004, 9);
-    config->setpoint_timeout_ms = (uint16_t)number(od, 0x2004, 10);
-    config->feedforward = (uint8_t)number(od, 0x2004, 11);
-    config->stop_time_ms = (uint16_t)number(od, 0x2004, 12);
+    config->axis_count = (uint8_t)number(od, CONFIGURATION, SUB_AXIS_COUNT);
+    config->feed_limit_um_s = (uint32_t)number(od, CONFIGURATION, SUB_FEED_LIMIT);
+    config->acceleration_limit_um_s2 = (uint32_t)number(od, CONFIGURATION, SUB_ACCELERATION_LIMIT);
+    config->jerk_limit_mm_s3 = (uint32_t)number(od, CONFIGURATION, SUB_JERK_LIMIT);
+    config->kernel = (uint8_t)number(od, CONFIGURATION, SUB_KERNEL);
+    config->start_tolerance_counts = (uint32_t)number(od, CONFIGURATION, SUB_START_TOLERANCE);
+    config->counts_per_mm = (uint32_t)number(od, CONFIGURATION, SUB_COUNTS_PER_MM);
+    config->answer_wait_ms = (uint16_t)number(od, CONFIGURATION, SUB_ANSWER_WAIT);
+    config->missed_max = (uint8_t)number(od, CONFIGURATION, SUB_MISSED_MAX);
+    config->setpoint_timeout_ms = (uint16_t)number(od, CONFIGURATION, SUB_SETPOINT_TIMEOUT);
+    config->feedforward = (uint8_t)number(od, CONFIGURATION, SUB_FEEDFORWARD);
+    config->stop_time_ms = (uint16_t)number(od, CONFIGURATION, SUB_STOP_TIME);
     for (uint8_t i = 0; i < AXES_MAX; ++i) {
         const uint8_t sub = (uint8_t)(i + 1u);
-        config->node[i] = (uint8_t)number(od, 0x2005, sub);
-        config->travel_min_counts[i] = (int32_t)number(od, 0x2006, sub);
-        config->travel_max_counts[i] = (int32_t)number(od, 0x2007, sub);
+        config->node[i] = (uint8_t)number(od, NODE, sub);
+        config->travel_min_counts[i] = (int32_t)number(od, TRAVEL_MIN, sub);
+        config->travel_max_counts[i] = (int32_t)number(od, TRAVEL_MAX, sub);
         read_axis(&config->axis[i], od, sub);
         read_window(config, i);
     }
@@ -149,13 +174,13 @@ void config_read(struct config *config, const struct od *od)
 
 bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value)
 {
-    if (index == 0x1006) {
+    if (index == PERIOD) {
         return value == 1000u || value == 2000u || value == 4000u || value == 8000u;
     }
-    if (index == 0x2004 && sub == 5) {
+    if (index == CONFIGURATION && sub == SUB_KERNEL) {
         return kernel_find((uint32_t)value) != NULL;
     }
-    if (index == 0x2004 && sub == 7) {
+    if (index == CONFIGURATION && sub == SUB_COUNTS_PER_MM) {
         return value >= 1u && value <= CONFIG_COUNTS_PER_MM_MAX;
     }
     return true;
@@ -163,8 +188,8 @@ bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value)
 
 bool config_concerns_drives(uint16_t index, uint8_t sub)
 {
-    if (index == 0x2004) {
-        return sub == 1 || sub == 10 || sub == 11;
+    if (index == CONFIGURATION) {
+        return sub == SUB_AXIS_COUNT || sub == SUB_SETPOINT_TIMEOUT || sub == SUB_FEEDFORWARD;
     }
     const bool is_feedforward = index >= 0x2018 && index <= 0x201A;
     const bool is_limit = index >= 0x2030 && index <= 0x2032;
@@ -173,7 +198,7 @@ bool config_concerns_drives(uint16_t index, uint8_t sub)
 
 bool config_contains(uint16_t index)
 {
-    return index == 0x1006 || index == 0x2004 || is_by_axis(index);
+    return index == PERIOD || index == CONFIGURATION || is_by_axis(index);
 }
 
 bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis)

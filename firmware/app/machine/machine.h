@@ -9,9 +9,8 @@
  *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
  * The state changes in two places only: in the requests (mainline, under the lock; machine_requests.c) and in the
- * timer's functions (machine_tick.c, machine_supervise.c, machine_fault.c), and where a fault is raised (machine_raise.c).
- * The whole struct is guarded by the port's lock. Who uses whom: tick -> fault -> raise -> drives -> machine, and supervise and
- * requests -> raise.
+ * timer's functions (machine_tick.c, machine_supervise.c, machine_fault.c), and where a fault is raised (machine_fault.c).
+ * The whole struct is guarded by the port's lock. Who uses whom: tick, supervise and requests -> fault -> drives -> machine.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H

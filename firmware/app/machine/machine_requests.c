@@ -3,7 +3,7 @@
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"
-#include "app/machine/machine_raise.h"
+#include "app/machine/machine_fault.h"
 
 /* What keeps most requests from being looked at any further. */
 static enum machine_refusal not_available(const struct machine *machine)

@@ -3,7 +3,7 @@
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"
-#include "app/machine/machine_raise.h"
+#include "app/machine/machine_fault.h"
 
 static uint16_t trouble_of(const struct axis *axis)
 {

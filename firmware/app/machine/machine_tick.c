@@ -4,7 +4,6 @@
 
 #include "app/machine/machine_drives.h"
 #include "app/machine/machine_fault.h"
-#include "app/machine/machine_raise.h"
 
 static uint8_t silent_node(const struct machine *machine)
 {

@@ -203,13 +203,13 @@ int can_socket_send(struct can_socket *socket, const struct can_msg *message)
     return errno == ENOBUFS ? -EAGAIN : -errno;
 }
 
-static int plain_frame(const struct can_frame *frame)
+static bool plain_frame(const struct can_frame *frame)
 {
     return (frame->can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) == 0 &&
            frame->can_dlc <= CAN_MAX_DLEN;
 }
 
-static int passes(const struct can_socket *socket, const struct can_msg *message)
+static bool passes(const struct can_socket *socket, const struct can_msg *message)
 {
     return socket->filter_count == 0u ||
            can_match_any(socket->filters, socket->filter_count, message);
@@ -224,8 +224,8 @@ static void convert(struct can_msg *message, const struct can_frame *frame)
 }
 
 /* Whether it is one that this socket has sent. */
-static int is_own(const struct can_socket *socket, const struct mmsghdr *header,
-                  const struct local_bus_frame *frame)
+static bool is_own(const struct can_socket *socket, const struct mmsghdr *header,
+                   const struct local_bus_frame *frame)
 {
     return socket->local ? (frame->frame.__res0 & LOCAL_BUS_OWN) != 0u
                          : (header->msg_hdr.msg_flags & MSG_CONFIRM) != 0;
@@ -253,7 +253,7 @@ static int sort_out(struct can_socket *socket, const struct mmsghdr *headers,
 }
 
 /* An empty message is how a local bus ends; what came before it is still given. */
-static int at_end(const struct mmsghdr *headers, int got)
+static bool at_end(const struct mmsghdr *headers, int got)
 {
     return got > 0 && headers[got - 1].msg_len == 0u;
 }

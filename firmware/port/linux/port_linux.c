@@ -212,6 +212,10 @@ void port_wait(uint32_t timeout_us)
     }
 }
 
+void port_progress(void)
+{
+}
+
 void port_wake(void)
 {
     const uint64_t one = 1;

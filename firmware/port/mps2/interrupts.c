@@ -135,6 +135,10 @@ void port_wait(uint32_t timeout_us)
     self.woken = false;
 }
 
+void port_progress(void)
+{
+}
+
 void port_wake(void)
 {
     self.woken = true;

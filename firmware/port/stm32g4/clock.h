@@ -3,7 +3,7 @@
  * clock: 170 MHz from the board's 24 MHz crystal.
  *
  *     HSE 24 MHz --+-- / 6 * 85 / 2 (VCO 340 MHz) --> SYSCLK = HCLK = PCLK1 = PCLK2 = timers, 170 MHz
- *                  '-- FDCAN1 (fdcan_timing.h)
+ *                  '-- FDCAN1 (fdcan.h)
  *     HSI 16 MHz ----> LPUART1, so that the console speaks where the crystal does not
  *
  * The crystal rather than the internal oscillator: CAN needs it, and the ticks are as exact as the bus. 170 MHz is the

@@ -14,6 +14,17 @@
  * sending is refused, and the chip is told to come back, which it does after 129 times 11 recessive bits (1.4 ms at 1 Mbit/s): without
  * limit and without help, as CiA 301 leaves it to the node. The application sees a port that refuses its frames.
  *
+ * Bit rates. FDCAN1 is clocked by the board's 24 MHz crystal (HSE) itself, not by the PLL. A sample point at 87.5 % = 7/8
+ * is exact where the time quanta of a bit are a multiple of 8:
+ *
+ *     crystal   24 MHz / 1 Mbit/s = 24 quanta: 1 + 20 before the sample, 3 after it; 21/24 = 87.5 %
+ *     PLL       its 340 MHz give 170, 85, 56.7 or 42.5 MHz here: 170 or 85 quanta, no multiple of 8
+ *     PCLK1     170 MHz, the same
+ *
+ * The crystal serves 500, 250 and 125 kbit/s with the same 24 quanta and prescalers 2, 4, 8, and has no jitter of a PLL. At 1 Mbit/s
+ * the bits of two nodes may differ by 0.48 % (3 quanta after the sample, jump width 3); a crystal is good for 0.01 %,
+ * the chip's own RC oscillator (1 %) is not good enough.
+ *
  * Pins, clock and interrupt lines are the caller's business. "Any context": interrupts of priority CPU_PRIORITY_TICK and
  * lower, and the mainline; the functions hold these off where they must.
  */
@@ -26,7 +37,17 @@
 
 #include "can/can_frame.h"
 #include "can/can_match.h"
-#include "port/stm32g4/fdcan_queue.h"
+
+/* A tick has at most 13 frames (SYNC, position and velocity of six axes). Not many more, so that a bus that comes back
+ * is not given old setpoints for long. */
+#define FDCAN_QUEUE_SIZE 16u
+
+/* Frames of one context that wait for the transmitter, in order. */
+struct fdcan_queue {
+    uint32_t head; /* frames ever put in; wraps */
+    uint32_t tail; /* frames ever taken out */
+    struct can_msg frames[FDCAN_QUEUE_SIZE];
+};
 
 /* Since they were last taken. */
 struct fdcan_events {
@@ -46,7 +67,7 @@ struct fdcan {
 
 enum fdcan_sender { FDCAN_URGENT, FDCAN_ORDINARY };
 
-/* Configures the chip and stays off the bus. False: a bit rate it cannot keep, or the chip does not answer (no clock). Mainline. */
+/* Configures the chip and stays off the bus. False: not one of 1000000, 500000, 250000 and 125000 bit/s, or the chip does not answer (no clock). Mainline. */
 bool fdcan_begin(struct fdcan *can, uint32_t bits_s);
 
 /* Between begin and start. False: more filters than the chip has (28). No filter: nothing passes. */

@@ -202,10 +202,15 @@ static void tell_events(uint32_t now_us)
     tell("frames came too fast, lost", events.lost);
 }
 
+void port_progress(void)
+{
+    watchdog_feed(irq_ticks());
+}
+
 void port_wait(uint32_t timeout_us)
 {
     const uint32_t began_us = port_time_us();
-    watchdog_feed(irq_ticks());
+    port_progress();
     tell_events(began_us);
     while (!self.awake && port_time_us() - began_us < timeout_us) {
         if (self.started) {

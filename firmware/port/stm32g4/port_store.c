@@ -2,8 +2,6 @@
 /* The store of port.h: the banks of flash_store, with the watchdog fed between. */
 #include "port/port.h"
 #include "port/stm32g4/flash_store.h"
-#include "port/stm32g4/irq.h"
-#include "port/stm32g4/watchdog.h"
 
 uint32_t port_store_size(unsigned bank)
 {
@@ -13,13 +11,13 @@ uint32_t port_store_size(unsigned bank)
 /* The mainline may be in the store for a second or two without a wait between. */
 int port_store_erase(unsigned bank)
 {
-    watchdog_feed(irq_ticks());
+    port_progress();
     return flash_store_erase(bank) ? 0 : PORT_ERR_STORE;
 }
 
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
 {
-    watchdog_feed(irq_ticks());
+    port_progress();
     return flash_store_write(bank, offset, data, size) ? 0 : PORT_ERR_STORE;
 }
 

@@ -2,7 +2,8 @@
 /*
  * watchdog: the independent one, on its own oscillator: restarts the chip 4 s (3.8 to 4.3 s) after it was fed last. Cannot be stopped.
  *
- * It is fed from the mainline, and only when ticks have gone on since the last time: so it bites when either of them stands still.
+ * It is fed from the mainline, in each round and at each step of longer work (port_progress), and only when ticks have gone on
+ * since the last time: so it bites when either of them stands still.
  * The drives notice a silent controller much sooner, by missing SYNCs and heartbeats; this is for the way back.
  */
 #ifndef PORT_STM32G4_WATCHDOG_H

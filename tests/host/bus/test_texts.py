@@ -166,7 +166,7 @@ def test_boot_trouble_in_words() -> None:
 
 
 def test_every_object_that_boot_touches_has_words() -> None:
-    rows = (FIRMWARE / "app" / "drives" / "drive_rows.c").read_text()
+    rows = (FIRMWARE / "app" / "drives" / "drive_configuration.c").read_text()
     objects = {int(n, 16) for n in re.findall(r"ROW_\w+, 0x([0-9A-F]{4}),", rows)}
     assert len(objects) > 20
     for index in objects:

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * drive_configuration: the configuration of one drive as a list of operations on its dictionary, in order:
+ * CiA 301 and CiA 402-2, docs/reference/protocol.md section 2. The table is in drive_configuration.c; one row for each object,
+ * or PDO.
+ *
+ *     drive_configuration_begin(&configuration, &config, axis, &facts);
+ *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }
+ *
+ * What the drive says of itself on the way (facts) decides what follows. Mainline.
+ */
+#ifndef APP_DRIVES_DRIVE_CONFIGURATION_H
+#define APP_DRIVES_DRIVE_CONFIGURATION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/drives/drive_properties.h"
+#include "app/machine/config.h"
+
+/* The drive's heartbeat, and for how long it may miss the controller's (sent each 100 ms; checking a
+ * long program can keep the mainline from it for a second). */
+#define DRIVE_HEARTBEAT_MS         100u
+#define DRIVE_CONTROLLER_SILENT_MS 2000u
+
+/* Kinds of operation on a drive's dictionary. */
+enum drive_op_kind {
+    DRIVE_OP_NMT_PRE_OPERATIONAL, /* process data off while parameters change */
+    DRIVE_OP_READ,                /* `masked` bits must be those of `value`; learns `fact` */
+    DRIVE_OP_WRITE,               /* refused: fine when it reads back so already */
+    DRIVE_OP_PREPARE,             /* a write that may be refused: a later one tells */
+};
+
+struct drive_op {
+    enum drive_op_kind kind;
+    uint16_t index;
+    uint8_t sub;
+    uint8_t size;   /* bytes of a write */
+    bool optional;  /* a drive without the object is fine */
+    uint8_t fact;   /* enum drive_fact: what a read teaches */
+    uint32_t value; /* to write, to expect */
+    uint32_t mask;  /* what counts when it is read */
+};
+
+struct drive_configuration {
+    const struct config *config;
+    struct drive_properties *facts;
+    uint8_t axis;
+    uint8_t row;
+    uint8_t item; /* of the row, when it is a PDO */
+};
+
+/* `config` and `facts` must stay; the facts are forgotten. */
+void drive_configuration_begin(struct drive_configuration *configuration,
+                               const struct config *config, uint8_t axis,
+                               struct drive_properties *facts);
+
+/* The present operation; false at the end. */
+bool drive_configuration_op(struct drive_configuration *configuration, struct drive_op *op);
+
+/* The present operation is done; a read has brought `value`. */
+void drive_configuration_advance(struct drive_configuration *configuration);
+
+/* The drive refuses the present operation with the abort code: true when the configuration can do without it, and has gone on. */
+bool drive_configuration_refused(struct drive_configuration *configuration, uint32_t abort_code);
+
+#endif

@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/objects_axis.h"
+
+#include "canopen/cob.h"
+#include "canopen/pdo_map.h"
+
+static const struct axis *axis_of(const struct controller *controller, const struct od_entry *entry)
+{
+    return &controller->machine.axes[entry->sub - 1u];
+}
+
+uint64_t object_read_statusword(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of(controller, entry)->statusword;
+}
+
+uint64_t object_read_position(struct controller *controller, const struct od_entry *entry)
+{
+    return (uint64_t)(int64_t)axis_of(controller, entry)->position_counts;
+}
+
+uint64_t object_read_error_code(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of(controller, entry)->error_code;
+}
+
+uint64_t object_read_target(struct controller *controller, const struct od_entry *entry)
+{
+    return (uint64_t)(int64_t)axis_of(controller, entry)->target_sent_counts;
+}
+
+uint64_t object_read_controlword(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of(controller, entry)->controlword;
+}
+
+uint64_t object_read_torque_offset(struct controller *controller, const struct od_entry *entry)
+{
+    return (uint64_t)(int64_t)axis_of(controller, entry)->torque_offset_permille;
+}
+
+uint64_t object_read_velocity_offset(struct controller *controller, const struct od_entry *entry)
+{
+    return (uint64_t)(int64_t)axis_of(controller, entry)->velocity_offset_counts_s;
+}
+
+uint64_t object_read_homed(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of(controller, entry)->homed ? 1u : 0u;
+}
+
+uint64_t object_read_inputs(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of(controller, entry)->digital_inputs;
+}
+
+uint64_t object_read_following_error(struct controller *controller, const struct od_entry *entry)
+{
+    return (uint64_t)(int64_t)axis_of(controller, entry)->following_error_counts;
+}
+
+uint64_t object_read_missed(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of(controller, entry)->answers.missed;
+}
+
+uint64_t object_read_drive_state(struct controller *controller, const struct od_entry *entry)
+{
+    const struct axis *axis = axis_of(controller, entry);
+    return axis->answers.present ? (uint64_t)axis->state + 1u : 0u;
+}
+
+uint64_t object_read_identity(struct controller *controller, const struct od_entry *entry)
+{
+    return controller->boot.facts[entry->sub - 1u].value[entry->index - 0x2027u];
+}
+
+/* ---- PDO parameters: 0x1400, 0x1800, 0x1A00 + i of axis i; 0x1806, 0x1A06 + i ---- */
+
+#define TORQUE_OFFSET   UINT32_C(0x202B0010) /* entries of a mapping, without the sub-index */
+#define VELOCITY_OFFSET UINT32_C(0x202C0020)
+
+static uint32_t pdo_axis(const struct od_entry *entry)
+{
+    return (entry->index & 0xFFu) % AXES_MAX;
+}
+
+static const struct axis *axis_of_pdo(const struct controller *controller,
+                                      const struct od_entry *entry)
+{
+    return &controller->machine.axes[pdo_axis(entry)];
+}
+
+static uint32_t cob_id(const struct controller *controller, const struct od_entry *entry,
+                       uint32_t base, bool on)
+{
+    const struct machine *machine = &controller->machine;
+    const uint32_t axis = pdo_axis(entry);
+    const uint32_t off = on && axis < machine->config.axis_count ? 0u : PDO_MAP_OFF;
+    return off | (base + machine->axes[axis].node);
+}
+
+static uint32_t mapped(uint32_t object, const struct od_entry *entry, bool is)
+{
+    return is ? object | ((pdo_axis(entry) + 1u) << 8) : 0u;
+}
+
+uint64_t object_read_actual_cob_id(struct controller *controller, const struct od_entry *entry)
+{
+    return cob_id(controller, entry, COB_TPDO1, true);
+}
+
+uint64_t object_read_setpoint_cob_id(struct controller *controller, const struct od_entry *entry)
+{
+    return cob_id(controller, entry, COB_RPDO1, true);
+}
+
+uint64_t object_read_velocity_cob_id(struct controller *controller, const struct od_entry *entry)
+{
+    return cob_id(controller, entry, COB_RPDO2, axis_of_pdo(controller, entry)->velocity_mapped);
+}
+
+uint64_t object_read_setpoint_count(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of_pdo(controller, entry)->torque_mapped ? 3u : 2u;
+}
+
+uint64_t object_read_setpoint_torque(struct controller *controller, const struct od_entry *entry)
+{
+    return mapped(TORQUE_OFFSET, entry, axis_of_pdo(controller, entry)->torque_mapped);
+}
+
+uint64_t object_read_velocity_count(struct controller *controller, const struct od_entry *entry)
+{
+    return axis_of_pdo(controller, entry)->velocity_mapped ? 1u : 0u;
+}
+
+uint64_t object_read_velocity_mapped(struct controller *controller, const struct od_entry *entry)
+{
+    return mapped(VELOCITY_OFFSET, entry, axis_of_pdo(controller, entry)->velocity_mapped);
+}

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * objects_axis: handlers of objects that tell of one axis each, for the table in objects.c.
+ *
+ *   0x200A ... 0x200E, 0x2017, 0x201B, 0x201C, 0x2024, 0x2026 ... 0x202C   sub i + 1: axis i: what its drive said last, what it was sent
+ *   0x1400 + i  TPDO1 of its drive      0x1800 + i  its RPDO1; third object 0x202B where the drive maps a torque offset
+ *                                       0x1806 + i  its RPDO2, where the drive maps a velocity offset
+ *
+ * PDO parameters say what is on the bus: those of axes that are not configured, and offsets that are not sent, have bit 31 of
+ * the COB-ID set.
+ *
+ * All are readers as objects.h describes them: they return the value of the entry, two's complement in 64 bits. Under the lock.
+ */
+#ifndef APP_OBJECTS_AXIS_H
+#define APP_OBJECTS_AXIS_H
+
+#include <stdint.h>
+
+#include "app/controller.h"
+
+/* Process data. */
+uint64_t object_read_statusword(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_position(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_error_code(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_target(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_controlword(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_torque_offset(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_velocity_offset(struct controller *controller, const struct od_entry *entry);
+
+/* State of the axis and of its drive. */
+uint64_t object_read_homed(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_inputs(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_following_error(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_missed(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_drive_state(struct controller *controller, const struct od_entry *entry);
+
+/* 0x2027 ... 0x202A: 0x1018 subs 1 ... 4 of the drive. */
+uint64_t object_read_identity(struct controller *controller, const struct od_entry *entry);
+
+/* PDO parameters: COB-IDs (sub 1), number of mapped objects (sub 0), mapped objects that are not always there. */
+uint64_t object_read_actual_cob_id(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_setpoint_cob_id(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_velocity_cob_id(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_setpoint_count(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_setpoint_torque(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_velocity_count(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_velocity_mapped(struct controller *controller, const struct od_entry *entry);
+
+#endif

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/objects_program.h"
+
+#include <string.h>
+
+#include "canopen/sdo_abort.h"
+#include "port/port.h"
+
+/* ---- Sub 1: the image ---- */
+
+static bool moving(struct controller *controller)
+{
+    port_lock();
+    const bool result = machine_moving(&controller->machine);
+    port_unlock();
+    return result;
+}
+
+uint32_t object_program_begin(void *context, const struct od_entry *entry, uint32_t size)
+{
+    struct controller *controller = context;
+    (void)entry;
+    if (moving(controller)) {
+        controller->refusal = MACHINE_MOVING;
+        return SDO_ABORT_STATE;
+    }
+    return program_slot_begin(&controller->slot, size) == 0 ? SDO_OK : SDO_ABORT_MEMORY;
+}
+
+uint32_t object_program_write(void *context, const struct od_entry *entry, uint32_t offset,
+                              const uint8_t *data, uint32_t size)
+{
+    struct controller *controller = context;
+    (void)entry;
+    return program_slot_write(&controller->slot, offset, data, size) == 0 ? SDO_OK
+                                                                          : SDO_ABORT_MEMORY;
+}
+
+/* One SDO channel serves commands and upload, so nothing can have been started since the beginning.
+ */
+uint32_t object_program_end(void *context, const struct od_entry *entry, uint32_t size)
+{
+    struct controller *controller = context;
+    (void)entry;
+    const int result = program_slot_finish(&controller->slot, size, &controller->config);
+    return result == 0 ? SDO_OK : SDO_ABORT_VALUE;
+}
+
+void object_program_abort(void *context, const struct od_entry *entry)
+{
+    struct controller *controller = context;
+    (void)entry;
+    program_slot_abandon(&controller->slot);
+}
+
+uint32_t object_program_size(void *context, const struct od_entry *entry, uint32_t *size)
+{
+    const struct controller *controller = context;
+    (void)entry;
+    if (!controller->slot.present) {
+        return SDO_ABORT_NO_DATA;
+    }
+    *size = controller->slot.program.header.image_size;
+    return SDO_OK;
+}
+
+uint32_t object_program_read(void *context, const struct od_entry *entry, uint32_t offset,
+                             uint8_t *data, uint32_t size)
+{
+    const struct controller *controller = context;
+    (void)entry;
+    memcpy(data, controller->slot.program.image + offset, size);
+    return SDO_OK;
+}
+
+/* ---- From sub 2 on: state of the upload, what the program says of itself ---- */
+
+static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
+{
+    const struct program_header *header = &slot->program.header;
+    switch (sub) {
+    case 5:
+        return header->crc32;
+    case 6:
+        return header->image_size;
+    case 7:
+        return header->segment_count;
+    case 8:
+        return header->piece_count;
+    case 9:
+        return program_ticks(&slot->program);
+    case 10:
+        return header->duration_q32_s;
+    case 11:
+        return (uint64_t)header->length_q40_mm;
+    default:
+        return 0;
+    }
+}
+
+#define STOPS_FIRST 16u /* four numbers of the longest hold, four of the longest fault stop */
+#define FAULT_FIRST 20u
+
+/* The first piece in which a stop takes as long as the header says that one takes at most. */
+static uint32_t longest_piece(const struct program *p, enum program_stop_kind kind,
+                              uint32_t worst_us)
+{
+    const uint32_t last = p->header.piece_count - 1u;
+    for (uint32_t i = 0; i < last; ++i) {
+        struct program_stop stop;
+        program_stop_get(p, i, kind, &stop);
+        if (stop.bound_us == worst_us) {
+            return i;
+        }
+    }
+    return last;
+}
+
+/* An arc length is below 2^22 mm. */
+static uint32_t start_um(const struct program *p, uint32_t piece)
+{
+    const uint64_t start_q20_mm = (uint64_t)program_piece_start(p, piece) >> 20;
+    return (uint32_t)((start_q20_mm * 1000u + (1u << 19)) >> 20);
+}
+
+static uint64_t stop_number(const struct program *p, uint8_t sub)
+{
+    const struct program_header *header = &p->header;
+    const bool fault = sub >= FAULT_FIRST;
+    const uint32_t worst_us = fault ? header->fault_worst_us : header->hold_worst_us;
+    const uint8_t number = (uint8_t)(sub - (fault ? FAULT_FIRST : STOPS_FIRST));
+    if (number == 0u) {
+        return worst_us;
+    }
+    if (number == 1u) {
+        return fault ? header->fault_worst_um : header->hold_worst_um;
+    }
+    const uint32_t piece =
+        longest_piece(p, fault ? PROGRAM_STOP_FAULT : PROGRAM_STOP_HOLD, worst_us);
+    return number == 2u ? piece : start_um(p, piece);
+}
+
+static uint64_t place_number(struct controller *controller, uint8_t sub)
+{
+    struct program_slot *slot = &controller->slot;
+    program_slot_refresh(slot, &controller->config);
+    const int32_t *counts = sub < 14u ? slot->start_counts : slot->end_counts;
+    return (uint64_t)(int64_t)counts[sub & 1u];
+}
+
+uint64_t object_read_program(struct controller *controller, const struct od_entry *entry)
+{
+    const uint8_t sub = entry->sub;
+    const struct program_slot *slot = &controller->slot;
+    switch (sub) {
+    case 2:
+        return (uint64_t)program_slot_state(slot);
+    case 3:
+        return (uint64_t)(int64_t)slot->refused.code;
+    case 4:
+        return slot->refused.index;
+    default:
+        break;
+    }
+    if (!slot->present) {
+        return 0;
+    }
+    if (sub >= STOPS_FIRST) {
+        return stop_number(&slot->program, sub);
+    }
+    return sub < 12u ? header_number(slot, sub) : place_number(controller, sub);
+}

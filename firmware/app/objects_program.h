@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* objects_program: handlers of object 0x2000, for the table and the hooks in objects.c: the image (sub 1, a DOMAIN), state of the
+ * upload, what the program in the slot says of itself. `context` is the controller. Mainline. */
+#ifndef APP_OBJECTS_PROGRAM_H
+#define APP_OBJECTS_PROGRAM_H
+
+#include "app/controller.h"
+
+/* A reader, of the sub-indices from 2 on: two's complement in 64 bits; 0 where the value needs a program and there is none. Checks
+ * the program anew when the configuration has changed since (program_slot_refresh). Not under the lock. */
+uint64_t object_read_program(struct controller *controller, const struct od_entry *entry);
+
+/* Refused with SDO_ABORT_STATE while a program runs, SDO_ABORT_MEMORY when it cannot fit. */
+uint32_t object_program_begin(void *context, const struct od_entry *entry, uint32_t size);
+uint32_t object_program_write(void *context, const struct od_entry *entry, uint32_t offset,
+                              const uint8_t *data, uint32_t size);
+/* Checks the image; SDO_ABORT_VALUE when it is refused (0x2000 subs 3 and 4 say why). */
+uint32_t object_program_end(void *context, const struct od_entry *entry, uint32_t size);
+void object_program_abort(void *context, const struct od_entry *entry);
+
+/* The active image goes back; SDO_ABORT_NO_DATA when there is none. */
+uint32_t object_program_size(void *context, const struct od_entry *entry, uint32_t *size);
+uint32_t object_program_read(void *context, const struct od_entry *entry, uint32_t offset,
+                             uint8_t *data, uint32_t size);
+
+#endif
