@@ -101,6 +101,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "spline": {"errors"},
     "feed": {"errors", "spline"},
     "config": {"errors", "names", "feed", "spline"},
+    "toolpath": {"errors"},
     "native": {"errors", "names", "config"},
     "program": {"errors", "spline", "feed", "native"},
     "simulate": {"errors", "config", "native", "program"},

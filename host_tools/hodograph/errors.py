@@ -18,6 +18,16 @@ class InputError(HodographError):
     exit_status = 2
 
 
+class ToolpathError(InputError):
+    """A toolpath file cannot be read on; the message begins with FILE:LINE:COLUMN, both 1-based."""
+
+    def __init__(self, file: str, line: int, column: int, text: str) -> None:
+        super().__init__(f"{file}:{line}:{column}: {text}")
+        self.file = file
+        self.line = line
+        self.column = column
+
+
 class PlanError(HodographError):
     """The input is well formed, but the path or the feed asked for is not possible."""
 

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: MIT
+"""Toolpaths: moves and machine commands, read from files that other programs wrote.
+
+`moves` holds the moves and machine commands, which are the same for every kind of file. `gcode` reads G-code. Fitting
+curves to the moves is not part of this package.
+"""

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""What the reader of G-code has to know besides the program: the machine's tables and how far to go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..moves import ORIGIN, Position
+from .block import Block
+from .coordinates import G28_POINT, G30_POINT, SYSTEMS, origin_parameter
+from .parameters import Parameters
+
+MOST_JUMPS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the machine at the start of a program; lengths in mm, angles in degrees.
+
+    start           machine position at which the program starts
+    origins         origins of coordinate systems 1 (G54) to 9 (G59.3); those not given are 0
+    g28, g30        reference points, as machine positions
+    tools           offset of each tool by its number. None: every tool has offset 0, so that positions are those of
+                    the tool's tip. With a table, a tool that is not in it is refused.
+    block_delete    whether lines that begin with "/" are left out
+    most_jumps      most subroutine calls and backward jumps of loops; a program that makes more is refused, since its
+                    loops may be without end
+    fast_path       whether plain straight moves are read without the general interpreter. The moves are the same.
+    """
+
+    start: Position = ORIGIN
+    origins: Mapping[int, Position] = field(default_factory=dict)
+    g28: Position = ORIGIN
+    g30: Position = ORIGIN
+    tools: Mapping[int, Position] | None = None
+    block_delete: bool = False
+    most_jumps: int = MOST_JUMPS
+    fast_path: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the numbers of the coordinate systems."""
+        if any(not 1 <= system <= SYSTEMS for system in self.origins):
+            raise ValueError(f"coordinate systems have numbers 1 to {SYSTEMS}")
+
+    def store_tables(self, parameters: Parameters) -> None:
+        """Write origins and reference points where a program reads them."""
+        places = {origin_parameter(system): point for system, point in self.origins.items()}
+        places |= {G28_POINT: self.g28, G30_POINT: self.g30}
+        for first, point in places.items():
+            for axis, number in enumerate(point):
+                parameters.set(first + axis, number)
+
+    def tool_offset(self, block: Block, word: str, tool: int) -> Position:
+        """The offset of a tool. Raises ToolpathError, at `word` of `block`, if the table does not have it."""
+        if self.tools is None or tool == 0:
+            return ORIGIN
+        if tool not in self.tools:
+            raise block.error(word, f"tool {tool} is not in the tool table: add it")
+        return self.tools[tool]
