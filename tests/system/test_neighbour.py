@@ -32,6 +32,7 @@ from hodograph.bus.sdo.objects import COMMAND, FAULT, HOLD, QUICK_STOP
 from hodograph.bus.sdo.objects import STOP as STOP_COMMAND
 from hodograph.cli.main import main
 from hodograph.pipeline import load_pipeline
+from marks import long
 
 DRIVE = 2
 AWAY = 0xFF08
@@ -71,7 +72,7 @@ def moving(make_bench: MakeBench, alpha_at: MakeAlpha) -> Iterator[Moving]:
         assert find_jumps(frames, bench.machine.nodes, step_limits(bench.machine)) == []
 
 
-@pytest.mark.parametrize("seconds", [0.05, 2.0, 9.9])
+@pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(9.9)])
 def test_setpoints_switched_off_at_a_drive(
     moving: Moving, other: Neighbour, seconds: float
 ) -> None:
@@ -96,7 +97,7 @@ def test_setpoints_switched_off_at_a_drive_that_stands(
     assert main(["start", "--follow"]) == 0
 
 
-@pytest.mark.parametrize("seconds", [0.05, 2.0, 9.9])
+@pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(9.9)])
 def test_a_drive_stopped_by_nmt(moving: Moving, other: Neighbour, seconds: float) -> None:
     """STOPPED, it answers no SDO: it is made pre-operational before it is asked anything."""
     bench, path = moving(seconds)
@@ -107,7 +108,7 @@ def test_a_drive_stopped_by_nmt(moving: Moving, other: Neighbour, seconds: float
 
 
 @pytest.mark.parametrize("node", [0, DRIVE])
-@pytest.mark.parametrize("command", [PRE_OPERATIONAL, RESET_NODE, 0x82])
+@pytest.mark.parametrize("command", [PRE_OPERATIONAL, RESET_NODE, long(0x82)])
 def test_nmt_to_drives_in_motion(moving: Moving, other: Neighbour, command: int, node: int) -> None:
     bench, path = moving(2.0)
     other.nmt(command, node)
@@ -156,7 +157,7 @@ def test_tpdo1_switched_off(moving: Moving, other: Neighbour) -> None:
     runs_again(path)
 
 
-@pytest.mark.parametrize("kind", [0, 2, 10, 240, 254, 255])
+@pytest.mark.parametrize("kind", [0, long(2), long(10), 240, long(254), long(255)])
 def test_transmission_types_of_tpdo1(moving: Moving, other: Neighbour, kind: int) -> None:
     """A drive that answers not every SYNC is a drive that is lost; one that answers more often does no harm."""
     bench, path = moving(2.0)
@@ -294,7 +295,7 @@ def test_the_commands_to_stop_while_another_computer_goes_on_reading(
     assert bench.controller.state() in (READY, HELD, OFF)
 
 
-@pytest.mark.parametrize("identifier", [0x7FF, 0x6FF])
+@pytest.mark.parametrize("identifier", [long(0x7FF), 0x6FF])
 def test_a_bus_that_is_full_of_what_matters_less(
     moving: Moving, other: Neighbour, identifier: int
 ) -> None:
@@ -306,7 +307,7 @@ def test_a_bus_that_is_full_of_what_matters_less(
     runs_again(path)
 
 
-@pytest.mark.parametrize("seconds", [0.0005, 0.002, 0.05])
+@pytest.mark.parametrize("seconds", [long(0.0005), 0.002, long(0.05)])
 def test_a_bus_that_is_full_of_what_matters_more(
     moving: Moving, other: Neighbour, seconds: float
 ) -> None:
@@ -319,7 +320,7 @@ def test_a_bus_that_is_full_of_what_matters_more(
     runs_again(path)
 
 
-@pytest.mark.parametrize("phase_us", [0, 250, 500, 750])
+@pytest.mark.parametrize("phase_us", [0, long(250), long(500), long(750)])
 def test_simulated_drives_wait_from_any_instant_on(
     moving: Moving, other: Neighbour, phase_us: int
 ) -> None:

@@ -26,6 +26,7 @@ from hodograph.bus.sdo.objects import FAULT
 from hodograph.cli.main import main
 from hodograph.pipeline import load_pipeline
 from hodograph.program import Program
+from marks import every
 
 HEART = str(EXAMPLES / "heart_optimal.toml")
 PAPER_HEART = EXAMPLES / "machines" / "paper_heart.toml"
@@ -151,7 +152,7 @@ def switched_off(frames: Frames, at_us: int) -> bool:
 INSTANTS_S = (0.0, 0.004, 0.03, 0.111, 0.25, 0.4, 0.585, 0.64, 0.8, 1.0, 1.2, 1.27)
 
 
-@pytest.mark.parametrize("after_s", INSTANTS_S)
+@pytest.mark.parametrize("after_s", every(2, INSTANTS_S))
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_stops_on_the_path_within_the_bound(
     way: Way, heart: Program, after_s: float, end: signal.Signals
@@ -168,7 +169,7 @@ def test_a_signal_stops_on_the_path_within_the_bound(
         assert axis.first_us(QUICK_STOP, at_us) is None
 
 
-@pytest.mark.parametrize("after_s", INSTANTS_S[1:-1])
+@pytest.mark.parametrize("after_s", every(3, INSTANTS_S[1:-1]))
 @pytest.mark.parametrize("again_s", [0.0, 0.004, 0.02])
 def test_a_second_signal_stops_quickly_at_once(way: Way, after_s: float, again_s: float) -> None:
     way.clock.sleep(after_s)
@@ -186,7 +187,7 @@ def test_a_second_signal_stops_quickly_at_once(way: Way, after_s: float, again_s
 HOST_NODE, BEAT_S, SILENT_MS = 127, 0.02, 100
 
 
-@pytest.mark.parametrize("after_s", [0.02, 0.14, 0.3, 0.48, 0.7, 0.9, 1.1])
+@pytest.mark.parametrize("after_s", every(2, [0.02, 0.14, 0.3, 0.48, 0.7, 0.9, 1.1]))
 def test_a_lost_host_stops_the_axes_on_the_path(
     make_bench: MakeBench, heart: Program, after_s: float
 ) -> None:

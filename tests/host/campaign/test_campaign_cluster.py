@@ -79,6 +79,7 @@ def under_way(file: Path, folder: Path, *options: str) -> Iterator[subprocess.Po
     child.kill()
 
 
+@pytest.mark.long
 def test_killed_and_gone_on_with_on_two_cores(write: Write, tmp_path: Path) -> None:
     """In the middle of it, between two lines of its journal or within one."""
     file = write(TEXT)
