@@ -71,6 +71,8 @@ class Core:
         ]
         subprocess.run(command, check=True)
         self.lib = ctypes.CDLL(str(target))
+        self.lib.kernel_find.restype = ctypes.c_void_p
+        self.lib.coefficients_size.restype = ctypes.c_uint64
 
     def open(self, image: bytes) -> tuple[Any, Any]:
         """struct program and the buffer that it refers to."""
@@ -84,7 +86,11 @@ class Core:
         """Points at program times in 2^-42 s."""
         program, _buffer = self.open(image)
         cursor = ctypes.create_string_buffer(4096)
-        self.lib.interp_begin(cursor, program, kernel)
+        made_for = ctypes.c_void_p(self.lib.kernel_find(kernel))
+        size = self.lib.coefficients_size(program, made_for)
+        records = (ctypes.c_uint64 * (size // 8 + 1))()
+        self.lib.coefficients_make_in(program, made_for, records, ctypes.c_uint64(size))
+        self.lib.interp_begin(cursor, program)
         out = []
         for time in times_q42:
             point = Point()

@@ -173,9 +173,7 @@ int feed_override_motion(const struct feed_override *f, const struct interp *it,
 static int plan_tick(struct feed_override *f, struct interp *it)
 {
     const uint64_t time_q42_s = override_plan_tick(&f->plan, &f->clock);
-    const int result = it->piece != NULL
-                           ? interp_at_piece(it, f->clock.record, time_q42_s, &f->point)
-                           : interp_at_q42(it, time_q42_s, &f->point);
+    const int result = interp_at_piece(it, f->clock.record, time_q42_s, &f->point);
     if (result == INTERP_END) {
         f->state = FEED_ENDED;
     }
@@ -334,15 +332,12 @@ static void replace_brake(struct feed_override *f)
 }
 
 /* On from the place of rest when that is known, and wanted. */
-static void look_for_place(struct feed_override *f, struct interp *it)
+static void look_for_place(struct feed_override *f, const struct interp *it)
 {
     for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
         if (interp_search_step(it, &f->place)) {
-            const struct coefficients_piece *piece =
-                f->place.piece != NULL ? f->place.piece : &it->own_piece;
             f->found = 1;
-            program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece,
-                              piece->end_q32_s);
+            program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece);
             override_plan_rest(&f->plan);
         }
     }

@@ -53,7 +53,7 @@ struct feed_override {
     int64_t left_q30;           /* ticks at override 1 until the deadline */
 };
 
-/* For a checked program at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.
+/* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.
  * period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must stay as it is. */
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);

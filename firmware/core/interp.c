@@ -8,28 +8,6 @@
 #define FINE_BITS 10 /* from q32 to q42 */
 #define MOST_ENDS 2u /* piece ends and segment ends a tick may cross: protocol.md 1.2 and 1.3 */
 
-static void load_piece(struct interp *it, uint32_t i, uint64_t start_q32_s)
-{
-    coefficients_piece_make(&it->own_piece, it->program, it->kernel, i, start_q32_s);
-    it->piece_index = i;
-}
-
-static void load_segment(struct interp *it, uint32_t i)
-{
-    coefficients_segment_make(&it->own_segment, it->program, it->kernel, i);
-    it->segment_index = i;
-}
-
-static const struct coefficients_piece *present_piece(const struct interp *it)
-{
-    return it->piece != NULL ? it->piece : &it->own_piece;
-}
-
-static const struct coefficients_segment *present_segment(const struct interp *it)
-{
-    return it->segment != NULL ? it->segment : &it->own_segment;
-}
-
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
 static void evaluate_feed(const struct interp *it, const struct coefficients_piece *piece,
                           uint64_t time_q42_s, struct feed_point *f)
@@ -43,37 +21,12 @@ static void evaluate_feed(const struct interp *it, const struct coefficients_pie
     }
 }
 
-/* Expands the piece of this time. */
-static int enter_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
-{
-    uint32_t i = it->piece_index;
-    uint64_t start = it->own_piece.start_q32_s;
-    uint64_t end = it->own_piece.end_q32_s;
-    while (i + 1u < it->program->header.piece_count && time_q32_s >= end) {
-        if (most == 0) {
-            return INTERP_ERR_JUMP;
-        }
-        most--;
-        i++;
-        start = end;
-        end += program_piece_duration(it->program, i);
-    }
-    load_piece(it, i, start);
-    return INTERP_OK;
-}
-
 /* Makes the piece of this time, below the duration, the present one, crossing `most` ends at most. */
 static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
 {
-    const struct coefficients_piece *piece = present_piece(it);
+    const struct coefficients_piece *piece = it->piece;
     if (time_q32_s < piece->start_q32_s) {
         return INTERP_ERR_JUMP;
-    }
-    if (time_q32_s < piece->end_q32_s) {
-        return INTERP_OK;
-    }
-    if (it->piece == NULL) {
-        return enter_piece(it, time_q32_s, most);
     }
     const struct coefficients_piece *last =
         coefficients_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
@@ -84,30 +37,6 @@ static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
         piece = coefficients_piece_next(piece, it->kernel);
     }
     it->piece = piece;
-    return INTERP_OK;
-}
-
-/* Expands the segment of this arc length. */
-static int enter_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
-{
-    const struct program *p = it->program;
-    uint32_t i = it->segment_index;
-    while (i + 1 < p->header.segment_count &&
-           program_segment_start(p, i + 1) <= arc_length_q40_mm) {
-        if (most == 0) {
-            return INTERP_ERR_JUMP;
-        }
-        most--;
-        i++;
-    }
-    while (i > 0 && program_segment_start(p, i) > arc_length_q40_mm) {
-        if (most == 0) {
-            return INTERP_ERR_JUMP;
-        }
-        most--;
-        i--;
-    }
-    load_segment(it, i);
     return INTERP_OK;
 }
 
@@ -139,58 +68,66 @@ static int step_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t m
  * back only where the feed dips below zero by rounding. */
 static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
 {
-    const struct coefficients_segment *segment = present_segment(it);
+    const struct coefficients_segment *segment = it->segment;
     if (arc_length_q40_mm >= segment->from_q40_mm && arc_length_q40_mm < segment->to_q40_mm) {
         return INTERP_OK;
     }
-    return it->segment != NULL ? step_segment(it, arc_length_q40_mm, most)
-                               : enter_segment(it, arc_length_q40_mm, most);
+    return step_segment(it, arc_length_q40_mm, most);
 }
 
-static void set_end(struct interp *it)
+static void set_start(struct interp_point *start, const struct program *p,
+                      const struct kernel *kernel)
+{
+    struct coefficients_segment record;
+    struct program_segment segment;
+    struct ph_segment ph;
+    int64_t point[2];
+    program_segment_get(p, 0, &segment);
+    ph_segment_expand(&ph, &segment);
+    kernel->segment_set(&record.path, &ph);
+    kernel->segment_at(&record.path, 0, point);
+    start->arc_length_q40_mm = 0;
+    start->x_q40_mm = point[0];
+    start->y_q40_mm = point[1];
+    start->feed_q32_mm_s = 0;
+}
+
+static void set_end(struct interp_point *end, const struct program *p)
 {
     struct program_segment segment;
     struct ph_segment ph;
     int64_t end_q48[3];
-    program_segment_get(it->program, it->program->header.segment_count - 1u, &segment);
+    program_segment_get(p, p->header.segment_count - 1u, &segment);
     ph_segment_expand(&ph, &segment);
     ph_segment_end(&ph, end_q48);
-    it->end.arc_length_q40_mm = it->program->header.length_q40_mm;
-    it->end.x_q40_mm = segment.x_q40_mm + qmath_round(end_q48[PH_X], 8);
-    it->end.y_q40_mm = segment.y_q40_mm + qmath_round(end_q48[PH_Y], 8);
-    it->end.feed_q32_mm_s = 0;
+    end->arc_length_q40_mm = p->header.length_q40_mm;
+    end->x_q40_mm = segment.x_q40_mm + qmath_round(end_q48[PH_X], 8);
+    end->y_q40_mm = segment.y_q40_mm + qmath_round(end_q48[PH_Y], 8);
+    end->feed_q32_mm_s = 0;
 }
 
-static void go_to_begin(struct interp *it)
+void interp_ends(const struct program *p, const struct kernel *kernel, struct interp_point *first,
+                 struct interp_point *last)
 {
-    if (it->program->coefficients_for == it->kernel) {
-        it->piece = coefficients_piece_at(it->program, it->kernel, 0);
-    } else {
-        it->piece = NULL;
-        load_piece(it, 0, 0);
-    }
+    set_start(first, p, kernel);
+    set_end(last, p);
 }
 
-int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel)
+int interp_begin(struct interp *it, const struct program *p)
 {
     if (p == NULL || p->image == NULL) {
         return INTERP_ERR_PROGRAM;
     }
-    it->kernel = kernel_find((uint32_t)kernel);
-    if (it->kernel == NULL) {
-        return INTERP_ERR_KERNEL;
+    if (p->coefficients_for == NULL) {
+        return INTERP_ERR_COEFFICIENTS;
     }
     it->program = p;
+    it->kernel = p->coefficients_for;
     it->duration_q32_s = p->header.duration_q32_s;
     it->length_q40_mm = p->header.length_q40_mm;
-    set_end(it);
-    go_to_begin(it);
-    if (p->coefficients_for == it->kernel) {
-        it->segment = coefficients_segment_at(p, it->kernel, 0);
-    } else {
-        it->segment = NULL;
-        load_segment(it, 0);
-    }
+    it->piece = coefficients_piece_at(p, it->kernel, 0);
+    it->segment = coefficients_segment_at(p, it->kernel, 0);
+    set_end(&it->end, p);
     return 0;
 }
 
@@ -212,7 +149,7 @@ static int evaluate_path(struct interp *it, int64_t arc_length_q40_mm, uint32_t 
         return INTERP_ERR_JUMP;
     }
     int64_t point[2];
-    it->kernel->segment_at(&present_segment(it)->path, arc_length_q40_mm, point);
+    it->kernel->segment_at(&it->segment->path, arc_length_q40_mm, point);
     out->arc_length_q40_mm = arc_length_q40_mm;
     out->x_q40_mm = point[0];
     out->y_q40_mm = point[1];
@@ -240,7 +177,7 @@ int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *o
     if (time_q32_s < it->duration_q32_s && find_piece(it, time_q32_s, MOST_ENDS) != INTERP_OK) {
         return INTERP_ERR_JUMP;
     }
-    return interp_at_piece(it, present_piece(it), time_q42_s, out);
+    return interp_at_piece(it, it->piece, time_q42_s, out);
 }
 
 int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out)
@@ -256,8 +193,8 @@ int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct in
 int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
                                 uint64_t time_q42_s)
 {
-    const struct coefficients_piece *own = piece != NULL ? piece : present_piece(it);
-    return it->kernel->piece_acceleration(&own->feed, time_q42_s - (own->start_q32_s << FINE_BITS));
+    const uint64_t t_q42_s = time_q42_s - (piece->start_q32_s << FINE_BITS);
+    return it->kernel->piece_acceleration(&piece->feed, t_q42_s);
 }
 
 void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
@@ -270,34 +207,18 @@ void interp_search_begin(struct interp_search *search, const struct coefficients
     search->bisecting = 0;
 }
 
-static const struct coefficients_piece *searched_piece(const struct interp *it,
-                                                       const struct interp_search *search)
-{
-    return search->piece != NULL ? search->piece : &it->own_piece;
-}
-
-static void search_next_piece(struct interp *it, struct interp_search *search)
-{
-    search->piece_index++;
-    if (search->piece != NULL) {
-        search->piece = coefficients_piece_next(search->piece, it->kernel);
-    } else {
-        load_piece(it, search->piece_index, it->own_piece.end_q32_s);
-    }
-}
-
-int interp_search_step(struct interp *it, struct interp_search *search)
+int interp_search_step(const struct interp *it, struct interp_search *search)
 {
     const struct program *p = it->program;
-    const struct coefficients_piece *piece = searched_piece(it, search);
-    const uint64_t start_q42_s = piece->start_q32_s << FINE_BITS;
+    const struct coefficients_piece *piece = search->piece;
     if (search->bisecting == 0) {
         const uint32_t next = search->piece_index + 1u;
         if (next < p->header.piece_count &&
             program_piece_start(p, next) <= search->arc_length_q40_mm) {
-            search_next_piece(it, search);
+            search->piece_index = next;
+            search->piece = coefficients_piece_next(piece, it->kernel);
         } else {
-            search->low_q42_s = start_q42_s;
+            search->low_q42_s = piece->start_q32_s << FINE_BITS;
             search->high_q42_s = (piece->end_q32_s << FINE_BITS) - 1u;
             search->bisecting = 1;
         }
@@ -328,11 +249,11 @@ int interp_seek(struct interp *it, uint64_t time_q32_s)
     uint64_t last = it->duration_q32_s - 1u;
     uint64_t time = time_q32_s < last ? time_q32_s : last;
     struct feed_point f;
-    if (time < present_piece(it)->start_q32_s) {
-        go_to_begin(it);
+    if (time < it->piece->start_q32_s) {
+        it->piece = coefficients_piece_at(it->program, it->kernel, 0);
     }
     find_piece(it, time, UINT32_MAX);
-    evaluate_feed(it, present_piece(it), time << FINE_BITS, &f);
+    evaluate_feed(it, it->piece, time << FINE_BITS, &f);
     find_segment(it, f.arc_length_q40_mm, UINT32_MAX);
     return 0;
 }

@@ -4,11 +4,9 @@
  *
  * The point is a pure function of (program, time, kernel): the cursor inside struct interp only
  * remembers which segment and piece are looked at. So a run, a seek and a run backwards by seeks
- * give the same bits, and so do a program with coefficient records (core/coefficients.h) and one without, where the tick
- * expands what it enters. Kernels: docs/theory/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
- * (the inverse of arc length). The program must have passed program_check with any limits; the
- * image must outlive the struct. interp_at_q42 is meant for the tick (interrupt); the other functions
- * for the main loop.
+ * give the same bits. Kernels: docs/theory/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
+ * (the inverse of arc length). The program must have passed program_check with any limits and must have coefficient
+ * records (core/coefficients.h); the records decide the kernel. Image and records must outlive the struct.
  */
 #ifndef HODOGRAPH_CORE_INTERP_H
 #define HODOGRAPH_CORE_INTERP_H
@@ -22,9 +20,9 @@
 
 enum interp_result {
     INTERP_OK = 0,
-    INTERP_END = 1,          /* time is at or beyond the end: the point is the exact end point */
-    INTERP_ERR_KERNEL = -1,  /* this image has no such kernel */
-    INTERP_ERR_PROGRAM = -2, /* no program */
+    INTERP_END = 1, /* time is at or beyond the end: the point is the exact end point */
+    INTERP_ERR_COEFFICIENTS = -1, /* the program has no coefficient records */
+    INTERP_ERR_PROGRAM = -2,      /* no program */
     INTERP_ERR_JUMP = -3, /* time is before the cursor, or more than two ends ahead: seek first */
 };
 
@@ -39,23 +37,23 @@ struct interp_point {
     int64_t feed_q32_mm_s; /* F' at rate 1 */
 };
 
-/* Caller allocates (about 0.6 KiB); contents private. */
+/* Caller allocates (about 0.1 KiB); contents private. */
 struct interp {
     const struct program *program;
     const struct kernel *kernel;
-    const struct coefficients_piece *piece;     /* the present ones of a program with records, */
-    const struct coefficients_segment *segment; /* else NULL: those below */
-    uint32_t piece_index;                       /* of those below */
-    uint32_t segment_index;
+    const struct coefficients_piece *piece; /* the present ones */
+    const struct coefficients_segment *segment;
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
     struct interp_point end; /* the exact end point */
-    struct coefficients_piece own_piece;
-    struct coefficients_segment own_segment;
 };
 
 /* Starts at time 0. Returns 0 or INTERP_ERR_... Main loop. */
-int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
+int interp_begin(struct interp *it, const struct program *p);
+
+/* First and last point of a program, with coefficient records or without. Main loop. */
+void interp_ends(const struct program *p, const struct kernel *kernel, struct interp_point *first,
+                 struct interp_point *last);
 
 /* The point at a program time in 2^-42 s, below 2^22 s. Crosses at most two piece ends forwards and
  * two segment ends either way, which program_check guarantees to suffice for steps up to two
@@ -64,9 +62,9 @@ int interp_begin(struct interp *it, const struct program *p, enum interp_kernel 
  * INTERP_ERR_JUMP. Tick context; bounded time. */
 int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
 
-/* The same of a program with records, by whoever has already found the piece that this time lies in: its record. Nothing
- * is looked for but the segment; the cursor of pieces stays where it is. INTERP_ERR_JUMP too when the piece ends before
- * this time and is not the last; it must not begin behind it. */
+/* The same by a caller that has already found the record of the piece that this time lies in. Nothing is looked for but
+ * the segment; the cursor of pieces stays where it is. INTERP_ERR_JUMP too when the piece ends before this time and is
+ * not the last; it must not begin after this time. */
 int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out);
 
@@ -75,8 +73,7 @@ int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, u
  * bounded time. */
 int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out);
 
-/* F'' in 2^-40 mm/s^2 at a time of the piece given, which interp_at_piece has just evaluated; of a program without
- * records: NULL, for the piece of interp_at_q42. Tick context. */
+/* F'' in 2^-40 mm/s^2 at a time of this piece. Tick context. */
 int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
                                 uint64_t time_q42_s);
 
@@ -84,20 +81,20 @@ int64_t interp_acceleration_q40(const struct interp *it, const struct coefficien
 struct interp_search {
     int64_t arc_length_q40_mm;
     uint64_t time_q42_s;                    /* when it is found */
-    const struct coefficients_piece *piece; /* that it lies in; NULL of a program without records */
+    const struct coefficients_piece *piece; /* that it lies in */
     uint32_t piece_index;
     uint32_t bisecting; /* the piece is known; the time is between these two, from its start: */
     uint64_t low_q42_s;
     uint64_t high_q42_s;
 };
 
-/* Looks from piece `index` on (its record, or NULL), which begins at or before the arc length. */
+/* Looks from piece `index` on, of which this is the record; it begins at or before the arc length. */
 void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
                          uint32_t index, int64_t arc_length_q40_mm);
 
-/* One step: goes on by a piece, or halves the time. 1 when it is found, else 0. A program without records: the cursor of
- * pieces moves with it. Some 60 steps and one for each piece on the way. Tick context; bounded time. */
-int interp_search_step(struct interp *it, struct interp_search *search);
+/* One step: goes on by a piece, or halves the time. 1 when it is found, else 0. Some 60 steps and one for each piece on
+ * the way. Tick context; bounded time. */
+int interp_search_step(const struct interp *it, struct interp_search *search);
 
 /* The same at a time in 2^-32 s, for tools. A tick uses the finer one: at 100 mm/s, 2^-33 s of
  * rounding is 1e-8 mm, some 50 mm/s^3 in the third difference at 1 kHz. */

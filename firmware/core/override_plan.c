@@ -78,32 +78,17 @@ static int64_t wanted_override(const struct override_plan *plan)
 
 /* --- Look-ahead --- */
 
-static void look_at_pieces(struct override_window *w, const struct program_clock *clock,
-                           uint32_t last)
-{
-    override_bounds_of(&w->own, clock->program, clock->piece, last + 1u - clock->piece);
-    w->bounds = &w->own;
-    w->end_q32_s = clock->piece_end_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
-    for (uint32_t k = clock->piece + 1u; k <= last; k++) {
-        w->end_q32_s += program_piece_duration(clock->program, k);
-    }
-}
-
 void override_window_get(struct override_window *w, const struct program_clock *clock,
                          uint32_t window)
 {
     const struct program *p = clock->program;
     const uint32_t behind = override_window_pieces(window) - 1u;
     const uint32_t left = p->header.piece_count - 1u - clock->piece;
-    const uint32_t last = clock->piece + (behind < left ? behind : left);
-    if (clock->record != NULL) {
-        w->bounds = &clock->record->ahead[window];
-        w->end_q32_s = coefficients_piece_at(p, p->coefficients_for, last)->end_q32_s;
-    } else {
-        look_at_pieces(w, clock, last);
-    }
-    if (behind >= left) {
-        w->end_q32_s = UINT64_MAX;
+    w->bounds = &clock->record->ahead[window];
+    w->end_q32_s = UINT64_MAX;
+    if (behind < left) {
+        w->end_q32_s =
+            coefficients_piece_at(p, p->coefficients_for, clock->piece + behind)->end_q32_s;
     }
 }
 

@@ -43,7 +43,6 @@ enum override_search {
 struct override_window {
     const struct program_override *bounds; /* least of all pieces in it */
     uint64_t end_q32_s;                    /* UINT64_MAX with the last piece */
-    struct program_override own;           /* `bounds` of a program without coefficient records */
 };
 
 /* Contents private, but for `now` and `saturated`. */
@@ -102,8 +101,7 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
 /* Part of it: one step of a search. */
 void override_plan_search(struct override_plan *plan, const struct program_clock *clock);
 
-/* The window of this number (below OVERRIDE_WINDOWS) from the present piece of the clock on. Constant time with prepared
- * records (core/coefficients.h), else it looks at each piece. */
+/* The window of this number (below OVERRIDE_WINDOWS) from the present piece of the clock on. */
 void override_window_get(struct override_window *w, const struct program_clock *clock,
                          uint32_t window);
 

@@ -42,18 +42,18 @@ struct program_clock {
     uint64_t sixth_q70_s;  /* a sixth of the period */
     uint64_t even_q62_s;   /* program time of a tick whose override does not change */
     uint32_t piece;        /* of the last tick, */
-    const struct coefficients_piece *record; /* its record, or NULL where the program has none, */
+    const struct coefficients_piece *record; /* its coefficient record, */
     uint64_t piece_end_q42_s;                /* and its end; of the last piece the duration */
 };
 
-/* Sets the clock to a program time of a checked program; beyond the duration: to the duration.
+/* Sets the clock to a program time of a checked program with coefficient records; beyond the duration: to the duration.
  * period_us: 1000, 2000, 4000 or 8000. Linear in the number of pieces: main loop. */
 void program_clock_begin(struct program_clock *clock, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
 
-/* Sets the clock to a time inside this piece; `record` as in the struct. Tick context. */
+/* Sets the clock to a time inside this piece, which has this record. Tick context. */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct coefficients_piece *record, uint64_t piece_end_q32_s);
+                       const struct coefficients_piece *record);
 
 /* Program time of a tick in 2^-62 s, in which the override changes from `from` to the slope at its end (2^-56 a tick):
  * six times its mean is 3 override + 2 slope + next slope. */
@@ -102,26 +102,6 @@ static inline void program_clock_advance_even(struct program_clock *clock, int64
     clock->rest = rest;
 }
 
-/* The last piece ends with the program. */
-static inline uint64_t program_clock_end_of_piece(const struct program_clock *clock,
-                                                  uint64_t end_q42_s)
-{
-    return clock->piece + 1u == clock->program->header.piece_count ? clock->duration_q42_s
-                                                                   : end_q42_s;
-}
-
-/* Of a program without records. */
-static inline void program_clock_read_ends(struct program_clock *clock, uint64_t time_q42_s,
-                                           uint32_t most)
-{
-    for (; time_q42_s >= clock->piece_end_q42_s && most > 0; most--) {
-        clock->piece++;
-        uint64_t length_q32_s = program_piece_duration(clock->program, clock->piece);
-        clock->piece_end_q42_s = program_clock_end_of_piece(
-            clock, clock->piece_end_q42_s + (length_q32_s << PROGRAM_CLOCK_Q32_TO_Q42));
-    }
-}
-
 /* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
  * ends at most. When they are not enough, the piece ends before the time, which interp_at_piece refuses. */
 static inline void program_clock_find_piece(struct program_clock *clock, uint64_t time_q42_s,
@@ -130,10 +110,6 @@ static inline void program_clock_find_piece(struct program_clock *clock, uint64_
     const struct coefficients_piece *record = clock->record;
     const uint64_t time_q32_s = time_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
     uint32_t left = most;
-    if (record == NULL) {
-        program_clock_read_ends(clock, time_q42_s, most);
-        return;
-    }
     do {
         record = coefficients_piece_next(record, clock->program->coefficients_for);
         left--;

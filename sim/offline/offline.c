@@ -33,7 +33,7 @@ static int offline_drives(struct offline *rig, const struct program *program,
     return drives[0].counts_per_mm == drives[1].counts_per_mm ? 0 : OFFLINE_ERR_COUNTS;
 }
 
-int offline_begin(struct offline *rig, const struct program *program, enum interp_kernel kernel,
+int offline_begin(struct offline *rig, const struct program *program,
                   const struct drive_config drives[2], struct contour_segment *segments)
 {
     const struct feedforward_gains without = {.period_us = drives[0].period_us};
@@ -49,8 +49,8 @@ int offline_begin(struct offline *rig, const struct program *program, enum inter
     rig->fault_count = 0;
     rig->fault_tick = -1;
     rig->program_ticks = program_ticks(program);
-    if (interp_begin(&rig->interp, program, kernel) != 0) {
-        return OFFLINE_ERR_KERNEL;
+    if (interp_begin(&rig->interp, program) != 0) {
+        return OFFLINE_ERR_COEFFICIENTS;
     }
     error = offline_start_point(rig, start);
     if (error != 0) {

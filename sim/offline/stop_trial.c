@@ -246,7 +246,7 @@ static int begin(struct course *course, const struct program *p, struct stop_tri
 {
     memset(course, 0, sizeof *course);
     clear(trial);
-    const int error = interp_begin(&course->interp, p, (enum interp_kernel)trial->kernel);
+    const int error = interp_begin(&course->interp, p);
     if (error == 0) {
         feed_override_begin(&course->feed, p, p->header.period_us, 0);
     }

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The program clock looks for its piece, in a program of any three pieces, with records and without, from any of them and at
- * any time: it never asks for a piece or a record behind the last.
+ * The program clock looks for its piece, in a program of any three pieces, from any of them and at any time: it never
+ * asks for a record after the last.
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
  * shows: program_clock_find_piece
- * mutant: core/program_clock.h: clock->piece + 1u == clock->program->header.piece_count => clock->piece + 2u == clock->program->header.piece_count
+ * mutant: core/program_clock.h: clock->piece += most - left => clock->piece += most - left + 1u
  * mutant: core/program_clock.h: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
  * mutant: core/program_clock.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
  */
@@ -15,14 +15,6 @@
 #include "core/program_clock.c"
 
 #define COUNT 3u
-
-uint64_t program_piece_duration(const struct program *p, uint32_t i)
-{
-    prove(i < p->header.piece_count);
-    uint64_t duration = nondet_uint64();
-    __CPROVER_assume(duration > 0 && duration <= (uint64_t)1 << 54);
-    return duration;
-}
 
 static struct coefficients_piece records[COUNT];
 static struct program program;
@@ -37,9 +29,7 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
-    clock->piece = i;
-    clock->piece_end_q42_s = program_clock_end_of_piece(clock, nondet_uint64());
-    clock->record = program.coefficients_for != 0 ? &records[i] : 0;
+    set_piece(clock, i, &records[i]);
 }
 
 void harness(void)
@@ -47,7 +37,7 @@ void harness(void)
     struct program_clock clock;
     program.header.piece_count = COUNT;
     program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> PROGRAM_CLOCK_Q32_TO_Q42);
-    program.coefficients_for = nondet_uint32() != 0 ? &kernel : 0;
+    program.coefficients_for = &kernel;
     for (uint32_t k = 0; k < COUNT; k++) {
         records[k].end_q32_s = k + 1u == COUNT ? program.header.duration_q32_s : nondet_uint64();
     }
@@ -59,6 +49,6 @@ void harness(void)
         program_clock_pass_end(&clock, time_q42_s);
     }
     prove(clock.piece < COUNT);
-    prove(clock.record == 0 || clock.record == &records[clock.piece]);
+    prove(clock.record == &records[clock.piece]);
     reached();
 }

@@ -1,16 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The interpolator and the records of a prepared program, for any program of three segments and pieces that passed the
+ * The interpolator and the coefficient records of a program, for any program of three segments and pieces that passed the
  * checks, any kernel, wherever the cursor is, and any times: no segment, piece or record is asked for that there is not, nothing overflows.
  *
  * prover: eva
  * options: -eva-slevel 60
  * instead: core/interp.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
- * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override program_piece_start ph_segment_expand ph_segment_end
- * shows: interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step interp_seek coefficients_make
- * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
- * mutant: core/interp.c: while (i > 0 && => while (
- * mutant: core/interp.c: while (i + 1u < it->program->header.piece_count && => while (i < it->program->header.piece_count &&
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_override program_piece_start ph_segment_expand ph_segment_end
+ * shows: interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step interp_seek interp_ends coefficients_make
  * mutant: core/interp.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
  * mutant: core/interp.c: if (next < p->header.piece_count && => if (next <= p->header.piece_count &&
  * mutant: core/coefficients.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
@@ -38,11 +35,6 @@ int64_t program_segment_start(const struct program *p, uint32_t i);
     assigns *out \from i;
     ensures \initialized(out) && 0 < out->duration_q32_s <= (1 << 54) && 0 <= out->start_q40_mm < (1 << 62); */
 void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out);
-
-/*@ requires i < p->header.piece_count;
-    assigns \result \from i;
-    ensures 0 < \result <= (1 << 54); */
-uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
 /*@ requires i < p->header.piece_count;
     assigns \result \from i;
@@ -137,23 +129,16 @@ static uint64_t any_time(void)
  * segments to the piece. */
 static void place(struct interp *it, uint32_t i)
 {
-    if (it->piece == NULL) {
-        load_piece(it, i, (uint64_t)any_between(0, POWER(54)));
-        load_segment(it, i);
-    } else {
-        it->piece = coefficients_piece_at(it->program, it->kernel, i);
-        it->segment = coefficients_segment_at(it->program, it->kernel, i);
-    }
+    it->piece = coefficients_piece_at(it->program, it->kernel, i);
+    it->segment = coefficients_segment_at(it->program, it->kernel, i);
 }
 
 /* Records of pieces and of segments stand behind one another: neither is taken for the other. */
 static void stays(const struct interp *it)
 {
-    if (it->piece != NULL) {
-        prove((const void *)it->piece <
-              (const void *)coefficients_segment_at(it->program, it->kernel, 0));
-        prove(it->segment >= coefficients_segment_at(it->program, it->kernel, 0));
-    }
+    prove((const void *)it->piece <
+          (const void *)coefficients_segment_at(it->program, it->kernel, 0));
+    prove(it->segment >= coefficients_segment_at(it->program, it->kernel, 0));
 }
 
 /* By arc length; and the time of one: a step from a piece, and one between any two times. */
@@ -182,7 +167,9 @@ static void interpolate(const struct program *p)
 {
     struct interp it;
     struct interp_point point;
-    if (interp_begin(&it, p, INTERP_FIXED) != 0) {
+    struct interp_point last;
+    interp_ends(p, p->coefficients_for, &point, &last);
+    if (interp_begin(&it, p) != 0) {
         return;
     }
     for (uint32_t i = 0; i < COUNT; i++) {
@@ -190,10 +177,8 @@ static void interpolate(const struct program *p)
         interp_at_q42(&it, any_time(), &point);
         stays(&it);
         place(&it, i);
-        if (it.piece != NULL) {
-            interp_at_piece(&it, it.piece, any_time(), &point);
-            stays(&it);
-        }
+        interp_at_piece(&it, it.piece, any_time(), &point);
+        stays(&it);
         place(&it, i);
         interp_seek(&it, any_time());
         stays(&it);
@@ -214,9 +199,6 @@ int main(void)
     p.header.period_us = (uint32_t)1000 << any_between(0, 3);
     p.header.duration_q32_s = (uint64_t)any_between(1, POWER(54) - 1);
     p.header.length_q40_mm = any_between(1, POWER(62) - 1);
-    p.coefficients = NULL;
-    p.coefficients_for = NULL;
-    interpolate(&p);
     if (coefficients_make(&p, &any_kernel, take, records) == 0) {
         prove(filled == coefficients_size(&p, &any_kernel) && filled <= sizeof records);
         coefficients_attach(&p, &any_kernel, (const uint8_t *)records);

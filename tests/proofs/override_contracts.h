@@ -35,10 +35,10 @@
 
 /*@ requires piece < clock->program->header.piece_count;
     assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->piece_end_q42_s, clock->even_q62_s
-            \from time_q42_s, piece, piece_end_q32_s;
+            \from time_q42_s, piece;
     ensures is_clock(clock); */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct coefficients_piece *record, uint64_t piece_end_q32_s);
+                       const struct coefficients_piece *record);
 
 /*@ assigns *plan \from \nothing;
     ensures \initialized(plan) && plan->now.override_q57 == 0 && plan->now.slope_q56 == 0; */
@@ -110,16 +110,12 @@ int path_brake_rests(const struct path_brake *brake);
 
 /* --- core/interp.h: eva_interp.c --- */
 
-/*@ assigns \result, *out, it->segment_index \from time_q42_s;
-    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
-
-/*@ assigns \result, *out, it->segment_index \from time_q42_s;
+/*@ assigns \result, *out, it->segment \from time_q42_s;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
 int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out);
 
-/*@ assigns \result, *out, it->segment_index \from arc_length_q40_mm;
+/*@ assigns \result, *out, it->segment \from arc_length_q40_mm;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
 int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out);
 
@@ -135,9 +131,9 @@ void interp_search_begin(struct interp_search *search, const struct coefficients
                          uint32_t index, int64_t arc_length_q40_mm);
 
 /*@ requires search->piece_index < 3;
-    assigns \result, search->time_q42_s, search->piece_index, search->bisecting, search->low_q42_s, search->high_q42_s,
-            it->piece_index \from search->piece_index;
+    assigns \result, search->time_q42_s, search->piece_index, search->bisecting, search->low_q42_s, search->high_q42_s
+            \from search->piece_index;
     ensures search->piece_index < 3; */
-int interp_search_step(struct interp *it, struct interp_search *search);
+int interp_search_step(const struct interp *it, struct interp_search *search);
 
 #endif

@@ -20,6 +20,7 @@
 /* --- What the plan stands on: override_contracts.h --- */
 
 static int64_t begun_q57; /* the way that a step was made for */
+static struct program_override ahead; /* bounds of the window that is looked at */
 
 void some_ticks(struct ramp_ticks *ticks, const struct ramp_limits *limits, int64_t change_q57)
 {
@@ -74,9 +75,9 @@ void some_window(struct override_window *w, const struct program_clock *clock, u
 {
     (void)clock;
     prove(window < OVERRIDE_WINDOWS);
-    w->own.factor_q14 = (uint16_t)nondet_uint32();
-    assume(IS_FACTOR(w->own.factor_q14));
-    w->bounds = &w->own;
+    ahead.factor_q14 = (uint16_t)nondet_uint32();
+    assume(IS_FACTOR(ahead.factor_q14));
+    w->bounds = &ahead;
     w->end_q32_s = nondet_uint64();
 }
 
@@ -180,8 +181,9 @@ static void any_plan(struct override_plan *plan, struct way *way)
 {
     assume(IS_FACTOR(plan->guaranteed.factor_q14));
     plan->guaranteed_q57 = (int64_t)plan->guaranteed.factor_q14 << 43;
-    assume(IS_FACTOR(plan->ahead.own.factor_q14));
-    plan->ahead.bounds = nondet_uint32() != 0 ? &plan->ahead.own : &plan->guaranteed;
+    ahead.factor_q14 = (uint16_t)nondet_uint32();
+    assume(IS_FACTOR(ahead.factor_q14));
+    plan->ahead.bounds = nondet_uint32() != 0 ? &ahead : &plan->guaranteed;
     assume(IS_OVERRIDE(plan->commanded_q57));
     assume(IS_OVERRIDE(plan->now.override_q57));
     way->slope = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);

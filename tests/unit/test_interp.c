@@ -13,17 +13,34 @@ static const char *const names[] = {"alpha_exponential.hdgp", "heart_minimax.hdg
 #define NAMES (sizeof names / sizeof names[0])
 
 static struct program p;
+static struct golden_prepared prepared[KERNELS];
 static struct interp it;
 static struct interp_point a, b;
 
+static void open(const char *name)
+{
+    golden_open(&p, name);
+    for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
+        golden_prepare(&prepared[kernel], &p, (enum interp_kernel)kernel);
+    }
+}
+
+static void close(void)
+{
+    for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
+        golden_discard(&prepared[kernel]);
+    }
+    golden_close(&p);
+}
+
 void setUp(void)
 {
-    golden_open(&p, "alpha_minimax.hdgp");
+    open("alpha_minimax.hdgp");
 }
 
 void tearDown(void)
 {
-    golden_close(&p);
+    close();
 }
 
 static void assert_same_point(void)
@@ -36,8 +53,10 @@ static void assert_same_point(void)
 
 static void test_refuses_nonsense(void)
 {
-    TEST_ASSERT_EQUAL_INT(INTERP_ERR_PROGRAM, interp_begin(&it, NULL, INTERP_FIXED));
-    TEST_ASSERT_EQUAL_INT(INTERP_ERR_KERNEL, interp_begin(&it, &p, (enum interp_kernel)3));
+    const struct program nothing = {.image = NULL};
+    TEST_ASSERT_EQUAL_INT(INTERP_ERR_PROGRAM, interp_begin(&it, NULL));
+    TEST_ASSERT_EQUAL_INT(INTERP_ERR_PROGRAM, interp_begin(&it, &nothing));
+    TEST_ASSERT_EQUAL_INT(INTERP_ERR_COEFFICIENTS, interp_begin(&it, &p));
 }
 
 static void test_begins_at_the_start(void)
@@ -45,7 +64,7 @@ static void test_begins_at_the_start(void)
     struct program_segment first;
     program_segment_get(&p, 0, &first);
     for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        interp_begin(&it, &p, (enum interp_kernel)kernel);
+        interp_begin(&it, &prepared[kernel].program);
         TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(&it, 0, &a));
         TEST_ASSERT_EQUAL_INT64(0, a.arc_length_q40_mm);
         TEST_ASSERT_INT64_WITHIN(10 * NANOMETRE_Q40, first.x_q40_mm, a.x_q40_mm);
@@ -57,7 +76,7 @@ static void test_begins_at_the_start(void)
 static void test_ends_exactly(void)
 {
     for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        interp_begin(&it, &p, (enum interp_kernel)kernel);
+        interp_begin(&it, &prepared[kernel].program);
         TEST_ASSERT_EQUAL_INT(INTERP_END, interp_at(&it, p.header.duration_q32_s, &a));
         TEST_ASSERT_EQUAL_INT(INTERP_END, interp_at(&it, UINT64_MAX, &b));
         assert_same_point();
@@ -68,14 +87,28 @@ static void test_ends_exactly(void)
     }
 }
 
+/* Without records: the first point and the last one. */
+static void test_ends_are_those_of_a_run(void)
+{
+    for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
+        struct interp_point first, last;
+        interp_begin(&it, &prepared[kernel].program);
+        interp_ends(&p, kernel_find(kernel), &first, &last);
+        interp_at(&it, 0, &a);
+        TEST_ASSERT_EQUAL_MEMORY(&a, &first, sizeof a);
+        interp_at(&it, p.header.duration_q32_s, &a);
+        TEST_ASSERT_EQUAL_MEMORY(&a, &last, sizeof a);
+    }
+}
+
 /* A run, and single points reached by seeks in random order, give the same bits. */
 static void test_point_depends_on_time_only(void)
 {
     static struct interp other;
     uint64_t random = 1;
     for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        interp_begin(&it, &p, (enum interp_kernel)kernel);
-        interp_begin(&other, &p, (enum interp_kernel)kernel);
+        interp_begin(&it, &prepared[kernel].program);
+        interp_begin(&other, &prepared[kernel].program);
         uint64_t duration = p.header.duration_q32_s << 10;
         uint64_t time = 0;
         while (time < duration) {
@@ -91,7 +124,7 @@ static void test_point_depends_on_time_only(void)
 
 static void test_jumps_are_refused(void)
 {
-    interp_begin(&it, &p, INTERP_FIXED);
+    interp_begin(&it, &prepared[INTERP_FIXED].program);
     TEST_ASSERT_EQUAL_INT(INTERP_ERR_JUMP, interp_at(&it, p.header.duration_q32_s - 1u, &a));
     TEST_ASSERT_EQUAL_INT(0, interp_seek(&it, p.header.duration_q32_s - 1u));
     TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at(&it, p.header.duration_q32_s - 1u, &a));
@@ -113,10 +146,10 @@ static void compare_kernels(void)
     struct interp_point c;
     struct program_clock clock;
     struct override_plan plan;
-    interp_begin(&it, &p, INTERP_FIXED);
-    interp_begin(&floating, &p, INTERP_FLOAT);
-    interp_begin(&exact, &p, INTERP_DOUBLE);
-    program_clock_begin(&clock, &p, p.header.period_us, 0);
+    interp_begin(&it, &prepared[INTERP_FIXED].program);
+    interp_begin(&floating, &prepared[INTERP_FLOAT].program);
+    interp_begin(&exact, &prepared[INTERP_DOUBLE].program);
+    program_clock_begin(&clock, &prepared[INTERP_FIXED].program, p.header.period_us, 0);
     override_plan_begin(&plan, &p);
     for (uint32_t tick = 0; tick < program_ticks(&p); tick++) {
         const uint64_t time = override_plan_tick(&plan, &clock);
@@ -135,8 +168,8 @@ static void compare_kernels(void)
 static void test_kernels_agree(void)
 {
     for (unsigned i = 0; i < NAMES; i++) {
-        golden_close(&p);
-        golden_open(&p, names[i]);
+        close();
+        open(names[i]);
         compare_kernels();
     }
 }
@@ -147,6 +180,7 @@ int main(void)
     RUN_TEST(test_refuses_nonsense);
     RUN_TEST(test_begins_at_the_start);
     RUN_TEST(test_ends_exactly);
+    RUN_TEST(test_ends_are_those_of_a_run);
     RUN_TEST(test_point_depends_on_time_only);
     RUN_TEST(test_jumps_are_refused);
     RUN_TEST(test_kernels_agree);

@@ -56,15 +56,14 @@ static void mutate(uint8_t *image, uint32_t size, uint64_t *random)
     }
 }
 
-static void run_accepted(const struct program *p, const struct program_limits *limits,
-                         enum interp_kernel kernel)
+static void run_accepted(const struct program *p, const struct program_limits *limits)
 {
     static struct interp it;
     struct interp_point point;
     uint64_t period = ((uint64_t)p->header.period_us << 42) / 1000000u;
     uint64_t duration = p->header.duration_q32_s << 10;
     uint64_t step = 2 * period;
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, p, kernel));
+    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, p));
     uint64_t most = 300 * step;
     uint64_t from = duration > most ? duration - most : 0;
     TEST_ASSERT_EQUAL_INT(0, interp_seek(&it, from >> 10));
@@ -105,7 +104,7 @@ static void run_within_axis_limits(const struct program *p, const struct program
     const uint64_t duration = p->header.duration_q32_s << 10;
     struct interp_point point;
     double mm[4][2];
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, p, INTERP_DOUBLE));
+    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, p));
     for (uint32_t k = 0; k < 1000u && k * period <= duration + 3u * period; k++) {
         (void)interp_at_q42(&it, k * period, &point);
         memmove(mm[1], mm[0], 3 * sizeof mm[0]);
@@ -141,11 +140,14 @@ static int try_image(uint8_t *image, uint32_t size, uint64_t random)
     if (program_open(&p, image, size) != 0 || program_check(&p, &limits, &fault) != 0) {
         return 0;
     }
-    if (limits.axis_jerk_mm_s3[0] != 0u) {
-        run_within_axis_limits(&p, &limits);
-    }
     for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        run_accepted(&p, &limits, (enum interp_kernel)kernel);
+        struct golden_prepared prepared;
+        golden_prepare(&prepared, &p, (enum interp_kernel)kernel);
+        run_accepted(&prepared.program, &limits);
+        if (kernel == INTERP_DOUBLE && limits.axis_jerk_mm_s3[0] != 0u) {
+            run_within_axis_limits(&prepared.program, &limits);
+        }
+        golden_discard(&prepared);
     }
     return 1;
 }

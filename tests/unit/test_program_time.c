@@ -6,17 +6,20 @@
 #include "unity.h"
 
 static struct program p;
+static struct golden_prepared prepared;
 static struct interp it;
 static struct interp_point point;
 
 void setUp(void)
 {
     golden_open(&p, "heart_minimax.hdgp");
-    interp_begin(&it, &p, INTERP_FIXED);
+    golden_prepare(&prepared, &p, INTERP_FIXED);
+    interp_begin(&it, &prepared.program);
 }
 
 void tearDown(void)
 {
+    golden_discard(&prepared);
     golden_close(&p);
 }
 

@@ -200,9 +200,11 @@ static void test_what_the_store_refuses(void)
 static uint32_t run(const struct program *program)
 {
     static struct interp interp;
+    struct golden_prepared prepared;
     uint32_t crc = 0;
     const uint32_t ticks = program_ticks(program);
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, program, INTERP_FIXED));
+    golden_prepare(&prepared, program, INTERP_FIXED);
+    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &prepared.program));
     for (uint32_t k = 0; k < ticks; ++k) {
         struct interp_point point;
         const uint64_t time_q32_s = ((uint64_t)k << 32) / 1000u;
@@ -210,6 +212,7 @@ static uint32_t run(const struct program *program)
         crc = crc32_update(crc, (const uint8_t *)&point.x_q40_mm, sizeof point.x_q40_mm);
         crc = crc32_update(crc, (const uint8_t *)&point.y_q40_mm, sizeof point.y_q40_mm);
     }
+    golden_discard(&prepared);
     return crc;
 }
 

@@ -33,9 +33,9 @@ class Bounds:
 
     @classmethod
     def read(cls, file: Path, *never: str) -> Bounds:
-        """From the file; `never`: further functions that are not called."""
+        """From the file; `never`: functions that are not called."""
         data = tomllib.loads(file.read_text(encoding="utf-8"))
-        return cls(data["rounds"], data["order"], frozenset([*data["never"]["functions"], *never]))
+        return cls(data["rounds"], data["order"], frozenset(never))
 
 
 @dataclass

@@ -36,7 +36,7 @@ RULES = (
     (r"core/kernel_\w+\.\w:(set_|\w+_set$)", "search"),
     (r"core/feed_piece\.\w:\w+_(set|make)$", "search"),
     (r"core/(ph_segment|coefficients)\.\w:", "search"),
-    (r"core/interp\.\w:(find_|load_)", "search"),
+    (r"core/interp\.\w:(find_|step_)", "search"),
     (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),
     (r"core/kernel_\w+\.\w:\w+_at$", "position"),
     (r"core/counts\.\w:", "position"),

@@ -12,8 +12,11 @@ int motion_begin(struct motion *motion, const struct program *program, const str
 {
     memset(motion, 0, sizeof *motion);
     motion->counts_per_mm = config->counts_per_mm;
-    feed_override_begin(&motion->feed, program, config->period_us, 0);
-    return interp_begin(&motion->interp, program, (enum interp_kernel)config->kernel);
+    const int result = interp_begin(&motion->interp, program);
+    if (result == 0) {
+        feed_override_begin(&motion->feed, program, config->period_us, 0);
+    }
+    return result;
 }
 
 static void to_counts(const struct motion *motion, const struct interp_point *point,

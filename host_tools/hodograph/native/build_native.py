@@ -19,6 +19,7 @@ ROOT = PACKAGE.parents[2]
 HEADERS = (
     "core/program_check.h",
     "core/stop_check.h",
+    "core/coefficients.h",
     "core/interp.h",
     "core/feed_override.h",
     "plant/drive.h",

@@ -9,6 +9,7 @@
 #include "core/program_check.h"
 
 static uint8_t image[1 << 20];
+static uint64_t records[1 << 20];
 
 static uint32_t add(uint32_t crc, int64_t value)
 {
@@ -32,8 +33,10 @@ int main(int argc, char **argv)
     }
     uint32_t size = (uint32_t)fread(image, 1, sizeof image, file);
     fclose(file);
-    if (program_open(&p, image, size) != 0 ||
-        interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2])) != 0) {
+    const struct kernel *kernel = kernel_find((uint32_t)atoi(argv[2]));
+    if (kernel == NULL || program_open(&p, image, size) != 0 ||
+        coefficients_make_in(&p, kernel, records, sizeof records) != 0 ||
+        interp_begin(&it, &p) != 0) {
         return 2;
     }
     uint32_t crc = 0;
