@@ -5,6 +5,8 @@
 
 #include "core/ph_segment.h"
 
+#define Q32_TO_Q42 10
+
 static uint64_t pieces_size(const struct program *p, const struct kernel *kernel)
 {
     return (uint64_t)p->header.piece_count * coefficients_piece_size(kernel);
@@ -25,13 +27,14 @@ static void look_ahead(struct program_override ahead[OVERRIDE_WINDOWS], const st
 }
 
 static void make_piece(struct coefficients_piece *out, const struct program *p,
-                       const struct kernel *kernel, uint32_t i, uint64_t start_q32_s)
+                       const struct kernel *kernel, uint32_t i, uint64_t start_q42_s)
 {
     struct program_piece piece;
     program_piece_get(p, i, &piece);
-    out->start_q32_s = start_q32_s;
-    out->end_q32_s = i + 1u == p->header.piece_count ? p->header.duration_q32_s
-                                                     : start_q32_s + piece.duration_q32_s;
+    out->start_q42_s = start_q42_s;
+    out->end_q42_s = i + 1u == p->header.piece_count
+                         ? p->header.duration_q32_s << Q32_TO_Q42
+                         : start_q42_s + (piece.duration_q32_s << Q32_TO_Q42);
     look_ahead(out->ahead, p, i);
     kernel->piece_set(&out->feed, &piece);
 }
@@ -57,12 +60,12 @@ int coefficients_make(const struct program *p, const struct kernel *kernel, coef
         struct coefficients_segment segment;
         uint8_t bytes[sizeof(struct coefficients_segment)];
     } record;
-    uint64_t start_q32_s = 0;
+    uint64_t start_q42_s = 0;
     int error = 0;
     memset(&record, 0, sizeof record);
     for (uint32_t i = 0; error == 0 && i < p->header.piece_count; i++) {
-        make_piece(&record.piece, p, kernel, i, start_q32_s);
-        start_q32_s = record.piece.end_q32_s;
+        make_piece(&record.piece, p, kernel, i, start_q42_s);
+        start_q42_s = record.piece.end_q42_s;
         error = sink(context, record.bytes, coefficients_piece_size(kernel));
     }
     memset(&record, 0, sizeof record);

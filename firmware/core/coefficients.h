@@ -27,8 +27,8 @@
 
 /* A record ends behind the kernel's own part. */
 struct coefficients_piece {
-    uint64_t start_q32_s;
-    uint64_t end_q32_s;                              /* of the last piece the duration */
+    uint64_t start_q42_s;
+    uint64_t end_q42_s;                              /* of the last piece the duration */
     struct program_override ahead[OVERRIDE_WINDOWS]; /* of the windows that begin with it */
     union {
         struct feed_piece integers;

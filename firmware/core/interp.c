@@ -12,8 +12,7 @@
 static void evaluate_feed(const struct interp *it, const struct coefficients_piece *piece,
                           uint64_t time_q42_s, struct feed_point *f)
 {
-    uint64_t t = time_q42_s - (piece->start_q32_s << FINE_BITS);
-    it->kernel->piece_at(&piece->feed, t, f);
+    it->kernel->piece_at(&piece->feed, f, time_q42_s - piece->start_q42_s);
     if (f->arc_length_q40_mm < 0) {
         f->arc_length_q40_mm = 0;
     } else if (f->arc_length_q40_mm > it->length_q40_mm) {
@@ -22,15 +21,15 @@ static void evaluate_feed(const struct interp *it, const struct coefficients_pie
 }
 
 /* Makes the piece of this time, below the duration, the present one, crossing `most` ends at most. */
-static int find_piece(struct interp *it, uint64_t time_q32_s, uint32_t most)
+static int find_piece(struct interp *it, uint64_t time_q42_s, uint32_t most)
 {
     const struct coefficients_piece *piece = it->piece;
-    if (time_q32_s < piece->start_q32_s) {
+    if (time_q42_s < piece->start_q42_s) {
         return INTERP_ERR_JUMP;
     }
     const struct coefficients_piece *last =
         coefficients_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
-    for (; piece != last && time_q32_s >= piece->end_q32_s; most--) {
+    for (; piece != last && time_q42_s >= piece->end_q42_s; most--) {
         if (most == 0) {
             return INTERP_ERR_JUMP;
         }
@@ -85,7 +84,7 @@ static void set_start(struct interp_point *start, const struct program *p,
     program_segment_get(p, 0, &segment);
     ph_segment_expand(&ph, &segment);
     kernel->segment_set(&record.path, &ph);
-    kernel->segment_at(&record.path, 0, point);
+    kernel->segment_at(&record.path, point, 0);
     start->arc_length_q40_mm = 0;
     start->x_q40_mm = point[0];
     start->y_q40_mm = point[1];
@@ -123,7 +122,7 @@ int interp_begin(struct interp *it, const struct program *p)
     }
     it->program = p;
     it->kernel = p->coefficients_for;
-    it->duration_q32_s = p->header.duration_q32_s;
+    it->duration_q42_s = p->header.duration_q32_s << FINE_BITS;
     it->length_q40_mm = p->header.length_q40_mm;
     it->piece = coefficients_piece_at(p, it->kernel, 0);
     it->segment = coefficients_segment_at(p, it->kernel, 0);
@@ -134,7 +133,7 @@ int interp_begin(struct interp *it, const struct program *p)
 /* Beyond the end of the piece: the last one ends with the program. */
 static int beyond(const struct interp *it, uint64_t time_q42_s, struct interp_point *out)
 {
-    if (time_q42_s >> FINE_BITS < it->duration_q32_s) {
+    if (time_q42_s < it->duration_q42_s) {
         return INTERP_ERR_JUMP;
     }
     *out = it->end;
@@ -149,7 +148,7 @@ static int evaluate_path(struct interp *it, int64_t arc_length_q40_mm, uint32_t 
         return INTERP_ERR_JUMP;
     }
     int64_t point[2];
-    it->kernel->segment_at(&it->segment->path, arc_length_q40_mm, point);
+    it->kernel->segment_at(&it->segment->path, point, arc_length_q40_mm);
     out->arc_length_q40_mm = arc_length_q40_mm;
     out->x_q40_mm = point[0];
     out->y_q40_mm = point[1];
@@ -159,7 +158,7 @@ static int evaluate_path(struct interp *it, int64_t arc_length_q40_mm, uint32_t 
 int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
                     struct interp_point *out)
 {
-    if (time_q42_s >> FINE_BITS >= piece->end_q32_s) {
+    if (time_q42_s >= piece->end_q42_s) {
         return beyond(it, time_q42_s, out);
     }
     struct feed_point f;
@@ -173,8 +172,7 @@ int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, u
 
 int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out)
 {
-    uint64_t time_q32_s = time_q42_s >> FINE_BITS;
-    if (time_q32_s < it->duration_q32_s && find_piece(it, time_q32_s, MOST_ENDS) != INTERP_OK) {
+    if (time_q42_s < it->duration_q42_s && find_piece(it, time_q42_s, MOST_ENDS) != INTERP_OK) {
         return INTERP_ERR_JUMP;
     }
     return interp_at_piece(it, it->piece, time_q42_s, out);
@@ -193,8 +191,7 @@ int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct in
 int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
                                 uint64_t time_q42_s)
 {
-    const uint64_t t_q42_s = time_q42_s - (piece->start_q32_s << FINE_BITS);
-    return it->kernel->piece_acceleration(&piece->feed, t_q42_s);
+    return it->kernel->piece_acceleration(&piece->feed, time_q42_s - piece->start_q42_s);
 }
 
 void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
@@ -218,8 +215,8 @@ int interp_search_step(const struct interp *it, struct interp_search *search)
             search->piece_index = next;
             search->piece = coefficients_piece_next(piece, it->kernel);
         } else {
-            search->low_q42_s = piece->start_q32_s << FINE_BITS;
-            search->high_q42_s = (piece->end_q32_s << FINE_BITS) - 1u;
+            search->low_q42_s = piece->start_q42_s;
+            search->high_q42_s = piece->end_q42_s - 1u;
             search->bisecting = 1;
         }
         return 0;
@@ -240,20 +237,21 @@ int interp_search_step(const struct interp *it, struct interp_search *search)
 
 int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
 {
-    uint64_t time = time_q32_s < it->duration_q32_s ? time_q32_s : it->duration_q32_s;
-    return interp_at_q42(it, time << FINE_BITS, out);
+    const uint64_t duration_q32_s = it->duration_q42_s >> FINE_BITS;
+    const uint64_t time_q32_s_inside = time_q32_s < duration_q32_s ? time_q32_s : duration_q32_s;
+    return interp_at_q42(it, time_q32_s_inside << FINE_BITS, out);
 }
 
 int interp_seek(struct interp *it, uint64_t time_q32_s)
 {
-    uint64_t last = it->duration_q32_s - 1u;
-    uint64_t time = time_q32_s < last ? time_q32_s : last;
+    const uint64_t last_q32_s = (it->duration_q42_s >> FINE_BITS) - 1u;
+    const uint64_t time_q42_s = (time_q32_s < last_q32_s ? time_q32_s : last_q32_s) << FINE_BITS;
     struct feed_point f;
-    if (time < it->piece->start_q32_s) {
+    if (time_q42_s < it->piece->start_q42_s) {
         it->piece = coefficients_piece_at(it->program, it->kernel, 0);
     }
-    find_piece(it, time, UINT32_MAX);
-    evaluate_feed(it, it->piece, time << FINE_BITS, &f);
+    find_piece(it, time_q42_s, UINT32_MAX);
+    evaluate_feed(it, it->piece, time_q42_s, &f);
     find_segment(it, f.arc_length_q40_mm, UINT32_MAX);
     return 0;
 }

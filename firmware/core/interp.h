@@ -43,7 +43,7 @@ struct interp {
     const struct kernel *kernel;
     const struct coefficients_piece *piece; /* the present ones */
     const struct coefficients_segment *segment;
-    uint64_t duration_q32_s;
+    uint64_t duration_q42_s;
     int64_t length_q40_mm;
     struct interp_point end; /* the exact end point */
 };

@@ -23,18 +23,19 @@ enum interp_kernel {
 
 #define KERNELS 3u
 
-/* Contents of a piece or segment that was made ready are the kernel's own: `*_size` bytes, aligned to 8. */
+/* Contents of a piece or segment that was made ready are the kernel's own: `*_size` bytes, aligned to 8. Results stand
+ * before 64-bit arguments: so all of them are passed in registers on a 32-bit Arm. */
 struct kernel {
     size_t piece_size;
     size_t segment_size;
     void (*piece_set)(void *piece, const struct program_piece *from);
     void (*segment_set)(void *segment, const struct ph_segment *from);
     /* At local time t, 0 <= t < duration. */
-    void (*piece_at)(const void *piece, uint64_t t_q42_s, struct feed_point *out);
+    void (*piece_at)(const void *piece, struct feed_point *out, uint64_t t_q42_s);
     /* F'' there, in 2^-40 mm/s^2. */
     int64_t (*piece_acceleration)(const void *piece, uint64_t t_q42_s);
     /* At an arc length of this segment (from the start of the program). */
-    void (*segment_at)(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2]);
+    void (*segment_at)(const void *segment, int64_t point_q40_mm[2], int64_t arc_length_q40_mm);
 };
 
 extern const struct kernel kernel_fixed;

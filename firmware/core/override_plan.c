@@ -87,8 +87,9 @@ void override_window_get(struct override_window *w, const struct program_clock *
     w->bounds = &clock->record->ahead[window];
     w->end_q32_s = UINT64_MAX;
     if (behind < left) {
-        w->end_q32_s =
-            coefficients_piece_at(p, p->coefficients_for, clock->piece + behind)->end_q32_s;
+        const struct coefficients_piece *last =
+            coefficients_piece_at(p, p->coefficients_for, clock->piece + behind);
+        w->end_q32_s = last->end_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
     }
 }
 
@@ -186,6 +187,9 @@ static void look(struct override_plan *plan, const struct program_clock *clock)
     } else {
         give_up(plan);
     }
+    if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY) {
+        override_change_of(&plan->change, next_rest(plan), plan->target_q57);
+    }
 }
 
 /* How far one ramp may go with the bounds of the window. Above guaranteed_q57 it goes all the way, or not at all. */
@@ -197,7 +201,7 @@ static void find_stage(struct override_plan *plan)
         plan->stage.level = PROGRAM_LEVEL_FULL;
         return;
     }
-    override_stage_of(&plan->stage, plan->ahead.bounds, next_rest(plan), plan->target_q57);
+    override_stage_of(&plan->stage, plan->ahead.bounds, &plan->change);
     if (plan->kind == OVERRIDE_CLIMB) {
         plan->stage.level = PROGRAM_LEVEL_FULL;
         if (plan->stage.end_q57 != plan->target_q57) {
@@ -428,15 +432,12 @@ static void first_tick(struct override_plan *plan, struct program_clock *clock)
     (void)comes_steady(plan);
 }
 
-/* The tick that ends a ramp looks how far each tick at rest will go. */
 static void tick_of_ramp(struct override_plan *plan, struct program_clock *clock)
 {
     const int64_t slope_q56 = next_slope(plan, clock);
     program_clock_advance_q62(clock, program_clock_way_q62_s(clock, &plan->now, slope_q56));
     override_tick(&plan->now, slope_q56);
-    if (!override_ramp_moves(&plan->ramp)) {
-        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
-    }
+    clock->even_q62_s = 0;
 }
 
 void override_plan_change(struct override_plan *plan, struct program_clock *clock)
@@ -448,6 +449,9 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
     if (override_ramp_moves(&plan->ramp)) {
         tick_of_ramp(plan, clock);
         return;
+    }
+    if (clock->even_q62_s == 0) { /* after a ramp: not in its last tick, which takes long itself */
+        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
     }
     if (!comes_steady(plan)) {
         tick_of_decision(plan, clock);

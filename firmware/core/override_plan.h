@@ -33,7 +33,7 @@ enum override_kind {
 
 /* The steps of a search, one in a tick. */
 enum override_search {
-    OVERRIDE_LOOKS,    /* at the next window of pieces: what it allows, */
+    OVERRIDE_LOOKS, /* at the next window of pieces: what it allows, and the levels of the change, */
     OVERRIDE_STAGES,   /* how far one ramp may go with that, */
     OVERRIDE_MEASURES, /* how long that ramp takes, */
     OVERRIDE_FITS,     /* and whether it ends inside the window */
@@ -64,6 +64,7 @@ struct override_plan {
     uint32_t searched;            /* last search above guaranteed_q57 began in this piece */
     int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
     int64_t target_q57;           /* what is looked for, */
+    struct ramp_change change;    /* how the override gets there from its next rest, */
     struct ramp_stage stage;      /* where the next ramp on the way there ends, */
     struct ramp_ticks ticks;      /* and its ticks */
     int64_t high_q57;             /* greatest override on it */

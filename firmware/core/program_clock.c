@@ -33,14 +33,6 @@ static void set_time(struct program_clock *clock, uint64_t time_q42_s)
     clock->even_q62_s = 0;
 }
 
-static void set_piece(struct program_clock *clock, uint32_t piece,
-                      const struct coefficients_piece *record)
-{
-    clock->piece = piece;
-    clock->record = record;
-    clock->piece_end_q42_s = record->end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
-}
-
 void program_clock_begin(struct program_clock *clock, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)
 {
@@ -48,8 +40,10 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
     clock->duration_q42_s = p->header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
     set_time(clock, time_q42_s < clock->duration_q42_s ? time_q42_s : clock->duration_q42_s);
     set_period(clock, period_us);
-    set_piece(clock, 0, coefficients_piece_at(p, p->coefficients_for, 0));
-    if (clock->time_q42_s != clock->duration_q42_s && clock->time_q42_s >= clock->piece_end_q42_s) {
+    clock->piece = 0;
+    clock->record = coefficients_piece_at(p, p->coefficients_for, 0);
+    if (clock->time_q42_s != clock->duration_q42_s &&
+        clock->time_q42_s >= clock->record->end_q42_s) {
         program_clock_find_piece(clock, clock->time_q42_s, UINT32_MAX);
     }
 }
@@ -58,5 +52,6 @@ void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_
                        const struct coefficients_piece *record)
 {
     set_time(clock, time_q42_s);
-    set_piece(clock, piece, record);
+    clock->piece = piece;
+    clock->record = record;
 }

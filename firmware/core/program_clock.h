@@ -40,10 +40,10 @@ struct program_clock {
     uint32_t period_log2;  /* of the period in ms */
     uint32_t period_q32_s; /* rounded up, for look-ahead */
     uint64_t sixth_q70_s;  /* a sixth of the period */
-    uint64_t even_q62_s;   /* program time of a tick whose override does not change */
-    uint32_t piece;        /* of the last tick, */
-    const struct coefficients_piece *record; /* its coefficient record, */
-    uint64_t piece_end_q42_s;                /* and its end; of the last piece the duration */
+    uint64_t
+        even_q62_s; /* program time of a tick whose override does not change; 0: not known yet */
+    uint32_t piece; /* of the last tick, */
+    const struct coefficients_piece *record; /* and its coefficient record */
 };
 
 /* Sets the clock to a program time of a checked program with coefficient records; beyond the duration: to the duration.
@@ -108,15 +108,13 @@ static inline void program_clock_find_piece(struct program_clock *clock, uint64_
                                             uint32_t most)
 {
     const struct coefficients_piece *record = clock->record;
-    const uint64_t time_q32_s = time_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
     uint32_t left = most;
     do {
         record = coefficients_piece_next(record, clock->program->coefficients_for);
         left--;
-    } while (time_q32_s >= record->end_q32_s && left > 0);
+    } while (time_q42_s >= record->end_q42_s && left > 0);
     clock->record = record;
     clock->piece += most - left;
-    clock->piece_end_q42_s = record->end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
 }
 
 /* The time is at or beyond the end of the present piece: goes to the piece that it is in, or stays at the duration. */
@@ -136,8 +134,8 @@ static inline uint64_t program_clock_pass_end(struct program_clock *clock, uint6
 static inline uint64_t program_clock_enter(struct program_clock *clock)
 {
     const uint64_t time_q42_s = program_clock_time_q42(clock);
-    return time_q42_s < clock->piece_end_q42_s ? time_q42_s
-                                               : program_clock_pass_end(clock, time_q42_s);
+    return time_q42_s < clock->record->end_q42_s ? time_q42_s
+                                                 : program_clock_pass_end(clock, time_q42_s);
 }
 
 #endif

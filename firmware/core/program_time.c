@@ -14,7 +14,7 @@ static uint64_t bisect(const struct program_piece *piece, int64_t arc_length_q40
     feed_piece_set(&feed, piece);
     while (low < high) {
         uint64_t middle = low + (high - low) / 2u;
-        feed_piece_at(&feed, middle, &at);
+        feed_piece_at(&feed, &at, middle);
         if (at.arc_length_q40_mm >= arc_length_q40_mm) {
             high = middle;
         } else {

@@ -8,7 +8,7 @@
  * shows: program_clock_find_piece
  * mutant: core/program_clock.h: clock->piece += most - left => clock->piece += most - left + 1u
  * mutant: core/program_clock.h: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
- * mutant: core/program_clock.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
+ * mutant: core/program_clock.h: while (time_q42_s >= record->end_q42_s && left > 0) => while (time_q42_s <= record->end_q42_s && left > 0)
  */
 #include "proof.h"
 
@@ -29,7 +29,8 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
-    set_piece(clock, i, &records[i]);
+    clock->piece = i;
+    clock->record = &records[i];
 }
 
 void harness(void)
@@ -39,13 +40,15 @@ void harness(void)
     program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> PROGRAM_CLOCK_Q32_TO_Q42);
     program.coefficients_for = &kernel;
     for (uint32_t k = 0; k < COUNT; k++) {
-        records[k].end_q32_s = k + 1u == COUNT ? program.header.duration_q32_s : nondet_uint64();
+        records[k].end_q42_s = k + 1u == COUNT
+                                   ? program.header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42
+                                   : nondet_uint64();
     }
     uint32_t i = nondet_uint32();
     __CPROVER_assume(i < COUNT);
     place(&clock, i);
     const uint64_t time_q42_s = program_clock_time_q42(&clock);
-    if (time_q42_s >= clock.piece_end_q42_s) {
+    if (time_q42_s >= clock.record->end_q42_s) {
         program_clock_pass_end(&clock, time_q42_s);
     }
     prove(clock.piece < COUNT);

@@ -87,7 +87,8 @@ static void place(struct program_clock *clock, uint32_t i)
 {
     const struct program *p = clock->program;
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    set_piece(clock, i, coefficients_piece_at(p, p->coefficients_for, i));
+    clock->piece = i;
+    clock->record = coefficients_piece_at(p, p->coefficients_for, i);
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
 }
@@ -144,7 +145,7 @@ int main(void)
     p.coefficients_for = &any_kernel;
     for (uint32_t i = 0; i < COUNT; i++) {
         struct coefficients_piece *record = (void *)coefficients_piece_at(&p, &any_kernel, i);
-        record->end_q32_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(1, POWER(54));
+        record->end_q42_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(INT64_MIN, INT64_MAX);
         for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
             record->ahead[k] = any_bounds();
         }

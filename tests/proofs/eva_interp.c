@@ -72,7 +72,7 @@ static void segment_set(void *segment, const struct ph_segment *from)
     k->exponent = from->exponent;
 }
 
-static void piece_at(const void *piece, uint64_t t_q42_s, struct feed_point *out)
+static void piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s)
 {
     const struct feed_piece *f = piece;
     (void)t_q42_s;
@@ -89,7 +89,7 @@ static int64_t piece_acceleration(const void *piece, uint64_t t_q42_s)
     return any_between(INT64_MIN, INT64_MAX);
 }
 
-static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
+static void segment_at(const void *segment, int64_t point_q40_mm[2], int64_t arc_length_q40_mm)
 {
     const struct kernel_fixed_segment *k = segment;
     point_q40_mm[0] = k->exponent;

@@ -34,8 +34,7 @@
 /* --- core/program_clock.h, core/override_plan.h: eva_clock.c --- */
 
 /*@ requires piece < clock->program->header.piece_count;
-    assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->piece_end_q42_s, clock->even_q62_s
-            \from time_q42_s, piece;
+    assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s \from time_q42_s, piece;
     ensures is_clock(clock); */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
                        const struct coefficients_piece *record);
@@ -66,8 +65,8 @@ void override_plan_set(struct override_plan *plan, uint32_t percent);
 void override_plan_rise_no_more(struct override_plan *plan);
 
 /*@ requires is_plan(plan) && is_clock(clock);
-    assigns \result, *plan, clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->piece_end_q42_s,
-            clock->even_q62_s \from *plan, clock->time_q42_s;
+    assigns \result, *plan, clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s
+            \from *plan, clock->time_q42_s;
     ensures \initialized(plan) && is_plan(plan) && is_clock(clock); */
 uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock);
 

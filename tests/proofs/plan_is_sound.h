@@ -49,12 +49,24 @@ uint64_t some_span(const struct ramp_ticks *ticks, int64_t mean_q57, uint32_t pe
     return span;
 }
 
-/* Between both ends; a rest on the way is that of a level below 1. */
-void some_stage(struct ramp_stage *out, const struct program_override *bounds, int64_t from_q57,
-                int64_t to_q57)
+void some_change(struct ramp_change *out, int64_t from_q57, int64_t to_q57)
 {
-    (void)bounds;
     prove(IS_OVERRIDE(from_q57) && IS_OVERRIDE(to_q57));
+    out->from_q57 = from_q57;
+    out->to_q57 = to_q57;
+    out->first = nondet_uint32();
+    out->last = nondet_uint32();
+    assume(IS_CHANGE(out));
+}
+
+/* Between both ends; a rest on the way is that of a level below 1. */
+void some_stage(struct ramp_stage *out, const struct program_override *bounds,
+                const struct ramp_change *change)
+{
+    const int64_t from_q57 = change->from_q57;
+    const int64_t to_q57 = change->to_q57;
+    (void)bounds;
+    prove(IS_CHANGE(change));
     out->level = nondet_uint32();
     out->end_q57 = nondet_int64();
     assume(out->end_q57 == to_q57 || out->end_q57 < OVERRIDE_ONE);
@@ -128,6 +140,11 @@ static int search_is_sound(const struct override_plan *plan)
     if (plan->step >= OVERRIDE_STAGES &&
         ((climbs && plan->target_q57 <= plan->guaranteed_q57 + OVERRIDE_SPARE) ||
          !IS_OVERRIDE(plan->target_q57))) {
+        return 0;
+    }
+    if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY &&
+        !(IS_CHANGE(&plan->change) && plan->change.from_q57 == next_rest(plan) &&
+          plan->change.to_q57 == plan->target_q57)) {
         return 0;
     }
     if (plan->step >= OVERRIDE_MEASURES &&

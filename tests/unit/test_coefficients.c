@@ -81,7 +81,7 @@ static void expand(struct interp_point *out, const struct kernel *kernel, uint64
         start_q42_s += from.duration_q32_s << 10;
     }
     kernel->piece_set(&piece.feed, &from);
-    kernel->piece_at(&piece.feed, time_q42_s - start_q42_s, &f);
+    kernel->piece_at(&piece.feed, &f, time_q42_s - start_q42_s);
     const int64_t least = f.arc_length_q40_mm < 0 ? 0 : f.arc_length_q40_mm;
     const int64_t arc = least > plain.header.length_q40_mm ? plain.header.length_q40_mm : least;
     for (i = plain.header.segment_count - 1u; i > 0 && program_segment_start(&plain, i) > arc;
@@ -90,7 +90,7 @@ static void expand(struct interp_point *out, const struct kernel *kernel, uint64
     program_segment_get(&plain, i, &g);
     ph_segment_expand(&ph, &g);
     kernel->segment_set(&segment.path, &ph);
-    kernel->segment_at(&segment.path, arc, point);
+    kernel->segment_at(&segment.path, point, arc);
     *out = (struct interp_point){arc, point[0], point[1], f.feed_q32_mm_s};
 }
 
@@ -168,15 +168,14 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
         const uint64_t tick_q32_s = (uint64_t)ready.header.period_us * 4294967296u / 1000000u;
         struct coefficients_piece *piece = (void *)records.bytes;
         for (uint64_t k = 1; k <= ends; k++) { /* all between the second tick and the third */
-            const uint64_t end_q32_s = tick_q32_s + tick_q32_s * k / (ends + 1u);
-            piece->end_q32_s = end_q32_s;
+            const uint64_t end_q42_s = (tick_q32_s + tick_q32_s * k / (ends + 1u)) << 10;
+            piece->end_q42_s = end_q42_s;
             piece = (void *)((uint8_t *)piece + coefficients_piece_size(ready.coefficients_for));
-            piece->start_q32_s = end_q32_s;
+            piece->start_q42_s = end_q42_s;
         }
         TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &ready));
         program_clock_begin(&clock, &ready, ready.header.period_us, 0);
         override_plan_begin(&plan, &ready);
-        clock.piece_end_q42_s = clock.record->end_q32_s << 10; /* as if from the image */
         for (int k = 0; k < 2; k++) {
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
             TEST_ASSERT_EQUAL_INT(INTERP_OK,

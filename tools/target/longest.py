@@ -11,6 +11,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from target.effects import effect
@@ -146,7 +147,7 @@ class Longest:
         names = self.bounds.order.get(function.name, [])
         if len(calls) != len(names):
             raise LongestError(f"{function.name}: {len(calls)} calls through pointers")
-        return [f for f in self.image.functions if f.name == names[calls.index(at)]]
+        return [f for f in self.image.functions if fnmatchcase(f.name, names[calls.index(at)])]
 
     def _is_indirect(self, function: Function, index: int) -> bool:
         return effect(self.image, function, index).indirect
