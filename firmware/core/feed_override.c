@@ -18,10 +18,10 @@ enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 #define NO_NUMBERS    2u
 #define MOST_FEED_Q32 ((int64_t)1 << 45)
 #define MOST_SLOPE_Q56                                                                             \
-    (((int64_t)1 << 57) - 1)    /* 2^57, the greatest, less a unit: it is made an int32_t */
-#define MS_Q40      1099511628u /* 2^40 / 1000 */
-#define UM_Q40_BITS 30          /* 2^30 of 2^-40 mm are less than a micrometre */
-#define US_Q42_BITS 22          /* 2^22 of 2^-42 s are less than a microsecond */
+    (((int64_t)1 << 57) - 1)  /* 2^57, the greatest, less a unit: it is made an int32_t */
+#define MS_Q40    1099511628u /* 2^40 / 1000 */
+#define UM_PER_MM 1000u
+#define US_PER_S  1000000u
 
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)
@@ -225,15 +225,17 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-/* Whether any brake of the stop table would rest before the end of the path, and before the program does. */
+/* Whether any brake of the stop table would rest before the end of the path, and before the program does. What is left is
+ * rounded down, to micrometres and microseconds. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
     const struct program_header *h = &f->clock.program->header;
     const uint32_t way_um = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_um : h->fault_worst_um;
     const uint32_t time_us = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_us : h->fault_worst_us;
     const int64_t left_q40_mm = h->length_q40_mm - from->arc_length_q40_mm;
-    const uint64_t left_q42_s = f->clock.duration_q42_s - f->clock.time_q42_s;
-    return left_q40_mm >> UM_Q40_BITS >= (int64_t)way_um && left_q42_s >> US_Q42_BITS >= time_us;
+    const int64_t left_q32_s = (int64_t)((f->clock.duration_q42_s - f->clock.time_q42_s) >> 10);
+    return qmath_mul_unsigned(left_q40_mm, UM_PER_MM) >> 8 >= (int64_t)way_um &&
+           qmath_mul_unsigned(left_q32_s, US_PER_S) >= (int64_t)time_us;
 }
 
 /* --- From the plan to the brake --- */

@@ -162,8 +162,8 @@ static void expect_first_step(int64_t acceleration_q56, int64_t change_q56)
     struct path_brake brake;
     TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &n));
     path_brake_step(&brake);
-    TEST_ASSERT_INT64_WITHIN(6 + (change_q56 >> 30), acceleration_q56 + change_q56,
-                             brake.at.acceleration_q56);
+    TEST_ASSERT_INT64_WITHIN((uint64_t)(6 + (labs(change_q56) >> 30)),
+                             acceleration_q56 + change_q56, brake.at.acceleration_q56);
 }
 
 /* Towards the deceleration, from above it and from below, and not beyond it. */
@@ -209,7 +209,7 @@ static void expect_first_tick(int64_t a, int64_t change)
     struct path_brake brake;
     TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &n));
     path_brake_first(&brake);
-    const int64_t slack = 6 + (-change >> 30);
+    const uint64_t slack = (uint64_t)(6 + (-change >> 30));
     TEST_ASSERT_INT64_WITHIN(slack, a + change, brake.at.acceleration_q56);
     TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a + change / 2, brake.at.speed_q56);
     TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a / 2 + change / 6, way_q56(&from, &brake.at));
