@@ -48,7 +48,7 @@ LENGTHS_MM = (31.0, 20.0, 5.0, 1.0, 0.1, 1e-3, 1e-6)
 
 
 class Point(ctypes.Structure):
-    """struct interp_point."""
+    """struct interpolator_point."""
 
     _fields_ = [(name, ctypes.c_int64) for name in ("arc", "x", "y", "feed")]
 
@@ -90,12 +90,12 @@ class Core:
         size = self.lib.coefficients_size(program, made_for)
         records = (ctypes.c_uint64 * (size // 8 + 1))()
         self.lib.coefficients_make_in(program, made_for, records, ctypes.c_uint64(size))
-        self.lib.interp_begin(cursor, program)
+        self.lib.interpolator_begin(cursor, program)
         out = []
         for time in times_q42:
             point = Point()
-            self.lib.interp_seek(cursor, ctypes.c_uint64(time >> 10))
-            if self.lib.interp_at_q42(cursor, ctypes.c_uint64(time), ctypes.byref(point)) < 0:
+            self.lib.interpolator_seek(cursor, ctypes.c_uint64(time >> 10))
+            if self.lib.interpolator_at_q42(cursor, ctypes.c_uint64(time), ctypes.byref(point)) < 0:
                 raise SystemExit("a point was refused")
             out.append(point)
         return out

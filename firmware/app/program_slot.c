@@ -7,7 +7,7 @@
 #include "app/program_table.h"
 #include "core/coefficients.h"
 #include "core/counts.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)
@@ -71,7 +71,7 @@ static int check(const struct program_slot *slot, const struct program *program,
     return program_check(program, &limits, fault);
 }
 
-static void to_counts(const struct interp_point *point, uint32_t counts_per_mm,
+static void to_counts(const struct interpolator_point *point, uint32_t counts_per_mm,
                       int32_t counts[PLANE_AXES])
 {
     counts[0] = counts_from_q40_mm(point->x_q40_mm, counts_per_mm);
@@ -81,10 +81,10 @@ static void to_counts(const struct interp_point *point, uint32_t counts_per_mm,
 static void find_ends(struct program_slot *slot, const struct config *config)
 {
     const struct kernel *kernel = kernel_find(config->kernel);
-    struct interp_point first;
-    struct interp_point last;
+    struct interpolator_point first;
+    struct interpolator_point last;
     if (kernel != NULL) {
-        interp_ends(&slot->program, kernel, &first, &last);
+        interpolator_ends(&slot->program, kernel, &first, &last);
         to_counts(&first, config->counts_per_mm, slot->start_counts);
         to_counts(&last, config->counts_per_mm, slot->end_counts);
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a kernel is: how a segment and a feed piece are made ready and then evaluated. core/interp.h drives one of them.
+ * What a kernel is: how a segment and a feed piece are made ready and then evaluated. core/interpolator.h drives one of them.
  *
  * An image links the kernels that it names: its `kernels_linked` is core/kernels_all.c on a host, one of
  * firmware/targets/kernels_*.c on a microcontroller. Pure, any context.
@@ -15,10 +15,10 @@
 #include "core/ph_segment.h"
 
 /* Numbers as in object 0x2004 sub 5. */
-enum interp_kernel {
-    INTERP_FIXED = 0,  /* integers only, the same bits everywhere, within 1 nm */
-    INTERP_FLOAT = 1,  /* single precision and integers, within 10 nm */
-    INTERP_DOUBLE = 2, /* the host's reference, within 1e-9 mm */
+enum kernel_number {
+    KERNEL_FIXED = 0,  /* integers only, the same bits everywhere, within 1 nm */
+    KERNEL_FLOAT = 1,  /* single precision and integers, within 10 nm */
+    KERNEL_DOUBLE = 2, /* the host's reference, within 1e-9 mm */
 };
 
 #define KERNELS 3u

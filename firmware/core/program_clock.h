@@ -60,7 +60,7 @@ void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_
 uint64_t program_clock_way_q62_s(const struct program_clock *clock,
                                  const struct override_state *from, int64_t slope_q56);
 
-/* Program time of the last tick in 2^-42 s, rounded to nearest: for interp_at_q42. */
+/* Program time of the last tick in 2^-42 s, rounded to nearest: for interpolator_at_q42. */
 static inline uint64_t program_clock_time_q42(const struct program_clock *clock)
 {
     if (clock->fine == 0) {
@@ -103,7 +103,7 @@ static inline void program_clock_advance_even(struct program_clock *clock, int64
 }
 
 /* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
- * ends at most. When they are not enough, the piece ends before the time, which interp_at_piece refuses. */
+ * ends at most. When they are not enough, the piece ends before the time, which interpolator_at_piece refuses. */
 static inline void program_clock_find_piece(struct program_clock *clock, uint64_t time_q42_s,
                                             uint32_t most)
 {

@@ -8,6 +8,16 @@
  * narrower signed type is modulo 2^N. Nothing else.
  *
  * All inline functions: constant time, any context.
+ *
+ * Names of fixed-point numbers, in all of the core:
+ *
+ *   NAME_qN_UNIT     an integer that stands for integer / 2^N of the unit: x_q40_mm in 2^-40 mm, time_q42_s in 2^-42 s
+ *   NAME_qN          the same without a unit: override_q57, 2^57 = 1
+ *   NAME_UNIT        whole units: period_us, feed_um_s
+ *   unit of speed    mm_s; of acceleration mm_s2; of jerk mm_s3
+ *   q56 of a brake and of a ramp: mm, or 1, a tick, a tick squared or cubed, as their headers say
+ *
+ * A conversion to fewer bits after the point drops bits (floor) unless it is qmath_round; one to more is exact.
  */
 #ifndef HODOGRAPH_CORE_QMATH_H
 #define HODOGRAPH_CORE_QMATH_H

@@ -19,7 +19,7 @@
 
 #include "core/feed_override.h"
 #include "core/feedforward.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/program.h"
 #include "offline/contour.h"
 #include "offline/offline_fault.h"
@@ -74,7 +74,7 @@ enum offline_error {
 
 /* Fields are private. */
 struct offline {
-    struct interp interp;
+    struct interpolator interp;
     struct feed_override feed;
     const struct offline_order *orders; /* borrowed */
     uint32_t order_count;
@@ -127,8 +127,8 @@ int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
 
 /* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
  * counts: x, y pairs, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */
-int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
-                   uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
+int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
+                   uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 
 /* Program times of n ticks from tick0 on, as the controller's program clock gives them at override 1, in
  * 2^-42 s. */

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "core/feed_override.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/program_check.h"
 #include "fuzz.h"
 #include "golden.h"
@@ -36,13 +36,13 @@ enum time_command { TIME_HOLD, TIME_RESUME, TIME_STOP, TIME_OVERRIDE };
 
 struct program_run {
     struct feed_override feed;
-    struct interp interp;
+    struct interpolator interp;
 };
 
 static void run_begin(struct program_run *run, const struct program *p)
 {
     feed_override_begin(&run->feed, p, p->header.period_us, 0);
-    FUZZ_CHECK(interp_begin(&run->interp, p) == 0);
+    FUZZ_CHECK(interpolator_begin(&run->interp, p) == 0);
 }
 
 static void run_command(struct program_run *run, enum time_command command, uint32_t percent)
@@ -63,7 +63,7 @@ static void run_command(struct program_run *run, enum time_command command, uint
     }
 }
 
-static void run_step(struct program_run *run, struct interp_point *point)
+static void run_step(struct program_run *run, struct interpolator_point *point)
 {
     FUZZ_CHECK(feed_override_next(&run->feed, &run->interp, point) >= 0);
 }
@@ -253,7 +253,7 @@ struct trail {
     double period_s;
 };
 
-static void trail_push(struct trail *trail, const struct interp_point *point)
+static void trail_push(struct trail *trail, const struct interpolator_point *point)
 {
     memmove(trail->mm[1], trail->mm[0], 3 * sizeof trail->mm[0]);
     trail->mm[0][0] = (double)point->x_q40_mm / Q40;
@@ -264,7 +264,8 @@ static void trail_begin(struct trail *trail, const struct program *p)
 {
     struct program_segment first;
     program_segment_get(p, 0, &first);
-    const struct interp_point point = {.x_q40_mm = first.x_q40_mm, .y_q40_mm = first.y_q40_mm};
+    const struct interpolator_point point = {.x_q40_mm = first.x_q40_mm,
+                                             .y_q40_mm = first.y_q40_mm};
     memset(trail, 0, sizeof *trail);
     trail->period_s = 1e-6 * p->header.period_us;
     for (int i = 0; i < 4; i++) {
@@ -292,15 +293,15 @@ static double greater(double a, double b)
 /* At rate 1, up to TICKS_MAX. */
 static void find_peaks(const struct program *p, double peak[2][3])
 {
-    static struct interp it;
+    static struct interpolator it;
     struct trail trail;
-    struct interp_point point = {0};
+    struct interpolator_point point = {0};
     const uint64_t period = ((uint64_t)p->header.period_us << 42) / 1000000u;
     trail_begin(&trail, p);
-    FUZZ_CHECK(interp_begin(&it, p) == 0);
-    int result = INTERP_OK;
-    for (uint32_t k = 0; k < TICKS_MAX && result == INTERP_OK; ++k) {
-        result = interp_at_q42(&it, k * period, &point);
+    FUZZ_CHECK(interpolator_begin(&it, p) == 0);
+    int result = INTERPOLATOR_OK;
+    for (uint32_t k = 0; k < TICKS_MAX && result == INTERPOLATOR_OK; ++k) {
+        result = interpolator_at_q42(&it, k * period, &point);
         FUZZ_CHECK(result >= 0);
         trail_push(&trail, &point);
         for (int axis = 0; axis < 2; axis++) {
@@ -384,7 +385,7 @@ static void run_accepted(const struct program *p, const struct program_limits *l
     trail_begin(&trail, p);
     unsigned behind = 0;
     for (uint32_t k = 0; k < TICKS_MAX && behind < 4u; ++k) {
-        struct interp_point point = {0};
+        struct interpolator_point point = {0};
         give_commands(commands, &run);
         run_step(&run, &point);
         trail_push(&trail, &point);
@@ -414,7 +415,7 @@ static void harness(struct fuzz_input *in)
     memcpy(exact, image.bytes, image.size);
     if (program_open(&p, exact, image.size) == 0 && program_check(&p, &limits, &fault) == 0) {
         struct golden_prepared prepared;
-        golden_prepare(&prepared, &p, INTERP_DOUBLE);
+        golden_prepare(&prepared, &p, KERNEL_DOUBLE);
         set_limits(&limits, &prepared.program, scale);
         if (program_check(&p, &limits, &fault) == 0) {
             run_accepted(&prepared.program, &limits, &commands);

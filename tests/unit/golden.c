@@ -55,7 +55,7 @@ void golden_close(struct program *p)
     p->image = NULL;
 }
 
-void golden_prepare(struct golden_prepared *out, const struct program *p, enum interp_kernel kernel)
+void golden_prepare(struct golden_prepared *out, const struct program *p, enum kernel_number kernel)
 {
     const struct kernel *made_for = kernel_find((uint32_t)kernel);
     const uint64_t size = coefficients_size(p, made_for);

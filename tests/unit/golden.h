@@ -29,7 +29,7 @@ struct golden_prepared {
 /* A copy of an opened program, with records for a kernel; ends the process when there is no memory. The image has to stay.
  * Free with golden_discard. */
 void golden_prepare(struct golden_prepared *out, const struct program *p,
-                    enum interp_kernel kernel);
+                    enum kernel_number kernel);
 void golden_discard(struct golden_prepared *prepared);
 
 /* Seeded 64-bit generator (splitmix64), for tests with random cases. */

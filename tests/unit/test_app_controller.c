@@ -5,7 +5,7 @@
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 #include "core/counts.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 
 #include "app_bench.h"
 #include "app_image.h"
@@ -205,14 +205,14 @@ static void test_setpoints_are_those_of_the_interpolator(void)
     TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS + MACHINE_SETTLE_TICKS, ticks);
     struct program program;
     struct golden_prepared prepared;
-    struct interp interp;
-    struct interp_point point;
+    struct interpolator interp;
+    struct interpolator_point point;
     TEST_ASSERT_EQUAL_INT(0, program_open(&program, image, sizeof image));
-    golden_prepare(&prepared, &program, INTERP_FIXED);
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &prepared.program));
+    golden_prepare(&prepared, &program, KERNEL_FIXED);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &prepared.program));
     for (uint32_t k = 0; k < APP_IMAGE_TICKS; ++k) {
         const uint64_t time_q42_s = ((uint64_t)k * 4398046511104u + 500u) / 1000u;
-        TEST_ASSERT_TRUE(interp_at_q42(&interp, time_q42_s, &point) >= 0);
+        TEST_ASSERT_TRUE(interpolator_at_q42(&interp, time_q42_s, &point) >= 0);
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.x_q40_mm, 1000000), bench.targets[0][k]);
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.y_q40_mm, 1000000), bench.targets[1][k]);
     }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/override_plan.h"
 #include "core/ph_segment.h"
 #include "golden.h"
@@ -45,7 +45,7 @@ static int append(void *context, const uint8_t *bytes, uint32_t size)
     return 0;
 }
 
-static void begin(const char *name, enum interp_kernel kernel)
+static void begin(const char *name, enum kernel_number kernel)
 {
     golden_open(&plain, name);
     const struct kernel *made_for = kernel_find((uint32_t)kernel);
@@ -65,7 +65,7 @@ static void end(void)
 }
 
 /* The point as the image has it: its piece and its segment are looked for from the first on and expanded. */
-static void expand(struct interp_point *out, const struct kernel *kernel, uint64_t time_q42_s)
+static void expand(struct interpolator_point *out, const struct kernel *kernel, uint64_t time_q42_s)
 {
     struct coefficients_piece piece;
     struct coefficients_segment segment;
@@ -91,13 +91,13 @@ static void expand(struct interp_point *out, const struct kernel *kernel, uint64
     ph_segment_expand(&ph, &g);
     kernel->segment_set(&segment.path, &ph);
     kernel->segment_at(&segment.path, point, arc);
-    *out = (struct interp_point){arc, point[0], point[1], f.feed_q32_mm_s};
+    *out = (struct interpolator_point){arc, point[0], point[1], f.feed_q32_mm_s};
 }
 
-static void is_as_expanded(struct interp *it, uint64_t time_q42_s)
+static void is_as_expanded(struct interpolator *it, uint64_t time_q42_s)
 {
-    struct interp_point p, q;
-    TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(it, time_q42_s, &p));
+    struct interpolator_point p, q;
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at_q42(it, time_q42_s, &p));
     expand(&q, it->kernel, time_q42_s);
     TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
 }
@@ -106,14 +106,14 @@ static void run(void)
 {
     const uint64_t period = (uint64_t)plain.header.period_us * 4398046u;
     const uint64_t duration = plain.header.duration_q32_s << 10;
-    struct interp it;
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &ready));
+    struct interpolator it;
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &ready));
     for (uint64_t time = 0; time < duration; time += 1u + golden_random(&seed) % (2u * period)) {
         is_as_expanded(&it, time);
     }
     for (int i = 0; i < 300 && duration > 0; i++) {
         const uint64_t time = golden_random(&seed) % duration;
-        interp_seek(&it, time >> 10);
+        interpolator_seek(&it, time >> 10);
         is_as_expanded(&it, time);
     }
 }
@@ -121,8 +121,8 @@ static void run(void)
 static void test_same_bits_as_expanded(void)
 {
     for (size_t i = 0; i < NAMES; i++) {
-        for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-            begin(names[i], (enum interp_kernel)kernel);
+        for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
+            begin(names[i], (enum kernel_number)kernel);
             run();
             end();
         }
@@ -135,20 +135,20 @@ static void test_the_piece_of_the_clock_is_the_one(void)
     for (size_t i = 0; i < NAMES; i++) {
         struct program_clock clock;
         struct override_plan plan;
-        struct interp a, b;
-        struct interp_point p, q;
-        begin(names[i], INTERP_FIXED);
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &ready));
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready));
+        struct interpolator a, b;
+        struct interpolator_point p, q;
+        begin(names[i], KERNEL_FIXED);
+        TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&a, &ready));
+        TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&b, &ready));
         program_clock_begin(&clock, &ready, ready.header.period_us, 0);
         override_plan_begin(&plan, &ready);
         override_plan_set(&plan, 200);
-        for (int result = INTERP_OK; result == INTERP_OK;) {
+        for (int result = INTERPOLATOR_OK; result == INTERPOLATOR_OK;) {
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
             memset(&p, 0, sizeof p);
             memset(&q, 0, sizeof q);
-            result = interp_at_q42(&a, time_q42_s, &p);
-            TEST_ASSERT_EQUAL_INT(result, interp_at_piece(&b, clock.record, time_q42_s, &q));
+            result = interpolator_at_q42(&a, time_q42_s, &p);
+            TEST_ASSERT_EQUAL_INT(result, interpolator_at_piece(&b, clock.record, time_q42_s, &q));
             TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
         }
         TEST_ASSERT_EQUAL_UINT64(clock.duration_q42_s, clock.time_q42_s);
@@ -162,9 +162,9 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
     for (uint64_t ends = 2; ends <= 3; ends++) {
         struct program_clock clock;
         struct override_plan plan;
-        struct interp it;
-        struct interp_point point, before;
-        begin("alpha_exponential.hdgp", INTERP_FIXED);
+        struct interpolator it;
+        struct interpolator_point point, before;
+        begin("alpha_exponential.hdgp", KERNEL_FIXED);
         const uint64_t tick_q32_s = (uint64_t)ready.header.period_us * 4294967296u / 1000000u;
         struct coefficients_piece *piece = (void *)records.bytes;
         for (uint64_t k = 1; k <= ends; k++) { /* all between the second tick and the third */
@@ -173,18 +173,18 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
             piece = (void *)((uint8_t *)piece + coefficients_piece_size(ready.coefficients_for));
             piece->start_q42_s = end_q42_s;
         }
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &ready));
+        TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &ready));
         program_clock_begin(&clock, &ready, ready.header.period_us, 0);
         override_plan_begin(&plan, &ready);
         for (int k = 0; k < 2; k++) {
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
-            TEST_ASSERT_EQUAL_INT(INTERP_OK,
-                                  interp_at_piece(&it, clock.record, time_q42_s, &point));
+            TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK,
+                                  interpolator_at_piece(&it, clock.record, time_q42_s, &point));
         }
         memcpy(&before, &point, sizeof point);
         const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
-        const int result = interp_at_piece(&it, clock.record, time_q42_s, &point);
-        TEST_ASSERT_EQUAL_INT(ends == 2 ? INTERP_OK : INTERP_ERR_JUMP, result);
+        const int result = interpolator_at_piece(&it, clock.record, time_q42_s, &point);
+        TEST_ASSERT_EQUAL_INT(ends == 2 ? INTERPOLATOR_OK : INTERPOLATOR_ERR_JUMP, result);
         TEST_ASSERT_EQUAL_INT(ends == 2 ? 1 : 0, memcmp(&before, &point, sizeof point) != 0);
         end();
     }
@@ -192,8 +192,8 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
 
 static void test_windows_hold_the_least_of_their_pieces(void)
 {
-    const struct kernel *fixed = kernel_find(INTERP_FIXED);
-    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    const struct kernel *fixed = kernel_find(KERNEL_FIXED);
+    begin("alpha_exponential.hdgp", KERNEL_FIXED);
     for (uint32_t i = 0; i < plain.header.piece_count; i++) {
         const struct coefficients_piece *piece = coefficients_piece_at(&ready, fixed, i);
         for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
@@ -221,7 +221,7 @@ static void test_windows_end_with_their_pieces(void)
 {
     struct program_clock clock;
     uint64_t start_q32_s = 0;
-    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    begin("alpha_exponential.hdgp", KERNEL_FIXED);
     for (uint32_t i = 0; i < plain.header.piece_count; i++) {
         program_clock_begin(&clock, &ready, ready.header.period_us, start_q32_s << 10);
         TEST_ASSERT_EQUAL_UINT32(i, clock.piece);
@@ -245,8 +245,8 @@ static void test_windows_end_with_their_pieces(void)
 static void test_records_in_memory(void)
 {
     struct program own;
-    begin("alpha_offset.hdgp", INTERP_FLOAT);
-    const struct kernel *kernel = kernel_find(INTERP_FLOAT);
+    begin("alpha_offset.hdgp", KERNEL_FLOAT);
+    const struct kernel *kernel = kernel_find(KERNEL_FLOAT);
     uint8_t *memory = malloc(records.used);
     own = plain;
     TEST_ASSERT_EQUAL_INT(COEFFICIENTS_ERR_SIZE,
@@ -262,11 +262,11 @@ static void test_records_in_memory(void)
 
 static void test_an_error_of_the_sink_is_passed_on(void)
 {
-    begin("alpha_offset.hdgp", INTERP_FIXED);
+    begin("alpha_offset.hdgp", KERNEL_FIXED);
     for (uint32_t room = 0; room < records.used; room += 57u) {
         struct buffer small = {records.bytes, 0, room};
         TEST_ASSERT_EQUAL_INT(-7,
-                              coefficients_make(&plain, kernel_find(INTERP_FIXED), append, &small));
+                              coefficients_make(&plain, kernel_find(KERNEL_FIXED), append, &small));
     }
     end();
 }

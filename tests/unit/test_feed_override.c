@@ -9,14 +9,14 @@ enum { TICKS = 100 };
 
 static struct program p;
 static struct golden_prepared prepared;
-static struct interp it;
+static struct interpolator it;
 static struct feed_override feed;
-static struct interp_point point;
+static struct interpolator_point point;
 
 void setUp(void)
 {
     golden_open(&p, "heart_minimax.hdgp");
-    golden_prepare(&prepared, &p, INTERP_FIXED);
+    golden_prepare(&prepared, &p, KERNEL_FIXED);
 }
 
 void tearDown(void)
@@ -29,7 +29,7 @@ void tearDown(void)
 static void run(void)
 {
     feed_override_begin(&feed, &prepared.program, p.header.period_us, 0);
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &prepared.program));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &prepared.program));
     for (int k = 0; k < TICKS; k++) {
         TEST_ASSERT_EQUAL_INT(0, feed_override_next(&feed, &it, &point));
     }

@@ -25,7 +25,7 @@ void tearDown(void)
 static void begin_at(uint32_t period_us, uint64_t time_q42_s)
 {
     golden_discard(&prepared);
-    golden_prepare(&prepared, &p, INTERP_FIXED);
+    golden_prepare(&prepared, &p, KERNEL_FIXED);
     program_clock_begin(&clock, &prepared.program, period_us, time_q42_s);
     override_plan_begin(&plan, &prepared.program);
 }

@@ -60,7 +60,7 @@ void setUp(void)
     configs[0] = configs[1] = drive_bench_config;
     make_program();
     TEST_ASSERT_EQUAL_INT(
-        0, coefficients_make_in(&program, kernel_find(INTERP_FIXED), records, sizeof records));
+        0, coefficients_make_in(&program, kernel_find(KERNEL_FIXED), records, sizeof records));
 }
 
 void tearDown(void)
@@ -132,9 +132,9 @@ static void test_faulty_set_up_is_refused(void)
 static void test_times_and_points(void)
 {
     static uint64_t times[TICKS + 2];
-    static struct interp_point points[TICKS + 2];
+    static struct interpolator_point points[TICKS + 2];
     static int32_t counts[2 * (TICKS + 2)];
-    struct interp interp;
+    struct interpolator interp;
     TEST_ASSERT_EQUAL_INT(0, begin());
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
     offline_times(&program, 0, TICKS + 2, times);
@@ -146,7 +146,7 @@ static void test_times_and_points(void)
         times[k] = times[TICKS - 1 - k];
         times[TICKS - 1 - k] = kept;
     }
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &program));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &program));
     TEST_ASSERT_EQUAL_INT(0, offline_points(&interp, TICKS, times, 1000000, points, counts));
     for (int k = 0; k < TICKS; k++) {
         TEST_ASSERT_EQUAL_INT64(rows[TICKS - 1 - k].cmd_q40_mm[0], points[k].x_q40_mm);

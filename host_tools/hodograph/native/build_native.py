@@ -20,7 +20,7 @@ HEADERS = (
     "core/program_check.h",
     "core/stop_check.h",
     "core/coefficients.h",
-    "core/interp.h",
+    "core/interpolator.h",
     "core/feed_override.h",
     "plant/drive.h",
     "offline/contour.h",

@@ -50,14 +50,14 @@ const struct kernel *kernel_find(uint32_t number);
 uint64_t coefficients_size(const struct program *p, const struct kernel *kernel);
 int coefficients_make_in(struct program *p, const struct kernel *kernel, void *memory, uint64_t size);
 
-/* core/interp.h */
-struct interp_point {
+/* core/interpolator.h */
+struct interpolator_point {
     int64_t arc_length_q40_mm, x_q40_mm, y_q40_mm, feed_q32_mm_s;
 };
-struct interp {
+struct interpolator {
     ...;
 };
-int interp_begin(struct interp *it, const struct program *p);
+int interpolator_begin(struct interpolator *it, const struct program *p);
 
 /* core/feed_override.h */
 struct override_state {
@@ -78,7 +78,7 @@ void feed_override_resume(struct feed_override *f);
 void feed_override_set(struct feed_override *f, uint32_t percent);
 void feed_override_stop(struct feed_override *f);
 void feed_override_fault_stop(struct feed_override *f);
-int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
+int feed_override_next(struct feed_override *f, struct interpolator *it, struct interpolator_point *out);
 int feed_override_state(const struct feed_override *f);
 int feed_override_late(const struct feed_override *f);
 uint64_t feed_override_time_q42(const struct feed_override *f);
@@ -179,8 +179,8 @@ struct offline_stop {
 int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count);
 void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
 int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
-int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
-               uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
+int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
+               uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 void offline_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 void offline_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
 enum offline_error { OFFLINE_ERR_COEFFICIENTS, OFFLINE_ERR_PERIOD, OFFLINE_ERR_COUNTS, OFFLINE_ERR_FAULT, OFFLINE_ERR_DRIVE, OFFLINE_ERR_INTERP, ... };

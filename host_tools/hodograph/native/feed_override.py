@@ -49,11 +49,11 @@ class FeedOverride:
         ffi, self._lib = library()
         self._program = program  # keeps the image alive
         self._period_s = 1e-6 * program.period_us
-        self._interp = ffi.new("struct interp *")
-        self._point = ffi.new("struct interp_point *")
+        self._interp = ffi.new("struct interpolator *")
+        self._point = ffi.new("struct interpolator_point *")
         self._feed = ffi.new("struct feed_override *")
         prepared = program.prepared(kernel)
-        self._lib.interp_begin(self._interp, prepared)
+        self._lib.interpolator_begin(self._interp, prepared)
         self._lib.feed_override_begin(self._feed, prepared, program.period_us, 0)
 
     def step(self) -> Step:

@@ -21,7 +21,7 @@ POINT = np.dtype(
         ("feed_q32_mm_s", "<i8"),
     ]
 )
-"""One interpolated point, struct interp_point of core/interp.h: unrounded output of a kernel."""
+"""One interpolated point, struct interpolator_point of core/interpolator.h: unrounded output of a kernel."""
 
 
 @dataclass(frozen=True)
@@ -163,14 +163,14 @@ class NativeProgram:
         program = self.prepared(kernel)
         times = np.ascontiguousarray(times_q42_s, dtype=np.uint64)
         points = np.empty(times.size, dtype=POINT)
-        interp = ffi.new("struct interp *")
-        begun = lib.interp_begin(interp, program)
+        interp = ffi.new("struct interpolator *")
+        begun = lib.interpolator_begin(interp, program)
         made = begun or lib.offline_points(
             interp,
             times.size,
             ffi.from_buffer("uint64_t[]", times),
             1,
-            ffi.cast("struct interp_point *", ffi.from_buffer(points)),
+            ffi.cast("struct interpolator_point *", ffi.from_buffer(points)),
             ffi.NULL,
         )
         if made != 0:

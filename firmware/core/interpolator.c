@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/interp.h"
+#include "core/interpolator.h"
 
 #include <stddef.h>
 
@@ -9,7 +9,7 @@
 #define MOST_ENDS 2u /* piece ends and segment ends a tick may cross: protocol.md 1.2 and 1.3 */
 
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
-static void evaluate_feed(const struct interp *it, const struct coefficients_piece *piece,
+static void evaluate_feed(const struct interpolator *it, const struct coefficients_piece *piece,
                           uint64_t time_q42_s, struct feed_point *f)
 {
     it->kernel->piece_at(&piece->feed, f, time_q42_s - piece->start_q42_s);
@@ -21,25 +21,25 @@ static void evaluate_feed(const struct interp *it, const struct coefficients_pie
 }
 
 /* Makes the piece of this time, below the duration, the present one, crossing `most` ends at most. */
-static int find_piece(struct interp *it, uint64_t time_q42_s, uint32_t most)
+static int find_piece(struct interpolator *it, uint64_t time_q42_s, uint32_t most)
 {
     const struct coefficients_piece *piece = it->piece;
     if (time_q42_s < piece->start_q42_s) {
-        return INTERP_ERR_JUMP;
+        return INTERPOLATOR_ERR_JUMP;
     }
     const struct coefficients_piece *last =
         coefficients_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
     for (; piece != last && time_q42_s >= piece->end_q42_s; most--) {
         if (most == 0) {
-            return INTERP_ERR_JUMP;
+            return INTERPOLATOR_ERR_JUMP;
         }
         piece = coefficients_piece_next(piece, it->kernel);
     }
     it->piece = piece;
-    return INTERP_OK;
+    return INTERPOLATOR_OK;
 }
 
-static int step_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
+static int step_segment(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most)
 {
     const uint32_t size = coefficients_segment_size(it->kernel);
     const struct coefficients_segment *segment = it->segment;
@@ -47,34 +47,34 @@ static int step_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t m
     if (arc_length_q40_mm >= segment->to_q40_mm) {
         do {
             if (left-- == 0) {
-                return INTERP_ERR_JUMP;
+                return INTERPOLATOR_ERR_JUMP;
             }
             segment = (const void *)((const uint8_t *)segment + size);
         } while (arc_length_q40_mm >= segment->to_q40_mm);
     } else {
         do {
             if (left-- == 0) {
-                return INTERP_ERR_JUMP;
+                return INTERPOLATOR_ERR_JUMP;
             }
             segment = (const void *)((const uint8_t *)segment - size);
         } while (arc_length_q40_mm < segment->from_q40_mm);
     }
     it->segment = segment;
-    return INTERP_OK;
+    return INTERPOLATOR_OK;
 }
 
 /* Makes the segment of this arc length the present one: the last that starts at or before it. Steps
  * back only where the feed dips below zero by rounding. */
-static int find_segment(struct interp *it, int64_t arc_length_q40_mm, uint32_t most)
+static int find_segment(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most)
 {
     const struct coefficients_segment *segment = it->segment;
     if (arc_length_q40_mm >= segment->from_q40_mm && arc_length_q40_mm < segment->to_q40_mm) {
-        return INTERP_OK;
+        return INTERPOLATOR_OK;
     }
     return step_segment(it, arc_length_q40_mm, most);
 }
 
-static void set_start(struct interp_point *start, const struct program *p,
+static void set_start(struct interpolator_point *start, const struct program *p,
                       const struct kernel *kernel)
 {
     struct coefficients_segment record;
@@ -91,7 +91,7 @@ static void set_start(struct interp_point *start, const struct program *p,
     start->feed_q32_mm_s = 0;
 }
 
-static void set_end(struct interp_point *end, const struct program *p)
+static void set_end(struct interpolator_point *end, const struct program *p)
 {
     struct program_segment segment;
     struct ph_segment ph;
@@ -105,20 +105,20 @@ static void set_end(struct interp_point *end, const struct program *p)
     end->feed_q32_mm_s = 0;
 }
 
-void interp_ends(const struct program *p, const struct kernel *kernel, struct interp_point *first,
-                 struct interp_point *last)
+void interpolator_ends(const struct program *p, const struct kernel *kernel,
+                       struct interpolator_point *first, struct interpolator_point *last)
 {
     set_start(first, p, kernel);
     set_end(last, p);
 }
 
-int interp_begin(struct interp *it, const struct program *p)
+int interpolator_begin(struct interpolator *it, const struct program *p)
 {
     if (p == NULL || p->image == NULL) {
-        return INTERP_ERR_PROGRAM;
+        return INTERPOLATOR_ERR_PROGRAM;
     }
     if (p->coefficients_for == NULL) {
-        return INTERP_ERR_COEFFICIENTS;
+        return INTERPOLATOR_ERR_COEFFICIENTS;
     }
     it->program = p;
     it->kernel = p->coefficients_for;
@@ -131,71 +131,76 @@ int interp_begin(struct interp *it, const struct program *p)
 }
 
 /* Beyond the end of the piece: the last one ends with the program. */
-static int beyond(const struct interp *it, uint64_t time_q42_s, struct interp_point *out)
+static int beyond(const struct interpolator *it, uint64_t time_q42_s,
+                  struct interpolator_point *out)
 {
     if (time_q42_s < it->duration_q42_s) {
-        return INTERP_ERR_JUMP;
+        return INTERPOLATOR_ERR_JUMP;
     }
     *out = it->end;
-    return INTERP_END;
+    return INTERPOLATOR_END;
 }
 
 /* Arc length inside the path. */
-static int evaluate_path(struct interp *it, int64_t arc_length_q40_mm, uint32_t most,
-                         struct interp_point *out)
+static int evaluate_path(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most,
+                         struct interpolator_point *out)
 {
-    if (find_segment(it, arc_length_q40_mm, most) != INTERP_OK) {
-        return INTERP_ERR_JUMP;
+    if (find_segment(it, arc_length_q40_mm, most) != INTERPOLATOR_OK) {
+        return INTERPOLATOR_ERR_JUMP;
     }
     int64_t point[2];
     it->kernel->segment_at(&it->segment->path, point, arc_length_q40_mm);
     out->arc_length_q40_mm = arc_length_q40_mm;
     out->x_q40_mm = point[0];
     out->y_q40_mm = point[1];
-    return INTERP_OK;
+    return INTERPOLATOR_OK;
 }
 
-int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
-                    struct interp_point *out)
+int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece,
+                          uint64_t time_q42_s, struct interpolator_point *out)
 {
     if (time_q42_s >= piece->end_q42_s) {
         return beyond(it, time_q42_s, out);
     }
     struct feed_point f;
     evaluate_feed(it, piece, time_q42_s, &f);
-    if (evaluate_path(it, f.arc_length_q40_mm, MOST_ENDS, out) != INTERP_OK) {
-        return INTERP_ERR_JUMP;
+    if (evaluate_path(it, f.arc_length_q40_mm, MOST_ENDS, out) != INTERPOLATOR_OK) {
+        return INTERPOLATOR_ERR_JUMP;
     }
     out->feed_q32_mm_s = f.feed_q32_mm_s;
-    return INTERP_OK;
+    return INTERPOLATOR_OK;
 }
 
-int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out)
+int interpolator_at_q42(struct interpolator *it, uint64_t time_q42_s,
+                        struct interpolator_point *out)
 {
-    if (time_q42_s < it->duration_q42_s && find_piece(it, time_q42_s, MOST_ENDS) != INTERP_OK) {
-        return INTERP_ERR_JUMP;
+    if (time_q42_s < it->duration_q42_s &&
+        find_piece(it, time_q42_s, MOST_ENDS) != INTERPOLATOR_OK) {
+        return INTERPOLATOR_ERR_JUMP;
     }
-    return interp_at_piece(it, it->piece, time_q42_s, out);
+    return interpolator_at_piece(it, it->piece, time_q42_s, out);
 }
 
-int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out)
+int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm,
+                               struct interpolator_point *out)
 {
     const int64_t inside = qmath_lesser(qmath_greater(arc_length_q40_mm, 0), it->length_q40_mm);
-    const int result = evaluate_path(it, inside, INTERP_MOST_SEGMENTS, out);
-    if (result == INTERP_OK) {
+    const int result = evaluate_path(it, inside, INTERPOLATOR_MOST_SEGMENTS, out);
+    if (result == INTERPOLATOR_OK) {
         out->feed_q32_mm_s = 0;
     }
     return result;
 }
 
-int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
-                                uint64_t time_q42_s)
+int64_t interpolator_acceleration_q40(const struct interpolator *it,
+                                      const struct coefficients_piece *piece, uint64_t time_q42_s)
 {
     return it->kernel->piece_acceleration(&piece->feed, time_q42_s - piece->start_q42_s);
 }
 
-void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
-                         uint32_t index, int64_t arc_length_q40_mm)
+void interpolator_search_begin(struct interpolator_search *search,
+                               const struct coefficients_piece *piece, uint32_t index,
+                               int64_t arc_length_q40_mm)
 {
     search->arc_length_q40_mm = arc_length_q40_mm;
     search->time_q42_s = 0;
@@ -204,7 +209,7 @@ void interp_search_begin(struct interp_search *search, const struct coefficients
     search->bisecting = 0;
 }
 
-int interp_search_step(const struct interp *it, struct interp_search *search)
+int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search)
 {
     const struct program *p = it->program;
     const struct coefficients_piece *piece = search->piece;
@@ -235,14 +240,14 @@ int interp_search_step(const struct interp *it, struct interp_search *search)
     return search->low_q42_s == search->high_q42_s;
 }
 
-int interp_at(struct interp *it, uint64_t time_q32_s, struct interp_point *out)
+int interpolator_at(struct interpolator *it, uint64_t time_q32_s, struct interpolator_point *out)
 {
     const uint64_t duration_q32_s = it->duration_q42_s >> FINE_BITS;
     const uint64_t time_q32_s_inside = time_q32_s < duration_q32_s ? time_q32_s : duration_q32_s;
-    return interp_at_q42(it, time_q32_s_inside << FINE_BITS, out);
+    return interpolator_at_q42(it, time_q32_s_inside << FINE_BITS, out);
 }
 
-int interp_seek(struct interp *it, uint64_t time_q32_s)
+int interpolator_seek(struct interpolator *it, uint64_t time_q32_s)
 {
     const uint64_t last_q32_s = (it->duration_q42_s >> FINE_BITS) - 1u;
     const uint64_t time_q42_s = (time_q32_s < last_q32_s ? time_q32_s : last_q32_s) << FINE_BITS;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/interp.h"
+#include "core/interpolator.h"
 
 #include "core/override_plan.h"
 #include "golden.h"
@@ -14,14 +14,14 @@ static const char *const names[] = {"alpha_exponential.hdgp", "heart_minimax.hdg
 
 static struct program p;
 static struct golden_prepared prepared[KERNELS];
-static struct interp it;
-static struct interp_point a, b;
+static struct interpolator it;
+static struct interpolator_point a, b;
 
 static void open(const char *name)
 {
     golden_open(&p, name);
     for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
-        golden_prepare(&prepared[kernel], &p, (enum interp_kernel)kernel);
+        golden_prepare(&prepared[kernel], &p, (enum kernel_number)kernel);
     }
 }
 
@@ -54,18 +54,18 @@ static void assert_same_point(void)
 static void test_refuses_nonsense(void)
 {
     const struct program nothing = {.image = NULL};
-    TEST_ASSERT_EQUAL_INT(INTERP_ERR_PROGRAM, interp_begin(&it, NULL));
-    TEST_ASSERT_EQUAL_INT(INTERP_ERR_PROGRAM, interp_begin(&it, &nothing));
-    TEST_ASSERT_EQUAL_INT(INTERP_ERR_COEFFICIENTS, interp_begin(&it, &p));
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_ERR_PROGRAM, interpolator_begin(&it, NULL));
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_ERR_PROGRAM, interpolator_begin(&it, &nothing));
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_ERR_COEFFICIENTS, interpolator_begin(&it, &p));
 }
 
 static void test_begins_at_the_start(void)
 {
     struct program_segment first;
     program_segment_get(&p, 0, &first);
-    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        interp_begin(&it, &prepared[kernel].program);
-        TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(&it, 0, &a));
+    for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
+        interpolator_begin(&it, &prepared[kernel].program);
+        TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at_q42(&it, 0, &a));
         TEST_ASSERT_EQUAL_INT64(0, a.arc_length_q40_mm);
         TEST_ASSERT_INT64_WITHIN(10 * NANOMETRE_Q40, first.x_q40_mm, a.x_q40_mm);
         TEST_ASSERT_INT64_WITHIN(10 * NANOMETRE_Q40, first.y_q40_mm, a.y_q40_mm);
@@ -75,10 +75,10 @@ static void test_begins_at_the_start(void)
 /* The end is the same bits in every kernel, and the alpha ends at its last control point, 18i. */
 static void test_ends_exactly(void)
 {
-    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        interp_begin(&it, &prepared[kernel].program);
-        TEST_ASSERT_EQUAL_INT(INTERP_END, interp_at(&it, p.header.duration_q32_s, &a));
-        TEST_ASSERT_EQUAL_INT(INTERP_END, interp_at(&it, UINT64_MAX, &b));
+    for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
+        interpolator_begin(&it, &prepared[kernel].program);
+        TEST_ASSERT_EQUAL_INT(INTERPOLATOR_END, interpolator_at(&it, p.header.duration_q32_s, &a));
+        TEST_ASSERT_EQUAL_INT(INTERPOLATOR_END, interpolator_at(&it, UINT64_MAX, &b));
         assert_same_point();
         TEST_ASSERT_EQUAL_INT64(p.header.length_q40_mm, a.arc_length_q40_mm);
         TEST_ASSERT_INT64_WITHIN(64, 0, a.x_q40_mm);
@@ -91,12 +91,12 @@ static void test_ends_exactly(void)
 static void test_ends_are_those_of_a_run(void)
 {
     for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
-        struct interp_point first, last;
-        interp_begin(&it, &prepared[kernel].program);
-        interp_ends(&p, kernel_find(kernel), &first, &last);
-        interp_at(&it, 0, &a);
+        struct interpolator_point first, last;
+        interpolator_begin(&it, &prepared[kernel].program);
+        interpolator_ends(&p, kernel_find(kernel), &first, &last);
+        interpolator_at(&it, 0, &a);
         TEST_ASSERT_EQUAL_MEMORY(&a, &first, sizeof a);
-        interp_at(&it, p.header.duration_q32_s, &a);
+        interpolator_at(&it, p.header.duration_q32_s, &a);
         TEST_ASSERT_EQUAL_MEMORY(&a, &last, sizeof a);
     }
 }
@@ -104,18 +104,18 @@ static void test_ends_are_those_of_a_run(void)
 /* A run, and single points reached by seeks in random order, give the same bits. */
 static void test_point_depends_on_time_only(void)
 {
-    static struct interp other;
+    static struct interpolator other;
     uint64_t random = 1;
-    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        interp_begin(&it, &prepared[kernel].program);
-        interp_begin(&other, &prepared[kernel].program);
+    for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
+        interpolator_begin(&it, &prepared[kernel].program);
+        interpolator_begin(&other, &prepared[kernel].program);
         uint64_t duration = p.header.duration_q32_s << 10;
         uint64_t time = 0;
         while (time < duration) {
-            TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(&it, time, &a));
-            interp_seek(&other, golden_random(&random) % duration >> 10);
-            interp_seek(&other, time >> 10);
-            TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at_q42(&other, time, &b));
+            TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at_q42(&it, time, &a));
+            interpolator_seek(&other, golden_random(&random) % duration >> 10);
+            interpolator_seek(&other, time >> 10);
+            TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at_q42(&other, time, &b));
             assert_same_point();
             time += golden_random(&random) % ((uint64_t)8 << 32);
         }
@@ -124,13 +124,14 @@ static void test_point_depends_on_time_only(void)
 
 static void test_jumps_are_refused(void)
 {
-    interp_begin(&it, &prepared[INTERP_FIXED].program);
-    TEST_ASSERT_EQUAL_INT(INTERP_ERR_JUMP, interp_at(&it, p.header.duration_q32_s - 1u, &a));
-    TEST_ASSERT_EQUAL_INT(0, interp_seek(&it, p.header.duration_q32_s - 1u));
-    TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at(&it, p.header.duration_q32_s - 1u, &a));
-    TEST_ASSERT_EQUAL_INT(INTERP_ERR_JUMP, interp_at(&it, 0, &a));
-    TEST_ASSERT_EQUAL_INT(0, interp_seek(&it, 0));
-    TEST_ASSERT_EQUAL_INT(INTERP_OK, interp_at(&it, 0, &a));
+    interpolator_begin(&it, &prepared[KERNEL_FIXED].program);
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_ERR_JUMP,
+                          interpolator_at(&it, p.header.duration_q32_s - 1u, &a));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_seek(&it, p.header.duration_q32_s - 1u));
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at(&it, p.header.duration_q32_s - 1u, &a));
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_ERR_JUMP, interpolator_at(&it, 0, &a));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_seek(&it, 0));
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at(&it, 0, &a));
 }
 
 static int64_t distance(int64_t u, int64_t v)
@@ -142,20 +143,20 @@ static int64_t distance(int64_t u, int64_t v)
  * within 10 nm. */
 static void compare_kernels(void)
 {
-    static struct interp floating, exact;
-    struct interp_point c;
+    static struct interpolator floating, exact;
+    struct interpolator_point c;
     struct program_clock clock;
     struct override_plan plan;
-    interp_begin(&it, &prepared[INTERP_FIXED].program);
-    interp_begin(&floating, &prepared[INTERP_FLOAT].program);
-    interp_begin(&exact, &prepared[INTERP_DOUBLE].program);
-    program_clock_begin(&clock, &prepared[INTERP_FIXED].program, p.header.period_us, 0);
+    interpolator_begin(&it, &prepared[KERNEL_FIXED].program);
+    interpolator_begin(&floating, &prepared[KERNEL_FLOAT].program);
+    interpolator_begin(&exact, &prepared[KERNEL_DOUBLE].program);
+    program_clock_begin(&clock, &prepared[KERNEL_FIXED].program, p.header.period_us, 0);
     override_plan_begin(&plan, &p);
     for (uint32_t tick = 0; tick < program_ticks(&p); tick++) {
         const uint64_t time = override_plan_tick(&plan, &clock);
-        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&it, time, &a));
-        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&floating, time, &b));
-        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interp_at_q42(&exact, time, &c));
+        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interpolator_at_q42(&it, time, &a));
+        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interpolator_at_q42(&floating, time, &b));
+        TEST_ASSERT_LESS_OR_EQUAL_INT(1, (unsigned)interpolator_at_q42(&exact, time, &c));
         TEST_ASSERT_LESS_THAN_INT64(NANOMETRE_Q40 / 1000, distance(a.x_q40_mm, c.x_q40_mm));
         TEST_ASSERT_LESS_THAN_INT64(NANOMETRE_Q40 / 1000, distance(a.y_q40_mm, c.y_q40_mm));
         TEST_ASSERT_LESS_THAN_INT64(10 * NANOMETRE_Q40, distance(b.x_q40_mm, c.x_q40_mm));
