@@ -4,8 +4,7 @@
 #include <string.h>
 
 #include "core/ph_segment.h"
-
-#define Q32_TO_Q42 10
+#include "core/qmath.h"
 
 static uint64_t pieces_size(const struct program *p, const struct kernel *kernel)
 {
@@ -33,8 +32,8 @@ static void make_piece(struct coefficients_piece *out, const struct program *p,
     program_piece_get(p, i, &piece);
     out->start_q42_s = start_q42_s;
     out->end_q42_s = i + 1u == p->header.piece_count
-                         ? p->header.duration_q32_s << Q32_TO_Q42
-                         : start_q42_s + (piece.duration_q32_s << Q32_TO_Q42);
+                         ? qmath_q42_of_q32(p->header.duration_q32_s)
+                         : start_q42_s + qmath_q42_of_q32(piece.duration_q32_s);
     look_ahead(out->ahead, p, i);
     kernel->piece_set(&out->feed, &piece);
 }

@@ -5,7 +5,6 @@
 
 #include "core/qmath.h"
 
-#define FINE_BITS 10 /* from q32 to q42 */
 #define MOST_ENDS 2u /* piece ends and segment ends a tick may cross: protocol.md 1.2 and 1.3 */
 
 /* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
@@ -122,7 +121,7 @@ int interpolator_begin(struct interpolator *it, const struct program *p)
     }
     it->program = p;
     it->kernel = p->coefficients_for;
-    it->duration_q42_s = p->header.duration_q32_s << FINE_BITS;
+    it->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
     it->length_q40_mm = p->header.length_q40_mm;
     it->piece = coefficients_piece_at(p, it->kernel, 0);
     it->segment = coefficients_segment_at(p, it->kernel, 0);
@@ -242,15 +241,15 @@ int interpolator_search_step(const struct interpolator *it, struct interpolator_
 
 int interpolator_at(struct interpolator *it, uint64_t time_q32_s, struct interpolator_point *out)
 {
-    const uint64_t duration_q32_s = it->duration_q42_s >> FINE_BITS;
+    const uint64_t duration_q32_s = qmath_q32_of_q42(it->duration_q42_s);
     const uint64_t time_q32_s_inside = time_q32_s < duration_q32_s ? time_q32_s : duration_q32_s;
-    return interpolator_at_q42(it, time_q32_s_inside << FINE_BITS, out);
+    return interpolator_at_q42(it, qmath_q42_of_q32(time_q32_s_inside), out);
 }
 
 int interpolator_seek(struct interpolator *it, uint64_t time_q32_s)
 {
-    const uint64_t last_q32_s = (it->duration_q42_s >> FINE_BITS) - 1u;
-    const uint64_t time_q42_s = (time_q32_s < last_q32_s ? time_q32_s : last_q32_s) << FINE_BITS;
+    const uint64_t last_q32_s = qmath_q32_of_q42(it->duration_q42_s) - 1u;
+    const uint64_t time_q42_s = qmath_q42_of_q32(time_q32_s < last_q32_s ? time_q32_s : last_q32_s);
     struct feed_point f;
     if (time_q42_s < it->piece->start_q42_s) {
         it->piece = coefficients_piece_at(it->program, it->kernel, 0);

@@ -34,7 +34,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
 {
     memset(plan, 0, sizeof *plan);
     override_bounds_of(&plan->guaranteed, p, 0, p->header.piece_count);
-    plan->guaranteed_q57 = (int64_t)plan->guaranteed.factor_q14 << 43;
+    plan->guaranteed_q57 = override_of_factor(plan->guaranteed.factor_q14);
     plan->commanded_q57 = OVERRIDE_ONE;
     come_to_rest(plan);
 }
@@ -89,13 +89,13 @@ void override_window_get(struct override_window *w, const struct program_clock *
     if (behind < left) {
         const struct coefficients_piece *last =
             coefficients_piece_at(p, p->coefficients_for, clock->piece + behind);
-        w->end_q32_s = last->end_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
+        w->end_q32_s = qmath_q32_of_q42(last->end_q42_s);
     }
 }
 
 static int64_t factor_q57(const struct override_window *w)
 {
-    return (int64_t)w->bounds->factor_q14 << 43;
+    return override_of_factor(w->bounds->factor_q14);
 }
 
 /* Where the override rests next: the end of a ramp that falls to it. */
@@ -241,7 +241,8 @@ static int fits(const struct override_plan *plan, const struct program_clock *cl
 {
     const int64_t mean_q57 = (plan->stage.end_q57 + plan->high_q57) / 2;
     const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
-    return (clock->time_q42_s >> 10) + span + margin_q32(plan, clock) <= plan->ahead.end_q32_s &&
+    return qmath_q32_of_q42(clock->time_q42_s) + span + margin_q32(plan, clock) <=
+               plan->ahead.end_q32_s &&
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
 }
 
@@ -264,7 +265,7 @@ static void fit_above(struct override_plan *plan, const struct program_clock *cl
     /* by then, if the ramp up takes what the ramp back may take */
     const uint64_t there_q32_s = plan->ahead.end_q32_s - by_q32_s;
     if (stays ? by_q32_s <= plan->return_q32_s
-              : by_q32_s == 0 || (clock->time_q42_s >> 10) + there_q32_s > by_q32_s) {
+              : by_q32_s == 0 || qmath_q32_of_q42(clock->time_q42_s) + there_q32_s > by_q32_s) {
         return;
     }
     plan->return_q32_s = by_q32_s;
@@ -346,7 +347,7 @@ static void decide(struct override_plan *plan, const struct program_clock *clock
 static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock)
 {
     if (plan->now.override_q57 > plan->guaranteed_q57 &&
-        clock->time_q42_s >> 10 >= plan->return_q32_s) {
+        qmath_q32_of_q42(clock->time_q42_s) >= plan->return_q32_s) {
         go_back(plan);
     }
     if (plan->task == OVERRIDE_BEGINS) {

@@ -24,6 +24,12 @@
 /* 10^-6: what a ramp may leave of its change, but for bounds next to nothing. */
 #define OVERRIDE_SPARE ((int64_t)1 << 37)
 
+/* A factor of the override bounds as an override. */
+static inline int64_t override_of_factor(uint32_t factor_q14)
+{
+    return (int64_t)factor_q14 << 43;
+}
+
 struct override_state {
     int64_t override_q57; /* 0 ... OVERRIDE_MOST */
     int64_t slope_q56;

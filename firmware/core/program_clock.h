@@ -21,9 +21,8 @@
 #include "core/qmath.h"
 
 /* 10^6 = 15625 * 2^6: periods in 2^-42 s are multiples of 1/15625. */
-#define PROGRAM_CLOCK_REST_UNIT  15625u
-#define PROGRAM_CLOCK_FINE_BITS  20
-#define PROGRAM_CLOCK_Q32_TO_Q42 10
+#define PROGRAM_CLOCK_REST_UNIT 15625u
+#define PROGRAM_CLOCK_FINE_BITS 20
 /* Piece ends in a tick: docs/reference/protocol.md 1.3. */
 #define PROGRAM_CLOCK_MOST_ENDS 2u
 

@@ -158,6 +158,18 @@ static inline int64_t qmath_round(int64_t a, int bits)
     return (a + ((int64_t)1 << (bits - 1))) >> bits;
 }
 
+/* Program times: 2^-32 s in the image and the object dictionary, 2^-42 s in a tick; below 2^22 s. */
+static inline uint64_t qmath_q42_of_q32(uint64_t time_q32_s)
+{
+    return time_q32_s << 10;
+}
+
+/* Rounded down. */
+static inline uint64_t qmath_q32_of_q42(uint64_t time_q42_s)
+{
+    return time_q42_s >> 10;
+}
+
 /* |a|; not of INT64_MIN. */
 static inline int64_t qmath_magnitude(int64_t a)
 {

@@ -25,7 +25,7 @@ static struct kernel kernel = {.piece_size = sizeof(struct coefficients_piece) -
 static void place(struct program_clock *clock, uint32_t i)
 {
     clock->program = &program;
-    clock->duration_q42_s = program.header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
+    clock->duration_q42_s = qmath_q42_of_q32(program.header.duration_q32_s);
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
@@ -37,11 +37,11 @@ void harness(void)
 {
     struct program_clock clock;
     program.header.piece_count = COUNT;
-    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> PROGRAM_CLOCK_Q32_TO_Q42);
+    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> 10);
     program.coefficients_for = &kernel;
     for (uint32_t k = 0; k < COUNT; k++) {
         records[k].end_q42_s = k + 1u == COUNT
-                                   ? program.header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42
+                                   ? qmath_q42_of_q32(program.header.duration_q32_s)
                                    : nondet_uint64();
     }
     uint32_t i = nondet_uint32();

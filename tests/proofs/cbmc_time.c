@@ -12,7 +12,7 @@
  * mutant: core/program_time.c: i < p->header.piece_count => i <= p->header.piece_count
  * mutant: core/program_time.c: low = middle + 1u => low = middle
  * mutant: core/program_time.c: middle = low + (high - low) / 2u => middle = low + (high - low + 2u) / 2u
- * mutant: core/program_time.c: piece->duration_q32_s << 10 => piece->duration_q32_s << 11
+ * mutant: core/program_time.c: qmath_q42_of_q32(piece->duration_q32_s) => qmath_q42_of_q32(2u * piece->duration_q32_s)
  */
 #include "proof.h"
 
