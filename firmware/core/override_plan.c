@@ -429,7 +429,9 @@ static void first_tick(struct override_plan *plan, struct program_clock *clock)
         return;
     }
     plan->now.override_q57 = qmath_lesser(wanted_override(plan), OVERRIDE_ONE);
-    clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    if (plan->now.override_q57 != OVERRIDE_ONE) { /* at 1 a tick is a period exactly */
+        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    }
     (void)comes_steady(plan);
 }
 
