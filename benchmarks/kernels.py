@@ -48,7 +48,7 @@ LENGTHS_MM = (31.0, 20.0, 5.0, 1.0, 0.1, 1e-3, 1e-6)
 
 
 class Point(ctypes.Structure):
-    """struct interp_point."""
+    """struct interpolator_point."""
 
     _fields_ = [(name, ctypes.c_int64) for name in ("arc", "x", "y", "feed")]
 
@@ -71,6 +71,8 @@ class Core:
         ]
         subprocess.run(command, check=True)
         self.lib = ctypes.CDLL(str(target))
+        self.lib.kernel_find.restype = ctypes.c_void_p
+        self.lib.coefficients_size.restype = ctypes.c_uint64
 
     def open(self, image: bytes) -> tuple[Any, Any]:
         """struct program and the buffer that it refers to."""
@@ -84,12 +86,16 @@ class Core:
         """Points at program times in 2^-42 s."""
         program, _buffer = self.open(image)
         cursor = ctypes.create_string_buffer(4096)
-        self.lib.interp_begin(cursor, program, kernel)
+        made_for = ctypes.c_void_p(self.lib.kernel_find(kernel))
+        size = self.lib.coefficients_size(program, made_for)
+        records = (ctypes.c_uint64 * (size // 8 + 1))()
+        self.lib.coefficients_make_in(program, made_for, records, ctypes.c_uint64(size))
+        self.lib.interpolator_begin(cursor, program)
         out = []
         for time in times_q42:
             point = Point()
-            self.lib.interp_seek(cursor, ctypes.c_uint64(time >> 10))
-            if self.lib.interp_at_q42(cursor, ctypes.c_uint64(time), ctypes.byref(point)) < 0:
+            self.lib.interpolator_seek(cursor, ctypes.c_uint64(time >> 10))
+            if self.lib.interpolator_at_q42(cursor, ctypes.c_uint64(time), ctypes.byref(point)) < 0:
                 raise SystemExit("a point was refused")
             out.append(point)
         return out

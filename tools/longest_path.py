@@ -32,9 +32,9 @@ NOT_PLAIN = {
         "override_plan_change",
         "feed_override_stop_tick",
         "path_brake_step",
-        "interp_at_arc_length",
+        "interpolator_at_arc_length",
     ),
-    "override": ("feed_override_stop_tick", "path_brake_step", "interp_at_arc_length"),
+    "override": ("feed_override_stop_tick", "path_brake_step", "interpolator_at_arc_length"),
 }
 # Any tick, also of a stop.
 STOP: tuple[str, ...] = ()

@@ -6,44 +6,29 @@
  */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-#include "core/counts.h"
-#include "core/interp.h"
 #include "core/coefficients.h"
+#include "core/counts.h"
+#include "core/interpolator.h"
 #include "core/override_plan.h"
 
 enum { COUNTS_PER_MM = 1000000, SWITCH_TICKS = 40 };
 
 static uint64_t image[1 << 17], records[1 << 17];
 
-static int put(void *context, const uint8_t *bytes, uint32_t size)
-{
-    uint8_t **to = context;
-    memcpy(*to, bytes, size);
-    *to += size;
-    return 0;
-}
-
 static int prepare(struct program *p, uint32_t number)
 {
-    uint8_t *to = (uint8_t *)records;
     const struct kernel *kernel = kernel_find(number);
-    if (kernel == NULL || coefficients_size(p, kernel) > sizeof records ||
-        coefficients_make(p, kernel, put, &to) != 0) {
-        return -1;
-    }
-    coefficients_attach(p, kernel, (const uint8_t *)records);
-    return 0;
+    return kernel == NULL ? -1 : coefficients_make_in(p, kernel, records, sizeof records);
 }
 
 int main(int argc, char **argv)
 {
     struct program p;
-    struct interp it;
+    struct interpolator it;
     struct program_clock clock;
     struct override_plan plan;
-    struct interp_point point;
+    struct interpolator_point point;
     volatile int64_t sum = 0;
     unsigned long ticks = 0;
     FILE *file = argc > 3 ? fopen(argv[1], "rb") : NULL;
@@ -55,7 +40,7 @@ int main(int argc, char **argv)
     const uint32_t low = argc > 5 ? (uint32_t)atoi(argv[4]) : 100u;
     const uint32_t high = argc > 5 ? (uint32_t)atoi(argv[5]) : 100u;
     for (int run = atoi(argv[3]); run > 0; run--) {
-        (void)interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2]));
+        (void)interpolator_begin(&it, &p);
         program_clock_begin(&clock, &p, p.header.period_us, 0);
         override_plan_begin(&plan, &p);
         override_plan_set(&plan, high);
@@ -64,7 +49,7 @@ int main(int argc, char **argv)
                 override_plan_set(&plan, k % (2u * SWITCH_TICKS) == 0 ? high : low);
             }
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
-            (void)interp_at_piece(&it, clock.record, time_q42_s, &point);
+            (void)interpolator_at_piece(&it, clock.record, time_q42_s, &point);
             sum += counts_from_q40_mm(point.x_q40_mm, COUNTS_PER_MM);
             sum += counts_from_q40_mm(point.y_q40_mm, COUNTS_PER_MM);
             ticks++;

@@ -7,7 +7,7 @@
 #include "app/program_table.h"
 #include "core/coefficients.h"
 #include "core/counts.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)
@@ -71,23 +71,23 @@ static int check(const struct program_slot *slot, const struct program *program,
     return program_check(program, &limits, fault);
 }
 
-static void point_at(const struct program_slot *slot, const struct config *config,
-                     uint64_t time_q32_s, int32_t counts[PLANE_AXES])
+static void to_counts(const struct interpolator_point *point, uint32_t counts_per_mm,
+                      int32_t counts[PLANE_AXES])
 {
-    struct interp interp;
-    struct interp_point point;
-    if (interp_begin(&interp, &slot->program, (enum interp_kernel)config->kernel) != 0 ||
-        interp_seek(&interp, time_q32_s) != 0 || interp_at(&interp, time_q32_s, &point) < 0) {
-        return;
-    }
-    counts[0] = counts_from_q40_mm(point.x_q40_mm, config->counts_per_mm);
-    counts[1] = counts_from_q40_mm(point.y_q40_mm, config->counts_per_mm);
+    counts[0] = counts_from_q40_mm(point->x_q40_mm, counts_per_mm);
+    counts[1] = counts_from_q40_mm(point->y_q40_mm, counts_per_mm);
 }
 
 static void find_ends(struct program_slot *slot, const struct config *config)
 {
-    point_at(slot, config, 0, slot->start_counts);
-    point_at(slot, config, slot->program.header.duration_q32_s, slot->end_counts);
+    const struct kernel *kernel = kernel_find(config->kernel);
+    struct interpolator_point first;
+    struct interpolator_point last;
+    if (kernel != NULL) {
+        interpolator_ends(&slot->program, kernel, &first, &last);
+        to_counts(&first, config->counts_per_mm, slot->start_counts);
+        to_counts(&last, config->counts_per_mm, slot->end_counts);
+    }
 }
 
 static void adopt(struct program_slot *slot, const struct program *program, unsigned bank,

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/ph_segment.h"
+#include "core/qmath.h"
 
 static uint64_t pieces_size(const struct program *p, const struct kernel *kernel)
 {
@@ -24,19 +25,21 @@ static void look_ahead(struct program_override ahead[OVERRIDE_WINDOWS], const st
     }
 }
 
-void coefficients_piece_make(struct coefficients_piece *out, const struct program *p,
-                             const struct kernel *kernel, uint32_t i, uint64_t start_q32_s)
+static void make_piece(struct coefficients_piece *out, const struct program *p,
+                       const struct kernel *kernel, uint32_t i, uint64_t start_q42_s)
 {
     struct program_piece piece;
     program_piece_get(p, i, &piece);
-    out->start_q32_s = start_q32_s;
-    out->end_q32_s = i + 1u == p->header.piece_count ? p->header.duration_q32_s
-                                                     : start_q32_s + piece.duration_q32_s;
+    out->start_q42_s = start_q42_s;
+    out->end_q42_s = i + 1u == p->header.piece_count
+                         ? qmath_q42_of_q32(p->header.duration_q32_s)
+                         : start_q42_s + qmath_q42_of_q32(piece.duration_q32_s);
+    look_ahead(out->ahead, p, i);
     kernel->piece_set(&out->feed, &piece);
 }
 
-void coefficients_segment_make(struct coefficients_segment *out, const struct program *p,
-                               const struct kernel *kernel, uint32_t i)
+static void make_segment(struct coefficients_segment *out, const struct program *p,
+                         const struct kernel *kernel, uint32_t i)
 {
     struct program_segment segment;
     struct ph_segment ph;
@@ -56,18 +59,17 @@ int coefficients_make(const struct program *p, const struct kernel *kernel, coef
         struct coefficients_segment segment;
         uint8_t bytes[sizeof(struct coefficients_segment)];
     } record;
-    uint64_t start_q32_s = 0;
+    uint64_t start_q42_s = 0;
     int error = 0;
     memset(&record, 0, sizeof record);
     for (uint32_t i = 0; error == 0 && i < p->header.piece_count; i++) {
-        coefficients_piece_make(&record.piece, p, kernel, i, start_q32_s);
-        look_ahead(record.piece.ahead, p, i);
-        start_q32_s = record.piece.end_q32_s;
+        make_piece(&record.piece, p, kernel, i, start_q42_s);
+        start_q42_s = record.piece.end_q42_s;
         error = sink(context, record.bytes, coefficients_piece_size(kernel));
     }
     memset(&record, 0, sizeof record);
     for (uint32_t i = 0; error == 0 && i < p->header.segment_count; i++) {
-        coefficients_segment_make(&record.segment, p, kernel, i);
+        make_segment(&record.segment, p, kernel, i);
         error = sink(context, record.bytes, coefficients_segment_size(kernel));
     }
     return error;
@@ -77,4 +79,24 @@ void coefficients_attach(struct program *p, const struct kernel *kernel, const u
 {
     p->coefficients = records;
     p->coefficients_for = kernel;
+}
+
+static int append(void *context, const uint8_t *bytes, uint32_t size)
+{
+    uint8_t **to = context;
+    memcpy(*to, bytes, size);
+    *to += size;
+    return 0;
+}
+
+int coefficients_make_in(struct program *p, const struct kernel *kernel, void *memory,
+                         uint64_t size)
+{
+    uint8_t *to = memory;
+    if (coefficients_size(p, kernel) > size) {
+        return COEFFICIENTS_ERR_SIZE;
+    }
+    (void)coefficients_make(p, kernel, append, &to);
+    coefficients_attach(p, kernel, memory);
+    return 0;
 }

@@ -23,10 +23,12 @@
 
 #define COEFFICIENTS_ALIGNMENT 8u /* of the first record */
 
+#define COEFFICIENTS_ERR_SIZE (-1) /* the memory is too small */
+
 /* A record ends behind the kernel's own part. */
 struct coefficients_piece {
-    uint64_t start_q32_s;
-    uint64_t end_q32_s;                              /* of the last piece the duration */
+    uint64_t start_q42_s;
+    uint64_t end_q42_s;                              /* of the last piece the duration */
     struct program_override ahead[OVERRIDE_WINDOWS]; /* of the windows that begin with it */
     union {
         struct feed_piece integers;
@@ -58,12 +60,6 @@ static inline uint32_t coefficients_segment_size(const struct kernel *kernel)
 /* Bytes of all records of a program; may be above 2^32. */
 uint64_t coefficients_size(const struct program *p, const struct kernel *kernel);
 
-/* One record; a piece without `ahead`. The piece begins at start_q32_s. Main loop, or a tick without coefficient records. */
-void coefficients_piece_make(struct coefficients_piece *out, const struct program *p,
-                             const struct kernel *kernel, uint32_t i, uint64_t start_q32_s);
-void coefficients_segment_make(struct coefficients_segment *out, const struct program *p,
-                               const struct kernel *kernel, uint32_t i);
-
 /* Takes the next bytes of the records; 0 or a negative error. */
 typedef int coefficients_sink(void *context, const uint8_t *bytes, uint32_t size);
 
@@ -73,6 +69,11 @@ int coefficients_make(const struct program *p, const struct kernel *kernel, coef
 
 /* From now on the program has these records, which must stay; aligned to COEFFICIENTS_ALIGNMENT. */
 void coefficients_attach(struct program *p, const struct kernel *kernel, const uint8_t *records);
+
+/* Makes all records in this memory, aligned to COEFFICIENTS_ALIGNMENT, and attaches them. Returns 0, or
+ * COEFFICIENTS_ERR_SIZE where `size` is below coefficients_size. Main loop; linear. */
+int coefficients_make_in(struct program *p, const struct kernel *kernel, void *memory,
+                         uint64_t size);
 
 /* A record of a program that has them for this kernel. */
 static inline const struct coefficients_piece *

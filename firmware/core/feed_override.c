@@ -18,10 +18,10 @@ enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 #define NO_NUMBERS    2u
 #define MOST_FEED_Q32 ((int64_t)1 << 45)
 #define MOST_SLOPE_Q56                                                                             \
-    (((int64_t)1 << 57) - 1)    /* 2^57, the greatest, less a unit: it is made an int32_t */
-#define MS_Q40      1099511628u /* 2^40 / 1000 */
-#define UM_Q40_BITS 30          /* 2^30 of 2^-40 mm are less than a micrometre */
-#define US_Q42_BITS 22          /* 2^22 of 2^-42 s are less than a microsecond */
+    (((int64_t)1 << 57) - 1)  /* 2^57, the greatest, less a unit: it is made an int32_t */
+#define MS_Q40    1099511628u /* 2^40 / 1000 */
+#define UM_PER_MM 1000u
+#define US_PER_S  1000000u
 
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)
@@ -144,7 +144,7 @@ static uint32_t time_of_tick_q40(const struct feed_override *f)
 }
 
 /* With v the override: v F' and v^2 F'' + v' F' as way of a tick. */
-int feed_override_motion(const struct feed_override *f, const struct interp *it,
+int feed_override_motion(const struct feed_override *f, const struct interpolator *it,
                          struct path_state *state, int64_t *turned_q56)
 {
     const struct program_clock *clock = &f->clock;
@@ -155,7 +155,7 @@ int feed_override_motion(const struct feed_override *f, const struct interp *it,
         return 0;
     }
     const int64_t bend_q40 =
-        interp_acceleration_q40(it, clock->record, program_clock_time_q42(clock));
+        interpolator_acceleration_q40(it, clock->record, program_clock_time_q42(clock));
     const int64_t even = qmath_mul_unsigned(qmath_mul_unsigned(bend_q40, time_q40), time_q40);
     const int64_t at_override_1 = qmath_mul_unsigned(feed * 65536, MS_Q40);
     const int64_t slope_q56 = qmath_lesser(f->plan.now.slope_q56, MOST_SLOPE_Q56);
@@ -170,13 +170,11 @@ int feed_override_motion(const struct feed_override *f, const struct interp *it,
 
 /* --- A tick --- */
 
-static int plan_tick(struct feed_override *f, struct interp *it)
+static int plan_tick(struct feed_override *f, struct interpolator *it)
 {
     const uint64_t time_q42_s = override_plan_tick(&f->plan, &f->clock);
-    const int result = it->piece != NULL
-                           ? interp_at_piece(it, f->clock.record, time_q42_s, &f->point)
-                           : interp_at_q42(it, time_q42_s, &f->point);
-    if (result == INTERP_END) {
+    const int result = interpolator_at_piece(it, f->clock.record, time_q42_s, &f->point);
+    if (result == INTERPOLATOR_END) {
         f->state = FEED_ENDED;
     }
     return result;
@@ -192,28 +190,29 @@ static void come_to_rest(struct feed_override *f, uint32_t found)
 }
 
 /* The point at the brake's arc length. */
-static int interpolate_brake(struct feed_override *f, struct interp *it)
+static int interpolate_brake(struct feed_override *f, struct interpolator *it)
 {
     const struct path_state *at = &f->brake.at;
-    return interp_at_arc_length(it, at->arc_length_q40_mm + (int64_t)(at->fine_q56_mm >> 15),
-                                &f->point);
+    return interpolator_at_arc_length(it, at->arc_length_q40_mm + (int64_t)(at->fine_q56_mm >> 15),
+                                      &f->point);
 }
 
 /* The tick that leaves the plan. */
-static int first_brake_tick(struct feed_override *f, struct interp *it)
+static int first_brake_tick(struct feed_override *f, struct interpolator *it)
 {
     f->left_q30 -= TICK_Q30;
     path_brake_first(&f->brake);
     return interpolate_brake(f, it);
 }
 
-static int brake_tick(struct feed_override *f, struct interp *it)
+static int brake_tick(struct feed_override *f, struct interpolator *it)
 {
     f->left_q30 -= TICK_Q30;
     path_brake_step(&f->brake);
     const int result = interpolate_brake(f, it);
-    if (result == INTERP_OK && path_brake_rests(&f->brake)) {
-        interp_search_begin(&f->place, f->clock.record, f->clock.piece, f->point.arc_length_q40_mm);
+    if (result == INTERPOLATOR_OK && path_brake_rests(&f->brake)) {
+        interpolator_search_begin(&f->place, f->clock.record, f->clock.piece,
+                                  f->point.arc_length_q40_mm);
         come_to_rest(f, 0);
     }
     return result;
@@ -227,15 +226,18 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-/* Whether any brake of the stop table would rest before the end of the path, and before the program does. */
+/* Whether any brake of the stop table would rest before the end of the path, and before the program does. What is left is
+ * rounded down, to micrometres and microseconds. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
     const struct program_header *h = &f->clock.program->header;
     const uint32_t way_um = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_um : h->fault_worst_um;
     const uint32_t time_us = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_us : h->fault_worst_us;
     const int64_t left_q40_mm = h->length_q40_mm - from->arc_length_q40_mm;
-    const uint64_t left_q42_s = f->clock.duration_q42_s - f->clock.time_q42_s;
-    return left_q40_mm >> UM_Q40_BITS >= (int64_t)way_um && left_q42_s >> US_Q42_BITS >= time_us;
+    const int64_t left_q32_s =
+        (int64_t)qmath_q32_of_q42(f->clock.duration_q42_s - f->clock.time_q42_s);
+    return qmath_mul_unsigned(left_q40_mm, UM_PER_MM) >> 8 >= (int64_t)way_um &&
+           qmath_mul_unsigned(left_q32_s, US_PER_S) >= (int64_t)time_us;
 }
 
 /* --- From the plan to the brake --- */
@@ -282,7 +284,7 @@ static void wait_slowly(struct feed_override *f)
 }
 
 /* The plan is left, or it is known to rest. */
-static int leaves_or_rests(struct feed_override *f, const struct interp *it)
+static int leaves_or_rests(struct feed_override *f, const struct interpolator *it)
 {
     struct path_state state;
     int64_t turned_q56 = 0;
@@ -297,7 +299,7 @@ static int leaves_or_rests(struct feed_override *f, const struct interp *it)
 
 /* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. What there is
  * to find out before is spread over ticks. */
-static int wait_tick(struct feed_override *f, struct interp *it)
+static int wait_tick(struct feed_override *f, struct interpolator *it)
 {
     if (f->plan.started != 0) {
         if (f->numbers_piece != f->clock.piece) {
@@ -307,7 +309,7 @@ static int wait_tick(struct feed_override *f, struct interp *it)
             f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_WAIT;
         }
         if (f->look != LOOK_WAIT && leaves_or_rests(f, it)) {
-            return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERP_OK;
+            return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERPOLATOR_OK;
         }
         if (f->look != LOOK_SEEN) {
             f->look = LOOK_NOT_YET; /* what fits, fits in this tick only */
@@ -334,15 +336,12 @@ static void replace_brake(struct feed_override *f)
 }
 
 /* On from the place of rest when that is known, and wanted. */
-static void look_for_place(struct feed_override *f, struct interp *it)
+static void look_for_place(struct feed_override *f, const struct interpolator *it)
 {
     for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
-        if (interp_search_step(it, &f->place)) {
-            const struct coefficients_piece *piece =
-                f->place.piece != NULL ? f->place.piece : &it->own_piece;
+        if (interpolator_search_step(it, &f->place)) {
             f->found = 1;
-            program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece,
-                              piece->end_q32_s);
+            program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece);
             override_plan_rest(&f->plan);
         }
     }
@@ -351,7 +350,7 @@ static void look_for_place(struct feed_override *f, struct interp *it)
     }
 }
 
-int feed_override_stop_tick(struct feed_override *f, struct interp *it)
+int feed_override_stop_tick(struct feed_override *f, struct interpolator *it)
 {
     if (f->phase == PHASE_PLAN) {
         return wait_tick(f, it);
@@ -363,10 +362,11 @@ int feed_override_stop_tick(struct feed_override *f, struct interp *it)
         return brake_tick(f, it);
     }
     look_for_place(f, it);
-    return f->phase == PHASE_PLAN ? plan_tick(f, it) : INTERP_OK;
+    return f->phase == PHASE_PLAN ? plan_tick(f, it) : INTERPOLATOR_OK;
 }
 
-int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out)
+int feed_override_next(struct feed_override *f, struct interpolator *it,
+                       struct interpolator_point *out)
 {
     const int aside = f->phase != PHASE_PLAN || comes_to_rest(f);
     const int result = aside ? feed_override_stop_tick(f, it) : plan_tick(f, it);

@@ -19,7 +19,7 @@
 
 #include <stdint.h>
 
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/override_plan.h"
 #include "core/path_brake.h"
 #include "core/program_clock.h"
@@ -41,19 +41,19 @@ struct feed_override {
     struct path_brake_numbers numbers; /* of the stop asked for, in this piece: */
     uint32_t numbers_piece;
     uint32_t numbers_kind; /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
-    struct path_state seen;     /* near the end of the program: the state looked at, */
-    uint32_t look;              /* and how far the look has come */
-    struct interp_search place; /* of rest */
-    struct interp_point point;  /* of the last setpoint */
-    uint32_t state;             /* enum feed_state: what is wanted, and whether it is reached */
-    uint32_t phase;             /* where setpoints come from */
-    uint32_t kind;              /* enum program_stop_kind of the stop asked for */
-    uint32_t replace;           /* 1: a fault stop, whose numbers the brake has not got yet */
-    uint32_t found;             /* 1: `place` is */
-    int64_t left_q30;           /* ticks at override 1 until the deadline */
+    struct path_state seen;           /* near the end of the program: the state looked at, */
+    uint32_t look;                    /* and how far the look has come */
+    struct interpolator_search place; /* of rest */
+    struct interpolator_point point;  /* of the last setpoint */
+    uint32_t state;   /* enum feed_state: what is wanted, and whether it is reached */
+    uint32_t phase;   /* where setpoints come from */
+    uint32_t kind;    /* enum program_stop_kind of the stop asked for */
+    uint32_t replace; /* 1: a fault stop, whose numbers the brake has not got yet */
+    uint32_t found;   /* 1: `place` is */
+    int64_t left_q30; /* ticks at override 1 until the deadline */
 };
 
-/* For a checked program at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.
+/* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.
  * period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must stay as it is. */
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
@@ -78,16 +78,17 @@ void feed_override_fault_stop(struct feed_override *f);
 /* --- Tick --- */
 
 /* The next setpoint; *it is an interpolator of the same program that nobody else moves. After the end, or at rest, the
- * same point again. Returns 0 or a negative INTERP_ERR_..., then *out is unchanged. Bounded time, tick context. */
-int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
+ * same point again. Returns 0 or a negative INTERPOLATOR_ERR_..., then *out is unchanged. Bounded time, tick context. */
+int feed_override_next(struct feed_override *f, struct interpolator *it,
+                       struct interpolator_point *out);
 
 /* Part of feed_override_next: a tick in which a stop is under way, or rest. By itself, so that the longest path of a tick
  * in which only the plan goes on can be counted without it. */
-int feed_override_stop_tick(struct feed_override *f, struct interp *it);
+int feed_override_stop_tick(struct feed_override *f, struct interpolator *it);
 
 /* Part of a tick of a stop: how the plan passes the place of its last setpoint; in *turned_q56 what the change of the override
  * adds to the acceleration. Returns 1, or 0 where the feed is beyond all brakes. */
-int feed_override_motion(const struct feed_override *f, const struct interp *it,
+int feed_override_motion(const struct feed_override *f, const struct interpolator *it,
                          struct path_state *state, int64_t *turned_q56);
 
 /* --- What is so at the last setpoint --- */

@@ -21,13 +21,14 @@ static void set_slope(struct feed_piece *f)
     f->feed_drop = shift >= 0 ? 0 : shift < -31 ? 31 : -shift;
 }
 
-void feed_piece_set(struct feed_piece *f, const struct program_piece *piece)
+void feed_piece_set(void *piece, const struct program_piece *from)
 {
-    f->start_q40_mm = piece->start_q40_mm;
+    struct feed_piece *f = piece;
+    f->start_q40_mm = from->start_q40_mm;
     for (int k = 0; k < 7; k++) {
-        f->c_q44_mm[k] = piece->c_q40_mm[k] * 16;
+        f->c_q44_mm[k] = from->c_q40_mm[k] * 16;
     }
-    f->exponent = program_piece_exponent(piece->duration_q32_s);
+    f->exponent = program_piece_exponent(from->duration_q32_s);
     set_slope(f);
 }
 
@@ -39,8 +40,9 @@ static uint64_t scaled_time(uint64_t t_q42_s, int exponent)
     return shift >= 0 ? t_q42_s << shift : t_q42_s >> -shift;
 }
 
-void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_point *out)
+void feed_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s)
 {
+    const struct feed_piece *f = piece;
     uint64_t tau_q64 = scaled_time(t_q42_s, f->exponent);
     uint32_t tau = (uint32_t)(tau_q64 >> 32);
     int32_t tau_q31 = (int32_t)(tau >> 1);
@@ -58,27 +60,13 @@ void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_poi
 }
 
 /* The derivative of the slope, less three bits so that a coefficient times 6 fits. */
-int64_t feed_piece_acceleration(const struct feed_piece *f, uint64_t t_q42_s)
+int64_t feed_piece_acceleration(const void *piece, uint64_t t_q42_s)
 {
+    const struct feed_piece *f = piece;
     const int32_t tau_q31 = (int32_t)(scaled_time(t_q42_s, f->exponent) >> 33);
     int32_t sum = 0;
     for (int k = 6; k > 0; k--) {
         sum = 2 * qmath_mul_hi(sum, tau_q31) + (int32_t)(qmath_product(f->slope[k], k) >> 3);
     }
     return qmath_shift_clamp(sum, f->slope_shift - 1 - 2 * f->exponent);
-}
-
-void feed_piece_make(void *piece, const struct program_piece *from)
-{
-    feed_piece_set(piece, from);
-}
-
-void feed_piece_point(const void *piece, uint64_t t_q42_s, struct feed_point *out)
-{
-    feed_piece_at(piece, t_q42_s, out);
-}
-
-int64_t feed_piece_bend(const void *piece, uint64_t t_q42_s)
-{
-    return feed_piece_acceleration(piece, t_q42_s);
 }

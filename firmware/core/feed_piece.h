@@ -25,20 +25,17 @@ struct feed_point {
     int64_t feed_q32_mm_s; /* below 2^62; too low where coefficients sum up to 2^30 mm/s or more */
 };
 
-void feed_piece_set(struct feed_piece *f, const struct program_piece *piece);
+/* The functions have the types of struct kernel: `piece` is a struct feed_piece. */
+
+void feed_piece_set(void *piece, const struct program_piece *from);
 
 /* At local time t, 0 <= t < duration. Arc length within 2^-40.4 mm of the polynomial (half a unit
  * and the Horner steps), feed within 14 units of `slope`, 2^-30 of the sum of its
  * coefficients. Seven wide products and eight narrow ones, no division. */
-void feed_piece_at(const struct feed_piece *f, uint64_t t_q42_s, struct feed_point *out);
+void feed_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s);
 
 /* F'' at local time t, in 2^-40 mm/s^2, held within +-(2^62 - 1): for the begin of a brake (core/feed_override). Within
  * 2^-27 of the greatest F' of the coefficients, divided by the time scale of the piece. */
-int64_t feed_piece_acceleration(const struct feed_piece *f, uint64_t t_q42_s);
-
-/* The same for struct kernel: `piece` is a struct feed_piece. */
-void feed_piece_make(void *piece, const struct program_piece *from);
-void feed_piece_point(const void *piece, uint64_t t_q42_s, struct feed_point *out);
-int64_t feed_piece_bend(const void *piece, uint64_t t_q42_s);
+int64_t feed_piece_acceleration(const void *piece, uint64_t t_q42_s);
 
 #endif

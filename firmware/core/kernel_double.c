@@ -31,20 +31,21 @@ static int64_t round_scaled(double a, double scale)
     return (int64_t)(b < 0.0 ? b - 0.5 : b + 0.5);
 }
 
-void kernel_double_piece_set(struct kernel_double_piece *k, const struct program_piece *piece)
+void kernel_double_piece_set(void *piece, const struct program_piece *from)
 {
-    int e = program_piece_exponent(piece->duration_q32_s);
-    k->start_q40_mm = piece->start_q40_mm;
+    struct kernel_double_piece *k = piece;
+    int e = program_piece_exponent(from->duration_q32_s);
+    k->start_q40_mm = from->start_q40_mm;
     for (int i = 0; i < 7; i++) {
-        k->c_mm[i] = (double)piece->c_q40_mm[i] / Q40;
+        k->c_mm[i] = (double)from->c_q40_mm[i] / Q40;
     }
     k->tau_per_q42 = power_of_two(-42 - e);
     k->per_s = power_of_two(-e);
 }
 
-void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_s,
-                            struct feed_point *out)
+void kernel_double_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s)
 {
+    const struct kernel_double_piece *k = piece;
     double tau = (double)t_q42_s * k->tau_per_q42;
     double arc = k->c_mm[6];
     double slope = arc;
@@ -56,8 +57,9 @@ void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_
     out->feed_q32_mm_s = round_scaled(slope * k->per_s, 4294967296.0);
 }
 
-int64_t kernel_double_piece_acceleration(const struct kernel_double_piece *k, uint64_t t_q42_s)
+int64_t kernel_double_piece_acceleration(const void *piece, uint64_t t_q42_s)
 {
+    const struct kernel_double_piece *k = piece;
     const double tau = (double)t_q42_s * k->tau_per_q42;
     double sum = 0.0;
     for (int i = 6; i > 0; i--) {
@@ -78,8 +80,9 @@ static void set_inverse(double g[4], double half, double sigma_middle, double si
     g[3] = first + last - 2.0;
 }
 
-void kernel_double_segment_set(struct kernel_double_segment *k, const struct ph_segment *ph)
+void kernel_double_segment_set(void *segment, const struct ph_segment *ph)
 {
+    struct kernel_double_segment *k = segment;
     for (int axis = PH_X; axis <= PH_S; axis++) {
         k->origin_q40_mm[axis] = ph->origin_q40_mm[axis];
         for (int i = 0; i < 6; i++) {
@@ -123,9 +126,10 @@ static double horner(const double c[6], double z)
     return ((((c[5] * z + c[4]) * z + c[3]) * z + c[2]) * z + c[1]) * z + c[0];
 }
 
-void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc_length_q40_mm,
-                              int64_t point_q40_mm[2])
+void kernel_double_segment_at(const void *segment, int64_t point_q40_mm[2],
+                              int64_t arc_length_q40_mm)
 {
+    const struct kernel_double_segment *k = segment;
     double s = (double)(arc_length_q40_mm - k->origin_q40_mm[PH_S]) / Q40;
     double z = first_guess(k, s - k->c_mm[PH_S][0]);
     for (int i = 0; i < STEPS; i++) {
@@ -136,37 +140,12 @@ void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc
     }
 }
 
-static void set_piece(void *piece, const struct program_piece *from)
-{
-    kernel_double_piece_set(piece, from);
-}
-
-static void piece_at(const void *piece, uint64_t t_q42_s, struct feed_point *out)
-{
-    kernel_double_piece_at(piece, t_q42_s, out);
-}
-
-static int64_t piece_acceleration(const void *piece, uint64_t t_q42_s)
-{
-    return kernel_double_piece_acceleration(piece, t_q42_s);
-}
-
-static void set_segment(void *segment, const struct ph_segment *from)
-{
-    kernel_double_segment_set(segment, from);
-}
-
-static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
-{
-    kernel_double_segment_at(segment, arc_length_q40_mm, point_q40_mm);
-}
-
 const struct kernel kernel_double = {
     .piece_size = sizeof(struct kernel_double_piece),
     .segment_size = sizeof(struct kernel_double_segment),
-    .piece_set = set_piece,
-    .segment_set = set_segment,
-    .piece_at = piece_at,
-    .piece_acceleration = piece_acceleration,
-    .segment_at = segment_at,
+    .piece_set = kernel_double_piece_set,
+    .segment_set = kernel_double_segment_set,
+    .piece_at = kernel_double_piece_at,
+    .piece_acceleration = kernel_double_piece_acceleration,
+    .segment_at = kernel_double_segment_at,
 };

@@ -23,17 +23,18 @@ struct kernel_double_segment {
     double inverse[2][4]; /* first guess of z, behind and before the middle: scale, then cubic */
 };
 
-void kernel_double_piece_set(struct kernel_double_piece *k, const struct program_piece *piece);
+void kernel_double_piece_set(void *piece, const struct program_piece *from);
 /* F'' in 2^-40 mm/s^2, held within 2^62. */
-int64_t kernel_double_piece_acceleration(const struct kernel_double_piece *k, uint64_t t_q42_s);
-void kernel_double_piece_at(const struct kernel_double_piece *k, uint64_t t_q42_s,
-                            struct feed_point *out);
+int64_t kernel_double_piece_acceleration(const void *piece, uint64_t t_q42_s);
+void kernel_double_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s);
 
-void kernel_double_segment_set(struct kernel_double_segment *k, const struct ph_segment *ph);
+/* The functions have the types of struct kernel: `segment` is a struct kernel_double_segment, `piece` a struct kernel_double_piece. */
+
+void kernel_double_segment_set(void *segment, const struct ph_segment *ph);
 
 /* Point at an arc length of this segment (counted from the start of the program; a little outside
  * is allowed: the curve is continued). Within 1e-9 mm. Three Newton steps, always. */
-void kernel_double_segment_at(const struct kernel_double_segment *k, int64_t arc_length_q40_mm,
-                              int64_t point_q40_mm[2]);
+void kernel_double_segment_at(const void *segment, int64_t point_q40_mm[2],
+                              int64_t arc_length_q40_mm);
 
 #endif

@@ -41,8 +41,9 @@ static void set_inverses(struct kernel_fixed_segment *k, const struct ph_segment
     set_inverse(&k->inverse[1], behind, sigma_q30[1], sigma_q30[2]);
 }
 
-void kernel_fixed_segment_set(struct kernel_fixed_segment *k, const struct ph_segment *ph)
+void kernel_fixed_segment_set(void *segment, const struct ph_segment *ph)
 {
+    struct kernel_fixed_segment *k = segment;
     int n = ph->exponent;
     for (int axis = PH_X; axis <= PH_S; axis++) {
         k->origin_q40_mm[axis] = ph->origin_q40_mm[axis];
@@ -129,9 +130,10 @@ static void tangent(const struct kernel_fixed_segment *k, int32_t z, int32_t rec
     tangent_q25[PH_Y] = qmath_mul_hi(2 * qmath_mul_hi(u, v), inverse_q27);
 }
 
-void kernel_fixed_segment_at(const struct kernel_fixed_segment *k, int64_t arc_length_q40_mm,
-                             int64_t point_q40_mm[2])
+void kernel_fixed_segment_at(const void *segment, int64_t point_q40_mm[2],
+                             int64_t arc_length_q40_mm)
 {
+    const struct kernel_fixed_segment *k = segment;
     int64_t s_q48 = (arc_length_q40_mm - k->origin_q40_mm[PH_S]) * 256;
     int64_t from_middle = s_q48 - k->c_q48_mm[PH_S][0];
     int32_t s_q30 = qmath_clamp32(qmath_shift(from_middle, -18 - k->exponent));
@@ -151,22 +153,12 @@ void kernel_fixed_segment_at(const struct kernel_fixed_segment *k, int64_t arc_l
     }
 }
 
-static void set_segment(void *segment, const struct ph_segment *from)
-{
-    kernel_fixed_segment_set(segment, from);
-}
-
-static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
-{
-    kernel_fixed_segment_at(segment, arc_length_q40_mm, point_q40_mm);
-}
-
 const struct kernel kernel_fixed = {
     .piece_size = sizeof(struct feed_piece),
     .segment_size = sizeof(struct kernel_fixed_segment),
-    .piece_set = feed_piece_make,
-    .segment_set = set_segment,
-    .piece_at = feed_piece_point,
-    .piece_acceleration = feed_piece_bend,
-    .segment_at = segment_at,
+    .piece_set = feed_piece_set,
+    .segment_set = kernel_fixed_segment_set,
+    .piece_at = feed_piece_at,
+    .piece_acceleration = feed_piece_acceleration,
+    .segment_at = kernel_fixed_segment_at,
 };

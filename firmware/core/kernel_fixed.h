@@ -30,12 +30,14 @@ struct kernel_fixed_segment {
     int exponent;
 };
 
-void kernel_fixed_segment_set(struct kernel_fixed_segment *k, const struct ph_segment *ph);
+/* The functions have the types of struct kernel: `segment` is a struct kernel_fixed_segment. */
+
+void kernel_fixed_segment_set(void *segment, const struct ph_segment *ph);
 
 /* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside
  * is allowed: the curve is continued by its tangent). Within 2^-32 mm by the bound that needs no
  * numerics, 2^-37 mm measured. Two Newton steps with one 32-bit division each, 15 wide products. */
-void kernel_fixed_segment_at(const struct kernel_fixed_segment *k, int64_t arc_length_q40_mm,
-                             int64_t point_q40_mm[2]);
+void kernel_fixed_segment_at(const void *segment, int64_t point_q40_mm[2],
+                             int64_t arc_length_q40_mm);
 
 #endif

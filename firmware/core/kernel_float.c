@@ -70,8 +70,9 @@ static void set_polynomial(struct kernel_float_polynomial *p, const int64_t c_q4
     }
 }
 
-void kernel_float_segment_set(struct kernel_float_segment *k, const struct ph_segment *ph)
+void kernel_float_segment_set(void *segment, const struct ph_segment *ph)
 {
+    struct kernel_float_segment *k = segment;
     int n = ph->exponent;
     int shift = bits_of(ph) - 31 > 1 ? bits_of(ph) - 31 : 1;
     k->scale = (int32_t)1 << shift;
@@ -151,9 +152,10 @@ static void move_along(const struct kernel_float_segment *k, float z, float rest
     move[PH_Y] = 2.0f * u * v * scale;
 }
 
-void kernel_float_segment_at(const struct kernel_float_segment *k, int64_t arc_length_q40_mm,
-                             int64_t point_q40_mm[2])
+void kernel_float_segment_at(const void *segment, int64_t point_q40_mm[2],
+                             int64_t arc_length_q40_mm)
 {
+    const struct kernel_float_segment *k = segment;
     int64_t s_q48 = (arc_length_q40_mm - k->middle_arc_q40_mm) * 256 - k->middle_rest_q48;
     float s = from_q30(k->shift > 0 ? s_q48 >> k->shift
                                     : qmath_clamp32(s_q48 * ((int64_t)1 << -k->shift)));
@@ -169,22 +171,12 @@ void kernel_float_segment_at(const struct kernel_float_segment *k, int64_t arc_l
     }
 }
 
-static void set_segment(void *segment, const struct ph_segment *from)
-{
-    kernel_float_segment_set(segment, from);
-}
-
-static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
-{
-    kernel_float_segment_at(segment, arc_length_q40_mm, point_q40_mm);
-}
-
 const struct kernel kernel_float = {
     .piece_size = sizeof(struct feed_piece),
     .segment_size = sizeof(struct kernel_float_segment),
-    .piece_set = feed_piece_make,
-    .segment_set = set_segment,
-    .piece_at = feed_piece_point,
-    .piece_acceleration = feed_piece_bend,
-    .segment_at = segment_at,
+    .piece_set = feed_piece_set,
+    .segment_set = kernel_float_segment_set,
+    .piece_at = feed_piece_at,
+    .piece_acceleration = feed_piece_acceleration,
+    .segment_at = kernel_float_segment_at,
 };

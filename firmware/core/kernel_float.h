@@ -39,10 +39,12 @@ struct kernel_float_segment {
     struct kernel_float_inverse inverse[KERNEL_FLOAT_PARTS];
 };
 
-void kernel_float_segment_set(struct kernel_float_segment *k, const struct ph_segment *ph);
+/* The functions have the types of struct kernel: `segment` is a struct kernel_float_segment. */
+
+void kernel_float_segment_set(void *segment, const struct ph_segment *ph);
 
 /* As kernel_fixed_segment_at; within 10 nm. One Newton step, two divisions, six wide products and fifteen narrow ones. */
-void kernel_float_segment_at(const struct kernel_float_segment *k, int64_t arc_length_q40_mm,
-                             int64_t point_q40_mm[2]);
+void kernel_float_segment_at(const void *segment, int64_t point_q40_mm[2],
+                             int64_t arc_length_q40_mm);
 
 #endif

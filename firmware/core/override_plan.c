@@ -34,7 +34,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
 {
     memset(plan, 0, sizeof *plan);
     override_bounds_of(&plan->guaranteed, p, 0, p->header.piece_count);
-    plan->guaranteed_q57 = (int64_t)plan->guaranteed.factor_q14 << 43;
+    plan->guaranteed_q57 = override_of_factor(plan->guaranteed.factor_q14);
     plan->commanded_q57 = OVERRIDE_ONE;
     come_to_rest(plan);
 }
@@ -78,38 +78,24 @@ static int64_t wanted_override(const struct override_plan *plan)
 
 /* --- Look-ahead --- */
 
-static void look_at_pieces(struct override_window *w, const struct program_clock *clock,
-                           uint32_t last)
-{
-    override_bounds_of(&w->own, clock->program, clock->piece, last + 1u - clock->piece);
-    w->bounds = &w->own;
-    w->end_q32_s = clock->piece_end_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
-    for (uint32_t k = clock->piece + 1u; k <= last; k++) {
-        w->end_q32_s += program_piece_duration(clock->program, k);
-    }
-}
-
 void override_window_get(struct override_window *w, const struct program_clock *clock,
                          uint32_t window)
 {
     const struct program *p = clock->program;
     const uint32_t behind = override_window_pieces(window) - 1u;
     const uint32_t left = p->header.piece_count - 1u - clock->piece;
-    const uint32_t last = clock->piece + (behind < left ? behind : left);
-    if (clock->record != NULL) {
-        w->bounds = &clock->record->ahead[window];
-        w->end_q32_s = coefficients_piece_at(p, p->coefficients_for, last)->end_q32_s;
-    } else {
-        look_at_pieces(w, clock, last);
-    }
-    if (behind >= left) {
-        w->end_q32_s = UINT64_MAX;
+    w->bounds = &clock->record->ahead[window];
+    w->end_q32_s = UINT64_MAX;
+    if (behind < left) {
+        const struct coefficients_piece *last =
+            coefficients_piece_at(p, p->coefficients_for, clock->piece + behind);
+        w->end_q32_s = qmath_q32_of_q42(last->end_q42_s);
     }
 }
 
 static int64_t factor_q57(const struct override_window *w)
 {
-    return (int64_t)w->bounds->factor_q14 << 43;
+    return override_of_factor(w->bounds->factor_q14);
 }
 
 /* Where the override rests next: the end of a ramp that falls to it. */
@@ -201,6 +187,9 @@ static void look(struct override_plan *plan, const struct program_clock *clock)
     } else {
         give_up(plan);
     }
+    if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY) {
+        override_change_of(&plan->change, next_rest(plan), plan->target_q57);
+    }
 }
 
 /* How far one ramp may go with the bounds of the window. Above guaranteed_q57 it goes all the way, or not at all. */
@@ -212,7 +201,7 @@ static void find_stage(struct override_plan *plan)
         plan->stage.level = PROGRAM_LEVEL_FULL;
         return;
     }
-    override_stage_of(&plan->stage, plan->ahead.bounds, next_rest(plan), plan->target_q57);
+    override_stage_of(&plan->stage, plan->ahead.bounds, &plan->change);
     if (plan->kind == OVERRIDE_CLIMB) {
         plan->stage.level = PROGRAM_LEVEL_FULL;
         if (plan->stage.end_q57 != plan->target_q57) {
@@ -252,7 +241,8 @@ static int fits(const struct override_plan *plan, const struct program_clock *cl
 {
     const int64_t mean_q57 = (plan->stage.end_q57 + plan->high_q57) / 2;
     const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
-    return (clock->time_q42_s >> 10) + span + margin_q32(plan, clock) <= plan->ahead.end_q32_s &&
+    return qmath_q32_of_q42(clock->time_q42_s) + span + margin_q32(plan, clock) <=
+               plan->ahead.end_q32_s &&
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
 }
 
@@ -275,7 +265,7 @@ static void fit_above(struct override_plan *plan, const struct program_clock *cl
     /* by then, if the ramp up takes what the ramp back may take */
     const uint64_t there_q32_s = plan->ahead.end_q32_s - by_q32_s;
     if (stays ? by_q32_s <= plan->return_q32_s
-              : by_q32_s == 0 || (clock->time_q42_s >> 10) + there_q32_s > by_q32_s) {
+              : by_q32_s == 0 || qmath_q32_of_q42(clock->time_q42_s) + there_q32_s > by_q32_s) {
         return;
     }
     plan->return_q32_s = by_q32_s;
@@ -357,7 +347,7 @@ static void decide(struct override_plan *plan, const struct program_clock *clock
 static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock)
 {
     if (plan->now.override_q57 > plan->guaranteed_q57 &&
-        clock->time_q42_s >> 10 >= plan->return_q32_s) {
+        qmath_q32_of_q42(clock->time_q42_s) >= plan->return_q32_s) {
         go_back(plan);
     }
     if (plan->task == OVERRIDE_BEGINS) {
@@ -439,19 +429,18 @@ static void first_tick(struct override_plan *plan, struct program_clock *clock)
         return;
     }
     plan->now.override_q57 = qmath_lesser(wanted_override(plan), OVERRIDE_ONE);
-    clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    if (plan->now.override_q57 != OVERRIDE_ONE) { /* at 1 a tick is a period exactly */
+        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+    }
     (void)comes_steady(plan);
 }
 
-/* The tick that ends a ramp looks how far each tick at rest will go. */
 static void tick_of_ramp(struct override_plan *plan, struct program_clock *clock)
 {
     const int64_t slope_q56 = next_slope(plan, clock);
     program_clock_advance_q62(clock, program_clock_way_q62_s(clock, &plan->now, slope_q56));
     override_tick(&plan->now, slope_q56);
-    if (!override_ramp_moves(&plan->ramp)) {
-        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
-    }
+    clock->even_q62_s = 0;
 }
 
 void override_plan_change(struct override_plan *plan, struct program_clock *clock)
@@ -463,6 +452,9 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
     if (override_ramp_moves(&plan->ramp)) {
         tick_of_ramp(plan, clock);
         return;
+    }
+    if (clock->even_q62_s == 0) { /* after a ramp: not in its last tick, which takes long itself */
+        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
     }
     if (!comes_steady(plan)) {
         tick_of_decision(plan, clock);

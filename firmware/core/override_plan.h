@@ -33,7 +33,7 @@ enum override_kind {
 
 /* The steps of a search, one in a tick. */
 enum override_search {
-    OVERRIDE_LOOKS,    /* at the next window of pieces: what it allows, */
+    OVERRIDE_LOOKS, /* at the next window of pieces: what it allows, and the levels of the change, */
     OVERRIDE_STAGES,   /* how far one ramp may go with that, */
     OVERRIDE_MEASURES, /* how long that ramp takes, */
     OVERRIDE_FITS,     /* and whether it ends inside the window */
@@ -43,7 +43,6 @@ enum override_search {
 struct override_window {
     const struct program_override *bounds; /* least of all pieces in it */
     uint64_t end_q32_s;                    /* UINT64_MAX with the last piece */
-    struct program_override own;           /* `bounds` of a program without coefficient records */
 };
 
 /* Contents private, but for `now` and `saturated`. */
@@ -65,6 +64,7 @@ struct override_plan {
     uint32_t searched;            /* last search above guaranteed_q57 began in this piece */
     int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
     int64_t target_q57;           /* what is looked for, */
+    struct ramp_change change;    /* how the override gets there from its next rest, */
     struct ramp_stage stage;      /* where the next ramp on the way there ends, */
     struct ramp_ticks ticks;      /* and its ticks */
     int64_t high_q57;             /* greatest override on it */
@@ -102,8 +102,7 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
 /* Part of it: one step of a search. */
 void override_plan_search(struct override_plan *plan, const struct program_clock *clock);
 
-/* The window of this number (below OVERRIDE_WINDOWS) from the present piece of the clock on. Constant time with prepared
- * records (core/coefficients.h), else it looks at each piece. */
+/* The window of this number (below OVERRIDE_WINDOWS) from the present piece of the clock on. */
 void override_window_get(struct override_window *w, const struct program_clock *clock,
                          uint32_t window);
 

@@ -57,43 +57,51 @@ static int alike(const struct program_override *bounds, uint32_t high, uint32_t 
            bounds->second[high] + ALIKE >= bounds->second[low];
 }
 
-static void stage_up(struct ramp_stage *out, const struct program_override *bounds,
-                     int64_t from_q57, int64_t to_q57)
+/* A ramp up begins in the level just above its start. */
+void override_change_of(struct ramp_change *out, int64_t from_q57, int64_t to_q57)
 {
-    const uint32_t top = level_of(to_q57);
-    const uint32_t first = least(level_of(from_q57 + 2 * OVERRIDE_SPARE), top);
-    uint32_t level = first;
-    while (level < top && alike(bounds, level + 1u, first)) {
+    const int up = from_q57 < to_q57;
+    const uint32_t first = level_of(up ? from_q57 + 2 * OVERRIDE_SPARE : from_q57);
+    const uint32_t last = level_of(to_q57);
+    out->from_q57 = from_q57;
+    out->to_q57 = to_q57;
+    out->first = up ? least(first, last) : first;
+    out->last = last;
+}
+
+static void stage_up(struct ramp_stage *out, const struct program_override *bounds,
+                     const struct ramp_change *change)
+{
+    uint32_t level = change->first;
+    while (level < change->last && alike(bounds, level + 1u, change->first)) {
         level++;
     }
     out->level = level;
-    out->end_q57 = level < top ? override_of(level) : to_q57;
+    out->end_q57 = level < change->last ? override_of(level) : change->to_q57;
 }
 
 /* To rest just inside the first level below whose bounds are not alike. */
 static void stage_down(struct ramp_stage *out, const struct program_override *bounds,
-                       int64_t from_q57, int64_t to_q57)
+                       const struct ramp_change *change)
 {
-    const uint32_t bottom = level_of(to_q57);
-    const uint32_t level = level_of(from_q57);
-    uint32_t low = level;
-    while (low > bottom && alike(bounds, level, low - 1u)) {
+    uint32_t low = change->first;
+    while (low > change->last && alike(bounds, change->first, low - 1u)) {
         low--;
     }
-    out->level = level;
-    out->end_q57 = to_q57;
-    if (low > bottom && override_of(low - 1u) - OVERRIDE_SPARE > to_q57) {
+    out->level = change->first;
+    out->end_q57 = change->to_q57;
+    if (low > change->last && override_of(low - 1u) - OVERRIDE_SPARE > change->to_q57) {
         out->end_q57 = override_of(low - 1u) - OVERRIDE_SPARE;
     }
 }
 
 void override_stage_of(struct ramp_stage *out, const struct program_override *bounds,
-                       int64_t from_q57, int64_t to_q57)
+                       const struct ramp_change *change)
 {
-    if (from_q57 < to_q57) {
-        stage_up(out, bounds, from_q57, to_q57);
+    if (change->from_q57 < change->to_q57) {
+        stage_up(out, bounds, change);
     } else {
-        stage_down(out, bounds, from_q57, to_q57);
+        stage_down(out, bounds, change);
     }
 }
 

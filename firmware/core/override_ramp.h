@@ -24,6 +24,12 @@
 /* 10^-6: what a ramp may leave of its change, but for bounds next to nothing. */
 #define OVERRIDE_SPARE ((int64_t)1 << 37)
 
+/* A factor of the override bounds as an override. */
+static inline int64_t override_of_factor(uint32_t factor_q14)
+{
+    return (int64_t)factor_q14 << 43;
+}
+
 struct override_state {
     int64_t override_q57; /* 0 ... OVERRIDE_MOST */
     int64_t slope_q56;
@@ -50,9 +56,19 @@ struct ramp_stage {
     uint32_t level;
 };
 
-/* The first stage from one override to another. Levels whose bounds are alike are one. */
+/* A change of the override, whatever the bounds are: its ends, and the levels of its first part and of its last. */
+struct ramp_change {
+    int64_t from_q57;
+    int64_t to_q57;
+    uint32_t first;
+    uint32_t last;
+};
+
+void override_change_of(struct ramp_change *out, int64_t from_q57, int64_t to_q57);
+
+/* The first stage of a change. Levels whose bounds are alike are one. */
 void override_stage_of(struct ramp_stage *out, const struct program_override *bounds,
-                       int64_t from_q57, int64_t to_q57);
+                       const struct ramp_change *change);
 
 /* Bounds of a level as a tick uses them. With R and S the bounds of slope and second difference, in 2^-56 a tick and a
  * tick squared; R from 2^30, S from 2^28, both up to 2^56. */

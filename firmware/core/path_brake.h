@@ -7,7 +7,7 @@
  * the same tick. Jerks and deceleration are the three numbers that the program's stop table has for the piece
  * (core/program.h). Each tick decides from the state alone whether the acceleration still falls or the way to rest begins
  * (docs/theory/numerics.md section 12, "Path stop"), so there is no plan to search for, and the numbers may change on the way.
- * Only the arc length is made here; the point on the curve is the interpolator's (interp_at_arc_length).
+ * Only the arc length is made here; the point on the curve is the interpolator's (interpolator_at_arc_length).
  *
  * Unit of length: 2^-56 mm. Unit of time: a tick. Integers only, the same on every target. Speed and acceleration are 0
  * exactly at the end. Pure functions, bounded time, any context.

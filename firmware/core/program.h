@@ -3,7 +3,7 @@
  * The uploaded program image: reading its header, segments, feed pieces and stops.
  *
  * The format is docs/reference/protocol.md section 1: little-endian scaled integers at any alignment. The
- * image is never copied; it must stay unchanged as long as a struct program or a struct interp
+ * image is never copied; it must stay unchanged as long as a struct program or a struct interpolator
  * refers to it. `program_open` checks what is needed to read without leaving the image (sizes,
  * counts, CRC); everything else is the business of `program_check` (core/program_check.h), which
  * has to pass before a program is interpolated.

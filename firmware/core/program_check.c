@@ -78,3 +78,79 @@ int program_check(const struct program *p, const struct program_limits *limits,
     }
     return fault->code;
 }
+
+/* --- Texts of the codes --- */
+
+struct text {
+    int code;
+    const char *text;
+};
+
+static const struct text texts[] = {
+    {0, "no error"},
+    {PROGRAM_ERR_SIZE, "truncated, or sizes and counts do not fit each other"},
+    {PROGRAM_ERR_MAGIC, "does not begin with 'HDGP'"},
+    {PROGRAM_ERR_VERSION, "version or header size unknown"},
+    {PROGRAM_ERR_CRC, "CRC-32 of the contents is wrong"},
+    {PROGRAM_ERR_COUNT, "no segment or no piece"},
+    {PROGRAM_ERR_STORE, "the program store did not keep it"},
+    {PROGRAM_ERR_ROOM, "with what is prepared from it too large for the program store"},
+    {PROGRAM_ERR_KERNEL, "the controller does not have the kernel configured"},
+    {PROGRAM_ERR_PERIOD, "period not 1000, 2000, 4000 or 8000 us"},
+    {PROGRAM_ERR_PERIOD_USED, "period is not the one configured in the controller"},
+    {PROGRAM_ERR_FLAGS, "unknown flag, or a reserved field of the header is not 0"},
+    {PROGRAM_ERR_AXES, "axis count is not 2"},
+    {PROGRAM_ERR_DURATION, "not the sum of the pieces, or not below 2^22 s"},
+    {PROGRAM_ERR_LENGTH, "length not in (0, 2^22) mm"},
+    {PROGRAM_ERR_NAME, "name not padded with zeros"},
+    {PROGRAM_ERR_W_RANGE, "|u| or |v| is 64 or more"},
+    {PROGRAM_ERR_POINT_RANGE, "coordinate is 4096 mm or more"},
+    {PROGRAM_ERR_ARC_RANGE, "arc length is negative or 2^22 mm or more"},
+    {PROGRAM_ERR_SIGMA, "a Bernstein coefficient of the parametric speed is not positive"},
+    {PROGRAM_ERR_SIGMA_RATIO, "the largest is more than twice the smallest"},
+    {PROGRAM_ERR_SEGMENT_LONG, "longer than 32 mm"},
+    {PROGRAM_ERR_SEGMENT_FIRST, "the first segment does not start at arc length 0"},
+    {PROGRAM_ERR_JOIN_POINT, "points differ by more than 2^-34 mm"},
+    {PROGRAM_ERR_JOIN_ARC, "arc lengths differ by more than 2^-34 mm"},
+    {PROGRAM_ERR_JOIN_DIRECTION, "directions differ by more than 2^-20 rad"},
+    {PROGRAM_ERR_SEGMENT_END, "the last segment does not end at the length of the header"},
+    {PROGRAM_ERR_NOT_CLOSED, "flag 'closed', but end and start are more than 2^-24 mm apart"},
+    {PROGRAM_ERR_SEGMENT_SHORT, "a tick at 200 % could cross more than two segment ends"},
+    {PROGRAM_ERR_TRAVEL, "leaves the travel limits"},
+    {PROGRAM_ERR_PIECE_DURATION, "duration 0, or above 2^22 s"},
+    {PROGRAM_ERR_COEFFICIENT, "a coefficient is above 2^14 mm"},
+    {PROGRAM_ERR_PIECE_LONG, "longer than 32 mm"},
+    {PROGRAM_ERR_PIECE_FIRST, "the first piece does not start at arc length 0"},
+    {PROGRAM_ERR_JOIN_LENGTH, "F differs by more than 2^-34 mm"},
+    {PROGRAM_ERR_JOIN_FEED, "F' differs by more than 2^-16 mm/s"},
+    {PROGRAM_ERR_JOIN_ACCELERATION, "F'' differs by more than 2^-6 mm/s^2"},
+    {PROGRAM_ERR_START_MOVING, "the program does not begin at rest"},
+    {PROGRAM_ERR_END_MOVING, "the program does not end at rest"},
+    {PROGRAM_ERR_PIECE_END, "the last piece does not end at the length of the header"},
+    {PROGRAM_ERR_PIECE_SHORT, "two neighbouring pieces last no longer than two periods"},
+    {PROGRAM_ERR_BACKWARDS, "feed below -2^-10 mm/s"},
+    {PROGRAM_ERR_FEED, "above the feed limit of the controller"},
+    {PROGRAM_ERR_ACCELERATION, "above its acceleration limit"},
+    {PROGRAM_ERR_JERK, "above its jerk limit"},
+    {PROGRAM_ERR_OVERRIDE, "override factor not in 1.0 ... 2.0, rate or second rate 0"},
+    {PROGRAM_ERR_STOP_ENTRY,
+     "some codes of a stop are 0 and some are not, or a reserved field is not 0"},
+    {PROGRAM_ERR_STOP_NUMBERS, "a brake would be above the limits of the controller"},
+    {PROGRAM_ERR_STOP_BOUND, "a stop can take longer than its bound"},
+    {PROGRAM_ERR_STOP_LONG, "a fault stop can take longer than the controller allows"},
+    {PROGRAM_ERR_STOP_WORST, "the worst stops of the header are not those of the table"},
+    {PROGRAM_ERR_AXIS_VELOCITY, "above the velocity limit of an axis"},
+    {PROGRAM_ERR_AXIS_ACCELERATION, "above the acceleration limit of an axis"},
+    {PROGRAM_ERR_AXIS_JERK, "above the jerk limit of an axis"},
+    {PROGRAM_ERR_AXIS_STEP, "velocity or acceleration of an axis jumps at a joint"},
+};
+
+const char *program_error_text(int code)
+{
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        if (texts[i].code == code) {
+            return texts[i].text;
+        }
+    }
+    return "unknown error";
+}

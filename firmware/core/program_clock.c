@@ -18,7 +18,7 @@ static void set_period(struct program_clock *clock, uint32_t period_us)
                          (period_us >= 8000u ? 1u : 0u);
     clock->period_q42_s = qmath_div_u64(period, PROGRAM_CLOCK_REST_UNIT);
     clock->period_rest = (uint32_t)(period - clock->period_q42_s * PROGRAM_CLOCK_REST_UNIT);
-    clock->period_q32_s = (uint32_t)(clock->period_q42_s >> 10) + 1u;
+    clock->period_q32_s = (uint32_t)qmath_q32_of_q42(clock->period_q42_s) + 1u;
     /* period_us 2^63 / 46875 in two steps */
     uint64_t high = qmath_div_u64((uint64_t)period_us << 48, 46875u);
     uint64_t left = ((uint64_t)period_us << 48) - high * 46875u;
@@ -37,25 +37,21 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
                          uint64_t time_q42_s)
 {
     clock->program = p;
-    clock->duration_q42_s = p->header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
+    clock->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
     set_time(clock, time_q42_s < clock->duration_q42_s ? time_q42_s : clock->duration_q42_s);
     set_period(clock, period_us);
     clock->piece = 0;
-    clock->record =
-        p->coefficients_for != NULL ? coefficients_piece_at(p, p->coefficients_for, 0) : NULL;
-    clock->piece_end_q42_s =
-        program_clock_end_of_piece(clock, program_piece_duration(p, 0) << PROGRAM_CLOCK_Q32_TO_Q42);
-    if (clock->time_q42_s != clock->duration_q42_s && clock->time_q42_s >= clock->piece_end_q42_s) {
+    clock->record = coefficients_piece_at(p, p->coefficients_for, 0);
+    if (clock->time_q42_s != clock->duration_q42_s &&
+        clock->time_q42_s >= clock->record->end_q42_s) {
         program_clock_find_piece(clock, clock->time_q42_s, UINT32_MAX);
     }
 }
 
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct coefficients_piece *record, uint64_t piece_end_q32_s)
+                       const struct coefficients_piece *record)
 {
     set_time(clock, time_q42_s);
     clock->piece = piece;
     clock->record = record;
-    clock->piece_end_q42_s =
-        program_clock_end_of_piece(clock, piece_end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42);
 }

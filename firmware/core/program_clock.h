@@ -21,9 +21,8 @@
 #include "core/qmath.h"
 
 /* 10^6 = 15625 * 2^6: periods in 2^-42 s are multiples of 1/15625. */
-#define PROGRAM_CLOCK_REST_UNIT  15625u
-#define PROGRAM_CLOCK_FINE_BITS  20
-#define PROGRAM_CLOCK_Q32_TO_Q42 10
+#define PROGRAM_CLOCK_REST_UNIT 15625u
+#define PROGRAM_CLOCK_FINE_BITS 20
 /* Piece ends in a tick: docs/reference/protocol.md 1.3. */
 #define PROGRAM_CLOCK_MOST_ENDS 2u
 
@@ -40,27 +39,27 @@ struct program_clock {
     uint32_t period_log2;  /* of the period in ms */
     uint32_t period_q32_s; /* rounded up, for look-ahead */
     uint64_t sixth_q70_s;  /* a sixth of the period */
-    uint64_t even_q62_s;   /* program time of a tick whose override does not change */
-    uint32_t piece;        /* of the last tick, */
-    const struct coefficients_piece *record; /* its record, or NULL where the program has none, */
-    uint64_t piece_end_q42_s;                /* and its end; of the last piece the duration */
+    uint64_t
+        even_q62_s; /* program time of a tick whose override does not change; 0: not known yet */
+    uint32_t piece; /* of the last tick, */
+    const struct coefficients_piece *record; /* and its coefficient record */
 };
 
-/* Sets the clock to a program time of a checked program; beyond the duration: to the duration.
+/* Sets the clock to a program time of a checked program with coefficient records; beyond the duration: to the duration.
  * period_us: 1000, 2000, 4000 or 8000. Linear in the number of pieces: main loop. */
 void program_clock_begin(struct program_clock *clock, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
 
-/* Sets the clock to a time inside this piece; `record` as in the struct. Tick context. */
+/* Sets the clock to a time inside this piece, which has this record. Tick context. */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct coefficients_piece *record, uint64_t piece_end_q32_s);
+                       const struct coefficients_piece *record);
 
 /* Program time of a tick in 2^-62 s, in which the override changes from `from` to the slope at its end (2^-56 a tick):
  * six times its mean is 3 override + 2 slope + next slope. */
 uint64_t program_clock_way_q62_s(const struct program_clock *clock,
                                  const struct override_state *from, int64_t slope_q56);
 
-/* Program time of the last tick in 2^-42 s, rounded to nearest: for interp_at_q42. */
+/* Program time of the last tick in 2^-42 s, rounded to nearest: for interpolator_at_q42. */
 static inline uint64_t program_clock_time_q42(const struct program_clock *clock)
 {
     if (clock->fine == 0) {
@@ -102,45 +101,19 @@ static inline void program_clock_advance_even(struct program_clock *clock, int64
     clock->rest = rest;
 }
 
-/* The last piece ends with the program. */
-static inline uint64_t program_clock_end_of_piece(const struct program_clock *clock,
-                                                  uint64_t end_q42_s)
-{
-    return clock->piece + 1u == clock->program->header.piece_count ? clock->duration_q42_s
-                                                                   : end_q42_s;
-}
-
-/* Of a program without records. */
-static inline void program_clock_read_ends(struct program_clock *clock, uint64_t time_q42_s,
-                                           uint32_t most)
-{
-    for (; time_q42_s >= clock->piece_end_q42_s && most > 0; most--) {
-        clock->piece++;
-        uint64_t length_q32_s = program_piece_duration(clock->program, clock->piece);
-        clock->piece_end_q42_s = program_clock_end_of_piece(
-            clock, clock->piece_end_q42_s + (length_q32_s << PROGRAM_CLOCK_Q32_TO_Q42));
-    }
-}
-
 /* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
- * ends at most. When they are not enough, the piece ends before the time, which interp_at_piece refuses. */
+ * ends at most. When they are not enough, the piece ends before the time, which interpolator_at_piece refuses. */
 static inline void program_clock_find_piece(struct program_clock *clock, uint64_t time_q42_s,
                                             uint32_t most)
 {
     const struct coefficients_piece *record = clock->record;
-    const uint64_t time_q32_s = time_q42_s >> PROGRAM_CLOCK_Q32_TO_Q42;
     uint32_t left = most;
-    if (record == NULL) {
-        program_clock_read_ends(clock, time_q42_s, most);
-        return;
-    }
     do {
         record = coefficients_piece_next(record, clock->program->coefficients_for);
         left--;
-    } while (time_q32_s >= record->end_q32_s && left > 0);
+    } while (time_q42_s >= record->end_q42_s && left > 0);
     clock->record = record;
     clock->piece += most - left;
-    clock->piece_end_q42_s = record->end_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
 }
 
 /* The time is at or beyond the end of the present piece: goes to the piece that it is in, or stays at the duration. */
@@ -160,8 +133,8 @@ static inline uint64_t program_clock_pass_end(struct program_clock *clock, uint6
 static inline uint64_t program_clock_enter(struct program_clock *clock)
 {
     const uint64_t time_q42_s = program_clock_time_q42(clock);
-    return time_q42_s < clock->piece_end_q42_s ? time_q42_s
-                                               : program_clock_pass_end(clock, time_q42_s);
+    return time_q42_s < clock->record->end_q42_s ? time_q42_s
+                                                 : program_clock_pass_end(clock, time_q42_s);
 }
 
 #endif

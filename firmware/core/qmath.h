@@ -8,6 +8,16 @@
  * narrower signed type is modulo 2^N. Nothing else.
  *
  * All inline functions: constant time, any context.
+ *
+ * Names of fixed-point numbers, in all of the core:
+ *
+ *   NAME_qN_UNIT     an integer that stands for integer / 2^N of the unit: x_q40_mm in 2^-40 mm, time_q42_s in 2^-42 s
+ *   NAME_qN          the same without a unit: override_q57, 2^57 = 1
+ *   NAME_UNIT        whole units: period_us, feed_um_s
+ *   unit of speed    mm_s; of acceleration mm_s2; of jerk mm_s3
+ *   q56 of a brake and of a ramp: mm, or 1, a tick, a tick squared or cubed, as their headers say
+ *
+ * A conversion to fewer bits after the point drops bits (floor) unless it is qmath_round; one to more is exact.
  */
 #ifndef HODOGRAPH_CORE_QMATH_H
 #define HODOGRAPH_CORE_QMATH_H
@@ -146,6 +156,18 @@ int64_t qmath_shift_clamp(int64_t a, int shift);
 static inline int64_t qmath_round(int64_t a, int bits)
 {
     return (a + ((int64_t)1 << (bits - 1))) >> bits;
+}
+
+/* Program times: 2^-32 s in the image and the object dictionary, 2^-42 s in a tick; below 2^22 s. */
+static inline uint64_t qmath_q42_of_q32(uint64_t time_q32_s)
+{
+    return time_q32_s << 10;
+}
+
+/* Rounded down. */
+static inline uint64_t qmath_q32_of_q42(uint64_t time_q42_s)
+{
+    return time_q42_s >> 10;
 }
 
 /* |a|; not of INT64_MIN. */

@@ -66,7 +66,7 @@ TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
 
 # What the tick runs: loops of fixed length unrolled. Measured: a quarter fewer instructions.
-TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interp.c feed_override.c program_clock.c override_plan.c override_ramp.c qmath.c) \
+TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interpolator.c feed_override.c program_clock.c override_plan.c override_ramp.c qmath.c) \
             firmware/app/machine/motion.c
 
 # In one function with all that it calls, the check of the limits would be longer than a Cortex-M0 can jump, and it needs

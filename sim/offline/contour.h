@@ -50,7 +50,7 @@ void contour_begin(struct contour *contour, const struct program *program,
  * length, which is clamped to the program's. */
 double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[2]);
 
-/* n points in bus counts at once: errors in um. arc_length_q40_mm as interp gives it; act_counts
+/* n points in bus counts at once: errors in um. arc_length_q40_mm as the interpolator gives it; act_counts
  * holds x, y pairs. */
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
                        const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um);

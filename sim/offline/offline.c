@@ -9,8 +9,8 @@ typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 64 ? 
 
 static int offline_start_point(struct offline *rig, int32_t start[2])
 {
-    struct interp_point point;
-    if (interp_at(&rig->interp, 0, &point) < 0) {
+    struct interpolator_point point;
+    if (interpolator_at(&rig->interp, 0, &point) < 0) {
         return OFFLINE_ERR_INTERP;
     }
     start[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
@@ -33,7 +33,7 @@ static int offline_drives(struct offline *rig, const struct program *program,
     return drives[0].counts_per_mm == drives[1].counts_per_mm ? 0 : OFFLINE_ERR_COUNTS;
 }
 
-int offline_begin(struct offline *rig, const struct program *program, enum interp_kernel kernel,
+int offline_begin(struct offline *rig, const struct program *program,
                   const struct drive_config drives[2], struct contour_segment *segments)
 {
     const struct feedforward_gains without = {.period_us = drives[0].period_us};
@@ -49,8 +49,8 @@ int offline_begin(struct offline *rig, const struct program *program, enum inter
     rig->fault_count = 0;
     rig->fault_tick = -1;
     rig->program_ticks = program_ticks(program);
-    if (interp_begin(&rig->interp, program, kernel) != 0) {
-        return OFFLINE_ERR_KERNEL;
+    if (interpolator_begin(&rig->interp, program) != 0) {
+        return OFFLINE_ERR_COEFFICIENTS;
     }
     error = offline_start_point(rig, start);
     if (error != 0) {
@@ -160,7 +160,7 @@ static void offline_order(struct offline *rig, const struct offline_order *order
     }
 }
 
-static int offline_point_next(struct offline *rig, struct interp_point *point)
+static int offline_point_next(struct offline *rig, struct interpolator_point *point)
 {
     while (rig->next_order < rig->order_count && rig->orders[rig->next_order].tick <= rig->tick) {
         offline_order(rig, &rig->orders[rig->next_order++]);
@@ -178,7 +178,7 @@ static int offline_point_next(struct offline *rig, struct interp_point *point)
 
 static int offline_command(struct offline *rig, struct offline_row *row)
 {
-    struct interp_point point;
+    struct interpolator_point point;
     if (offline_point_next(rig, &point) != 0) {
         return OFFLINE_ERR_INTERP;
     }
@@ -280,17 +280,18 @@ int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n)
     return 0;
 }
 
-static int offline_point(struct interp *interp, uint64_t time_q42_s, struct interp_point *point)
+static int offline_point(struct interpolator *interp, uint64_t time_q42_s,
+                         struct interpolator_point *point)
 {
-    int result = interp_at_q42(interp, time_q42_s, point);
-    if (result == INTERP_ERR_JUMP && interp_seek(interp, time_q42_s >> 10) == 0) {
-        result = interp_at_q42(interp, time_q42_s, point);
+    int result = interpolator_at_q42(interp, time_q42_s, point);
+    if (result == INTERPOLATOR_ERR_JUMP && interpolator_seek(interp, time_q42_s >> 10) == 0) {
+        result = interpolator_at_q42(interp, time_q42_s, point);
     }
     return result < 0 ? OFFLINE_ERR_INTERP : 0;
 }
 
-int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
-                   uint32_t counts_per_mm, struct interp_point *points, int32_t *counts)
+int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
+                   uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts)
 {
     for (uint32_t i = 0; i < n; i++) {
         if (offline_point(interp, time_q42_s[i], &points[i]) != 0) {

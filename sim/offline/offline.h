@@ -9,7 +9,7 @@
  * repeat its end point (settling), those behind a stop its place of rest.
  *
  * Use: offline_begin, then rig_run as often as wanted. No heap: the caller lends the segment array, and
- * the program, its image and the segments must outlive the rig. Main loop only.
+ * the program, its image, its coefficient records and the segments must outlive the rig. Main loop only.
  */
 #ifndef HODOGRAPH_OFFLINE_OFFLINE_H
 #define HODOGRAPH_OFFLINE_OFFLINE_H
@@ -19,7 +19,7 @@
 
 #include "core/feed_override.h"
 #include "core/feedforward.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/program.h"
 #include "offline/contour.h"
 #include "offline/offline_fault.h"
@@ -64,17 +64,17 @@ struct offline_stop {
 };
 
 enum offline_error {
-    OFFLINE_ERR_KERNEL = -100, /* no such kernel */
-    OFFLINE_ERR_PERIOD = -101, /* a drive's period is not the program's */
-    OFFLINE_ERR_COUNTS = -102, /* the drives' counts per mm differ */
-    OFFLINE_ERR_FAULT = -103,  /* a fault or an order that cannot be carried out */
-    OFFLINE_ERR_DRIVE = -200,  /* minus 10 * axis, plus the enum drive_error of that axis */
-    OFFLINE_ERR_INTERP = -300, /* the interpolator failed: the program was not checked */
+    OFFLINE_ERR_COEFFICIENTS = -100, /* the program has no coefficient records */
+    OFFLINE_ERR_PERIOD = -101,       /* a drive's period is not the program's */
+    OFFLINE_ERR_COUNTS = -102,       /* the drives' counts per mm differ */
+    OFFLINE_ERR_FAULT = -103,        /* a fault or an order that cannot be carried out */
+    OFFLINE_ERR_DRIVE = -200,        /* minus 10 * axis, plus the enum drive_error of that axis */
+    OFFLINE_ERR_INTERP = -300,       /* the interpolator failed: the program was not checked */
 };
 
 /* Fields are private. */
 struct offline {
-    struct interp interp;
+    struct interpolator interp;
     struct feed_override feed;
     const struct offline_order *orders; /* borrowed */
     uint32_t order_count;
@@ -98,9 +98,9 @@ struct offline {
     uint32_t tick;
 };
 
-/* Sets up for a program that passed program_check; segments has room for its segment_count. Returns
- * 0 or an error. */
-int offline_begin(struct offline *rig, const struct program *program, enum interp_kernel kernel,
+/* Sets up for a program that passed program_check and has coefficient records; segments has room for its
+ * segment_count. Returns 0 or an error. */
+int offline_begin(struct offline *rig, const struct program *program,
                   const struct drive_config drives[2], struct contour_segment *segments);
 
 /* The controller's feedforward of both axes (0x2018 ... 0x201A), right after offline_begin; period and
@@ -127,8 +127,8 @@ int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
 
 /* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
  * counts: x, y pairs, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */
-int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
-                   uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
+int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
+                   uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 
 /* Program times of n ticks from tick0 on, as the controller's program clock gives them at override 1, in
  * 2^-42 s. */

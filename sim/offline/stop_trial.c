@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/feed_override.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 
 #define MOST_COMMANDS 4u
 #define MOST_BETWEEN  60u
@@ -16,7 +16,7 @@
 /* A motion under commands, with its last setpoints: x, y and arc length in mm. */
 struct course {
     struct feed_override feed;
-    struct interp interp;
+    struct interpolator interp;
     double points[HISTORY + 1u][3]; /* the newest first */
     uint32_t count;
     uint32_t brake_ticks; /* of the brake so far; 0: none */
@@ -99,7 +99,7 @@ static int at_rest(const struct course *course)
 
 static int step(struct course *course, struct stop_trial *trial)
 {
-    struct interp_point point;
+    struct interpolator_point point;
     const double period_s = 1e-6 * course->interp.program->header.period_us;
     const int error = feed_override_next(&course->feed, &course->interp, &point);
     if (error != 0) {
@@ -246,7 +246,7 @@ static int begin(struct course *course, const struct program *p, struct stop_tri
 {
     memset(course, 0, sizeof *course);
     clear(trial);
-    const int error = interp_begin(&course->interp, p, (enum interp_kernel)trial->kernel);
+    const int error = interpolator_begin(&course->interp, p);
     if (error == 0) {
         feed_override_begin(&course->feed, p, p->header.period_us, 0);
     }

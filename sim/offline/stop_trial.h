@@ -12,7 +12,6 @@
 
 #include <stdint.h>
 
-#include "core/kernel.h"
 #include "core/program.h"
 #include "offline/stop_search.h"
 
@@ -30,7 +29,6 @@ struct stop_case {
 struct stop_trial {
     uint64_t seed;
     uint32_t trials;
-    uint32_t kernel; /* enum interp_kernel */
     struct stop_limits
         hold; /* program's limits: for everything but fault stops, those along the path for brakes only */
     struct stop_limits fault; /* machine's */
@@ -47,7 +45,7 @@ struct stop_trial {
     struct stop_case failed;  /* and of the last that failed */
 };
 
-/* Spreads the trials over the program's ticks; the inputs are seed ... fault, the rest is set. Returns 0 or an error of the
+/* Spreads the trials over the ticks of a program with coefficient records; the inputs are seed ... fault, the rest is set. Returns 0 or an error of the
  * interpolator. */
 int stop_trial_run(const struct program *p, struct stop_trial *trial);
 

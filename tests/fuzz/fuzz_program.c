@@ -2,8 +2,7 @@
 /*
  * A program image: a golden one with changes, or any bytes, always with the CRC that it should have. What program_check
  * accepts for axes with limits runs to its end, or to the end of a stop, under holds, resumes, overrides and stops at any
- * tick: the setpoints keep the limits of each axis at every tick and stay within travel, and a program with prepared
- * records gives the same bits as one without.
+ * tick: the setpoints keep the limits of each axis at every tick and stay within travel.
  *
  * Input: which image, 6 bytes of limits, commands (16 pairs: ticks to wait, command), then changes.
  */
@@ -11,9 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/coefficients.h"
 #include "core/feed_override.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/program_check.h"
 #include "fuzz.h"
 #include "golden.h"
@@ -38,13 +36,13 @@ enum time_command { TIME_HOLD, TIME_RESUME, TIME_STOP, TIME_OVERRIDE };
 
 struct program_run {
     struct feed_override feed;
-    struct interp interp;
+    struct interpolator interp;
 };
 
 static void run_begin(struct program_run *run, const struct program *p)
 {
     feed_override_begin(&run->feed, p, p->header.period_us, 0);
-    FUZZ_CHECK(interp_begin(&run->interp, p, INTERP_DOUBLE) == 0);
+    FUZZ_CHECK(interpolator_begin(&run->interp, p) == 0);
 }
 
 static void run_command(struct program_run *run, enum time_command command, uint32_t percent)
@@ -65,7 +63,7 @@ static void run_command(struct program_run *run, enum time_command command, uint
     }
 }
 
-static void run_step(struct program_run *run, struct interp_point *point)
+static void run_step(struct program_run *run, struct interpolator_point *point)
 {
     FUZZ_CHECK(feed_override_next(&run->feed, &run->interp, point) >= 0);
 }
@@ -255,7 +253,7 @@ struct trail {
     double period_s;
 };
 
-static void trail_push(struct trail *trail, const struct interp_point *point)
+static void trail_push(struct trail *trail, const struct interpolator_point *point)
 {
     memmove(trail->mm[1], trail->mm[0], 3 * sizeof trail->mm[0]);
     trail->mm[0][0] = (double)point->x_q40_mm / Q40;
@@ -266,7 +264,8 @@ static void trail_begin(struct trail *trail, const struct program *p)
 {
     struct program_segment first;
     program_segment_get(p, 0, &first);
-    const struct interp_point point = {.x_q40_mm = first.x_q40_mm, .y_q40_mm = first.y_q40_mm};
+    const struct interpolator_point point = {.x_q40_mm = first.x_q40_mm,
+                                             .y_q40_mm = first.y_q40_mm};
     memset(trail, 0, sizeof *trail);
     trail->period_s = 1e-6 * p->header.period_us;
     for (int i = 0; i < 4; i++) {
@@ -294,15 +293,15 @@ static double greater(double a, double b)
 /* At rate 1, up to TICKS_MAX. */
 static void find_peaks(const struct program *p, double peak[2][3])
 {
-    static struct interp it;
+    static struct interpolator it;
     struct trail trail;
-    struct interp_point point = {0};
+    struct interpolator_point point = {0};
     const uint64_t period = ((uint64_t)p->header.period_us << 42) / 1000000u;
     trail_begin(&trail, p);
-    FUZZ_CHECK(interp_begin(&it, p, INTERP_DOUBLE) == 0);
-    int result = INTERP_OK;
-    for (uint32_t k = 0; k < TICKS_MAX && result == INTERP_OK; ++k) {
-        result = interp_at_q42(&it, k * period, &point);
+    FUZZ_CHECK(interpolator_begin(&it, p) == 0);
+    int result = INTERPOLATOR_OK;
+    for (uint32_t k = 0; k < TICKS_MAX && result == INTERPOLATOR_OK; ++k) {
+        result = interpolator_at_q42(&it, k * period, &point);
         FUZZ_CHECK(result >= 0);
         trail_push(&trail, &point);
         for (int axis = 0; axis < 2; axis++) {
@@ -355,36 +354,6 @@ static void keeps_limits(const struct trail *trail, const struct program_limits 
 
 /* --- The run --- */
 
-struct records {
-    uint8_t *bytes;
-    size_t used;
-    size_t room;
-};
-
-static int keep_record(void *context, const uint8_t *bytes, uint32_t size)
-{
-    struct records *records = context;
-    FUZZ_CHECK(size <= records->room - records->used);
-    memcpy(records->bytes + records->used, bytes, size);
-    records->used += size;
-    return 0;
-}
-
-/* The same program with records. */
-static struct program prepare(const struct program *p, struct records *records)
-{
-    const struct kernel *kernel = kernel_find(INTERP_DOUBLE);
-    struct program prepared = *p;
-    records->room = (size_t)coefficients_size(p, kernel);
-    records->used = 0;
-    records->bytes = malloc(records->room);
-    FUZZ_CHECK(records->bytes != NULL);
-    FUZZ_CHECK(coefficients_make(p, kernel, keep_record, records) == 0);
-    FUZZ_CHECK(records->used == records->room);
-    coefficients_attach(&prepared, kernel, records->bytes);
-    return prepared;
-}
-
 struct commands {
     uint8_t wait[COMMANDS];
     uint8_t what[COMMANDS];
@@ -392,7 +361,7 @@ struct commands {
     unsigned waited;
 };
 
-static void give_commands(struct commands *commands, struct program_run runs[2])
+static void give_commands(struct commands *commands, struct program_run *run)
 {
     while (commands->at < COMMANDS && commands->waited >= commands->wait[commands->at]) {
         const uint8_t what = commands->what[commands->at];
@@ -400,9 +369,7 @@ static void give_commands(struct commands *commands, struct program_run runs[2])
                                           : what < 28u ? TIME_HOLD
                                           : what < 48u ? TIME_RESUME
                                                        : TIME_OVERRIDE;
-        for (int i = 0; i < 2; i++) {
-            run_command(&runs[i], command, what - 48u);
-        }
+        run_command(run, command, what - 48u);
         commands->at++;
         commands->waited = 0;
     }
@@ -412,26 +379,19 @@ static void give_commands(struct commands *commands, struct program_run runs[2])
 static void run_accepted(const struct program *p, const struct program_limits *limits,
                          struct commands *commands)
 {
-    static struct program_run runs[2];
-    struct records records;
-    const struct program prepared = prepare(p, &records);
+    static struct program_run run;
     struct trail trail;
-    run_begin(&runs[0], p);
-    run_begin(&runs[1], &prepared);
+    run_begin(&run, p);
     trail_begin(&trail, p);
     unsigned behind = 0;
     for (uint32_t k = 0; k < TICKS_MAX && behind < 4u; ++k) {
-        struct interp_point point = {0};
-        struct interp_point same = {0};
-        give_commands(commands, runs);
-        run_step(&runs[0], &point);
-        run_step(&runs[1], &same);
-        FUZZ_CHECK(memcmp(&point, &same, sizeof point) == 0);
+        struct interpolator_point point = {0};
+        give_commands(commands, &run);
+        run_step(&run, &point);
         trail_push(&trail, &point);
         keeps_limits(&trail, limits);
-        behind += run_over(&runs[0]) ? 1u : 0u;
+        behind += run_over(&run) ? 1u : 0u;
     }
-    free(records.bytes);
 }
 
 static void harness(struct fuzz_input *in)
@@ -454,10 +414,13 @@ static void harness(struct fuzz_input *in)
     FUZZ_CHECK(exact != NULL);
     memcpy(exact, image.bytes, image.size);
     if (program_open(&p, exact, image.size) == 0 && program_check(&p, &limits, &fault) == 0) {
-        set_limits(&limits, &p, scale);
+        struct golden_prepared prepared;
+        golden_prepare(&prepared, &p, KERNEL_DOUBLE);
+        set_limits(&limits, &prepared.program, scale);
         if (program_check(&p, &limits, &fault) == 0) {
-            run_accepted(&p, &limits, &commands);
+            run_accepted(&prepared.program, &limits, &commands);
         }
+        golden_discard(&prepared);
     }
     free(exact);
 }

@@ -1,28 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The program clock looks for its piece, in a program of any three pieces, with records and without, from any of them and at
- * any time: it never asks for a piece or a record behind the last.
+ * The program clock looks for its piece, in a program of any three pieces, from any of them and at any time: it never
+ * asks for a record after the last.
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
  * shows: program_clock_find_piece
- * mutant: core/program_clock.h: clock->piece + 1u == clock->program->header.piece_count => clock->piece + 2u == clock->program->header.piece_count
+ * mutant: core/program_clock.h: clock->piece += most - left => clock->piece += most - left + 1u
  * mutant: core/program_clock.h: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
- * mutant: core/program_clock.h: while (time_q32_s >= record->end_q32_s && left > 0) => while (time_q32_s <= record->end_q32_s && left > 0)
+ * mutant: core/program_clock.h: while (time_q42_s >= record->end_q42_s && left > 0) => while (time_q42_s <= record->end_q42_s && left > 0)
  */
 #include "proof.h"
 
 #include "core/program_clock.c"
 
 #define COUNT 3u
-
-uint64_t program_piece_duration(const struct program *p, uint32_t i)
-{
-    prove(i < p->header.piece_count);
-    uint64_t duration = nondet_uint64();
-    __CPROVER_assume(duration > 0 && duration <= (uint64_t)1 << 54);
-    return duration;
-}
 
 static struct coefficients_piece records[COUNT];
 static struct program program;
@@ -33,32 +25,33 @@ static struct kernel kernel = {.piece_size = sizeof(struct coefficients_piece) -
 static void place(struct program_clock *clock, uint32_t i)
 {
     clock->program = &program;
-    clock->duration_q42_s = program.header.duration_q32_s << PROGRAM_CLOCK_Q32_TO_Q42;
+    clock->duration_q42_s = qmath_q42_of_q32(program.header.duration_q32_s);
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     clock->piece = i;
-    clock->piece_end_q42_s = program_clock_end_of_piece(clock, nondet_uint64());
-    clock->record = program.coefficients_for != 0 ? &records[i] : 0;
+    clock->record = &records[i];
 }
 
 void harness(void)
 {
     struct program_clock clock;
     program.header.piece_count = COUNT;
-    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> PROGRAM_CLOCK_Q32_TO_Q42);
-    program.coefficients_for = nondet_uint32() != 0 ? &kernel : 0;
+    program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> 10);
+    program.coefficients_for = &kernel;
     for (uint32_t k = 0; k < COUNT; k++) {
-        records[k].end_q32_s = k + 1u == COUNT ? program.header.duration_q32_s : nondet_uint64();
+        records[k].end_q42_s = k + 1u == COUNT
+                                   ? qmath_q42_of_q32(program.header.duration_q32_s)
+                                   : nondet_uint64();
     }
     uint32_t i = nondet_uint32();
     __CPROVER_assume(i < COUNT);
     place(&clock, i);
     const uint64_t time_q42_s = program_clock_time_q42(&clock);
-    if (time_q42_s >= clock.piece_end_q42_s) {
+    if (time_q42_s >= clock.record->end_q42_s) {
         program_clock_pass_end(&clock, time_q42_s);
     }
     prove(clock.piece < COUNT);
-    prove(clock.record == 0 || clock.record == &records[clock.piece]);
+    prove(clock.record == &records[clock.piece]);
     reached();
 }

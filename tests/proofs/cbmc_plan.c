@@ -5,7 +5,7 @@
  *
  * prover: cbmc
  * options: --unwind 6 --signed-overflow-check
- * replaces: override_ticks_of:some_ticks override_step_of:some_step override_span_q32:some_span override_window_get:some_window override_stage_of:some_stage override_limits_of:some_limits
+ * replaces: override_ticks_of:some_ticks override_step_of:some_step override_span_q32:some_span override_window_get:some_window override_change_of:some_change override_stage_of:some_stage override_limits_of:some_limits
  * shows: tick_of_decision come_to_rest comes_steady
  * mutant: core/override_plan.c: down ? -step_q56 : step_q56 => step_q56
  * mutant: core/override_plan.c: above ? OVERRIDE_STAY : OVERRIDE_CLIMB => OVERRIDE_STAY

@@ -12,7 +12,7 @@
  * mutant: core/program_time.c: i < p->header.piece_count => i <= p->header.piece_count
  * mutant: core/program_time.c: low = middle + 1u => low = middle
  * mutant: core/program_time.c: middle = low + (high - low) / 2u => middle = low + (high - low + 2u) / 2u
- * mutant: core/program_time.c: piece->duration_q32_s << 10 => piece->duration_q32_s << 11
+ * mutant: core/program_time.c: qmath_q42_of_q32(piece->duration_q32_s) => qmath_q42_of_q32(2u * piece->duration_q32_s)
  */
 #include "proof.h"
 
@@ -50,15 +50,15 @@ void some_piece(const struct program *p, uint32_t i, struct program_piece *out)
     out->duration_q32_s = duration_q32_s[i];
 }
 
-void some_feed(struct feed_piece *f, const struct program_piece *piece)
+void some_feed(void *piece, const struct program_piece *from)
 {
-    (void)f;
-    present_q32_s = piece->duration_q32_s;
+    (void)piece;
+    present_q32_s = from->duration_q32_s;
 }
 
-void some_point(const struct feed_piece *f, uint64_t t_q42_s, struct feed_point *out)
+void some_point(const void *piece, struct feed_point *out, uint64_t t_q42_s)
 {
-    (void)f;
+    (void)piece;
     prove(t_q42_s < present_q32_s << 10);
     out->arc_length_q40_mm = nondet_int64();
 }

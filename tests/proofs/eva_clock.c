@@ -1,17 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A tick of the program clock and of the plan of its override, for any program of three pieces, with records and without,
- * wherever its time is and after any command: nothing overflows, no window asks for what is behind the last piece. What the
+ * A tick of the program clock and of the plan of its override, for any program of three pieces, wherever its
+ * time is and after any command: nothing overflows, no window asks for what is behind the last piece. What the
  * plan decides: cbmc_plan.c. Which piece the clock is in: cbmc_ends.c.
  *
  * prover: eva
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/program_clock.h: program_clock_find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)program_clock_find_piece;
- * assumes: qmath_div_u64 program_piece_duration override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
+ * assumes: qmath_div_u64 override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
  * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
- * mutant: core/override_plan.c: behind < left ? behind : left => behind
- * mutant: core/override_plan.c: last + 1u - clock->piece => last - clock->piece
+ * mutant: core/override_plan.c: if (behind < left) { => if (behind <= left + 1u) {
  * mutant: core/override_plan.c: percent < OVERRIDE_MOST_PERCENT ? percent => percent < 2 * OVERRIDE_MOST_PERCENT ? percent
  * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
@@ -19,11 +18,6 @@
 #include "ramp_contracts.h"
 #include "proof.h"
 #include "qmath_contracts.h"
-
-/*@ requires i < p->header.piece_count;
-    assigns \result \from i;
-    ensures 0 < \result <= (1 << 54); */
-uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
 /*@ predicate is_plan(struct override_plan *plan) =
       IS_OVERRIDE(plan->now.override_q57) && -OVERRIDE_MOST <= plan->now.slope_q56 <= OVERRIDE_MOST &&
@@ -92,12 +86,9 @@ static void command(struct override_plan *plan)
 static void place(struct program_clock *clock, uint32_t i)
 {
     const struct program *p = clock->program;
-    clock->piece = i;
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    clock->piece_end_q42_s = program_clock_end_of_piece(clock, (uint64_t)any_between(0, INT64_MAX));
-    if (p->coefficients_for != NULL) {
-        clock->record = coefficients_piece_at(p, p->coefficients_for, i);
-    }
+    clock->piece = i;
+    clock->record = coefficients_piece_at(p, p->coefficients_for, i);
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
 }
@@ -129,8 +120,8 @@ static void tick(const struct program *p)
         plan.steady = (uint32_t)any_between(0, 1);
         plan.started = (uint32_t)any_between(0, 1);
         override_plan_tick(&plan, &clock);
-        program_clock_set(&clock, (uint64_t)any_between(0, INT64_MAX), i, clock.record,
-                          (uint64_t)any_between(0, POWER(54)));
+        program_clock_set(&clock, (uint64_t)any_between(0, INT64_MAX), i,
+                          coefficients_piece_at(p, p->coefficients_for, i));
         override_plan_rest(&plan);
     }
 }
@@ -149,15 +140,12 @@ int main(void)
     Frama_C_make_unknown((char *)&p.header, sizeof p.header);
     p.header.piece_count = COUNT;
     p.header.duration_q32_s = (uint64_t)any_between(1, POWER(53));
-    p.coefficients = NULL;
-    p.coefficients_for = NULL;
-    tick(&p);
     Frama_C_make_unknown((char *)records, sizeof records);
     p.coefficients = (const uint8_t *)records;
     p.coefficients_for = &any_kernel;
     for (uint32_t i = 0; i < COUNT; i++) {
         struct coefficients_piece *record = (void *)coefficients_piece_at(&p, &any_kernel, i);
-        record->end_q32_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(1, POWER(54));
+        record->end_q42_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(INT64_MIN, INT64_MAX);
         for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
             record->ahead[k] = any_bounds();
         }

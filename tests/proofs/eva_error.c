@@ -4,12 +4,12 @@
  *
  * prover: eva
  * shows: program_error_text
- * mutant: core/program_error.c: i < sizeof texts => i <= sizeof texts
- * mutant: core/program_error.c: return "unknown error" => return NULL
+ * mutant: core/program_check.c: i < sizeof texts => i <= sizeof texts
+ * mutant: core/program_check.c: return "unknown error" => return NULL
  */
 #include "proof.h"
 
-#include "core/program_error.c"
+#include "core/program_check.c"
 
 int main(void)
 {

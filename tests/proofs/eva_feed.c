@@ -10,7 +10,7 @@
  * assumes: qmath_clz64
  * shows: feed_piece_set feed_piece_at
  * mutant: core/feed_piece.c: int shift = 22 - exponent => int shift = 62 - exponent
- * mutant: core/feed_piece.c: piece->c_q40_mm[k] * 16 => piece->c_q40_mm[k] * 256
+ * mutant: core/feed_piece.c: from->c_q40_mm[k] * 16 => from->c_q40_mm[k] * 256
  * mutant: core/feed_piece.c: bits > 32 ? bits - 31 : 1 => bits > 32 ? bits : 1
  * mutant: core/feed_piece.c: shift < -31 ? 31 => shift < -31 ? 32
  * mutant: core/feed_piece.c: shift < 31 ? (int32_t)1 => shift < 33 ? (int32_t)1
@@ -43,7 +43,7 @@ int main(void)
         c.c_q40_mm[k] = any_between(-POWER(54), POWER(54));
     }
     feed_piece_set(&f, &c);
-    feed_piece_at(&f, (uint64_t)any_between(INT64_MIN, INT64_MAX), &at);
+    feed_piece_at(&f, &at, (uint64_t)any_between(INT64_MIN, INT64_MAX));
     prove(at.feed_q32_mm_s < POWER(62) && at.feed_q32_mm_s > -POWER(62));
     reached();
     return 0;

@@ -79,7 +79,7 @@ static void at(const struct kernel_fixed_segment *k, int64_t from, int64_t to)
 {
     int64_t point[2];
     from_middle_q48 = any_between(from, to);
-    kernel_fixed_segment_at(k, any_between(-POWER(7), POWER(45) + POWER(7)), point);
+    kernel_fixed_segment_at(k, point, any_between(-POWER(7), POWER(45) + POWER(7)));
 }
 
 /* In the segment and outside: up to a normalised arc length of 1.25, and beyond, which only the shortest segments know. */

@@ -10,14 +10,14 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/qmath.h: int32_t low = (int32_t)((uint32_t)a >> 1); => int32_t low = (int32_t)any_between(0, INT32_MAX);
  * instead: core/feed_override.c: qmath_magnitude(feed) >= MOST_FEED_Q32 => feed >= MOST_FEED_Q32 || feed <= -MOST_FEED_Q32
- * assumes: qmath_div_u64 qmath_shift_clamp program_clock_set override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_rise_no_more override_plan_tick path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step path_brake_rests interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step
+ * assumes: qmath_div_u64 qmath_shift_clamp program_clock_set override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_rise_no_more override_plan_tick path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step path_brake_rests interpolator_at_piece interpolator_at_arc_length interpolator_acceleration_q40 interpolator_search_begin interpolator_search_step
  * mutant: core/feed_override.c: ((int64_t)1 << 45) => ((int64_t)1 << 49)
  * mutant: core/feed_override.c: program_stop_get(f->clock.program, f->clock.piece, (enum => program_stop_get(f->clock.program, f->clock.piece + 1u, (enum
  * mutant: core/feed_override.c: slope_q56 >> 26 => slope_q56 >> 25
  * mutant: core/feed_override.c: (int64_t)ticks_q8 << 22 => (int64_t)ticks_q8 << 40
  * mutant: core/feed_override.c: f->kind : NO_NUMBERS; => f->kind : NO_NUMBERS + 1u;
- * mutant: core/feed_override.c: f->place.piece != NULL ? f->place.piece : &it->own_piece => f->place.piece
- * mutant: core/feed_override.c: f->clock.record, f->clock.piece, f->point => f->clock.record, f->clock.piece + 1u, f->point
+ * mutant: core/feed_override.c: f->place.piece_index, f->place.piece => f->place.piece_index + 1u, f->place.piece
+ * mutant: core/feed_override.c: &f->place, f->clock.record, f->clock.piece, => &f->place, f->clock.record, f->clock.piece + 1u,
  */
 #include "override_contracts.h"
 #include "proof.h"
@@ -35,6 +35,8 @@ uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 
 #define COUNT 3u
 
+static struct coefficients_piece record;
+
 /* As eva_clock.c shows: in range, wherever it begins. */
 void program_clock_begin(struct program_clock *clock, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)
@@ -47,10 +49,8 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
     clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     clock->piece = (uint32_t)any_between(0, COUNT - 1);
-    clock->record = NULL;
+    clock->record = &record;
 }
-
-static struct coefficients_piece record;
 
 static struct path_state any_at(void)
 {
@@ -86,7 +86,7 @@ static void place(struct feed_override *f)
     f->numbers_kind = (uint32_t)any_between(0, 2);
     f->seen = any_at();
     f->look = (uint32_t)any_between(0, 3);
-    f->place.piece = any_between(0, 1) ? &record : NULL;
+    f->place.piece = &record;
     f->place.piece_index = (uint32_t)any_between(0, COUNT - 1);
     f->place.time_q42_s = (uint64_t)any_between(INT64_MIN, INT64_MAX);
     f->point.arc_length_q40_mm = any_between(LEAST_ARC, MOST_ARC);
@@ -137,11 +137,9 @@ static void ask_all(struct feed_override *f)
     feed_override_saturated(f);
 }
 
-static void tick(struct feed_override *f, struct interp *it)
+static void tick(struct feed_override *f, struct interpolator *it)
 {
-    struct interp_point out = {0, 0, 0, 0}; /* unchanged where the tick fails */
-    it->piece = any_between(0, 1) ? &record : NULL;
-    Frama_C_make_unknown((char *)&it->own_piece, sizeof it->own_piece);
+    struct interpolator_point out = {0, 0, 0, 0}; /* unchanged where the tick fails */
     place(f);
     if (feed_override_next(f, it, &out) == 0) {
         prove(IS_ARC(out.arc_length_q40_mm));
@@ -154,7 +152,7 @@ int main(void)
     static uint8_t image[PROGRAM_HEADER_SIZE + COUNT * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE)];
     static struct program p;
     static struct feed_override f;
-    static struct interp it;
+    static struct interpolator it;
     Frama_C_make_unknown((char *)image, sizeof image);
     Frama_C_make_unknown((char *)&p.header, sizeof p.header);
     Frama_C_make_unknown((char *)&record, sizeof record);

@@ -5,7 +5,7 @@
  *
  * prover: eva
  * assumes: qmath_div_u64 program_piece_override
- * shows: override_bounds_of override_limits_of override_stage_of override_ticks_of override_step_of override_span_q32
+ * shows: override_bounds_of override_limits_of override_change_of override_stage_of override_ticks_of override_step_of override_span_q32
  * mutant: core/override_ramp.c: down < 32u ? => down < 64u ?
  * mutant: core/override_ramp.c: k < PROGRAM_LEVEL_FULL => k <= PROGRAM_LEVEL_FULL
  * mutant: core/override_ramp.c: (uint32_t)(change_q57 >> 27) + 1u => (uint32_t)(change_q57 >> 27)
@@ -37,6 +37,7 @@ static void period(uint32_t period_log2)
     struct program p;
     struct program_override bounds;
     struct ramp_limits limits;
+    struct ramp_change change;
     struct ramp_stage stage;
     p.header.piece_count = 5;
     //@ loop unroll 5;
@@ -46,7 +47,9 @@ static void period(uint32_t period_log2)
         for (uint32_t level = 0; level < PROGRAM_LEVELS; level++) {
             override_limits_of(&limits, &bounds, level, period_log2);
         }
-        override_stage_of(&stage, &bounds, any_between(0, OVERRIDE_MOST), any_between(0, OVERRIDE_MOST));
+        override_change_of(&change, any_between(0, OVERRIDE_MOST), any_between(0, OVERRIDE_MOST));
+        prove(change.first < PROGRAM_LEVELS && change.last < PROGRAM_LEVELS);
+        override_stage_of(&stage, &bounds, &change);
         prove(stage.level < PROGRAM_LEVELS);
     }
 }

@@ -23,7 +23,7 @@
     ensures \result < 0 || (\result == 0 && is_bounded(g)); */
 static int check_speed(const struct program_segment *g);
 
-/* What eva_interp.c and eva_crossing.c take for granted of segments */
+/* What eva_interpolator.c and eva_crossing.c take for granted of segments */
 /*@ ensures \result < 0 || (\result == 0 && in_range(g) && 0 <= g->start_q40_mm < (1 << 62) &&
             -(1 << 52) < g->x_q40_mm < (1 << 52) && -(1 << 52) < g->y_q40_mm < (1 << 52)); */
 static int check_ranges(const struct program_segment *g);

@@ -34,7 +34,7 @@ int main(void)
     kernel_fixed_segment_set(&k, &ph);
     //@ loop unroll 40;
     for (int64_t at = -POWER(7); at <= POWER(7) + POWER(5); at += 16) { /* it is 2^5 long */
-        kernel_fixed_segment_at(&k, any_between(at, at + 15), point);
+        kernel_fixed_segment_at(&k, point, any_between(at, at + 15));
     }
     reached();
     return 0;

@@ -24,7 +24,7 @@
 /*@ predicate is_clock(struct program_clock *clock) = clock->piece < clock->program->header.piece_count;
     predicate is_plan(struct override_plan *plan) =
       IS_OVERRIDE(plan->now.override_q57) && -MOST_SLOPE <= plan->now.slope_q56 <= MOST_SLOPE;
-    predicate is_point(struct interp_point *point) =
+    predicate is_point(struct interpolator_point *point) =
       IS_ARC(point->arc_length_q40_mm) && -MOST_FEED_AT <= point->feed_q32_mm_s <= MOST_FEED_AT;
     predicate is_at(struct path_state *at) = IS_ARC(at->arc_length_q40_mm) && at->fine_q56_mm < 65536;
     predicate is_brake(struct path_brake *brake) = is_at(&brake->at) && IS_SPEED(brake->at.speed_q56);
@@ -34,11 +34,10 @@
 /* --- core/program_clock.h, core/override_plan.h: eva_clock.c --- */
 
 /*@ requires piece < clock->program->header.piece_count;
-    assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->piece_end_q42_s, clock->even_q62_s
-            \from time_q42_s, piece, piece_end_q32_s;
+    assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s \from time_q42_s, piece;
     ensures is_clock(clock); */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
-                       const struct coefficients_piece *record, uint64_t piece_end_q32_s);
+                       const struct coefficients_piece *record);
 
 /*@ assigns *plan \from \nothing;
     ensures \initialized(plan) && plan->now.override_q57 == 0 && plan->now.slope_q56 == 0; */
@@ -66,8 +65,8 @@ void override_plan_set(struct override_plan *plan, uint32_t percent);
 void override_plan_rise_no_more(struct override_plan *plan);
 
 /*@ requires is_plan(plan) && is_clock(clock);
-    assigns \result, *plan, clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->piece_end_q42_s,
-            clock->even_q62_s \from *plan, clock->time_q42_s;
+    assigns \result, *plan, clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s
+            \from *plan, clock->time_q42_s;
     ensures \initialized(plan) && is_plan(plan) && is_clock(clock); */
 uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock);
 
@@ -108,36 +107,32 @@ void path_brake_step(struct path_brake *brake);
     ensures \result == 0 || \result == 1; */
 int path_brake_rests(const struct path_brake *brake);
 
-/* --- core/interp.h: eva_interp.c --- */
+/* --- core/interpolator.h: eva_interpolator.c --- */
 
-/*@ assigns \result, *out, it->segment_index \from time_q42_s;
+/*@ assigns \result, *out, it->segment \from time_q42_s;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interp_at_q42(struct interp *it, uint64_t time_q42_s, struct interp_point *out);
+int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
+                    struct interpolator_point *out);
 
-/*@ assigns \result, *out, it->segment_index \from time_q42_s;
+/*@ assigns \result, *out, it->segment \from arc_length_q40_mm;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interp_at_piece(struct interp *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
-                    struct interp_point *out);
-
-/*@ assigns \result, *out, it->segment_index \from arc_length_q40_mm;
-    ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interp_at_arc_length(struct interp *it, int64_t arc_length_q40_mm, struct interp_point *out);
+int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm, struct interpolator_point *out);
 
 /*@ assigns \result \from time_q42_s; */
-int64_t interp_acceleration_q40(const struct interp *it, const struct coefficients_piece *piece,
+int64_t interpolator_acceleration_q40(const struct interpolator *it, const struct coefficients_piece *piece,
                                 uint64_t time_q42_s);
 
 /*@ requires index < 3;
     assigns search->arc_length_q40_mm, search->time_q42_s, search->piece_index, search->bisecting \from index,
             arc_length_q40_mm;
     ensures search->piece_index < 3; */
-void interp_search_begin(struct interp_search *search, const struct coefficients_piece *piece,
+void interpolator_search_begin(struct interpolator_search *search, const struct coefficients_piece *piece,
                          uint32_t index, int64_t arc_length_q40_mm);
 
 /*@ requires search->piece_index < 3;
-    assigns \result, search->time_q42_s, search->piece_index, search->bisecting, search->low_q42_s, search->high_q42_s,
-            it->piece_index \from search->piece_index;
+    assigns \result, search->time_q42_s, search->piece_index, search->bisecting, search->low_q42_s, search->high_q42_s
+            \from search->piece_index;
     ensures search->piece_index < 3; */
-int interp_search_step(struct interp *it, struct interp_search *search);
+int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search);
 
 #endif

@@ -20,6 +20,7 @@
 /* --- What the plan stands on: override_contracts.h --- */
 
 static int64_t begun_q57; /* the way that a step was made for */
+static struct program_override ahead; /* bounds of the window that is looked at */
 
 void some_ticks(struct ramp_ticks *ticks, const struct ramp_limits *limits, int64_t change_q57)
 {
@@ -48,12 +49,24 @@ uint64_t some_span(const struct ramp_ticks *ticks, int64_t mean_q57, uint32_t pe
     return span;
 }
 
-/* Between both ends; a rest on the way is that of a level below 1. */
-void some_stage(struct ramp_stage *out, const struct program_override *bounds, int64_t from_q57,
-                int64_t to_q57)
+void some_change(struct ramp_change *out, int64_t from_q57, int64_t to_q57)
 {
-    (void)bounds;
     prove(IS_OVERRIDE(from_q57) && IS_OVERRIDE(to_q57));
+    out->from_q57 = from_q57;
+    out->to_q57 = to_q57;
+    out->first = nondet_uint32();
+    out->last = nondet_uint32();
+    assume(IS_CHANGE(out));
+}
+
+/* Between both ends; a rest on the way is that of a level below 1. */
+void some_stage(struct ramp_stage *out, const struct program_override *bounds,
+                const struct ramp_change *change)
+{
+    const int64_t from_q57 = change->from_q57;
+    const int64_t to_q57 = change->to_q57;
+    (void)bounds;
+    prove(IS_CHANGE(change));
     out->level = nondet_uint32();
     out->end_q57 = nondet_int64();
     assume(out->end_q57 == to_q57 || out->end_q57 < OVERRIDE_ONE);
@@ -74,9 +87,9 @@ void some_window(struct override_window *w, const struct program_clock *clock, u
 {
     (void)clock;
     prove(window < OVERRIDE_WINDOWS);
-    w->own.factor_q14 = (uint16_t)nondet_uint32();
-    assume(IS_FACTOR(w->own.factor_q14));
-    w->bounds = &w->own;
+    ahead.factor_q14 = (uint16_t)nondet_uint32();
+    assume(IS_FACTOR(ahead.factor_q14));
+    w->bounds = &ahead;
     w->end_q32_s = nondet_uint64();
 }
 
@@ -127,6 +140,11 @@ static int search_is_sound(const struct override_plan *plan)
     if (plan->step >= OVERRIDE_STAGES &&
         ((climbs && plan->target_q57 <= plan->guaranteed_q57 + OVERRIDE_SPARE) ||
          !IS_OVERRIDE(plan->target_q57))) {
+        return 0;
+    }
+    if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY &&
+        !(IS_CHANGE(&plan->change) && plan->change.from_q57 == next_rest(plan) &&
+          plan->change.to_q57 == plan->target_q57)) {
         return 0;
     }
     if (plan->step >= OVERRIDE_MEASURES &&
@@ -180,8 +198,9 @@ static void any_plan(struct override_plan *plan, struct way *way)
 {
     assume(IS_FACTOR(plan->guaranteed.factor_q14));
     plan->guaranteed_q57 = (int64_t)plan->guaranteed.factor_q14 << 43;
-    assume(IS_FACTOR(plan->ahead.own.factor_q14));
-    plan->ahead.bounds = nondet_uint32() != 0 ? &plan->ahead.own : &plan->guaranteed;
+    ahead.factor_q14 = (uint16_t)nondet_uint32();
+    assume(IS_FACTOR(ahead.factor_q14));
+    plan->ahead.bounds = nondet_uint32() != 0 ? &ahead : &plan->guaranteed;
     assume(IS_OVERRIDE(plan->commanded_q57));
     assume(IS_OVERRIDE(plan->now.override_q57));
     way->slope = any_between(-OVERRIDE_MOST, OVERRIDE_MOST);

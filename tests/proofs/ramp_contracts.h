@@ -17,6 +17,9 @@
 #define IS_TICKS(t)   (1 <= (t)->rise && (t)->rise <= (t)->half && (t)->half <= MOST_HALF)
 #define IS_LIMITS(p)                                                                                 \
     ((p)->turns >= 1 && (p)->inverse_slope <= 0x80000001 && (p)->inverse_root <= 0x80040000)
+#define IS_CHANGE(c)                                                                                 \
+    (IS_OVERRIDE((c)->from_q57) && IS_OVERRIDE((c)->to_q57) && (c)->first < PROGRAM_LEVELS &&        \
+     (c)->last < PROGRAM_LEVELS)
 #define IS_STAGE(s) (IS_OVERRIDE((s)->end_q57) && (s)->level < PROGRAM_LEVELS)
 
 #if defined(__FRAMAC__)

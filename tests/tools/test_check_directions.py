@@ -11,20 +11,20 @@ import check_directions
 
 GOOD = {
     "firmware/can/can_frame.h": "#include <stdint.h>\n",
-    "firmware/core/interp.h": '#include "core/program.h"\n',
+    "firmware/core/interpolator.h": '#include "core/program.h"\n',
     "firmware/core/program.h": "#include <stdint.h>\n",
     "firmware/port/port.h": '#include "can/can_frame.h"\n',
     "firmware/port/linux/main.c": '#include "port/port.h"\n#include "port/linux/own.h"\n',
     "firmware/port/linux/own.h": "#include <poll.h>\n",
-    "firmware/app/tick.c": '#include "core/interp.h"\n#include "od_controller.h"\n',
+    "firmware/app/tick.c": '#include "core/interpolator.h"\n#include "od_controller.h"\n',
     "sim/plant/drive.h": "\n",
-    "sim/offline/offline.c": '#include "plant/drive.h"\n#include "core/interp.h"\n',
+    "sim/offline/offline.c": '#include "plant/drive.h"\n#include "core/interpolator.h"\n',
     "host_tools/hodograph/__init__.py": "",
     "host_tools/hodograph/errors.py": "",
     "host_tools/hodograph/spline/__init__.py": "from .curve import Curve\n",
     "host_tools/hodograph/spline/curve.py": "from ..errors import E\n",
     "host_tools/hodograph/feed/__init__.py": "import numpy\n",
-    "host_tools/hodograph/native/build_native.py": 'H = ("core/interp.h", "offline/offline.h")\n',
+    "host_tools/hodograph/native/build_native.py": 'H = ("core/interpolator.h", "offline/offline.h")\n',
 }
 
 
@@ -48,7 +48,11 @@ def test_a_good_tree_has_no_breach(tmp_path: Path) -> None:
         ("firmware/app/x.c", '#include "port/linux/own.h"\n', "may not use firmware/port/linux"),
         ("firmware/port/board/x.c", '#include "port/linux/own.h"\n', "firmware/port/* may not use"),
         ("firmware/port/linux/x.c", '#include "app/tick.h"\n', "firmware/port/* may not use"),
-        ("sim/plant/x.c", '#include "core/interp.h"\n', "sim/plant may not use firmware/core"),
+        (
+            "sim/plant/x.c",
+            '#include "core/interpolator.h"\n',
+            "sim/plant may not use firmware/core",
+        ),
         ("sim/offline/x.c", '#include "nowhere.h"\n', "is neither ours nor generated"),
         ("firmware/new/x.c", "", "x.c:1: this folder has no row"),
         ("host_tools/hodograph/spline/x.py", "import os\nfrom ..feed import y\n", "x.py:2: spline"),
@@ -72,14 +76,17 @@ def test_circles_are_found(tmp_path: Path) -> None:
     found = tree(
         tmp_path,
         {
-            "firmware/core/program.h": '#include "core/interp.h"\n',
+            "firmware/core/program.h": '#include "core/interpolator.h"\n',
             "host_tools/hodograph/spline/a.py": "from . import b\n",
             "host_tools/hodograph/spline/b.py": "from .a import x\n",
         },
     )
     assert len(found) == 2
     assert all("circle: " in breach for breach in found)
-    assert "firmware/core/interp.h -> firmware/core/program.h -> firmware/core/interp.h" in found[0]
+    assert (
+        "firmware/core/interpolator.h -> firmware/core/program.h -> firmware/core/interpolator.h"
+        in found[0]
+    )
 
 
 def test_this_tree_has_none() -> None:

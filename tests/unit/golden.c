@@ -55,6 +55,24 @@ void golden_close(struct program *p)
     p->image = NULL;
 }
 
+void golden_prepare(struct golden_prepared *out, const struct program *p, enum kernel_number kernel)
+{
+    const struct kernel *made_for = kernel_find((uint32_t)kernel);
+    const uint64_t size = coefficients_size(p, made_for);
+    out->program = *p;
+    out->records = malloc((size_t)size);
+    if (out->records == NULL ||
+        coefficients_make_in(&out->program, made_for, out->records, size) != 0) {
+        abort();
+    }
+}
+
+void golden_discard(struct golden_prepared *prepared)
+{
+    free(prepared->records);
+    prepared->records = NULL;
+}
+
 uint64_t golden_random(uint64_t *state)
 {
     uint64_t z = *state += 0x9E3779B97F4A7C15u;

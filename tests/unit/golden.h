@@ -3,6 +3,7 @@
 #ifndef HODOGRAPH_TESTS_GOLDEN_H
 #define HODOGRAPH_TESTS_GOLDEN_H
 
+#include "core/coefficients.h"
 #include "core/program_check.h"
 
 /* An image on the heap, exactly as long as the file, so that the sanitizer sees any read beyond it. NULL when
@@ -18,6 +19,18 @@ struct program_limits golden_no_limits(void);
 /* Loads and opens; fails the test when that does not work. Free p->image with golden_close. */
 void golden_open(struct program *p, const char *name);
 void golden_close(struct program *p);
+
+/* A program with coefficient records on the heap. */
+struct golden_prepared {
+    struct program program;
+    void *records;
+};
+
+/* A copy of an opened program, with records for a kernel; ends the process when there is no memory. The image has to stay.
+ * Free with golden_discard. */
+void golden_prepare(struct golden_prepared *out, const struct program *p,
+                    enum kernel_number kernel);
+void golden_discard(struct golden_prepared *prepared);
 
 /* Seeded 64-bit generator (splitmix64), for tests with random cases. */
 uint64_t golden_random(uint64_t *state);

@@ -5,11 +5,12 @@
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 #include "core/counts.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 
 #include "app_bench.h"
 #include "app_image.h"
 #include "fake_port.h"
+#include "golden.h"
 #include "unity.h"
 
 #define X_COUNTS 10000000
@@ -204,16 +205,19 @@ static void test_setpoints_are_those_of_the_interpolator(void)
     const uint32_t ticks = app_bench_until(&bench, MACHINE_READY, 2000);
     TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS + MACHINE_SETTLE_TICKS, ticks);
     struct program program;
-    struct interp interp;
-    struct interp_point point;
+    struct golden_prepared prepared;
+    struct interpolator interp;
+    struct interpolator_point point;
     TEST_ASSERT_EQUAL_INT(0, program_open(&program, image, sizeof image));
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &program, INTERP_FIXED));
+    golden_prepare(&prepared, &program, KERNEL_FIXED);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &prepared.program));
     for (uint32_t k = 0; k < APP_IMAGE_TICKS; ++k) {
         const uint64_t time_q42_s = ((uint64_t)k * 4398046511104u + 500u) / 1000u;
-        TEST_ASSERT_TRUE(interp_at_q42(&interp, time_q42_s, &point) >= 0);
+        TEST_ASSERT_TRUE(interpolator_at_q42(&interp, time_q42_s, &point) >= 0);
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.x_q40_mm, 1000000), bench.targets[0][k]);
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.y_q40_mm, 1000000), bench.targets[1][k]);
     }
+    golden_discard(&prepared);
     TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, bench.drives[0].position_counts);
     TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS - 1u, app_bench_read(&bench, 0x2008, 2));
     TEST_ASSERT_EQUAL_UINT32(0, app_bench_read(&bench, 0x2008, 6));

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* A program with coefficient records gives the bits of one without, at any rate and in any order of times. */
+/* Coefficient records give the bits that the image gives expanded at the place, in any order of times. */
 #include "core/coefficients.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/override_plan.h"
+#include "core/ph_segment.h"
 #include "golden.h"
 #include "unity.h"
 
@@ -44,7 +45,7 @@ static int append(void *context, const uint8_t *bytes, uint32_t size)
     return 0;
 }
 
-static void begin(const char *name, enum interp_kernel kernel)
+static void begin(const char *name, enum kernel_number kernel)
 {
     golden_open(&plain, name);
     const struct kernel *made_for = kernel_find((uint32_t)kernel);
@@ -63,42 +64,65 @@ static void end(void)
     golden_close(&plain);
 }
 
-static void same(struct interp *a, struct interp *b, uint64_t time_q42_s)
+/* The point as the image has it: its piece and its segment are looked for from the first on and expanded. */
+static void expand(struct interpolator_point *out, const struct kernel *kernel, uint64_t time_q42_s)
 {
-    struct interp_point p, q;
-    memset(&p, 0, sizeof p);
-    memset(&q, 0, sizeof q);
-    TEST_ASSERT_EQUAL_INT(interp_at_q42(a, time_q42_s, &p), interp_at_q42(b, time_q42_s, &q));
+    struct coefficients_piece piece;
+    struct coefficients_segment segment;
+    struct program_piece from;
+    struct program_segment g;
+    struct ph_segment ph;
+    struct feed_point f;
+    int64_t point[2];
+    uint64_t start_q42_s = 0;
+    uint32_t i = 0;
+    for (program_piece_get(&plain, 0, &from); time_q42_s - start_q42_s >= from.duration_q32_s << 10;
+         program_piece_get(&plain, ++i, &from)) {
+        start_q42_s += from.duration_q32_s << 10;
+    }
+    kernel->piece_set(&piece.feed, &from);
+    kernel->piece_at(&piece.feed, &f, time_q42_s - start_q42_s);
+    const int64_t least = f.arc_length_q40_mm < 0 ? 0 : f.arc_length_q40_mm;
+    const int64_t arc = least > plain.header.length_q40_mm ? plain.header.length_q40_mm : least;
+    for (i = plain.header.segment_count - 1u; i > 0 && program_segment_start(&plain, i) > arc;
+         i--) {
+    }
+    program_segment_get(&plain, i, &g);
+    ph_segment_expand(&ph, &g);
+    kernel->segment_set(&segment.path, &ph);
+    kernel->segment_at(&segment.path, point, arc);
+    *out = (struct interpolator_point){arc, point[0], point[1], f.feed_q32_mm_s};
+}
+
+static void is_as_expanded(struct interpolator *it, uint64_t time_q42_s)
+{
+    struct interpolator_point p, q;
+    TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at_q42(it, time_q42_s, &p));
+    expand(&q, it->kernel, time_q42_s);
     TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
 }
 
 static void run(void)
 {
     const uint64_t period = (uint64_t)plain.header.period_us * 4398046u;
-    const uint64_t duration = plain.header.duration_q32_s << 10 | 1u;
-    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        struct interp a, b;
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &plain, (enum interp_kernel)kernel));
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready, (enum interp_kernel)kernel));
-        for (uint64_t time = 0; time < duration; time += golden_random(&seed) % (2u * period)) {
-            same(&a, &b, time);
-        }
-        same(&a, &b, duration);
-        for (int i = 0; i < 300; i++) {
-            const uint64_t time = golden_random(&seed) % duration;
-            interp_seek(&a, time >> 10);
-            interp_seek(&b, time >> 10);
-            same(&a, &b, time);
-        }
-        same(&a, &b, golden_random(&seed) % duration); /* mostly a jump: both refuse */
+    const uint64_t duration = plain.header.duration_q32_s << 10;
+    struct interpolator it;
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &ready));
+    for (uint64_t time = 0; time < duration; time += 1u + golden_random(&seed) % (2u * period)) {
+        is_as_expanded(&it, time);
+    }
+    for (int i = 0; i < 300 && duration > 0; i++) {
+        const uint64_t time = golden_random(&seed) % duration;
+        interpolator_seek(&it, time >> 10);
+        is_as_expanded(&it, time);
     }
 }
 
 static void test_same_bits_as_expanded(void)
 {
     for (size_t i = 0; i < NAMES; i++) {
-        for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-            begin(names[i], (enum interp_kernel)kernel); /* the others go without */
+        for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
+            begin(names[i], (enum kernel_number)kernel);
             run();
             end();
         }
@@ -111,20 +135,20 @@ static void test_the_piece_of_the_clock_is_the_one(void)
     for (size_t i = 0; i < NAMES; i++) {
         struct program_clock clock;
         struct override_plan plan;
-        struct interp a, b;
-        struct interp_point p, q;
-        begin(names[i], INTERP_FIXED);
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&a, &plain, INTERP_FIXED));
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&b, &ready, INTERP_FIXED));
+        struct interpolator a, b;
+        struct interpolator_point p, q;
+        begin(names[i], KERNEL_FIXED);
+        TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&a, &ready));
+        TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&b, &ready));
         program_clock_begin(&clock, &ready, ready.header.period_us, 0);
         override_plan_begin(&plan, &ready);
         override_plan_set(&plan, 200);
-        for (int result = INTERP_OK; result == INTERP_OK;) {
+        for (int result = INTERPOLATOR_OK; result == INTERPOLATOR_OK;) {
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
             memset(&p, 0, sizeof p);
             memset(&q, 0, sizeof q);
-            result = interp_at_q42(&a, time_q42_s, &p);
-            TEST_ASSERT_EQUAL_INT(result, interp_at_piece(&b, clock.record, time_q42_s, &q));
+            result = interpolator_at_q42(&a, time_q42_s, &p);
+            TEST_ASSERT_EQUAL_INT(result, interpolator_at_piece(&b, clock.record, time_q42_s, &q));
             TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);
         }
         TEST_ASSERT_EQUAL_UINT64(clock.duration_q42_s, clock.time_q42_s);
@@ -138,30 +162,29 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
     for (uint64_t ends = 2; ends <= 3; ends++) {
         struct program_clock clock;
         struct override_plan plan;
-        struct interp it;
-        struct interp_point point, before;
-        begin("alpha_exponential.hdgp", INTERP_FIXED);
+        struct interpolator it;
+        struct interpolator_point point, before;
+        begin("alpha_exponential.hdgp", KERNEL_FIXED);
         const uint64_t tick_q32_s = (uint64_t)ready.header.period_us * 4294967296u / 1000000u;
         struct coefficients_piece *piece = (void *)records.bytes;
         for (uint64_t k = 1; k <= ends; k++) { /* all between the second tick and the third */
-            const uint64_t end_q32_s = tick_q32_s + tick_q32_s * k / (ends + 1u);
-            piece->end_q32_s = end_q32_s;
+            const uint64_t end_q42_s = (tick_q32_s + tick_q32_s * k / (ends + 1u)) << 10;
+            piece->end_q42_s = end_q42_s;
             piece = (void *)((uint8_t *)piece + coefficients_piece_size(ready.coefficients_for));
-            piece->start_q32_s = end_q32_s;
+            piece->start_q42_s = end_q42_s;
         }
-        TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, &ready, INTERP_FIXED));
+        TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &ready));
         program_clock_begin(&clock, &ready, ready.header.period_us, 0);
         override_plan_begin(&plan, &ready);
-        clock.piece_end_q42_s = clock.record->end_q32_s << 10; /* as if from the image */
         for (int k = 0; k < 2; k++) {
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
-            TEST_ASSERT_EQUAL_INT(INTERP_OK,
-                                  interp_at_piece(&it, clock.record, time_q42_s, &point));
+            TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK,
+                                  interpolator_at_piece(&it, clock.record, time_q42_s, &point));
         }
         memcpy(&before, &point, sizeof point);
         const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
-        const int result = interp_at_piece(&it, clock.record, time_q42_s, &point);
-        TEST_ASSERT_EQUAL_INT(ends == 2 ? INTERP_OK : INTERP_ERR_JUMP, result);
+        const int result = interpolator_at_piece(&it, clock.record, time_q42_s, &point);
+        TEST_ASSERT_EQUAL_INT(ends == 2 ? INTERPOLATOR_OK : INTERPOLATOR_ERR_JUMP, result);
         TEST_ASSERT_EQUAL_INT(ends == 2 ? 1 : 0, memcmp(&before, &point, sizeof point) != 0);
         end();
     }
@@ -169,8 +192,8 @@ static void test_a_tick_that_crosses_three_ends_is_refused(void)
 
 static void test_windows_hold_the_least_of_their_pieces(void)
 {
-    const struct kernel *fixed = kernel_find(INTERP_FIXED);
-    begin("alpha_exponential.hdgp", INTERP_FIXED);
+    const struct kernel *fixed = kernel_find(KERNEL_FIXED);
+    begin("alpha_exponential.hdgp", KERNEL_FIXED);
     for (uint32_t i = 0; i < plain.header.piece_count; i++) {
         const struct coefficients_piece *piece = coefficients_piece_at(&ready, fixed, i);
         for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
@@ -193,36 +216,57 @@ static void test_windows_hold_the_least_of_their_pieces(void)
     end();
 }
 
-/* The override too, whatever is commanded. */
-static void test_same_override_as_without_records(void)
+/* The end of a window is that of its last piece; with the program's last piece there is none. */
+static void test_windows_end_with_their_pieces(void)
 {
-    static struct program_clock a, b;
-    static struct override_plan c, d;
-    begin("alpha_exponential.hdgp", INTERP_FIXED);
-    for (int n = 0; n < 100; n++) {
-        program_clock_begin(&a, &plain, plain.header.period_us, 0);
-        program_clock_begin(&b, &ready, plain.header.period_us, 0);
-        override_plan_begin(&c, &plain);
-        override_plan_begin(&d, &ready);
-        for (int k = 0; k < 3000; k++) {
-            if (golden_random(&seed) % 64u == 0) {
-                const uint32_t percent = (uint32_t)(golden_random(&seed) % 201u);
-                override_plan_set(&c, percent);
-                override_plan_set(&d, percent);
+    struct program_clock clock;
+    uint64_t start_q32_s = 0;
+    begin("alpha_exponential.hdgp", KERNEL_FIXED);
+    for (uint32_t i = 0; i < plain.header.piece_count; i++) {
+        program_clock_begin(&clock, &ready, ready.header.period_us, start_q32_s << 10);
+        TEST_ASSERT_EQUAL_UINT32(i, clock.piece);
+        for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
+            struct override_window w;
+            uint64_t end_q32_s = start_q32_s;
+            const uint32_t behind = i + (1u << k);
+            for (uint32_t j = i; j < behind && j < plain.header.piece_count; j++) {
+                end_q32_s += program_piece_duration(&plain, j);
             }
-            TEST_ASSERT_TRUE(override_plan_tick(&c, &a) == override_plan_tick(&d, &b));
+            override_window_get(&w, &clock, k);
+            TEST_ASSERT_EQUAL_UINT64(behind < plain.header.piece_count ? end_q32_s : UINT64_MAX,
+                                     w.end_q32_s);
         }
+        start_q32_s += program_piece_duration(&plain, i);
     }
+    end();
+}
+
+/* In memory: the same records, or a refusal where there is a byte too little. */
+static void test_records_in_memory(void)
+{
+    struct program own;
+    begin("alpha_offset.hdgp", KERNEL_FLOAT);
+    const struct kernel *kernel = kernel_find(KERNEL_FLOAT);
+    uint8_t *memory = malloc(records.used);
+    own = plain;
+    TEST_ASSERT_EQUAL_INT(COEFFICIENTS_ERR_SIZE,
+                          coefficients_make_in(&own, kernel, memory, records.used - 1u));
+    TEST_ASSERT_NULL(own.coefficients);
+    TEST_ASSERT_EQUAL_INT(0, coefficients_make_in(&own, kernel, memory, records.used));
+    TEST_ASSERT_EQUAL_PTR(kernel, own.coefficients_for);
+    TEST_ASSERT_EQUAL_PTR(memory, own.coefficients);
+    TEST_ASSERT_EQUAL_MEMORY(records.bytes, memory, records.used);
+    free(memory);
     end();
 }
 
 static void test_an_error_of_the_sink_is_passed_on(void)
 {
-    begin("alpha_offset.hdgp", INTERP_FIXED);
+    begin("alpha_offset.hdgp", KERNEL_FIXED);
     for (uint32_t room = 0; room < records.used; room += 57u) {
         struct buffer small = {records.bytes, 0, room};
         TEST_ASSERT_EQUAL_INT(-7,
-                              coefficients_make(&plain, kernel_find(INTERP_FIXED), append, &small));
+                              coefficients_make(&plain, kernel_find(KERNEL_FIXED), append, &small));
     }
     end();
 }
@@ -234,7 +278,8 @@ int main(void)
     RUN_TEST(test_the_piece_of_the_clock_is_the_one);
     RUN_TEST(test_a_tick_that_crosses_three_ends_is_refused);
     RUN_TEST(test_windows_hold_the_least_of_their_pieces);
-    RUN_TEST(test_same_override_as_without_records);
+    RUN_TEST(test_windows_end_with_their_pieces);
+    RUN_TEST(test_records_in_memory);
     RUN_TEST(test_an_error_of_the_sink_is_passed_on);
     return UNITY_END();
 }

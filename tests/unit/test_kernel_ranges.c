@@ -158,8 +158,8 @@ static int64_t evaluate(const struct program_segment *g)
         int64_t at = i < 0 ? -OUTSIDE : i > 8 ? length + OUTSIDE : length / 8 * i;
         int64_t point[2];
         int64_t exact[2];
-        kernel_fixed_segment_at(&fixed, at, point);
-        kernel_double_segment_at(&doubles, at, exact);
+        kernel_fixed_segment_at(&fixed, point, at);
+        kernel_double_segment_at(&doubles, exact, at);
         for (int axis = 0; axis < 2 && i >= 0 && i <= 8; axis++) {
             int64_t off = point[axis] - exact[axis];
             worst = off > worst ? off : -off > worst ? -off : worst;
@@ -237,8 +237,8 @@ static void test_feed_with_a_full_slope_does_not_overflow(void)
         feed_piece_set(&feed, &c);
         uint64_t end = (c.duration_q32_s << 10) - 1u;
         for (uint64_t t = 0; t < 5; t++) {
-            feed_piece_at(&feed, end - t * t * t, &at);
-            feed_piece_at(&feed, end / 5u * t, &at);
+            feed_piece_at(&feed, &at, end - t * t * t);
+            feed_piece_at(&feed, &at, end / 5u * t);
         }
         TEST_ASSERT_TRUE(sign * at.feed_q32_mm_s >= -64);
     }
@@ -258,7 +258,7 @@ static void test_feed_slopes_rounded_away_from_zero_do_not_overflow(void)
         c.c_q40_mm[0] -= (int64_t)INT32_MAX << (shift - 4);
         c.duration_q32_s = (uint64_t)1 << 40;
         feed_piece_set(&feed, &c);
-        feed_piece_at(&feed, (c.duration_q32_s << 10) - 1u, &at);
+        feed_piece_at(&feed, &at, (c.duration_q32_s << 10) - 1u);
         TEST_ASSERT_TRUE(at.feed_q32_mm_s < 0);
     }
 }

@@ -96,9 +96,9 @@ static void compare_at(int64_t arc_q40)
     int64_t a[2];
     int64_t b[2];
     int64_t c[2];
-    kernel_fixed_segment_at(&fixed, arc_q40, a);
-    kernel_float_segment_at(&floats, arc_q40, b);
-    kernel_double_segment_at(&doubles, arc_q40, c);
+    kernel_fixed_segment_at(&fixed, a, arc_q40);
+    kernel_float_segment_at(&floats, b, arc_q40);
+    kernel_double_segment_at(&doubles, c, arc_q40);
     TEST_ASSERT_LESS_OR_EQUAL_INT64(8, worst_of(a, c));                /* 2^-37 mm */
     TEST_ASSERT_LESS_OR_EQUAL_INT64((int64_t)1 << 22, worst_of(b, c)); /* 2^-18 mm = 3.8 nm */
 }
@@ -144,7 +144,7 @@ static uint32_t add_path_bits(uint32_t crc)
     kernel_fixed_segment_set(&fixed, &ph);
     int64_t length_q40 = 2 * ph.c_q48_mm[PH_S][0] >> 8;
     for (int k = 0; k <= POINTS; k++) {
-        kernel_fixed_segment_at(&fixed, g.start_q40_mm + length_q40 / POINTS * k, point);
+        kernel_fixed_segment_at(&fixed, point, g.start_q40_mm + length_q40 / POINTS * k);
         crc = add_to_crc(add_to_crc(crc, point[0]), point[1]);
     }
     return crc;
@@ -160,7 +160,7 @@ static uint32_t add_feed_bits(uint32_t crc)
     }
     feed_piece_set(&feed, &piece);
     for (uint64_t k = 0; k < POINTS; k++) {
-        feed_piece_at(&feed, (piece.duration_q32_s << 10) / POINTS * k, &point);
+        feed_piece_at(&feed, &point, (piece.duration_q32_s << 10) / POINTS * k);
         crc = add_to_crc(add_to_crc(crc, point.arc_length_q40_mm), point.feed_q32_mm_s);
     }
     return crc;
@@ -193,10 +193,10 @@ static void test_ends_are_met(void)
             continue;
         }
         kernel_fixed_segment_set(&fixed, &ph);
-        kernel_fixed_segment_at(&fixed, g.start_q40_mm, a);
+        kernel_fixed_segment_at(&fixed, a, g.start_q40_mm);
         TEST_ASSERT_INT64_WITHIN(4, g.x_q40_mm, a[0]);
         TEST_ASSERT_INT64_WITHIN(4, g.y_q40_mm, a[1]);
-        kernel_fixed_segment_at(&fixed, g.start_q40_mm + qmath_round(end_q48[PH_S], 8), a);
+        kernel_fixed_segment_at(&fixed, a, g.start_q40_mm + qmath_round(end_q48[PH_S], 8));
         TEST_ASSERT_INT64_WITHIN(4, g.x_q40_mm + qmath_round(end_q48[PH_X], 8), a[0]);
         TEST_ASSERT_INT64_WITHIN(4, g.y_q40_mm + qmath_round(end_q48[PH_Y], 8), a[1]);
     }
@@ -228,11 +228,11 @@ static void test_absurd_feeds_are_held(void)
     struct feed_point point;
     for (int sign = 1; sign >= -1; sign -= 2) {
         feed_piece_set(&integers, &piece);
-        feed_piece_at(&integers, 0, &point);
+        feed_piece_at(&integers, &point, 0);
         TEST_ASSERT_TRUE(sign * point.feed_q32_mm_s > most / 4 &&
                          sign * point.feed_q32_mm_s < most);
         kernel_double_piece_set(&exact, &piece);
-        kernel_double_piece_at(&exact, 0, &point);
+        kernel_double_piece_at(&exact, &point, 0);
         TEST_ASSERT_EQUAL_INT64(sign * most, point.feed_q32_mm_s);
         piece.c_q40_mm[0] = -piece.c_q40_mm[0];
     }

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "core/feed_override.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/program_time.h"
 #include "golden.h"
 #include "override_program.h"
@@ -35,13 +35,14 @@ enum phase { PLAN, BRAKE, REST }; /* of feed_override.c */
 
 static struct override_program bank[4][LINES];
 static struct override_program goldens[GOLDENS];
+static struct golden_prepared fixed, exact; /* the program that runs, for two kernels */
 
 static struct {
     const struct override_program *p;
     struct feed_override feed;
-    struct interp interp;
-    struct interp exact;
-    struct interp_point point;
+    struct interpolator interp;
+    struct interpolator exact;
+    struct interpolator_point point;
     double h;
     enum wish wish;
     int fault;         /* a fault stop was asked for */
@@ -230,13 +231,11 @@ static void check_point(void)
                 400);
         at_most("on the line", fabs((double)now.point.y_q40_mm), 0);
     } else if (now.ticks % 16u == 0 || now.feed.state == FEED_ENDED) {
-        struct interp_point exact;
-        interp_seek(&now.exact, now.time_q42 >> 10);
-        while (interp_at_arc_length(&now.exact, now.point.arc_length_q40_mm, &exact) < 0) {
-            TEST_ASSERT_TRUE(now.exact.segment_index < now.p->program.header.segment_count);
-            (void)interp_at_arc_length(
-                &now.exact, program_segment_start(&now.p->program, now.exact.segment_index + 1u),
-                &exact);
+        struct interpolator_point exact;
+        interpolator_seek(&now.exact, now.time_q42 >> 10);
+        while (interpolator_at_arc_length(&now.exact, now.point.arc_length_q40_mm, &exact) < 0) {
+            TEST_ASSERT_TRUE(now.exact.segment->to_q40_mm != INT64_MAX);
+            (void)interpolator_at_arc_length(&now.exact, now.exact.segment->to_q40_mm, &exact);
         }
         at_most("on the curve",
                 hypot((double)(exact.x_q40_mm - now.point.x_q40_mm),
@@ -368,10 +367,16 @@ static void begin(struct override_program *p, int line, uint32_t period_us, uint
     now.h = period_us * 1e-6;
     now.percent = 100;
     override_program_limits(p, random);
-    interp_begin(&now.interp, &p->program, INTERP_FIXED);
-    interp_begin(&now.exact, &p->program, INTERP_DOUBLE);
-    feed_override_begin(&now.feed, &p->program, period_us, from);
-    interp_seek(&now.interp, from >> 10);
+    golden_discard(&fixed);
+    golden_prepare(&fixed, &p->program, KERNEL_FIXED);
+    interpolator_begin(&now.interp, &fixed.program);
+    if (!line) {
+        golden_discard(&exact);
+        golden_prepare(&exact, &p->program, KERNEL_DOUBLE);
+        interpolator_begin(&now.exact, &exact.program);
+    }
+    feed_override_begin(&now.feed, &fixed.program, period_us, from);
+    interpolator_seek(&now.interp, from >> 10);
     if (from > 0 && golden_random(random) % 2u == 0) {
         now.feed.plan.now.override_q57 = OVERRIDE_ONE;
     }
@@ -423,7 +428,7 @@ static void run_to_the_end(void)
 static void check_over(void)
 {
     int ended = now.feed.state == FEED_ENDED;
-    const struct interp_point before = now.point;
+    const struct interpolator_point before = now.point;
     for (int i = 0; i < 4; i++) {
         tick();
     }
@@ -516,6 +521,8 @@ static void test_any_commands_at_any_instant(void)
     for (unsigned i = 0; i < GOLDENS; i++) {
         override_program_close(&goldens[i]);
     }
+    golden_discard(&fixed);
+    golden_discard(&exact);
 }
 
 int main(void)

@@ -7,6 +7,7 @@
 #include "unity.h"
 
 static struct program p;
+static struct golden_prepared prepared; /* the same with coefficient records */
 static struct program_clock clock;
 static struct override_plan plan;
 
@@ -17,13 +18,16 @@ void setUp(void)
 
 void tearDown(void)
 {
+    golden_discard(&prepared);
     golden_close(&p);
 }
 
 static void begin_at(uint32_t period_us, uint64_t time_q42_s)
 {
-    program_clock_begin(&clock, &p, period_us, time_q42_s);
-    override_plan_begin(&plan, &p);
+    golden_discard(&prepared);
+    golden_prepare(&prepared, &p, KERNEL_FIXED);
+    program_clock_begin(&clock, &prepared.program, period_us, time_q42_s);
+    override_plan_begin(&plan, &prepared.program);
 }
 
 static uint64_t step(void)
@@ -251,8 +255,7 @@ static void test_rest(void)
 {
     begin_at(1000, 0);
     steps(300);
-    program_clock_set(&clock, clock.time_q42_s, clock.piece, clock.record,
-                      clock.piece_end_q42_s >> 10);
+    program_clock_set(&clock, clock.time_q42_s, clock.piece, clock.record);
     override_plan_rest(&plan);
     TEST_ASSERT_EQUAL_UINT32(0, override_q30());
     (void)step();

@@ -208,6 +208,14 @@ static double level_rate(uint32_t level)
     return level == PROGRAM_LEVEL_FULL ? 2.0 : program_level_q9(level) / 512.0;
 }
 
+static void stage_of(struct ramp_stage *out, const struct program_override *bounds,
+                     int64_t from_q57, int64_t to_q57)
+{
+    struct ramp_change change;
+    override_change_of(&change, from_q57, to_q57);
+    override_stage_of(out, bounds, &change);
+}
+
 /* Each stage goes towards the end, within the level whose bounds it takes, and few of them come there. */
 static void test_stages(void)
 {
@@ -218,7 +226,7 @@ static void test_stages(void)
         uint32_t stages = 0;
         while (at != to) {
             struct ramp_stage stage;
-            override_stage_of(&stage, &bounds, at, to);
+            stage_of(&stage, &bounds, at, to);
             TEST_ASSERT_TRUE(at < to ? stage.end_q57 > at && stage.end_q57 <= to
                                      : stage.end_q57 < at && stage.end_q57 >= to);
             TEST_ASSERT_TRUE(stage.end_q57 == to || stage.end_q57 < OVERRIDE_ONE);
@@ -237,16 +245,16 @@ static void test_levels_that_are_alike_are_one(void)
     struct ramp_stage stage;
     memset(bounds.rate, 150, sizeof bounds.rate);
     memset(bounds.second, 120, sizeof bounds.second);
-    override_stage_of(&stage, &bounds, 0, OVERRIDE_ONE);
+    stage_of(&stage, &bounds, 0, OVERRIDE_ONE);
     TEST_ASSERT_EQUAL_INT64(OVERRIDE_ONE, stage.end_q57);
     TEST_ASSERT_EQUAL_UINT32(PROGRAM_LEVEL_FULL, stage.level);
-    override_stage_of(&stage, &bounds, OVERRIDE_ONE, 0);
+    stage_of(&stage, &bounds, OVERRIDE_ONE, 0);
     TEST_ASSERT_EQUAL_INT64(0, stage.end_q57);
     bounds.rate[PROGRAM_LEVEL_FULL] = 100;
-    override_stage_of(&stage, &bounds, 0, OVERRIDE_ONE);
+    stage_of(&stage, &bounds, 0, OVERRIDE_ONE);
     TEST_ASSERT_EQUAL_INT64((int64_t)511 << 48, stage.end_q57);
     TEST_ASSERT_EQUAL_UINT32(PROGRAM_LEVEL_FULL - 1u, stage.level);
-    override_stage_of(&stage, &bounds, OVERRIDE_ONE, 0);
+    stage_of(&stage, &bounds, OVERRIDE_ONE, 0);
     TEST_ASSERT_EQUAL_INT64(((int64_t)511 << 48) - OVERRIDE_SPARE, stage.end_q57);
 }
 

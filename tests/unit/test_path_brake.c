@@ -146,11 +146,85 @@ static void test_of_a_book(void)
     struct path_brake brake;
     int ticks = 0;
     TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &numbers));
-    for (; !path_brake_rests(&brake); ticks++) {
+    for (; !path_brake_rests(&brake) && ticks < 100; ticks++) {
         path_brake_step(&brake);
     }
     TEST_ASSERT_INT_WITHIN(2, 71, ticks);
     TEST_ASSERT_DOUBLE_WITHIN(0.06, 3.5, (double)way_from(&from, &brake.at) / Q40);
+}
+
+/* The first step changes the acceleration by this; sixths are rounded, so up to 6 units less. */
+static void expect_first_step(int64_t acceleration_q56, int64_t change_q56)
+{
+    const struct path_brake_numbers n = {(int64_t)1 << 40, (int64_t)1 << 44, (int64_t)1 << 40};
+    const struct path_state from = {.speed_q56 = (int64_t)1 << 50,
+                                    .acceleration_q56 = acceleration_q56};
+    struct path_brake brake;
+    TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &n));
+    path_brake_step(&brake);
+    TEST_ASSERT_INT64_WITHIN((uint64_t)(6 + (labs(change_q56) >> 30)),
+                             acceleration_q56 + change_q56, brake.at.acceleration_q56);
+}
+
+/* Towards the deceleration, from above it and from below, and not beyond it. */
+static void test_acceleration_goes_to_the_deceleration(void)
+{
+    const int64_t jerk = (int64_t)1 << 40;
+    const int64_t most = (int64_t)1 << 44;
+    expect_first_step(0, -jerk);
+    expect_first_step(3 * jerk, -jerk);
+    expect_first_step(-most + jerk / 2, -jerk / 2);
+    expect_first_step(-most, 0);
+    expect_first_step(-most - jerk / 2, jerk / 2);
+    expect_first_step(-most - 5 * jerk, jerk);
+}
+
+/* A state from which the way to rest just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration as it
+ * is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise before
+ * the way to rest. */
+static void test_no_rise_before_the_way_to_rest(void)
+{
+    const int64_t jerk = (int64_t)1 << 34;
+    const int64_t fall = (int64_t)1 << 44;
+    const struct path_brake_numbers n = {jerk, 2 * fall, jerk};
+    const int64_t speed = ((int64_t)1 << 53) + 3 * fall;
+    const struct path_state from = {.speed_q56 = speed + (speed >> 26), .acceleration_q56 = -fall};
+    struct path_brake brake;
+    TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &n));
+    path_brake_step(&brake);
+    TEST_ASSERT_EQUAL_INT64(-fall, brake.at.acceleration_q56);
+    TEST_ASSERT_EQUAL_INT64(from.speed_q56 - fall, brake.at.speed_q56);
+    path_brake_step(&brake);
+    TEST_ASSERT_TRUE(brake.at.acceleration_q56 > -fall);
+}
+
+/* A brake whose first tick is in place of a step: with acceleration `a` at its begin. */
+static void expect_first_tick(int64_t a, int64_t change)
+{
+    const struct path_brake_numbers n = {(int64_t)6 << 38, (int64_t)1 << 44, (int64_t)1 << 40};
+    const struct path_state from = {.arc_length_q40_mm = 12345,
+                                    .fine_q56_mm = 54321,
+                                    .speed_q56 = (int64_t)1 << 50,
+                                    .acceleration_q56 = a};
+    struct path_brake brake;
+    TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &n));
+    path_brake_first(&brake);
+    const uint64_t slack = (uint64_t)(6 + (-change >> 30));
+    TEST_ASSERT_INT64_WITHIN(slack, a + change, brake.at.acceleration_q56);
+    TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a + change / 2, brake.at.speed_q56);
+    TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a / 2 + change / 6, way_q56(&from, &brake.at));
+    TEST_ASSERT_FALSE(path_brake_rests(&brake));
+}
+
+/* An acceleration above 0 falls by the first jerk at most, and as far as 0; one below stays. */
+static void test_first_tick(void)
+{
+    const int64_t jerk = (int64_t)6 << 38;
+    expect_first_tick(3 * jerk, -jerk);
+    expect_first_tick(jerk, -jerk);
+    expect_first_tick(jerk / 3, -jerk / 3);
+    expect_first_tick(0, 0);
+    expect_first_tick(-jerk, 0);
 }
 
 /* The state and its numbers in 2^-56 mm and ticks keep what they promise in one tick: a cubic from the state before to the
@@ -298,6 +372,9 @@ int main(void)
     RUN_TEST(test_codes_are_rounded_down);
     RUN_TEST(test_code_0_is_no_brake);
     RUN_TEST(test_of_a_book);
+    RUN_TEST(test_acceleration_goes_to_the_deceleration);
+    RUN_TEST(test_no_rise_before_the_way_to_rest);
+    RUN_TEST(test_first_tick);
     RUN_TEST(test_random_brakes);
     RUN_TEST(test_refused_states);
     RUN_TEST(test_extreme_numbers);

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/override_plan.h"
 #include "golden.h"
 #include "unity.h"
@@ -56,21 +56,20 @@ static void mutate(uint8_t *image, uint32_t size, uint64_t *random)
     }
 }
 
-static void run_accepted(const struct program *p, const struct program_limits *limits,
-                         enum interp_kernel kernel)
+static void run_accepted(const struct program *p, const struct program_limits *limits)
 {
-    static struct interp it;
-    struct interp_point point;
+    static struct interpolator it;
+    struct interpolator_point point;
     uint64_t period = ((uint64_t)p->header.period_us << 42) / 1000000u;
     uint64_t duration = p->header.duration_q32_s << 10;
     uint64_t step = 2 * period;
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, p, kernel));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, p));
     uint64_t most = 300 * step;
     uint64_t from = duration > most ? duration - most : 0;
-    TEST_ASSERT_EQUAL_INT(0, interp_seek(&it, from >> 10));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_seek(&it, from >> 10));
     for (uint64_t t = from; t <= duration + step; t += step) {
-        int result = interp_at_q42(&it, t, &point);
-        TEST_ASSERT_EQUAL_INT(t >= duration ? INTERP_END : INTERP_OK, result);
+        int result = interpolator_at_q42(&it, t, &point);
+        TEST_ASSERT_EQUAL_INT(t >= duration ? INTERPOLATOR_END : INTERPOLATOR_OK, result);
         TEST_ASSERT_TRUE(point.x_q40_mm >= limits->min_q40_mm[0] - (1 << 22));
         TEST_ASSERT_TRUE(point.x_q40_mm <= limits->max_q40_mm[0] + (1 << 22));
         TEST_ASSERT_TRUE(point.y_q40_mm >= limits->min_q40_mm[1] - (1 << 22));
@@ -99,15 +98,15 @@ static void keeps_axis_limits(const struct program_limits *limits, double period
 
 static void run_within_axis_limits(const struct program *p, const struct program_limits *limits)
 {
-    static struct interp it;
+    static struct interpolator it;
     const double unit = 1099511627776.0;
     const uint64_t period = ((uint64_t)p->header.period_us << 42) / 1000000u;
     const uint64_t duration = p->header.duration_q32_s << 10;
-    struct interp_point point;
+    struct interpolator_point point;
     double mm[4][2];
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&it, p, INTERP_DOUBLE));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, p));
     for (uint32_t k = 0; k < 1000u && k * period <= duration + 3u * period; k++) {
-        (void)interp_at_q42(&it, k * period, &point);
+        (void)interpolator_at_q42(&it, k * period, &point);
         memmove(mm[1], mm[0], 3 * sizeof mm[0]);
         mm[0][0] = (double)point.x_q40_mm / unit;
         mm[0][1] = (double)point.y_q40_mm / unit;
@@ -141,11 +140,14 @@ static int try_image(uint8_t *image, uint32_t size, uint64_t random)
     if (program_open(&p, image, size) != 0 || program_check(&p, &limits, &fault) != 0) {
         return 0;
     }
-    if (limits.axis_jerk_mm_s3[0] != 0u) {
-        run_within_axis_limits(&p, &limits);
-    }
-    for (int kernel = INTERP_FIXED; kernel <= INTERP_DOUBLE; kernel++) {
-        run_accepted(&p, &limits, (enum interp_kernel)kernel);
+    for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
+        struct golden_prepared prepared;
+        golden_prepare(&prepared, &p, (enum kernel_number)kernel);
+        run_accepted(&prepared.program, &limits);
+        if (kernel == KERNEL_DOUBLE && limits.axis_jerk_mm_s3[0] != 0u) {
+            run_within_axis_limits(&prepared.program, &limits);
+        }
+        golden_discard(&prepared);
     }
     return 1;
 }

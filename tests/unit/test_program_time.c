@@ -1,29 +1,32 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/program_time.h"
 
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "golden.h"
 #include "unity.h"
 
 static struct program p;
-static struct interp it;
-static struct interp_point point;
+static struct golden_prepared prepared;
+static struct interpolator it;
+static struct interpolator_point point;
 
 void setUp(void)
 {
     golden_open(&p, "heart_minimax.hdgp");
-    interp_begin(&it, &p, INTERP_FIXED);
+    golden_prepare(&prepared, &p, KERNEL_FIXED);
+    interpolator_begin(&it, &prepared.program);
 }
 
 void tearDown(void)
 {
+    golden_discard(&prepared);
     golden_close(&p);
 }
 
 static int64_t arc_at(uint64_t time_q42_s)
 {
-    interp_seek(&it, time_q42_s >> 10);
-    interp_at_q42(&it, time_q42_s, &point);
+    interpolator_seek(&it, time_q42_s >> 10);
+    interpolator_at_q42(&it, time_q42_s, &point);
     return point.arc_length_q40_mm;
 }
 

@@ -15,6 +15,8 @@ enum { TICKS = 1001, SETTLING = 200, ROWS = TICKS + SETTLING };
 static uint8_t
     image[PROGRAM_HEADER_SIZE + PROGRAM_SEGMENT_SIZE + PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE];
 static struct program program;
+static uint64_t records[(sizeof(struct coefficients_piece) + sizeof(struct coefficients_segment)) /
+                        sizeof(uint64_t)];
 static struct contour_segment segments[1];
 static struct drive_config configs[2];
 static struct offline rig;
@@ -57,6 +59,8 @@ void setUp(void)
 {
     configs[0] = configs[1] = drive_bench_config;
     make_program();
+    TEST_ASSERT_EQUAL_INT(
+        0, coefficients_make_in(&program, kernel_find(KERNEL_FIXED), records, sizeof records));
 }
 
 void tearDown(void)
@@ -65,7 +69,7 @@ void tearDown(void)
 
 static int begin(void)
 {
-    return offline_begin(&rig, &program, INTERP_FIXED, configs, segments);
+    return offline_begin(&rig, &program, configs, segments);
 }
 
 static void test_rows_of_a_line(void)
@@ -121,16 +125,16 @@ static void test_faulty_set_up_is_refused(void)
     configs[1].counts_per_mm = 1000;
     TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_COUNTS, begin());
     setUp();
-    TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_KERNEL,
-                          offline_begin(&rig, &program, (enum interp_kernel)3, configs, segments));
+    program.coefficients_for = NULL;
+    TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_COEFFICIENTS, begin());
 }
 
 static void test_times_and_points(void)
 {
     static uint64_t times[TICKS + 2];
-    static struct interp_point points[TICKS + 2];
+    static struct interpolator_point points[TICKS + 2];
     static int32_t counts[2 * (TICKS + 2)];
-    struct interp interp;
+    struct interpolator interp;
     TEST_ASSERT_EQUAL_INT(0, begin());
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
     offline_times(&program, 0, TICKS + 2, times);
@@ -142,7 +146,7 @@ static void test_times_and_points(void)
         times[k] = times[TICKS - 1 - k];
         times[TICKS - 1 - k] = kept;
     }
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, &program, INTERP_FIXED));
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &program));
     TEST_ASSERT_EQUAL_INT(0, offline_points(&interp, TICKS, times, 1000000, points, counts));
     for (int k = 0; k < TICKS; k++) {
         TEST_ASSERT_EQUAL_INT64(rows[TICKS - 1 - k].cmd_q40_mm[0], points[k].x_q40_mm);
@@ -167,9 +171,9 @@ static void test_feedforward(void)
     const struct feedforward_gains none[2] = {{0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}};
     struct feedforward_gains gains[2] = {{0, 0, 500, 0, 0}, {0, 0, 500, 0, 0}};
     static struct offline_row forward[ROWS];
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
     offline_feedforward(&rig, none);
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
     for (int k = 0; k < ROWS; k++) {
@@ -177,9 +181,9 @@ static void test_feedforward(void)
         TEST_ASSERT_EQUAL_INT16_ARRAY(rows[k].volts_mv, forward[k].volts_mv, 2);
     }
     configs[0].pdff.k_pf_rad_mm = 0.3; /* 0.3 + 0.5 * 1/1.59 is near the 1/1.59 of the screw */
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, INTERP_FIXED, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
     offline_feedforward(&rig, gains);
     TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
     const int32_t plain = rows[500].set_counts[0] - rows[500].act_counts[0];

@@ -8,7 +8,7 @@
 #include "app/parameter_store.h"
 #include "app/program_slot.h"
 #include "core/crc32.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/override_plan.h"
 #include "fake_port.h"
 #include "flash_model.h"
@@ -199,17 +199,20 @@ static void test_what_the_store_refuses(void)
 
 static uint32_t run(const struct program *program)
 {
-    static struct interp interp;
+    static struct interpolator interp;
+    struct golden_prepared prepared;
     uint32_t crc = 0;
     const uint32_t ticks = program_ticks(program);
-    TEST_ASSERT_EQUAL_INT(0, interp_begin(&interp, program, INTERP_FIXED));
+    golden_prepare(&prepared, program, KERNEL_FIXED);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &prepared.program));
     for (uint32_t k = 0; k < ticks; ++k) {
-        struct interp_point point;
+        struct interpolator_point point;
         const uint64_t time_q32_s = ((uint64_t)k << 32) / 1000u;
-        TEST_ASSERT_TRUE(interp_at(&interp, time_q32_s, &point) >= 0);
+        TEST_ASSERT_TRUE(interpolator_at(&interp, time_q32_s, &point) >= 0);
         crc = crc32_update(crc, (const uint8_t *)&point.x_q40_mm, sizeof point.x_q40_mm);
         crc = crc32_update(crc, (const uint8_t *)&point.y_q40_mm, sizeof point.y_q40_mm);
     }
+    golden_discard(&prepared);
     return crc;
 }
 

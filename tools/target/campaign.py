@@ -71,7 +71,6 @@ KINDS = {
     "moves": "override_ramp_slope",
     "looks": "override_plan_search",
     "begins": "override_step_of",
-    "start": "program_clock_way_q62_s",
     "chooses": "override_plan_change",
     "steady": "override_plan_tick",
 }

@@ -11,6 +11,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from target.effects import effect
@@ -33,9 +34,9 @@ class Bounds:
 
     @classmethod
     def read(cls, file: Path, *never: str) -> Bounds:
-        """From the file; `never`: further functions that are not called."""
+        """From the file; `never`: functions that are not called."""
         data = tomllib.loads(file.read_text(encoding="utf-8"))
-        return cls(data["rounds"], data["order"], frozenset([*data["never"]["functions"], *never]))
+        return cls(data["rounds"], data["order"], frozenset(never))
 
 
 @dataclass
@@ -146,7 +147,7 @@ class Longest:
         names = self.bounds.order.get(function.name, [])
         if len(calls) != len(names):
             raise LongestError(f"{function.name}: {len(calls)} calls through pointers")
-        return [f for f in self.image.functions if f.name == names[calls.index(at)]]
+        return [f for f in self.image.functions if fnmatchcase(f.name, names[calls.index(at)])]
 
     def _is_indirect(self, function: Function, index: int) -> bool:
         return effect(self.image, function, index).indirect

@@ -32,11 +32,11 @@ PARTS = (
 RULES = (
     (r"core/(program_clock|override)\w*\.\w:", "rate"),
     (r"core/feed_piece\.\w:feed_piece_(at|point)", "feed"),
-    (r"core/interp\.\w:evaluate_feed", "feed"),
+    (r"core/interpolator\.\w:evaluate_feed", "feed"),
     (r"core/kernel_\w+\.\w:(set_|\w+_set$)", "search"),
     (r"core/feed_piece\.\w:\w+_(set|make)$", "search"),
     (r"core/(ph_segment|coefficients)\.\w:", "search"),
-    (r"core/interp\.\w:(find_|load_)", "search"),
+    (r"core/interpolator\.\w:(find_|step_)", "search"),
     (r"core/kernel_\w+\.\w:(newton|slope|first_guess)", "newton"),
     (r"core/kernel_\w+\.\w:\w+_at$", "position"),
     (r"core/counts\.\w:", "position"),

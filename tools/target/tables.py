@@ -277,7 +277,6 @@ def worst_of(rows: Iterable[Figures]) -> int:
 
 
 _KINDS = {
-    "start": "first of a program",
     "steady": "steady, or found to be",
     "moves": "the rate moves",
     "chooses": "chooses",

@@ -68,7 +68,7 @@ struct config {
     uint8_t node[AXES_MAX];
     uint8_t own_node;    /* the controller itself */
     uint8_t axis_count;  /* 1 ... AXES_MAX */
-    uint8_t kernel;      /* enum interp_kernel */
+    uint8_t kernel;      /* enum kernel_number */
     uint8_t missed_max;  /* so many answers in a row may be missed */
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
     uint32_t crc32;      /* of the objects; docs/reference/protocol.md section 3.4 */

@@ -12,11 +12,14 @@ int motion_begin(struct motion *motion, const struct program *program, const str
 {
     memset(motion, 0, sizeof *motion);
     motion->counts_per_mm = config->counts_per_mm;
-    feed_override_begin(&motion->feed, program, config->period_us, 0);
-    return interp_begin(&motion->interp, program, (enum interp_kernel)config->kernel);
+    const int result = interpolator_begin(&motion->interp, program);
+    if (result == 0) {
+        feed_override_begin(&motion->feed, program, config->period_us, 0);
+    }
+    return result;
 }
 
-static void to_counts(const struct motion *motion, const struct interp_point *point,
+static void to_counts(const struct motion *motion, const struct interpolator_point *point,
                       int32_t counts[PLANE_AXES])
 {
     counts[0] = counts_from_q40_mm(point->x_q40_mm, motion->counts_per_mm);
@@ -33,8 +36,8 @@ int motion_begin_at(struct motion *motion, const struct program *program,
     }
     const uint64_t time_q42_s = program_time_at_q42(program, arc_length_q40_mm);
     feed_override_begin(&motion->feed, program, config->period_us, time_q42_s);
-    (void)interp_seek(&motion->interp, time_q42_s >> 10);
-    (void)interp_at_q42(&motion->interp, time_q42_s, &motion->point);
+    (void)interpolator_seek(&motion->interp, time_q42_s >> 10);
+    (void)interpolator_at_q42(&motion->interp, time_q42_s, &motion->point);
     to_counts(motion, &motion->point, start_counts);
     return 0;
 }

@@ -13,18 +13,18 @@
 
 #include "app/machine/config.h"
 #include "core/feed_override.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 
 struct motion {
-    struct interp interp;
+    struct interpolator interp;
     struct feed_override feed;
-    struct interp_point point; /* of the last setpoint */
-    uint32_t setpoints;        /* given so far */
+    struct interpolator_point point; /* of the last setpoint */
+    uint32_t setpoints;              /* given so far */
     uint32_t counts_per_mm;
 };
 
 /* Sets up the first setpoint. The program must have passed program_check; it must stay while the
- * motion lasts. 0 or a negative INTERP_ERR_... Mainline; linear in the number of pieces. */
+ * motion lasts. 0 or a negative INTERPOLATOR_ERR_... Mainline; linear in the number of pieces. */
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config);
 
 /* The same, but to go on from rest at an arc length of the program. Gives where that is, in counts.
@@ -33,7 +33,7 @@ int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
                     int32_t start_counts[PLANE_AXES]);
 
-/* The next setpoint. 0, or a negative INTERP_ERR_... with targets unchanged. Timer. */
+/* The next setpoint. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged. Timer. */
 int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES]);
 
 /* Asks for a stop along the path inside the program's limits, or the machine's. Under the lock. */

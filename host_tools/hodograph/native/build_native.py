@@ -21,7 +21,8 @@ ROOT = PACKAGE.parents[2]
 HEADERS = (
     "core/program_check.h",
     "core/stop_check.h",
-    "core/interp.h",
+    "core/coefficients.h",
+    "core/interpolator.h",
     "core/feed_override.h",
     "plant/drive.h",
     "offline/contour.h",

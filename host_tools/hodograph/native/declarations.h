@@ -44,15 +44,20 @@ struct stop_walk {
 void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);
 struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece);
 
-/* core/interp.h */
-enum interp_kernel { INTERP_FIXED, INTERP_FLOAT, INTERP_DOUBLE };
-struct interp_point {
+/* core/coefficients.h */
+struct kernel;
+const struct kernel *kernel_find(uint32_t number);
+uint64_t coefficients_size(const struct program *p, const struct kernel *kernel);
+int coefficients_make_in(struct program *p, const struct kernel *kernel, void *memory, uint64_t size);
+
+/* core/interpolator.h */
+struct interpolator_point {
     int64_t arc_length_q40_mm, x_q40_mm, y_q40_mm, feed_q32_mm_s;
 };
-struct interp {
+struct interpolator {
     ...;
 };
-int interp_begin(struct interp *it, const struct program *p, enum interp_kernel kernel);
+int interpolator_begin(struct interpolator *it, const struct program *p);
 
 /* core/feed_override.h */
 struct override_state {
@@ -73,7 +78,7 @@ void feed_override_resume(struct feed_override *f);
 void feed_override_set(struct feed_override *f, uint32_t percent);
 void feed_override_stop(struct feed_override *f);
 void feed_override_fault_stop(struct feed_override *f);
-int feed_override_next(struct feed_override *f, struct interp *it, struct interp_point *out);
+int feed_override_next(struct feed_override *f, struct interpolator *it, struct interpolator_point *out);
 int feed_override_state(const struct feed_override *f);
 int feed_override_late(const struct feed_override *f);
 uint64_t feed_override_time_q42(const struct feed_override *f);
@@ -146,8 +151,8 @@ struct offline_row {
 struct offline {
     ...;
 };
-int offline_begin(struct offline *rig, const struct program *program, enum interp_kernel kernel,
-              const struct drive_config drives[2], struct contour_segment *segments);
+int offline_begin(struct offline *rig, const struct program *program, const struct drive_config drives[2],
+                  struct contour_segment *segments);
 struct feedforward_gains {
     uint32_t period_us, counts_per_mm, velocity_permille;
     int32_t torque_per_acceleration_q16, torque_per_velocity_q16;
@@ -174,11 +179,11 @@ struct offline_stop {
 int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count);
 void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
 int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
-int offline_points(struct interp *interp, uint32_t n, const uint64_t *time_q42_s,
-               uint32_t counts_per_mm, struct interp_point *points, int32_t *counts);
+int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
+               uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 void offline_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 void offline_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
-enum offline_error { OFFLINE_ERR_KERNEL, OFFLINE_ERR_PERIOD, OFFLINE_ERR_COUNTS, OFFLINE_ERR_FAULT, OFFLINE_ERR_DRIVE, OFFLINE_ERR_INTERP, ... };
+enum offline_error { OFFLINE_ERR_COEFFICIENTS, OFFLINE_ERR_PERIOD, OFFLINE_ERR_COUNTS, OFFLINE_ERR_FAULT, OFFLINE_ERR_DRIVE, OFFLINE_ERR_INTERP, ... };
 
 /* offline/stop_search.h */
 struct stop_row {
@@ -216,7 +221,7 @@ struct stop_case {
 };
 struct stop_trial {
     uint64_t seed;
-    uint32_t trials, kernel;
+    uint32_t trials;
     struct stop_limits hold, fault;
     struct stop_use of_hold, of_fault;
     double of_bound[2], longest_s[2];

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from .library import library
-from .program import NativeProgram, kernel_code
+from .program import NativeProgram
 
 
 class State(IntEnum):
@@ -47,14 +47,14 @@ class FeedOverride:
     def __init__(self, program: NativeProgram, kernel: str = "fixed") -> None:
         """Raises InputError: a program that does not pass the controller's check, no such kernel."""
         ffi, self._lib = library()
-        program.require()
         self._program = program  # keeps the image alive
         self._period_s = 1e-6 * program.period_us
-        self._interp = ffi.new("struct interp *")
-        self._point = ffi.new("struct interp_point *")
+        self._interp = ffi.new("struct interpolator *")
+        self._point = ffi.new("struct interpolator_point *")
         self._feed = ffi.new("struct feed_override *")
-        self._lib.interp_begin(self._interp, program.pointer, kernel_code(kernel))
-        self._lib.feed_override_begin(self._feed, program.pointer, program.period_us, 0)
+        prepared = program.prepared(kernel)
+        self._lib.interpolator_begin(self._interp, prepared)
+        self._lib.feed_override_begin(self._feed, prepared, program.period_us, 0)
 
     def step(self) -> Step:
         """The next tick."""

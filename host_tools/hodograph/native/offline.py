@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import HodographError, InputError
 from .drive import drive_config
 from .library import library, text
-from .program import NativeProgram, kernel_code
+from .program import NativeProgram
 
 if TYPE_CHECKING:
     from ..config.axis_table import Feedforward
@@ -102,16 +102,14 @@ class Rig:
         Raises InputError: unknown kernel, figures out of range, program not acceptable.
         """
         ffi, lib = library()
-        program.require()
-        code = kernel_code(kernel)
+        prepared = program.prepared(kernel)
         self._program = program  # keeps the image alive
         self._segments = ffi.new("struct contour_segment[]", program.segment_count)
         self._rig = ffi.new("struct offline *")
         configs = [drive_config(drive, counts_per_mm, program.period_us) for drive in drives]
         error = lib.offline_begin(
             self._rig,
-            program.pointer,
-            code,
+            prepared,
             ffi.new("struct drive_config[2]", configs),
             self._segments,
         )

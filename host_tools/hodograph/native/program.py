@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import HodographError, InputError
 from ..names import KERNELS
 from .library import library, text
 
@@ -20,7 +21,7 @@ POINT = np.dtype(
         ("feed_q32_mm_s", "<i8"),
     ]
 )
-"""One interpolated point, struct interp_point of core/interp.h: unrounded output of a kernel."""
+"""One interpolated point, struct interpolator_point of core/interpolator.h: unrounded output of a kernel."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,7 @@ class NativeProgram:
                 f"program image: {text(lib.program_error_text(code))}: compile it again (code {code})"
             )
         self._accepted = False
+        self._prepared: dict[int, tuple[Any, Any]] = {}
 
     @property
     def period_us(self) -> int:
@@ -125,6 +127,25 @@ class NativeProgram:
                 f"program image: {fault.text} (code {fault.code}, number {fault.index}): compile it again"
             )
 
+    def prepared(self, kernel: str) -> Any:
+        """The program with precomputed coefficients for a kernel, `struct program *`; valid as long as this object.
+
+        The coefficients are made once (core/coefficients.h). Raises InputError for an unknown kernel and for a
+        program that does not pass `check`.
+        """
+        self.require()
+        code = kernel_code(kernel)
+        if code not in self._prepared:
+            ffi, lib = library()
+            made_for = lib.kernel_find(code)
+            size = lib.coefficients_size(self.pointer, made_for)
+            records = ffi.new("uint64_t[]", (size + 7) // 8)
+            own = ffi.new("struct program *", self.pointer[0])
+            if lib.coefficients_make_in(own, made_for, records, size) != 0:
+                raise HodographError("coefficients: their size is not what it was: report a bug")
+            self._prepared[code] = (own, records)
+        return self._prepared[code][0]
+
     def tick_times_q42_s(self, tick0: int = 0, count: int | None = None) -> NDArray[np.uint64]:
         """Program times of `count` ticks from `tick0` on (default: to the last), s * 2^42, (count,)."""
         ffi, lib = library()
@@ -139,18 +160,17 @@ class NativeProgram:
         Raises InputError for an unknown kernel and for a program that does not pass `check`.
         """
         ffi, lib = library()
-        self.require()
-        code = kernel_code(kernel)
+        program = self.prepared(kernel)
         times = np.ascontiguousarray(times_q42_s, dtype=np.uint64)
         points = np.empty(times.size, dtype=POINT)
-        interp = ffi.new("struct interp *")
-        begun = lib.interp_begin(interp, self.pointer, code)
+        interp = ffi.new("struct interpolator *")
+        begun = lib.interpolator_begin(interp, program)
         made = begun or lib.offline_points(
             interp,
             times.size,
             ffi.from_buffer("uint64_t[]", times),
             1,
-            ffi.cast("struct interp_point *", ffi.from_buffer(points)),
+            ffi.cast("struct interpolator_point *", ffi.from_buffer(points)),
             ffi.NULL,
         )
         if made != 0:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from .library import library
-from .program import NativeProgram, kernel_code
+from .program import NativeProgram
 from .stop_search import StopLimits, limits_struct
 
 
@@ -61,15 +61,15 @@ def run_trials(
     Raises InputError: a program that is refused, no such kernel.
     """
     ffi, lib = library()
-    program.require()
+    prepared = program.prepared(kernel)
     trial = ffi.new("struct stop_trial *")
-    trial.seed, trial.trials, trial.kernel = seed, trials, kernel_code(kernel)
+    trial.seed, trial.trials = seed, trials
     own = [limits_struct(limits) for limits in (hold, fault)]
     trial.hold, trial.fault = own[0][0][0], own[1][0][0]
     if tick is None:
-        error = lib.stop_trial_run(program.pointer, trial)
+        error = lib.stop_trial_run(prepared, trial)
     else:
-        error = lib.stop_trial_again(program.pointer, trial, tick)
+        error = lib.stop_trial_again(prepared, trial, tick)
     if error != 0:
         raise InputError("stop trials: the interpolator refused the program")
     names = ("velocity", "acceleration", "jerk", "path_acceleration", "path_jerk")

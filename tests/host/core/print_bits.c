@@ -4,11 +4,12 @@
 #include <stdlib.h>
 
 #include "core/crc32.h"
-#include "core/interp.h"
+#include "core/interpolator.h"
 #include "core/override_plan.h"
 #include "core/program_check.h"
 
 static uint8_t image[1 << 20];
+static uint64_t records[1 << 20];
 
 static uint32_t add(uint32_t crc, int64_t value)
 {
@@ -22,18 +23,20 @@ static uint32_t add(uint32_t crc, int64_t value)
 int main(int argc, char **argv)
 {
     static struct program p;
-    static struct interp it;
+    static struct interpolator it;
     static struct program_clock clock;
     static struct override_plan plan;
-    struct interp_point point;
+    struct interpolator_point point;
     FILE *file = argc == 3 ? fopen(argv[1], "rb") : NULL;
     if (file == NULL) {
         return 2;
     }
     uint32_t size = (uint32_t)fread(image, 1, sizeof image, file);
     fclose(file);
-    if (program_open(&p, image, size) != 0 ||
-        interp_begin(&it, &p, (enum interp_kernel)atoi(argv[2])) != 0) {
+    const struct kernel *kernel = kernel_find((uint32_t)atoi(argv[2]));
+    if (kernel == NULL || program_open(&p, image, size) != 0 ||
+        coefficients_make_in(&p, kernel, records, sizeof records) != 0 ||
+        interpolator_begin(&it, &p) != 0) {
         return 2;
     }
     uint32_t crc = 0;
@@ -44,7 +47,7 @@ int main(int argc, char **argv)
         if (tick == ticks - ticks / 4) {
             override_plan_hold(&plan);
         }
-        if (interp_at_q42(&it, override_plan_tick(&plan, &clock), &point) < 0) {
+        if (interpolator_at_q42(&it, override_plan_tick(&plan, &clock), &point) < 0) {
             return 3;
         }
         crc = add(add(crc, point.x_q40_mm), point.y_q40_mm);

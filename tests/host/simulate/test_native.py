@@ -31,7 +31,7 @@ def test_missing_module_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None
 def test_records_have_the_size_of_the_c_structs() -> None:
     ffi, _ = library()
     assert ffi.sizeof("struct offline_row") == ROW.itemsize
-    assert ffi.sizeof("struct interp_point") == POINT.itemsize
+    assert ffi.sizeof("struct interpolator_point") == POINT.itemsize
     for name, field in ROW.fields.items():  # type: ignore[union-attr]
         assert ffi.offsetof("struct offline_row", name) == field[1]
 

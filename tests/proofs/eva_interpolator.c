@@ -1,18 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The interpolator and the records of a prepared program, for any program of three segments and pieces that passed the
+ * The interpolator and the coefficient records of a program, for any program of three segments and pieces that passed the
  * checks, any kernel, wherever the cursor is, and any times: no segment, piece or record is asked for that there is not, nothing overflows.
  *
  * prover: eva
  * options: -eva-slevel 60
- * instead: core/interp.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
- * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override program_piece_start ph_segment_expand ph_segment_end
- * shows: interp_at_q42 interp_at_piece interp_at_arc_length interp_acceleration_q40 interp_search_begin interp_search_step interp_seek coefficients_make
- * mutant: core/interp.c: while (i + 1 < p->header.segment_count && => while (i < p->header.segment_count &&
- * mutant: core/interp.c: while (i > 0 && => while (
- * mutant: core/interp.c: while (i + 1u < it->program->header.piece_count && => while (i < it->program->header.piece_count &&
- * mutant: core/interp.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
- * mutant: core/interp.c: if (next < p->header.piece_count && => if (next <= p->header.piece_count &&
+ * instead: core/interpolator.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_override program_piece_start ph_segment_expand ph_segment_end
+ * shows: interpolator_at_q42 interpolator_at_piece interpolator_at_arc_length interpolator_acceleration_q40 interpolator_search_begin interpolator_search_step interpolator_seek interpolator_ends coefficients_make
+ * mutant: core/interpolator.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
+ * mutant: core/interpolator.c: if (next < p->header.piece_count && => if (next <= p->header.piece_count &&
  * mutant: core/coefficients.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
  * mutant: core/coefficients.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
  * mutant: core/override_ramp.c: first + least(count, left) => first + count
@@ -41,11 +38,6 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
 
 /*@ requires i < p->header.piece_count;
     assigns \result \from i;
-    ensures 0 < \result <= (1 << 54); */
-uint64_t program_piece_duration(const struct program *p, uint32_t i);
-
-/*@ requires i < p->header.piece_count;
-    assigns \result \from i;
     ensures 0 <= \result < (1 << 62); */
 int64_t program_piece_start(const struct program *p, uint32_t i);
 
@@ -61,7 +53,7 @@ void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segm
     ensures -(1 << 60) < end_q48_mm[0] < (1 << 60) && -(1 << 60) < end_q48_mm[1] < (1 << 60); */
 void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[3]);
 
-#include "core/interp.c"
+#include "core/interpolator.c"
 #include "core/kernel.c"
 #include "core/coefficients.c"
 #include "core/override_ramp.c"
@@ -80,7 +72,7 @@ static void segment_set(void *segment, const struct ph_segment *from)
     k->exponent = from->exponent;
 }
 
-static void piece_at(const void *piece, uint64_t t_q42_s, struct feed_point *out)
+static void piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s)
 {
     const struct feed_piece *f = piece;
     (void)t_q42_s;
@@ -97,7 +89,7 @@ static int64_t piece_acceleration(const void *piece, uint64_t t_q42_s)
     return any_between(INT64_MIN, INT64_MAX);
 }
 
-static void segment_at(const void *segment, int64_t arc_length_q40_mm, int64_t point_q40_mm[2])
+static void segment_at(const void *segment, int64_t point_q40_mm[2], int64_t arc_length_q40_mm)
 {
     const struct kernel_fixed_segment *k = segment;
     point_q40_mm[0] = k->exponent;
@@ -135,72 +127,65 @@ static uint64_t any_time(void)
 
 /* Wherever the cursor is: after begin, and after any call before. Pieces are looked for without regard to the segment, and
  * segments to the piece. */
-static void place(struct interp *it, uint32_t i)
+static void place(struct interpolator *it, uint32_t i)
 {
-    if (it->piece == NULL) {
-        load_piece(it, i, (uint64_t)any_between(0, POWER(54)));
-        load_segment(it, i);
-    } else {
-        it->piece = coefficients_piece_at(it->program, it->kernel, i);
-        it->segment = coefficients_segment_at(it->program, it->kernel, i);
-    }
+    it->piece = coefficients_piece_at(it->program, it->kernel, i);
+    it->segment = coefficients_segment_at(it->program, it->kernel, i);
 }
 
 /* Records of pieces and of segments stand behind one another: neither is taken for the other. */
-static void stays(const struct interp *it)
+static void stays(const struct interpolator *it)
 {
-    if (it->piece != NULL) {
-        prove((const void *)it->piece <
-              (const void *)coefficients_segment_at(it->program, it->kernel, 0));
-        prove(it->segment >= coefficients_segment_at(it->program, it->kernel, 0));
-    }
+    prove((const void *)it->piece <
+          (const void *)coefficients_segment_at(it->program, it->kernel, 0));
+    prove(it->segment >= coefficients_segment_at(it->program, it->kernel, 0));
 }
 
 /* By arc length; and the time of one: a step from a piece, and one between any two times. */
-static void along_path(struct interp *it, uint32_t i)
+static void along_path(struct interpolator *it, uint32_t i)
 {
-    struct interp_point point;
-    struct interp_search search;
+    struct interpolator_point point;
+    struct interpolator_search search;
     place(it, i);
-    interp_at_arc_length(it, any_between(INT64_MIN, INT64_MAX), &point);
+    interpolator_at_arc_length(it, any_between(INT64_MIN, INT64_MAX), &point);
     stays(it);
     place(it, i);
-    interp_acceleration_q40(it, it->piece, any_time());
-    interp_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
-    interp_search_step(it, &search);
+    interpolator_acceleration_q40(it, it->piece, any_time());
+    interpolator_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
+    interpolator_search_step(it, &search);
     prove(search.piece_index < COUNT);
     stays(it);
     place(it, i);
-    interp_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
+    interpolator_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
     search.bisecting = 1;
     search.low_q42_s = any_time();
     search.high_q42_s = any_time();
-    interp_search_step(it, &search);
+    interpolator_search_step(it, &search);
 }
 
 static void interpolate(const struct program *p)
 {
-    struct interp it;
-    struct interp_point point;
-    if (interp_begin(&it, p, INTERP_FIXED) != 0) {
+    struct interpolator it;
+    struct interpolator_point point;
+    struct interpolator_point last;
+    interpolator_ends(p, p->coefficients_for, &point, &last);
+    if (interpolator_begin(&it, p) != 0) {
         return;
     }
     for (uint32_t i = 0; i < COUNT; i++) {
         place(&it, i);
-        interp_at_q42(&it, any_time(), &point);
+        interpolator_at_q42(&it, any_time(), &point);
         stays(&it);
         place(&it, i);
-        if (it.piece != NULL) {
-            interp_at_piece(&it, it.piece, any_time(), &point);
-            stays(&it);
-        }
+        interpolator_at_piece(&it, it.piece, any_time(), &point);
+        stays(&it);
         place(&it, i);
-        interp_seek(&it, any_time());
+        interpolator_seek(&it, any_time());
         stays(&it);
         along_path(&it, i);
     }
     place(&it, 0);
-    interp_at(&it, any_time(), &point);
+    interpolator_at(&it, any_time(), &point);
 }
 
 int main(void)
@@ -214,9 +199,6 @@ int main(void)
     p.header.period_us = (uint32_t)1000 << any_between(0, 3);
     p.header.duration_q32_s = (uint64_t)any_between(1, POWER(54) - 1);
     p.header.length_q40_mm = any_between(1, POWER(62) - 1);
-    p.coefficients = NULL;
-    p.coefficients_for = NULL;
-    interpolate(&p);
     if (coefficients_make(&p, &any_kernel, take, records) == 0) {
         prove(filled == coefficients_size(&p, &any_kernel) && filled <= sizeof records);
         coefficients_attach(&p, &any_kernel, (const uint8_t *)records);

@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The core: from a program image to one setpoint in each period. This header is its manual, and includes what an
+ * application needs. Each function is described in the header that declares it.
+ *
+ * ## What to call, in this order
+ *
+ *   main loop   program_open                 reads the image: sizes, magic, version, CRC
+ *               program_check                all rules of the format, and the limits of this controller
+ *               kernel_find                  fixed, float or double; NULL where it is not linked
+ *               coefficients_make_in         what a tick needs of each segment and piece, in memory
+ *               (or coefficients_make and coefficients_attach: by a sink, for flash)
+ *               interpolator_begin           the cursor on the curve
+ *               feed_override_begin          the motion: at rest, at a program time, override 100 %
+ *   tick        feed_override_next           the next setpoint, as a point in mm
+ *               counts_from_q40_mm           the same in counts, for the bus
+ *               feedforward_next             velocity and torque offsets, where drives take them
+ *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off
+ *               feed_override_state, _late, _feed_q32, _time_q42, _bound_us   what is so at the last setpoint
+ *
+ * ## Context
+ *
+ * The main loop calls what reads the whole program. A tick is one run of the timer interrupt; it calls only what its
+ * headers mark "tick context", which takes bounded time. One owner calls everything of one motion; nothing here locks.
+ * Structs are the caller's, and no function allocates or has state of its own. The image, the records and the structs
+ * must stay where they are while a motion uses them; the image and the records must not change.
+ *
+ * ## Cost
+ *
+ *   program_check          some 10^3 to 10^4 instructions a segment and piece, more for limits of the axes
+ *   coefficients_make_in   some 2500 instructions a segment; bytes: coefficients_size
+ *   feed_override_begin    linear in the number of pieces
+ *   feed_override_next     docs/validation/wcet.md: bounds of instructions for each core and kernel
+ *   struct interpolator    about 0.1 KiB; struct feed_override about 0.6 KiB
+ *
+ * ## Errors
+ *
+ * Functions return 0 or a negative code. A tick with an error leaves its result as it was. program_open and program_check: enum program_error,
+ * program_error_text. coefficients_make_in: COEFFICIENTS_ERR_SIZE. interpolator_begin and feed_override_next:
+ * INTERPOLATOR_ERR_...; of a program that passed program_check a tick has no error. Arguments are validated there and
+ * nowhere else: what a header demands of the caller is not checked again. Questions with two answers return an int, 1 or 0.
+ *
+ * ## Numbers
+ *
+ * Units and scales stand in the names; core/qmath.h has the rules. Integers only, but for the kernels float and double:
+ * the same program and commands give the same bits on every target.
+ *
+ * ## Example
+ *
+ * tests/host/core/test_core_manual.py compiles this text and runs it.
+ *
+ *     #include "core/hodograph.h"
+ *
+ *     static struct program program;
+ *     static uint64_t records[8192];
+ *     static struct interpolator interpolator;
+ *     static struct feed_override feed;
+ *
+ *     // Main loop. The image has to stay.
+ *     int load(const uint8_t *image, uint32_t size, const struct program_limits *limits)
+ *     {
+ *         struct program_fault fault;
+ *         int error = program_open(&program, image, size);
+ *         if (error == 0) {
+ *             error = program_check(&program, limits, &fault);
+ *         }
+ *         if (error == 0) {
+ *             error = coefficients_make_in(&program, kernel_find(KERNEL_FIXED), records, sizeof records);
+ *         }
+ *         if (error == 0) {
+ *             error = interpolator_begin(&interpolator, &program);
+ *         }
+ *         if (error == 0) {
+ *             feed_override_begin(&feed, &program, program.header.period_us, 0);
+ *         }
+ *         return error;
+ *     }
+ *
+ *     // Timer interrupt, once in each period. 1: this was the last setpoint.
+ *     int tick(int32_t counts[2])
+ *     {
+ *         struct interpolator_point point;
+ *         const int error = feed_override_next(&feed, &interpolator, &point);
+ *         if (error != 0) {
+ *             return error;
+ *         }
+ *         counts[0] = counts_from_q40_mm(point.x_q40_mm, 1000000);
+ *         counts[1] = counts_from_q40_mm(point.y_q40_mm, 1000000);
+ *         return feed_override_state(&feed) == FEED_ENDED;
+ *     }
+ */
+#ifndef HODOGRAPH_CORE_HODOGRAPH_H
+#define HODOGRAPH_CORE_HODOGRAPH_H
+
+#include "core/coefficients.h"
+#include "core/counts.h"
+#include "core/feed_override.h"
+#include "core/feedforward.h"
+#include "core/interpolator.h"
+#include "core/kernel.h"
+#include "core/program.h"
+#include "core/program_check.h"
+
+#endif

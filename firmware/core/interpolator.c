@@ -1,0 +1,261 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/interpolator.h"
+
+#include <stddef.h>
+
+#include "core/qmath.h"
+
+#define MOST_ENDS 2u /* piece ends and segment ends a tick may cross: protocol.md 1.2 and 1.3 */
+
+/* Arc length is kept inside the path: a feed that dips below zero by rounding must not leave it. */
+static void evaluate_feed(const struct interpolator *it, const struct coefficients_piece *piece,
+                          uint64_t time_q42_s, struct feed_point *f)
+{
+    it->kernel->piece_at(&piece->feed, f, time_q42_s - piece->start_q42_s);
+    if (f->arc_length_q40_mm < 0) {
+        f->arc_length_q40_mm = 0;
+    } else if (f->arc_length_q40_mm > it->length_q40_mm) {
+        f->arc_length_q40_mm = it->length_q40_mm;
+    }
+}
+
+/* Makes the piece of this time, below the duration, the present one, crossing `most` ends at most. */
+static int find_piece(struct interpolator *it, uint64_t time_q42_s, uint32_t most)
+{
+    const struct coefficients_piece *piece = it->piece;
+    if (time_q42_s < piece->start_q42_s) {
+        return INTERPOLATOR_ERR_JUMP;
+    }
+    const struct coefficients_piece *last =
+        coefficients_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
+    for (; piece != last && time_q42_s >= piece->end_q42_s; most--) {
+        if (most == 0) {
+            return INTERPOLATOR_ERR_JUMP;
+        }
+        piece = coefficients_piece_next(piece, it->kernel);
+    }
+    it->piece = piece;
+    return INTERPOLATOR_OK;
+}
+
+static int step_segment(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most)
+{
+    const uint32_t size = coefficients_segment_size(it->kernel);
+    const struct coefficients_segment *segment = it->segment;
+    uint32_t left = most;
+    if (arc_length_q40_mm >= segment->to_q40_mm) {
+        do {
+            if (left-- == 0) {
+                return INTERPOLATOR_ERR_JUMP;
+            }
+            segment = (const void *)((const uint8_t *)segment + size);
+        } while (arc_length_q40_mm >= segment->to_q40_mm);
+    } else {
+        do {
+            if (left-- == 0) {
+                return INTERPOLATOR_ERR_JUMP;
+            }
+            segment = (const void *)((const uint8_t *)segment - size);
+        } while (arc_length_q40_mm < segment->from_q40_mm);
+    }
+    it->segment = segment;
+    return INTERPOLATOR_OK;
+}
+
+/* Makes the segment of this arc length the present one: the last that starts at or before it. Steps
+ * back only where the feed dips below zero by rounding. */
+static int find_segment(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most)
+{
+    const struct coefficients_segment *segment = it->segment;
+    if (arc_length_q40_mm >= segment->from_q40_mm && arc_length_q40_mm < segment->to_q40_mm) {
+        return INTERPOLATOR_OK;
+    }
+    return step_segment(it, arc_length_q40_mm, most);
+}
+
+static void set_start(struct interpolator_point *start, const struct program *p,
+                      const struct kernel *kernel)
+{
+    struct coefficients_segment record;
+    struct program_segment segment;
+    struct ph_segment ph;
+    int64_t point[2];
+    program_segment_get(p, 0, &segment);
+    ph_segment_expand(&ph, &segment);
+    kernel->segment_set(&record.path, &ph);
+    kernel->segment_at(&record.path, point, 0);
+    start->arc_length_q40_mm = 0;
+    start->x_q40_mm = point[0];
+    start->y_q40_mm = point[1];
+    start->feed_q32_mm_s = 0;
+}
+
+static void set_end(struct interpolator_point *end, const struct program *p)
+{
+    struct program_segment segment;
+    struct ph_segment ph;
+    int64_t end_q48[3];
+    program_segment_get(p, p->header.segment_count - 1u, &segment);
+    ph_segment_expand(&ph, &segment);
+    ph_segment_end(&ph, end_q48);
+    end->arc_length_q40_mm = p->header.length_q40_mm;
+    end->x_q40_mm = segment.x_q40_mm + qmath_round(end_q48[PH_X], 8);
+    end->y_q40_mm = segment.y_q40_mm + qmath_round(end_q48[PH_Y], 8);
+    end->feed_q32_mm_s = 0;
+}
+
+void interpolator_ends(const struct program *p, const struct kernel *kernel,
+                       struct interpolator_point *first, struct interpolator_point *last)
+{
+    set_start(first, p, kernel);
+    set_end(last, p);
+}
+
+int interpolator_begin(struct interpolator *it, const struct program *p)
+{
+    if (p == NULL || p->image == NULL) {
+        return INTERPOLATOR_ERR_PROGRAM;
+    }
+    if (p->coefficients_for == NULL) {
+        return INTERPOLATOR_ERR_COEFFICIENTS;
+    }
+    it->program = p;
+    it->kernel = p->coefficients_for;
+    it->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
+    it->length_q40_mm = p->header.length_q40_mm;
+    it->piece = coefficients_piece_at(p, it->kernel, 0);
+    it->segment = coefficients_segment_at(p, it->kernel, 0);
+    set_end(&it->end, p);
+    return 0;
+}
+
+/* Beyond the end of the piece: the last one ends with the program. */
+static int beyond(const struct interpolator *it, uint64_t time_q42_s,
+                  struct interpolator_point *out)
+{
+    if (time_q42_s < it->duration_q42_s) {
+        return INTERPOLATOR_ERR_JUMP;
+    }
+    *out = it->end;
+    return INTERPOLATOR_END;
+}
+
+/* Arc length inside the path. */
+static int evaluate_path(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most,
+                         struct interpolator_point *out)
+{
+    if (find_segment(it, arc_length_q40_mm, most) != INTERPOLATOR_OK) {
+        return INTERPOLATOR_ERR_JUMP;
+    }
+    int64_t point[2];
+    it->kernel->segment_at(&it->segment->path, point, arc_length_q40_mm);
+    out->arc_length_q40_mm = arc_length_q40_mm;
+    out->x_q40_mm = point[0];
+    out->y_q40_mm = point[1];
+    return INTERPOLATOR_OK;
+}
+
+int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece,
+                          uint64_t time_q42_s, struct interpolator_point *out)
+{
+    if (time_q42_s >= piece->end_q42_s) {
+        return beyond(it, time_q42_s, out);
+    }
+    struct feed_point f;
+    evaluate_feed(it, piece, time_q42_s, &f);
+    if (evaluate_path(it, f.arc_length_q40_mm, MOST_ENDS, out) != INTERPOLATOR_OK) {
+        return INTERPOLATOR_ERR_JUMP;
+    }
+    out->feed_q32_mm_s = f.feed_q32_mm_s;
+    return INTERPOLATOR_OK;
+}
+
+int interpolator_at_q42(struct interpolator *it, uint64_t time_q42_s,
+                        struct interpolator_point *out)
+{
+    if (time_q42_s < it->duration_q42_s &&
+        find_piece(it, time_q42_s, MOST_ENDS) != INTERPOLATOR_OK) {
+        return INTERPOLATOR_ERR_JUMP;
+    }
+    return interpolator_at_piece(it, it->piece, time_q42_s, out);
+}
+
+int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm,
+                               struct interpolator_point *out)
+{
+    const int64_t inside = qmath_lesser(qmath_greater(arc_length_q40_mm, 0), it->length_q40_mm);
+    const int result = evaluate_path(it, inside, INTERPOLATOR_MOST_SEGMENTS, out);
+    if (result == INTERPOLATOR_OK) {
+        out->feed_q32_mm_s = 0;
+    }
+    return result;
+}
+
+int64_t interpolator_acceleration_q40(const struct interpolator *it,
+                                      const struct coefficients_piece *piece, uint64_t time_q42_s)
+{
+    return it->kernel->piece_acceleration(&piece->feed, time_q42_s - piece->start_q42_s);
+}
+
+void interpolator_search_begin(struct interpolator_search *search,
+                               const struct coefficients_piece *piece, uint32_t index,
+                               int64_t arc_length_q40_mm)
+{
+    search->arc_length_q40_mm = arc_length_q40_mm;
+    search->time_q42_s = 0;
+    search->piece = piece;
+    search->piece_index = index;
+    search->bisecting = 0;
+}
+
+int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search)
+{
+    const struct program *p = it->program;
+    const struct coefficients_piece *piece = search->piece;
+    if (search->bisecting == 0) {
+        const uint32_t next = search->piece_index + 1u;
+        if (next < p->header.piece_count &&
+            program_piece_start(p, next) <= search->arc_length_q40_mm) {
+            search->piece_index = next;
+            search->piece = coefficients_piece_next(piece, it->kernel);
+        } else {
+            search->low_q42_s = piece->start_q42_s;
+            search->high_q42_s = piece->end_q42_s - 1u;
+            search->bisecting = 1;
+        }
+        return 0;
+    }
+    if (search->low_q42_s < search->high_q42_s) {
+        struct feed_point f;
+        const uint64_t middle = search->low_q42_s + (search->high_q42_s - search->low_q42_s) / 2u;
+        evaluate_feed(it, piece, middle, &f);
+        if (f.arc_length_q40_mm >= search->arc_length_q40_mm) {
+            search->high_q42_s = middle;
+        } else {
+            search->low_q42_s = middle + 1u;
+        }
+    }
+    search->time_q42_s = search->low_q42_s;
+    return search->low_q42_s == search->high_q42_s;
+}
+
+int interpolator_at(struct interpolator *it, uint64_t time_q32_s, struct interpolator_point *out)
+{
+    const uint64_t duration_q32_s = qmath_q32_of_q42(it->duration_q42_s);
+    const uint64_t time_q32_s_inside = time_q32_s < duration_q32_s ? time_q32_s : duration_q32_s;
+    return interpolator_at_q42(it, qmath_q42_of_q32(time_q32_s_inside), out);
+}
+
+int interpolator_seek(struct interpolator *it, uint64_t time_q32_s)
+{
+    const uint64_t last_q32_s = qmath_q32_of_q42(it->duration_q42_s) - 1u;
+    const uint64_t time_q42_s = qmath_q42_of_q32(time_q32_s < last_q32_s ? time_q32_s : last_q32_s);
+    struct feed_point f;
+    if (time_q42_s < it->piece->start_q42_s) {
+        it->piece = coefficients_piece_at(it->program, it->kernel, 0);
+    }
+    find_piece(it, time_q42_s, UINT32_MAX);
+    evaluate_feed(it, it->piece, time_q42_s, &f);
+    find_segment(it, f.arc_length_q40_mm, UINT32_MAX);
+    return 0;
+}

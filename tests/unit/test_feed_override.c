@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: MIT */
+/* When a hold may begin at once: far from the end of the program, by the worst stops of its header. */
+#include "core/feed_override.h"
+
+#include "golden.h"
+#include "unity.h"
+
+enum { TICKS = 100 };
+
+static struct program p;
+static struct golden_prepared prepared;
+static struct interpolator it;
+static struct feed_override feed;
+static struct interpolator_point point;
+
+void setUp(void)
+{
+    golden_open(&p, "heart_minimax.hdgp");
+    golden_prepare(&prepared, &p, KERNEL_FIXED);
+}
+
+void tearDown(void)
+{
+    golden_discard(&prepared);
+    golden_close(&p);
+}
+
+/* To the middle of the program, at 100 %. */
+static void run(void)
+{
+    feed_override_begin(&feed, &prepared.program, p.header.period_us, 0);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &prepared.program));
+    for (int k = 0; k < TICKS; k++) {
+        TEST_ASSERT_EQUAL_INT(0, feed_override_next(&feed, &it, &point));
+    }
+}
+
+/* The first tick of a hold: the override is 0 in a brake. */
+static int brakes_at_once(uint32_t worst_um, uint32_t worst_us)
+{
+    run();
+    prepared.program.header.hold_worst_um = worst_um;
+    prepared.program.header.hold_worst_us = worst_us;
+    feed_override_hold(&feed);
+    TEST_ASSERT_EQUAL_INT(0, feed_override_next(&feed, &it, &point));
+    return feed_override_actual_q30(&feed) == 0u;
+}
+
+/* As long as the way that is left is enough: not when a micrometre of it is missing. */
+static void test_way_to_the_end(void)
+{
+    run();
+    const double left_mm =
+        (double)(p.header.length_q40_mm - point.arc_length_q40_mm) / 1099511627776.0;
+    const uint32_t left_um = (uint32_t)(left_mm * 1000.0);
+    TEST_ASSERT_TRUE(left_um > 1000u);
+    TEST_ASSERT_TRUE(brakes_at_once(left_um, 0));
+    TEST_ASSERT_FALSE(brakes_at_once(left_um + 1u, 0));
+}
+
+static void test_time_to_the_end(void)
+{
+    run();
+    const uint64_t left_q42_s = (p.header.duration_q32_s << 10) - feed_override_time_q42(&feed);
+    const uint32_t left_us = (uint32_t)((double)left_q42_s * 1e6 / 4398046511104.0);
+    TEST_ASSERT_TRUE(left_us > 1000u);
+    TEST_ASSERT_TRUE(brakes_at_once(0, left_us));
+    TEST_ASSERT_FALSE(brakes_at_once(0, left_us + 1u));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_way_to_the_end);
+    RUN_TEST(test_time_to_the_end);
+    return UNITY_END();
+}
