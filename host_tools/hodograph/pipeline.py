@@ -12,9 +12,20 @@ from time import perf_counter
 
 from .config import Drive, Machine, PathFile, is_there, load_machine, load_path_file
 from .errors import InputError, PlanError
-from .feed import AxisLimits, ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
-from .feed.ineffective_limits import ineffective_limits
-from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
+from .feed import (
+    AxisLimits,
+    ControllerLimits,
+    FeedPlan,
+    FeedRequest,
+    Limits,
+    Peak,
+    Plant,
+    Replan,
+    ineffective_limits,
+    plan_path,
+    replan,
+)
+from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
 from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
@@ -232,7 +243,7 @@ class Pipeline:
         return self.file.feed
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> FeedPlan:
         """The feed over the spline, before the program is made of it (`compilation.plan`)."""
         return self._timed_plan[0]
 
@@ -254,23 +265,21 @@ class Pipeline:
         """Where every limited quantity of the plan comes nearest to its limit."""
         plan, machine, limits = self.plan, self.machine_or_none, self.limits
         controller = controller_limits(machine) if machine is not None else None
-        bounds = gather(self.feed, limits, controller, plants(machine, limits), plan.period_us)
         spline = self.spline_result.spline
-        return find_peaks(spline, bounds, track_of(plan.raw, spline.length_mm))
+        return plan_peaks(plan, spline, limits, controller, plants(machine, limits))
 
     @cached_property
-    def _timed_plan(self) -> tuple[Plan, float]:
+    def _timed_plan(self) -> tuple[FeedPlan, float]:
         begin = perf_counter()
         plan = self._planned(self.limits)
         return plan, perf_counter() - begin
 
-    def _planned(self, limits: Limits) -> Plan:
+    def _planned(self, limits: Limits) -> FeedPlan:
         feed, machine = self.feed, self.machine_or_none
         spline = self.spline_result.spline
         controller = controller_limits(machine) if machine is not None else None
         period_us = machine.period_us if machine is not None else 1000
         with _told_by(f"{self.file.file}:"):
-            plan: Plan
             make = plan_optimal if feed.optimal else plan_path
             plan = make(
                 spline,
@@ -280,7 +289,7 @@ class Pipeline:
                 plants(machine, limits),
                 period_us=period_us,
             )
-            return fit_plan(spline, plan)
+            return fit_plan(spline, plan, self._replan)
 
     @property
     def compilation(self) -> Compilation:
@@ -303,7 +312,11 @@ class Pipeline:
             judged = _judge(self._compiled(self._planned(roomier)), machine)
         return judged
 
-    def _compiled(self, plan: Plan) -> Compilation:
+    @property
+    def _replan(self) -> Replan:
+        return replan_optimal if self.feed.optimal else replan
+
+    def _compiled(self, plan: FeedPlan) -> Compilation:
         machine = self.machine
         limits = program_limits(machine)
         spline = self.spline_result.spline
@@ -318,6 +331,7 @@ class Pipeline:
                     machine.period_us,
                     self.stop_terms,
                 ),
+                self._replan,
             )
 
     @property
@@ -347,9 +361,9 @@ class Pipeline:
             )
         return self._judged.native
 
-    def notes(self, plan: Plan) -> tuple[str, ...]:
+    def notes(self, plan: FeedPlan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""
-        excesses = tuple(f"feed: {excess}" for excess in plan.excesses)
+        excesses = tuple(f"feed: {excess.excess_text}" for excess in plan.excesses)
         limits = self.file.limits
         length_mm = self.spline_result.spline.length_mm
         idle = ineffective_limits(

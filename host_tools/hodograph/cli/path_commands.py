@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..bustime import require_fit
 from ..config import Machine
 from ..errors import HodographError, InputError
-from ..feed import Plan
+from ..feed import FeedPlan
 from ..native import NativeProgram
 from ..pipeline import Pipeline, load_pipeline
 from ..program import Program, decode, inspect_dict, inspect_text
@@ -80,7 +80,7 @@ def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray
     return np.minimum(array, end)
 
 
-def print_notes(chain: Pipeline, plan: Plan) -> None:
+def print_notes(chain: Pipeline, plan: FeedPlan) -> None:
     """The notes of a path, each with the file's name."""
     for line in chain.notes(plan):
         note(f"{chain.file.file.name}: {line}")
@@ -99,7 +99,7 @@ def feed(options: Namespace) -> None:
         "duration_s": plan.duration_s,
         "planning_s": chain.planning_s,
         "peak": {
-            name: {"value": peak.value, "limit": peak.limit, "at_mm": peak.s_mm}
+            name: {"value": peak.value, "limit": peak.limit.given, "at_mm": peak.s_mm}
             for name, peak in chain.peaks.items()
         },
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
@@ -134,7 +134,8 @@ def feed(options: Namespace) -> None:
     print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
     for name, peak in chain.peaks.items():
         print(
-            f"{name:28} {peak.value:12.6g} {peak.limit:12.6g} {100.0 * peak.share:8.2f} {peak.s_mm:12.6g}"
+            f"{name:28} {peak.value:12.6g} {peak.limit.given:12.6g} "
+            f"{100.0 * peak.value / peak.limit.given:8.2f} {peak.s_mm:12.6g}"
         )
     if options.at is not None:
         print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from argparse import Namespace
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 
 from ..config import PLANE_AXES, Drive, Machine
 from ..errors import InputError, LimitError
+from ..feed import Peak
 from ..native.program import NativeFault, NativeProgram
 from ..pipeline import Pipeline, controller_verdict, load_pipeline, proved_limits
 from ..program import compile_program, encode
@@ -16,7 +18,6 @@ from ..program.compiler import ProgramOptions
 from ..verify import (
     TOLERANCE,
     BusNoise,
-    Peak,
     Sampled,
     Verification,
     bus_noise,
@@ -54,7 +55,7 @@ def verify(options: Namespace) -> None:
     if fault is not None:
         raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
     if not found.kept:
-        beyond = [peak.quantity for peak in found.peaks if not peak.kept]
+        beyond = [peak.quantity for peak in found.exceeded]
         raise LimitError(
             f"{options.file}: beyond its limits by more than {100 * TOLERANCE:g} %: {', '.join(beyond)}"
         )
@@ -121,11 +122,12 @@ def _document(
 
 
 def _entry(peak: Peak) -> dict[str, object]:
+    limited = isfinite(peak.limit.value)
     return {
         "value": peak.value,
-        "at_most": peak.at_most,
-        "limit": peak.limit,
-        "ratio": peak.ratio,
+        "at_most": peak.most,
+        "limit": peak.limit.value if limited else None,
+        "ratio": peak.usage if limited else None,
         "s_mm": peak.s_mm,
         "t_s": peak.t_s,
     }
@@ -165,10 +167,11 @@ def _text(found: Verification, drives_see: tuple[Sampled, ...], noise: BusNoise)
 
 
 def _row(peak: Peak) -> str:
-    limit = "-" if peak.limit is None else number(peak.limit)
-    ratio = "-" if peak.ratio is None else f"{peak.ratio:.5f}"
+    limited = isfinite(peak.limit.value)
+    limit = number(peak.limit.value) if limited else "-"
+    ratio = f"{peak.usage:.5f}" if limited else "-"
     return (
-        f"{peak.quantity:<24} {number(peak.value):>12} {number(peak.at_most):>12} {limit:>10} {ratio:>8} "
+        f"{peak.quantity:<24} {number(peak.value):>12} {number(peak.most):>12} {limit:>10} {ratio:>8} "
         f"{peak.s_mm:>10.4f} {peak.t_s:>9.4f}"
     )
 

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed import AxisLimits, FeedCap, FeedRequest, Limits
+from ..feed import AxisLimits, FeedRequest, FeedZone, Limits
 from ..feed.limits import GREATEST_RESERVE, LEAST_RESERVE, POLICIES
 from ..feed.request import (
     GREATEST_DEGREE,
@@ -182,7 +182,7 @@ def _limits(table: Table) -> Limits:
         volts=table.optional_number("volts", low=1e-3, high=1e3),
         axis=_axis_limits(table.table("axis", _AXIS_LIMITS, required=False)),
         reserve=table.number("reserve", Limits.reserve, low=LEAST_RESERVE, high=GREATEST_RESERVE),
-        caps=tuple(_cap(one) for one in table.tables("cap", _CAP, required=False)),
+        zones=tuple(_zone(one) for one in table.tables("cap", _CAP, required=False)),
     )
 
 
@@ -194,8 +194,8 @@ def _axis_limits(table: Table) -> AxisLimits:
     )
 
 
-def _cap(table: Table) -> FeedCap:
+def _zone(table: Table) -> FeedZone:
     from_mm, to_mm = (table.number(key, low=0.0, high=1e7) for key in ("from_mm", "to_mm"))
     if not from_mm < to_mm:
         raise table.error("from_mm", f"is {from_mm:g}: must be below to_mm = {to_mm:g}")
-    return FeedCap(from_mm, to_mm, table.number("feed_mm_s", **_FEEDS))
+    return FeedZone(from_mm, to_mm, table.number("feed_mm_s", **_FEEDS))

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from matplotlib import pyplot
 
-from ..feed import Plan
+from ..feed import FeedPlan
 from ..paper import chord_acceleration_mm_s2, joint_disturbance
 from ..pipeline import Pipeline
 from .style import BLUE, GREY, ORANGE, png
 
 
-def joint_figure(chain: Pipeline, plan: Plan) -> bytes:
+def joint_figure(chain: Pipeline, plan: FeedPlan) -> bytes:
     """First and second differences of chord speed along the whole path, joints marked."""
     spline = chain.spline_result.spline
     period_s = plan.period_us / 1e6

@@ -30,7 +30,7 @@ def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str
     for one in found.values():
         # A difference is a mean of the derivative, plus what the kernel's rounding adds.
         for axis, name_ in enumerate("xy"):
-            jerk = peaks[f"{name_}_jerk_mm_s3"].at_most
+            jerk = peaks[f"{name_}_jerk_mm_s3"].most
             assert one.jerk_mm_s3[axis] <= jerk + one.noise_mm_s3 + 0.01
             assert one.jerk_mm_s3[axis] >= 0.98 * jerk - one.noise_mm_s3
     assert found["double"].noise_mm_s3 == 0.0
