@@ -20,7 +20,7 @@ from hodograph.bus.capture.frames import FRAME_DTYPE, Frames
 from hodograph.monitor.decoder import Decoder
 from hodograph.monitor.derived import Derivation
 from hodograph.monitor.messages import encode, rows_message
-from hodograph.monitor.path import ProgramPath
+from hodograph.monitor.derived import ProgramPath
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 

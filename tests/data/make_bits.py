@@ -19,7 +19,7 @@ from hodograph.errors import HodographError
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.request import PERIODS_US, PROFILES
 from hodograph.program import Program, ProgramOptions, check, compile_program, encode
-from hodograph.program.limits import ProgramLimits
+from hodograph.program.image import ProgramLimits
 from hodograph.spline import PHSpline, from_control_polygon, line
 
 HERE = Path(__file__).resolve().parent

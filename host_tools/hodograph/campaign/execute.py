@@ -10,7 +10,7 @@ from ..errors import HodographError, one_line
 from ..native import NativeProgram
 from ..simulate import simulate
 from .definition import Source
-from .design import Design, Run
+from .run_settings import Design, Run
 
 QUANTITIES = (
     "max_contour_error_um",

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import Design
 from .execute import QUANTITIES
-from .results import Results
-from .table import case_texts
+from .results import Results, case_texts
+from .run_settings import Design
 
 SHARES = (50.0, 95.0, 100.0)
 """Percentiles that are told of the greatest contour error."""

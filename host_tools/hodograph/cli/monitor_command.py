@@ -42,7 +42,7 @@ def monitor(options: Namespace) -> None:
 def _replay(
     options: Namespace, machine: Machine | None, image: bytes | None
 ) -> tuple[Live | Replay, Layout]:
-    from ..monitor.replay import ReplaySource, load_recording
+    from ..monitor.source import ReplaySource, load_recording
 
     if not options.speed > 0:
         raise InputError(f"--speed: must be more than 0, but is {options.speed:g}")

@@ -17,8 +17,7 @@ from ..native import NativeProgram
 from ..pipeline import Pipeline, load_pipeline
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.check import check
-from ..program.image import MAGIC
-from ..program.memory import LARGEST_BANK, RECORD_BYTES, memory_bytes
+from ..program.image import LARGEST_BANK, MAGIC, RECORD_BYTES, memory_bytes
 from ..program.stops import stops_dict, stops_text
 from ..simulate import Motion, StoppedRun, last_tick_s, simulate, simulate_stop, write_trace
 from .output import json_text, note, number, print_json, print_rows, progress, write_file

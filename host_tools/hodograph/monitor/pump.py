@@ -21,10 +21,9 @@ from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.diagnostics.texts import drive_state
 from ..errors import BusError, InputError
 from .decoder import Decoder, Samples
-from .derived import Derivation
+from .derived import Derivation, ProgramPath
 from .emergencies import Emergencies
 from .messages import path_message, rows_message
-from .path import ProgramPath
 from .source import Source, Taken
 
 LOOK_S = 0.04

@@ -13,8 +13,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from ..errors import HodographError, InputError
-from .client_slots import ClientSlots
-from .hub import Client, Hub
+from .clients import Client, ClientSlots, Hub
 from .messages import encode
 from .security import HEADERS, Guard
 

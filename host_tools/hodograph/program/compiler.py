@@ -13,13 +13,10 @@ from ..errors import InputError, PlanError
 from ..feed import FeedPlan, FeedZone, Replan, replan
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
-from .check import Fault, check
-from .check_segments import boxes_q40
+from .check import LEAST_FEED_MM_S, Fault, boxes_q40, brief_pairs, check
 from .codes import ProgramError
 from .geometry import quantise
-from .image import NAME_SIZE, Program
-from .limits import ProgramLimits
-from .neighbours import LEAST_FEED_MM_S, brief_pairs
+from .image import NAME_SIZE, Program, ProgramLimits
 from .stop_planning import StopTerms, plan_stops
 from .stops import no_stops
 

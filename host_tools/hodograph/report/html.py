@@ -13,9 +13,8 @@ from ..paper.compare import CASES
 from ..pipeline import Pipeline, proved_limits
 from ..simulate import Motion
 from .feed_figures import feed_figure, search_figure
-from .joint_figures import joint_figure
 from .page import Figure, file_name, render, write_page
-from .path_figures import polygon_figure
+from .path_figures import joint_figure, polygon_figure
 from .run_figures import contour_figure, drive_figure
 from .style import styled
 

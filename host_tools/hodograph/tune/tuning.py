@@ -14,8 +14,7 @@ from ..errors import PlanError
 from ..pipeline import Pipeline
 from .cases import CASES, Drives, Forward, Outcome, outcomes
 from .design import Poles, feedforward_of, pole_for_stiffness, stiffness_n_um, with_poles
-from .loop import loop_of
-from .margins import margins
+from .loop import loop_of, margins
 from .result import AxisResult, CaseResult, PathResult, Side, Tuning
 from .search import Wanted, best_poles
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .bounds import bends
 from .cells import Cells
-from .motion import Motion, motion_at
+from .instants import Motion, motion_at
 from .quantities import Quantity
 
 Real = NDArray[np.float64]

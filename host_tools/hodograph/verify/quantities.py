@@ -14,7 +14,7 @@ from ..config import Drive
 from ..errors import InputError
 from ..feed import FeedZone, Limit, Limits
 from .cells import Cells
-from .motion import Motion
+from .instants import Motion
 
 Real = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from ..config import Drive
 from ..feed import Limit, Limits, Peak
 from ..program import Program
 from .cells import Cells, cut
-from .motion import motion_at
+from .instants import motion_at
 from .peaks import CellMaxima, cell_peaks, refine, scales
 from .quantities import Quantity, quantities
 

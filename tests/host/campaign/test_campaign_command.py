@@ -14,13 +14,11 @@ import pytest
 from campaign_files import EXAMPLES, MACHINE, PATH, Write, table
 from filelock import lock_descriptor
 
-from hodograph.campaign import engine as engines
 from hodograph.campaign import runner
+from hodograph.campaign import runner as engines
 from hodograph.campaign.definition import load_campaign
-from hodograph.campaign.engine import Here
-from hodograph.campaign.journal import NAME, journal
-from hodograph.campaign.runner import run_campaign
-from hodograph.campaign.table import write_csv
+from hodograph.campaign.results import NAME, journal, write_csv
+from hodograph.campaign.runner import Here, run_campaign
 from hodograph.cli.main import main
 from hodograph.native import RigFault
 from hodograph.pipeline import load_pipeline

@@ -18,7 +18,7 @@ from hodograph.native.program import NativeProgram
 from hodograph.program import Program, compile_program, encode
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify.cells import cut
-from hodograph.verify.motion import motion_at
+from hodograph.verify.instants import motion_at
 
 PLANTS = (Plant(132.0, 0.19936, 2.5), Plant(80.3, 0.15641, 3.5, 0.2))
 COUNT_S, MOST_TICKS = 5, 4000

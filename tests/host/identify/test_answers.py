@@ -8,7 +8,7 @@ import pytest
 
 from hodograph.errors import RunError
 from hodograph.identify import identify_axis, stretches
-from hodograph.identify.answers import LATE_SYNCS, answered
+from hodograph.identify.stretches import LATE_SYNCS, answered
 
 from .recorded import REST, chain_of, drives_of, packed, recording
 

@@ -8,8 +8,7 @@ import pytest
 
 from hodograph.errors import InputError
 from hodograph.monitor.decoder import Decoder
-from hodograph.monitor.derived import Derivation, Rows, derivative_weights
-from hodograph.monitor.path import ProgramPath
+from hodograph.monitor.derived import Derivation, ProgramPath, Rows, derivative_weights
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import Motion, simulate
 from traffic import EXAMPLES, alpha

@@ -10,7 +10,7 @@ from hodograph.feed import Limits
 from hodograph.program import Program
 from hodograph.verify.bounds import bends
 from hodograph.verify.cells import cut
-from hodograph.verify.motion import motion_at
+from hodograph.verify.instants import motion_at
 from hodograph.verify.quantities import quantities
 
 mp = mpmath.mp.clone()

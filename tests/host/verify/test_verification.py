@@ -15,7 +15,7 @@ from hodograph.pipeline import load_pipeline
 from hodograph.program import Program
 from hodograph.verify import verify_program
 from hodograph.verify.cells import cut
-from hodograph.verify.motion import motion_at
+from hodograph.verify.instants import motion_at
 from hodograph.verify.peaks import GAP
 from hodograph.verify.quantities import quantities
 
