@@ -19,7 +19,7 @@ class InputError(HodographError):
 
 
 class PlanError(HodographError):
-    """The input is well formed, but the path or the feed asked for is not possible."""
+    """The input is well formed, but the path or the requested feed is not possible."""
 
     exit_status = 3
 

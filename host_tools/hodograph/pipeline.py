@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a path file to a program: the steps that all commands share, each computed once and when asked for."""
+"""From a path file to a program: the steps that all commands share, each computed once, on request."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def proved_limits(machine: Machine) -> str:
     )
 
 
-_MORE_ROOM = (0.002, 0.01)
+_MORE_RESERVE = (0.002, 0.01)
 """Further shares of the machine's axis limits that are left free where the controller could not prove a plan."""
 _PROVED = (
     ProgramError.AXIS_VELOCITY,
@@ -167,7 +167,7 @@ _PROVED = (
     ProgramError.AXIS_JERK,
     ProgramError.AXIS_STEP,
 )
-"""What more room may mend."""
+"""Faults that lower limits may avoid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +186,7 @@ def _judge(compilation: Compilation, machine: Machine) -> _Judged:
 
 @dataclass(frozen=True, eq=False)
 class Pipeline:
-    """A path file and everything computed from it. Errors come when a step is first asked for."""
+    """A path file and everything computed from it. Errors come when a step is first requested."""
 
     file: PathFile
     given_machine: Path | Machine | None = None
@@ -222,7 +222,7 @@ class Pipeline:
     def spline_result(self) -> SplineResult:
         """The spline and how it was found."""
         path = self.file.path
-        with _told_by(f"{self.file.file}: [path]"):
+        with _named_by(f"{self.file.file}: [path]"):
             if not path.through:
                 return from_control_polygon(path.points, path.closed)
             return through_points(
@@ -235,7 +235,7 @@ class Pipeline:
 
     @property
     def feed(self) -> FeedRequest:
-        """The feed asked for; raises InputError when the file has no section [feed]."""
+        """The requested feed; raises InputError when the file has no section [feed]."""
         if self.file.feed is None:
             raise InputError(
                 f"{self.file.file}: the section [feed] is missing: add it with nominal_mm_s and ramp_time_s"
@@ -279,7 +279,7 @@ class Pipeline:
         spline = self.spline_result.spline
         controller = controller_limits(machine) if machine is not None else None
         period_us = machine.period_us if machine is not None else 1000
-        with _told_by(f"{self.file.file}:"):
+        with _named_by(f"{self.file.file}:"):
             make = plan_optimal if feed.optimal else plan_path
             plan = make(
                 spline,
@@ -301,15 +301,15 @@ class Pipeline:
         """The first program that the controller accepts; where it accepts none, the last one tried.
 
         The controller's bounds of what lies between its samples may be too wide for a plan that uses a limit fully.
-        Such a plan is made again with more room.
+        Such a plan is made again with lower limits.
         """
         machine, limits = self.machine, self.limits
         judged = _judge(self._compiled(self.plan), machine)
-        for room in _MORE_ROOM:
+        for reserve in _MORE_RESERVE:
             if judged.fault is None or judged.fault.code not in _PROVED:
                 break
-            roomier = replace(limits, machine=limits.machine.scaled(1.0 - room))
-            judged = _judge(self._compiled(self._planned(roomier)), machine)
+            lower = replace(limits, machine=limits.machine.scaled(1.0 - reserve))
+            judged = _judge(self._compiled(self._planned(lower)), machine)
         return judged
 
     @property
@@ -320,7 +320,7 @@ class Pipeline:
         machine = self.machine
         limits = program_limits(machine)
         spline = self.spline_result.spline
-        with _told_by(f"{self.file.file}:"):
+        with _named_by(f"{self.file.file}:"):
             return compile_path(
                 spline,
                 plan,
@@ -373,7 +373,7 @@ class Pipeline:
 
 
 @contextmanager
-def _told_by(place: str) -> Iterator[None]:
+def _named_by(place: str) -> Iterator[None]:
     """Errors of the mathematics say first which file, or part of it, they are about."""
     try:
         yield
@@ -382,5 +382,5 @@ def _told_by(place: str) -> Iterator[None]:
 
 
 def load_pipeline(file: Path, machine: Path | None = None) -> Pipeline:
-    """The chain that begins with a path file; raises InputError."""
+    """The pipeline that begins with a path file; raises InputError."""
     return Pipeline(load_path_file(file), machine)

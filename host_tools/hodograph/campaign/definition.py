@@ -127,7 +127,7 @@ class Source:
     path: PathFile
     machine: Machine
 
-    def chain(self, profile: str | None, feed_mm_s: float | None) -> Pipeline:
+    def pipeline(self, profile: str | None, feed_mm_s: float | None) -> Pipeline:
         """The steps to a program, with another profile or feed than the file asks for (None: the file's)."""
         feed = Pipeline(self.path).feed
         feed = replace(
@@ -192,9 +192,9 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
     for name in _list(root, raw, "paths", '["path.toml"]'):
         one = Table(root.file, "", {"paths": name}, ("paths",))
         path = load_path_file(one.present("paths"))
-        chain = Pipeline(path, machine)
-        chain.feed  # noqa: B018  (says what is missing)
-        found.append(Source(path, chain.machine))
+        pipeline = Pipeline(path, machine)
+        pipeline.feed  # noqa: B018  (says what is missing)
+        found.append(Source(path, pipeline.machine))
     return tuple(found)
 
 

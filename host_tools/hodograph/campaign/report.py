@@ -101,7 +101,7 @@ def dependence_figure(
 
 
 GROUPS_COMPARED = 6
-"""Groups in the figure of what the error depends on: more cannot be told apart."""
+"""Groups in the figure of what the error depends on: more cannot be distinguished."""
 ERRORS_SHOWN = 20
 
 

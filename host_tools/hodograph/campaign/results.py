@@ -3,7 +3,7 @@
 campaign go on.
 
 Lines are only ever added. A line that was cut off (the process was killed in the middle of it) is dropped when the file
-is opened again. The first line tells which campaign it belongs to.
+is opened again. The first line names the campaign that it belongs to.
 """
 
 from __future__ import annotations

@@ -35,15 +35,15 @@ _MOST_LINES = 20
 
 def verify(options: Namespace) -> None:
     """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
-    chain = load_pipeline(options.file, options.machine)
-    machine = chain.machine_or_none
-    native = _planned(chain) if options.program is None else _given(options.program)
+    pipeline = load_pipeline(options.file, options.machine)
+    machine = pipeline.machine_or_none
+    native = _planned(pipeline) if options.program is None else _given(options.program)
     program = decode_file(options.program or options.file, native.image)
     fault = None
     if machine is not None and options.program is not None:  # else it has been accepted already
         fault = controller_verdict(native, machine)
     native.require()
-    found = verify_program(program, chain.limits, _drives(machine))
+    found = verify_program(program, pipeline.limits, _drives(machine))
     drives_see = sampled(native)
     counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
     noise = bus_noise(counts_per_mm, program.period_us)
@@ -79,12 +79,14 @@ def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dic
     return {"controller": {"accepted": False} | refusal}
 
 
-def _planned(chain: Pipeline) -> NativeProgram:
-    print_notes(chain, chain.plan)
-    if chain.machine_or_none is not None:
-        return chain.accepted
-    options = ProgramOptions(chain.file.name)
-    return NativeProgram(encode(compile_program(chain.spline_result.spline, chain.plan, options)))
+def _planned(pipeline: Pipeline) -> NativeProgram:
+    print_notes(pipeline, pipeline.plan)
+    if pipeline.machine_or_none is not None:
+        return pipeline.accepted
+    options = ProgramOptions(pipeline.file.name)
+    return NativeProgram(
+        encode(compile_program(pipeline.spline_result.spline, pipeline.plan, options))
+    )
 
 
 def _given(file: Path) -> NativeProgram:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Path files: the curve, the feed asked for, its limits, and the machine to run it on."""
+"""Path files: the curve, the requested feed, its limits, and the machine to run it on."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _check_closing(table: Table, key: str, points: NDArray[np.complex128]) -> No
     """Refuses a tail that seems meant to repeat the first points of a closed path and does not.
 
     It seems so where the last point, or two of the last three, lie within `_CLOSING` of the median
-    distance between neighbours; exact repeats are left to the spline, which drops them.
+    distance between consecutive points; exact repeats are left to the spline, which drops them.
     """
     near = _CLOSING * float(np.median(np.abs(np.diff(points)))) if points.size > 1 else 0.0
     for tail in (1, 3):

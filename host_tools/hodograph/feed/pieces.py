@@ -189,7 +189,7 @@ def derivative_extremes(
 
 
 def way_excess(duration_q32_s: Int, c_q40: Int, halvings: int = 4) -> Real:
-    """How far (M,) each piece goes at most behind its start or beyond its end, in mm, of its bounds after halving."""
+    """How far (M,) each piece goes at most before its start or beyond its end, in mm, of its bounds after halving."""
     seconds = np.ldexp(duration_q32_s.astype(np.float64), -32)
     feed = derivative_bounds(duration_q32_s, c_q40)[0]
     way = np.zeros((len(seconds), DEGREE + 1))

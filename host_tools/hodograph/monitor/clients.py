@@ -83,7 +83,7 @@ class Client:
         self._there.set()
 
     def put(self, text: str) -> None:
-        """Queues a message; the oldest gives way when there is no room."""
+        """Queues a message; the oldest is dropped when there is no space."""
         if len(self._queue) >= QUEUE:
             self._queue.popleft()
             self.dropped += 1

@@ -45,7 +45,7 @@ from .pump import Publish
 
 PAUSE_S = 0.2
 WHOLE_S = 1.5
-"""Between two looks at the state and what moves; between two at everything."""
+"""Between two readings of the state and what moves; between two of everything."""
 _ANSWER_S = 3.0
 _RETRY_S = 1.0
 LONGEST_UPLOAD = 256 * 1024
@@ -244,7 +244,7 @@ def _changed(controller: Controller, status: dict[str, Any]) -> bool:
 
 
 def _moving_part(controller: Controller) -> dict[str, Any]:
-    """What changes from look to look: some objects instead of all, the same keys as in `read_status`."""
+    """What changes from reading to reading: some objects instead of all, the same keys as in `read_status`."""
     return {
         "motion": {
             "arc_length_mm": controller.read(MOTION, 1) * 2.0**-40,

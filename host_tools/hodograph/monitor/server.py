@@ -38,7 +38,7 @@ Obey = Callable[[dict[str, Any]], Awaitable[str]]
 
 
 class Server:
-    """The web application; `greeting` is what a page is told first."""
+    """The web application; `greeting` is the first message to a page."""
 
     def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], obey: Obey) -> None:
         self._guard, self._hub, self._greeting, self._obey = guard, hub, greeting, obey
@@ -195,7 +195,7 @@ def _number(value: object) -> float | int:
 
 
 def _load_pages() -> dict[str, tuple[str, bytes]]:
-    """The files of the page by name: nothing else can be asked for."""
+    """The files of the page by name: nothing else can be requested."""
     pages = {}
     for file in (files(__package__) / "page").iterdir():
         ending = "." + file.name.rpartition(".")[2]

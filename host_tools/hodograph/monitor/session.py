@@ -63,7 +63,7 @@ class Replay:
 
 
 @dataclass(frozen=True)
-class Place:
+class PageAddress:
     """Where the page is served."""
 
     host: str
@@ -78,14 +78,14 @@ class Place:
         return f"http://{host}:{self.port}/#token={self.token}"
 
 
-class Session:
+class LivePage:
     """Serves until SIGINT or SIGTERM. `image` is the program given, None without one."""
 
     def __init__(
         self,
         what: Live | Replay,
         layout: Layout,
-        place: Place,
+        place: PageAddress,
         image: bytes | None,
         say: Callable[[str], None],
     ) -> None:

@@ -103,7 +103,7 @@ class SocketSource:
 
 
 class PythonCanSource:
-    """Any other interface of python-can: a thread receives, the oldest frames give way."""
+    """Any other interface of python-can: a thread receives, the oldest frames are dropped."""
 
     def __init__(self, address: BusAddress, bitrate: int) -> None:
         self._address = address

@@ -42,11 +42,11 @@ _LEAST_FEED_Q24 = 1 << 14
 
 
 def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[Int, Real, Real]:
-    """Pairs of neighbouring segments not longer than the way of one tick at 200 %.
+    """Pairs of consecutive segments not longer than the distance of one tick at 200 %.
 
     joints_q40  (N + 1,) arc lengths of the joints
     Returns the first segment (K,) of each such pair, the pair's way in mm and the highest feed in mm/s that
-    would be slow enough. Pairs with the first or last segment of the path are free of the rule.
+    would be slow enough. Pairs with the first or last segment of the path are exempt.
     """
     if joints_q40.size < 5:
         empty: Real = np.zeros(0)
@@ -140,7 +140,7 @@ def end_faults(program: Program, ways: tuple[Big, Big, Big]) -> list[Rule]:
 
 
 def too_short(program: Program) -> Bool:
-    """Later segments of neighbouring pairs that a tick at 200 % could pass whole."""
+    """Later segments of consecutive pairs that a tick at 200 % could cross."""
     joints = np.append(program.start_q40, program.length_q40)
     mask = np.zeros(program.segment_count, dtype=np.bool_)
     mask[brief_pairs(joints, program.pieces, program.period_us)[0] + 1] = True
@@ -206,7 +206,7 @@ JOIN_ACCELERATION_Q16 = 2.0**10
 """2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
 BACKWARDS_MM_S = -(2.0**-10)
 WAY_SLACK_MM = 2.0**-14
-"""What a piece may go behind its start or beyond its end."""
+"""How far a piece may go before its start or beyond its end."""
 
 
 def piece_faults(program: Program, limits: ProgramLimits | None) -> list[Rule]:
@@ -335,7 +335,7 @@ def _way_q44(d: int, e: int, c: Int) -> int:
 
 
 def _brief(duration: Int, period_us: int) -> Bool:
-    """Neighbours (without first and last piece) that last no longer than two periods together."""
+    """Consecutive pieces (without first and last piece) that last no longer than two periods together."""
     pairs = duration[1:-2] + duration[2:-1]
     return np.asarray(pairs.astype(object) * 1_000_000 <= 2 * period_us << 32, dtype=np.bool_)
 

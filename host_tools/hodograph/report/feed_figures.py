@@ -17,13 +17,13 @@ from .style import BLUE, GREEN, GREY, ORANGE, RED, png
 _SAMPLES = 1600
 
 
-def feed_figure(chain: Pipeline, plan: FeedPlan) -> bytes:
+def feed_figure(pipeline: Pipeline, plan: FeedPlan) -> bytes:
     """Feed, acceleration and jerk of the profile used; whole run and first ramp, with the plain quintic beside it.
 
     Of profile `optimal`, which has no ramps: whole run and first quarter.
     """
     ramps = plan.ramp_time_s is not None
-    plain: FeedPlan = plain_plan(chain) if ramps else plan
+    plain: FeedPlan = plain_plan(pipeline) if ramps else plan
     figure, grid = pyplot.subplots(3, 2, figsize=(9.6, 7.2), width_ratios=(1.5, 1), sharey="row")
     name = plan.profile if plan.n_c is None else f"{plan.profile}, n_c {plan.n_c:.3f}"
     ramp_end_s = 0.25 * plan.duration_s
@@ -43,13 +43,13 @@ def feed_figure(chain: Pipeline, plan: FeedPlan) -> bytes:
         for axes in grid[:, column]:
             axes.set_xlim(0, 1e3 * end_s)
         grid[2, column].set_xlabel("time, ms")
-    _limits(grid[1], chain.file.limits.acceleration_mm_s2)
-    _limits(grid[2], chain.file.limits.jerk_mm_s3)
+    _limits(grid[1], pipeline.file.limits.acceleration_mm_s2)
+    _limits(grid[2], pipeline.file.limits.jerk_mm_s3)
     for axes, label in zip(
         grid[:, 0], ("feed, mm/s", "acceleration, mm/s²", "jerk, mm/s³"), strict=True
     ):
         axes.set_ylabel(label)
-    grid[0, 0].set_title(f"{chain.file.name}: feed along the path")
+    grid[0, 0].set_title(f"{pipeline.file.name}: feed along the path")
     grid[0, 1].set_title("first ramp" if ramps else "first quarter")
     grid[0, 1].legend(loc="lower right")
     return png(figure)

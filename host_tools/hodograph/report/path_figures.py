@@ -17,11 +17,11 @@ from .style import BLUE, GREEN, GREY, ORANGE, plan_axes, png
 _SAMPLES = 2000
 
 
-def polygon_figure(chain: Pipeline) -> bytes:
+def polygon_figure(pipeline: Pipeline) -> bytes:
     """Control polygon or given points, nodal points, PH curve, and the curvature along it."""
-    spline = chain.spline_result.spline
+    spline = pipeline.spline_result.spline
     figure, (plane, curve) = pyplot.subplots(1, 2, figsize=(9.6, 4.4), width_ratios=(1.15, 1))
-    _plane(plane, chain)
+    _plane(plane, pipeline)
     s_mm = np.linspace(0.0, spline.length_mm, _SAMPLES)
     curve.plot(s_mm, spline.curvature(s_mm), color=BLUE)
     for joint in spline.segment_starts_mm:
@@ -33,8 +33,8 @@ def polygon_figure(chain: Pipeline) -> bytes:
     return png(figure)
 
 
-def _plane(axes: Axes, chain: Pipeline) -> None:
-    path, spline = chain.file.path, chain.spline_result.spline
+def _plane(axes: Axes, pipeline: Pipeline) -> None:
+    path, spline = pipeline.file.path, pipeline.spline_result.spline
     given = path.points
     if not path.through:
         polygon = np.append(given, given[0]) if path.closed else given
@@ -62,7 +62,7 @@ def _plane(axes: Axes, chain: Pipeline) -> None:
     _start(axes, spline)
     plan_axes(axes)
     axes.margins(0.06)
-    axes.set_title(f"{chain.file.name}: polygon, nodes, curve")
+    axes.set_title(f"{pipeline.file.name}: polygon, nodes, curve")
     axes.legend(loc="best")
 
 
@@ -78,9 +78,9 @@ def _start(axes: Axes, spline: PHSpline) -> None:
     )
 
 
-def joint_figure(chain: Pipeline, plan: FeedPlan) -> bytes:
+def joint_figure(pipeline: Pipeline, plan: FeedPlan) -> bytes:
     """First and second differences of chord speed along the whole path, joints marked."""
-    spline = chain.spline_result.spline
+    spline = pipeline.spline_result.spline
     period_s = plan.period_us / 1e6
     found = joint_disturbance(spline, plan.feed_mm_s, period_s)
     s_mm = found.s_mm
@@ -101,7 +101,7 @@ def joint_figure(chain: Pipeline, plan: FeedPlan) -> bytes:
         for joint in found.joints_mm:
             axes.axvline(float(joint), color=GREY, linewidth=0.8, linestyle=(0, (2, 3)), zorder=0)
     top.set_title(
-        f"{chain.file.name}: disturbance at constant {plan.feed_mm_s:.4g} mm/s; dashed: joints"
+        f"{pipeline.file.name}: disturbance at constant {plan.feed_mm_s:.4g} mm/s; dashed: joints"
     )
     bottom.legend(
         *top.get_legend_handles_labels(),

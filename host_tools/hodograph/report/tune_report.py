@@ -102,7 +102,7 @@ def step_figure(axis: AxisResult) -> bytes:
     return png(figure)
 
 
-def contour_figure(tuning: Tuning, path: PathResult, chain: Pipeline) -> bytes:
+def contour_figure(tuning: Tuning, path: PathResult, pipeline: Pipeline) -> bytes:
     """Contour error along a path, as given and tuned, of the plant as modelled."""
     machine = tuning.machine
     figure, axes = pyplot.subplots(figsize=(9.6, 3.4))
@@ -122,7 +122,7 @@ def contour_figure(tuning: Tuning, path: PathResult, chain: Pipeline) -> bytes:
         axes.semilogy(motion.t_s, np.maximum(motion.contour_error_um, 1e-4), color, label=label)
     axes.set_ylim(bottom=1e-4)
     axes.minorticks_off()
-    axes.set_title(f"{chain.file.name}: contour error along the run")
+    axes.set_title(f"{pipeline.file.name}: contour error along the run")
     axes.set_xlabel("time, s")
     axes.set_ylabel("contour error, µm")
     axes.margins(x=0)
@@ -130,10 +130,10 @@ def contour_figure(tuning: Tuning, path: PathResult, chain: Pipeline) -> bytes:
     return png(figure)
 
 
-def write_tune_report(tuning: Tuning, chains: Sequence[Pipeline], directory: Path) -> Path:
+def write_tune_report(tuning: Tuning, pipelines: Sequence[Pipeline], directory: Path) -> Path:
     """Writes tune.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
     with styled():
-        figures = list(_figures(tuning, chains))
+        figures = list(_figures(tuning, pipelines))
     text = render(
         "tune.html.j2",
         machine=str(tuning.machine.file),
@@ -146,7 +146,7 @@ def write_tune_report(tuning: Tuning, chains: Sequence[Pipeline], directory: Pat
     return write_page(directory / "tune.html", text, ((one.name, one) for one in figures))
 
 
-def _figures(tuning: Tuning, chains: Sequence[Pipeline]) -> Iterator[Figure]:
+def _figures(tuning: Tuning, pipelines: Sequence[Pipeline]) -> Iterator[Figure]:
     for axis in tuning.axes:
         name = file_name(axis.name, "unnamed")
         yield Figure(
@@ -155,9 +155,9 @@ def _figures(tuning: Tuning, chains: Sequence[Pipeline]) -> Iterator[Figure]:
             frequency_figure(axis),
         )
         yield Figure(f"step_{name}", f"Axis {axis.name}: step responses.", step_figure(axis))
-    for path, chain in zip(tuning.paths, chains, strict=True):
+    for path, pipeline in zip(tuning.paths, pipelines, strict=True):
         yield Figure(
             f"contour_{file_name(path.name, 'unnamed')}",
             f"{path.name}: contour error along the run, the plant as modelled.",
-            contour_figure(tuning, path, chain),
+            contour_figure(tuning, path, pipeline),
         )

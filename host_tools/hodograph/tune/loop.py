@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The servo loop of one axis as a linear sampled system, and its margins; docs/theory/numerics.md section 17.
 
-Exact for the simulated drive (sim/plant) but for what is not linear: encoder increments, voltage limit, friction.
+Exact for the simulated drive (sim/plant) but for nonlinear parts: encoder increments, voltage limit, friction.
 """
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ def cell_peaks(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real
 
 
 def _spans(count: Int) -> Iterator[tuple[int, int]]:
-    """Neighbouring cells whose samples together are about _CHUNK."""
+    """Consecutive cells whose samples together are about _CHUNK."""
     total = np.cumsum(count)
     first = 0
     while first < count.size:

@@ -25,8 +25,8 @@ def test_examples_are_faster_than_the_paper_and_keep_every_limit(name: str, shar
 
 
 def test_the_plan_and_its_pieces_agree() -> None:
-    chain = load_pipeline(EXAMPLES / "alpha_optimal.toml")
-    plan, pieces = chain.plan, chain.program.pieces
+    pipeline = load_pipeline(EXAMPLES / "alpha_optimal.toml")
+    plan, pieces = pipeline.plan, pipeline.program.pieces
     start = np.concatenate(([0], np.cumsum(pieces.duration_q32_s))) * 2.0**-32
     assert np.abs(plan.arc_length(start[:-1]) - pieces.start_q40 * 2.0**-40).max() < 1e-11
     assert plan.arc_length(start[-1]) == pytest.approx(plan.length_mm, abs=1e-10)

@@ -29,9 +29,9 @@ def rows_of(chunk: int, path: ProgramPath | None) -> Rows:
 
 
 def motion() -> Motion:
-    chain = load_pipeline(EXAMPLES / "alpha.toml", None)
-    drives = [axis.drive for axis in chain.machine.axes if axis.drive is not None]
-    return simulate(chain.image, drives)
+    pipeline = load_pipeline(EXAMPLES / "alpha.toml", None)
+    drives = [axis.drive for axis in pipeline.machine.axes if axis.drive is not None]
+    return simulate(pipeline.image, drives)
 
 
 @pytest.mark.parametrize("chunk", [200, 333, 100_000])

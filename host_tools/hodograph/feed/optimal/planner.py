@@ -46,7 +46,7 @@ def plan_optimal(
     """The fastest feed along `spline` from rest to rest.
 
     plants  of the axes, where `limits.volts` is given
-    Raises InputError (length, period) and PlanError: limits that no useful feed obeys (which, where, and what
+    Raises InputError (length, period) and PlanError: limits that no useful feed keeps (which, where, and what
     would do).
     """
     check_period(period_us)

@@ -28,7 +28,7 @@ INTERVALS = 960
 """About so many intervals a window."""
 
 _STOPS = 4.0
-"""What is not kept of a window, in times that stopping takes."""
+"""The rejected end of a window, in times that stopping takes."""
 
 _RETREATS = 4
 

@@ -72,7 +72,7 @@ class Solution:
         return float(self.times.sum())
 
     def squared_feed(self, s: Real) -> Real:
-        """q at arc lengths, above 0 at least by a hair."""
+        """q at arc lengths, above 0 by at least 1e-14 of the greatest."""
         return np.maximum(
             squared_feed(self.grid, self.q, self.slope, s), _LEAST_Q * float(self.q.max())
         )
@@ -255,7 +255,7 @@ def _interval_zones(limits: PlanLimits, knots: Real) -> Real:
 class _Rounds:
     """Quadratic programs about the last feed, with further rows where it was above a limit between the others.
 
-    One without a solution is solved with limits that give way: the next, about its feed, has one as a rule.
+    One without a solution is solved with limits that may be exceeded: the next, about its feed, has one as a rule.
     """
 
     def __init__(self, setting: _Setting, estimate: Feed, known: Solution | None = None) -> None:
@@ -267,7 +267,7 @@ class _Rounds:
         self.typical_q = estimate(setting.grid.s)
         self.duration_s = np.inf
         self.best: Solution | None = None
-        self.gave_way = False
+        self.exceeded = False
         if known is not None:
             p, d, dd = setting.points.cubic(setting.grid, known.q, known.slope)
             self.about = About(np.maximum(p, _LEAST_P), (d, dd))
@@ -290,14 +290,14 @@ class _Rounds:
             if self.best.excess <= ALLOWED and abs(gain) < _GAIN * self.duration_s:
                 break
         moving = self.setting.start is not None
-        return None if self.gave_way and moving and not self._tolerable else self.best
+        return None if self.exceeded and moving and not self._tolerable else self.best
 
     @property
     def _tolerable(self) -> bool:
         return self.best is not None and self.best.excess < _TOLERABLE
 
     def _solved(self) -> Real | None:
-        """The unknowns of the next program; where a tolerable feed is known already, None rather than give way."""
+        """The unknowns of the next program; where a tolerable feed is known already, None rather than exceed limits."""
         problem = _problem(
             self.setting,
             make_rows(self.setting.points, self.about, self.select, self.setting.once),
@@ -307,7 +307,7 @@ class _Rounds:
         )
         found = solve(problem)
         if found is None and not self._tolerable:
-            self.gave_way = True
+            self.exceeded = True
             times = _times(self.setting, self.inner_p)
             found = solve(problem, _PENALTY * float(times.sum()))
         return found
