@@ -160,7 +160,7 @@ def planned(case: Case, reserve: float, folder: Path) -> dict[str, Any] | None:
         "segments": spline.segment_count,
         "planning_s": planning_s,
         "kept": found.kept,
-        "worst_ratio": max(peak.ratio or 0.0 for peak in found.peaks),
+        "worst_ratio": max(peak.usage for peak in found.peaks),
         "axis_jerk_mm_s3": max(jerks),
     }
 
