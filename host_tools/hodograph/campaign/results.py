@@ -2,8 +2,8 @@
 """Results of runs: in arrays by number (100 bytes a run), as a table (CSV, RFC 4180), and in a journal that lets a
 campaign go on.
 
-Lines are only ever added. A line that was cut off (the process was killed in the middle of it) is dropped when the file
-is opened again. The first line names the campaign that it belongs to.
+Lines of the journal are only ever added. A line that was cut off (the process was killed in the middle of it) is
+dropped when the file is opened again. The first line names the campaign that it belongs to.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 """A campaign from its file to a complete table, by one of three engines: this process, the cores of this machine, or a
 cluster (the last two by Dask).
 
-Dask is loaded only here and only when it is requested: it takes half a second, and is an extra of the package.
+Dask is loaded only here and only on request: it takes half a second, and is an extra of the package.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The browsers of the live page: client slots, and a bounded queue of messages for each.
 
-A socket that has not said hello yet only waits; when too many wait, the one that has waited longest goes. Of those who
-look on, a new one is sent away when all seats are taken. Who has the token always gets in: at worst the oldest of
-those who have it makes room.
+A socket that has not said hello yet only waits; when too many wait, the one that has waited longest goes. A browser
+that only watches is refused when all slots are taken. One with the token always gets a slot: if need be that of the
+oldest browser with the token.
 
 All methods but `publish` belong to the event loop.
 """
@@ -37,7 +37,7 @@ class ClientSlots(Generic[Socket]):
         return self._waiting.pop(0) if len(self._waiting) > MOST_WAITING else None
 
     def seat(self, socket: Socket, *, may_command: bool) -> Socket | None:
-        """It has said hello: a looker gets itself back when there is no seat."""
+        """It has said hello: a browser that only watches is returned itself when there is no slot."""
         if socket in self._waiting:
             self._waiting.remove(socket)
         if may_command:

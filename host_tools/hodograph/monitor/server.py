@@ -43,7 +43,7 @@ class Server:
     def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], obey: Obey) -> None:
         self._guard, self._hub, self._greeting, self._obey = guard, hub, greeting, obey
         self._pages = _load_pages()
-        self._seats: ClientSlots[web.WebSocketResponse] = ClientSlots()
+        self._slots: ClientSlots[web.WebSocketResponse] = ClientSlots()
         self._closing: set[asyncio.Task[None]] = set()
         self.app = web.Application(middlewares=[self._check], client_max_size=_MOST_REQUEST)
         self.app.router.add_get("/ws", self._socket)
@@ -85,17 +85,17 @@ class Server:
             return web.Response(status=426, headers=HEADERS, text="A WebSocket is wanted here.\n")
         await socket.prepare(request)
         try:
-            self._send_away(self._seats.enter(socket))
+            self._send_away(self._slots.enter(socket))
             await self._serve(socket)
         finally:
-            self._seats.leave(socket)
+            self._slots.leave(socket)
         return socket
 
     async def _serve(self, socket: web.WebSocketResponse) -> None:
         may_command = await self._welcome(socket)
         if may_command is None:
             return
-        too_many = self._seats.seat(socket, may_command=may_command)
+        too_many = self._slots.seat(socket, may_command=may_command)
         if too_many is socket:
             await _close_full(socket)
             return
@@ -161,7 +161,7 @@ class Server:
             return answer | {"text": str(error)}
 
     async def _shut_down(self, _: web.Application) -> None:
-        for socket in self._seats.everybody():
+        for socket in self._slots.everybody():
             await socket.close(code=1001, message=b"the monitor ends")
 
 
