@@ -28,7 +28,7 @@ from hodograph.feed.ramp import (  # noqa: E402
     Ramp,
     exponential_ramp,
     minimax_ramp,
-    optimise_n_c,  # noqa: E402
+    optimise_n_c,
     quintic_ramp,
 )
 from hodograph.program import compile_program, decode, encode  # noqa: E402
