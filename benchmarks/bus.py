@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hodograph.bus.address import parse_address
-from hodograph.bus.run import run_program, station
+from hodograph.bus.run import run_program, run_session
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 
@@ -26,12 +26,12 @@ RUNS = [(name, pace) for pace in ("fast", "real-time") for name in ("alpha", "he
 
 def measure(name: str, pace: str) -> dict[str, Any]:
     """One run of an example."""
-    chain = load_pipeline(ROOT / "examples" / f"{name}.toml")
+    pipeline = load_pipeline(ROOT / "examples" / f"{name}.toml")
     address = parse_address("socketcan:vcan0")
-    with station(chain.machine, address, pace, 5.0, print) as at:
-        run = run_program(at, chain.machine, chain.image, chain.machine.kernel)
-    drives = chain.machine.models(chain.machine.plane)
-    expected = simulate(chain.image, drives, kernel=chain.machine.kernel).summary()
+    with run_session(pipeline.machine, address, pace, 5.0, print) as at:
+        run = run_program(at, pipeline.machine, pipeline.image, pipeline.machine.kernel)
+    drives = pipeline.machine.models(pipeline.machine.plane)
+    expected = simulate(pipeline.image, drives, kernel=pipeline.machine.kernel).summary()
     got = run.summary()
     return {
         "ticks": run.motion.ticks,

@@ -28,9 +28,9 @@ from hodograph.feed.ramp import (  # noqa: E402
     Ramp,
     exponential_ramp,
     minimax_ramp,
+    optimise_n_c,
     quintic_ramp,
 )
-from hodograph.feed.shapes import optimise_n_c  # noqa: E402
 from hodograph.program import compile_program, decode, encode  # noqa: E402
 from hodograph.spline import PHSpline  # noqa: E402
 

@@ -18,9 +18,8 @@ import numpy as np
 
 from hodograph.bus.capture.frames import FRAME_DTYPE, Frames
 from hodograph.monitor.decoder import Decoder
-from hodograph.monitor.derived import Derivation
+from hodograph.monitor.derived import Derivation, ProgramPath
 from hodograph.monitor.messages import encode, rows_message
-from hodograph.monitor.path import ProgramPath
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 
@@ -32,8 +31,8 @@ LOOK_TICKS = 40
 
 def traffic() -> tuple[bytes, Frames]:
     """Program image and frames of the alpha, run and begun again."""
-    chain = load_pipeline(EXAMPLES / "alpha.toml", None)
-    motion = simulate(chain.image, chain.machine.models(chain.machine.plane))
+    pipeline = load_pipeline(EXAMPLES / "alpha.toml", None)
+    motion = simulate(pipeline.image, pipeline.machine.models(pipeline.machine.plane))
     rows = motion.rows
     frames = np.zeros((LAPS * len(rows), FRAMES_A_TICK), dtype=FRAME_DTYPE)
     frames["id"] = [0x080, 0x202, 0x203, 0x182, 0x183]
@@ -44,7 +43,7 @@ def traffic() -> tuple[bytes, Frames]:
     for column, counts in enumerate(values, start=1):
         data = np.tile(counts.astype("<i4"), LAPS).view(np.uint8).reshape(-1, 4)
         frames["data"][:, column, 2:6] = data
-    return chain.image, frames.reshape(-1)
+    return pipeline.image, frames.reshape(-1)
 
 
 def main() -> None:

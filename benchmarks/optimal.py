@@ -99,9 +99,9 @@ def chain_of(case: Case, feed: str, reserve: float, folder: Path) -> Pipeline:
     return load_pipeline(file)
 
 
-def task_of(chain: Pipeline) -> Task:
+def task_of(pipeline: Pipeline) -> Task:
     """What the planner has to obey, its reserve aside: path file and controller."""
-    limits, own = chain.file.limits, controller_limits(chain.machine)
+    limits, own = pipeline.file.limits, controller_limits(pipeline.machine)
     kept = 1.0 - own.kept_free
 
     def least(name: str) -> float:
@@ -110,7 +110,7 @@ def task_of(chain: Pipeline) -> Task:
 
     names = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
     bound_by: Limits = replace(limits, **{name: least(name) for name in names})
-    return Task(chain.spline_result.spline, bound_by, plants(chain.machine, limits))
+    return Task(pipeline.spline_result.spline, bound_by, plants(pipeline.machine, limits))
 
 
 def optimum(task: Task, intervals: int) -> dict[str, Any]:
@@ -143,24 +143,24 @@ def optimum(task: Task, intervals: int) -> dict[str, Any]:
 
 def planned(case: Case, reserve: float, folder: Path) -> dict[str, Any] | None:
     """The planner's own time, peaks and wall time; None where it cannot."""
-    chain = chain_of(case, 'profile = "optimal"\n', reserve, folder)
-    spline = chain.spline_result.spline  # not to be timed
+    pipeline = chain_of(case, 'profile = "optimal"\n', reserve, folder)
+    spline = pipeline.spline_result.spline  # not to be timed
     begin = time.perf_counter()
     try:
-        duration_s = chain.plan.duration_s
+        duration_s = pipeline.plan.duration_s
     except HodographError as error:
         print(f"  {case.name}: {error}", file=sys.stderr)
         return None
     planning_s = time.perf_counter() - begin
-    machine = chain.machine
-    found = verify_program(chain.program, chain.file.limits, machine.models(machine.plane))
-    jerks = next(one for one in sampled(chain.image) if one.kernel == "fixed").jerk_mm_s3
+    machine = pipeline.machine
+    found = verify_program(pipeline.program, pipeline.file.limits, machine.models(machine.plane))
+    jerks = next(one for one in sampled(pipeline.image) if one.kernel == "fixed").jerk_mm_s3
     return {
         "duration_s": duration_s,
         "segments": spline.segment_count,
         "planning_s": planning_s,
         "kept": found.kept,
-        "worst_ratio": max(peak.ratio or 0.0 for peak in found.peaks),
+        "worst_ratio": max(peak.usage for peak in found.peaks),
         "axis_jerk_mm_s3": max(jerks),
     }
 
@@ -191,8 +191,8 @@ def of_the_papers_kind(case: Case, folder: Path) -> dict[str, Any] | None:
 
 def measure(case: Case, intervals: int, folder: Path) -> dict[str, Any]:
     """All figures of one case."""
-    chain = chain_of(case, 'profile = "optimal"\n', LEAST_RESERVE, folder)
-    task = task_of(chain)
+    pipeline = chain_of(case, 'profile = "optimal"\n', LEAST_RESERVE, folder)
+    task = task_of(pipeline)
     out = optimum(task, intervals)
     lower = bound(task.spline, task.limits)
     out |= {"toppra_s": lower.duration_s, "toppra_axis_jerk_mm_s3": lower.axis_jerk_mm_s3}

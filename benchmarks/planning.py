@@ -55,7 +55,7 @@ def measure(segments: int) -> dict[str, Any]:
         "duration_s": plan.duration_s,
         "pieces": len(program.pieces),
         "verify_processor_s": time.process_time() - used,
-        "worst_ratio": max(peak.ratio or 0.0 for peak in found.peaks),
+        "worst_ratio": max(peak.usage for peak in found.peaks),
     }
 
 

@@ -67,7 +67,7 @@ def loops() -> dict[str, tuple[Drives, Forward]]:
 
 
 def between_um(
-    chain: Pipeline, motion: Motion, drives: Drives, forward: Forward
+    pipeline: Pipeline, motion: Motion, drives: Drives, forward: Forward
 ) -> dict[str, float]:
     """Greatest distance of the true position from the curve at any servo sample; how far this model is off at SYNCs;
     samples of both axes at the voltage limit.
@@ -81,7 +81,7 @@ def between_um(
     before = np.concatenate([arc[:1], arc[:-1]])
     parts = np.arange(1, per + 1) / per
     arcs = np.rint(before[:, None] + (arc - before)[:, None] * parts).astype(np.int64)
-    contour = Contour(NativeProgram(chain.image))
+    contour = Contour(NativeProgram(pipeline.image))
     fine = 8_000_000  # counts a mm, so that rounding does not count
     positions = np.stack([np.rint(p.ravel() * fine).astype(np.int32) for p in places], axis=1)
     errors = contour.errors_um(arcs.ravel(), positions, fine)
@@ -138,19 +138,19 @@ def contours() -> dict[str, Any]:
     figures: dict[str, Any] = {}
     tuned = loops()
     for name in PATHS:
-        chain = load_pipeline(EXAMPLES / f"{name}.toml")
-        x, y = chain.machine.models(chain.machine.plane)
+        pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
+        x, y = pipeline.machine.models(pipeline.machine.plane)
         paper: tuple[Drives, Forward] = ((x, y), None)
         figures[name] = {}
         for loop, (drives, forward) in {"paper": paper, **tuned}.items():
-            motion = simulate(chain.image, drives, feedforward=forward)
+            motion = simulate(pipeline.image, drives, feedforward=forward)
             found: dict[str, Any] = {
                 "contour_um": motion.max_contour_error_um,
                 "following_um": motion.max_following_error_um,
                 "volts": motion.max_volts,
             }
             if loop != "tuned_late":
-                found["between_syncs"] = between_um(chain, motion, drives, forward)
+                found["between_syncs"] = between_um(pipeline, motion, drives, forward)
             figures[name][loop] = found
     return figures
 
@@ -173,16 +173,16 @@ def sensitivity() -> dict[str, Any]:
         files = [EXAMPLES / f"{name}.toml" for name in PATHS]
         files += [weaker_volts(name, Path(folder)) for name in PATHS if "optimal" in name]
         for file in files:
-            chain = load_pipeline(file)
-            own_x, own_y = chain.machine.models(chain.machine.plane)
+            pipeline = load_pipeline(file)
+            own_x, own_y = pipeline.machine.models(pipeline.machine.plane)
             loops = {
                 "paper": ((own_x, own_y), None),
                 "no_offsets": ((x, y), None),
                 "tuned": ((x, y), example.plane_feedforward),
             }
-            found: dict[str, Any] = {"duration_s": chain.plan.duration_s}
+            found: dict[str, Any] = {"duration_s": pipeline.plan.duration_s}
             for loop, (drives, forward) in loops.items():
-                runs = outcomes(chain.image, chain.machine.counts_per_mm, drives, forward)
+                runs = outcomes(pipeline.image, pipeline.machine.counts_per_mm, drives, forward)
                 found[loop] = {
                     case.name: {"contour_um": run.contour_error_um, "at_limit": run.saturated}
                     for case, run in zip(CASES, runs, strict=True)
@@ -195,13 +195,13 @@ def plants() -> dict[str, Any]:
     """Errors of the plants found from noisy reports of the alpha and the heart, %, by friction."""
     figures: dict[str, Any] = {}
     for name in ("alpha", "heart"):
-        chain = load_pipeline(EXAMPLES / f"{name}.toml")
-        given = chain.machine.models(chain.machine.plane)
+        pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
+        given = pipeline.machine.models(pipeline.machine.plane)
         for friction in (0.0, 0.2):
             truth = [
                 replace(d, equipment=replace(d.equipment, friction_volts=friction)) for d in given
             ]
-            motion = simulate(chain.image, truth)
+            motion = simulate(pipeline.image, truth)
             found = [
                 _found(motion, axis, truth[axis], seed) for seed in range(SEEDS) for axis in (0, 1)
             ]

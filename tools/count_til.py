@@ -38,9 +38,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--worst", type=int, default=3, help="show so many of the worst ticks")
     parser.add_argument("file", metavar="FILE", type=Path)
     options = parser.parse_args(arguments)
-    chain = load_pipeline(options.file)
+    pipeline = load_pipeline(options.file)
     if options.kernel:
-        chain = replace(chain, given_machine=replace(chain.machine, kernel=options.kernel))
+        pipeline = replace(pipeline, given_machine=replace(pipeline.machine, kernel=options.kernel))
     target = emulator.TARGETS[options.target]
     counter = Counter(options.build, target, "controller", "startup_systick", (_EXCHANGE,))
     with tempfile.TemporaryDirectory() as name:
@@ -50,7 +50,7 @@ def main(arguments: list[str]) -> int:
         plugin = counter.plugin_words(folder / "map", out)
         board = f"{til.EMULATE} {options.target} --plugin {plugin}"
         with til.local_bus() as bus:
-            til.run(chain, bus, "fast", board)
+            til.run(pipeline, bus, "fast", board)
         counts = read(out, len(counter.names))
     show(counter.names, counts[counts[:, _FEED] > 0], options.worst)
     return 0

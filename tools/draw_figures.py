@@ -55,10 +55,10 @@ def example(name: str) -> Pipeline:
 # --- Path and feed ---
 
 
-def draw_path(axes: Axes, chain: Pipeline) -> None:
+def draw_path(axes: Axes, pipeline: Pipeline) -> None:
     """Control polygon, nodal points, and the PH segments of the program in alternating colours."""
-    spline = chain.spline_result.spline
-    polygon, nodes = chain.file.path.points, spline.nodal_points
+    spline = pipeline.spline_result.spline
+    polygon, nodes = pipeline.file.path.points, spline.nodal_points
     axes.plot(polygon.real, polygon.imag, "s--", color=GREY, linewidth=1.0, markersize=4)
     axes.text(polygon[2].real, polygon[2].imag + 1.2, "control polygon", color=SOFT, ha="center")
     for k in range(spline.segment_count):
@@ -94,9 +94,9 @@ def trace(program: NativeProgram, stop: str = "", tick: int = 0) -> Trace:
     return Trace(period_s * np.arange(feed.size), feed, acceleration)
 
 
-def native(chain: Pipeline) -> NativeProgram:
+def native(pipeline: Pipeline) -> NativeProgram:
     """The program of a path, as the controller runs it."""
-    return NativeProgram(encode(chain.compilation.program))
+    return NativeProgram(encode(pipeline.compilation.program))
 
 
 def path_figure() -> Figure:
@@ -104,8 +104,8 @@ def path_figure() -> Figure:
     paper, optimal = example("alpha.toml"), example("alpha_optimal.toml")
     figure, (plane, feed) = pyplot.subplots(1, 2, figsize=(9.6, 4.2))
     draw_path(plane, paper)
-    for chain, color, name in ((paper, BLUE, "exponential"), (optimal, ORANGE, "optimal")):
-        run = trace(native(chain))
+    for pipeline, color, name in ((paper, BLUE, "exponential"), (optimal, ORANGE, "optimal")):
+        run = trace(native(pipeline))
         feed.plot(run.time_s, run.feed, color=color, label=f"profile {name}")
     feed.set(xlabel="time, s", ylabel="feed, mm/s", title="Feed of the same path by two profiles")
     feed.legend()

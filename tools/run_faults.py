@@ -17,8 +17,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from hodograph.faults.case_table import text
 from hodograph.faults.judge import Verdict
-from hodograph.faults.table import text
 
 ROOT = Path(__file__).resolve().parent.parent
 _VIOLATIONS = 6

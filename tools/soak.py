@@ -26,7 +26,7 @@ from bus_checker import BusChecker
 from hodograph.bus.address import BusAddress
 from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.run import run_program, station
+from hodograph.bus.run import run_program, run_session
 from hodograph.errors import HodographError
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import simulate
@@ -46,9 +46,9 @@ class Soak:
         """Plans and simulates the programs. Raises HodographError."""
         self.address = address
         self.note = note
-        self.chains = [load_pipeline(file, machine) for file in PROGRAMS]
-        self.machine = self.chains[0].machine
-        self.expected = [self._simulated(chain) for chain in self.chains]
+        self.pipelines = [load_pipeline(file, machine) for file in PROGRAMS]
+        self.machine = self.pipelines[0].machine
+        self.expected = [self._simulated(pipeline) for pipeline in self.pipelines]
         self.checker = BusChecker(self.machine)
         self.repetitions = 0
         self.program_ticks = 0
@@ -56,10 +56,10 @@ class Soak:
         self.wall_s = 0.0
         self.dropped = 0
 
-    def _simulated(self, chain: Pipeline) -> tuple[str, str]:
+    def _simulated(self, pipeline: Pipeline) -> tuple[str, str]:
         drives = [axis.drive for axis in self.machine.plane if axis.drive is not None]
         counts = self.machine.counts_per_mm
-        motion = simulate(chain.image, drives, kernel=KERNEL, counts_per_mm=counts)
+        motion = simulate(pipeline.image, drives, kernel=KERNEL, counts_per_mm=counts)
         return motion.setpoints_sha256, motion.encoders_sha256
 
     @property
@@ -72,11 +72,11 @@ class Soak:
         begun = told = time.monotonic()
         with (
             Recorder(self.address) as recorder,
-            station(self.machine, self.address, "fast", 10.0, self.note) as at,
+            run_session(self.machine, self.address, "fast", 10.0, self.note) as at,
         ):
             while self.bus_s < seconds:
-                which = self.repetitions % len(self.chains)
-                run = run_program(at, self.machine, self.chains[which].image, KERNEL)
+                which = self.repetitions % len(self.pipelines)
+                run = run_program(at, self.machine, self.pipelines[which].image, KERNEL)
                 found = (run.motion.setpoints_sha256, run.motion.encoders_sha256)
                 if found != self.expected[which]:
                     self.checker.found(f"{PROGRAMS[which].name}: hashes {found}")

@@ -19,7 +19,7 @@ from pathlib import Path
 from emulate import TARGETS
 from hodograph.bus.address import DEFAULT_BUS, parse_address
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.run import BusRun, run_program, station
+from hodograph.bus.run import BusRun, run_program, run_session
 from hodograph.errors import HodographError
 from hodograph.pipeline import Pipeline, load_pipeline
 
@@ -37,21 +37,21 @@ def local_bus(*, virtual: bool = True) -> Iterator[str]:
         yield str(hub.address)
 
 
-def run(chain: Pipeline, bus: str, pace: str, controller: str | None) -> BusRun:
+def run(pipeline: Pipeline, bus: str, pace: str, controller: str | None) -> BusRun:
     """One run; `controller` None: hodograph-controller."""
-    with station(chain.machine, parse_address(bus), pace, 15.0, _note, controller) as at:
-        return run_program(at, chain.machine, chain.image, chain.machine.kernel)
+    with run_session(pipeline.machine, parse_address(bus), pace, 15.0, _note, controller) as at:
+        return run_program(at, pipeline.machine, pipeline.image, pipeline.machine.kernel)
 
 
 def compare(file: Path, options: argparse.Namespace, bus: str) -> bool:
     """Whether both give the same bits."""
-    chain = load_pipeline(file)
+    pipeline = load_pipeline(file)
     pace = "fast" if options.link == "fifo" else "real-time"
     image = f" --image {options.image}" if options.image else ""
     boards = {name: f"{EMULATE} {name} --link {options.link}{image}" for name in options.target}
     found = set()
     for name, controller in {"linux": None, **boards}.items():
-        result = run(chain, bus, pace if controller else "fast", controller)
+        result = run(pipeline, bus, pace if controller else "fast", controller)
         motion = result.motion
         hashes = (motion.setpoints_sha256, motion.encoders_sha256)
         found.add(hashes)

@@ -78,7 +78,7 @@ def bound(spline: PHSpline, limits: Limits) -> Bound:
         kappa = abs(float(spline.curvature(min(max(s, 0.0), spline.length_mm))))
         curve = inf if limits.centripetal_mm_s2 is None else limits.centripetal_mm_s2
         most = min(feed, (curve / max(kappa, 1e-12)) ** 0.5)
-        most = min([most, *(c.feed_mm_s for c in limits.caps if c.from_mm <= s <= c.to_mm)])
+        most = min([most, *(c.feed_mm_s for c in limits.zones if c.from_mm <= s <= c.to_mm)])
         high = np.array([vx, vy, most])
         return np.stack((-high, high), axis=1)
 

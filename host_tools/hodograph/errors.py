@@ -29,7 +29,7 @@ class ToolpathError(InputError):
 
 
 class PlanError(HodographError):
-    """The input is well formed, but the path or the feed asked for is not possible."""
+    """The input is well formed, but the path or the requested feed is not possible."""
 
     exit_status = 3
 

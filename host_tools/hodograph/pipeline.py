@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a path file to a program: the steps that all commands share, each computed once and when asked for."""
+"""From a path file to a program: the steps that all commands share, each computed once, on request."""
 
 from __future__ import annotations
 
@@ -12,9 +12,20 @@ from time import perf_counter
 
 from .config import Drive, Machine, PathFile, is_there, load_machine, load_path_file
 from .errors import InputError, PlanError
-from .feed import AxisLimits, ControllerLimits, FeedRequest, Limits, Plan, Plant, plan_path
-from .feed.ineffective_limits import ineffective_limits
-from .feed.optimal import Peak, find_peaks, gather, plan_optimal, track_of
+from .feed import (
+    AxisLimits,
+    ControllerLimits,
+    FeedPlan,
+    FeedRequest,
+    Limits,
+    Peak,
+    Plant,
+    Replan,
+    ineffective_limits,
+    plan_path,
+    replan,
+)
+from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
 from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
@@ -148,7 +159,7 @@ def proved_limits(machine: Machine) -> str:
     )
 
 
-_MORE_ROOM = (0.002, 0.01)
+_MORE_RESERVE = (0.002, 0.01)
 """Further shares of the machine's axis limits that are left free where the controller could not prove a plan."""
 _PROVED = (
     ProgramError.AXIS_VELOCITY,
@@ -156,7 +167,7 @@ _PROVED = (
     ProgramError.AXIS_JERK,
     ProgramError.AXIS_STEP,
 )
-"""What more room may mend."""
+"""Faults that lower limits may avoid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +186,7 @@ def _judge(compilation: Compilation, machine: Machine) -> _Judged:
 
 @dataclass(frozen=True, eq=False)
 class Pipeline:
-    """A path file and everything computed from it. Errors come when a step is first asked for."""
+    """A path file and everything computed from it. Errors come when a step is first requested."""
 
     file: PathFile
     given_machine: Path | Machine | None = None
@@ -211,7 +222,7 @@ class Pipeline:
     def spline_result(self) -> SplineResult:
         """The spline and how it was found."""
         path = self.file.path
-        with _told_by(f"{self.file.file}: [path]"):
+        with _named_by(f"{self.file.file}: [path]"):
             if not path.through:
                 return from_control_polygon(path.points, path.closed)
             return through_points(
@@ -224,7 +235,7 @@ class Pipeline:
 
     @property
     def feed(self) -> FeedRequest:
-        """The feed asked for; raises InputError when the file has no section [feed]."""
+        """The requested feed; raises InputError when the file has no section [feed]."""
         if self.file.feed is None:
             raise InputError(
                 f"{self.file.file}: the section [feed] is missing: add it with nominal_mm_s and ramp_time_s"
@@ -232,7 +243,7 @@ class Pipeline:
         return self.file.feed
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> FeedPlan:
         """The feed over the spline, before the program is made of it (`compilation.plan`)."""
         return self._timed_plan[0]
 
@@ -254,23 +265,21 @@ class Pipeline:
         """Where every limited quantity of the plan comes nearest to its limit."""
         plan, machine, limits = self.plan, self.machine_or_none, self.limits
         controller = controller_limits(machine) if machine is not None else None
-        bounds = gather(self.feed, limits, controller, plants(machine, limits), plan.period_us)
         spline = self.spline_result.spline
-        return find_peaks(spline, bounds, track_of(plan.raw, spline.length_mm))
+        return plan_peaks(plan, spline, limits, controller, plants(machine, limits))
 
     @cached_property
-    def _timed_plan(self) -> tuple[Plan, float]:
+    def _timed_plan(self) -> tuple[FeedPlan, float]:
         begin = perf_counter()
         plan = self._planned(self.limits)
         return plan, perf_counter() - begin
 
-    def _planned(self, limits: Limits) -> Plan:
+    def _planned(self, limits: Limits) -> FeedPlan:
         feed, machine = self.feed, self.machine_or_none
         spline = self.spline_result.spline
         controller = controller_limits(machine) if machine is not None else None
         period_us = machine.period_us if machine is not None else 1000
-        with _told_by(f"{self.file.file}:"):
-            plan: Plan
+        with _named_by(f"{self.file.file}:"):
             make = plan_optimal if feed.optimal else plan_path
             plan = make(
                 spline,
@@ -280,7 +289,7 @@ class Pipeline:
                 plants(machine, limits),
                 period_us=period_us,
             )
-            return fit_plan(spline, plan)
+            return fit_plan(spline, plan, self._replan)
 
     @property
     def compilation(self) -> Compilation:
@@ -292,22 +301,26 @@ class Pipeline:
         """The first program that the controller accepts; where it accepts none, the last one tried.
 
         The controller's bounds of what lies between its samples may be too wide for a plan that uses a limit fully.
-        Such a plan is made again with more room.
+        Such a plan is made again with lower limits.
         """
         machine, limits = self.machine, self.limits
         judged = _judge(self._compiled(self.plan), machine)
-        for room in _MORE_ROOM:
+        for reserve in _MORE_RESERVE:
             if judged.fault is None or judged.fault.code not in _PROVED:
                 break
-            roomier = replace(limits, machine=limits.machine.scaled(1.0 - room))
-            judged = _judge(self._compiled(self._planned(roomier)), machine)
+            lower = replace(limits, machine=limits.machine.scaled(1.0 - reserve))
+            judged = _judge(self._compiled(self._planned(lower)), machine)
         return judged
 
-    def _compiled(self, plan: Plan) -> Compilation:
+    @property
+    def _replan(self) -> Replan:
+        return replan_optimal if self.feed.optimal else replan
+
+    def _compiled(self, plan: FeedPlan) -> Compilation:
         machine = self.machine
         limits = program_limits(machine)
         spline = self.spline_result.spline
-        with _told_by(f"{self.file.file}:"):
+        with _named_by(f"{self.file.file}:"):
             return compile_path(
                 spline,
                 plan,
@@ -318,6 +331,7 @@ class Pipeline:
                     machine.period_us,
                     self.stop_terms,
                 ),
+                self._replan,
             )
 
     @property
@@ -347,9 +361,9 @@ class Pipeline:
             )
         return self._judged.native
 
-    def notes(self, plan: Plan) -> tuple[str, ...]:
+    def notes(self, plan: FeedPlan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""
-        excesses = tuple(f"feed: {excess}" for excess in plan.excesses)
+        excesses = tuple(f"feed: {excess.excess_text}" for excess in plan.excesses)
         limits = self.file.limits
         length_mm = self.spline_result.spline.length_mm
         idle = ineffective_limits(
@@ -359,7 +373,7 @@ class Pipeline:
 
 
 @contextmanager
-def _told_by(place: str) -> Iterator[None]:
+def _named_by(place: str) -> Iterator[None]:
     """Errors of the mathematics say first which file, or part of it, they are about."""
     try:
         yield
@@ -368,5 +382,5 @@ def _told_by(place: str) -> Iterator[None]:
 
 
 def load_pipeline(file: Path, machine: Path | None = None) -> Pipeline:
-    """The chain that begins with a path file; raises InputError."""
+    """The pipeline that begins with a path file; raises InputError."""
     return Pipeline(load_path_file(file), machine)

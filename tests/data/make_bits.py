@@ -13,13 +13,13 @@ import lzma
 from pathlib import Path
 
 import numpy as np
-from hodograph.chain import load_chain
 
 from hodograph.errors import HodographError
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.request import PERIODS_US, PROFILES
+from hodograph.pipeline import load_pipeline
 from hodograph.program import Program, ProgramOptions, check, compile_program, encode
-from hodograph.program.limits import ProgramLimits
+from hodograph.program.image import ProgramLimits
 from hodograph.spline import PHSpline, from_control_polygon, line
 
 HERE = Path(__file__).resolve().parent
@@ -88,7 +88,7 @@ def one(seed: int) -> Program:
 
 def main() -> None:
     """Writes the file."""
-    images = [load_chain(EXAMPLES / f"{name}.toml").image for name in ("alpha", "heart", "star")]
+    images = [load_pipeline(EXAMPLES / f"{name}.toml").image for name in ("alpha", "heart", "star")]
     images += [encode(one(seed)) for seed in range(COUNT)]
     file = HERE / "bits" / "programs.xz"
     file.parent.mkdir(exist_ok=True)

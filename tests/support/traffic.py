@@ -19,15 +19,15 @@ ENABLED = 0x1237
 @cache
 def alpha() -> tuple[bytes, Frames]:
     """Program image and frames of the alpha: 300 SYNCs of standstill, the run, settling."""
-    chain = load_pipeline(EXAMPLES / "alpha.toml", None)
+    pipeline = load_pipeline(EXAMPLES / "alpha.toml", None)
     motion = simulate(
-        chain.image, [axis.drive for axis in chain.machine.axes if axis.drive is not None]
+        pipeline.image, [axis.drive for axis in pipeline.machine.axes if axis.drive is not None]
     )
     still = np.repeat(motion.rows["set_counts"][:1], 300, axis=0)
     targets = np.concatenate([still, motion.rows["set_counts"]])
     actual = np.concatenate([still, motion.rows["set_counts"][:1], motion.rows["set_counts"][:1]])
     actual = np.concatenate([actual, motion.rows["act_counts"]])[: len(targets)]
-    return chain.image, machine_frames(targets, actual)
+    return pipeline.image, machine_frames(targets, actual)
 
 
 def machine_frames(targets: np.ndarray, actual: np.ndarray) -> Frames:

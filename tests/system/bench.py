@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hodograph.bus.address import BusAddress, parse_address
 from hodograph.bus.clock import Clock
-from hodograph.bus.processes import Rig
+from hodograph.bus.processes import SimulatedMachine
 from hodograph.bus.sdo.controller import Controller
 from hodograph.config import Machine
 
@@ -23,7 +23,7 @@ class Bench:
     """A simulated machine on a bus and its controller: configured, drives off."""
 
     machine: Machine
-    rig: Rig
+    rig: SimulatedMachine
     controller: Controller
     bus: BusAddress
 

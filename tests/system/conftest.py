@@ -19,7 +19,7 @@ from bench import EXAMPLES, PAPER_ALPHA, VCAN0, Bench, MakeAlpha, MakeBench
 from hodograph.bus.address import BUS_VARIABLE
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
-from hodograph.bus.processes import Rig, virtual_clock
+from hodograph.bus.processes import SimulatedMachine, virtual_clock
 from hodograph.bus.sdo.controller import OFF, connect
 from hodograph.config import load_machine
 
@@ -66,7 +66,7 @@ def _benches(stack: ExitStack, request: pytest.FixtureRequest) -> MakeBench:
 
     def make(pace: str = "real-time", file: Path = PAPER_ALPHA) -> Bench:
         machine = load_machine(file)
-        rig = stack.enter_context(Rig(machine, bus, pace))
+        rig = stack.enter_context(SimulatedMachine(machine, bus, pace))
         controller = stack.enter_context(connect(bus, machine.node, machine.bitrate))
         controller.require(20.0)
         controller.configure(machine, "fixed")

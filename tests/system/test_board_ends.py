@@ -43,7 +43,7 @@ LOOK_US = 10_000
 class Running:
     """A board in the middle of the alpha; everything on the bus is recorded."""
 
-    chain: Pipeline
+    pipeline: Pipeline
     address: BusAddress
     clock: Clock
     board: Process
@@ -52,37 +52,37 @@ class Running:
     is_virtual: bool
 
 
-def begin(controller: Controller, chain: Pipeline, percent: int) -> None:
-    _, setpoints = NativeProgram(chain.image).setpoints("fixed", chain.machine.counts_per_mm)
+def begin(controller: Controller, pipeline: Pipeline, percent: int) -> None:
+    _, setpoints = NativeProgram(pipeline.image).setpoints("fixed", pipeline.machine.counts_per_mm)
     controller.require(END_S)
-    controller.configure(chain.machine, "fixed")
+    controller.configure(pipeline.machine, "fixed")
     controller.enable()
-    goto(controller, chain.machine, (int(setpoints[0, 0]), int(setpoints[0, 1])))
+    goto(controller, pipeline.machine, (int(setpoints[0, 0]), int(setpoints[0, 1])))
     controller.override(percent)
-    controller.upload(chain.image)
+    controller.upload(pipeline.image)
 
 
 @pytest.fixture(params=["slcan", "fifo"])
 def running(request: pytest.FixtureRequest, one_core: None) -> Iterator[Running]:
     """With FIFOs in virtual time, over SLCAN in real time."""
-    chain, link = load_pipeline(ROOT / "examples/alpha.toml"), request.param
+    pipeline, link = load_pipeline(ROOT / "examples/alpha.toml"), request.param
     with ExitStack() as stack:
         address = stack.enter_context(LocalHub(virtual=link == "fifo")).address
         clock = virtual_clock(address)
         if clock is not None:
             stack.callback(clock.release)
-        drives = Process("drives", drive_command(chain.machine, address), clock)
+        drives = Process("drives", drive_command(pipeline.machine, address), clock)
         stack.callback(drives.end)
         emulated = board("an386", address, 1, clock, "--link", link)
         stack.callback(emulated.end)
-        controller = stack.enter_context(connect(address, 1, chain.machine.bitrate))
-        begin(controller, chain, PERCENT[link])
+        controller = stack.enter_context(connect(address, 1, pipeline.machine.bitrate))
+        begin(controller, pipeline, PERCENT[link])
         recorder = stack.enter_context(Recorder(address))
         controller.start()
         while controller.read(STATISTICS, TICK) < MIDWAY_TICKS:
             controller.clock.sleep(0.01)
         at = clock or REAL_CLOCK
-        yield Running(chain, address, at, emulated, recorder, PERCENT[link], clock is not None)
+        yield Running(pipeline, address, at, emulated, recorder, PERCENT[link], clock is not None)
 
 
 def targets(frames: Frames, node: int) -> tuple[np.ndarray, np.ndarray]:
@@ -95,7 +95,7 @@ def test_told_to_end_it_stops_the_axes_on_the_path_first(running: Running) -> No
     running.board.end(END_S)
     assert running.board.child.returncode == 0
     frames = running.recorder.so_far()
-    machine = running.chain.machine
+    machine = running.pipeline.machine
     require_no_jump(frames, machine.nodes, step_limits(machine))
     for node in machine.nodes:
         control, counts = targets(frames, node)
@@ -110,7 +110,7 @@ def test_told_to_end_it_stops_the_axes_on_the_path_first(running: Running) -> No
 
 def test_with_its_plug_pulled_the_drives_stop_by_themselves(running: Running) -> None:
     running.board.kill()
-    machine = running.chain.machine
+    machine = running.pipeline.machine
     for node in machine.nodes:
         with connect(running.address, node, machine.bitrate, DRIVE_EDS) as drive:
             while drive.read(0x6041) & STATE_MASK == OPERATION_ENABLED:

@@ -25,7 +25,7 @@ from hodograph.bus.sdo.objects import PROGRAM_MEMORY
 from hodograph.cli.main import main
 from hodograph.errors import BusError, RefusedError
 from hodograph.pipeline import load_pipeline
-from hodograph.program.memory import LARGEST_BANK, RECORD_BYTES
+from hodograph.program.image import LARGEST_BANK, RECORD_BYTES
 
 ALPHA = EXAMPLES / "alpha.toml"
 LIMIT_S = 60.0

@@ -15,7 +15,7 @@ import pytest
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.local_bus import LocalBus
-from hodograph.bus.run import run_program, station
+from hodograph.bus.run import run_program, run_session
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import Motion, simulate
 
@@ -95,22 +95,22 @@ class Noise:
 @cache
 def alpha(root: Path) -> tuple[Pipeline, Motion]:
     """The program, and what it does undisturbed."""
-    chain = load_pipeline(root / "examples/alpha.toml")
-    drives = [axis.drive for axis in chain.machine.plane if axis.drive is not None]
-    return chain, simulate(chain.image, drives, counts_per_mm=chain.machine.counts_per_mm)
+    pipeline = load_pipeline(root / "examples/alpha.toml")
+    drives = [axis.drive for axis in pipeline.machine.plane if axis.drive is not None]
+    return pipeline, simulate(pipeline.image, drives, counts_per_mm=pipeline.machine.counts_per_mm)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_random_frames_change_nothing(
     hub: LocalHub, clock: VirtualClock, root: Path, seed: int
 ) -> None:
-    chain, expected = alpha(root)
-    machine = chain.machine
-    with station(machine, hub.address, "real-time", 10.0, print) as at:
+    pipeline, expected = alpha(root)
+    machine = pipeline.machine
+    with run_session(machine, hub.address, "real-time", 10.0, print) as at:
         at.controller.configure(machine, "fixed")
         at.controller.enable()
         with Noise(hub, clock, seed) as noise:
-            motion = run_program(at, machine, chain.image, "fixed").motion
+            motion = run_program(at, machine, pipeline.image, "fixed").motion
             at.controller.read(0x2002)
         assert noise.sent > 1500
     assert motion.setpoints_sha256 == expected.setpoints_sha256

@@ -19,7 +19,7 @@ from hodograph.bus.capture.recorder import Frames, Recorder
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import Process
-from hodograph.bus.run import BusRun, run_program, station
+from hodograph.bus.run import BusRun, run_program, run_session
 from hodograph.bus.sdo.controller import connect
 from hodograph.bus.sdo.objects import BOOT
 from hodograph.pipeline import load_pipeline
@@ -45,7 +45,7 @@ def test_the_m4f_runs_alpha_and_heart(
 
 def _recorded_run(target: str, stopped: str | None = None) -> tuple[Frames, BusRun]:
     """The alpha at the board; `stopped`: a program of it that stands still for a second on the way."""
-    chain = load_pipeline(Path(FILES[0]))
+    pipeline = load_pipeline(Path(FILES[0]))
     victims: list[int] = []
 
     def progress(tick: int) -> None:
@@ -55,12 +55,14 @@ def _recorded_run(target: str, stopped: str | None = None) -> tuple[Frames, BusR
     with (
         LocalHub() as hub,
         Recorder(hub.address) as recorder,
-        station(chain.machine, hub.address, "fast", 15.0, print, f"{EMULATE} {target}") as at,
+        run_session(
+            pipeline.machine, hub.address, "fast", 15.0, print, f"{EMULATE} {target}"
+        ) as at,
     ):
         assert at.rig is not None
         if stopped is not None:
             victims += children(at.rig.processes[1].child.pid, stopped)
-        run = run_program(at, chain.machine, chain.image, chain.machine.kernel, progress)
+        run = run_program(at, pipeline.machine, pipeline.image, pipeline.machine.kernel, progress)
         assert not victims
         return recorder.so_far(), run
 

@@ -101,7 +101,7 @@ def _check_socketcan(address: BusAddress) -> None:
 
 
 def is_virtual(address: BusAddress) -> bool:
-    """Whether no hardware is behind this bus, so that simulated nodes may be started."""
+    """Whether this bus has no hardware, so that simulated nodes may be started."""
     if not address.is_socketcan:
         return address.is_local
     device = Path("/sys/class/net") / address.channel

@@ -21,7 +21,7 @@ REACHED_AFTER = 2
 """Setpoint k is reached at SYNC k+2 (docs/reference/protocol.md section 2)."""
 
 _AROUND = 220
-"""SYNCs kept before and behind a run: late answers show themselves within 200."""
+"""SYNCs kept before and after a run: late answers come within 200."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def complete_ticks(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -
 
 
 def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Where flags are set one after the other: (first, behind the last)."""
+    """Where flags are set one after the other: (first, after the last)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
@@ -141,7 +141,7 @@ def _run_s(frames: Frames, motion: Motion) -> float:
 
 
 def measured_pace(motion: Motion, wall_s: float) -> str:
-    """The pace that a run's duration tells, for a controller that was there already."""
+    """The pace that follows from a run's duration, for a controller that was there already."""
     nominal_s = motion.ticks * motion.period_us / 1e6
     return "real-time" if wall_s > 0.9 * nominal_s else "fast"
 

@@ -280,7 +280,7 @@ class VirtualClock:
         self._send(_CONTINUE, name=name)
 
     def _await_notice(self, name: str, child: subprocess.Popen[bytes], *kinds: int) -> None:
-        """Until the hub has told one of these of a process, or it has ended; time stands still."""
+        """Until the hub has reported one of these of a process, or it has ended; time stands still."""
         while child.poll() is None and not any((kind, name) in self._notices for kind in kinds):
             self._look()
 
@@ -290,7 +290,7 @@ class VirtualClock:
             self._take()
 
     def _has_left(self, name: str) -> bool:
-        """Whether that is the last that we heard of it."""
+        """Whether that is the last report of it."""
         heard = [kind for kind, of in self._notices if of == name and kind in (_JOINED, _LEFT)]
         return bool(heard) and heard[-1] == _LEFT
 
@@ -407,7 +407,7 @@ def member_connection(path: str, participant: int) -> socket.socket:
 
 
 def filter_message(filters: Sequence[tuple[int, int]]) -> bytes:
-    """Tells the hub which frames a member wants: identifier and mask of each kind."""
+    """Names to the hub the frames that a member wants: identifier and mask of each kind."""
     packed = b"".join(struct.pack("=II", identifier, mask) for identifier, mask in filters)
     return struct.pack("=IHH", _MARK, _FILTER, len(filters)) + packed
 

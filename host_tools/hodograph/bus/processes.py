@@ -202,7 +202,7 @@ def virtual_clock(address: BusAddress) -> VirtualClock | None:
         ) from None
 
 
-class Rig:
+class SimulatedMachine:
     """Controller and drives as child processes; ends them on leaving."""
 
     def __init__(
@@ -213,7 +213,7 @@ class Rig:
         self._clock: VirtualClock | None = None
         self._children: list[Process] = []
 
-    def __enter__(self) -> Rig:
+    def __enter__(self) -> SimulatedMachine:
         self._clock = virtual_clock(self._address)
         # In virtual time ticks cost what they take to compute: nothing is gained by leaving out the time between them.
         pace = self._pace if self._clock is None else "real-time"

@@ -19,24 +19,24 @@ from .capture.decode import unhomed_starts
 from .capture.recorder import Recorder
 from .capture.recordings import write_recording
 from .goto import goto
-from .processes import Rig
+from .processes import SimulatedMachine
 from .sdo.controller import DISABLE, READY, STATISTICS, Controller, connect
 from .sdo.follow import Follower
 from .signals import unbroken
 
 __all__ = [
     "BusRun",
-    "Station",
+    "RunSession",
     "first_tick",
     "measured_pace",
     "rig_until_interrupted",
     "run_program",
-    "station",
+    "run_session",
 ]
 
 _SYNCS, _TICK, _MISSES = 1, 2, 3
 _MARGIN_TICKS = 50
-"""Recorded beyond what is needed, so that late answers can be told from lost ones."""
+"""Recorded beyond what is needed, so that late answers differ from lost ones."""
 _REST_TICKS = 10
 """Recorded before the start: `hodograph identify` wants to see that a motion begins at rest."""
 
@@ -48,35 +48,35 @@ def _silent(text: str) -> None:
 
 
 @dataclass(frozen=True)
-class Station:
+class RunSession:
     """A controller that answers; `pace` is known when its processes are ours. `note` takes lines for the user."""
 
     controller: Controller
     pace: str | None
-    rig: Rig | None
+    rig: SimulatedMachine | None
     note: Callable[[str], None] = _silent
 
 
 @contextmanager
-def station(
+def run_session(
     machine: Machine,
     address: BusAddress,
     pace: str,
     wait_s: float,
     note: Callable[[str], None],
     controller_program: str | None = None,
-) -> Iterator[Station]:
+) -> Iterator[RunSession]:
     """The machine's controller on this bus, with a simulated machine started on a virtual bus without one.
 
     `controller_program`: what is started as its controller, instead of hodograph-controller.
 
-    On the way out by an error or an interrupt the axes are stopped, and what was started is ended.
+    On an error or an interrupt the axes are stopped, and what was started is ended.
     """
     with ExitStack() as stack:
         controller = stack.enter_context(connect(address, machine.node, machine.bitrate))
         rig = None
         if is_virtual(address) and not controller.answers(0.3):
-            rig = stack.enter_context(Rig(machine, address, pace, controller_program))
+            rig = stack.enter_context(SimulatedMachine(machine, address, pace, controller_program))
             _await_rig(controller, rig, max(wait_s, 5.0))
         elif not is_virtual(address):
             controller.require(wait_s)
@@ -84,7 +84,7 @@ def station(
             controller.require_standing()
             note(f"node {machine.node} is on {address} already: using it and its drives")
         try:
-            yield Station(controller, pace if rig is not None else None, rig, note)
+            yield RunSession(controller, pace if rig is not None else None, rig, note)
         except BaseException:
             with unbroken(), suppress(HodographError):
                 controller.stop_and_wait()
@@ -94,7 +94,7 @@ def station(
                 controller.command(DISABLE)
 
 
-def _await_rig(controller: Controller, rig: Rig, wait_s: float) -> None:
+def _await_rig(controller: Controller, rig: SimulatedMachine, wait_s: float) -> None:
     deadline = controller.clock.now_s() + wait_s
     while not controller.answers(0.25):
         rig.check()
@@ -103,7 +103,7 @@ def _await_rig(controller: Controller, rig: Rig, wait_s: float) -> None:
 
 
 def run_program(
-    at: Station,
+    at: RunSession,
     machine: Machine,
     image: bytes,
     kernel: str,
@@ -157,7 +157,7 @@ def run_program(
     )
 
 
-def _follow(at: Station, progress: Progress | None) -> None:
+def _follow(at: RunSession, progress: Progress | None) -> None:
     controller, follower = at.controller, Follower(at.controller, at.note)
 
     def tick() -> None:
@@ -194,7 +194,7 @@ def rig_until_interrupted(
     with connect(address, machine.node, machine.bitrate) as controller:
         if controller.answers(0.3):
             raise BusError(f"{address}: node {machine.node} is there already: end it first")
-        with Rig(machine, address, pace, controller_program) as rig:
+        with SimulatedMachine(machine, address, pace, controller_program) as rig:
             _await_rig(controller, rig, 5.0)
             controller.configure(machine, kernel)
             names = ", ".join(f"{axis.name} (node {axis.node})" for axis in machine.axes)

@@ -33,7 +33,7 @@ def plain_bits(size: int) -> int:
 
 
 def generic_worst_bits(size: int) -> int:
-    """The usual bound for any base identifier: every fourth bit behind the first is a stuff bit."""
+    """The usual bound for any base identifier: every fourth bit after the first is a stuff bit."""
     return plain_bits(size) + (19 + 8 * size + CRC_BITS - 1) // 4
 
 

@@ -98,7 +98,7 @@ class BusTime:
         return self._blocking(sync) + self._length(sync)
 
     def _released(self, message: Message) -> int:
-        """When a setpoint can be on the bus but for those that win: behind SYNC, or later, behind any frame."""
+        """When a setpoint can be on the bus but for those that win: after SYNC, or later, after any frame."""
         return max(self._sync_end, self.compute_us * self.bitrate + self._blocking(message))
 
     def _response(self, message: Message) -> int | None:

@@ -5,22 +5,112 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..config import Machine, PathFile, load_machine, load_path_file, read_toml
+from ..config.axis_table import Feedforward
 from ..config.table import Table
 from ..errors import InputError
+from ..faults.scenario import inline_scenario, load_scenario
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, PROFILES
-from ..names import KERNELS
+from ..names import INTERPOLATIONS, KERNELS
 from ..native import native_file
 from ..pipeline import Pipeline
-from .design import Design, Plant
-from .fault_table import read_faults
-from .gain_table import read_gains
-from .variation_table import read_variations
+from .fault_rules import Fault
+from .run_settings import Design, Gains, Plant, gains_of
+from .variation import read_variations
+
+NO_FAULT = Fault("none")
+
+
+def read_faults(root: Table, raw: Mapping[str, Any], plants: Sequence[Plant]) -> tuple[Fault, ...]:
+    """In the order of the file; without any: none. Raises InputError, also where a machine cannot have a rule."""
+    if not root.has("faults"):
+        return (NO_FAULT,)
+    found: list[Fault] = []
+    tables = root.tables("faults", ("name", "scenario", "rules", "random"))
+    for table, data in zip(tables, raw["faults"], strict=True):
+        fault = _fault(table, data)
+        if fault.name in [other.name for other in found]:
+            raise table.error("name", f'"{fault.name}" is there twice')
+        _try(table, fault, plants)
+        found.append(fault)
+    return tuple(found)
+
+
+def _fault(table: Table, data: Mapping[str, Any]) -> Fault:
+    name = table.text("name")
+    if table.has("scenario"):
+        if table.has("rules") or table.has("random"):
+            raise table.error("scenario", "is given beside rules: keep one of the two")
+        return Fault(name, load_scenario(table.present("scenario")))
+    if table.has("random") and not table.has("rules"):
+        raise table.error("random", "is given without rules that use it: add rules, or take it out")
+    return Fault(name, inline_scenario(table, data, name)) if table.has("rules") else Fault(name)
+
+
+def _try(table: Table, fault: Fault, plants: Sequence[Plant]) -> None:
+    if fault.scenario is not None and fault.scenario.action != "none":
+        raise table.error(
+            "scenario", "has an action of the host, which needs a bus: use `hodograph faults`"
+        )
+    for plant in plants:
+        try:
+            fault.rules(0, 0, plant.nodes, plant.period_us)
+        except InputError as error:
+            key = "scenario" if table.has("scenario") else "rules"
+            raise table.error(key, str(error).removeprefix("rule ")) from None
+
+
+_PDFF = ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s", "k_pf_rad_mm", "k_vf")
+_FEED = tuple(field.name for field in fields(Feedforward))
+AS_GIVEN = Gains("own")
+"""Without [[gains]]: the machine's own."""
+
+
+def read_gains(root: Table) -> tuple[Gains, ...]:
+    """In the order of the file; raises InputError."""
+    if not root.has("gains"):
+        return (AS_GIVEN,)
+    tables = root.tables("gains", ("name", "machine", *_PDFF, "feedforward", "interpolation"))
+    found: list[Gains] = []
+    for table in tables:
+        gains = _gains(table)
+        if gains.name in [other.name for other in found]:
+            raise table.error("name", f'"{gains.name}" is there twice')
+        found.append(gains)
+    return tuple(found)
+
+
+def _gains(table: Table) -> Gains:
+    changes: dict[str, tuple[float, float]] = {}
+    feed: dict[str, tuple[float, float]] = {}
+    interpolation = None
+    if table.has("machine"):
+        machine = load_machine(table.present("machine"))
+        drives = machine.models(machine.plane)
+        changes |= gains_of((drives[0], drives[1]), _PDFF)
+        interpolation = drives[0].interpolation, drives[1].interpolation
+        x, y = (axis.feedforward for axis in machine.plane)
+        feed |= {name: (getattr(x, name), getattr(y, name)) for name in _FEED}
+    changes |= {name: _both(table, name, 1e6) for name in _PDFF if table.has(name)}
+    forward = table.table("feedforward", _FEED, required=False)
+    feed |= {name: _both(forward, name, 32767) for name in _FEED if forward.has(name)}
+    if table.has("interpolation"):
+        interpolation = (table.choice("interpolation", INTERPOLATIONS),) * 2
+    return Gains(table.text("name"), tuple(changes.items()), tuple(feed.items()), interpolation)
+
+
+def _both(table: Table, name: str, high: float) -> tuple[float, float]:
+    """A number for both axes, or [x, y]."""
+    if table.is_list(name):
+        return table.pair(name, low=0, high=high)
+    value = table.number(name, low=0, high=high)
+    return value, value
+
 
 GREATEST_SAMPLES = 10_000_000
 GREATEST_RUNS = 10_000_000
@@ -37,7 +127,7 @@ class Source:
     path: PathFile
     machine: Machine
 
-    def chain(self, profile: str | None, feed_mm_s: float | None) -> Pipeline:
+    def pipeline(self, profile: str | None, feed_mm_s: float | None) -> Pipeline:
         """The steps to a program, with another profile or feed than the file asks for (None: the file's)."""
         feed = Pipeline(self.path).feed
         feed = replace(
@@ -102,9 +192,9 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
     for name in _list(root, raw, "paths", '["path.toml"]'):
         one = Table(root.file, "", {"paths": name}, ("paths",))
         path = load_path_file(one.present("paths"))
-        chain = Pipeline(path, machine)
-        chain.feed  # noqa: B018  (says what is missing)
-        found.append(Source(path, chain.machine))
+        pipeline = Pipeline(path, machine)
+        pipeline.feed  # noqa: B018  (says what is missing)
+        found.append(Source(path, pipeline.machine))
     return tuple(found)
 
 

@@ -10,7 +10,7 @@ from ..errors import HodographError, one_line
 from ..native import NativeProgram
 from ..simulate import simulate
 from .definition import Source
-from .design import Design, Run
+from .run_settings import Design, Run
 
 QUANTITIES = (
     "max_contour_error_um",
@@ -45,8 +45,8 @@ class Outcome:
 def build(source: Source, profile: str | None, feed_mm_s: float | None, number: int) -> Built:
     """Plans and compiles one program."""
     try:
-        chain = source.chain(profile, feed_mm_s)
-        return Built(number, chain.image, chain.program.ticks)
+        pipeline = source.pipeline(profile, feed_mm_s)
+        return Built(number, pipeline.image, pipeline.program.ticks)
     except Exception as error:  # a program that cannot be is a result, whatever the reason
         return Built(number, error=_told(error))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..faults.scenario import Scenario, draw
-from ..native import FOR_EVER, RigFault
+from ..native import FOR_EVER, OfflineFault
 
 _VALUES = {
     "encoder-freeze": None,
@@ -33,7 +33,7 @@ class Fault:
 
     def rules(
         self, seed: int, sample: int, nodes: tuple[int, int], period_us: int
-    ) -> list[RigFault]:
+    ) -> list[OfflineFault]:
         """The faults of one sample. Raises InputError: a rule that a run without a bus cannot have."""
         return [offline_fault(line, nodes, period_us) for line in self.lines(seed, sample)]
 
@@ -46,7 +46,7 @@ class Fault:
         ]
 
 
-def offline_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault:
+def offline_fault(rule: str, nodes: tuple[int, int], period_us: int) -> OfflineFault:
     """A line of rules, for the drives with these node numbers. Raises InputError."""
     kind, *words = rule.split()
     if kind not in _VALUES:
@@ -61,7 +61,7 @@ def offline_fault(rule: str, nodes: tuple[int, int], period_us: int) -> RigFault
     if node not in nodes:
         what = "setpoints (0x200 + node) of" if kind == "drop" else "the node of"
         raise InputError(f'rule "{rule}": is not about {what} an axis of the path ({nodes})')
-    return RigFault(
+    return OfflineFault(
         "setpoint-lost" if kind == "drop" else kind,
         nodes.index(int(node)),
         int(_required(rule, given, "at")),

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import Design
 from .execute import QUANTITIES
-from .results import Results
-from .table import case_texts
+from .results import Results, case_texts
+from .run_settings import Design
 
 SHARES = (50.0, 95.0, 100.0)
-"""Percentiles that are told of the greatest contour error."""
+"""Percentiles of the greatest contour error that are reported."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class Group:
 
     @property
     def label(self) -> str:
-        """For people: what is not as the files have it."""
+        """For people: what differs from the files."""
         path, profile, feed_mm_s, gains, fault = self.case
         feed = "own" if feed_mm_s == "own" else f"{float(feed_mm_s):g} mm/s"
         said = (path, profile, feed, gains, fault)

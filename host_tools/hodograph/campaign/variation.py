@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Figures of a drive that differ from run to run: grids, which are tried in full, and random draws.
+"""Figures of a drive that differ from run to run (tables [vary.FIGURE]): grids, which are tried in full, and random
+draws.
 
 A draw is a pure function of seed, sample, figure and axis: it does not depend on the other variations, nor on the order
 or the place in which runs are made; sample k is the same machine on every path and with all gains.
@@ -8,10 +9,13 @@ or the place in which runs are made; sample k is the same machine on every path 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Any
 
 from ..config.drive_file import Drive
+from ..config.table import Table
 
 FIGURES = (
     "gain_rad_s_v",
@@ -84,3 +88,38 @@ def unit(text: str) -> float:
     """A number between 0 and 1, neither included, from a text: 52 bits of its hash."""
     bits = int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "big") >> 12
     return (bits + 0.5) * 2.0**-52
+
+
+def read_variations(root: Table, raw: Mapping[str, Any]) -> tuple[Variation, ...]:
+    """In the order of the file; raises InputError."""
+    vary = root.table("vary", FIGURES, required=False)
+    return tuple(
+        _variation(vary.table(name, (*KINDS, "axis")), name) for name in raw.get("vary", {})
+    )
+
+
+def _variation(table: Table, name: str) -> Variation:
+    kinds = [kind for kind in KINDS if table.has(kind)]
+    if len(kinds) != 1:
+        given = " and ".join(kinds) or "nothing"
+        raise table.error(
+            kinds[0] if kinds else KINDS[0], f"needs one of {', '.join(KINDS)}, but has {given}"
+        )
+    kind = kinds[0]
+    axis = table.choice("axis", AXES, "both" if kind in GRIDS else "each")
+    if kind in GRIDS:
+        if axis == "each":
+            raise table.error("axis", 'cannot be "each" for a grid: use "both", "x" or "y"')
+        return Variation(name, kind, table.numbers(kind), axis)
+    return Variation(name, kind, _two(table, kind), axis)
+
+
+def _two(table: Table, kind: str) -> tuple[float, float]:
+    first, second = table.pair(kind, low=-1e9, high=1e9)
+    if kind.endswith("uniform") and not first < second:
+        raise table.error(kind, f"must be [least, greatest], but is [{first:g}, {second:g}]")
+    if kind.endswith("normal") and second <= 0:
+        raise table.error(
+            kind, f"must be [mean, standard deviation above 0], but is [{first:g}, {second:g}]"
+        )
+    return first, second

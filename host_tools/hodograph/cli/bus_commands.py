@@ -42,7 +42,7 @@ def reached(address: BusAddress, node: int, bitrate: int, wait_s: float) -> Iter
 def commanded(
     address: BusAddress, node: int, bitrate: int, wait_s: float, command: int
 ) -> Iterator[Controller]:
-    """A controller that has been told to stop or to hold, whoever else talks to it.
+    """A controller that has been commanded to stop or to hold, whoever else talks to it.
 
     Raises BusError when it does not answer within `wait_s`.
     """

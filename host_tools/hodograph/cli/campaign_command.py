@@ -8,12 +8,9 @@ from argparse import Namespace
 from pathlib import Path
 
 from ..campaign.definition import Campaign, load_campaign
-from ..campaign.engine import available_cores, engine
-from ..campaign.journal import journal
-from ..campaign.results import Results
-from ..campaign.runner import default_folder, run_campaign
+from ..campaign.results import Results, journal, write_csv
+from ..campaign.runner import available_cores, default_folder, engine, run_campaign
 from ..campaign.summary import groups, text
-from ..campaign.table import write_csv
 from ..errors import InputError, RunError
 from .output import note, print_json, progress, write_file
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph demo: the whole chain once, with nothing but what the package brings."""
+"""hodograph demo: path, program, run and report once, with nothing but what the package brings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import IO
 from ..bus.address import BusAddress
 from ..bus.hub import LocalHub
 from ..bus.processes import guarded
-from ..bus.run import run_program, station
+from ..bus.run import run_program, run_session
 from ..data import EXAMPLES
 from ..errors import BusError
 from ..pipeline import load_pipeline
@@ -31,17 +31,17 @@ _URL = "http://"
 
 def demo(options: Namespace) -> None:
     """hodograph demo."""
-    chain = load_pipeline(_PROGRAM)
-    machine = chain.machine
+    pipeline = load_pipeline(_PROGRAM)
+    machine = pipeline.machine
     with LocalHub(speed=1.0) as hub, _live_page(hub.address) as url:
         note(f"live page: {url}")
         opened = not options.no_browser and webbrowser.open(url)
         with (
-            station(machine, hub.address, "real-time", _WAIT_S, note) as at,
-            progress("demo", "tick", chain.program.ticks) as bar,
+            run_session(machine, hub.address, "real-time", _WAIT_S, note) as at,
+            progress("demo", "tick", pipeline.program.ticks) as bar,
         ):
-            result = run_program(at, machine, chain.image, machine.kernel, bar)
-        report = write_report([(chain, result.motion, result)], options.output)
+            result = run_program(at, machine, pipeline.image, machine.kernel, bar)
+        report = write_report([(pipeline, result.motion, result)], options.output)
         note(f"report: {report}")
         if options.json:
             print_json(result.summary() | {"page": url, "report": str(report)})

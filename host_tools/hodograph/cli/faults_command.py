@@ -9,9 +9,9 @@ from ..bus.address import parse_address
 from ..data import EXAMPLES
 from ..errors import InputError, RunError
 from ..faults.campaign import run_campaign
+from ..faults.case_table import text
 from ..faults.run_case import Buses
 from ..faults.scenario import find_scenarios
-from ..faults.table import text
 from .output import note, print_json
 
 SCENARIOS = EXAMPLES / "faults"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Entry point: from the command line to an exit status, never a traceback unless asked for."""
+"""Entry point: from the command line to an exit status, a traceback only on request."""
 
 from __future__ import annotations
 

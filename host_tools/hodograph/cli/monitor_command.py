@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..monitor.decoder import nodes_in
 from ..monitor.pump import Layout
 from ..monitor.security import make_token
-from ..monitor.session import Live, Place, Replay, Session
+from ..monitor.session import Live, LivePage, PageAddress, Replay
 from ..native import NativeProgram
 from ..pipeline import load_pipeline
 from .output import note
@@ -29,20 +29,20 @@ _USUAL_COUNTS_PER_MM = 1_000_000
 def monitor(options: Namespace) -> None:
     """hodograph monitor."""
     image, machine = _image_and_machine(options)
-    place = Place(options.host, options.port, make_token(_token(options)))
+    place = PageAddress(options.host, options.port, make_token(_token(options)))
     if options.replay is not None:
         what, layout = _replay(options, machine, image)
     elif machine is not None:
         what, layout = Live(parse_address(options.bus), machine.node), machine_layout(machine)
     else:
         raise InputError("monitor: needs --machine FILE, or a path file as --program")
-    asyncio.run(Session(what, layout, place, image, note).serve())
+    asyncio.run(LivePage(what, layout, place, image, note).serve())
 
 
 def _replay(
     options: Namespace, machine: Machine | None, image: bytes | None
 ) -> tuple[Live | Replay, Layout]:
-    from ..monitor.replay import ReplaySource, load_recording
+    from ..monitor.source import ReplaySource, load_recording
 
     if not options.speed > 0:
         raise InputError(f"--speed: must be more than 0, but is {options.speed:g}")
@@ -83,8 +83,8 @@ def _image_and_machine(options: Namespace) -> tuple[bytes | None, Machine | None
     image = read_image(options.program)
     if image is not None:
         return image, machine
-    chain = load_pipeline(options.program, options.machine)
-    return chain.image, chain.machine
+    pipeline = load_pipeline(options.program, options.machine)
+    return pipeline.image, pipeline.machine
 
 
 def _token(options: Namespace) -> str | None:

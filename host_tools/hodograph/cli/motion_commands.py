@@ -13,7 +13,7 @@ from ..bus.address import BusAddress, parse_address
 from ..bus.capture.recordings import check_suffix
 from ..bus.goto import goto as goto_point
 from ..bus.own_bus import opened_bus
-from ..bus.run import BusRun, rig_until_interrupted, run_program, station
+from ..bus.run import BusRun, rig_until_interrupted, run_program, run_session
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.status import loaded_program
 from ..bustime import require_fit
@@ -36,11 +36,11 @@ def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
             program_limits(machine)
             require_fit(machine)
         return image, machine
-    chain = load_pipeline(options.file, options.machine)
-    require_fit(chain.machine)
-    image = chain.image
-    print_notes(chain, chain.compilation.plan)
-    return image, chain.machine
+    pipeline = load_pipeline(options.file, options.machine)
+    require_fit(pipeline.machine)
+    image = pipeline.image
+    print_notes(pipeline, pipeline.compilation.plan)
+    return image, pipeline.machine
 
 
 def upload(options: Namespace) -> None:
@@ -130,29 +130,29 @@ def _run_all(options: Namespace, address: BusAddress) -> None:
         check_suffix(options.record)
         if len(options.files) > 1:
             raise InputError("--record: takes one FILE; run the others by themselves")
-    chains = [load_pipeline(file, options.machine) for file in options.files]
-    for chain in chains:
-        require_fit(chain.machine)
-        chain.image  # noqa: B018  (all that can be wrong with the input shows before anything moves)
-    runs = [_run_one(chain, address, options) for chain in chains]
+    pipelines = [load_pipeline(file, options.machine) for file in options.files]
+    for pipeline in pipelines:
+        require_fit(pipeline.machine)
+        pipeline.image  # noqa: B018  (all that can be wrong with the input shows before anything moves)
+    runs = [_run_one(pipeline, address, options) for pipeline in pipelines]
     if options.trace is not None:
         write_trace(runs[0].motion, options.trace)
     if options.report is not None:
         from ..report import write_report
 
-        cases = [(chain, run.motion, run) for chain, run in zip(chains, runs, strict=True)]
+        cases = [(pipeline, run.motion, run) for pipeline, run in zip(pipelines, runs, strict=True)]
         note(f"report: {write_report(cases, options.report)}")
-    _print_runs(chains, runs, options.json)
+    _print_runs(pipelines, runs, options.json)
 
 
-def _run_one(chain: Pipeline, address: BusAddress, options: Namespace) -> BusRun:
-    machine = chain.machine
-    print_notes(chain, chain.compilation.plan)
+def _run_one(pipeline: Pipeline, address: BusAddress, options: Namespace) -> BusRun:
+    machine = pipeline.machine
+    print_notes(pipeline, pipeline.compilation.plan)
     with (
-        station(
+        run_session(
             machine, address, options.pace or "real-time", options.wait, note, options.controller
         ) as at,
-        progress(f"run {chain.file.name}", "tick", chain.program.ticks) as bar,
+        progress(f"run {pipeline.file.name}", "tick", pipeline.program.ticks) as bar,
     ):
         if options.pace is not None and at.pace is None:
             note("--pace has no effect on a controller that is running already")
@@ -160,21 +160,21 @@ def _run_one(chain: Pipeline, address: BusAddress, options: Namespace) -> BusRun
             note("--controller has no effect where one is running already")
         kernel = options.kernel or machine.kernel
         return run_program(
-            at, machine, chain.image, kernel, bar, options.record, unhomed=options.unhomed
+            at, machine, pipeline.image, kernel, bar, options.record, unhomed=options.unhomed
         )
 
 
-def _print_runs(chains: list[Pipeline], runs: list[BusRun], as_json: bool) -> None:
+def _print_runs(pipelines: list[Pipeline], runs: list[BusRun], as_json: bool) -> None:
     if as_json:
         results: list[dict[str, Any]] = [run.summary() for run in runs]
         if len(results) == 1:
             print_json(results[0])
         else:
-            files = [{"file": str(chain.file.file)} for chain in chains]
+            files = [{"file": str(pipeline.file.file)} for pipeline in pipelines]
             print_json([a | b for a, b in zip(files, results, strict=True)])
         return
-    for chain, result in zip(chains, runs, strict=True):
-        print_run(str(chain.file.file), result)
+    for pipeline, result in zip(pipelines, runs, strict=True):
+        print_run(str(pipeline.file.file), result)
 
 
 def print_run(title: str, result: BusRun) -> None:

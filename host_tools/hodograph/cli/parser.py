@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from .. import __version__
 from ..errors import InputError
-from .arguments import moving, offline, operating, watching
+from . import arguments
 
 DESCRIPTION = (
     "From a control polygon to encoder counts: jerk-limited motion on PH splines over CAN."
@@ -46,7 +46,6 @@ def make_parser() -> argparse.ArgumentParser:
     def command(name: str, text: str) -> argparse.ArgumentParser:
         return commands.add_parser(name, help=text, description=text.capitalize() + ".")
 
-    for family in (offline, moving, operating, watching):
-        for add in family.ALL:
-            add(command)
+    for add in arguments.ALL:
+        add(command)
     return parser

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from ..bustime import require_fit
 from ..config import Machine
 from ..errors import HodographError, InputError
-from ..feed import Plan
+from ..feed import FeedPlan
 from ..native import NativeProgram
 from ..pipeline import Pipeline, load_pipeline
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.check import check
-from ..program.image import MAGIC
-from ..program.memory import LARGEST_BANK, RECORD_BYTES, memory_bytes
+from ..program.image import LARGEST_BANK, MAGIC, RECORD_BYTES, memory_bytes
 from ..program.stops import stops_dict, stops_text
 from ..simulate import Motion, StoppedRun, last_tick_s, simulate, simulate_stop, write_trace
 from .output import json_text, note, number, print_json, print_rows, progress, write_file
@@ -26,8 +25,8 @@ from .output import json_text, note, number, print_json, print_rows, progress, w
 
 def spline(options: Namespace) -> None:
     """hodograph spline."""
-    chain = load_pipeline(options.file)
-    found = chain.spline_result
+    pipeline = load_pipeline(options.file)
+    found = pipeline.spline_result
     curve = found.spline
     for line in found.notes:
         note(f"{options.file.name}: {line}")
@@ -80,32 +79,32 @@ def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray
     return np.minimum(array, end)
 
 
-def print_notes(chain: Pipeline, plan: Plan) -> None:
+def print_notes(pipeline: Pipeline, plan: FeedPlan) -> None:
     """The notes of a path, each with the file's name."""
-    for line in chain.notes(plan):
-        note(f"{chain.file.file.name}: {line}")
+    for line in pipeline.notes(plan):
+        note(f"{pipeline.file.file.name}: {line}")
 
 
 def feed(options: Namespace) -> None:
     """hodograph feed."""
-    chain = load_pipeline(options.file, options.machine)
-    plan = chain.plan
-    print_notes(chain, plan)
+    pipeline = load_pipeline(options.file, options.machine)
+    plan = pipeline.plan
+    print_notes(pipeline, plan)
     result: dict[str, object] = {
         "profile": plan.profile,
         "n_c": plan.n_c,
         "evaluations": plan.evaluations,
         "ramp_time_s": plan.ramp_time_s,
         "duration_s": plan.duration_s,
-        "planning_s": chain.planning_s,
+        "planning_s": pipeline.planning_s,
         "peak": {
-            name: {"value": peak.value, "limit": peak.limit, "at_mm": peak.s_mm}
-            for name, peak in chain.peaks.items()
+            name: {"value": peak.value, "limit": peak.limit.given, "at_mm": peak.s_mm}
+            for name, peak in pipeline.peaks.items()
         },
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
     }
-    stops = _program_of(chain)
+    stops = _program_of(pipeline)
     if stops is not None:
         result["stops"] = stops_dict(stops.stops, stops.piece_starts_mm)
     if options.at is not None:
@@ -123,7 +122,7 @@ def feed(options: Namespace) -> None:
             ("feed", f"{number(plan.feed_mm_s)} mm/s"),
             *ramps,
             ("duration", f"{number(plan.duration_s)} s"),
-            ("planned in", f"{chain.planning_s:.3g} s"),
+            ("planned in", f"{pipeline.planning_s:.3g} s"),
             ("peak acceleration", f"{number(plan.peak_acceleration_mm_s2)} mm/s^2"),
             ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
         ]
@@ -132,9 +131,10 @@ def feed(options: Namespace) -> None:
         for line in stops_text(stops.stops, stops.piece_starts_mm):
             print(line)
     print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
-    for name, peak in chain.peaks.items():
+    for name, peak in pipeline.peaks.items():
         print(
-            f"{name:28} {peak.value:12.6g} {peak.limit:12.6g} {100.0 * peak.share:8.2f} {peak.s_mm:12.6g}"
+            f"{name:28} {peak.value:12.6g} {peak.limit.given:12.6g} "
+            f"{100.0 * peak.value / peak.limit.given:8.2f} {peak.s_mm:12.6g}"
         )
     if options.at is not None:
         print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
@@ -142,12 +142,12 @@ def feed(options: Namespace) -> None:
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
 
 
-def _program_of(chain: Pipeline) -> Program | None:
+def _program_of(pipeline: Pipeline) -> Program | None:
     """The program, for what `feed` says of stops; None without a machine, or where `compile` would refuse it."""
-    if chain.machine_or_none is None:
+    if pipeline.machine_or_none is None:
         return None
     try:
-        return chain.program
+        return pipeline.program
     except HodographError as error:
         note(f"no program: {error}")
         return None
@@ -155,14 +155,14 @@ def _program_of(chain: Pipeline) -> Program | None:
 
 def compile_(options: Namespace) -> None:
     """hodograph compile."""
-    chain = load_pipeline(options.file, options.machine)
-    require_fit(chain.machine)
-    image = chain.image
-    print_notes(chain, chain.compilation.plan)
-    output = options.output or Path(chain.file.name + ".hdgp")
+    pipeline = load_pipeline(options.file, options.machine)
+    require_fit(pipeline.machine)
+    image = pipeline.image
+    print_notes(pipeline, pipeline.compilation.plan)
+    output = options.output or Path(pipeline.file.name + ".hdgp")
     write_file(output, image)
-    _warn_of_size(image, chain.machine)
-    program = chain.program
+    _warn_of_size(image, pipeline.machine)
+    program = pipeline.program
     if options.json:
         print_json({"file": str(output), "bytes": len(image)} | inspect_dict(program))
         return
@@ -236,11 +236,11 @@ def _unsound(program: Program) -> str:
     return f"no program: {fault.code.text} ({fault.code.name}, code {fault.code}, {fault.place})"
 
 
-def simulate_chain(chain: Pipeline, kernel: str | None, *, keep_rows: bool = True) -> Motion:
-    """A run of a path without a bus. Without its rows (one a tick) it takes no memory to speak of."""
-    machine = chain.machine
-    image = chain.image
-    with progress("simulate", "tick", chain.program.ticks) as bar:
+def simulate_chain(pipeline: Pipeline, kernel: str | None, *, keep_rows: bool = True) -> Motion:
+    """A run of a path without a bus. Without its rows (one a tick) its memory does not grow with time."""
+    machine = pipeline.machine
+    image = pipeline.image
+    with progress("simulate", "tick", pipeline.program.ticks) as bar:
         return simulate(
             image,
             machine.models(machine.plane),
@@ -254,14 +254,14 @@ def simulate_chain(chain: Pipeline, kernel: str | None, *, keep_rows: bool = Tru
 
 def simulate_(options: Namespace) -> None:
     """hodograph simulate."""
-    chain = load_pipeline(options.file, options.machine)
+    pipeline = load_pipeline(options.file, options.machine)
     times = {"hold": options.hold_at, "stop": options.stop_at, "fault": options.fault_at}
     for kind, values in times.items():
-        _within(f"--{kind}-at", values, last_tick_s(chain.program), "s")
-    motion = simulate_chain(chain, options.kernel, keep_rows=options.trace is not None)
-    print_notes(chain, chain.compilation.plan)
+        _within(f"--{kind}-at", values, last_tick_s(pipeline.program), "s")
+    motion = simulate_chain(pipeline, options.kernel, keep_rows=options.trace is not None)
+    print_notes(pipeline, pipeline.compilation.plan)
     stops = [
-        _stopped(chain, options.kernel, kind, at_s)
+        _stopped(pipeline, options.kernel, kind, at_s)
         for kind, values in times.items()
         for at_s in values
     ]
@@ -284,10 +284,10 @@ def _shortest(value: float) -> str:
     return short if float(short) == value else repr(value)
 
 
-def _stopped(chain: Pipeline, kernel: str | None, kind: str, at_s: float) -> StoppedRun:
-    machine = chain.machine
+def _stopped(pipeline: Pipeline, kernel: str | None, kind: str, at_s: float) -> StoppedRun:
+    machine = pipeline.machine
     return simulate_stop(
-        NativeProgram(chain.image),
+        NativeProgram(pipeline.image),
         machine.models(machine.plane),
         kind,
         at_s,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph record: the bus into a file, and a look at every setpoint that is written."""
+"""hodograph record: the bus into a file, and the setpoint step check of all that is written."""
 
 from __future__ import annotations
 

@@ -21,10 +21,10 @@ def replay(options: Namespace) -> None:
 
     check_suffix(options.recording)
     image = read_image(options.file)
-    chain = None if image is not None else load_pipeline(options.file, options.machine)
-    if chain is not None:
-        image, machine = chain.image, chain.machine
-        print_notes(chain, chain.compilation.plan)
+    pipeline = None if image is not None else load_pipeline(options.file, options.machine)
+    if pipeline is not None:
+        image, machine = pipeline.image, pipeline.machine
+        print_notes(pipeline, pipeline.compilation.plan)
     elif options.machine is None:
         raise InputError(f"{options.file}: a program image needs --machine FILE")
     elif options.report is not None:
@@ -40,11 +40,11 @@ def replay(options: Namespace) -> None:
         raise RunError(f"{options.recording}: {error}") from error
     if options.trace is not None:
         write_trace(found.motion, options.trace)
-    if chain is not None and options.report is not None:
+    if pipeline is not None and options.report is not None:
         from ..report import write_report
         from .output import note
 
-        note(f"report: {write_report([(chain, found.motion, found)], options.report)}")
+        note(f"report: {write_report([(pipeline, found.motion, found)], options.report)}")
     if options.json:
         print_json(found.summary())
     else:

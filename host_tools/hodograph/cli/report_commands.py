@@ -14,11 +14,11 @@ def report(options: Namespace) -> None:
     """hodograph report."""
     from ..report import write_report
 
-    chains = [load_pipeline(file, options.machine) for file in options.files]
+    pipelines = [load_pipeline(file, options.machine) for file in options.files]
     cases = []
-    for chain in chains:
-        print_notes(chain, chain.plan)
-        cases.append((chain, simulate_chain(chain, options.kernel), None))
+    for pipeline in pipelines:
+        print_notes(pipeline, pipeline.plan)
+        cases.append((pipeline, simulate_chain(pipeline, options.kernel), None))
     print(write_report(cases, options.output))
 
 

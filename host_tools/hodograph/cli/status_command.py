@@ -138,8 +138,8 @@ def _look(controller: Controller, meter: LoadMeter | None, screen: _Screen) -> N
 
 
 def _forget(meter: LoadMeter | None) -> None:
-    """What was heard meanwhile: other nodes may talk on for hours."""
-    with suppress(BusError):  # the bus is down as well, which the next look tells
+    """What was received meanwhile: other nodes may talk on for hours."""
+    with suppress(BusError):  # the bus is down as well, which the next reading shows
         if meter is not None:
             meter.measure(0.0)
 

@@ -11,7 +11,7 @@ DEFAULT_BITRATE = 1_000_000
 
 @dataclass(frozen=True)
 class Target:
-    """Node number, bit rate, and names of the axes where a machine file tells them."""
+    """Node number, bit rate, and names of the axes where a machine file gives them."""
 
     node: int
     bitrate: int

@@ -23,7 +23,7 @@ def tune(options: Namespace) -> None:
 
     _check(options)
     machine = load_machine(options.file)
-    chains = [load_pipeline(file, options.file) for file in options.path or ()]
+    pipelines = [load_pipeline(file, options.file) for file in options.path or ()]
     asked = Asked(
         bandwidth_hz=options.bandwidth,
         damping=options.damping if options.damping is not None else 1.0,
@@ -33,7 +33,7 @@ def tune(options: Namespace) -> None:
         wanted=Wanted(modulus=options.margin, delay_s=options.delay_us * 1e-6),
     )
     with progress("search", "loop") as advance:
-        found = tune_machine(machine, chains, asked, advance)
+        found = tune_machine(machine, pipelines, asked, advance)
     for axis in found.axes:
         if options.bandwidth is not None and axis.tuned.margins.modulus < options.margin:
             note(
@@ -48,7 +48,7 @@ def tune(options: Namespace) -> None:
     if options.report is not None:
         from ..report.tune_report import write_tune_report
 
-        files[write_tune_report(found, chains, options.report)] = ""
+        files[write_tune_report(found, pipelines, options.report)] = ""
     if options.json:
         print_json(tuning_json(found) | {"files": [str(file) for file in files]})
         return

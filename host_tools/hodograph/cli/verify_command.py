@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from argparse import Namespace
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 
 from ..config import PLANE_AXES, Drive, Machine
 from ..errors import InputError, LimitError
+from ..feed import Peak
 from ..native.program import NativeFault, NativeProgram
 from ..pipeline import Pipeline, controller_verdict, load_pipeline, proved_limits
 from ..program import compile_program, encode
@@ -16,7 +18,6 @@ from ..program.compiler import ProgramOptions
 from ..verify import (
     TOLERANCE,
     BusNoise,
-    Peak,
     Sampled,
     Verification,
     bus_noise,
@@ -34,15 +35,15 @@ _MOST_LINES = 20
 
 def verify(options: Namespace) -> None:
     """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
-    chain = load_pipeline(options.file, options.machine)
-    machine = chain.machine_or_none
-    native = _planned(chain) if options.program is None else _given(options.program)
+    pipeline = load_pipeline(options.file, options.machine)
+    machine = pipeline.machine_or_none
+    native = _planned(pipeline) if options.program is None else _given(options.program)
     program = decode_file(options.program or options.file, native.image)
     fault = None
     if machine is not None and options.program is not None:  # else it has been accepted already
         fault = controller_verdict(native, machine)
     native.require()
-    found = verify_program(program, chain.limits, _drives(machine))
+    found = verify_program(program, pipeline.limits, _drives(machine))
     drives_see = sampled(native)
     counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
     noise = bus_noise(counts_per_mm, program.period_us)
@@ -54,7 +55,7 @@ def verify(options: Namespace) -> None:
     if fault is not None:
         raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
     if not found.kept:
-        beyond = [peak.quantity for peak in found.peaks if not peak.kept]
+        beyond = [peak.quantity for peak in found.exceeded]
         raise LimitError(
             f"{options.file}: beyond its limits by more than {100 * TOLERANCE:g} %: {', '.join(beyond)}"
         )
@@ -78,12 +79,14 @@ def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dic
     return {"controller": {"accepted": False} | refusal}
 
 
-def _planned(chain: Pipeline) -> NativeProgram:
-    print_notes(chain, chain.plan)
-    if chain.machine_or_none is not None:
-        return chain.accepted
-    options = ProgramOptions(chain.file.name)
-    return NativeProgram(encode(compile_program(chain.spline_result.spline, chain.plan, options)))
+def _planned(pipeline: Pipeline) -> NativeProgram:
+    print_notes(pipeline, pipeline.plan)
+    if pipeline.machine_or_none is not None:
+        return pipeline.accepted
+    options = ProgramOptions(pipeline.file.name)
+    return NativeProgram(
+        encode(compile_program(pipeline.spline_result.spline, pipeline.plan, options))
+    )
 
 
 def _given(file: Path) -> NativeProgram:
@@ -121,11 +124,12 @@ def _document(
 
 
 def _entry(peak: Peak) -> dict[str, object]:
+    limited = isfinite(peak.limit.value)
     return {
         "value": peak.value,
-        "at_most": peak.at_most,
-        "limit": peak.limit,
-        "ratio": peak.ratio,
+        "at_most": peak.most,
+        "limit": peak.limit.value if limited else None,
+        "ratio": peak.usage if limited else None,
         "s_mm": peak.s_mm,
         "t_s": peak.t_s,
     }
@@ -165,10 +169,11 @@ def _text(found: Verification, drives_see: tuple[Sampled, ...], noise: BusNoise)
 
 
 def _row(peak: Peak) -> str:
-    limit = "-" if peak.limit is None else number(peak.limit)
-    ratio = "-" if peak.ratio is None else f"{peak.ratio:.5f}"
+    limited = isfinite(peak.limit.value)
+    limit = number(peak.limit.value) if limited else "-"
+    ratio = f"{peak.usage:.5f}" if limited else "-"
     return (
-        f"{peak.quantity:<24} {number(peak.value):>12} {number(peak.at_most):>12} {limit:>10} {ratio:>8} "
+        f"{peak.quantity:<24} {number(peak.value):>12} {number(peak.most):>12} {limit:>10} {ratio:>8} "
         f"{peak.s_mm:>10.4f} {peak.t_s:>9.4f}"
     )
 

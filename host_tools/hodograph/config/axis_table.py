@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tables [[axis]] of a machine file, with what the controller tells each drive
+"""The tables [[axis]] of a machine file, with what the controller writes to each drive
 (docs/reference/protocol.md section 3)."""
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ class Identity:
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: CANopen node, travel limits in machine coordinates, limits of its motion, what its drive is told, and
-    its model.
+    """One axis: CANopen node, travel limits in machine coordinates, limits of its motion, what is written to its
+    drive, and its model.
 
     No program moves the axis beyond its velocity, acceleration and jerk: plans keep them, and the controller proves it
     before it accepts a program (docs/guides/limits.md).

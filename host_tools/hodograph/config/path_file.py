@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Path files: the curve, the feed asked for, its limits, and the machine to run it on."""
+"""Path files: the curve, the requested feed, its limits, and the machine to run it on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed import AxisLimits, FeedCap, FeedRequest, Limits
+from ..feed import AxisLimits, FeedRequest, FeedZone, Limits
 from ..feed.limits import GREATEST_RESERVE, LEAST_RESERVE, POLICIES
 from ..feed.request import (
     GREATEST_DEGREE,
@@ -124,7 +124,7 @@ def _check_closing(table: Table, key: str, points: NDArray[np.complex128]) -> No
     """Refuses a tail that seems meant to repeat the first points of a closed path and does not.
 
     It seems so where the last point, or two of the last three, lie within `_CLOSING` of the median
-    distance between neighbours; exact repeats are left to the spline, which drops them.
+    distance between consecutive points; exact repeats are left to the spline, which drops them.
     """
     near = _CLOSING * float(np.median(np.abs(np.diff(points)))) if points.size > 1 else 0.0
     for tail in (1, 3):
@@ -182,7 +182,7 @@ def _limits(table: Table) -> Limits:
         volts=table.optional_number("volts", low=1e-3, high=1e3),
         axis=_axis_limits(table.table("axis", _AXIS_LIMITS, required=False)),
         reserve=table.number("reserve", Limits.reserve, low=LEAST_RESERVE, high=GREATEST_RESERVE),
-        caps=tuple(_cap(one) for one in table.tables("cap", _CAP, required=False)),
+        zones=tuple(_zone(one) for one in table.tables("cap", _CAP, required=False)),
     )
 
 
@@ -194,8 +194,8 @@ def _axis_limits(table: Table) -> AxisLimits:
     )
 
 
-def _cap(table: Table) -> FeedCap:
+def _zone(table: Table) -> FeedZone:
     from_mm, to_mm = (table.number(key, low=0.0, high=1e7) for key in ("from_mm", "to_mm"))
     if not from_mm < to_mm:
         raise table.error("from_mm", f"is {from_mm:g}: must be below to_mm = {to_mm:g}")
-    return FeedCap(from_mm, to_mm, table.number("feed_mm_s", **_FEEDS))
+    return FeedZone(from_mm, to_mm, table.number("feed_mm_s", **_FEEDS))

@@ -4,6 +4,8 @@
 A `Table` knows the file it came from and the name of its section, and every getter either returns a value of
 the promised type and range or raises `InputError` with one line such as
 `path.toml: [feed] nominal_mm_s must be a number, but is "fast"`.
+
+No schema library: the messages of msgspec name neither the value nor near keys, so this walk would stay beside it.
 """
 
 from __future__ import annotations

@@ -91,7 +91,9 @@ class CaseRecord:
         return int(time_us[away[-1]])
 
     def still_moving(self, tolerance_counts: int) -> tuple[int, ...]:
-        """Nodes that went on moving to the end of the recording, by their own words; silent ones are not known."""
+        """Nodes that went on moving to the end of the recording, by their own reports; those that send nothing are
+        not known.
+        """
         if not self.drives.size:
             return ()
         begin_us = int(self.drives["time_us"][-1]) - _LAST_LOOK_US
@@ -104,7 +106,9 @@ class CaseRecord:
         return tuple(found)
 
     def setpoints(self) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
-        """By axis: the targets by SYNC from tick 0 on, and where one was sent that the drive was told to follow."""
+        """By axis: the targets by SYNC from tick 0 on, and where one was sent that the drive was commanded to
+        follow.
+        """
         count = max(0, self._sync_at.size - (self._first or 0))
         rows = []
         for node in self.nodes:

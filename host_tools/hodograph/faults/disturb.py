@@ -12,9 +12,9 @@ from ..bus.processes import Process
 from ..bus.sdo.controller import BOOT, FAULT_STATE, OFF, READY, Controller
 from ..bus.sdo.objects import ACTUAL, FAULT, MOVING, STATISTICS
 from ..errors import BusError, RunError
-from .actions import await_rest, drives_at, spawn_command
 from .bench import FaultBench
-from .record import LIMIT_S, LOOK_S, REST_TOLERANCE_COUNTS, Record
+from .case_run import LIMIT_S, LOOK_S, REST_TOLERANCE_COUNTS, CaseRun
+from .fault_actions import await_rest, drives_at, spawn_command
 from .uploads import disturb_upload
 
 QUIET_S = 0.25
@@ -25,7 +25,7 @@ _START_S = 120.0
 """For a command of its own to come up: on a busy machine it loads for longer than any case lasts."""
 
 
-def disturb(record: Record, stand: FaultBench, controller: Controller, control: Recorder) -> None:
+def disturb(record: CaseRun, bench: FaultBench, controller: Controller, control: Recorder) -> None:
     """Runs the case's program, or its upload, with what its scenario does to it. Raises what the bus tools raise."""
     job, case = record.job, record.case
     controller.require(5.0)
@@ -34,15 +34,15 @@ def disturb(record: Record, stand: FaultBench, controller: Controller, control: 
     controller.enable()
     controller.upload(job.image)
     if case.scenario.action in ("cut-upload", "kill-upload"):
-        disturb_upload(record, stand, controller, control)
+        disturb_upload(record, bench, controller, control)
         return
     process = None
     if case.scenario.action == "kill-host":
-        process = spawn_command(stand.clock, "start", "--follow", "--bus", str(stand.bus))
+        process = spawn_command(bench.clock, "start", "--follow", "--bus", str(bench.bus))
     else:
         controller.start()
     try:
-        state = _follow(record, stand, controller, process)
+        state = _follow(record, bench, controller, process)
     finally:
         if process is not None:
             process.kill()
@@ -58,7 +58,7 @@ def disturb(record: Record, stand: FaultBench, controller: Controller, control: 
 
 
 def _follow(
-    record: Record, stand: FaultBench, controller: Controller, process: Process | None
+    record: CaseRun, bench: FaultBench, controller: Controller, process: Process | None
 ) -> int | None:
     """Until the controller is at rest again, acting on the way; its state, None when it was killed."""
     action, started, acted = record.case.scenario.action, False, False
@@ -69,7 +69,7 @@ def _follow(
             started, deadline = True, controller.clock.now_s() + LIMIT_S
         if state in MOVING and not acted and action != "none":
             acted = controller.read(STATISTICS, _TICK) >= record.case.at
-            if acted and not _act(record, stand, controller.clock, process):
+            if acted and not _act(record, bench, controller.clock, process):
                 return None
         if state in (FAULT_STATE, OFF, BOOT) or (started and state == READY):
             return state
@@ -80,35 +80,35 @@ def _follow(
         controller.clock.sleep(LOOK_S)
 
 
-def _act(record: Record, stand: FaultBench, clock: Clock, process: Process | None) -> bool:
+def _act(record: CaseRun, bench: FaultBench, clock: Clock, process: Process | None) -> bool:
     """Does what the scenario asks of the host; whether there still is a controller."""
     action = record.case.scenario.action
     if action == "watch-drives":
-        _watch_drives(record, stand, clock)
+        _watch_drives(record, bench, clock)
         return True
     record.began_us = clock.stamp_ns() // 1000
     if action == "kill-drives":
-        for drive in stand.drives:
+        for drive in bench.drives:
             drive.kill()
     elif action == "kill-one-drive":
-        stand.drives[record.job.machine.nodes.index(int(record.case.drawn["node"]))].kill()
+        bench.drives[record.job.machine.nodes.index(int(record.case.drawn["node"]))].kill()
     elif process is not None:
         process.kill()
     elif action == "kill-controller":
-        stand.controller.kill()
-        _watch_drives(record, stand, clock)
+        bench.controller.kill()
+        _watch_drives(record, bench, clock)
         return False
     return True
 
 
-def _watch_drives(record: Record, stand: FaultBench, clock: Clock) -> None:
+def _watch_drives(record: CaseRun, bench: FaultBench, clock: Clock) -> None:
     machine = record.job.machine
-    with drives_at(stand.drives_bus, machine.nodes, machine.bitrate) as clients:
+    with drives_at(bench.drives_bus, machine.nodes, machine.bitrate) as clients:
         rest_s = await_rest(clients, clock, REST_TOLERANCE_COUNTS, LIMIT_S)
     record.rest_us = round((rest_s - clock.now_s()) * 1e6) + clock.stamp_ns() // 1000
 
 
-def _await_end_of_rules(record: Record, controller: Controller) -> None:
+def _await_end_of_rules(record: CaseRun, controller: Controller) -> None:
     """Until no rule acts any more, and a little longer; ticks go on as long as there is a controller."""
     case = record.case
     base = controller.read(STATISTICS, _SYNCS) - controller.read(STATISTICS, _TICK)
@@ -123,7 +123,9 @@ def _await_end_of_rules(record: Record, controller: Controller) -> None:
 
 
 def _await_rest(controller: Controller, axes: int) -> None:
-    """Until the axes stand, by what the controller hears: one that is off rolls on. If they do not, the judge sees."""
+    """Until the axes stand, by what the controller receives: one that is off rolls on. If they do not, the judge
+    sees.
+    """
     deadline = controller.clock.now_s() + LIMIT_S
     place, looks = [0] * axes, 0
     while looks < _STILL_LOOKS and controller.clock.now_s() < deadline:

@@ -13,7 +13,7 @@ import numpy as np
 from ..bus.capture.setpoint_check import find_jumps, find_rough_starts, step_limits
 from ..native import Contour, NativeProgram
 from .case_record import CaseRecord, Emergency
-from .record import REST_TOLERANCE_COUNTS, Record
+from .case_run import REST_TOLERANCE_COUNTS, CaseRun
 
 CONTROLLER_KILLED = "kill-controller"
 _PATH_TOLERANCE_MM = 3e-6
@@ -75,8 +75,8 @@ class Verdict:
         }
 
 
-def judge(record: Record) -> Verdict:
-    """Looks at everything that a case has left."""
+def judge(record: CaseRun) -> Verdict:
+    """Checks everything that a case has recorded."""
     evidence = record.evidence
     violations = list(record.troubles)
     codes: list[int] = []
@@ -112,7 +112,7 @@ def judge(record: Record) -> Verdict:
     )
 
 
-def _reaction(record: Record, evidence: CaseRecord) -> tuple[list[int], Times, Times]:
+def _reaction(record: CaseRun, evidence: CaseRecord) -> tuple[list[int], Times, Times]:
     """Fault codes, times from the injection to the fault and to rest."""
     found = _told(record, evidence)
     rest: Times
@@ -129,7 +129,7 @@ def _reaction(record: Record, evidence: CaseRecord) -> tuple[list[int], Times, T
     return codes, latency, rest
 
 
-def _told(record: Record, evidence: CaseRecord) -> list[Emergency]:
+def _told(record: CaseRun, evidence: CaseRecord) -> list[Emergency]:
     """Faults since the injection: the controller's words, or, when it was killed, the drives'."""
     if record.case.scenario.action == CONTROLLER_KILLED:
         found = evidence.emergencies(evidence.drives, evidence.nodes)
@@ -143,7 +143,7 @@ def _between(evidence: CaseRecord, from_us: int, to_us: int) -> tuple[int, float
     return max(0, ticks), max(0.0, round((to_us - from_us) / 1000, 3))
 
 
-def _bad_setpoints(record: Record, evidence: CaseRecord) -> list[str]:
+def _bad_setpoints(record: CaseRun, evidence: CaseRecord) -> list[str]:
     """Jumps, and setpoints away from the curve."""
     machine = record.job.machine
     limits = step_limits(machine, record.job.setpoints)
@@ -161,7 +161,7 @@ def _bad_setpoints(record: Record, evidence: CaseRecord) -> list[str]:
     return bad
 
 
-def _distance_mm(record: Record, points: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> float:
+def _distance_mm(record: CaseRun, points: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> float:
     program = NativeProgram(record.job.image)
     rows, nominal = program.setpoints("fixed", record.job.machine.counts_per_mm)
     contour, worst = Contour(program), 0.0
@@ -174,7 +174,7 @@ def _distance_mm(record: Record, points: np.ndarray[tuple[int, int], np.dtype[np
     return worst
 
 
-def _not_seen_at_rest(record: Record, evidence: CaseRecord, codes: list[int]) -> list[str]:
+def _not_seen_at_rest(record: CaseRun, evidence: CaseRecord, codes: list[int]) -> list[str]:
     """A rest that nobody measured is none that was in time."""
     expect = record.case.scenario.expect
     if not codes or not expect.limits_rest or record.rest_us is not None:
@@ -186,7 +186,7 @@ def _not_seen_at_rest(record: Record, evidence: CaseRecord, codes: list[int]) ->
     return [f"nobody saw when node {node} came to rest" for node in unknown]
 
 
-def _not_on_path(record: Record, evidence: CaseRecord) -> list[str]:
+def _not_on_path(record: CaseRun, evidence: CaseRecord) -> list[str]:
     """Where the stop has to be on the path: what was late, or was broken off by a quick stop."""
     found = _told(record, evidence)
     if not record.case.scenario.expect.on_path or not found or not evidence.moved:
@@ -206,7 +206,7 @@ def _not_on_path(record: Record, evidence: CaseRecord) -> list[str]:
     return bad
 
 
-def _unexpected(record: Record, codes: list[int], latency: Times, rest: Times) -> list[str]:
+def _unexpected(record: CaseRun, codes: list[int], latency: Times, rest: Times) -> list[str]:
     expect, bad = record.case.scenario.expect, []
     if record.case.rules and not record.injections:
         bad.append("nothing was injected")
@@ -230,7 +230,7 @@ def _unexpected(record: Record, codes: list[int], latency: Times, rest: Times) -
     return bad
 
 
-def _not_recovered(record: Record) -> list[str]:
+def _not_recovered(record: CaseRun) -> list[str]:
     clean, again = record.job.clean, record.again
     if again is None:
         return ["no clean run afterwards"] if not record.troubles else []

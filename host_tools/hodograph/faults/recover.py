@@ -1,32 +1,32 @@
 # SPDX-License-Identifier: MIT
-"""The way out of a fault: what has ended is started anew, the fault is reset, the program runs again."""
+"""Recovery of a fault: what has ended is started anew, the fault is reset, the program runs again."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 
 from ..bus.diagnostics.texts import STATES
-from ..bus.run import Station, run_program
+from ..bus.run import RunSession, run_program
 from ..bus.sdo.controller import FAULT_STATE, OFF, READY, RESET, CommandRefusedError, Controller
 from ..errors import RunError
 from .bench import FaultBench
-from .record import LIMIT_S, Record
+from .case_run import LIMIT_S, CaseRun
 
 
-def recover(record: Record, stand: FaultBench, controller: Controller) -> None:
-    """Resets what is left of the fault, and runs the program again from its start."""
+def recover(record: CaseRun, bench: FaultBench, controller: Controller) -> None:
+    """Resets the fault, and runs the program again from its start."""
     job = record.job
-    if stand.controller.ended():
-        stand.start_controller()
+    if bench.controller.ended():
+        bench.start_controller()
         controller.require(5.0)
-    if any(drive.ended() for drive in stand.drives):
-        for drive in stand.drives:
+    if any(drive.ended() for drive in bench.drives):
+        for drive in bench.drives:
             drive.end()
-        stand.start_drives(faulty=False)
+        bench.start_drives(faulty=False)
     began_s = controller.clock.now_s()
     _reset(controller)
     record.recovery_ms = 1000 * (controller.clock.now_s() - began_s)
-    run = run_program(Station(controller, "fast", None), job.machine, job.image, "fixed")
+    run = run_program(RunSession(controller, "fast", None), job.machine, job.image, "fixed")
     record.again = run.motion
 
 

@@ -13,8 +13,8 @@ from ..bus.sdo.controller import connect
 from ..errors import HodographError
 from .bench import FaultBench
 from .case_record import CaseRecord
+from .case_run import CaseRun, load_job
 from .disturb import disturb
-from .record import Record, load_job
 from .recover import recover
 from .scenario import Case
 
@@ -25,7 +25,7 @@ Buses = tuple[BusAddress, BusAddress]
 """The controller's and the drives'."""
 
 
-def run_case(case: Case, buses: Buses | None) -> Record:
+def run_case(case: Case, buses: Buses | None) -> CaseRun:
     """Runs a case to its end, whatever happens; troubles are in the record. Raises BusError: no bus to run on.
 
     Without buses it has its own, in virtual time: the same record each time.
@@ -36,36 +36,36 @@ def run_case(case: Case, buses: Buses | None) -> Record:
         return _run(case, hub.addresses[0], hub.addresses[1])
 
 
-def _run(case: Case, bus: BusAddress, drives_bus: BusAddress) -> Record:
+def _run(case: Case, bus: BusAddress, drives_bus: BusAddress) -> CaseRun:
     began_s = time.monotonic()
-    record = Record(case, load_job(case.scenario.path))
+    record = CaseRun(case, load_job(case.scenario.path))
     machine = record.job.machine
     apart = case.scenario.action == "kill-one-drive"
     with (
-        FaultBench(machine, bus, drives_bus, case.rules, apart=apart) as stand,
+        FaultBench(machine, bus, drives_bus, case.rules, apart=apart) as bench,
         connect(bus, machine.node, machine.bitrate) as controller,
         Recorder(bus, _TAKE_S) as control,
         Recorder(drives_bus, _TAKE_S) as drives,
     ):
         try:
-            disturb(record, stand, controller, control)
+            disturb(record, bench, controller, control)
         except HodographError as error:
             record.troubles.append(f"disturbed run: {error}")
-        _gather(record, stand, controller.clock, control, drives)
+        _gather(record, bench, controller.clock, control, drives)
         try:
-            recover(record, stand, controller)
+            recover(record, bench, controller)
         except HodographError as error:
             record.troubles.append(f"recovery: {error}")
         record.control = control.so_far()
-        record.troubles += stand.complaints()
+        record.troubles += bench.complaints()
     record.wall_s = time.monotonic() - began_s
     return record
 
 
 def _gather(
-    record: Record, stand: FaultBench, clock: Clock, control: Recorder, drives: Recorder
+    record: CaseRun, bench: FaultBench, clock: Clock, control: Recorder, drives: Recorder
 ) -> None:
-    record.injections = stand.injections()
+    record.injections = bench.injections()
     record.evidence = CaseRecord(control.so_far(), drives.so_far(), record.job.machine.nodes)
     if control.dropped or drives.dropped:
         record.troubles.append("the kernel dropped frames of a recording")

@@ -47,7 +47,7 @@ ACTIONS = (
 )
 NO_LIMIT = 10**9
 RECOVER_MS, NOTHING_TO_RESET_MS = 3000, 1000
-"""How long the way out of a fault may last; of scenarios that give no code, whose machine goes on by itself."""
+"""How long the recovery of a fault may last; of scenarios that give no code, whose machine goes on by itself."""
 _EXPECT = (
     *("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders"),
     *("unseen", "recover_ms", "on_path"),

@@ -12,22 +12,22 @@ from ..bus.clock import Clock
 from ..bus.processes import Process
 from ..bus.sdo.controller import FAULT_STATE, READY, Controller
 from ..errors import BusError, RefusedError, RunError
-from .actions import cut_upload, spawn_command
 from .bench import FaultBench
-from .record import LIMIT_S, LOOK_S, Record, load_job
+from .case_run import LIMIT_S, LOOK_S, CaseRun, load_job
+from .fault_actions import cut_upload, spawn_command
 
 _SDO_ASK = 0x600
 
 
 def disturb_upload(
-    record: Record, stand: FaultBench, controller: Controller, control: Recorder
+    record: CaseRun, bench: FaultBench, controller: Controller, control: Recorder
 ) -> None:
     """Breaks an upload of another program off; what was there must stay."""
     other = load_job(record.job.other).image
     record.began_us = controller.clock.stamp_ns() // 1000
     if record.case.scenario.action == "kill-upload":
         process = spawn_command(
-            stand.clock, "upload", str(record.job.other), "--bus", str(stand.bus)
+            bench.clock, "upload", str(record.job.other), "--bus", str(bench.bus)
         )
         _await_frames(
             controller.clock,
@@ -79,7 +79,7 @@ def _crc_after_cut(controller: Controller) -> int | None:
             controller.clock.sleep(0.05)
 
 
-def _run_old(record: Record, controller: Controller) -> None:
+def _run_old(record: CaseRun, controller: Controller) -> None:
     """The program that was there before runs as if nothing had been."""
     controller.start()
     deadline = controller.clock.now_s() + LIMIT_S

@@ -1,28 +1,40 @@
 # SPDX-License-Identifier: MIT
 """Feed along a path: profiles, plans inside limits, and the feed pieces of a program."""
 
-from .limits import AxisLimits, ControllerLimits, FeedCap, Limits
-from .path_planning import plan_path
-from .pattern_search import SearchStep
+from .limits import (
+    AxisLimits,
+    ControllerLimits,
+    FeedZone,
+    Limit,
+    Limits,
+    Peak,
+    Plant,
+    Plants,
+    ineffective_limits,
+)
 from .pieces import FeedPiece, FeedPieces
-from .plan import Excess, FeedPlan, Plan
-from .planning import plan_feed
-from .plant import Plant
+from .plan import FeedPlan, Replan
+from .planning import plan_feed, plan_path, replan
+from .ramp import SearchStep
 from .request import FeedRequest
 
 __all__ = [
     "AxisLimits",
     "ControllerLimits",
-    "Excess",
-    "FeedCap",
     "FeedPiece",
     "FeedPieces",
     "FeedPlan",
     "FeedRequest",
+    "FeedZone",
+    "Limit",
     "Limits",
-    "Plan",
+    "Peak",
     "Plant",
+    "Plants",
+    "Replan",
     "SearchStep",
+    "ineffective_limits",
     "plan_feed",
     "plan_path",
+    "replan",
 ]

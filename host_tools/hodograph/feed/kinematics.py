@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Feed pieces along a path: what they ask of the axes, beside limits of axes, curvature, volts and stretches.
+"""Path kinematics: velocity, acceleration and jerk of the axes that follow from a curve and a motion along it.
 
-Samples within cells (one piece on one segment of the path); how far a quantity may rise between them is taken
-from its second differences. docs/theory/numerics.md section 7.
+`frames` has the derivatives of a PH curve by arc length, `axis_motion` the chain rule; docs/theory/numerics.md 5.6.
+`sample` applies them to feed pieces, in cells (one piece on one segment of the path); how far a quantity may rise
+between samples is taken from its second differences. docs/theory/numerics.md section 7.
 """
 
 from __future__ import annotations
@@ -15,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..spline import PHSpline
-from .limits import Limits
+from .limits import Limits, Plants
 from .pieces import exponents
-from .plant import Plants
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -30,6 +30,54 @@ _BRIEF = 1e-9
 _ROUGH = 0.1
 _PARTS = 4
 _ROUNDS = 3
+
+
+LEFT, RIGHT = -1, 1
+"""Sides of a joint of segments: PH quintic splines are C2, the slope of the curvature jumps there."""
+
+_AT_JOINT = 1e-9
+_CLOSE = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """r_s, r_ss and r_sss as x + iy, and the curvature, at points of any shape; mm."""
+
+    r1: Complex
+    r2: Complex
+    r3: Complex
+    curvature: Real
+
+
+def frames(spline: PHSpline, s_mm: Real, side: NDArray[np.int8] | None = None) -> Frames:
+    """At arc lengths `s_mm` (any shape); at joints those of the segment to the LEFT or RIGHT, by `side`."""
+    segment, xi = spline.locate(np.clip(s_mm, 0.0, spline.length_mm), _CLOSE)
+    if side is not None:
+        back = (xi < _AT_JOINT) & (side == LEFT) & (segment > 0)
+        on = (xi > 1.0 - _AT_JOINT) & (side == RIGHT) & (segment < spline.segment_count - 1)
+        segment = segment - back + on
+        xi = np.where(back, 1.0, np.where(on, 0.0, xi))
+    w0, w1, w2 = np.moveaxis(spline.w[segment], -1, 0)
+    w = w0 * (1.0 - xi) ** 2 + 2.0 * w1 * xi * (1.0 - xi) + w2 * xi * xi
+    first = 2.0 * ((w1 - w0) * (1.0 - xi) + (w2 - w1) * xi)
+    second = 2.0 * (w2 - 2.0 * w1 + w0)
+    sigma = w.real * w.real + w.imag * w.imag
+    turn = (np.conj(w) * first).imag
+    growth = 2.0 * (np.conj(w) * first).real
+    curvature = 2.0 * turn / sigma**2
+    slope = (2.0 * (np.conj(w) * second).imag / sigma**2 - 4.0 * turn * growth / sigma**3) / sigma
+    tangent = w * w / sigma
+    normal = 1j * tangent
+    return Frames(tangent, curvature * normal, slope * normal - curvature**2 * tangent, curvature)
+
+
+def axis_motion(frame: Frames, d1: Real, d2: Real, d3: Real) -> tuple[Complex, Complex, Complex]:
+    """The first three derivatives of the point, from those of the arc length by the same variable."""
+    return (
+        frame.r1 * d1,
+        frame.r1 * d2 + frame.r2 * d1**2,
+        frame.r1 * d3 + 3.0 * frame.r2 * d1 * d2 + frame.r3 * d1**3,
+    )
 
 
 class Pieces(Protocol):
@@ -52,25 +100,27 @@ class Pieces(Protocol):
 class PathBounds:
     """A path, and the limits of its file that depend on where on the path the motion is.
 
-    `obeyed`: the plan keeps them; else they only keep factors above 1 from breaking more of them.
+    `kept`: the plan keeps them; else they only keep factors above 1 from exceeding more of them.
     """
 
     spline: PHSpline
     limits: Limits
     plants: Plants | None = None
-    obeyed: bool = True
+    kept: bool = True
 
     @property
     def bind(self) -> bool:
         """Whether there are any."""
         limits = self.limits
-        some = limits.centripetal_mm_s2 is not None or bool(limits.caps)
+        some = limits.centripetal_mm_s2 is not None or bool(limits.zones)
         return some or limits.axes.any or self.plants is not None
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
-    """C cells, K samples each: `piece` (C,); the others (C, K), those of the point as x + iy; mm, s."""
+class PathKinematics:
+    """The motion of feed pieces along a path, in C cells with K samples each: `piece` (C,); the others (C, K), those
+    of the point as x + iy; mm, s.
+    """
 
     piece: Int
     arc_mm: Real
@@ -81,13 +131,13 @@ class Samples:
     jerk: Complex
 
 
-def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> Samples:
+def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> PathKinematics:
     """The motion of `pieces` along the path. Cells in which an axis' acceleration or jerk may rise between samples by
     more than a share of its reserve are cut into parts, where it is near its limit; `filled`: everywhere, since the
     override uses up what the plan leaves of a limit.
     """
     track = _track(pieces)
-    ends = [end for cap in bounds.limits.caps for end in (cap.from_mm, cap.to_mm)]
+    ends = [end for zone in bounds.limits.zones for end in (zone.from_mm, zone.to_mm)]
     cuts = np.unique(np.concatenate((bounds.spline.segment_starts_mm[1:-1], ends)))
     cells = _cells(track, cuts)
     found = []
@@ -100,11 +150,13 @@ def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> Sampl
             break
     else:
         found.append(_evaluate(bounds.spline, track, cells))
-    return Samples(*(np.concatenate(parts) for parts in zip(*map(_fields, found), strict=True)))
+    return PathKinematics(
+        *(np.concatenate(parts) for parts in zip(*map(_fields, found), strict=True))
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class _Track:
+class _ArcLength:
     """Arc length of M pieces: `start` mm, and powers (M, 8) of u = t / seconds."""
 
     start: Real
@@ -121,38 +173,28 @@ class _Cells:
     high: Real
 
 
-def _track(pieces: Pieces) -> _Track:
+def _track(pieces: Pieces) -> _ArcLength:
     seconds = np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
     stretch = np.ldexp(seconds, -exponents(pieces.duration_q32_s))
     way = np.zeros((seconds.size, 8))
     way[:, 1:] = np.ldexp(pieces.c_q40.astype(np.float64), -40)
     way[:, 1:] *= stretch[:, None] ** np.arange(1, 8)
-    return _Track(np.ldexp(pieces.start_q40.astype(np.float64), -40), way, seconds)
+    return _ArcLength(np.ldexp(pieces.start_q40.astype(np.float64), -40), way, seconds)
 
 
-def _evaluate(spline: PHSpline, track: _Track, cells: _Cells) -> Samples:
+def _evaluate(spline: PHSpline, track: _ArcLength, cells: _Cells) -> PathKinematics:
     piece = cells.piece
     share = np.linspace(_BESIDE, 1.0 - _BESIDE, INTERVALS + 1)
     u = cells.low[:, None] + (cells.high - cells.low)[:, None] * share
     s = np.clip(track.start[piece, None] + _value(track.way[piece], u, 0), 0.0, spline.length_mm)
     per_s = 1.0 / track.seconds[piece, None]
     f1, f2, f3 = (_value(track.way[piece], u, n) * per_s**n for n in (1, 2, 3))
-    tangent, kappa, slope = _frames(spline, s)
-    normal = kappa * f1 * f1
-    across = 3.0 * kappa * f1 * f2 + slope * f1**3
-    return Samples(
-        piece,
-        s,
-        f1,
-        normal,
-        f1 * tangent,
-        (f2 + 1j * normal) * tangent,
-        (f3 - kappa * normal * f1 + 1j * across) * tangent,
-    )
+    frame = frames(spline, s)
+    return PathKinematics(piece, s, f1, frame.curvature * f1 * f1, *axis_motion(frame, f1, f2, f3))
 
 
-def _rough(limits: Limits, samples: Samples, filled: bool) -> NDArray[np.bool_]:
-    """Cells that want to be cut."""
+def _rough(limits: Limits, samples: PathKinematics, filled: bool) -> NDArray[np.bool_]:
+    """Cells that have to be cut."""
     rough = np.zeros(samples.piece.size, dtype=np.bool_)
     for values, both in (
         (samples.acceleration, limits.axes.acceleration_mm_s2),
@@ -172,22 +214,22 @@ def _divided(cells: _Cells) -> _Cells:
     return _Cells(np.repeat(cells.piece, _PARTS), low.ravel(), (low + width / _PARTS).ravel())
 
 
-def _fields(samples: Samples) -> tuple[NDArray[np.generic], ...]:
+def _fields(samples: PathKinematics) -> tuple[NDArray[np.generic], ...]:
     return tuple(getattr(samples, one.name) for one in fields(samples))
 
 
-def _taken(samples: Samples, which: NDArray[np.bool_]) -> Samples:
-    return Samples(*(values[which] for values in _fields(samples)))  # type: ignore[arg-type]
+def _taken(samples: PathKinematics, which: NDArray[np.bool_]) -> PathKinematics:
+    return PathKinematics(*(values[which] for values in _fields(samples)))  # type: ignore[arg-type]
 
 
 def raised(values: Real) -> Real:
-    """Magnitudes of samples (C, K), raised by what second differences say they may rise in between."""
+    """Magnitudes of samples (C, K), raised by what they may rise in between, from second differences."""
     bend = np.abs(np.diff(values, 2, axis=1))
     bend = np.concatenate((bend[:, :1], bend, bend[:, -1:]), axis=1) / 8.0
     return np.asarray(np.abs(values) + bend)
 
 
-def _cells(track: _Track, cuts: Real) -> _Cells:
+def _cells(track: _ArcLength, cuts: Real) -> _Cells:
     """Pieces, cut at arc lengths `cuts`."""
     at = np.clip(np.searchsorted(track.start, cuts, side="right") - 1, 0, None)
     low, high = np.zeros(cuts.size), np.ones(cuts.size)
@@ -214,27 +256,13 @@ def _value(way: Real, u: Real, order: int) -> Real:
     return out
 
 
-def _frames(spline: PHSpline, s: Real) -> tuple[Complex, Real, Real]:
-    """Unit tangent, curvature and its slope along the arc at arc lengths of any shape."""
-    segment, xi = spline.locate(s)
-    w0, w1, w2 = np.moveaxis(spline.w[segment], -1, 0)
-    w = w0 * (1.0 - xi) ** 2 + 2.0 * w1 * xi * (1.0 - xi) + w2 * xi * xi
-    first = 2.0 * ((w1 - w0) * (1.0 - xi) + (w2 - w1) * xi)
-    second = 2.0 * (w2 - 2.0 * w1 + w0)
-    sigma = w.real * w.real + w.imag * w.imag
-    turn = np.conj(w) * first
-    kappa = 2.0 * turn.imag / sigma**2
-    slope = (2.0 * (np.conj(w) * second).imag - 8.0 * turn.imag * turn.real / sigma) / sigma**3
-    return w * w / sigma, kappa, slope
-
-
 def per_axis(values: Complex) -> Iterator[Real]:
     """x, then y."""
     yield values.real
     yield values.imag
 
 
-def least_of_pieces(samples: Samples, values: Real, count: int) -> Real:
+def least_of_pieces(samples: PathKinematics, values: Real, count: int) -> Real:
     """The least value (M,) over all samples of each piece."""
     out = np.full(count, np.inf)
     np.minimum.at(out, samples.piece, values.min(axis=1))

@@ -1,22 +1,201 @@
 # SPDX-License-Identifier: MIT
-"""The limits that a feed has to keep: those of the path file, and those of the controller."""
+"""Limits of a motion: one `Limit`, the tables of limits that files give, and the `Peak` beside a limit.
+
+Limits come from a path file ([limits], [feed]), a machine file (its axes and its controller) and drive files (volts).
+docs/theory/numerics.md 5.5.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from math import isfinite
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, fields, replace
+from math import inf, isfinite
 
 from ..errors import InputError
+from .request import FeedRequest
 
 POLICIES = ("respect", "report")
 LEAST_RESERVE, GREATEST_RESERVE = 2e-3, 0.9
 
 MACHINE_SHARE = 0.998
-"""Of the machine's axis limits: what plans use. The rest is for rounding, and for the controller's bounds of what lies
-between the places where it looks (docs/guides/limits.md)."""
+"""Of the machine's axis limits: what plans use. The rest is for rounding, and for the controller's bounds between the
+places that it evaluates (docs/guides/limits.md)."""
 
 PerAxis = tuple[float, float]
 """One value for x, one for y."""
+
+AXES = ("x", "y")
+
+
+@dataclass(frozen=True)
+class FeedZone:
+    """A stretch of the path with its own feed limit (`[[limits.cap]]`). Raises InputError."""
+
+    from_mm: float
+    to_mm: float
+    feed_mm_s: float
+
+    def __post_init__(self) -> None:
+        _above_zero("limits.cap: feed_mm_s", self.feed_mm_s)
+        if not (isfinite(self.to_mm) and 0.0 <= self.from_mm < self.to_mm):
+            raise InputError(
+                f"limits.cap: from_mm {self.from_mm:g} must be at least 0 and below to_mm {self.to_mm:g}"
+            )
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One bound that a motion has to keep.
+
+    key     what is bounded, with its unit, as files name it: "feed_mm_s", "velocity_mm_s", "volts" …
+    value   the greatest magnitude, a reserve already taken off; inf: none
+    source  section that gives it: "limits" or "feed" of the path file, "machine", "controller", "drive", "format"
+    axis    0: x, 1: y; None: along the path
+    zone    where on the path it applies; None: everywhere
+    share   `value` over the value given in the file; below 1 where a reserve is kept
+    words   the reason for a limit that no file gives
+    """
+
+    key: str
+    value: float
+    source: str = "limits"
+    axis: int | None = None
+    zone: FeedZone | None = None
+    share: float = 1.0
+    words: str = ""
+
+    @property
+    def given(self) -> float:
+        """The value without a reserve taken off."""
+        return self.value / self.share
+
+    @property
+    def quantity(self) -> str:
+        """The limited quantity: "feed_mm_s", "x_velocity_mm_s", "cap_mm_s" (the feed in a zone)."""
+        if self.zone is not None:
+            return "cap_mm_s"
+        return self.key if self.axis is None else f"{AXES[self.axis]}_{self.key}"
+
+    @property
+    def dotted(self) -> str:
+        """The same as a plan's JSON has it: "feed_mm_s", "axis.velocity_mm_s.x", "volts.x"."""
+        return self.quantity if self.axis is None else f"{self._table}{self.key}.{AXES[self.axis]}"
+
+    @property
+    def entry(self) -> str:
+        """The key in its file: "axis.velocity_mm_s of x"."""
+        if self.axis is not None:
+            return f"{self._table}{self.key} of {AXES[self.axis]}"
+        return self._zone + self.key
+
+    @property
+    def name(self) -> str:
+        """The same in notes: "axis x velocity_mm_s"."""
+        return self._zone + self.key if self.axis is None else f"axis {AXES[self.axis]} {self.key}"
+
+    @property
+    def reason(self) -> str:
+        """The limit in words, for notes."""
+        given = self.given / MACHINE_SHARE if self.source == "machine" else self.given
+        less = " less its reserve" if self.share < 1.0 else ""
+        return self.words or f"{self.source} {self.name} = {given:g}{less}"
+
+    @property
+    def _table(self) -> str:
+        return "" if self.key == "volts" else "axis."
+
+    @property
+    def _zone(self) -> str:
+        zone = self.zone
+        return "" if zone is None else f"cap of {zone.from_mm:g} to {zone.to_mm:g} mm, "
+
+
+def least(limits: Iterable[Limit]) -> Limit:
+    """The limit with the least value, the first of equal ones."""
+    return min(limits, key=lambda one: one.value)
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest value of a limited quantity, and its place.
+
+    value    in the unit of `limit`; the value is nowhere above `at_most` (None: not proven)
+    s_mm     arc length where it was found
+    t_s      program time of that place, None where it is not known
+    curvature_per_mm  of the path there
+    """
+
+    limit: Limit
+    value: float
+    s_mm: float = 0.0
+    t_s: float | None = None
+    at_most: float | None = None
+    curvature_per_mm: float = 0.0
+
+    @property
+    def quantity(self) -> str:
+        """See Limit."""
+        return self.limit.quantity
+
+    @property
+    def usage(self) -> float:
+        """Peak divided by limit: 1 is the limit itself; 0 where there is none."""
+        return self.value / self.limit.value
+
+    @property
+    def most(self) -> float:
+        """`at_most`, or the value itself."""
+        return self.value if self.at_most is None else self.at_most
+
+    def within(self, tolerance: float) -> bool:
+        """Whether the value is certainly nowhere above its limit by more than this share."""
+        return self.most <= self.limit.value * (1.0 + tolerance)
+
+    @property
+    def place(self) -> str:
+        """Where, in words."""
+        radius = f" (radius {1.0 / self.curvature_per_mm:.3g} mm)" if self.curvature_per_mm else ""
+        return f"at {self.s_mm:.6g} mm, where the curvature is {self.curvature_per_mm:.3g} 1/mm{radius}"
+
+    @property
+    def excess_text(self) -> str:
+        """By how much the given limit is exceeded, in words."""
+        given = self.limit.given
+        over = 100.0 * (self.value / given - 1.0)
+        return f"{self.limit.name} {self.value:.6g} is above its limit {given:g} by {over:.1f} %"
+
+
+@dataclass(frozen=True)
+class Plant:
+    """The voltage limit of an axis: volts * gain = velocity + time constant * acceleration; docs/theory/numerics.md 13.
+
+    gain_mm_s_v     steady speed for one volt
+    volts           greatest voltage that may be used, of which friction takes `friction_volts`
+    volts_limit     of the drive itself; never below `volts`
+    """
+
+    gain_mm_s_v: float
+    time_constant_s: float
+    volts: float
+    friction_volts: float = 0.0
+    volts_limit: float = inf
+
+    @property
+    def reach_mm_s(self) -> float:
+        """Bound of |velocity + time constant * acceleration|."""
+        return self.gain_mm_s_v * (self.volts - self.friction_volts)
+
+
+Plants = tuple[Plant, Plant]
+"""Of x and y."""
+
+
+def as_drives_limit(plants: Plants | None) -> Plants | None:
+    """The same with all volts that the drives have; None: these are not known."""
+    if plants is None or any(plant.volts_limit == inf for plant in plants):
+        return None
+    x, y = (replace(plant, volts=plant.volts_limit) for plant in plants)
+    return x, y
 
 
 @dataclass(frozen=True)
@@ -61,38 +240,22 @@ def _lower(a: PerAxis | None, b: PerAxis | None) -> PerAxis | None:
 
 
 @dataclass(frozen=True)
-class FeedCap:
-    """A greatest feed on the stretch of path from one arc length to another. Raises InputError."""
-
-    from_mm: float
-    to_mm: float
-    feed_mm_s: float
-
-    def __post_init__(self) -> None:
-        _above_zero("limits.cap: feed_mm_s", self.feed_mm_s)
-        if not (isfinite(self.to_mm) and 0.0 <= self.from_mm < self.to_mm):
-            raise InputError(
-                f"limits.cap: from_mm {self.from_mm:g} must be at least 0 and below to_mm {self.to_mm:g}"
-            )
-
-
-@dataclass(frozen=True)
 class Limits:
-    """Limits of the path file, and of the machine's axes; None: no limit.
+    """The limits of a path file ([limits]), and those of the machine's axes; None: no limit.
 
     feed_mm_s, acceleration_mm_s2, jerk_mm_s3   of the motion along the path (F', F'', F''')
     centripetal_mm_s2   feed^2 times curvature
     volts               of each axis by the plant of its drive file (docs/theory/numerics.md 13), along the path;
                         the drive's own volts_limit where that is less
     axis                of the motion of x and y
-    caps                of the feed on stretches of the path; where several meet, the least
+    zones               feed zones; where several meet, the least feed
     reserve             share of the axes' accelerations, jerks and volts that plans leave free, so that hold, resume
                         and override keep these limits too (docs/theory/numerics.md section 7)
 
     machine             of the motion of x and y by the machine file: they always bind
 
-    policy "respect": the feed is lowered until the profile obeys; "report": it runs as asked and what
-    exceeds is listed, but the machine's limits are kept. Profile "optimal" always obeys. Raises InputError.
+    policy "respect": the feed is lowered until the profile keeps all limits; "report": it runs as requested and what
+    exceeds is listed, but the machine's limits are kept. Profile "optimal" always keeps them. Raises InputError.
     """
 
     feed_mm_s: float | None = None
@@ -102,7 +265,7 @@ class Limits:
     centripetal_mm_s2: float | None = None
     volts: float | None = None
     axis: AxisLimits = field(default_factory=AxisLimits)
-    caps: tuple[FeedCap, ...] = ()
+    zones: tuple[FeedZone, ...] = ()
     reserve: float = LEAST_RESERVE
     machine: AxisLimits = field(default_factory=AxisLimits)
 
@@ -120,12 +283,12 @@ class Limits:
 
     @property
     def bind(self) -> bool:
-        """Whether one of them bounds the motion everywhere; caps alone do not."""
+        """Whether one of them bounds the motion everywhere; zones alone do not."""
         return self.axes.any or any(getattr(self, name) is not None for name in _SCALARS)
 
     @property
     def axes(self) -> AxisLimits:
-        """What a plan obeys of x and y: the path file's, and MACHINE_SHARE of the machine's where that is less."""
+        """What a plan keeps of x and y: the path file's, and MACHINE_SHARE of the machine's where that is less."""
         return self.axis.and_of(self.machine.scaled(MACHINE_SHARE))
 
     @property
@@ -139,11 +302,37 @@ class Limits:
         return Limits(reserve=self.reserve, machine=self.machine)
 
     def source(self, name: str, axis: int) -> str:
-        """Whose limit of an axis (0: x) binds: "limits" of the path file, "machine", or "drive" (volts)."""
+        """Source of the limit of an axis (0: x) that binds: "limits" (path file), "machine", or "drive" (volts)."""
         if name == "volts":
             return "drive" if self.volts is None else "limits"
         own, used = getattr(self.axis, name), getattr(self.axes, name)
         return "limits" if own is not None and own[axis] == used[axis] else "machine"
+
+    def axis_limits(self, key: str) -> tuple[Limit, Limit]:
+        """The limits of x and y that a plan keeps, the reserve taken off accelerations and jerks; value inf: none."""
+        both = getattr(self.axes, key) or (inf, inf)
+        share = 1.0 if key == "velocity_mm_s" else 1.0 - self.reserve
+        x, y = (
+            Limit(key, share * value, self.source(key, k) if value < inf else "", k, None, share)
+            for k, value in enumerate(both)
+        )
+        return x, y
+
+    def volts_limits(self, plants: Plants) -> tuple[Limit, Limit]:
+        """The limits of the volts beside friction that a plan keeps, the reserve taken off."""
+        share = 1.0 - self.reserve
+        x, y = (
+            Limit(
+                "volts",
+                share * (plant.reach_mm_s / plant.gain_mm_s_v),
+                self.source("volts", k),
+                k,
+                None,
+                share,
+            )
+            for k, plant in enumerate(plants)
+        )
+        return x, y
 
 
 _SCALARS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "centripetal_mm_s2", "volts")
@@ -174,6 +363,36 @@ class ControllerLimits:
     def kept_free(self) -> float:
         """The fraction of each limit that a plan really keeps free."""
         return max(self.reserve, LEAST_RESERVE)
+
+    def limit(self, key: str) -> Limit:
+        """One of them as a plan keeps it, less its reserve."""
+        share = 1.0 - self.kept_free
+        return Limit(key, float(getattr(self, key)) * share, "controller", share=share)
+
+
+def ineffective_limits(
+    limits: Limits, request: FeedRequest, length_mm: float, plants: Plants | None
+) -> Iterator[str]:
+    """One line for each part of `limits` that changes nothing on a path of `length_mm`.
+
+    plants  of x and y with the volts that their drives allow; None: no volts are limited
+    """
+    if request.optimal and limits.policy == "report":
+        yield (
+            f'limits: policy "report" does nothing with profile "{request.profile}", which keeps every limit'
+        )
+    for number, zone in enumerate(limits.zones, start=1):
+        if zone.from_mm >= length_mm:
+            yield (
+                f"limits: cap {number} begins at {zone.from_mm:g} mm, behind the end of the path at "
+                f"{length_mm:.6g} mm: it does nothing"
+            )
+    for axis, plant in zip(AXES, plants or (), strict=False):
+        if limits.volts is not None and plant.volts < limits.volts:
+            yield (
+                f"limits: volts {limits.volts:g} is more than the drive of {axis} has: "
+                f"its volts_limit of {plant.volts:g} V counts"
+            )
 
 
 def _above_zero(name: str, value: float) -> None:

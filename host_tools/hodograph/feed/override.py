@@ -1,16 +1,37 @@
 # SPDX-License-Identifier: MIT
-"""Bounds for the rate of program time in each feed piece, by level; docs/theory/numerics.md section 7."""
+"""Override headroom: what limits leave for a changing feed override, and the override bounds of each feed piece by
+override level; docs/theory/numerics.md section 7.
+
+With program time at the override lambda an axis moves with
+
+    velocity      lambda v
+    acceleration  lambda' v + lambda^2 a
+    jerk          lambda'' v + 3 lambda lambda' a + lambda^3 j
+
+v, a, j its velocity, acceleration and jerk at an override of 1. The limits bound |lambda| <= f, |lambda'| <= R,
+|lambda''| <= Q in each piece, from samples and not from peaks, since an axis is seldom fast, accelerated and
+jerked at once.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .headroom import FACTOR_SHARE, RATE_SHARES, Room
-from .limits import ControllerLimits, Limits
+from .kinematics import (
+    PathBounds,
+    PathKinematics,
+    Pieces,
+    least_of_pieces,
+    per_axis,
+    raised,
+    sample,
+)
+from .limits import ControllerLimits, Limits, Plant
 from .override_levels import (
     FACTOR_ONE_Q14,
     FULL,
@@ -22,6 +43,7 @@ from .override_levels import (
     second_codes,
     seconds_per_s2,
 )
+from .pieces import FeedPieces, derivative_peaks
 
 Real = NDArray[np.float64]
 Unsigned = NDArray[np.uint32]
@@ -29,10 +51,34 @@ Unsigned = NDArray[np.uint32]
 GREATEST_FACTOR = 2.0
 
 _LEAST_FACTOR = 1.05
-"""Along a path a factor below is 1: it would take half of the room that a changing rate has, and be of no use."""
+"""Along a path a factor below is 1: it would take half of the headroom of a changing override, and gain less than 5
+%."""
 
 _HAIR = 1.0 - 1e-9
 _TINY = 1e-12
+
+FACTOR_SHARE = 0.5
+"""Part of the headroom under each limit that a factor above 1 may use up."""
+
+RATE_SHARES = (0.5, 0.7, 0.85, 0.95)
+"""Parts of the jerk's headroom that lambda' may use; lambda'' has the rest. The best one depends on the piece."""
+
+
+def with_override(
+    raw: Pieces, controller: ControllerLimits, limits: Limits, paths: Sequence[PathBounds] = ()
+) -> FeedPieces:
+    """Pieces with bounds of the override: from the controller's limits, and from those along a path."""
+    peaks = derivative_peaks(raw.duration_q32_s, raw.c_q40)
+    headrooms = [Headroom(path, raw) for path in paths if path.bind]
+    override = override_bounds(*peaks, controller, limits, headrooms)
+    return FeedPieces(
+        raw.duration_q32_s,
+        raw.start_q40,
+        raw.c_q40,
+        override.factor_q14,
+        override.rate_codes,
+        override.second_codes,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,23 +98,23 @@ class _Piece:
     a: Real
     j: Real
     controller: ControllerLimits
-    rooms: Sequence[Room]
+    headrooms: Sequence[Headroom]
 
     def rate(self, at: Real, share: float) -> Real:
-        """R (M,) for rates up to `at`, with `share` of what is left of the jerks."""
-        room_a = self.controller.acceleration_mm_s2 - at**2 * self.a
-        room_j = self.controller.jerk_mm_s3 - at**3 * self.j
-        rate = np.minimum(room_a / self.v, share * room_j / (3.0 * at * self.a))
-        for room in self.rooms:
-            rate = np.minimum(rate, room.rate(at, share))
+        """R (M,) for rates up to `at`, with `share` of the headroom of the jerks."""
+        left_a = self.controller.acceleration_mm_s2 - at**2 * self.a
+        left_j = self.controller.jerk_mm_s3 - at**3 * self.j
+        rate = np.minimum(left_a / self.v, share * left_j / (3.0 * at * self.a))
+        for headroom in self.headrooms:
+            rate = np.minimum(rate, headroom.rate(at, share))
         return rate
 
     def second(self, at: Real, rate: Real) -> Real:
         """Q (M,) for these rates and slopes."""
-        room_j = self.controller.jerk_mm_s3 - at**3 * self.j
-        second: Real = (room_j - 3.0 * at * rate * self.a) / self.v
-        for room in self.rooms:
-            second = np.minimum(second, room.second(at, rate))
+        left_j = self.controller.jerk_mm_s3 - at**3 * self.j
+        second: Real = (left_j - 3.0 * at * rate * self.a) / self.v
+        for headroom in self.headrooms:
+            second = np.minimum(second, headroom.second(at, rate))
         return second
 
     def codes(self, at: Real, share: float) -> tuple[Codes, Codes]:
@@ -82,11 +128,11 @@ def override_bounds(
     jerk_mm_s3: Real,
     controller: ControllerLimits,
     program: Limits,
-    rooms: Sequence[Room] = (),
+    headrooms: Sequence[Headroom] = (),
 ) -> OverrideBounds:
     """Bounds from the peaks of each piece (M,), such that in each level, for every lambda up to its rate,
     |lambda'| <= rate and |lambda''| <= second, the controller's limits hold, and at constant
-    lambda <= factor the program's too. `rooms` are those along the path; where the plan obeys the limits of one,
+    lambda <= factor the program's too. `headrooms` are those along the path; where the plan keeps the limits of one,
     they hold for every motion of lambda as the controller's do.
     """
     v, a, j = (np.maximum(p, _TINY) for p in (feed_mm_s, acceleration_mm_s2, jerk_mm_s3))
@@ -100,12 +146,12 @@ def override_bounds(
             np.cbrt(_ratio(program.jerk_mm_s3, j)),
         )
     )
-    for room in rooms:
-        factor = np.minimum(factor, room.factor())
-    binding = [room for room in rooms if room.bounds.obeyed]
+    for headroom in headrooms:
+        factor = np.minimum(factor, headroom.factor())
+    binding = [headroom for headroom in headrooms if headroom.bounds.kept]
     if binding:
         factor = np.where(factor < _LEAST_FACTOR, 1.0, factor)
-    # Rounded first: the rates then use the room that the stored factor really leaves.
+    # Rounded first: the rates then use the headroom that the stored factor really leaves.
     factor_q14 = np.floor(np.clip(factor * _HAIR, 1.0, GREATEST_FACTOR) * FACTOR_ONE_Q14)
     factor = factor_q14 / FACTOR_ONE_Q14
     piece = _Piece(v, a, j, controller, binding)
@@ -123,7 +169,7 @@ def override_bounds(
 def _best(piece: _Piece, at: Real, way: Real) -> tuple[Codes, Codes]:
     """Codes for rates up to `at`, of the share of the jerks with which they change by `way` soonest."""
     rate, second = piece.codes(at, RATE_SHARES[0])
-    for share in RATE_SHARES[1:] if piece.rooms else ():
+    for share in RATE_SHARES[1:] if piece.headrooms else ():
         other = piece.codes(at, share)
         better = _move_s(way, *other) < _move_s(way, rate, second)
         rate, second = np.where(better, other[0], rate), np.where(better, other[1], second)
@@ -143,3 +189,131 @@ def _shared(peak: Real, limit: float) -> Real:
 
 def _ratio(limit: float | None, peak: Real) -> Real:
     return np.full_like(peak, np.inf) if limit is None else np.asarray(limit / peak)
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One axis: raised magnitudes (C, K) and limits (inf: none); volts as velocities, v + T a signed."""
+
+    v: Real
+    a: Real
+    j: Real
+    velocity: float
+    acceleration: float
+    jerk: float
+    signed_v: Real
+    signed_a: Real
+    plant: Plant | None
+
+
+@dataclass(frozen=True, eq=False)
+class Headroom:
+    """What the limits along a path leave the override in each of M feed pieces."""
+
+    bounds: PathBounds
+    pieces: Pieces
+
+    @cached_property
+    def _samples(self) -> PathKinematics:
+        return sample(self.bounds, self.pieces, filled=True)
+
+    @cached_property
+    def axes(self) -> tuple[Axis, Axis]:
+        """x and y."""
+        samples, limits = self._samples, self.bounds.limits.axes
+        free = (np.inf, np.inf)
+        plants = self.bounds.plants or (None, None)
+        out = [
+            Axis(
+                raised(v) + _TINY,
+                raised(a) + _TINY,
+                raised(j) + _TINY,
+                (limits.velocity_mm_s or free)[k],
+                (limits.acceleration_mm_s2 or free)[k],
+                (limits.jerk_mm_s3 or free)[k],
+                v,
+                a,
+                plants[k],
+            )
+            for k, (v, a, j) in enumerate(
+                zip(
+                    per_axis(samples.velocity),
+                    per_axis(samples.acceleration),
+                    per_axis(samples.jerk),
+                    strict=True,
+                )
+            )
+        ]
+        return out[0], out[1]
+
+    def factor(self) -> Real:
+        """f (M,), below 1 where a limit is exceeded at an override of 1."""
+        limits, samples = self.bounds.limits, self._samples
+        feed = raised(samples.feed) + _TINY
+        f = np.full_like(feed, np.inf)
+        for zone in limits.zones:
+            inside = (samples.arc_mm > zone.from_mm) & (samples.arc_mm < zone.to_mm)
+            f = np.where(inside, np.minimum(f, zone.feed_mm_s / feed), f)
+        if limits.centripetal_mm_s2 is not None:
+            f = np.minimum(
+                f, np.sqrt(limits.centripetal_mm_s2 / (raised(samples.centripetal) + _TINY))
+            )
+        for axis in self.axes:
+            f = np.minimum(f, axis.velocity / axis.v)
+            f = np.minimum(f, np.sqrt(_shared_headroom(axis.a, axis.acceleration)))
+            f = np.minimum(f, np.cbrt(_shared_headroom(axis.j, axis.jerk)))
+            if axis.plant is not None:
+                f = np.minimum(f, _factor_of_volts(axis, axis.plant))
+        return least_of_pieces(samples, f, self._count)
+
+    def rate(self, factor: Real, share: float) -> Real:
+        """R (M,) for factors (M,), with `share` of the jerks; below 0 where a limit leaves nothing."""
+        f = factor[self._samples.piece, None]
+        rate = np.full_like(self._samples.feed, np.inf)
+        for axis in self.axes:
+            rate = np.minimum(rate, (axis.acceleration - f**2 * axis.a) / axis.v)
+            left = share * (axis.jerk - f**3 * axis.j)
+            rate = np.minimum(rate, left / (3.0 * f * axis.a))
+            if axis.plant is not None:
+                left = axis.plant.reach_mm_s - _greatest_volts(axis, axis.plant, f)
+                rate = np.minimum(rate, left / (axis.plant.time_constant_s * axis.v))
+        return least_of_pieces(self._samples, rate, self._count)
+
+    def second(self, factor: Real, rate: Real) -> Real:
+        """Q (M,) for factors and rates (M,)."""
+        piece = self._samples.piece
+        f, r = factor[piece, None], rate[piece, None]
+        second = np.full_like(self._samples.feed, np.inf)
+        for axis in self.axes:
+            left = axis.jerk - f**3 * axis.j - 3.0 * f * r * axis.a
+            second = np.minimum(second, left / axis.v)
+        return least_of_pieces(self._samples, second, self._count)
+
+    @property
+    def _count(self) -> int:
+        return int(self.pieces.duration_q32_s.size)
+
+
+def _shared_headroom(peak: Real, limit: float) -> Real:
+    """1 plus half of the headroom above a peak, over the peak; below 1 where there is none."""
+    headroom = limit / peak - 1.0
+    return np.asarray(1.0 + np.where(headroom > 0.0, FACTOR_SHARE, 1.0) * headroom)
+
+
+def _factor_of_volts(axis: Axis, plant: Plant) -> Real:
+    """The factor that raises |f v + f^2 T a| <= f^2 (g + |v|) - f |v|, g = |v + T a|, half the way to the reach."""
+    g = raised(axis.signed_v + plant.time_constant_s * axis.signed_a) + _TINY
+    goal = np.maximum(
+        FACTOR_SHARE * (g + plant.reach_mm_s), plant.reach_mm_s * (g > plant.reach_mm_s)
+    )
+    whole = g + axis.v
+    return np.asarray((axis.v + np.sqrt(axis.v**2 + 4.0 * whole * goal)) / (2.0 * whole))
+
+
+def _greatest_volts(axis: Axis, plant: Plant, f: Real) -> Real:
+    """Greatest |lambda v + lambda^2 T a| over 0 <= lambda <= f: at f, or v^2 / (4 T |a|) where the two pull apart."""
+    pull = plant.time_constant_s * axis.signed_a
+    at_f = raised(f * axis.signed_v + f**2 * pull)
+    apart = (axis.signed_v * pull < 0.0) & (np.abs(axis.signed_v) < 2.0 * f * np.abs(pull))
+    between = axis.v**2 / (4.0 * np.maximum(np.abs(pull), _TINY))
+    return np.asarray(np.maximum(at_f, np.where(apart, between, 0.0)))

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""The levels of the override bounds and their codes; docs/reference/protocol.md 1.3.
+"""Override levels, and the codes of override bounds; docs/reference/protocol.md 1.3 and 1.4.
 
-Up to each rate of `LEVEL_RATES` the bounds of slope and second derivative are given apart: at a rate below 1 much of
-acceleration and jerk is free. The last level, `FULL`, is that of all rates up to the factor.
+Each override of `LEVEL_RATES` ends a level with its own bounds of override rate and override acceleration: at an
+override below 1 much of acceleration and jerk is free. The last level, `FULL`, is that of all overrides up to the
+factor. A bound is stored as a code of 8 bits, in steps of an eighth of an octave.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from .eighth_codes import codes_below, mantissas
 
 Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
@@ -23,22 +22,43 @@ FACTOR_ONE_Q14 = 1 << 14
 
 _RATE_UNIT, _SECOND_UNIT = 2.0**-32, 2.0**-24
 
+_GREATEST_CODE = 255
+_EIGHTHS = np.array([65536, 71468, 77935, 84990, 92681, 101070, 110217, 120193], dtype=np.uint64)
+"""2^16 2^(i/8), rounded down."""
+
 
 def rates_per_s(codes: ArrayLike) -> Real:
-    """Greatest slopes of the rate of program time, 1/s, of codes of any shape."""
-    return np.asarray(mantissas(codes).astype(np.float64) * _RATE_UNIT)
+    """Greatest override rates, 1/s, of codes of any shape."""
+    return np.asarray(_mantissas(codes).astype(np.float64) * _RATE_UNIT)
 
 
 def seconds_per_s2(codes: ArrayLike) -> Real:
-    """Greatest second derivatives, 1/s^2."""
-    return np.asarray(mantissas(codes).astype(np.float64) * _SECOND_UNIT)
+    """Greatest override accelerations, 1/s^2."""
+    return np.asarray(_mantissas(codes).astype(np.float64) * _SECOND_UNIT)
 
 
 def rate_codes(rate_per_s: ArrayLike) -> Codes:
     """The greatest codes that are not above; 0 where there is none."""
-    return codes_below(np.asarray(rate_per_s) / _RATE_UNIT)
+    return _codes_below(np.asarray(rate_per_s) / _RATE_UNIT)
 
 
 def second_codes(second_per_s2: ArrayLike) -> Codes:
-    """The same of second derivatives."""
-    return codes_below(np.asarray(second_per_s2) / _SECOND_UNIT)
+    """The same of override accelerations."""
+    return _codes_below(np.asarray(second_per_s2) / _SECOND_UNIT)
+
+
+def _mantissas(codes: ArrayLike) -> NDArray[np.uint64]:
+    """The integers m < 2^48 that codes (any shape) stand for; code 0: 0."""
+    c = np.asarray(codes, dtype=np.uint64)
+    return np.where(c > 0, _EIGHTHS[c & np.uint64(7)] << (c >> np.uint64(3)), np.uint64(0))
+
+
+_ALL = _mantissas(np.arange(_GREATEST_CODE + 1))
+
+
+def _codes_below(values: ArrayLike) -> Codes:
+    """The greatest codes whose m is at most the values; 0: even that of code 1 is more."""
+    found = np.searchsorted(
+        _ALL, np.floor(np.clip(values, 0.0, 2.0**62)).astype(np.uint64), "right"
+    )
+    return np.asarray(found - 1, dtype=np.uint8)

@@ -18,6 +18,12 @@ Unsigned = NDArray[np.uint32]
 
 DEGREE = 7
 
+LONGEST_PIECE_MM = 31.875
+"""Below the 32 mm of the format."""
+
+JERK_GOAL_MM_S3 = 1.0
+LENGTH_GOAL_MM = 2e-10
+
 
 @dataclass(frozen=True)
 class FeedPiece:
@@ -82,6 +88,25 @@ class FeedPieces:
         return int(self.duration_q32_s.sum(dtype=np.int64))
 
 
+@dataclass(frozen=True, eq=False)
+class RawPieces:
+    """Durations (M,), starts (M,) and coefficients (M, 7) of pieces, and how well they fit.
+
+    The errors are bounds, against the timeline; above the goals only where the ramp has too few periods.
+    """
+
+    duration_q32_s: Int
+    start_q40: Int
+    c_q40: Int
+    jerk_error_mm_s3: float
+    length_error_mm: float
+
+    @property
+    def faithful(self) -> bool:
+        """Within JERK_GOAL_MM_S3 and LENGTH_GOAL_MM of the timeline."""
+        return self.jerk_error_mm_s3 < JERK_GOAL_MM_S3 and self.length_error_mm < LENGTH_GOAL_MM
+
+
 def exponents(duration_q32_s: Int) -> Int:
     """e of each piece, so that 2^e s is the least power of two not below the duration."""
     mantissa, e = np.frexp(duration_q32_s.astype(np.float64))
@@ -89,6 +114,30 @@ def exponents(duration_q32_s: Int) -> Int:
     # Above 2^53 the conversion could round up to a power of two; durations end at 2^54.
     exact = (mantissa == 0.5) & (duration_q32_s <= (np.int64(1) << (e - 1).astype(np.int64)))
     return np.asarray(e - exact - 32, dtype=np.int64)
+
+
+def round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
+    """Coefficients c1 … c7 in tau; c1 such that each end is the next start to the last bit.
+
+    times (n + 1,) in 2^-32 s, starts (n + 1,) in 2^-40 mm; shapes (n, 8): powers of u = 0 … 1 over a piece, mm
+    """
+    duration = np.diff(times)
+    e = exponents(duration)
+    stretch = np.ldexp(1.0, e + 32) / duration
+    k = np.arange(1, DEGREE + 1)
+    c = np.rint(shapes[:, 1:] * stretch[:, None] ** k * 2.0**40).astype(np.int64)
+    way = np.diff(starts)
+    curved = np.any(c[:, 1:] != 0, axis=1)
+    for i in range(duration.size):
+        d, shift = int(duration[i]), int(e[i]) + 32
+        rest = int(way[i]) << (shift * DEGREE)
+        if curved[i]:
+            rest -= sum(
+                int(c[i, n - 1]) * d**n << (shift * (DEGREE - n)) for n in range(2, DEGREE + 1)
+            )
+        below = d << (shift * (DEGREE - 1))
+        c[i, 0] = (2 * rest + below) // (2 * below)
+    return c
 
 
 def derivative_bounds(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]:
@@ -140,7 +189,7 @@ def derivative_extremes(
 
 
 def way_excess(duration_q32_s: Int, c_q40: Int, halvings: int = 4) -> Real:
-    """How far (M,) each piece goes at most behind its start or beyond its end, in mm, of its bounds after halving."""
+    """How far (M,) each piece goes at most before its start or beyond its end, in mm, of its bounds after halving."""
     seconds = np.ldexp(duration_q32_s.astype(np.float64), -32)
     feed = derivative_bounds(duration_q32_s, c_q40)[0]
     way = np.zeros((len(seconds), DEGREE + 1))
@@ -165,8 +214,66 @@ def derivative_peaks(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]
     return v, a, j
 
 
+def halved(pieces: FeedPieces, chosen: NDArray[np.bool_], length_q40: int) -> FeedPieces:
+    """The same feed, the `chosen` (M,) pieces each as two that last half as long; docs/theory/numerics.md section 7.
+
+    A half is the polynomial of its piece about its own start, rounded as every piece is: its end is the next start to
+    the last bit, its feed is off by less than 2^-30 mm/s. Override bounds are those of the piece.
+
+    length_q40  end of the last piece
+    """
+    rows = np.repeat(np.arange(len(pieces)), 1 + chosen)
+    duration, start, c = pieces.duration_q32_s[rows], pieces.start_q40[rows], pieces.c_q40[rows]
+    ends = np.append(pieces.start_q40[1:], length_q40)
+    first = np.flatnonzero(chosen) + np.arange(int(chosen.sum()))
+    for at, row in zip(first.tolist(), np.flatnonzero(chosen).tolist(), strict=True):
+        whole = int(pieces.duration_q32_s[row])
+        times = np.array([0, whole // 2, whole], dtype=np.int64)
+        shape = _powers(whole, pieces.c_q40[row])
+        low, high = _parts(shape, times[1] / whole)
+        begin = int(pieces.start_q40[row])
+        middle = begin + round(float(low.sum()) * 2.0**40)
+        starts = np.array([begin, middle, ends[row]], dtype=np.int64)
+        duration[at : at + 2] = np.diff(times)
+        start[at : at + 2] = starts[:2]
+        c[at : at + 2] = round_pieces(times, starts, np.stack((low, high)))
+    return FeedPieces(
+        duration,
+        start,
+        c,
+        pieces.override_factor_q14[rows],
+        pieces.override_rate_codes[rows],
+        pieces.override_second_codes[rows],
+    )
+
+
+def _powers(duration_q32_s: int, c_q40: Int) -> Real:
+    """Powers (8,) of u = 0 … 1 over a piece, from its start; mm."""
+    e = int(exponents(np.array([duration_q32_s], dtype=np.int64))[0])
+    end = float(np.ldexp(float(duration_q32_s), -(e + 32)))
+    shape: Real = np.zeros(DEGREE + 1)
+    shape[1:] = np.ldexp(c_q40.astype(np.float64), -40) * end ** np.arange(1, DEGREE + 1)
+    return shape
+
+
+def _parts(shape: Real, middle: float) -> tuple[Real, Real]:
+    """The same polynomial before and after u = middle, each in powers of its own 0 … 1 from its own start."""
+    k = np.arange(DEGREE + 1)
+    after = np.array(
+        [
+            sum(comb(n, i) * shape[n] * middle ** (n - i) for n in range(i, DEGREE + 1))
+            for i in range(DEGREE + 1)
+        ]
+    )
+    after[0] = 0.0
+    return shape * middle**k, after * (1.0 - middle) ** k
+
+
 def _halved(coefficients: Real) -> Real:
-    """Bernstein coefficients (…, n) on both halves of the interval, (…, 2, n); de Casteljau."""
+    """Bernstein coefficients (…, n) on both halves of the interval, (…, 2, n); de Casteljau.
+
+    scipy's BPoly evaluates and does not subdivide: bounds as close, from its values, would take 65 times as long.
+    """
     n = coefficients.shape[-1]
     out = np.empty((*coefficients.shape[:-1], 2, n))
     level = coefficients

@@ -1,24 +1,37 @@
 # SPDX-License-Identifier: MIT
-"""Planning a feed for a path length inside limits; docs/theory/numerics.md 5.4 and 5.5."""
+"""Planning a feed with ramps inside limits: for a path's length, and for the path itself; docs/theory/numerics.md 5.4
+and 5.5. Profile "optimal" has a planner of its own (feed.optimal)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from math import isfinite
+from math import log
 
-from ..errors import InputError, PlanError
-from .limits import ControllerLimits, Limits
-from .pieces import derivative_peaks
-from .plan import Excess, FeedPlan
-from .quantise import RawPieces
+from ..errors import PlanError
+from ..spline import PHSpline
+from .kinematics import PathBounds
+from .limits import ControllerLimits, FeedZone, Limit, Limits, Peak, Plants, as_drives_limit
+from .pieces import RawPieces, derivative_peaks
+from .plan import FeedPlan, assumed_controller
 from .ramp import ACCELERATION, JERK, Ramp
-from .reduction import Cap, choose
-from .request import FeedRequest, check_period
+from .reduction import choose, highest
+from .request import (
+    LEAST_FEED_MM_S,
+    LONGEST_S,
+    FeedRequest,
+    check_length,
+    check_period,
+)
 from .timeline import timeline
+from .usage import limit_peaks
 
-SHORTEST_MM, LONGEST_MM = 2.0**-10, 2.0**22 - 1.0
-LONGEST_S = 2.0**22 - 1.0
+_CLOSE = 1e-4
+_HAIR = 1e-6
+_MOST_TRIALS = 30
+_MOST_ROUNDS = 20
+_REMEDY = "raise the limit, or smooth the path there (points too close together make such places)"
 
 
 def plan_feed(
@@ -33,8 +46,8 @@ def plan_feed(
 
     The feed is lowered, and n_c found again, where the path is too short for its ramps, where the limits
     of the path file bind (policy "respect") and where those of the controller do, less their
-    reserve. Without a controller (no machine file) roomy limits are assumed. Raises InputError for a length out
-    of range and PlanError where no feed will do.
+    reserve. Without a controller (no machine file) limits are assumed that never bind. Raises InputError for a length
+    out of range and PlanError where no feed keeps the limits.
     """
     check_period(period_us)
     if request.optimal:
@@ -45,26 +58,54 @@ def plan_feed(
     return _plan(Fraction(length_mm), request, limits or Limits(), controller, period_us, ())
 
 
-def check_length(length_mm: float) -> None:
-    """Raises InputError for a length that the program format does not know."""
-    if not (isfinite(length_mm) and SHORTEST_MM <= length_mm <= LONGEST_MM):
-        raise InputError(
-            f"path: its length {length_mm:g} mm must be from {SHORTEST_MM:.3g} to {LONGEST_MM:.7g} mm: "
-            "scale its points (they are in mm)"
-        )
-
-
-def plan_again(plan: FeedPlan, feed_mm_s: float, reason: str) -> FeedPlan:
-    """The same request planned with the feed at most `feed_mm_s`; `reason` goes to the notes."""
-    again = _plan(
-        plan.line.length_mm,
-        plan.request,
-        plan.limits,
-        plan.controller,
-        plan.period_us,
-        (Cap(feed_mm_s, reason),),
+def plan_path(
+    spline: PHSpline,
+    request: FeedRequest,
+    limits: Limits,
+    controller: ControllerLimits | None = None,
+    plants: Plants | None = None,
+    *,
+    period_us: int = 1000,
+) -> FeedPlan:
+    """As `plan_feed`, and under policy "respect" with a feed at which the motion along `spline` keeps the limits of
+    axes, curvature, volts (`plants`) and feed zones too. Under "report" these are listed where they are exceeded, and
+    only the machine's are kept.
+    """
+    plan = plan_feed(spline.length_mm, request, limits, controller, period_us=period_us)
+    respect = limits.policy == "respect"
+    bounds = PathBounds(spline, limits, plants, kept=respect)
+    if not bounds.bind:
+        return plan
+    if respect:
+        return replace(_reduced(plan, bounds), paths=(bounds,))
+    must = PathBounds(spline, limits.of_machine, as_drives_limit(plants))
+    if must.bind:
+        plan = _reduced(plan, must)
+    exceeded = (
+        peak
+        for peak in limit_peaks(bounds, plan.raw)
+        if peak.value > peak.limit.given * (1.0 + _HAIR)
     )
-    return replace(again, path=plan.path, machine=plan.machine)
+    return replace(
+        plan,
+        paths=(bounds, must) if must.bind else (bounds,),
+        excesses=(*plan.excesses, *exceeded),
+    )
+
+
+def replan(plan: FeedPlan, zones: Sequence[FeedZone], reason: str) -> FeedPlan:
+    """Planned again with the feed nowhere above the least of the zones; `reason` goes to the notes."""
+    assert not plan.request.optimal, "replan_optimal makes such plans again"
+    lowest = min(zone.feed_mm_s for zone in zones)
+    return _below(plan, Limit("feed_mm_s", lowest, "format", words=reason))
+
+
+def _below(plan: FeedPlan, limit: Limit) -> FeedPlan:
+    """The same request planned with one more limit of the feed."""
+    again = _plan(
+        plan.curve.length_mm, plan.request, plan.limits, plan.controller, plan.period_us, (limit,)
+    )
+    return replace(again, paths=plan.paths, assumed=plan.assumed)
 
 
 def _plan(
@@ -73,13 +114,11 @@ def _plan(
     limits: Limits,
     controller: ControllerLimits | None,
     period_us: int,
-    caps: tuple[Cap, ...],
+    further: tuple[Limit, ...],
 ) -> FeedPlan:
-    least_constant_s = 1e-6 * period_us * (1.0 + 1e-3)
-    for _ in range(20):
-        shape, reasons = choose(
-            length, request, limits, controller, period_us, least_constant_s, caps
-        )
+    """The plan whose pieces keep the limits too, with `further` limits of the feed."""
+    for _ in range(_MOST_ROUNDS):
+        shape, reasons = choose(length, request, limits, controller, period_us, further)
         line = timeline(shape.ramp, length)
         if line.duration_s >= LONGEST_S:
             raise PlanError(
@@ -90,28 +129,21 @@ def _plan(
         plan = FeedPlan(
             request,
             limits,
-            controller or _assumed(shape.ramp),
+            controller or assumed_controller(*line.peaks()),
             period_us,
             line,
-            shape.history,
             (*reasons, *((shape.note,) if shape.note else ())),
             _excesses(shape.ramp, limits),
+            shape.history,
+            assumed=controller is None,
         )
         excess = _piece_excess(plan)
         if excess <= 1.0:
             return replace(plan, notes=(*plan.notes, *_fit_notes(plan.raw, period_us)))
+        lower = shape.ramp.feed_mm_s / excess * (1.0 - 1e-6)
         reason = f"pieces of more than a period of {period_us} us exceed the limits"
-        caps = (*caps, Cap(shape.ramp.feed_mm_s / excess * (1.0 - 1e-6), reason))
+        further = (*further, Limit("feed_mm_s", lower, "format", words=reason))
     raise PlanError("feed: no feed keeps the pieces inside the limits: raise them or ramp_time_s")
-
-
-def _assumed(ramp: Ramp) -> ControllerLimits:
-    """Limits of a controller that nobody named: roomy ones, so that they never bind."""
-    feed = ramp.feed_mm_s
-    acceleration, jerk = ramp.peak(ACCELERATION), ramp.peak(JERK)
-    return ControllerLimits(
-        2.0 * feed, 8.0 * acceleration + 10.0 * feed, 16.0 * jerk + 100.0 * feed
-    )
 
 
 def _fit_notes(raw: RawPieces, period_us: int) -> tuple[str, ...]:
@@ -124,21 +156,21 @@ def _fit_notes(raw: RawPieces, period_us: int) -> tuple[str, ...]:
     )
 
 
-def _excesses(ramp: Ramp, limits: Limits) -> tuple[Excess, ...]:
+def _excesses(ramp: Ramp, limits: Limits) -> tuple[Peak, ...]:
     values = (
         ("feed_mm_s", ramp.feed_mm_s),
         ("acceleration_mm_s2", ramp.peak(ACCELERATION)),
         ("jerk_mm_s3", ramp.peak(JERK)),
     )
     return tuple(
-        Excess(name, getattr(limits, name), value)
-        for name, value in values
-        if getattr(limits, name) is not None and value > getattr(limits, name) * (1.0 + 1e-9)
+        Peak(Limit(key, getattr(limits, key)), value)
+        for key, value in values
+        if getattr(limits, key) is not None and value > getattr(limits, key) * (1.0 + 1e-9)
     )
 
 
 def _piece_excess(plan: FeedPlan) -> float:
-    """Greatest bound of a piece over the controller's limit less half of what a plan keeps free.
+    """Greatest peak of a piece over the controller's limit less half of what a plan keeps free.
 
     Where the pieces are only near the profile, policy "respect" holds for them too; and where a bound on the
     override would round to zero, the feed has to fall.
@@ -149,8 +181,39 @@ def _piece_excess(plan: FeedPlan) -> float:
     keep = 1.0 - 0.5 * own.kept_free
     bounds = [own.feed_mm_s * keep, own.acceleration_mm_s2 * keep, own.jerk_mm_s3 * keep]
     if plan.limits.policy == "respect" and not plan.raw.faithful:
-        asked = plan.limits.acceleration_mm_s2, plan.limits.jerk_mm_s3
-        bounds[1:] = [min(b, x) if x else b for b, x in zip(bounds[1:], asked, strict=True)]
+        requested = plan.limits.acceleration_mm_s2, plan.limits.jerk_mm_s3
+        bounds[1:] = [min(b, x) if x else b for b, x in zip(bounds[1:], requested, strict=True)]
     excess = max(peak / bound for peak, bound in zip(peaks, bounds, strict=True))
     least_code = min(pieces.override_rate_codes.min(), pieces.override_second_codes.min())
     return excess if least_code > 0 else max(excess, 2.0)
+
+
+def _reduced(plan: FeedPlan, bounds: PathBounds) -> FeedPlan:
+    """The plan at the highest feed that the limits along the path allow."""
+    worst = _worst(plan, bounds)
+    if worst.usage <= 1.0:
+        return plan
+
+    def attempt(feed: float) -> tuple[FeedPlan, float]:
+        nonlocal worst
+        if feed < LEAST_FEED_MM_S:
+            raise PlanError(_infeasible(worst))
+        words = f"{worst.limit.reason}, {worst.place}"
+        tried = _below(plan, Limit("feed_mm_s", feed, worst.limit.source, words=words))
+        found = _worst(tried, bounds)
+        if found.usage > 1.0:
+            worst = found
+        return tried, log(found.usage)
+
+    best = highest(plan.feed_mm_s, log(worst.usage), attempt, _CLOSE, _HAIR, _MOST_TRIALS)
+    if best is None:
+        raise PlanError(_infeasible(worst))
+    return best
+
+
+def _infeasible(peak: Peak) -> str:
+    return f"feed: no feed of use obeys {peak.limit.reason}, {peak.place}: {_REMEDY}"
+
+
+def _worst(plan: FeedPlan, bounds: PathBounds) -> Peak:
+    return max(limit_peaks(bounds, plan.raw), key=lambda one: one.usage)

@@ -1,42 +1,32 @@
 # SPDX-License-Identifier: MIT
-"""The highest feed that the path, the limits and the format allow; docs/theory/numerics.md 5.5."""
+"""Feed reduction: the highest constant feed that the path, the limits and the format allow; docs/theory/numerics.md
+5.5."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from math import log
+from math import exp, log
+from typing import TypeVar
 
 from ..errors import PlanError
-from .bracket import highest
-from .limits import ControllerLimits, Limits
-from .quantise import LONGEST_PIECE_MM
-from .ramp import ACCELERATION, JERK
+from .limits import ControllerLimits, Limit, Limits, least
+from .pieces import LONGEST_PIECE_MM
+from .ramp import ACCELERATION, JERK, Shape, make_shape
 from .request import FeedRequest
-from .shapes import Shape, make_shape
+
+T = TypeVar("T")
 
 _HAIR = 1e-9
 _CLOSE = 1e-6
 _MOST_TRIALS = 40
 
+_LEAST_GAIN = 0.05
+"""Of a step down in the logarithm of the peak, over that of the feed: less is taken as so much."""
 
-@dataclass(frozen=True)
-class Cap:
-    """A feed not to be exceeded, and why, in words for the user."""
-
-    feed_mm_s: float
-    reason: str
-
-
-@dataclass(frozen=True)
-class Bound:
-    """A limit of the peak of a derivative (ACCELERATION or JERK), and whose it is."""
-
-    order: int
-    limit: float
-    reason: str
+_ORDERS = {"acceleration_mm_s2": ACCELERATION, "jerk_mm_s3": JERK}
+"""Derivatives of a ramp, by the key of their limit."""
 
 
 def choose(
@@ -45,100 +35,141 @@ def choose(
     limits: Limits,
     controller: ControllerLimits | None,
     period_us: int,
-    least_constant_s: float,
-    extra: tuple[Cap, ...],
+    further: tuple[Limit, ...],
 ) -> tuple[Shape, tuple[str, ...]]:
-    """The ramp with the highest feed that all caps and bounds allow, and what lowered it.
+    """The ramp with the highest feed that all limits allow, and what lowered it.
 
-    extra  further caps; the constant stretch, if any, lasts at least `least_constant_s`
+    further  more limits of the feed. The stretch of constant feed, if any, lasts at least a period.
     """
     make = partial(make_shape, request)
-    caps = [
-        Cap(float(request.nominal_mm_s), ""),
-        *_feed_caps(limits, controller, period_us),
-        *extra,
-    ]
-    only_ramps = float(length / Fraction(request.ramp_time_s))
-    short = Cap(
-        only_ramps,
-        f"the path of {float(length):.6g} mm is too short for two ramps of {request.ramp_time_s:g} s",
-    )
-    cap = min((*caps, short), key=lambda c: c.feed_mm_s)
-    with_constant = float(length / (Fraction(request.ramp_time_s) + Fraction(least_constant_s)))
-    too_brief = Cap(with_constant, "the stretch of constant feed would be shorter than a period")
-    if with_constant < cap.feed_mm_s < only_ramps:
-        cap = too_brief
-    shape, bound = _lowered(make, cap.feed_mm_s, _bounds(limits, controller))
-    if bound is not None and with_constant < shape.ramp.feed_mm_s < only_ramps:
-        shape, bound, cap = make(with_constant), None, too_brief
-    reasons = []
-    if shape.ramp.feed_mm_s < request.nominal_mm_s:
-        why = bound.reason if bound is not None else cap.reason
-        reasons.append(
-            f"feed lowered from {request.nominal_mm_s:g} to {shape.ramp.feed_mm_s:.6g} mm/s: {why}"
+    ramp_s = Fraction(request.ramp_time_s)
+    only_ramps = float(length / ramp_s)
+    lowest = least(
+        (
+            Limit("feed_mm_s", float(request.nominal_mm_s), "feed"),
+            *_feed_limits(limits, controller, period_us),
+            *further,
+            _feed_limit(
+                only_ramps,
+                f"the path of {float(length):.6g} mm is too short for two ramps of {request.ramp_time_s:g} s",
+            ),
         )
-    return shape, tuple(reasons)
+    )
+    with_constant = float(length / (ramp_s + Fraction(1e-6 * period_us * (1.0 + 1e-3))))
+    too_brief = _feed_limit(
+        with_constant, "the stretch of constant feed would be shorter than a period"
+    )
+    if with_constant < lowest.value < only_ramps:
+        lowest = too_brief
+    shape, binding = _reduced(make, lowest.value, _ramp_limits(limits, controller))
+    if binding is not None and with_constant < shape.ramp.feed_mm_s < only_ramps:
+        shape, binding, lowest = make(with_constant), None, too_brief
+    if not shape.ramp.feed_mm_s < request.nominal_mm_s:
+        return shape, ()
+    why = (binding or lowest).reason
+    reduced = (
+        f"feed lowered from {request.nominal_mm_s:g} to {shape.ramp.feed_mm_s:.6g} mm/s: {why}"
+    )
+    return shape, (reduced,)
 
 
-def _feed_caps(limits: Limits, controller: ControllerLimits | None, period_us: int) -> list[Cap]:
-    period_s = 1e-6 * period_us
-    caps = [
-        Cap(
-            0.99 * LONGEST_PIECE_MM / period_s,
+def _feed_limit(value: float, words: str) -> Limit:
+    return Limit("feed_mm_s", value, "format", words=words)
+
+
+def _feed_limits(
+    limits: Limits, controller: ControllerLimits | None, period_us: int
+) -> list[Limit]:
+    out = [
+        _feed_limit(
+            0.99 * LONGEST_PIECE_MM / (1e-6 * period_us),
             f"pieces of the format end within 32 mm, more than a period of {period_us} us",
         )
     ]
     if limits.policy == "respect" and limits.feed_mm_s is not None:
-        caps.append(Cap(limits.feed_mm_s, f"limits feed_mm_s = {limits.feed_mm_s:g}"))
+        out.append(Limit("feed_mm_s", limits.feed_mm_s))
     if controller is not None:
-        caps.append(
-            Cap(
-                controller.feed_mm_s * (1.0 - controller.kept_free),
-                f"controller feed_mm_s = {controller.feed_mm_s:g} less its reserve",
-            )
-        )
-    return caps
-
-
-def _bounds(limits: Limits, controller: ControllerLimits | None) -> list[Bound]:
-    names = ((ACCELERATION, "acceleration_mm_s2"), (JERK, "jerk_mm_s3"))
-    out = []
-    for order, name in names:
-        own = getattr(limits, name)
-        if limits.policy == "respect" and own is not None:
-            out.append(Bound(order, own, f"limits {name} = {own:g}"))
-        if controller is not None:
-            limit = getattr(controller, name)
-            kept = limit * (1.0 - controller.kept_free)
-            out.append(Bound(order, kept, f"controller {name} = {limit:g} less its reserve"))
+        out.append(controller.limit("feed_mm_s"))
     return out
 
 
-def _lowered(
-    make: Callable[[float], Shape], feed_mm_s: float, bounds: list[Bound]
-) -> tuple[Shape, Bound | None]:
-    """The shape at `feed_mm_s`, or at the highest feed below where no bound is broken, with that bound."""
+def _ramp_limits(limits: Limits, controller: ControllerLimits | None) -> list[Limit]:
+    """The limits of the ramp's acceleration and jerk."""
+    out = []
+    for key in _ORDERS:
+        own = getattr(limits, key)
+        if limits.policy == "respect" and own is not None:
+            out.append(Limit(key, own))
+        if controller is not None:
+            out.append(controller.limit(key))
+    return out
+
+
+def _reduced(
+    make: Callable[[float], Shape], feed_mm_s: float, limits: list[Limit]
+) -> tuple[Shape, Limit | None]:
+    """The shape at `feed_mm_s`, or at the highest feed below at which all limits are kept, with the one that binds."""
     shape = make(feed_mm_s)
-    excess, bound = _excess(shape, bounds)
-    if bound is None or excess <= 0.0:
+    excess, worst = _excess(shape, limits)
+    if worst is None or excess <= 0.0:
         return shape, None
 
-    def attempt(feed: float) -> tuple[tuple[Shape, Bound | None], float]:
+    def attempt(feed: float) -> tuple[tuple[Shape, Limit | None], float]:
         tried = make(feed)
-        found, broken = _excess(tried, bounds)
-        return (tried, broken), found
+        found, exceeded = _excess(tried, limits)
+        return (tried, exceeded), found
 
     best = highest(feed_mm_s, excess, attempt, _CLOSE, _HAIR, _MOST_TRIALS)
     if best is None:
-        raise PlanError(f"feed: no feed obeys {bound.reason}: raise it")
+        raise PlanError(f"feed: no feed obeys {worst.reason}: raise it")
     return best
 
 
-def _excess(shape: Shape, bounds: list[Bound]) -> tuple[float, Bound | None]:
-    """Logarithm of the greatest peak over its bound (above 0: broken), and that bound."""
-    worst, worst_bound = -1.0, None
-    for bound in bounds:
-        excess = log(shape.ramp.peak(bound.order) / bound.limit)
-        if worst_bound is None or excess > worst:
-            worst, worst_bound = excess, bound
-    return worst, worst_bound
+def _excess(shape: Shape, limits: list[Limit]) -> tuple[float, Limit | None]:
+    """Logarithm of the greatest limit usage of a ramp (above 0: exceeded), and that limit."""
+    worst, found = -1.0, None
+    for limit in limits:
+        excess = log(shape.ramp.peak(_ORDERS[limit.key]) / limit.value)
+        if found is None or excess > worst:
+            worst, found = excess, limit
+    return worst, found
+
+
+def highest(
+    feed_mm_s: float,
+    excess: float,
+    attempt: Callable[[float], tuple[T, float]],
+    close: float,
+    hair: float,
+    most_trials: int,
+) -> T | None:
+    """What `attempt` makes of the highest feed with an excess of at most 0, by a secant within a bracket; None where
+    none is found.
+
+    attempt  of a feed: what it gives and the logarithm of its greatest limit usage (above 0: exceeded)
+    excess   of `feed_mm_s`, above 0
+    close    how near to 0 the excess may stay, and how narrow the bracket, when the search ends
+    hair     what first steps go below proportion
+
+    Peaks go about with the feed: first steps in proportion until one keeps all limits, longer where the last one has
+    brought less; then the secant between the logarithms of feed and excess.
+    """
+    high, high_excess = log(feed_mm_s), excess
+    gain = 1.0
+    low = low_excess = 0.0
+    best: T | None = None
+    for _ in range(most_trials):
+        if best is None:
+            trial = high - high_excess / gain - hair
+        else:
+            share = -low_excess / (high_excess - low_excess)
+            trial = low + (high - low) * max(0.05, min(0.95, share))
+        made, found = attempt(exp(trial))
+        if found > 0.0:
+            gain = min(1.0, max(_LEAST_GAIN, (high_excess - found) / (high - trial)))
+            high, high_excess = trial, found
+            continue
+        best, low, low_excess = made, trial, found
+        if low_excess > -close or high - low < close:
+            break
+    return best

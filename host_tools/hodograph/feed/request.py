@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is asked of the feed."""
+"""The feed that is requested."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ LEAST_FEED_MM_S, GREATEST_FEED_MM_S = 1e-3, 4000.0
 LEAST_RAMP_S, GREATEST_RAMP_S = 2e-3, 1000.0
 LEAST_DEGREE, GREATEST_DEGREE = 3, 12
 GREATEST_N_C = 50.0
+SHORTEST_MM, LONGEST_MM = 2.0**-10, 2.0**22 - 1.0
+LONGEST_S = 2.0**22 - 1.0
 
 
 @dataclass(frozen=True)
 class FeedRequest:
-    """The feed asked for: accelerate for `ramp_time_s`, constant `nominal_mm_s`, decelerate; or profile "optimal".
+    """The requested feed: accelerate for `ramp_time_s`, constant `nominal_mm_s`, decelerate; or profile "optimal".
 
     profile  "quintic": paper (17); "exponential": (17) with (18); "minimax": least peak jerk;
              "optimal": least time inside the limits over the whole path. `nominal_mm_s` is then only
@@ -65,6 +67,15 @@ def check_period(period_us: int) -> None:
     if period_us not in PERIODS_US:
         known = ", ".join(str(p) for p in PERIODS_US)
         raise InputError(f"period_us {period_us} is not one of {known}")
+
+
+def check_length(length_mm: float) -> None:
+    """Raises InputError for a length that the program format does not know."""
+    if not (isfinite(length_mm) and SHORTEST_MM <= length_mm <= LONGEST_MM):
+        raise InputError(
+            f"path: its length {length_mm:g} mm must be from {SHORTEST_MM:.3g} to {LONGEST_MM:.7g} mm: "
+            "scale its points (they are in mm)"
+        )
 
 
 def _in_range(name: str, value: float, low: float, high: float) -> None:

@@ -2,9 +2,9 @@
 """The plant of each axis from a recorded run, with confidence intervals: docs/guides/tuning.md, numerics.md
 section 18."""
 
-from .fit import Estimate, Plant, identify_axis
+from .plant_fit import Estimate, Plant, identify_axis
+from .plant_text import plant_json, plant_text
 from .stretches import Stretch, stretches
-from .text import plant_json, plant_text
 
 __all__ = [
     "Estimate",

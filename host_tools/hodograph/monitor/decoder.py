@@ -30,8 +30,8 @@ Floats = NDArray[np.float64]
 class Samples:
     """Rows by SYNC, columns by axis: targets sent after it and positions answered to it, in counts.
 
-    `sync` counts SYNCs from the first one heard, lost ones too. NaN in targets and actual, -1 in statuswords: did not
-    come.
+    `sync` counts SYNCs from the first one received, lost ones too. NaN in targets and actual, -1 in statuswords: did
+    not come.
     """
 
     sync: NDArray[np.int64]
@@ -89,7 +89,7 @@ class Decoder:
         self._tail = frames
 
     def _count(self, frames: Frames, sync_at: NDArray[np.intp]) -> NDArray[np.int64]:
-        """Running numbers of these SYNCs; the counter tells of lost ones."""
+        """Running numbers of these SYNCs; the counter shows lost ones."""
         counters = frames["data"][sync_at, 0].astype(np.int64)
         before = counters[0] - 1 if self._counter is None else self._counter
         steps = (np.diff(counters, prepend=before) - 1) % SYNC_OVERFLOW + 1

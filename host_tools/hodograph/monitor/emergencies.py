@@ -18,10 +18,10 @@ _WINDOW_US = round(1e6 * WINDOW_S)
 
 
 class Emergencies:
-    """Told as they come, within the bounds of each window; what was left out is counted at its end.
+    """Reported as they come, within the bounds of each window; what was left out is counted at its end.
 
-    A window begins with an emergency frame, and ends by the time stamps of the bus: what is told of a recording does
-    not depend on how it is cut into pieces.
+    A window begins with an emergency frame, and ends by the time stamps of the bus: what is reported of a recording
+    does not depend on how it is cut into pieces.
     """
 
     def __init__(self) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The controller by SDO, in a thread of its own: its state a few times a second, commands in between.
+"""The controller by SDO, in a thread of its own: its state a few times a second, and the commands of browsers in
+between.
 
 A command does not wait until a state has been read: it goes between two objects of it; a program that is just being
 fetched is given up for it. In virtual time the thread takes part, and what it waits for is counted in that time.
@@ -23,15 +24,28 @@ from ..bus.clock import Clock, VirtualClock
 from ..bus.diagnostics.texts import STATES
 from ..bus.sdo.controller import Controller
 from ..bus.sdo.network import open_network
-from ..bus.sdo.objects import MOTION, OVERRIDE, PROGRAM
+from ..bus.sdo.objects import (
+    DISABLE,
+    ENABLE,
+    HOLD,
+    HOME,
+    MOTION,
+    OVERRIDE,
+    PROGRAM,
+    QUICK_STOP,
+    RESET,
+    RESUME,
+    START,
+    STOP,
+)
 from ..bus.sdo.status import read_status
 from ..data import CONTROLLER_EDS
-from ..errors import BusError, HodographError, RefusedError
+from ..errors import BusError, HodographError, InputError, RefusedError
 from .pump import Publish
 
 PAUSE_S = 0.2
 WHOLE_S = 1.5
-"""Between two looks at the state and what moves; between two at everything."""
+"""Between two readings of the state and what moves; between two of everything."""
 _ANSWER_S = 3.0
 _RETRY_S = 1.0
 LONGEST_UPLOAD = 256 * 1024
@@ -230,7 +244,7 @@ def _changed(controller: Controller, status: dict[str, Any]) -> bool:
 
 
 def _moving_part(controller: Controller) -> dict[str, Any]:
-    """What changes from look to look: some objects instead of all, the same keys as in `read_status`."""
+    """What changes from reading to reading: some objects instead of all, the same keys as in `read_status`."""
     return {
         "motion": {
             "arc_length_mm": controller.read(MOTION, 1) * 2.0**-40,
@@ -261,3 +275,39 @@ def _fetch(controller: Controller, give_up: Callable[[], bool]) -> bytes | None:
         raise RefusedError(f"{controller.who()} gives no program: {error}") from error
     except SdoError as error:
         raise BusError(f"{controller.who()} stopped answering: {error}") from error
+
+
+MOST_PERCENT = 200
+
+_BUTTONS = {
+    "enable": ENABLE,
+    "disable": DISABLE,
+    "start": START,
+    "hold": HOLD,
+    "resume": RESUME,
+    "stop": STOP,
+    "quick-stop": QUICK_STOP,
+    "reset": RESET,
+    "home": HOME,
+}
+"""Names as in the page, and commands of object 0x2001."""
+
+
+def read_command(request: dict[str, Any]) -> Command:
+    """The command that a request of a browser stands for. Raises InputError for anything else."""
+    name = request.get("name")
+    if name == "override":
+        percent = request.get("percent")
+        if type(percent) is not int or not 0 <= percent <= MOST_PERCENT:
+            raise InputError(f"override: a whole number from 0 to {MOST_PERCENT} is needed")
+        return lambda controller: controller.override(percent)
+    if not isinstance(name, str) or name not in _BUTTONS:
+        raise InputError("there is no such command")
+    return _button(_BUTTONS[name])
+
+
+def _button(number: int) -> Command:
+    def give(controller: Controller) -> None:
+        controller.command(number)
+
+    return give

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What goes to the browsers, as JSON: small numbers of digits, null for what is not there."""
+"""Messages to the browsers, as JSON: rows in groups that keep every peak, few digits, null where there is no value."""
 
 from __future__ import annotations
 
@@ -8,11 +8,30 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .decimator import extremes, group_starts
 from .decoder import Floats
-from .derived import Rows
-from .path import ProgramPath
+from .derived import ProgramPath, Rows
+
+
+def group_starts(count: int, size: int, most: int) -> NDArray[np.intp]:
+    """First rows of groups over `count` rows: `size` rows each, more when that would make over `most` groups."""
+    if count == 0:
+        return np.empty(0, dtype=np.intp)
+    size = max(1, size, -(-count // most))
+    return np.arange(0, count, size)
+
+
+def extremes(values: Floats, starts: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Least and greatest value of each group, by column where there are several; NaN where there is no value."""
+    if starts.size == 0:
+        empty = np.empty((0, *values.shape[1:]))
+        return empty, empty
+    return (
+        np.fmin.reduceat(values, starts, axis=0),
+        np.fmax.reduceat(values, starts, axis=0),
+    )
+
 
 GROUP_S = 0.010
 """Time that one group of the plots covers at the machine's own pace."""

@@ -15,16 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from ..bus.capture.load import Listener
+from ..bus.capture.load import LoadCapture
 from ..bus.capture.setpoint_check import StepLimits
 from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.diagnostics.texts import drive_state
 from ..errors import BusError, InputError
 from .decoder import Decoder, Samples
-from .derived import Derivation
+from .derived import Derivation, ProgramPath
 from .emergencies import Emergencies
 from .messages import path_message, rows_message
-from .path import ProgramPath
 from .source import Source, Taken
 
 LOOK_S = 0.04
@@ -69,7 +68,7 @@ class Pump:
         self._again = threading.Event()
         self._tally = Tally()
         self._emergencies = Emergencies()
-        self._load = Listener(layout.bitrate)
+        self._load = LoadCapture(layout.bitrate)
         self._watch = SetpointWatch(layout.nodes)
         self._decoder = Decoder(layout.nodes)
         self._derivation = self._fresh_derivation()
@@ -77,7 +76,7 @@ class Pump:
         self._thread = threading.Thread(target=self._work, name="monitor-pump", daemon=True)
 
     def start(self) -> None:
-        """Begins to look at the bus."""
+        """Begins to capture the bus."""
         self._thread.start()
 
     def close(self) -> None:
@@ -120,7 +119,7 @@ class Pump:
                 continue
             self._publish({"type": "bus", "there": True, "note": ""})
             self._emergencies = Emergencies()
-            self._load = Listener(self._layout.bitrate)
+            self._load = LoadCapture(self._layout.bitrate)
             self._watch = SetpointWatch(self._layout.nodes)
             self._decoder = Decoder(self._layout.nodes)
             self._derivation = self._fresh_derivation()

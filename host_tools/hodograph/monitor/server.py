@@ -13,8 +13,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from ..errors import HodographError, InputError
-from .client_slots import ClientSlots
-from .hub import Client, Hub
+from .clients import Client, ClientSlots, Hub
 from .messages import encode
 from .security import HEADERS, Guard
 
@@ -39,12 +38,12 @@ Obey = Callable[[dict[str, Any]], Awaitable[str]]
 
 
 class Server:
-    """The web application; `greeting` is what a page is told first."""
+    """The web application; `greeting` is the first message to a page."""
 
     def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], obey: Obey) -> None:
         self._guard, self._hub, self._greeting, self._obey = guard, hub, greeting, obey
         self._pages = _load_pages()
-        self._seats: ClientSlots[web.WebSocketResponse] = ClientSlots()
+        self._slots: ClientSlots[web.WebSocketResponse] = ClientSlots()
         self._closing: set[asyncio.Task[None]] = set()
         self.app = web.Application(middlewares=[self._check], client_max_size=_MOST_REQUEST)
         self.app.router.add_get("/ws", self._socket)
@@ -86,17 +85,17 @@ class Server:
             return web.Response(status=426, headers=HEADERS, text="A WebSocket is wanted here.\n")
         await socket.prepare(request)
         try:
-            self._send_away(self._seats.enter(socket))
+            self._send_away(self._slots.enter(socket))
             await self._serve(socket)
         finally:
-            self._seats.leave(socket)
+            self._slots.leave(socket)
         return socket
 
     async def _serve(self, socket: web.WebSocketResponse) -> None:
         may_command = await self._welcome(socket)
         if may_command is None:
             return
-        too_many = self._seats.seat(socket, may_command=may_command)
+        too_many = self._slots.seat(socket, may_command=may_command)
         if too_many is socket:
             await _close_full(socket)
             return
@@ -162,7 +161,7 @@ class Server:
             return answer | {"text": str(error)}
 
     async def _shut_down(self, _: web.Application) -> None:
-        for socket in self._seats.everybody():
+        for socket in self._slots.everybody():
             await socket.close(code=1001, message=b"the monitor ends")
 
 
@@ -196,7 +195,7 @@ def _number(value: object) -> float | int:
 
 
 def _load_pages() -> dict[str, tuple[str, bytes]]:
-    """The files of the page by name: nothing else can be asked for."""
+    """The files of the page by name: nothing else can be requested."""
     pages = {}
     for file in (files(__package__) / "page").iterdir():
         ending = "." + file.name.rpartition(".")[2]

@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import resource
 import signal
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,14 +17,32 @@ from aiohttp import web
 from .. import __version__
 from ..bus.address import BusAddress
 from ..errors import HodographError, InputError
-from .commands import read_command
-from .hub import Hub
-from .link import Link
+from .clients import Hub
+from .link import Link, read_command
 from .pump import Layout, Pump
 from .security import Guard, is_loopback
 from .server import REQUEST_S, Server
 from .source import Source, open_source
-from .usage import Usage
+
+
+class Usage:
+    """Share of a processor since the last message, and memory."""
+
+    def __init__(self) -> None:
+        self._last = (time.monotonic(), sum(os.times()[:2]))
+
+    def message(self, clients: int) -> dict[str, Any]:
+        """For the page's last line. `clients`: browsers that look on."""
+        now = (time.monotonic(), sum(os.times()[:2]))
+        passed_s = max(now[0] - self._last[0], 1e-3)
+        percent = 100 * (now[1] - self._last[1]) / passed_s
+        self._last = now
+        return {
+            "type": "usage",
+            "cpu_percent": round(percent, 1),
+            "memory_mib": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+            "clients": clients,
+        }
 
 
 @dataclass(frozen=True)
@@ -42,7 +63,7 @@ class Replay:
 
 
 @dataclass(frozen=True)
-class Place:
+class PageAddress:
     """Where the page is served."""
 
     host: str
@@ -57,14 +78,14 @@ class Place:
         return f"http://{host}:{self.port}/#token={self.token}"
 
 
-class Session:
+class LivePage:
     """Serves until SIGINT or SIGTERM. `image` is the program given, None without one."""
 
     def __init__(
         self,
         what: Live | Replay,
         layout: Layout,
-        place: Place,
+        place: PageAddress,
         image: bytes | None,
         say: Callable[[str], None],
     ) -> None:

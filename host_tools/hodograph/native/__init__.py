@@ -10,7 +10,7 @@ from .axis_run import AxisInputs, run_axis
 from .contour import Contour
 from .drive import DriveModel
 from .library import library, native_file
-from .offline import FAULT_KINDS, FOR_EVER, ROW, Rig, RigFault
+from .offline import FAULT_KINDS, FOR_EVER, ROW, OfflineFault, OfflineSimulation
 from .program import (
     POINT,
     NativeFault,
@@ -32,8 +32,8 @@ __all__ = [
     "NativeFault",
     "NativeLimits",
     "NativeProgram",
-    "Rig",
-    "RigFault",
+    "OfflineFault",
+    "OfflineSimulation",
     "counts_from_q40_mm",
     "kernel_code",
     "library",

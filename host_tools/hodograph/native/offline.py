@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The whole chain in one process, without a bus (sim/offline/offline.h)."""
+"""The offline simulation: controller and axes in one process, without a bus (sim/offline/offline.h)."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ ROW = np.dtype(
 
 
 FAULT_KINDS = ("encoder-freeze", "encoder-jump", "saturate", "load", "setpoint-lost")
-"""What a `RigFault` can be, in the order of enum offline_fault_kind."""
+"""What an `OfflineFault` can be, in the order of enum offline_fault_kind."""
 
 ORDER_KINDS = ("hold", "resume", "override", "stop", "fault-stop")
-"""What a `RigOrder` can be, in the order of enum offline_order_kind."""
+"""What a `OfflineOrder` can be, in the order of enum offline_order_kind."""
 
 FOR_EVER = 2**32 - 1
 """`ticks` of a fault that does not end."""
 
 
 @dataclass(frozen=True)
-class RigFault:
+class OfflineFault:
     """What happens to an axis (0, 1) for `ticks` ticks from tick `at` on (sim/offline/offline_fault.h).
 
     `value`: bus counts of a jump, volts of a voltage limit or load. Ticks count as in
@@ -60,8 +60,8 @@ class RigFault:
 
 
 @dataclass(frozen=True)
-class RigOrder:
-    """A command that setpoint `tick` is the first to obey; `percent` of an override."""
+class OfflineOrder:
+    """A command that setpoint `tick` is the first to follow; `percent` of an override."""
 
     kind: str
     tick: int
@@ -72,7 +72,7 @@ class RigOrder:
 class RigStop:
     """What became of the last hold, stop or fault stop: struct offline_stop.
 
-    tick       the first setpoint that could obey; rest_tick the first one at rest, None: there was none yet
+    tick       the first setpoint that could follow; rest_tick the first one at rest, None: there was none yet
     bound_s    what the stop table says for the place where it was ordered
     from_mm, rest_mm  arc lengths of the last setpoint before it and at rest
     """
@@ -84,7 +84,7 @@ class RigStop:
     rest_mm: float
 
 
-class Rig:
+class OfflineSimulation:
     """Interpolator, two drives and contour error; begins with the drives parked at the start point."""
 
     def __init__(
@@ -94,8 +94,8 @@ class Rig:
         drives: tuple[Drive, Drive],
         counts_per_mm: int,
         feedforward: tuple[Feedforward, Feedforward] | None = None,
-        faults: Sequence[RigFault] = (),
-        orders: Sequence[RigOrder] = (),
+        faults: Sequence[OfflineFault] = (),
+        orders: Sequence[OfflineOrder] = (),
     ) -> None:
         """Set up, with the controller's feedforward (None: none), faults, and orders by ascending tick.
 
@@ -175,14 +175,14 @@ def _gains(feedforward: Feedforward) -> dict[str, int]:
     }
 
 
-def _fault(fault: RigFault) -> tuple[object, ...]:
+def _fault(fault: OfflineFault) -> tuple[object, ...]:
     """As cffi takes a struct offline_fault."""
     if fault.kind not in FAULT_KINDS:
         raise InputError(f'simulation: there is no fault "{fault.kind}"; {", ".join(FAULT_KINDS)}')
     return (FAULT_KINDS.index(fault.kind), *astuple(fault)[1:])
 
 
-def _order(order: RigOrder) -> tuple[object, ...]:
+def _order(order: OfflineOrder) -> tuple[object, ...]:
     """As cffi takes a struct offline_order."""
     if order.kind not in ORDER_KINDS:
         raise InputError(f'simulation: there is no order "{order.kind}"; {", ".join(ORDER_KINDS)}')

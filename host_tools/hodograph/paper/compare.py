@@ -43,36 +43,36 @@ def _compare_case(name: str) -> dict[str, Any]:
     file = EXAMPLES / f"{name}.toml"
     if not file.is_file():
         raise InputError(f"{file}: the examples did not come with this installation: reinstall")
-    chain = load_pipeline(file)
+    pipeline = load_pipeline(file)
     rows: dict[str, Any] = {}
 
     def row(key: str, unit: str, paper: float | None, ours: float | None) -> None:
         rows[key] = {"unit": unit, "paper": paper, "ours": ours}
 
-    _feed_rows(chain, row)
-    _joint_rows(chain, PRINTED[name], row)
-    _contour_rows(chain, PRINTED[name], row)
-    _dynamics_rows(chain, row)
+    _feed_rows(pipeline, row)
+    _joint_rows(pipeline, PRINTED[name], row)
+    _contour_rows(pipeline, PRINTED[name], row)
+    _dynamics_rows(pipeline, row)
     return rows
 
 
-def plain_plan(chain: Pipeline) -> FeedPlan:
+def plain_plan(pipeline: Pipeline) -> FeedPlan:
     """The plain quintic profile with the same nominal feed and ramp time."""
-    asked = chain.feed
+    asked = pipeline.feed
     request = FeedRequest("quintic", asked.nominal_mm_s, asked.ramp_time_s)
     return plan_feed(
-        chain.spline_result.spline.length_mm,
+        pipeline.spline_result.spline.length_mm,
         request,
-        chain.file.limits,
-        chain.plan.controller,
-        period_us=chain.plan.period_us,
+        pipeline.file.limits,
+        pipeline.plan.controller,
+        period_us=pipeline.plan.period_us,
     )
 
 
-def _feed_rows(chain: Pipeline, row: Any) -> None:
-    plan, plain = chain.plan, plain_plan(chain)
+def _feed_rows(pipeline: Pipeline, row: Any) -> None:
+    plan, plain = pipeline.plan, plain_plan(pipeline)
     jerk, plain_jerk = plan.peak_jerk_mm_s3, plain.peak_jerk_mm_s3
-    at_paper_n_c = exponential_ramp(plan.feed_mm_s, chain.feed.ramp_time_s, PAPER_N_C).peak(JERK)
+    at_paper_n_c = exponential_ramp(plan.feed_mm_s, pipeline.feed.ramp_time_s, PAPER_N_C).peak(JERK)
     row("n_c", "", N_C, plan.n_c)
     row("search_iterations", "", ITERATIONS, len(plan.history) - 1)
     row("search_evaluations", "", EVALUATIONS, plan.evaluations)
@@ -89,9 +89,9 @@ def _feed_rows(chain: Pipeline, row: Any) -> None:
     row("peak_acceleration_mm_s2", "mm/s^2", None, plan.peak_acceleration_mm_s2)
 
 
-def _joint_rows(chain: Pipeline, printed: Printed, row: Any) -> None:
+def _joint_rows(pipeline: Pipeline, printed: Printed, row: Any) -> None:
     found = joint_disturbance(
-        chain.spline_result.spline, chain.feed.nominal_mm_s, chain.plan.period_us / 1e6
+        pipeline.spline_result.spline, pipeline.feed.nominal_mm_s, pipeline.plan.period_us / 1e6
     )
     acceleration, jerk = found.acceleration_mm_s2, found.jerk_mm_s3
     row(
@@ -105,10 +105,10 @@ def _joint_rows(chain: Pipeline, printed: Printed, row: Any) -> None:
     row("chord_jerk_mm_s3", "mm/s^3", None, found.largest(jerk))
 
 
-def _contour_rows(chain: Pipeline, printed: Printed, row: Any) -> None:
-    machine = chain.machine
+def _contour_rows(pipeline: Pipeline, printed: Printed, row: Any) -> None:
+    machine = pipeline.machine
     motion = simulate(
-        chain.image,
+        pipeline.image,
         machine.models(machine.plane),
         kernel=machine.kernel,
         counts_per_mm=machine.counts_per_mm,
@@ -118,8 +118,8 @@ def _contour_rows(chain: Pipeline, printed: Printed, row: Any) -> None:
     row("max_volts", "V", None, motion.max_volts)
 
 
-def _dynamics_rows(chain: Pipeline, row: Any) -> None:
-    found = constant_feed_dynamics(chain.spline_result.spline, chain.feed.nominal_mm_s)
+def _dynamics_rows(pipeline: Pipeline, row: Any) -> None:
+    found = constant_feed_dynamics(pipeline.spline_result.spline, pipeline.feed.nominal_mm_s)
     for key, limit, unit, maximum in (
         ("vector_acceleration_mm_s2", A_MAX_MM_S2, "mm/s^2", found.vector_acceleration),
         ("axis_acceleration_mm_s2", A_MAX_MM_S2, "mm/s^2", found.axis_acceleration),

@@ -57,7 +57,7 @@ def comparison_text(comparison: dict[str, Any]) -> str:
 
 
 def shown(value: float | None) -> str:
-    """A number with the digits that mean something; a dash for what is not printed."""
+    """A number with the digits that mean something; a dash for the others."""
     if value is None:
         return "-"
     if isinstance(value, int) or float(value).is_integer():

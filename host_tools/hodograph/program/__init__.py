@@ -3,9 +3,8 @@
 
 from .check import Fault, check
 from .compiler import Compilation, ProgramOptions, compile_path, compile_program, fit_plan
-from .image import Program, decode, encode
+from .image import Program, ProgramLimits, decode, encode
 from .inspection import inspect_dict, inspect_text
-from .limits import ProgramLimits
 from .stop_planning import StopTerms
 
 __all__ = [

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The rules of docs/reference/protocol.md 1.1 to 1.4, as the controller checks them (firmware/core/program_check.h).
+"""The validator: the rules of docs/reference/protocol.md 1.1 to 1.4, as the controller checks them
+(firmware/core/program_check.h), vectorised over segments and feed pieces.
 
 Independent of the C code on purpose: a program is judged by both. What the format decides exactly (joints, ranges,
 sums) is decided here in exact integers.
@@ -12,15 +13,332 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .check_pieces import last_piece_faults, piece_faults
-from .check_segments import Rule, end_faults, segment_faults, too_short
+from ..feed.override_levels import FACTOR_ONE_Q14
+from ..feed.pieces import (
+    DEGREE,
+    FeedPieces,
+    derivative_bounds,
+    derivative_extremes,
+    exponents,
+    way_excess,
+)
+from ..spline.bernstein import square
 from .check_stops import stop_fault
 from .codes import ProgramError
-from .exactmath import segment_ways
-from .image import Program, ReservedFields, decode, open_fault, reserved_fields
-from .limits import ProgramLimits
+from .geometry import WAY_SCALE, segment_ways
+from .image import Program, ProgramLimits, ReservedFields, decode, open_fault, reserved_fields
 
 Int = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+
+LEAST_FEED_MM_S = 2.0**-10
+"""A slower feed counts as this one: pairs that are too short for it are too short at any feed."""
+
+REACH_Q40 = 1 << 27
+"""How far a piece may reach beyond its ends: 2^-14 mm (WAY_SLACK_MM), and a gap at a joint."""
+
+_LEAST_FEED_Q24 = 1 << 14
+
+
+def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[Int, Real, Real]:
+    """Pairs of consecutive segments not longer than the distance of one tick at 200 %.
+
+    joints_q40  (N + 1,) arc lengths of the joints
+    Returns the first segment (K,) of each such pair, the pair's way in mm and the highest feed in mm/s that
+    would be slow enough. Pairs with the first or last segment of the path are exempt.
+    """
+    if joints_q40.size < 5:
+        empty: Real = np.zeros(0)
+        return np.zeros(0, dtype=np.int64), empty, empty
+    low, high = joints_q40[1:-3], joints_q40[3:-1]
+    allowed_q24 = _crossing_feed_q24(high - low, period_us)
+    allowed: Real = np.ldexp(allowed_q24.astype(np.float64), -24)
+    fast = ~(highest_feed(low, high, pieces) <= allowed)
+    brief = np.flatnonzero(fast | (allowed_q24 < _LEAST_FEED_Q24))
+    way: Real = np.ldexp((high - low)[brief].astype(np.float64), -40)
+    return np.asarray(brief + 1, dtype=np.int64), way, allowed[brief]
+
+
+def _crossing_feed_q24(way_q40: Int, period_us: int) -> Int:
+    """A feed in 2^-24 mm/s at which twice a period does not quite cover the way; rounded as the controller does."""
+    return np.asarray((way_q40 >> 16) * (4_000_000 // period_us) // 8 - 1)
+
+
+def highest_feed(low_q40: Int, high_q40: Int, pieces: FeedPieces) -> Real:
+    """Bound of the feed (K,) over stretches low … high of arc length, from the pieces that reach into them."""
+    peak = derivative_extremes(pieces.duration_q32_s, pieces.c_q40)[1][0]
+    first = np.clip(
+        np.searchsorted(pieces.start_q40, low_q40 - REACH_Q40, side="left") - 1, 0, None
+    )
+    last = np.searchsorted(pieces.start_q40, high_q40 + REACH_Q40, side="right")
+    ranges = np.column_stack((first, np.maximum(last, first + 1))).ravel()
+    padded = np.append(peak, 0.0)
+    return np.asarray(np.maximum.reduceat(padded, ranges)[::2])
+
+
+Bool = NDArray[np.bool_]
+Rule = tuple[Bool, int, ProgramError]
+Big = NDArray[np.object_]
+
+W_LIMIT_Q44 = 64 << 44
+POINT_LIMIT_Q40 = 4096 << 40
+ARC_LIMIT_Q40 = 1 << 62
+JOIN_Q88 = WAY_SCALE << (88 - 34)
+CLOSE_Q88 = WAY_SCALE << (88 - 24)
+DIRECTION_RAD = 2.0**-20
+TO_Q88 = WAY_SCALE << 48
+TRAVEL_SLACK_Q40 = 2.0**16
+"""A path may run along a travel limit: 2^-24 mm of rounding are allowed."""
+
+
+def segment_faults(
+    program: Program, ways: tuple[Big, Big, Big], limits: ProgramLimits | None
+) -> list[Rule]:
+    """What is wrong with the segments and their joints, in the order of the controller."""
+    code = ProgramError
+    u, v = program.u_q44, program.v_q44
+    wide = _bool((_beyond(u, W_LIMIT_Q44) | _beyond(v, W_LIMIT_Q44)).any(axis=1))
+    far = _beyond(program.x_q40, POINT_LIMIT_Q40) | _beyond(program.y_q40, POINT_LIMIT_Q40)
+    outside = _bool((program.start_q40 < 0) | (program.start_q40 >= ARC_LIMIT_Q40))
+    sigma = _sigma3(u.astype(object), v.astype(object))
+    low, high = sigma.min(axis=1), sigma.max(axis=1)
+    x, y, s = (a.astype(object) * TO_Q88 for a in (program.x_q40, program.y_q40, program.start_q40))
+    gap_x, gap_y, gap_s = _gap(x, ways[0]), _gap(y, ways[1]), _gap(s, ways[2])
+    apart = (np.abs(gap_x) > JOIN_Q88) | (np.abs(gap_y) > JOIN_Q88)
+    arc = (np.abs(gap_s) > JOIN_Q88) | (np.diff(program.start_q40.astype(object)) <= 0)
+    out: list[Rule] = [
+        (wide, 0, code.W_RANGE),
+        (far, 0, code.POINT_RANGE),
+        (outside, 0, code.ARC_RANGE),
+        (_bool(low <= 0), 0, code.SIGMA),
+        (_bool(high > 2 * low), 0, code.SIGMA_RATIO),
+        (_bool(ways[2] > 32 * (WAY_SCALE << 88)), 0, code.SEGMENT_LONG),
+    ]
+    if limits is not None:
+        out.append((_leaves(program, limits), 0, code.TRAVEL))
+    return [
+        *out,
+        (_bool(program.start_q40[:1] != 0), 0, code.SEGMENT_FIRST),
+        (_bool(apart), 1, code.JOIN_POINT),
+        (_bool(arc), 1, code.JOIN_ARC),
+        (_turned(u, v), 1, code.JOIN_DIRECTION),
+    ]
+
+
+def end_faults(program: Program, ways: tuple[Big, Big, Big]) -> list[Rule]:
+    """What is wrong with the end of the path."""
+    last = program.segment_count - 1
+    x, y = int(program.x_q40[last] - program.x_q40[0]), int(program.y_q40[last] - program.y_q40[0])
+    missing = (program.length_q40 - int(program.start_q40[last])) * TO_Q88
+    off = abs(missing - ways[2][last]) > JOIN_Q88 or missing <= 0
+    open_by = max(abs(x * TO_Q88 + ways[0][last]), abs(y * TO_Q88 + ways[1][last]))
+    return [
+        (np.array([off]), last, ProgramError.SEGMENT_END),
+        (np.array([program.closed and open_by > CLOSE_Q88]), last, ProgramError.NOT_CLOSED),
+    ]
+
+
+def too_short(program: Program) -> Bool:
+    """Later segments of consecutive pairs that a tick at 200 % could cross."""
+    joints = np.append(program.start_q40, program.length_q40)
+    mask = np.zeros(program.segment_count, dtype=np.bool_)
+    mask[brief_pairs(joints, program.pieces, program.period_us)[0] + 1] = True
+    return mask
+
+
+def _beyond(values: Int, limit: int) -> Bool:
+    return np.asarray((values >= limit) | (values <= -limit))
+
+
+def _bool(values: object) -> Bool:
+    return np.asarray(values, dtype=np.bool_)
+
+
+def _sigma3(u: Big, v: Big) -> Big:
+    """Three times the Bernstein coefficients (N, 5) of |w|^2, q88, exactly."""
+    columns = (
+        3 * (u[:, 0] * u[:, 0] + v[:, 0] * v[:, 0]),
+        3 * (u[:, 0] * u[:, 1] + v[:, 0] * v[:, 1]),
+        2 * (u[:, 1] * u[:, 1] + v[:, 1] * v[:, 1]) + u[:, 0] * u[:, 2] + v[:, 0] * v[:, 2],
+        3 * (u[:, 1] * u[:, 2] + v[:, 1] * v[:, 2]),
+        3 * (u[:, 2] * u[:, 2] + v[:, 2] * v[:, 2]),
+    )
+    return np.stack(columns, axis=1)
+
+
+def _gap(start: Big, way: Big) -> Big:
+    return np.asarray(start[:-1] + way[:-1] - start[1:])
+
+
+def _turned(u: Int, v: Int) -> Bool:
+    """Directions of w^2 at the joints differ by more than 2^-20 rad (twice the angle between the w)."""
+    end = u[:-1, 2].astype(np.float64) + 1j * v[:-1, 2]
+    start = u[1:, 0].astype(np.float64) + 1j * v[1:, 0]
+    return np.asarray(np.abs(np.angle((np.conj(end) * start) ** 2)) > DIRECTION_RAD)
+
+
+def boxes_q40(program: Program) -> tuple[Real, Real]:
+    """Lowest and highest corner (N, 2) of the boxes of the segments' six Bezier points."""
+    w = np.asarray((program.u_q44 + 1j * program.v_q44) * 2.0**-44, dtype=np.complex128)
+    steps = np.rint(square(w).view(np.float64).reshape(-1, 5, 2) * (2.0**40 / 5.0))
+    start = np.stack((program.x_q40, program.y_q40), axis=1).astype(np.float64)
+    points = np.concatenate(
+        (start[:, None, :], start[:, None, :] + np.cumsum(steps, axis=1)), axis=1
+    )
+    return points.min(axis=1), points.max(axis=1)
+
+
+def _leaves(program: Program, limits: ProgramLimits) -> Bool:
+    """The box is not within the travel."""
+    lowest, highest = boxes_q40(program)
+    low = np.array(limits.min_q40_mm, dtype=np.float64) - TRAVEL_SLACK_Q40
+    high = np.array(limits.max_q40_mm, dtype=np.float64) + TRAVEL_SLACK_Q40
+    return np.asarray(((lowest < low) | (highest > high)).any(axis=1))
+
+
+COEFFICIENT_Q40 = 1 << 54
+PIECE_Q40 = 32 << 40
+JOIN_Q40 = 1 << 6
+LONGEST_Q32 = 1 << 54
+JOIN_FEED_Q24 = 2.0**8
+JOIN_ACCELERATION_Q16 = 2.0**10
+"""2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
+BACKWARDS_MM_S = -(2.0**-10)
+WAY_SLACK_MM = 2.0**-14
+"""How far a piece may go before its start or beyond its end."""
+
+
+def piece_faults(program: Program, limits: ProgramLimits | None) -> list[Rule]:
+    """What is wrong with the pieces and their joints, in the order of the controller."""
+    code = ProgramError
+    pieces = program.pieces
+    duration, start, c = pieces.duration_q32_s, pieces.start_q40, pieces.c_q40
+    large: Bool = np.asarray(((c > COEFFICIENT_Q40) | (c < -COEFFICIENT_Q40)).any(axis=1))
+    outside: Bool = np.asarray((start < 0) | (start >= ARC_LIMIT_Q40))
+    ranges: list[Rule] = [
+        (np.asarray((duration <= 0) | (duration > LONGEST_Q32)), 0, code.PIECE_DURATION),
+        (large, 0, code.COEFFICIENT),
+        (outside, 0, code.ARC_RANGE),
+    ]
+    whole = _before_first(ranges, len(pieces))
+    if whole == 0:
+        return ranges
+    return ranges + _shape_faults(program, limits, whole)
+
+
+def _before_first(rules: list[Rule], count: int) -> int:
+    """How many pieces from the first are in range; the others cannot be looked into."""
+    return min([int(mask.argmax()) for mask, _, _ in rules if mask.any()], default=count)
+
+
+def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) -> list[Rule]:
+    code = ProgramError
+    pieces = program.pieces
+    duration, start, c = (
+        a[:count] for a in (pieces.duration_q32_s, pieces.start_q40, pieces.c_q40)
+    )
+    way = _ways_q44(duration, c)
+    advance = np.diff(start.astype(object))
+    gaps = way[:-1].astype(object) - 16 * advance
+    (feed_start, feed_end), (acceleration_start, acceleration_end) = _end_values(duration, c)
+    bounds = _bound_faults(duration, c, limits)
+    factor = pieces.override_factor_q14
+    codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
+    override = (factor < FACTOR_ONE_Q14) | (factor > 2 * FACTOR_ONE_Q14)
+    start_moving = np.array([_moving(feed_start[0], acceleration_start[0])])
+    return [
+        (np.asarray(np.abs(way) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
+        *bounds,
+        (np.asarray(override | (codes == 0).any(axis=1)), 0, code.OVERRIDE),
+        (np.asarray(start[:1] != 0, dtype=np.bool_), 0, code.PIECE_FIRST),
+        (start_moving, 0, code.START_MOVING),
+        (np.asarray(advance < 0, dtype=np.bool_), 1, code.BACKWARDS),
+        (np.asarray(np.abs(gaps) > JOIN_Q40 << 4, dtype=np.bool_), 1, code.JOIN_LENGTH),
+        (np.abs(feed_end[:-1] - feed_start[1:]) > JOIN_FEED_Q24, 1, code.JOIN_FEED),
+        (
+            np.abs(acceleration_end[:-1] - acceleration_start[1:]) > JOIN_ACCELERATION_Q16,
+            1,
+            code.JOIN_ACCELERATION,
+        ),
+        (_brief(pieces.duration_q32_s, program.period_us), 2, code.PIECE_SHORT),
+    ]
+
+
+def _bound_faults(duration: Int, c: Int, limits: ProgramLimits | None) -> list[Rule]:
+    """Feed, acceleration and jerk beyond what is allowed; close cases are looked at more closely."""
+    rules = _bound_masks(duration, c, limits, 4)
+    suspects = np.flatnonzero(np.logical_or.reduce([mask for mask, _, _ in rules]))
+    for first in range(0, suspects.size, 256):
+        some = suspects[first : first + 256]
+        close = _bound_masks(duration[some], c[some], limits, 9)
+        for (mask, _, _), (exact, _, _) in zip(rules, close, strict=True):
+            mask[some] = exact
+    return rules
+
+
+def _bound_masks(duration: Int, c: Int, limits: ProgramLimits | None, halvings: int) -> list[Rule]:
+    lows, highs = derivative_extremes(duration, c, halvings)
+    excess = way_excess(duration, c, halvings)
+    backwards = (lows[0] < BACKWARDS_MM_S) | (excess > WAY_SLACK_MM)
+    out: list[Rule] = [(np.asarray(backwards), 0, ProgramError.BACKWARDS)]
+    if limits is None:
+        return out
+    peaks = highs[0], np.maximum(-lows[1], highs[1]), np.maximum(-lows[2], highs[2])
+    asked = (limits.feed_um_s * 1e-3, limits.acceleration_um_s2 * 1e-3, limits.jerk_mm_s3)
+    codes = (ProgramError.FEED, ProgramError.ACCELERATION, ProgramError.JERK)
+    for peak, limit, code in zip(peaks, asked, codes, strict=True):
+        out.append((np.asarray((peak > limit) & (limit > 0.0)), 0, code))
+    return out
+
+
+def last_piece_faults(program: Program) -> list[Rule]:
+    """What is wrong with the end of the feed."""
+    pieces = program.pieces
+    last = len(pieces) - 1
+    duration, c = pieces.duration_q32_s[last:], pieces.c_q40[last:]
+    way = int(_ways_q44(duration, c)[0])
+    missed = abs(way + ((int(pieces.start_q40[last]) - program.length_q40) << 4)) > JOIN_Q40 << 4
+    feed, acceleration = _end_values(duration, c)
+    return [
+        (np.array([_moving(feed[1][0], acceleration[1][0])]), last, ProgramError.END_MOVING),
+        (np.array([missed]), last, ProgramError.PIECE_END),
+    ]
+
+
+def _end_values(duration: Int, c: Int) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
+    """Feed in 2^-24 mm/s and acceleration in 2^-16 mm/s^2, each (at the start, at the end) of the pieces."""
+    feed, acceleration, _ = derivative_bounds(duration, c)
+    v, a = np.floor(feed * 2.0**24), np.floor(acceleration * 2.0**16)
+    return (v[:, 0], v[:, -1]), (a[:, 0], a[:, -1])
+
+
+def _moving(feed_q24: float, acceleration_q16: float) -> bool:
+    return abs(feed_q24) > JOIN_FEED_Q24 or abs(acceleration_q16) > JOIN_ACCELERATION_Q16
+
+
+def _ways_q44(duration: Int, c: Int) -> Int:
+    """Way of each piece in 2^-44 mm, rounded down from the exact sum of its terms."""
+    shift = exponents(duration) + 32
+    ways = [_way_q44(int(d), int(e), row) for d, e, row in zip(duration, shift, c, strict=True)]
+    return np.array(ways, dtype=np.int64)
+
+
+def _way_q44(d: int, e: int, c: Int) -> int:
+    if not c[1:].any():
+        return (int(c[0]) * d << 4) >> e
+    total = 0
+    for k in range(DEGREE, 0, -1):
+        # Horner over the common denominator 2^(e (DEGREE - k + 1)).
+        total = (total + (int(c[k - 1]) << (e * (DEGREE - k)))) * d
+    return (total << 4) >> (e * DEGREE)
+
+
+def _brief(duration: Int, period_us: int) -> Bool:
+    """Consecutive pieces (without first and last piece) that last no longer than two periods together."""
+    pairs = duration[1:-2] + duration[2:-1]
+    return np.asarray(pairs.astype(object) * 1_000_000 <= 2 * period_us << 32, dtype=np.bool_)
+
 
 PERIODS_US = (1000, 2000, 4000, 8000)
 LONGEST_Q32_S = 2**54

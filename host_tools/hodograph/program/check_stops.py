@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from ..feed.override_levels import FULL, LEVEL_RATES, LEVELS
 from ..feed.pieces import part_bounds
 from .codes import ProgramError
-from .image import Program
-from .limits import ProgramLimits
+from .image import Program, ProgramLimits
 from .stops import DECELERATION, FAULT, HOLD, JERK_DOWN, JERK_UP, numbers
 
 Real = NDArray[np.float64]

@@ -10,16 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
-from ..feed import FeedCap, Plan
+from ..feed import FeedPlan, FeedZone, Replan, replan
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
-from .check import Fault, check
-from .check_segments import boxes_q40
+from .check import LEAST_FEED_MM_S, Fault, boxes_q40, brief_pairs, check
 from .codes import ProgramError
 from .geometry import quantise
-from .image import NAME_SIZE, Program
-from .limits import ProgramLimits
-from .neighbours import LEAST_FEED_MM_S, brief_pairs
+from .image import NAME_SIZE, Program, ProgramLimits
 from .stop_planning import StopTerms, plan_stops
 from .stops import no_stops
 
@@ -39,7 +36,7 @@ class Compilation:
     """
 
     program: Program
-    plan: Plan
+    plan: FeedPlan
     notes: tuple[str, ...]
     drift_mm: float
 
@@ -62,17 +59,22 @@ class ProgramOptions:
 _USUAL = ProgramOptions()
 
 
-def compile_program(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL) -> Program:
-    """The program of `compile_path`, for callers that need nothing else."""
+def compile_program(spline: PHSpline, plan: FeedPlan, options: ProgramOptions = _USUAL) -> Program:
+    """The program of `compile_path` for a profile with ramps, for callers that need nothing else."""
     return compile_path(spline, plan, options).program
 
 
-def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL) -> Compilation:
+def compile_path(
+    spline: PHSpline,
+    plan: FeedPlan,
+    options: ProgramOptions = _USUAL,
+    replan: Replan = replan,
+) -> Compilation:
     """Compiles `plan` along `spline`, shifted by the work offset into machine coordinates.
 
-    Under policy "respect" the feed is lowered where two neighbouring segments would pass within one tick at
-    200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, a fault stop longer than
-    it may be, and whatever `check` finds).
+    Under policy "respect" the feed is lowered, by `replan`, where two consecutive segments would pass within one tick
+    at 200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, a fault stop longer
+    than it may be, and whatever `check` finds).
     """
     name, offset_mm, period_us = options.name, options.offset_mm, options.period_us
     if period_us is not None and period_us != plan.period_us:
@@ -87,7 +89,7 @@ def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL)
         raise InputError(
             f"the plan is for {plan.length_mm:.9g} mm, the path has {length_q40 * 2.0**-40:.9g} mm"
         )
-    plan, pieces = _fit_feed(plan, geometry.start_q40, spline)
+    plan, pieces = _fit_feed(plan, geometry.start_q40, spline, replan)
     program = Program(
         name=name,
         period_us=plan.period_us,
@@ -114,16 +116,19 @@ def compile_path(spline: PHSpline, plan: Plan, options: ProgramOptions = _USUAL)
     return Compilation(program, plan, plan.notes, geometry.drift_mm)
 
 
-def fit_plan(spline: PHSpline, plan: Plan) -> Plan:
-    """The plan that `compile_path` makes a program of: its feed lowered where short segments ask for it.
+def fit_plan(spline: PHSpline, plan: FeedPlan, replan: Replan) -> FeedPlan:
+    """The plan that `compile_path` makes a program of: made again with a lower feed where segments are too short for
+    it.
 
     Raises PlanError as `compile_path` does for them, and InputError for a path beyond the format.
     """
     geometry = quantise(spline, 0j)
-    return _fit_feed(plan, geometry.start_q40, spline)[0]
+    return _fit_feed(plan, geometry.start_q40, spline, replan)[0]
 
 
-def _fit_feed(plan: Plan, joints_q40: Int, spline: PHSpline) -> tuple[Plan, FeedPieces]:
+def _fit_feed(
+    plan: FeedPlan, joints_q40: Int, spline: PHSpline, replan: Replan
+) -> tuple[FeedPlan, FeedPieces]:
     """The plan with its feed low enough for the segments, and its pieces over their exact length."""
     length_q40 = int(joints_q40[-1])
     for _ in range(_MOST_ROUNDS):
@@ -148,8 +153,8 @@ def _fit_feed(plan: Plan, joints_q40: Int, spline: PHSpline) -> tuple[Plan, Feed
                 'lower nominal_mm_s or set policy "respect"'
             )
         low, high = joints_q40[pairs] * 2.0**-40, joints_q40[pairs + 2] * 2.0**-40
-        caps = zip(low.tolist(), high.tolist(), feeds.tolist(), strict=True)
-        plan = plan.slowed([FeedCap(*cap) for cap in caps], where)
+        zones = zip(low.tolist(), high.tolist(), feeds.tolist(), strict=True)
+        plan = replan(plan, [FeedZone(*zone) for zone in zones], where)
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The program image as arrays, to and from bytes; docs/reference/protocol.md 1.1 to 1.4."""
+"""The program image as arrays, to and from bytes, and the memory and machine limits that it is made for;
+docs/reference/protocol.md 1.1 to 1.4."""
 
 from __future__ import annotations
 
@@ -263,3 +264,37 @@ def reserved_fields(image: bytes) -> ReservedFields:
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
         stops=stops != 0,
     )
+
+
+@dataclass(frozen=True)
+class ProgramLimits:
+    """What a controller allows, in the units of the protocol; 0 for all but the travel: any.
+
+    stop_time_ms  greatest bound of a fault stop
+
+    Those of the axes, (x, y), are proved by the controller's own check only (firmware/core/limit_check.h).
+    """
+
+    period_us: int
+    feed_um_s: int
+    acceleration_um_s2: int
+    jerk_mm_s3: int
+    min_q40_mm: tuple[int, int]
+    max_q40_mm: tuple[int, int]
+    stop_time_ms: int = 0
+    axis_velocity_um_s: tuple[int, int] = (0, 0)
+    axis_acceleration_um_s2: tuple[int, int] = (0, 0)
+    axis_jerk_mm_s3: tuple[int, int] = (0, 0)
+
+
+RECORD_BYTES = {"fixed": (288, 208), "float": (272, 208), "double": (248, 176)}
+"""Of a segment, of a piece, by kernel."""
+LARGEST_BANK = 64 * 2**20 - 16
+"""Bytes for a program of the largest store that a port of this project has (Linux); a board's is smaller."""
+_COUNTS = struct.Struct("<20xII")
+
+
+def memory_bytes(image: bytes, segment_bytes: int, piece_bytes: int) -> int:
+    """Image and records of these sizes. The image has a whole header."""
+    segments, pieces = _COUNTS.unpack_from(image[:HEADER_SIZE])
+    return len(image) + int(segments) * segment_bytes + int(pieces) * piece_bytes

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..feed.pieces import derivative_peaks
-from .exactmath import segment_ways, way_to_q40
+from .geometry import segment_ways, way_to_q40
 from .image import VERSION, Program
 from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
 

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PlanError
-from ..feed import AxisLimits, Plan
-from ..feed.halving import halved
-from ..feed.plant import Plants
+from ..feed import AxisLimits, FeedPlan, Plants
+from ..feed.pieces import halved
 from ..native.program import NativeProgram
 from ..native.stop_bounds import stop_bounds
 from ..native.stop_search import FREE, StopLimits, StopSearch
@@ -49,7 +48,7 @@ class StopTerms:
     stop_time_ms: int = 0
 
 
-def plan_stops(program: Program, plan: Plan, terms: StopTerms) -> Program:
+def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     """The program with its stop table. Feed pieces in which no numbers are found are halved, as far as that helps: a
     place where no brake may begin, such as a narrow bend that is passed as fast as its limits allow, need not keep the
     whole piece from braking. Raises PlanError: a fault stop may take longer than `stop_time_ms`.
@@ -220,7 +219,7 @@ def _checked(program: Program, terms: StopTerms) -> Program:
     return program
 
 
-def hold_limits(plan: Plan, terms: StopTerms) -> StopLimits:
+def hold_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
     """What feed hold and stop keep: the limits of the path file and of the machine."""
     own = plan.limits
     machine = fault_limits(plan, StopTerms(axis=terms.axis))
@@ -233,7 +232,7 @@ def hold_limits(plan: Plan, terms: StopTerms) -> StopLimits:
         axis_velocity=_both(own.axis.velocity_mm_s, machine.axis_velocity),
         axis_acceleration=_both(own.axis.acceleration_mm_s2, machine.axis_acceleration),
         axis_jerk=_both(own.axis.jerk_mm_s3, machine.axis_jerk),
-        caps=tuple((cap.from_mm, cap.to_mm, cap.feed_mm_s) for cap in own.caps),
+        caps=tuple((cap.from_mm, cap.to_mm, cap.feed_mm_s) for cap in own.zones),
         reach=_reach(terms.plants),
         time_constant=_time_constants(terms.plants),
         reach_at_pace=False,
@@ -241,7 +240,7 @@ def hold_limits(plan: Plan, terms: StopTerms) -> StopLimits:
     )
 
 
-def fault_limits(plan: Plan, terms: StopTerms) -> StopLimits:
+def fault_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
     """What fault stops keep: the limits of the machine."""
     machine = plan.controller
     return StopLimits(

@@ -8,9 +8,8 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from ..feed import Plan
-from ..feed.ramp import JERK, exponential_ramp
-from ..feed.shapes import N_C_HIGH, N_C_LOW
+from ..feed import FeedPlan
+from ..feed.ramp import JERK, N_C_HIGH, N_C_LOW, exponential_ramp
 from ..paper import plain_plan
 from ..pipeline import Pipeline
 from .style import BLUE, GREEN, GREY, ORANGE, RED, png
@@ -18,13 +17,13 @@ from .style import BLUE, GREEN, GREY, ORANGE, RED, png
 _SAMPLES = 1600
 
 
-def feed_figure(chain: Pipeline, plan: Plan) -> bytes:
+def feed_figure(pipeline: Pipeline, plan: FeedPlan) -> bytes:
     """Feed, acceleration and jerk of the profile used; whole run and first ramp, with the plain quintic beside it.
 
     Of profile `optimal`, which has no ramps: whole run and first quarter.
     """
     ramps = plan.ramp_time_s is not None
-    plain: Plan = plain_plan(chain) if ramps else plan
+    plain: FeedPlan = plain_plan(pipeline) if ramps else plan
     figure, grid = pyplot.subplots(3, 2, figsize=(9.6, 7.2), width_ratios=(1.5, 1), sharey="row")
     name = plan.profile if plan.n_c is None else f"{plan.profile}, n_c {plan.n_c:.3f}"
     ramp_end_s = 0.25 * plan.duration_s
@@ -44,13 +43,13 @@ def feed_figure(chain: Pipeline, plan: Plan) -> bytes:
         for axes in grid[:, column]:
             axes.set_xlim(0, 1e3 * end_s)
         grid[2, column].set_xlabel("time, ms")
-    _limits(grid[1], chain.file.limits.acceleration_mm_s2)
-    _limits(grid[2], chain.file.limits.jerk_mm_s3)
+    _limits(grid[1], pipeline.file.limits.acceleration_mm_s2)
+    _limits(grid[2], pipeline.file.limits.jerk_mm_s3)
     for axes, label in zip(
         grid[:, 0], ("feed, mm/s", "acceleration, mm/s²", "jerk, mm/s³"), strict=True
     ):
         axes.set_ylabel(label)
-    grid[0, 0].set_title(f"{chain.file.name}: feed along the path")
+    grid[0, 0].set_title(f"{pipeline.file.name}: feed along the path")
     grid[0, 1].set_title("first ramp" if ramps else "first quarter")
     grid[0, 1].legend(loc="lower right")
     return png(figure)
@@ -64,7 +63,7 @@ def _limits(row: np.ndarray, limit: float | None) -> None:
             axes.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
 
 
-def search_figure(plan: Plan) -> bytes | None:
+def search_figure(plan: FeedPlan) -> bytes | None:
     """Progress of the pattern search for n_c, beside the function it minimises; None without a search."""
     if not plan.history:
         return None
@@ -94,7 +93,7 @@ def search_figure(plan: Plan) -> bytes | None:
     return png(figure)
 
 
-def _progress(axes: Axes, plan: Plan) -> None:
+def _progress(axes: Axes, plan: FeedPlan) -> None:
     iterations = [step.iteration for step in plan.history]
     axes.step(iterations, [step.value for step in plan.history], where="post", color=BLUE)
     axes.set_xlabel(f"iteration ({plan.evaluations} evaluations in all)")

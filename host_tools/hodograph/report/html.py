@@ -13,9 +13,8 @@ from ..paper.compare import CASES
 from ..pipeline import Pipeline, proved_limits
 from ..simulate import Motion
 from .feed_figures import feed_figure, search_figure
-from .joint_figures import joint_figure
 from .page import Figure, file_name, render, write_page
-from .path_figures import polygon_figure
+from .path_figures import joint_figure, polygon_figure
 from .run_figures import contour_figure, drive_figure
 from .style import styled
 
@@ -47,20 +46,20 @@ def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return shown_cases
 
 
-def _case(chain: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, Any]:
-    plan = chain.compilation.plan
+def _case(pipeline: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, Any]:
+    plan = pipeline.compilation.plan
     source = "recorded on the bus" if run is not None else "simulated"
     figures = [
         Figure(
             "path",
             "Control polygon, nodal points and the C2 PH quintic spline; curvature (paper, figure 1).",
-            polygon_figure(chain),
+            polygon_figure(pipeline),
         ),
         Figure(
             "feed",
             "Feed, tangential acceleration and jerk of the plain quintic profile and of the one used "
             "(paper, figures 2 and 4); red: limits of the path file.",
-            feed_figure(chain, plan),
+            feed_figure(pipeline, plan),
         ),
     ]
     search = search_figure(plan)
@@ -72,24 +71,26 @@ def _case(chain: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, Any]
             "joints",
             "First and second differences of chord speed over the period at constant feed (paper, figure 5). "
             "The dashed curve is what the shortening of chords on a curve gives by itself.",
-            joint_figure(chain, plan),
+            joint_figure(pipeline, plan),
         ),
         Figure(
             "contour",
             f"Commanded and actual path, the worst place enlarged, and the contour error along the run, {source} "
             "(paper, figure 7).",
-            contour_figure(chain, motion),
+            contour_figure(pipeline, motion),
         ),
         Figure(
-            "drives", f"Following error and voltage by axis, {source}.", drive_figure(chain, motion)
+            "drives",
+            f"Following error and voltage by axis, {source}.",
+            drive_figure(pipeline, motion),
         ),
     ]
     return {
-        "name": chain.file.name,
-        "anchor": file_name(chain.file.name, "path"),
-        "file": str(chain.file.file),
-        "notes": chain.notes(plan),
-        "proof": proved_limits(chain.machine),
+        "name": pipeline.file.name,
+        "anchor": file_name(pipeline.file.name, "path"),
+        "file": str(pipeline.file.file),
+        "notes": pipeline.notes(plan),
+        "proof": proved_limits(pipeline.machine),
         "figures": figures,
         "load": _load(run),
     }
@@ -129,8 +130,8 @@ def _render(cases: Sequence[Case], shown_cases: list[dict[str, Any]]) -> str:
 
 def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
     rows: dict[str, list[str]] = {}
-    for chain, motion, run in cases:
-        plan, spline = chain.compilation.plan, chain.spline_result.spline
+    for pipeline, motion, run in cases:
+        plan, spline = pipeline.compilation.plan, pipeline.spline_result.spline
         values = {
             "path": f"{'closed' if spline.closed else 'open'}, {spline.segment_count} segments",
             "length, mm": f"{spline.length_mm:.4f}",
@@ -159,7 +160,7 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
 
 
 def _comparison(cases: Sequence[Case]) -> dict[str, Any] | None:
-    if not {chain.file.name for chain, _, _ in cases} & set(CASES):
+    if not {pipeline.file.name for pipeline, _, _ in cases} & set(CASES):
         return None
     found = compare()
     curves = list(found)

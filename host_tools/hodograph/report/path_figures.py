@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Figures of the path: polygon, nodes and curve (paper figure 1), curvature."""
+"""Figures of the path: polygon, nodes and curve (paper figure 1), curvature, and differences of chord speed at
+constant feed (figure 5)."""
 
 from __future__ import annotations
 
@@ -7,6 +8,8 @@ import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 
+from ..feed import FeedPlan
+from ..paper import chord_acceleration_mm_s2, joint_disturbance
 from ..pipeline import Pipeline
 from ..spline import PHSpline
 from .style import BLUE, GREEN, GREY, ORANGE, plan_axes, png
@@ -14,11 +17,11 @@ from .style import BLUE, GREEN, GREY, ORANGE, plan_axes, png
 _SAMPLES = 2000
 
 
-def polygon_figure(chain: Pipeline) -> bytes:
+def polygon_figure(pipeline: Pipeline) -> bytes:
     """Control polygon or given points, nodal points, PH curve, and the curvature along it."""
-    spline = chain.spline_result.spline
+    spline = pipeline.spline_result.spline
     figure, (plane, curve) = pyplot.subplots(1, 2, figsize=(9.6, 4.4), width_ratios=(1.15, 1))
-    _plane(plane, chain)
+    _plane(plane, pipeline)
     s_mm = np.linspace(0.0, spline.length_mm, _SAMPLES)
     curve.plot(s_mm, spline.curvature(s_mm), color=BLUE)
     for joint in spline.segment_starts_mm:
@@ -30,8 +33,8 @@ def polygon_figure(chain: Pipeline) -> bytes:
     return png(figure)
 
 
-def _plane(axes: Axes, chain: Pipeline) -> None:
-    path, spline = chain.file.path, chain.spline_result.spline
+def _plane(axes: Axes, pipeline: Pipeline) -> None:
+    path, spline = pipeline.file.path, pipeline.spline_result.spline
     given = path.points
     if not path.through:
         polygon = np.append(given, given[0]) if path.closed else given
@@ -59,7 +62,7 @@ def _plane(axes: Axes, chain: Pipeline) -> None:
     _start(axes, spline)
     plan_axes(axes)
     axes.margins(0.06)
-    axes.set_title(f"{chain.file.name}: polygon, nodes, curve")
+    axes.set_title(f"{pipeline.file.name}: polygon, nodes, curve")
     axes.legend(loc="best")
 
 
@@ -73,3 +76,39 @@ def _start(axes: Axes, spline: PHSpline) -> None:
         xytext=(start.real, start.imag),
         arrowprops={"arrowstyle": "-|>", "color": GREEN, "linewidth": 2.2, "mutation_scale": 15},
     )
+
+
+def joint_figure(pipeline: Pipeline, plan: FeedPlan) -> bytes:
+    """First and second differences of chord speed along the whole path, joints marked."""
+    spline = pipeline.spline_result.spline
+    period_s = plan.period_us / 1e6
+    found = joint_disturbance(spline, plan.feed_mm_s, period_s)
+    s_mm = found.s_mm
+    figure, (top, bottom) = pyplot.subplots(2, 1, figsize=(9.6, 5.2), sharex=True)
+    top.plot(s_mm[1:-1], found.acceleration_mm_s2, color=BLUE, label="difference of chord speed")
+    top.plot(
+        s_mm[1:-1],
+        chord_acceleration_mm_s2(spline, s_mm[1:-1], plan.feed_mm_s, period_s),
+        color=ORANGE,
+        linewidth=1.2,
+        linestyle=(0, (4, 3)),
+        label="chords shorter than arcs, nothing else",
+    )
+    bottom.plot(s_mm[1:-2], found.jerk_mm_s3, color=BLUE)
+    for axes, label in ((top, "acceleration, mm/s²"), (bottom, "jerk, mm/s³")):
+        axes.set_ylabel(label)
+        axes.margins(x=0)
+        for joint in found.joints_mm:
+            axes.axvline(float(joint), color=GREY, linewidth=0.8, linestyle=(0, (2, 3)), zorder=0)
+    top.set_title(
+        f"{pipeline.file.name}: disturbance at constant {plan.feed_mm_s:.4g} mm/s; dashed: joints"
+    )
+    bottom.legend(
+        *top.get_legend_handles_labels(),
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=2,
+        borderaxespad=0.1,
+    )
+    bottom.set_xlabel("arc length, mm")
+    return png(figure)

@@ -18,26 +18,26 @@ _ZOOM_FACTOR = 5.0
 _LEAST_ZOOM_UM = 5.0
 
 
-def contour_figure(chain: Pipeline, motion: Motion) -> bytes:
+def contour_figure(pipeline: Pipeline, motion: Motion) -> bytes:
     """Commanded and actual path, the worst place enlarged, contour error along the run."""
     figure = pyplot.figure(figsize=(9.6, 8.0))
     grid = figure.add_gridspec(2, 2, height_ratios=(1.35, 1))
     plane, zoom = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
     error = figure.add_subplot(grid[1, :])
     worst = int(np.argmax(motion.contour_error_um))
-    _plane(plane, chain, motion, worst)
+    _plane(plane, pipeline, motion, worst)
     _zoom(zoom, motion, worst)
     _error(error, motion, worst)
     return png(figure)
 
 
-def _plane(axes: Axes, chain: Pipeline, motion: Motion, worst: int) -> None:
+def _plane(axes: Axes, pipeline: Pipeline, motion: Motion, worst: int) -> None:
     set_mm, act_mm = motion.cmd_mm, motion.act_mm
     axes.plot(set_mm[:, 0], set_mm[:, 1], color=GREY, linewidth=3.5, label="commanded")
     axes.plot(act_mm[:, 0], act_mm[:, 1], color=BLUE, linewidth=1.2, label="actual")
     axes.plot(*act_mm[worst], "o", color=RED, markersize=7, fillstyle="none", label="worst place")
     plan_axes(axes)
-    axes.set_title(f"{chain.file.name}: commanded and actual path")
+    axes.set_title(f"{pipeline.file.name}: commanded and actual path")
     axes.legend(loc="best")
 
 
@@ -98,20 +98,20 @@ def _error(axes: Axes, motion: Motion, worst: int) -> None:
     axes.set_title("distance of the encoder position from the exact curve")
 
 
-def drive_figure(chain: Pipeline, motion: Motion) -> bytes:
+def drive_figure(pipeline: Pipeline, motion: Motion) -> bytes:
     """Following error and voltage of each axis."""
     figure, (following, volts) = pyplot.subplots(2, 1, figsize=(9.6, 4.8), sharex=True)
-    for i, (axis, color) in enumerate(zip(chain.machine.plane, (BLUE, GREEN), strict=True)):
+    for i, (axis, color) in enumerate(zip(pipeline.machine.plane, (BLUE, GREEN), strict=True)):
         following.plot(motion.t_s, motion.following_error_um[:, i], color=color, label=axis.name)
         volts.plot(motion.t_s, motion.volts[:, i], color=color, label=axis.name)
-    limits = [axis.drive.volts_limit for axis in chain.machine.plane if axis.drive is not None]
+    limits = [axis.drive.volts_limit for axis in pipeline.machine.plane if axis.drive is not None]
     if limits and (motion.max_volts or 0.0) > 0.5 * (limit := min(limits)):
         for sign in (-1, 1):
             volts.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
     following.set_ylabel("setpoint - position, µm")
     volts.set_ylabel("drive voltage, V")
     volts.set_xlabel("time, s")
-    following.set_title(f"{chain.file.name}: following error and voltage of the axes")
+    following.set_title(f"{pipeline.file.name}: following error and voltage of the axes")
     following.legend(loc="upper right", ncols=2)
     for axes in (following, volts):
         axes.margins(x=0)

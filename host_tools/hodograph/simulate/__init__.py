@@ -6,7 +6,7 @@ makes the same result from what a recorder saw on the bus. Both give a `Motion`:
 """
 
 from .motion import SETTLING_S, Motion, Tally, settling_ticks
-from .recording import analyse
+from .run_recording import analyse
 from .simulation import simulate
 from .stopping import STOP_ORDERS, StoppedRun, last_tick_s, simulate_stop
 from .trace import TRACE_HEADER, write_trace

@@ -10,11 +10,11 @@ import numpy as np
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import InputError
-from ..native import ROW, NativeProgram, Rig, RigFault
+from ..native import ROW, NativeProgram, OfflineFault, OfflineSimulation
 from .motion import Motion, Tally, settling_ticks
 
 CHUNK_TICKS = 16384
-"""Ticks a call of the C side: small enough to stay in cache, and between two looks at Ctrl-C."""
+"""Ticks a call of the C side: small enough to stay in cache, and between two checks for Ctrl-C."""
 
 
 def simulate(
@@ -24,7 +24,7 @@ def simulate(
     kernel: str = "fixed",
     counts_per_mm: int = 1_000_000,
     feedforward: tuple[Feedforward, Feedforward] | None = None,
-    faults: Sequence[RigFault] = (),
+    faults: Sequence[OfflineFault] = (),
     keep_rows: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Motion:
@@ -38,7 +38,9 @@ def simulate(
     if len(drives) != 2:
         raise InputError(f"simulate: needs the drives of 2 axes, not {len(drives)}")
     program = image if isinstance(image, NativeProgram) else NativeProgram(image)
-    rig = Rig(program, kernel, (drives[0], drives[1]), counts_per_mm, feedforward, faults)
+    rig = OfflineSimulation(
+        program, kernel, (drives[0], drives[1]), counts_per_mm, feedforward, faults
+    )
     total = program.ticks + settling_ticks(program.period_us)
     tally = Tally(program.ticks, counts_per_mm)
     rows = np.empty(total if keep_rows else min(total, CHUNK_TICKS), dtype=ROW)

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import HodographError, InputError
-from ..native import ROW, NativeProgram, Rig
-from ..native.offline import RigOrder
+from ..native import ROW, NativeProgram, OfflineSimulation
+from ..native.offline import OfflineOrder
 from ..program import Program
 from .motion import Motion, Tally, settling_ticks
 
 STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
-"""Kinds of a stop, and of the RigOrder that asks for it."""
+"""Kinds of a stop, and of the OfflineOrder that asks for it."""
 
 _HISTORY = 3
 _AXES = ("x", "y")
@@ -31,7 +31,7 @@ class StoppedRun:
     """A run that was stopped.
 
     kind          one of STOP_ORDERS
-    at_s          time from the program's start at which it was asked for
+    at_s          time from the program's start at which it was commanded
     rest_after_s  time from then to the first setpoint at rest
     distance_mm   way along the path in this time
     bound_s       longest time by the program's stop table
@@ -61,7 +61,7 @@ class StoppedRun:
 
 
 def last_tick_s(program: NativeProgram | Program) -> float:
-    """Time of a program's last setpoint: the last instant at which a stop may be asked for."""
+    """Time of a program's last setpoint: the last instant at which a stop may be commanded."""
     return (program.ticks - 1) * program.period_us * 1e-6
 
 
@@ -76,7 +76,7 @@ def simulate_stop(
     feedforward: tuple[Feedforward, Feedforward] | None = None,
 ) -> StoppedRun:
     """A run as `simulate` makes it, that is stopped `at_s` after its first setpoint: the setpoint of this time is the
-    first that obeys. Raises InputError: a time outside the program, and as `simulate`.
+    first that follows. Raises InputError: a time outside the program, and as `simulate`.
     """
     period_s = program.period_us * 1e-6
     if len(drives) != len(_AXES):
@@ -85,13 +85,13 @@ def simulate_stop(
     if not 0.0 <= at_s <= end_s * (1.0 + 1e-12):
         raise InputError(f"{kind} at {at_s:g} s: must be from 0 to {end_s:.9g} s")
     tick = ceil(at_s / period_s - 1e-9)
-    rig = Rig(
+    rig = OfflineSimulation(
         program,
         kernel,
         (drives[0], drives[1]),
         counts_per_mm,
         feedforward,
-        orders=(RigOrder(STOP_ORDERS[kind], tick),),
+        orders=(OfflineOrder(STOP_ORDERS[kind], tick),),
     )
     settling = settling_ticks(program.period_us)
     rows = np.empty(program.ticks + settling, dtype=ROW)

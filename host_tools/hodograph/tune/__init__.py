@@ -5,9 +5,8 @@ The method is docs/theory/numerics.md section 17, the use docs/guides/tuning.md.
 """
 
 from .design import VELOCITIES
-from .result import Tuning
+from .result import Tuning, tuning_json, tuning_text
 from .search import Wanted
-from .text import tuning_json, tuning_text
 from .tuning import Asked, tune
 
 __all__ = [

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
-from ..native import FOR_EVER, RigFault
+from ..native import FOR_EVER, OfflineFault
 from ..simulate import simulate
 
 Drives = tuple[Drive, Drive]
@@ -50,12 +50,12 @@ class Case:
             delay_samples=1 if self.sensed else drive.delay_samples,
         )
 
-    def faults(self, drives: Drives) -> tuple[RigFault, ...]:
+    def faults(self, drives: Drives) -> tuple[OfflineFault, ...]:
         """The load on both axes."""
         if self.load == 0:
             return ()
         return tuple(
-            RigFault("load", axis, 0, FOR_EVER, self.load * drive.volts_limit)
+            OfflineFault("load", axis, 0, FOR_EVER, self.load * drive.volts_limit)
             for axis, drive in enumerate(drives)
         )
 
@@ -107,7 +107,7 @@ def outcome(
         keep_rows=False,
     )
     limit = min(drive.volts_limit for drive in drives)
-    volts = motion.max_volts or 0.0  # a simulation tells them
+    volts = motion.max_volts or 0.0  # a simulation reports them
     return Outcome(motion.max_contour_error_um, volts, volts > limit - _MV)
 
 

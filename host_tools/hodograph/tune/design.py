@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Gains and feedforward from what is asked for, by placing the poles of the known plant (numerics.md section 17)."""
+"""Gains and feedforward from the requested properties, by placing the poles of the known plant (numerics.md section
+17)."""
 
 from __future__ import annotations
 

@@ -12,8 +12,7 @@ import numpy as np
 from ..errors import PlanError
 from .cases import CASES, NOMINAL, Case, Drives, Forward, outcome
 from .design import Poles, feedforward_of, pole_for_stiffness, with_poles
-from .loop import loop_of
-from .margins import Margins, margins
+from .loop import Margins, loop_of, margins
 
 DAMPINGS = (0.6, 0.7, 0.85, 1.0, 1.2)
 BANDWIDTHS = 7

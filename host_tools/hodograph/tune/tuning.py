@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a machine and what is asked for to gains, feedforward and what they do."""
+"""From a machine and the requested properties to gains, feedforward and what they do."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from ..errors import PlanError
 from ..pipeline import Pipeline
 from .cases import CASES, Drives, Forward, Outcome, outcomes
 from .design import Poles, feedforward_of, pole_for_stiffness, stiffness_n_um, with_poles
-from .loop import loop_of
-from .margins import margins
+from .loop import loop_of, margins
 from .result import AxisResult, CaseResult, PathResult, Side, Tuning
 from .search import Wanted, best_poles
 
@@ -40,7 +39,7 @@ class Asked:
 
 def tune(
     machine: Machine,
-    chains: Sequence[Pipeline],
+    pipelines: Sequence[Pipeline],
     asked: Asked,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Tuning:
@@ -51,7 +50,7 @@ def tune(
     x, y = machine.models(machine.plane)
     given: Drives = (x, y)
     drives = (_interpolated(x, asked), _interpolated(y, asked))
-    programs = [(chain.image, machine.counts_per_mm) for chain in chains]
+    programs = [(pipeline.image, machine.counts_per_mm) for pipeline in pipelines]
     tried = 0
     if asked.bandwidth_hz is None:
         poles, all_tried = best_poles(drives, programs, asked.wanted, asked.velocity, progress)
@@ -67,7 +66,7 @@ def tune(
         for axis, old, new in zip(machine.plane, before, sides, strict=True)
     ]
     result = Tuning(machine, poles, (axes[0], axes[1]), (), tried)
-    return replace(result, paths=tuple(_path(chain, result, given) for chain in chains))
+    return replace(result, paths=tuple(_path(pipeline, result, given) for pipeline in pipelines))
 
 
 def _interpolated(drive: Drive, asked: Asked) -> Drive:
@@ -104,8 +103,8 @@ def _side(drive: Drive, forward: Feedforward) -> Side:
     return Side(drive, forward, margins(loop), stiffness_n_um(drive))
 
 
-def _path(chain: Pipeline, tuning: Tuning, given: Drives) -> PathResult:
-    machine, image = tuning.machine, chain.image
+def _path(pipeline: Pipeline, tuning: Tuning, given: Drives) -> PathResult:
+    machine, image = tuning.machine, pipeline.image
 
     def runs(drives: Drives, forward: Forward) -> list[Outcome]:
         return outcomes(image, machine.counts_per_mm, drives, forward)
@@ -117,4 +116,4 @@ def _path(chain: Pipeline, tuning: Tuning, given: Drives) -> PathResult:
         runs(tuning.drives, tuning.feedforward),
         strict=True,
     )
-    return PathResult(chain.file.name, image, tuple(CaseResult(*row) for row in columns))
+    return PathResult(pipeline.file.name, image, tuple(CaseResult(*row) for row in columns))

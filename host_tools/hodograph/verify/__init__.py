@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Looks at what a program really does, beside the limits it was planned for; shares nothing with what planned it."""
+"""Checks what a program really does, beside the limits it was planned for. It shares the types of limits and peaks with
+the planner, but no computation."""
 
 from .setpoints import BusNoise, Sampled, bus_noise, sampled
-from .verification import TOLERANCE, Peak, Verification, verify_program
+from .verification import TOLERANCE, Verification, verify_program
 
 __all__ = [
     "TOLERANCE",
     "BusNoise",
-    "Peak",
     "Sampled",
     "Verification",
     "bus_noise",

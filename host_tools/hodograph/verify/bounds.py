@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells, speed_power
-from .motion import Motion
+from .instants import Motion
 from .polynomials import bernstein, shifted, taylor_bounds
 
 Real = NDArray[np.float64]

@@ -164,7 +164,7 @@ def _joints(program: Program, way: Real, more_mm: Sequence[float]) -> tuple[Int,
 
 
 def _stretches(count: int, piece: Int, u: Real) -> tuple[Int, Real, Real]:
-    """Piece, begin and end of what lies between neighbouring cuts; ends of pieces are cuts too."""
+    """Piece, begin and end of what lies between consecutive cuts; ends of pieces are cuts too."""
     whole = np.arange(count)
     pieces = np.concatenate((whole, piece))
     lows = np.concatenate((np.zeros(count), u))

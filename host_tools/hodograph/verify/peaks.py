@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .bounds import bends
 from .cells import Cells
-from .motion import Motion, motion_at
+from .instants import Motion, motion_at
 from .quantities import Quantity
 
 Real = NDArray[np.float64]
@@ -26,7 +26,7 @@ _CHUNK = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
-class CellPeaks:
+class CellMaxima:
     """By quantity and cell, (Q, C): the greatest magnitude among samples, where (u), and what it can be at most."""
 
     found: Real
@@ -39,8 +39,8 @@ def scales(cells: Cells, rows: Sequence[Quantity]) -> Real:
     """Of each quantity, (Q,): its least limit, or its magnitude at ends and middles of cells where that is more."""
     top = np.full(len(rows), 1e-12)
     for k, row in enumerate(rows):
-        if row.limit is not None and np.isfinite(row.limit).any():
-            top[k] = row.limit.min()
+        if row.limits is not None and np.isfinite(row.limits).any():
+            top[k] = row.limits.min()
     for u in (0.0, 0.5, 1.0):
         for first in range(0, len(cells), _CHUNK):
             cell = np.arange(first, min(first + _CHUNK, len(cells)))
@@ -69,7 +69,7 @@ def intervals(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real)
     return np.ceil(cells.duration_s * np.sqrt(worst / (8.0 * GAP)) + 1e-3).astype(np.int64)
 
 
-def cell_peaks(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real) -> CellPeaks:
+def cell_peaks(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real) -> CellMaxima:
     """Samples each cell at the ends of its intervals."""
     need = intervals(cells, bend, rows, scale)
     found, at = np.zeros((len(rows), len(cells))), np.zeros((len(rows), len(cells)))
@@ -86,11 +86,11 @@ def cell_peaks(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real
             where = np.where(size == np.repeat(top, count), u, np.inf)
             at[k, first:last] = np.minimum.reduceat(where, begin)
     rise = np.stack([row.of(bend) for row in rows]) * (cells.duration_s / need) ** 2 / 8.0
-    return CellPeaks(found, at, found + rise, int((need + 1).sum()))
+    return CellMaxima(found, at, found + rise, int((need + 1).sum()))
 
 
 def _spans(count: Int) -> Iterator[tuple[int, int]]:
-    """Neighbouring cells whose samples together are about _CHUNK."""
+    """Consecutive cells whose samples together are about _CHUNK."""
     total = np.cumsum(count)
     first = 0
     while first < count.size:

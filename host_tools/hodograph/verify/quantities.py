@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""The quantities that limits are about, and the limits."""
+"""The limited quantities of a motion, and their limits in each cell."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Drive
 from ..errors import InputError
-from ..feed import FeedCap, Limits
+from ..feed import FeedZone, Limit, Limits
 from .cells import Cells
-from .motion import Motion
+from .instants import Motion
 
 Real = NDArray[np.float64]
 
@@ -22,51 +23,49 @@ AXES = ("x", "y")
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """One quantity of the motion, and the limit of its magnitude in each cell, (C,); None: no limit anywhere.
+    """One quantity of the motion, its limit (value inf: none), and the limit in each cell, (C,); None: none anywhere.
 
     `of` takes it from a motion. It is linear, without negative coefficients, so it takes a bound from bounds too.
     """
 
-    name: str
-    unit: str
+    limit: Limit
     of: Callable[[Motion], Real]
-    limit: Real | None
+    limits: Real | None
 
 
 def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Quantity]:
     """All that can be limited; volts only with the `drives` of both axes. Raises InputError: limited without."""
     if limits.volts is not None and len(drives) != len(AXES):
         raise InputError("limits: volts needs a machine whose axes x and y have drive files")
-    count, whole = len(cells), limits.axes_whole
+    whole = limits.axes_whole
 
-    def row(name: str, unit: str, limit: float | None, of: Callable[[Motion], Real]) -> Quantity:
-        return Quantity(name, unit, of, None if limit is None else np.full(count, limit))
+    def row(
+        key: str, value: float | None, of: Callable[[Motion], Real], axis: int | None = None
+    ) -> Quantity:
+        limit = Limit(key, inf if value is None else value, axis=axis)
+        return Quantity(limit, of, None if value is None else np.full(len(cells), value))
 
     out = [
-        row("feed_mm_s", "mm/s", limits.feed_mm_s, lambda m: m.feed),
-        row("acceleration_mm_s2", "mm/s^2", limits.acceleration_mm_s2, lambda m: m.acceleration),
-        row("jerk_mm_s3", "mm/s^3", limits.jerk_mm_s3, lambda m: m.jerk),
-        row("centripetal_mm_s2", "mm/s^2", limits.centripetal_mm_s2, lambda m: m.centripetal),
+        row("feed_mm_s", limits.feed_mm_s, lambda m: m.feed),
+        row("acceleration_mm_s2", limits.acceleration_mm_s2, lambda m: m.acceleration),
+        row("jerk_mm_s3", limits.jerk_mm_s3, lambda m: m.jerk),
+        row("centripetal_mm_s2", limits.centripetal_mm_s2, lambda m: m.centripetal),
     ]
-    for k, axis in enumerate(AXES):
+    for k in range(len(AXES)):
         out += [
-            row(f"{axis}_{name}", unit, None if both is None else both[k], _of_axis(field, k))
-            for name, unit, field, both in (
-                ("velocity_mm_s", "mm/s", "axis_velocity", whole.velocity_mm_s),
-                (
-                    "acceleration_mm_s2",
-                    "mm/s^2",
-                    "axis_acceleration",
-                    whole.acceleration_mm_s2,
-                ),
-                ("jerk_mm_s3", "mm/s^3", "axis_jerk", whole.jerk_mm_s3),
+            row(key, None if both is None else both[k], _of_axis(field, k), k)
+            for key, field, both in (
+                ("velocity_mm_s", "axis_velocity", whole.velocity_mm_s),
+                ("acceleration_mm_s2", "axis_acceleration", whole.acceleration_mm_s2),
+                ("jerk_mm_s3", "axis_jerk", whole.jerk_mm_s3),
             )
         ]
-    for k, (axis, drive) in enumerate(zip(AXES, drives, strict=False)):
+    for k, drive in enumerate(drives):
         volts = None if limits.volts is None else _volts_left(drive, limits.volts)
-        out.append(row(f"{axis}_volts", "V", volts, _volts(drive, k)))
-    if limits.caps:
-        out.append(Quantity("cap_mm_s", "mm/s", lambda m: m.feed, _caps(cells, limits.caps)))
+        out.append(row("volts", volts, _volts(drive, k), k))
+    if limits.zones:
+        limit = Limit("feed_mm_s", inf, zone=limits.zones[0])
+        out.append(Quantity(limit, lambda m: m.feed, _in_zones(cells, limits.zones)))
     return out
 
 
@@ -75,7 +74,7 @@ def _of_axis(field: str, axis: int) -> Callable[[Motion], Real]:
 
 
 def _volts(drive: Drive, axis: int) -> Callable[[Motion], Real]:
-    """What holds the axis on its way by the plant alone: (v + T a) / (K g), docs/theory/numerics.md 13."""
+    """The volts of the motion by the plant alone: (v + T a) / (K g), docs/theory/numerics.md 13."""
     per_speed = 1.0 / (drive.gain_rad_s_v * drive.screw_mm_rad)
     per_acceleration = drive.time_constant_s * per_speed
     return lambda m: (
@@ -88,12 +87,12 @@ def _volts_left(drive: Drive, volts: float) -> float:
     return max(min(volts, drive.volts_limit) - (drive.equipment.friction_volts or 0.0), 1e-9)
 
 
-def _caps(cells: Cells, caps: Sequence[FeedCap]) -> Real:
-    """The least cap over the middle of each cell; cells end where caps do."""
+def _in_zones(cells: Cells, zones: Sequence[FeedZone]) -> Real:
+    """The least feed limit of zones over the middle of each cell; cells end where zones do."""
     every = np.arange(len(cells))
     middle = cells.arc_length_mm(every, np.full(len(cells), 0.5))
     out = np.full(len(cells), np.inf)
-    for cap in caps:
-        inside = (middle > cap.from_mm) & (middle < cap.to_mm)
-        out[inside] = np.minimum(out[inside], cap.feed_mm_s)
+    for zone in zones:
+        inside = (middle > zone.from_mm) & (middle < zone.to_mm)
+        out[inside] = np.minimum(out[inside], zone.feed_mm_s)
     return out

@@ -6,16 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Drive
-from ..feed import Limits
+from ..feed import Limit, Limits, Peak
 from ..program import Program
 from .cells import Cells, cut
-from .motion import motion_at
-from .peaks import CellPeaks, cell_peaks, refine, scales
+from .instants import motion_at
+from .peaks import CellMaxima, cell_peaks, refine, scales
 from .quantities import Quantity, quantities
 
 Real = NDArray[np.float64]
@@ -27,33 +28,10 @@ _HAIR = 1e-6
 
 
 @dataclass(frozen=True)
-class Peak:
-    """A greatest magnitude, found at an arc length and program time; it is nowhere above `at_most`."""
-
-    quantity: str
-    unit: str
-    value: float
-    at_most: float
-    limit: float | None
-    s_mm: float
-    t_s: float
-
-    @property
-    def ratio(self) -> float | None:
-        """Value over limit; None where there is none."""
-        return None if self.limit is None else self.value / self.limit
-
-    @property
-    def kept(self) -> bool:
-        """Certainly not above the limit by more than TOLERANCE."""
-        return self.limit is None or self.at_most <= self.limit * (1.0 + TOLERANCE)
-
-
-@dataclass(frozen=True)
 class Verification:
-    """Peaks of all quantities (limited or not), and each stretch of path on which one is above its limit.
+    """Peaks of all quantities (limited or not), and each stretch of path in which one is above its limit.
 
-    `excesses` holds the worst place of every stretch, worst ratio first, also of those within TOLERANCE.
+    `excesses` holds the worst place of every stretch, greatest usage first, also of those within TOLERANCE.
     """
 
     duration_s: float
@@ -65,15 +43,20 @@ class Verification:
     @property
     def kept(self) -> bool:
         """Whether every limit is kept."""
-        return all(peak.kept for peak in self.peaks)
+        return not self.exceeded
+
+    @property
+    def exceeded(self) -> tuple[Peak, ...]:
+        """Peaks that may be above their limit by more than TOLERANCE."""
+        return tuple(peak for peak in self.peaks if not peak.within(TOLERANCE))
 
 
 def verify_program(program: Program, limits: Limits, drives: Sequence[Drive] = ()) -> Verification:
-    """Looks at every instant of a program that passes `program.check`; the machine's limits count where they are lower.
+    """Checks every instant of a program that passes `program.check`; the machine's limits count where they are lower.
 
     `drives` of x and y turn motion into volts. Raises InputError: volts are limited, and there are no drives.
     """
-    cells = cut(program, [end for cap in limits.caps for end in (cap.from_mm, cap.to_mm)])
+    cells = cut(program, [end for zone in limits.zones for end in (zone.from_mm, zone.to_mm)])
     rows = quantities(cells, limits, drives)
     scale = scales(cells, rows)
     cells, bend = refine(cells, rows, scale)
@@ -82,46 +65,44 @@ def verify_program(program: Program, limits: Limits, drives: Sequence[Drive] = (
     peaks = [_peak(cells, row, found, k) for k, row in enumerate(rows)]
     excesses = [peak for k, row in enumerate(rows) for peak in _beyond(cells, row, found, k)]
     step = _step(cells, limits)
-    if step.limit is not None and step.value > step.limit:
+    if step.usage > 1.0:
         excesses.append(step)
-    excesses.sort(key=lambda peak: -(peak.ratio or 0.0))
+    excesses.sort(key=lambda peak: -peak.usage)
     return Verification(
         program.duration_s, program.length_mm, (*peaks, step), tuple(excesses), found.samples
     )
 
 
-def _peak(cells: Cells, row: Quantity, found: CellPeaks, k: int) -> Peak:
+def _peak(cells: Cells, row: Quantity, found: CellMaxima, k: int) -> Peak:
     """The peak of a quantity: where it comes nearest to its limit, or is greatest where it has none."""
-    limit = np.ones(len(cells)) if row.limit is None else row.limit
+    limit = np.ones(len(cells)) if row.limits is None else row.limits
     worst = int((found.found[k] / limit).argmax())
     at_most = float((found.at_most[k] / limit).max() * limit[worst])
     peak = _at(cells, row, found, k, worst)
     return replace(peak, at_most=at_most) if np.isfinite(at_most) else peak
 
 
-def _at(cells: Cells, row: Quantity, found: CellPeaks, k: int, cell: int) -> Peak:
+def _at(cells: Cells, row: Quantity, found: CellMaxima, k: int, cell: int) -> Peak:
     one, u = np.array([cell]), found.at[k, [cell]]
-    limit = None if row.limit is None else float(row.limit[cell])
+    limit = inf if row.limits is None else float(row.limits[cell])
     return Peak(
-        row.name,
-        row.unit,
+        replace(row.limit, value=limit),
         float(found.found[k, cell]),
-        float(found.at_most[k, cell]),
-        limit if limit is not None and np.isfinite(limit) else None,
         float(cells.arc_length_mm(one, u)[0]),
         float(cells.time_s(one, u)[0]),
+        float(found.at_most[k, cell]),
     )
 
 
-def _beyond(cells: Cells, row: Quantity, found: CellPeaks, k: int) -> Iterator[Peak]:
-    """The worst place of each run of neighbouring cells in which the limit is passed."""
-    if row.limit is None:
+def _beyond(cells: Cells, row: Quantity, found: CellMaxima, k: int) -> Iterator[Peak]:
+    """The worst place of each run of consecutive cells in which the limit is exceeded."""
+    if row.limits is None:
         return
-    share = found.found[k] / row.limit
-    over = np.flatnonzero(share > 1.0 + _HAIR)
+    usage = found.found[k] / row.limits
+    over = np.flatnonzero(usage > 1.0 + _HAIR)
     for stretch in np.split(over, np.flatnonzero(np.diff(over) > 1) + 1):
         if stretch.size:
-            yield _at(cells, row, found, k, int(stretch[share[stretch].argmax()]))
+            yield _at(cells, row, found, k, int(stretch[usage[stretch].argmax()]))
 
 
 def _step(cells: Cells, limits: Limits) -> Peak:
@@ -139,12 +120,11 @@ def _step(cells: Cells, limits: Limits) -> Peak:
     cell, u = np.array([min(worst, len(cells) - 1)]), np.array([float(worst == len(cells))])
     jerks = [limits.jerk_mm_s3, *(limits.axes_whole.jerk_mm_s3 or ())]
     given = [jerk for jerk in jerks if jerk is not None]
+    most = TOLERANCE * 1e-6 * cells.program.period_us * min(given) if given else inf
     return Peak(
-        "acceleration_step_mm_s2",
-        "mm/s^2",
+        Limit("acceleration_step_mm_s2", most),
         float(jump[worst]),
-        float(jump[worst]),
-        TOLERANCE * 1e-6 * cells.program.period_us * min(given) if given else None,
         float(cells.arc_length_mm(cell, u)[0]),
         float(cells.time_s(cell, u)[0]),
+        float(jump[worst]),
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
-from hodograph.bus.capture.load import LONGEST_S, Listener, bus_load
+from hodograph.bus.capture.load import LONGEST_S, LoadCapture, bus_load
 from hodograph.bustime.frame_bits import EXTENDED, exact_bits
 
 
@@ -64,27 +64,27 @@ def test_classes_add_up_and_silence_is_zero() -> None:
 
 def test_a_listener_measures_from_one_question_to_the_next() -> None:
     frames = frames_of([0x182] * 100, 6)
-    listener = Listener(1_000_000)
-    assert listener.measure() is None
-    listener.feed(frames, 10.0)  # when the first of these came nobody knows
-    assert listener.measure() is None
-    listener.feed(frames, 10.1)
-    listener.feed(frames, 10.2)
-    found = listener.measure()
+    capture = LoadCapture(1_000_000)
+    assert capture.measure() is None
+    capture.feed(frames, 10.0)  # when the first of these came nobody knows
+    assert capture.measure() is None
+    capture.feed(frames, 10.1)
+    capture.feed(frames, 10.2)
+    found = capture.measure()
     assert found is not None
     assert found.seconds == pytest.approx(0.2)
     assert found.percent == pytest.approx(bus_load(frames, 0.1, 1_000_000).percent)
-    assert listener.measure() is None
+    assert capture.measure() is None
     for k in range(100):  # nobody asks
-        listener.feed(frames, 11.0 + 0.1 * k)
-    found = listener.measure()
+        capture.feed(frames, 11.0 + 0.1 * k)
+    found = capture.measure()
     assert found is not None
     assert found.seconds <= LONGEST_S + 0.1
     assert found.frames_per_s == pytest.approx(1000)
-    listener.feed(frames, 21.0)
-    listener.feed(frames, 3.0)  # a recording begins anew: what was heard before does not count
-    assert listener.measure() is None
-    listener.feed(frames, 3.1)
-    found = listener.measure()
+    capture.feed(frames, 21.0)
+    capture.feed(frames, 3.0)  # a recording begins anew: what was heard before does not count
+    assert capture.measure() is None
+    capture.feed(frames, 3.1)
+    found = capture.measure()
     assert found is not None
     assert found.frames_per_s == pytest.approx(1000)

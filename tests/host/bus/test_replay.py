@@ -30,15 +30,15 @@ Counts = NDArray[np.int64]
 
 
 @pytest.fixture(scope="module")
-def chain() -> Pipeline:
+def pipeline() -> Pipeline:
     return load_pipeline(ALPHA)
 
 
 @pytest.fixture(scope="module")
-def motion(chain: Pipeline) -> Motion:
-    machine = chain.machine
+def motion(pipeline: Pipeline) -> Motion:
+    machine = pipeline.machine
     return simulate(
-        chain.image,
+        pipeline.image,
         [axis.drive for axis in machine.axes],
         kernel=machine.kernel,
         counts_per_mm=machine.counts_per_mm,
@@ -94,7 +94,7 @@ def frames(motion: Motion) -> Frames:
 @pytest.mark.parametrize("suffix", [".log", ".asc", ".blf"])
 def test_the_figures_of_the_simulation(
     frames: Frames,
-    chain: Pipeline,
+    pipeline: Pipeline,
     motion: Motion,
     tmp_path: Path,
     suffix: str,
@@ -102,7 +102,7 @@ def test_the_figures_of_the_simulation(
 ) -> None:
     file = tmp_path / f"alpha{suffix}"
     write_recording(file, frames)
-    found = replay(read_recording(file), file.name, chain.image, chain.machine, "fixed")
+    found = replay(read_recording(file), file.name, pipeline.image, pipeline.machine, "fixed")
     assert found.motion.summary() == motion.summary()
     assert found.pace == "real-time"
     assert found.frames == frames.size
@@ -114,7 +114,7 @@ def test_the_figures_of_the_simulation(
     assert told["bus_load"]["kinds"]["SYNC"]["frames"] == len(motion.rows) + 2 * STANDING - 1
 
 
-def test_a_run_among_other_things(frames: Frames, chain: Pipeline, motion: Motion) -> None:
+def test_a_run_among_other_things(frames: Frames, pipeline: Pipeline, motion: Motion) -> None:
     """Booting (SYNCs alone), a move to the start, the run; then a second run that was stopped half-way."""
     booting = np.concatenate([frame(0x080, bytes([j % 240 + 1])) for j in range(500)])
     start = motion.rows["set_counts"][0].astype(np.int64)
@@ -124,20 +124,20 @@ def test_a_run_among_other_things(frames: Frames, chain: Pipeline, motion: Motio
     half = [part[: len(motion.rows) // 2] for part in run_of(motion)]
     again = recorded(*half, 500 + len(way) + len(motion.rows) + 2 * STANDING)
     whole = np.concatenate([booting, there, run, again])
-    found = replay(whole, "beside", chain.image, chain.machine, "fixed")
+    found = replay(whole, "beside", pipeline.image, pipeline.machine, "fixed")
     assert found.motion.summary() == motion.summary()
     assert found.frames == whole.size
 
 
-def test_what_is_not_the_program(frames: Frames, chain: Pipeline, motion: Motion) -> None:
+def test_what_is_not_the_program(frames: Frames, pipeline: Pipeline, motion: Motion) -> None:
     targets, actual, volts = run_of(motion)
     targets = targets.copy()
     targets[STANDING + 400, 0] += 1
     with pytest.raises(RunError, match=r"setpoint 400 on the bus .* \(1 differ\)"):
-        replay(recorded(targets, actual, volts), "x", chain.image, chain.machine, "fixed")
+        replay(recorded(targets, actual, volts), "x", pipeline.image, pipeline.machine, "fixed")
     lost = np.delete(frames, 7 * 700 + 3)
     with pytest.raises(RunError, match="is incomplete"):
-        replay(lost, "x", chain.image, chain.machine, "fixed")
+        replay(lost, "x", pipeline.image, pipeline.machine, "fixed")
 
 
 def test_where_the_program_is() -> None:

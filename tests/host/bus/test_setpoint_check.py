@@ -301,9 +301,9 @@ def streamed(setpoints: NDArray[np.int32]) -> Stream:
 
 @pytest.mark.parametrize("name", ["alpha", "heart", "star", "alpha_optimal", "heart_optimal"])
 def test_whole_programs_pass_and_each_jump_in_them_is_found(name: str) -> None:
-    chain = load_pipeline(EXAMPLES / f"{name}.toml")
-    machine = chain.machine
-    _, setpoints = NativeProgram(chain.image).setpoints("fixed", machine.counts_per_mm)
+    pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
+    machine = pipeline.machine
+    _, setpoints = NativeProgram(pipeline.image).setpoints("fixed", machine.counts_per_mm)
     limits = step_limits(machine, setpoints)
     assert len(limits.axes) == len(machine.axes)
     assert find_jumps(streamed(setpoints).packed(), NODES, limits) == []

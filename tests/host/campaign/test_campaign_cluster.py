@@ -16,7 +16,6 @@ from pathlib import Path
 import pytest
 from campaign_files import Write
 
-from hodograph.campaign import engine
 from hodograph.cli.main import main
 
 TEXT = """
@@ -33,7 +32,7 @@ LOOK_S = 0.01
 COMMAND = [sys.executable, "-m", "hodograph", "campaign"]
 KILLED = """
 import json, os, signal, sys
-from hodograph.campaign.journal import Journal
+from hodograph.campaign.results import Journal
 from hodograph.cli.main import main
 
 left, cut = int(sys.argv[1]), int(sys.argv[2])
@@ -152,7 +151,7 @@ def test_no_scheduler(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(engine, "ANSWER_S", 1)
+    monkeypatch.setattr("hodograph.campaign.runner.ANSWER_S", 1)
     file = write(TEXT)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         assert main(["campaign", str(file), "-o", str(tmp_path), "--scheduler", address]) == 2

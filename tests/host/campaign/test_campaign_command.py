@@ -14,15 +14,13 @@ import pytest
 from campaign_files import EXAMPLES, MACHINE, PATH, Write, table
 from filelock import lock_descriptor
 
-from hodograph.campaign import engine as engines
 from hodograph.campaign import runner
+from hodograph.campaign import runner as engines
 from hodograph.campaign.definition import load_campaign
-from hodograph.campaign.engine import Here
-from hodograph.campaign.journal import NAME, journal
-from hodograph.campaign.runner import run_campaign
-from hodograph.campaign.table import write_csv
+from hodograph.campaign.results import NAME, journal, write_csv
+from hodograph.campaign.runner import Here, run_campaign
 from hodograph.cli.main import main
-from hodograph.native import RigFault
+from hodograph.native import OfflineFault
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
 
@@ -54,13 +52,13 @@ def test_rows_are_what_simulate_gives(write: Write, tmp_path: Path) -> None:
     rows = table(tmp_path / "out")
     assert [row["path"] for row in rows] == ["alpha", "alpha", "path", "path"]
     assert rows[0]["encoders_sha256"].startswith("81c8a7cb")
-    chain = load_pipeline(EXAMPLES / "alpha.toml")
-    drives = chain.machine.models(chain.machine.plane)
+    pipeline = load_pipeline(EXAMPLES / "alpha.toml")
+    drives = pipeline.machine.models(pipeline.machine.plane)
     for row, faults in (
         (rows[0], ()),
-        (rows[1], (RigFault("encoder-jump", 1, 50, 2**32 - 1, 9000),)),
+        (rows[1], (OfflineFault("encoder-jump", 1, 50, 2**32 - 1, 9000),)),
     ):
-        motion = simulate(chain.image, drives, faults=faults)
+        motion = simulate(pipeline.image, drives, faults=faults)
         assert row["encoders_sha256"] == motion.encoders_sha256
         assert float(row["max_contour_error_um"]) == motion.max_contour_error_um
         assert float(row["rms_contour_error_um"]) == motion.rms_contour_error_um
@@ -189,8 +187,8 @@ def test_machine_of_the_campaign(write: Write, tmp_path: Path) -> None:
     text = f'paths = ["path.toml"]\nmachine = "{EXAMPLES}/machines/paper_heart.toml"\n'
     text += f'[[gains]]\nname = "heart"\n[[gains]]\nname = "alpha"\nmachine = "{MACHINE}"\n'
     assert run(write(text), tmp_path / "out") == 0
-    chain = load_pipeline(tmp_path / "path.toml", EXAMPLES / "machines" / "paper_heart.toml")
-    own = simulate(chain.image, chain.machine.models(chain.machine.plane))
+    pipeline = load_pipeline(tmp_path / "path.toml", EXAMPLES / "machines" / "paper_heart.toml")
+    own = simulate(pipeline.image, pipeline.machine.models(pipeline.machine.plane))
     rows = table(tmp_path / "out")
     assert rows[0]["encoders_sha256"] == own.encoders_sha256
     assert rows[1]["encoders_sha256"] != own.encoders_sha256

@@ -6,7 +6,7 @@ from __future__ import annotations
 from campaign_files import Write
 
 from hodograph.campaign.definition import load_campaign
-from hodograph.campaign.design import Case
+from hodograph.campaign.run_settings import Case
 
 TEXT = """
 paths = ["path.toml", "{examples}/heart.toml"]

@@ -12,19 +12,19 @@ from campaign_files import EXAMPLES
 from hodograph.campaign.fault_rules import Fault, offline_fault
 from hodograph.errors import InputError
 from hodograph.faults.scenario import draw, load_scenario
-from hodograph.native import FOR_EVER, RigFault
+from hodograph.native import FOR_EVER, OfflineFault
 
 NODES = (2, 3)
 
 GOOD = [
-    ("encoder-freeze at=100 for=500 node=2", RigFault("encoder-freeze", 0, 100, 500)),
-    ("encoder-jump at=7 node=3 counts=-40", RigFault("encoder-jump", 1, 7, FOR_EVER, -40.0)),
-    ("encoder-jump at=7 for=2 node=3 counts=1", RigFault("encoder-jump", 1, 7, 2, 1.0)),
-    ("saturate at=0 for=9 node=2 volts=0.3", RigFault("saturate", 0, 0, 9, 0.3)),
-    ("load at=5 node=3 volts=-4.0", RigFault("load", 1, 5, 1, -4.0)),
-    ("load at=5 for_ms=11 node=3 volts=1", RigFault("load", 1, 5, 6, 1.0)),
-    ("drop at=5 id=0x203", RigFault("setpoint-lost", 1, 5, 1)),
-    ("drop at=5 for=9 id=514 count=4", RigFault("setpoint-lost", 0, 5, 4)),
+    ("encoder-freeze at=100 for=500 node=2", OfflineFault("encoder-freeze", 0, 100, 500)),
+    ("encoder-jump at=7 node=3 counts=-40", OfflineFault("encoder-jump", 1, 7, FOR_EVER, -40.0)),
+    ("encoder-jump at=7 for=2 node=3 counts=1", OfflineFault("encoder-jump", 1, 7, 2, 1.0)),
+    ("saturate at=0 for=9 node=2 volts=0.3", OfflineFault("saturate", 0, 0, 9, 0.3)),
+    ("load at=5 node=3 volts=-4.0", OfflineFault("load", 1, 5, 1, -4.0)),
+    ("load at=5 for_ms=11 node=3 volts=1", OfflineFault("load", 1, 5, 6, 1.0)),
+    ("drop at=5 id=0x203", OfflineFault("setpoint-lost", 1, 5, 1)),
+    ("drop at=5 for=9 id=514 count=4", OfflineFault("setpoint-lost", 0, 5, 4)),
 ]
 
 BAD = [
@@ -47,7 +47,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("rule", "expected"), GOOD)
-def test_good_rules(rule: str, expected: RigFault) -> None:
+def test_good_rules(rule: str, expected: OfflineFault) -> None:
     assert offline_fault(rule, NODES, 2000) == expected
 
 

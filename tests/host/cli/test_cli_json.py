@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from hodograph.cli.main import main
-from hodograph.program.memory import RECORD_BYTES, memory_bytes
+from hodograph.program.image import RECORD_BYTES, memory_bytes
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 NAMES = ["alpha", "heart", "star"]

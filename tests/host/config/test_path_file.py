@@ -12,7 +12,7 @@ import pytest
 
 from hodograph.config import load_path_file
 from hodograph.errors import InputError
-from hodograph.feed import AxisLimits, FeedCap
+from hodograph.feed import AxisLimits, FeedZone
 from hodograph.pipeline import load_pipeline
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -79,7 +79,7 @@ def test_every_limit(tmp_path: Path) -> None:
     limits = load_path_file(write(tmp_path, FULL)).limits
     assert (limits.centripetal_mm_s2, limits.volts) == (1500.0, 4.5)
     assert limits.axis == AxisLimits((200.0, 200.0), None, (5e4, 4e4))
-    assert limits.caps == (FeedCap(0.0, 12.5, 40.0), FeedCap(10.0, 20.0, 50.0))
+    assert limits.zones == (FeedZone(0.0, 12.5, 40.0), FeedZone(10.0, 20.0, 50.0))
 
 
 OPTIMAL = "[path]\nclosed = true\nthrough = [[0,0],[1,0],[1,1]]\n[feed]\nprofile = 'optimal'\n"

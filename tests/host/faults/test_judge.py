@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
 from hodograph.faults.case_record import CaseRecord
+from hodograph.faults.case_run import CaseRun, Job, load_job
+from hodograph.faults.case_table import text
 from hodograph.faults.judge import Verdict, judge
-from hodograph.faults.record import Job, Record, load_job
 from hodograph.faults.scenario import Case, Expectation, Scenario
-from hodograph.faults.table import text
 
 FOLDER = Path(__file__).resolve().parents[3] / "examples" / "faults"
 FOREVER = 10**9
@@ -63,11 +63,11 @@ def recording(
     return frames(rows)
 
 
-def record(recorded: Frames, expect: Expectation = EXPECT, *, at: int = 50) -> Record:
+def record(recorded: Frames, expect: Expectation = EXPECT, *, at: int = 50) -> CaseRun:
     scenario = Scenario(
         "made-up", "x", FOLDER / "path.toml", ("drop at=50 id=1",), {}, "none", expect
     )
-    made = Record(Case(scenario, 0, {"seed": 1}), job())
+    made = CaseRun(Case(scenario, 0, {"seed": 1}), job())
     made.injections = list(INJECTED)
     made.evidence = CaseRecord(recorded, recorded, (2, 3))
     made.began_us = BEGAN_US + 1000 * (5 + at)
@@ -87,7 +87,7 @@ def stopped(at: int) -> NDArray[np.int32]:
     ).astype(np.int32)
 
 
-def violations(made: Record) -> list[str]:
+def violations(made: CaseRun) -> list[str]:
     return list(judge(made).violations)
 
 

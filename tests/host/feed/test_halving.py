@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hodograph.feed.halving import halved
-from hodograph.feed.pieces import FeedPieces, exponents
+from hodograph.feed.pieces import FeedPieces, exponents, halved
 from hodograph.program.image import decode
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "data" / "programs"

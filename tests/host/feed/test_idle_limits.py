@@ -37,7 +37,7 @@ def test_what_has_no_effect_is_told(
         f"[limits]\nfeed_mm_s = 100\nacceleration_mm_s2 = 1000\njerk_mm_s3 = 20000\n{limits}\n"
         f'[machine]\nfile = "{EXAMPLES}/machines/paper_alpha.toml"\n'
     )
-    chain = load_pipeline(file)
-    notes = [note for note in chain.notes(chain.plan) if note.startswith("limits:")]
+    pipeline = load_pipeline(file)
+    notes = [note for note in pipeline.notes(pipeline.plan) if note.startswith("limits:")]
     assert len(notes) == len(told)
     assert all(text in note for text, note in zip(told, notes, strict=True))

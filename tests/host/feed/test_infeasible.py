@@ -11,8 +11,16 @@ import numpy as np
 import pytest
 
 from hodograph.errors import PlanError
-from hodograph.feed import AxisLimits, ControllerLimits, FeedCap, FeedRequest, Limits, Plant
-from hodograph.feed.optimal import OptimalPlan, plan_optimal
+from hodograph.feed import (
+    AxisLimits,
+    ControllerLimits,
+    FeedPlan,
+    FeedRequest,
+    FeedZone,
+    Limits,
+    Plant,
+)
+from hodograph.feed.optimal import plan_optimal, replan_optimal
 from hodograph.program import check, compile_path
 from hodograph.spline import PHSpline, from_control_polygon
 
@@ -33,11 +41,11 @@ def plan(
     controller: ControllerLimits | None = None,
     plants: tuple[Plant, Plant] | None = None,
     length_mm: float = 20.0,
-) -> OptimalPlan:
+) -> FeedPlan:
     return plan_optimal(bend(length_mm), OPTIMAL, limits, controller, plants)
 
 
-def refused(make: Callable[[float], OptimalPlan], value: float) -> tuple[str, float]:
+def refused(make: Callable[[float], FeedPlan], value: float) -> tuple[str, float]:
     """The message, and the least value that it gives."""
     with pytest.raises(PlanError) as caught:
         make(value)
@@ -51,13 +59,13 @@ def with_axis(**one: tuple[float, float]) -> Limits:
     return replace(FAST, axis=AxisLimits(**one))
 
 
-KINDS: dict[str, tuple[Callable[[float], OptimalPlan], float]] = {
+KINDS: dict[str, tuple[Callable[[float], FeedPlan], float]] = {
     "limits: feed_mm_s": (lambda x: plan(replace(FAST, feed_mm_s=x)), 2e-4),
     "limits: acceleration_mm_s2": (lambda x: plan(replace(FAST, acceleration_mm_s2=x)), 1e-9),
     "limits: jerk_mm_s3": (lambda x: plan(replace(FAST, jerk_mm_s3=x)), 1e-13),
     "limits: centripetal_mm_s2": (lambda x: plan(replace(FAST, centripetal_mm_s2=x)), 1e-9),
     "limits: cap of 3 to 4 mm, feed_mm_s": (
-        lambda x: plan(replace(FAST, caps=(FeedCap(3.0, 4.0, x),))),
+        lambda x: plan(replace(FAST, zones=(FeedZone(3.0, 4.0, x),))),
         1e-5,
     ),
     "limits: axis.velocity_mm_s of x": (lambda x: plan(with_axis(velocity_mm_s=(x, 1.0))), 1e-6),
@@ -90,7 +98,7 @@ def test_the_message_names_the_limit_and_its_value_works(name: str) -> None:
     assert text.startswith(f"{name} = ")
     assert "at arc length" in text
     found = make(least)
-    assert check(compile_path(found.spline, found).program) is None
+    assert check(compile_path(bend(), found, replan=replan_optimal).program) is None
     # It is the least: what is a tenth below it is refused too.
     friction = 0.3 if name.endswith("volts of x") else 0.0
     refused(make, friction + 0.9 * (least - friction))
@@ -119,7 +127,7 @@ LONG_MM = 40_000.0
     ],
 )
 def test_a_path_that_would_take_too_long(
-    name: str, make: Callable[[float], OptimalPlan], value: float
+    name: str, make: Callable[[float], FeedPlan], value: float
 ) -> None:
     text, least = refused(make, value)
     assert f"limits: {name} = " in text

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ def machine(**limits: float) -> Machine:
     return replace(found, axes=tuple(replace(axis, **limits) for axis in found.axes))
 
 
-def chain(folder: Path, points: str, profile: str, policy: str, on: Machine) -> Pipeline:
+def pipeline(folder: Path, points: str, profile: str, policy: str, on: Machine) -> Pipeline:
     file = folder / "path.toml"
     limits = f'[limits]\npolicy = "{policy}"\n'
     file.write_text(f"[path]\nclosed = false\nthrough = {points}\n[feed]\n{FEEDS[profile]}{limits}")
@@ -47,14 +48,14 @@ def chain(folder: Path, points: str, profile: str, policy: str, on: Machine) -> 
 @pytest.mark.parametrize("profile", FEEDS)
 def test_two_points_nearly_equal(tmp_path: Path, profile: str, policy: str) -> None:
     on = machine()
-    made = chain(tmp_path, NEAR, profile, policy, on)
+    made = pipeline(tmp_path, NEAR, profile, policy, on)
     found = verify_program(
         made.program, Limits(machine=made.limits.machine), [a.drive for a in on.plane if a.drive]
     )
     peaks = {peak.quantity: peak for peak in found.peaks}
     for name in QUANTITIES:
-        assert peaks[name].limit is not None
-        assert peaks[name].at_most <= peaks[name].limit, name
+        assert isfinite(peaks[name].limit.value)
+        assert peaks[name].within(0.0), name
     assert peaks["x_volts"].value <= 5.0
     assert peaks["y_volts"].value <= 5.0
     if profile == "quintic":
@@ -73,11 +74,11 @@ def test_two_points_nearly_equal(tmp_path: Path, profile: str, policy: str) -> N
 def test_each_limit_binds(tmp_path: Path, profile: str, name: str, stop_time_ms: int) -> None:
     """A tenth of what the plan would use otherwise: then that is what it uses, nearly in full."""
     points = "[[0, 0], [10, 3], [20, -4], [35, 5]]"
-    free = chain(tmp_path, points, profile, "respect", machine())
+    free = pipeline(tmp_path, points, profile, "respect", machine())
     peaks = {p.quantity: p for p in verify_program(free.program, free.limits).peaks}
     limit = 0.1 * max(peaks[f"{axis}_{name}"].value for axis in "xy")
     slow = replace(machine(**{name: limit}), stop_time_ms=stop_time_ms)
-    made = chain(tmp_path, points, profile, "respect", slow)
+    made = pipeline(tmp_path, points, profile, "respect", slow)
     found = {p.quantity: p for p in verify_program(made.program, made.limits).peaks}
     used = max(found[f"{axis}_{name}"].value for axis in "xy")
     assert 0.9 * limit < used <= limit
@@ -96,7 +97,7 @@ def test_a_plan_that_is_refused_is_planned_again_with_more_room(
     planned_beyond(monkeypatch, share)
     # A plan that uses a tenth of the usual jerk fully leaves no room for a brake until it is past the bend.
     slow = replace(machine(jerk_mm_s3=20000.0), stop_time_ms=1000)
-    made = chain(tmp_path, NEAR, profile, "respect", slow)
+    made = pipeline(tmp_path, NEAR, profile, "respect", slow)
     verdicts: list[NativeFault | None] = []
     check = NativeProgram.check
 
@@ -114,7 +115,7 @@ def test_a_plan_that_stays_refused_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     planned_beyond(monkeypatch, 1.05)
-    made = chain(tmp_path, NEAR, "quintic", "respect", machine(jerk_mm_s3=20000.0))
+    made = pipeline(tmp_path, NEAR, "quintic", "respect", machine(jerk_mm_s3=20000.0))
     with pytest.raises(PlanError, match=r"would refuse the program: above the jerk limit"):
         _ = made.image
 
@@ -125,7 +126,7 @@ def test_a_curve_that_no_feed_can_follow_is_named_with_place_and_curvature(tmp_p
         PlanError,
         match=r"obeys .* at [\d.]+ mm, where the curvature is .* 1/mm \(radius .* mm\): raise",
     ):
-        _ = chain(tmp_path, NEAR, "quintic", "respect", on).plan
+        _ = pipeline(tmp_path, NEAR, "quintic", "respect", on).plan
 
 
 def test_the_lower_limit_counts() -> None:

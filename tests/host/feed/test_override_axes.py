@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hodograph.errors import InputError
-from hodograph.feed import AxisLimits, FeedCap, FeedRequest, Limits, Plant, plan_feed, plan_path
+from hodograph.feed import AxisLimits, FeedRequest, FeedZone, Limits, Plant, plan_feed, plan_path
 from hodograph.feed.optimal import plan_optimal
 from hodograph.native.feed_override import FeedOverride, State
 from hodograph.native.program import NativeProgram
 from hodograph.program import Program, compile_program, encode
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify.cells import cut
-from hodograph.verify.motion import motion_at
+from hodograph.verify.instants import motion_at
 
 PLANTS = (Plant(132.0, 0.19936, 2.5), Plant(80.3, 0.15641, 3.5, 0.2))
 COUNT_S, MOST_TICKS = 5, 4000
@@ -50,11 +50,11 @@ def random_limits(rng: np.random.Generator, length_mm: float) -> Limits:
         return float(x), float(y)
 
     start = float(rng.uniform(0.0, 0.8 * length_mm))
-    cap = FeedCap(start, start + 0.1 * length_mm, float(rng.uniform(20.0, 200.0)))
+    cap = FeedZone(start, start + 0.1 * length_mm, float(rng.uniform(20.0, 200.0)))
     return Limits(
         centripetal_mm_s2=maybe(float(rng.uniform(300.0, 3000.0))),
         axis=AxisLimits(maybe(pair(30, 200)), maybe(pair(300, 3000)), maybe(pair(1e4, 1e5))),
-        caps=(cap,) if rng.uniform() < 0.4 else (),
+        zones=(cap,) if rng.uniform() < 0.4 else (),
         reserve=float(np.exp(rng.uniform(np.log(0.005), np.log(0.3)))),
     )
 
@@ -96,7 +96,7 @@ def worst_ratio(case: Case, t_s, rate, slope, second) -> dict[str, float]:
     if limits.centripetal_mm_s2 is not None:
         out["centripetal"] = np.abs(rate**2 * m.centripetal).max() / limits.centripetal_mm_s2
     s = cells.arc_length_mm(cell, u)
-    for cap in limits.caps:
+    for cap in limits.zones:
         inside = (s > cap.from_mm + 1e-6) & (s < cap.to_mm - 1e-6)
         out["cap"] = np.abs(rate * m.feed)[inside].max(initial=0.0) / cap.feed_mm_s
     for k in range(2):
@@ -214,11 +214,11 @@ def test_report_lists_what_is_broken_along_the_path() -> None:
         policy="report",
         centripetal_mm_s2=50.0,
         axis=AxisLimits(jerk_mm_s3=(1e9, 2e4)),
-        caps=(FeedCap(0.0, 5.0, 10.0),),
+        zones=(FeedZone(0.0, 5.0, 10.0),),
     )
     plan = plan_path(spline, FeedRequest("minimax", 100.0, 0.1), limits)
     assert plan.feed_mm_s == 100.0
-    names = {excess.quantity for excess in plan.excesses}
+    names = {excess.limit.name for excess in plan.excesses}
     assert "centripetal_mm_s2" in names
     assert "axis y jerk_mm_s3" in names
     assert not any("axis x" in name for name in names)

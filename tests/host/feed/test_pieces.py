@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from hodograph.errors import PlanError
 from hodograph.feed import ControllerLimits, FeedPlan, FeedRequest, Limits, plan_feed
-from hodograph.feed.minimax import minimax_nodes, minimax_peak
 from hodograph.feed.pieces import FeedPieces, derivative_bounds, derivative_extremes, exponents
+from hodograph.feed.ramp import minimax_nodes, minimax_peak
 
 CONTROLLER = ControllerLimits(500.0, 5000.0, 200000.0, 0.02)
 LENGTH_MM = 1e-9
@@ -44,7 +44,7 @@ class Reference:
     def __init__(self, plan: FeedPlan) -> None:
         self.feed = mpmath.mpf(plan.feed_mm_s)
         self.time = mpmath.mpf(plan.ramp_time_s)
-        self.length = mpmath.mpf(plan.line.length_mm.numerator) / plan.line.length_mm.denominator
+        self.length = mpmath.mpf(plan.curve.length_mm.numerator) / plan.curve.length_mm.denominator
         self.end = self.time + self.length / self.feed
         if plan.profile == "minimax":
             self._polynomial = self._minimax(plan.request.degree)
@@ -219,7 +219,7 @@ def test_pieces_join_and_end_exactly(plan: FeedPlan) -> None:
         assert abs(value) < 2.0**-18
     for value in (acceleration[0, 0], acceleration[-1, -1]):
         assert abs(value) < 2.0**-8
-    assert pieces.total_q32_s == round(plan.line.duration_s * 2**32)
+    assert pieces.total_q32_s == round(plan.curve.time_s * 2**32)
 
 
 @settings(max_examples=60, deadline=None)

@@ -12,13 +12,12 @@ from hodograph.errors import InputError, PlanError
 from hodograph.feed import (
     AxisLimits,
     ControllerLimits,
-    FeedCap,
     FeedRequest,
+    FeedZone,
     Limits,
     plan_feed,
 )
-from hodograph.feed.pattern_search import pattern_search
-from hodograph.feed.ramp import JERK, exponential_ramp, quintic_ramp
+from hodograph.feed.ramp import JERK, exponential_ramp, pattern_search, quintic_ramp
 
 PAPER = FeedRequest("exponential", 100.0, 0.1)
 
@@ -57,7 +56,7 @@ def test_report_lists_what_exceeds_and_leaves_the_feed() -> None:
     plan = plan_feed(100.0, request, Limits(80.0, 1800.0, 50000.0, "report"))
     assert plan.feed_mm_s == 100.0
     assert [e.quantity for e in plan.excesses] == ["feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3"]
-    assert "above its limit" in str(plan.excesses[0])
+    assert "above its limit" in plan.excesses[0].excess_text
 
 
 @settings(max_examples=40, deadline=None)
@@ -162,7 +161,7 @@ def test_absurd_lengths_are_refused(length: float) -> None:
 
 def test_what_bounds_a_motion() -> None:
     assert not Limits().bind
-    assert not Limits(caps=(FeedCap(0.0, 1.0, 5.0),)).bind
+    assert not Limits(zones=(FeedZone(0.0, 1.0, 5.0),)).bind
     assert Limits(volts=1.0).bind
     assert Limits(axis=AxisLimits(velocity_mm_s=(1.0, 2.0))).bind
 
@@ -188,7 +187,7 @@ def test_absurd_limits_are_refused() -> None:
         AxisLimits(jerk_mm_s3=(1.0, 0.0))
     for ends in ((1.0, 1.0), (-1.0, 1.0), (0.0, float("inf")), (float("nan"), 1.0)):
         with pytest.raises(InputError, match=r"limits.cap: from_mm"):
-            FeedCap(*ends, 10.0)
+            FeedZone(*ends, 10.0)
     with pytest.raises(InputError):
         ControllerLimits(1.0, 1.0, 1.0, 1.5)
     with pytest.raises(InputError):

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from hodograph.feed.minimax import minimax_nodes, minimax_peak
 from hodograph.feed.ramp import (
     ACCELERATION,
     DISPLACEMENT,
@@ -16,6 +15,8 @@ from hodograph.feed.ramp import (
     JERK,
     Ramp,
     exponential_ramp,
+    minimax_nodes,
+    minimax_peak,
     minimax_ramp,
     quintic_ramp,
 )

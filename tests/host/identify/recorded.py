@@ -26,7 +26,7 @@ def chain_of(name: str, machine: str | None = None) -> Pipeline:
 
 
 def recording(
-    chain: Pipeline,
+    pipeline: Pipeline,
     drives: tuple[Drive, Drive],
     seed: int,
     *,
@@ -34,9 +34,9 @@ def recording(
     noise_mv: float = 10.0,
     status: int = FOLLOWS,
 ) -> Frames:
-    """The run of a chain's program by these drives; normal noise on what they report."""
-    machine = chain.machine
-    motion = simulate(chain.image, drives, feedforward=machine.plane_feedforward)
+    """The run of a pipeline's program by these drives; normal noise on what they report."""
+    machine = pipeline.machine
+    motion = simulate(pipeline.image, drives, feedforward=machine.plane_feedforward)
     rows, noise = motion.rows, np.random.default_rng(seed)
     rest, volts_at_rest = (
         np.repeat(rows["set_counts"][:1], REST + 2, axis=0),
@@ -47,7 +47,7 @@ def recording(
     volts = np.concatenate([volts_at_rest, rows["volts_mv"]])
     actual = actual + np.rint(noise.normal(0, noise_counts, actual.shape)).astype(np.int64)
     volts = volts + np.rint(noise.normal(0, noise_mv, volts.shape))
-    offsets = _torques(chain, rows["cmd_q40_mm"], motion.ticks)
+    offsets = _torques(pipeline, rows["cmd_q40_mm"], motion.ticks)
     frames: list[tuple[int, bytes]] = []
     for j in range(len(targets)):
         frames.append((0x80, bytes([j % 240 + 1])))
@@ -62,10 +62,12 @@ def recording(
     return packed(frames)
 
 
-def _torques(chain: Pipeline, cmd_q40: NDArray[np.int64], ticks: int) -> NDArray[np.int64] | None:
+def _torques(
+    pipeline: Pipeline, cmd_q40: NDArray[np.int64], ticks: int
+) -> NDArray[np.int64] | None:
     """Torque offsets by docs/reference/protocol.md section 3.2, in floating point: rounding may differ by
     one per mille."""
-    forward = chain.machine.plane_feedforward
+    forward = pipeline.machine.plane_feedforward
     if forward is None:
         return None
     points = np.concatenate([cmd_q40[:1], cmd_q40[:1], cmd_q40]) * 2.0**-40

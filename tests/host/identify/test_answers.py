@@ -8,7 +8,7 @@ import pytest
 
 from hodograph.errors import RunError
 from hodograph.identify import identify_axis, stretches
-from hodograph.identify.answers import LATE_SYNCS, answered
+from hodograph.identify.stretches import LATE_SYNCS, answered
 
 from .recorded import REST, chain_of, drives_of, packed, recording
 
@@ -44,8 +44,8 @@ def test_what_is_surely_answered(counts: list[int], expected: str) -> None:
 
 
 def test_late_volts_give_the_same_plant() -> None:
-    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
-    frames = recording(chain, drives, 1)
+    pipeline, drives = chain_of("alpha"), drives_of("paper_alpha")
+    frames = recording(pipeline, drives, 1)
     late = frames.copy()
     syncs = np.flatnonzero(late["id"] == SYNC)
     for sync in syncs[
@@ -61,8 +61,8 @@ def test_late_volts_give_the_same_plant() -> None:
 
 
 def test_a_lost_sync_ends_a_motion_and_spoils_no_other() -> None:
-    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
-    frames = recording(chain, drives, 1)
+    pipeline, drives = chain_of("alpha"), drives_of("paper_alpha")
+    frames = recording(pipeline, drives, 1)
     sync = np.flatnonzero(frames["id"] == SYNC)[REST + 700]
     (motion,) = stretches(np.delete(frames, [sync]), 3)
     assert 690 < len(motion.position_counts) < 701

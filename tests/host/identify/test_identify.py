@@ -39,13 +39,13 @@ def wrong(drive: Drive) -> Drive:
 def identified(
     name: str, machine: str, seed: int, friction: float = 0.0
 ) -> list[tuple[Drive, Plant]]:
-    chain = chain_of(name, machine)
+    pipeline = chain_of(name, machine)
     given = drives_of(machine)
     truth = (with_friction(given[0], friction), with_friction(given[1], friction))
-    frames = recording(chain, truth, seed)
+    frames = recording(pipeline, truth, seed)
     return [
         (real, identify_axis(stretches(frames, node), wrong(drive), 1_000_000, 1000))
-        for node, drive, real in zip(chain.machine.nodes, given, truth, strict=True)
+        for node, drive, real in zip(pipeline.machine.nodes, given, truth, strict=True)
     ]
 
 
@@ -89,18 +89,18 @@ def test_with_torque_offsets_and_cubics() -> None:
 
 
 def test_less_noise_is_a_narrower_interval() -> None:
-    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
+    pipeline, drives = chain_of("alpha"), drives_of("paper_alpha")
     widths = []
     for noise in (1.0, 30.0):
-        frames = recording(chain, drives, 1, noise_counts=2 * noise, noise_mv=noise)
+        frames = recording(pipeline, drives, 1, noise_counts=2 * noise, noise_mv=noise)
         plant = identify_axis(stretches(frames, 2), wrong(drives[0]), 1_000_000, 1000)
         widths.append(plant.gain_rad_s_v.within)
     assert 5 * widths[0] < widths[1] < 100 * widths[0]
 
 
 def test_a_loop_that_is_another_is_seen_in_what_is_left_over() -> None:
-    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
-    frames = recording(chain, drives, 1)
+    pipeline, drives = chain_of("alpha"), drives_of("paper_alpha")
+    frames = recording(pipeline, drives, 1)
     other = replace(drives[0], k_pp_rad_s_mm=0.5 * drives[0].k_pp_rad_s_mm)
     plant = identify_axis(stretches(frames, 2), other, 1_000_000, 1000)
     assert plant.rms_mv > 15
@@ -108,14 +108,14 @@ def test_a_loop_that_is_another_is_seen_in_what_is_left_over() -> None:
 
 
 def test_only_motions_from_rest_of_a_drive_that_follows() -> None:
-    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
-    frames = recording(chain, drives, 1)
+    pipeline, drives = chain_of("alpha"), drives_of("paper_alpha")
+    frames = recording(pipeline, drives, 1)
     (motion,) = stretches(frames, 2)
     assert motion.inputs.start_counts == motion.inputs.targets[0]
     assert 1090 < len(motion.position_counts) <= 1102
     assert abs(motion.position_counts[0] - motion.inputs.start_counts) < 200
     with pytest.raises(RunError, match="begins at rest"):
-        stretches(recording(chain, drives, 1, status=0x0233), 2)
+        stretches(recording(pipeline, drives, 1, status=0x0233), 2)
     with pytest.raises(RunError, match="sends no volts"):
         stretches(frames[frames["id"] != 0x282], 2)
     syncs = np.flatnonzero(frames["id"] == 0x80)
@@ -124,9 +124,9 @@ def test_only_motions_from_rest_of_a_drive_that_follows() -> None:
 
 
 def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
+    pipeline, drives = chain_of("alpha"), drives_of("paper_alpha")
     file = tmp_path / "run.log"
-    write_recording(file, recording(chain, drives, 3))
+    write_recording(file, recording(pipeline, drives, 3))
     machine = str(EXAMPLES / "machines" / "paper_alpha.toml")
     output = tmp_path / "found.toml"
     assert main(["identify", str(file), "--machine", machine, "-o", str(output)]) == 0
@@ -153,8 +153,8 @@ def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None
 
 
 def test_a_recording_without_a_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    chain, drives = chain_of("alpha"), drives_of("paper_alpha")
-    frames = recording(chain, drives, 3)
+    pipeline, drives = chain_of("alpha"), drives_of("paper_alpha")
+    frames = recording(pipeline, drives, 3)
     file = tmp_path / "rest.log"
     write_recording(file, frames[: np.flatnonzero(frames["id"] == 0x80)[290]])
     machine = str(EXAMPLES / "machines" / "paper_alpha.toml")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hodograph.monitor.decimator import extremes, group_starts
+from hodograph.monitor.messages import extremes, group_starts
 
 
 @given(st.integers(0, 5000), st.integers(1, 50), st.integers(1, 40))

@@ -8,8 +8,7 @@ import pytest
 
 from hodograph.errors import InputError
 from hodograph.monitor.decoder import Decoder
-from hodograph.monitor.derived import Derivation, Rows, derivative_weights
-from hodograph.monitor.path import ProgramPath
+from hodograph.monitor.derived import Derivation, ProgramPath, Rows, derivative_weights
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import Motion, simulate
 from traffic import EXAMPLES, alpha
@@ -30,9 +29,9 @@ def rows_of(chunk: int, path: ProgramPath | None) -> Rows:
 
 
 def motion() -> Motion:
-    chain = load_pipeline(EXAMPLES / "alpha.toml", None)
-    drives = [axis.drive for axis in chain.machine.axes if axis.drive is not None]
-    return simulate(chain.image, drives)
+    pipeline = load_pipeline(EXAMPLES / "alpha.toml", None)
+    drives = [axis.drive for axis in pipeline.machine.axes if axis.drive is not None]
+    return simulate(pipeline.image, drives)
 
 
 @pytest.mark.parametrize("chunk", [200, 333, 100_000])

@@ -7,7 +7,7 @@ import asyncio
 import json
 from typing import Any
 
-from hodograph.monitor.hub import EVENTS, HISTORY, QUEUE, Client, Hub
+from hodograph.monitor.clients import EVENTS, HISTORY, QUEUE, Client, Hub
 
 
 async def taken(client: Client) -> list[Any]:

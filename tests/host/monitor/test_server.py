@@ -16,9 +16,8 @@ from aiohttp import WSMsgType
 from aiohttp.test_utils import TestClient, TestServer
 
 from hodograph.errors import InputError, RefusedError
-from hodograph.monitor.client_slots import MOST_CLIENTS, MOST_WAITING
-from hodograph.monitor.commands import read_command
-from hodograph.monitor.hub import Hub
+from hodograph.monitor.clients import MOST_CLIENTS, MOST_WAITING, Hub
+from hodograph.monitor.link import read_command
 from hodograph.monitor.security import Guard
 from hodograph.monitor.server import Server
 

@@ -23,7 +23,7 @@ from hodograph.program import (
 )
 from hodograph.program.check import check_image
 from hodograph.program.exact import ExactProgram
-from hodograph.program.exactmath import segment_ways
+from hodograph.program.geometry import segment_ways
 from hodograph.program.image import with_crc
 from hodograph.program.inspection import inspect_dict
 from hodograph.spline import PHSpline, from_control_polygon, line

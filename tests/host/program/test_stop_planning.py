@@ -20,7 +20,7 @@ ZIG_ZAG = """[[0.0, 0.0], [1.2, 2.7], [1.3, 0.0], [1.9, 2.7], [10.5, 0.0], [5.8,
 [5.2, 0.0], [17.7, 2.7], [23.0, 0.0], [28.3, 2.7], [10.3, 0.0], [20.7, 2.7], [13.9, 0.0], [25.7, 2.7]]"""
 
 
-def chain(
+def pipeline(
     folder: Path, points: str, feed: str, limits: str = "", stop_time_ms: int = 250
 ) -> Pipeline:
     file = folder / "path.toml"
@@ -49,7 +49,7 @@ def test_a_bend_without_brakes_does_not_keep_its_piece_from_braking(
 ) -> None:
     points = f"through = [[0, 0], [10, 0], [{10 + apart_mm}, 0], [20, 5]]"
     axis = "[limits.axis]\njerk_mm_s3 = 20000\n"
-    made = chain(tmp_path, points, CONSTANT, axis)
+    made = pipeline(tmp_path, points, CONSTANT, axis)
     stops, count = made.program.stops, made.program.piece_count
     assert stops.worst(0).time_s < 0.25
     assert stops.worst(1).time_s < 0.25
@@ -61,13 +61,13 @@ def test_a_bend_without_brakes_does_not_keep_its_piece_from_braking(
 
 def test_bends_in_long_pieces_are_looked_at(tmp_path: Path) -> None:
     """Constant feed in pieces of seconds; the bends take milliseconds."""
-    found = trials(chain(tmp_path, f"control_points = {ZIG_ZAG}", CONSTANT))
+    found = trials(pipeline(tmp_path, f"control_points = {ZIG_ZAG}", CONSTANT))
     assert found.within(0.01), found
 
 
 def test_stops_on_a_path_of_micrometres_are_never_late(tmp_path: Path) -> None:
     points = "control_points = [[0, 0], [0.0008, 0.0013], [0.0007, 0.0028], [0.0004, 0.0043]]"
-    made = chain(tmp_path, points, CONSTANT.replace("0.3", "0.2"), stop_time_ms=0)
+    made = pipeline(tmp_path, points, CONSTANT.replace("0.3", "0.2"), stop_time_ms=0)
     found = trials(made)
     assert found.kept, found
     assert sum(found.measured) > 500
@@ -77,7 +77,7 @@ def test_a_feed_zone_that_is_used_fully_does_not_keep_a_hold_from_braking(tmp_pa
     """Ten seconds at the feed of the zone: a hold begins at once, not behind its end."""
     points = "control_points = [[0, 0], [40, 5], [80, 40], [60, 90], [10, 80], [-20, 40]]"
     zone = "[[limits.cap]]\nfrom_mm = 20\nto_mm = 160\nfeed_mm_s = 12\n"
-    made = chain(tmp_path, points, 'profile = "optimal"\n', zone)
+    made = pipeline(tmp_path, points, 'profile = "optimal"\n', zone)
     assert made.plan.duration_s > 10.0
     assert made.program.stops.worst(0).time_s < 0.3
     found = trials(made)

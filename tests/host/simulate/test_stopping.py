@@ -23,11 +23,11 @@ BETWEEN = 0.01
 """Share of a limit by which a motion may pass it between the instants that the search looks at (0.5 % seen)."""
 
 
-def trials(chain: Pipeline, count: int, seed: int) -> StopTrials:
+def trials(pipeline: Pipeline, count: int, seed: int) -> StopTrials:
     """Random commands on a program, beside the limits that its stops were planned with."""
-    program = NativeProgram(chain.image)
+    program = NativeProgram(pipeline.image)
     search = StopSearch(program)
-    plan, terms = chain.compilation.plan, chain.stop_terms
+    plan, terms = pipeline.compilation.plan, pipeline.stop_terms
     hold, fault = (
         limits.raised(search.used(limits))
         for limits in (hold_limits(plan, terms), fault_limits(plan, terms))
@@ -38,11 +38,11 @@ def trials(chain: Pipeline, count: int, seed: int) -> StopTrials:
 @pytest.mark.parametrize("file", [ALPHA, HEART], ids=["alpha", "heart"])
 @pytest.mark.parametrize("kind", ["hold", "stop", "fault"])
 def test_a_stop_rests_within_its_bound_and_limits(file, kind) -> None:
-    chain = load_pipeline(file)
-    program = NativeProgram(chain.image)
+    pipeline = load_pipeline(file)
+    program = NativeProgram(pipeline.image)
     axis, path = (2000.0, 50000.0), (2000.0, 50000.0)
-    for at_s in np.linspace(0.0, chain.program.duration_s, 14)[:-1].tolist():
-        found = simulate_stop(program, chain.machine.models(chain.machine.plane), kind, at_s)
+    for at_s in np.linspace(0.0, pipeline.program.duration_s, 14)[:-1].tolist():
+        found = simulate_stop(program, pipeline.machine.models(pipeline.machine.plane), kind, at_s)
         assert found.rest_after_s <= found.bound_s
         assert found.distance_mm >= 0.0
         if kind == "fault":
@@ -56,10 +56,10 @@ def test_a_stop_rests_within_its_bound_and_limits(file, kind) -> None:
 
 
 def test_until_the_stop_the_run_is_the_undisturbed_one() -> None:
-    chain = load_pipeline(ALPHA)
-    drives = chain.machine.models(chain.machine.plane)
-    whole = simulate(chain.image, drives)
-    found = simulate_stop(NativeProgram(chain.image), drives, "fault", 0.3)
+    pipeline = load_pipeline(ALPHA)
+    drives = pipeline.machine.models(pipeline.machine.plane)
+    whole = simulate(pipeline.image, drives)
+    found = simulate_stop(NativeProgram(pipeline.image), drives, "fault", 0.3)
     assert np.array_equal(found.motion.rows["set_counts"][:300], whole.rows["set_counts"][:300])
     assert not np.array_equal(found.motion.rows["set_counts"][:310], whole.rows["set_counts"][:310])
     rest = found.motion.rows["set_counts"][found.motion.ticks - 1 :]
@@ -179,11 +179,11 @@ def random_file(folder: Path, seed: int) -> Path:
 def check_random(folder: Path, seed: int, count: int) -> int:
     """Random commands on a random program; how many trials there were."""
     try:
-        chain = load_pipeline(random_file(folder, seed))
-        _ = chain.image
+        pipeline = load_pipeline(random_file(folder, seed))
+        _ = pipeline.image
     except HodographError:
         return 0
-    found = trials(chain, count, seed)
+    found = trials(pipeline, count, seed)
     assert found.within(BETWEEN), f"random path {seed}: {found}"
     assert sum(found.measured) > count // 3
     return count

@@ -12,8 +12,7 @@ import pytest
 from hodograph.config import Drive
 from hodograph.native import DriveModel
 from hodograph.tune.design import Poles, feedforward_of, stiffness_n_um, with_poles
-from hodograph.tune.loop import loop_of
-from hodograph.tune.margins import margins
+from hodograph.tune.loop import loop_of, margins
 
 Drives = tuple[Drive, Drive]
 

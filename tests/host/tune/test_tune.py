@@ -49,10 +49,10 @@ def test_the_example_machine_has_a_contour_error_of_its_encoder(
     tuned = load_pipeline(EXAMPLES / f"{name}.toml", MACHINES / "tuned.toml")
     assert plain.image == tuned.image
     errors = []
-    for chain in (plain, tuned):
-        machine = chain.machine
+    for pipeline in (plain, tuned):
+        machine = pipeline.machine
         drives = machine.models(machine.plane)
-        motion = simulate(chain.image, drives, feedforward=machine.plane_feedforward)
+        motion = simulate(pipeline.image, drives, feedforward=machine.plane_feedforward)
         assert motion.max_volts < 5.0
         errors.append(motion.max_contour_error_um)
     assert errors[0] == pytest.approx(paper_um, abs=within)
@@ -66,8 +66,8 @@ def test_the_example_machine_is_what_tune_finds(
     monkeypatch.setattr(search, "DAMPINGS", (0.85,))
     monkeypatch.setattr(search, "BANDWIDTHS", 1)
     monkeypatch.setattr(search, "SPAN", 1.0)
-    chain = load_pipeline(EXAMPLES / "alpha.toml", machine.file)
-    found = tune(machine, [chain], Asked(interpolation="cubic"))
+    pipeline = load_pipeline(EXAMPLES / "alpha.toml", machine.file)
+    found = tune(machine, [pipeline], Asked(interpolation="cubic"))
     example = load_machine(MACHINES / "tuned.toml")
     assert found.drives == example.models(example.plane)
     assert found.feedforward == example.plane_feedforward
@@ -81,7 +81,7 @@ def test_the_example_machine_is_what_tune_finds(
 def test_straight_lines_and_late_sensing_keep_the_goals_too(
     machine: Machine, name: str, most_um: float
 ) -> None:
-    chain = load_pipeline(EXAMPLES / f"{name}.toml")
+    pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
     late = [
         replace(drive, speed="differences", delay_samples=1, interpolation="cubic")
         for drive in machine.models(machine.plane)
@@ -91,7 +91,7 @@ def test_straight_lines_and_late_sensing_keep_the_goals_too(
     errors = []
     for given in (machine, replace(machine, axes=axes)):
         found = tune(given, [], asked)
-        motion = simulate(chain.image, found.drives, feedforward=found.feedforward)
+        motion = simulate(pipeline.image, found.drives, feedforward=found.feedforward)
         errors.append(motion.max_contour_error_um)
     assert 0.1 < errors[0] < most_um
     assert 0.005 < errors[1] < 0.1
@@ -115,20 +115,23 @@ def test_volts_that_a_plan_leaves_are_for_weaker_plants(
     text = (EXAMPLES / "alpha_optimal.toml").read_text().replace("volts = 4.5", f"volts = {volts}")
     file = tmp_path / "alpha.toml"
     file.write_text(text)
-    chain = load_pipeline(file, MACHINES / "tuned.toml")
-    drives, forward = chain.machine.models(chain.machine.plane), chain.machine.plane_feedforward
+    pipeline = load_pipeline(file, MACHINES / "tuned.toml")
+    drives, forward = (
+        pipeline.machine.models(pipeline.machine.plane),
+        pipeline.machine.plane_feedforward,
+    )
     weak = next(case for case in CASES if case.name == "gain -20 %")
-    found = outcome(chain.image, 1_000_000, (drives[0], drives[1]), forward, weak)
+    found = outcome(pipeline.image, 1_000_000, (drives[0], drives[1]), forward, weak)
     assert found.saturated is spoiled
     assert (found.contour_error_um > 100) is spoiled
     assert (found.contour_error_um < 0.1) is not spoiled
 
 
 def test_saturation_is_seen(drives: tuple[Drive, Drive]) -> None:
-    chain = load_pipeline(EXAMPLES / "heart.toml")
+    pipeline = load_pipeline(EXAMPLES / "heart.toml")
     weak = next(c for c in CASES if c.name == "gain -20 %, time constant +20 %")
-    assert outcome(chain.image, 1_000_000, drives, None, weak).saturated
-    assert not outcome(chain.image, 1_000_000, drives, None, NOMINAL).saturated
+    assert outcome(pipeline.image, 1_000_000, drives, None, weak).saturated
+    assert not outcome(pipeline.image, 1_000_000, drives, None, NOMINAL).saturated
 
 
 def test_bandwidth_damping_and_stiffness_asked_for(machine: Machine) -> None:

@@ -24,7 +24,7 @@ from hodograph.pipeline import load_pipeline
 from hodograph.program import Program, encode
 from hodograph.program.codes import ProgramError
 from hodograph.verify.cells import curve_of, cut
-from hodograph.verify.motion import motion_at
+from hodograph.verify.instants import motion_at
 
 Real = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from hodograph.feed import Limits
 from hodograph.program import Program
 from hodograph.verify.bounds import bends
 from hodograph.verify.cells import cut
-from hodograph.verify.motion import motion_at
+from hodograph.verify.instants import motion_at
 from hodograph.verify.quantities import quantities
 
 mp = mpmath.mp.clone()
@@ -106,6 +106,6 @@ def test_second_derivatives_stay_within_their_bounds(seed: int) -> None:
             second = np.abs(a - 2.0 * b + c) / (step * cells.duration_s) ** 2
             rounding = 1e-13 * np.maximum(np.abs(b), 1.0) / (step * cells.duration_s) ** 2
             allowed = row.of(bound) * (1.0 + 1e-6) + 100.0 * rounding
-            assert np.all(second <= allowed), row.name
+            assert np.all(second <= allowed), row.limit.quantity
             slack.append(np.median(allowed / np.maximum(second, rounding)))
     assert np.median(slack) < 50.0

@@ -15,9 +15,9 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
 @pytest.mark.parametrize("name", ["alpha", "heart"])
 def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str) -> None:
-    chain = load_pipeline(EXAMPLES / f"{name}.toml")
-    found = {one.kernel: one for one in sampled(chain.accepted)}
-    program = chain.accepted
+    pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
+    found = {one.kernel: one for one in sampled(pipeline.accepted)}
+    program = pipeline.accepted
     points = program.points("fixed", program.tick_times_q42_s())
     for axis, key in enumerate(("x_q40_mm", "y_q40_mm")):
         x = points[key].astype(np.float64) * 2.0**-40
@@ -26,11 +26,11 @@ def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str
         jerk = np.abs(np.diff(x, 3)).max() / 1e-9
         assert found["fixed"].acceleration_mm_s2[axis] == pytest.approx(acceleration, abs=1e-3)
         assert found["fixed"].jerk_mm_s3[axis] == pytest.approx(jerk, abs=1.0)
-    peaks = {peak.quantity: peak for peak in verify_program(chain.program, Limits()).peaks}
+    peaks = {peak.quantity: peak for peak in verify_program(pipeline.program, Limits()).peaks}
     for one in found.values():
         # A difference is a mean of the derivative, plus what the kernel's rounding adds.
         for axis, name_ in enumerate("xy"):
-            jerk = peaks[f"{name_}_jerk_mm_s3"].at_most
+            jerk = peaks[f"{name_}_jerk_mm_s3"].most
             assert one.jerk_mm_s3[axis] <= jerk + one.noise_mm_s3 + 0.01
             assert one.jerk_mm_s3[axis] >= 0.98 * jerk - one.noise_mm_s3
     assert found["double"].noise_mm_s3 == 0.0

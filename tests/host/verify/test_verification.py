@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Peaks against dense samples, limits kept and passed, steps, caps, volts."""
+"""Peaks against dense samples, limits kept and passed, steps, zones, volts."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +10,12 @@ from programs import random_program
 
 from hodograph.config import load_drive
 from hodograph.errors import InputError
-from hodograph.feed import AxisLimits, FeedCap, Limits
+from hodograph.feed import AxisLimits, FeedZone, Limits
 from hodograph.pipeline import load_pipeline
 from hodograph.program import Program
 from hodograph.verify import verify_program
 from hodograph.verify.cells import cut
-from hodograph.verify.motion import motion_at
+from hodograph.verify.instants import motion_at
 from hodograph.verify.peaks import GAP
 from hodograph.verify.quantities import quantities
 
@@ -40,10 +40,10 @@ def test_no_sample_is_above_a_peak_and_no_peak_far_above_the_samples(seed: int) 
     motion = motion_at(cells, cell, u)
     for row in quantities(cells, Limits(), DRIVES):
         dense = float(np.abs(row.of(motion)).max())
-        peak = found[row.name]
-        assert dense <= peak.at_most * (1.0 + 1e-9), row.name
-        assert peak.value >= dense * (1.0 - 1.1 * GAP), row.name
-        assert peak.value <= peak.at_most <= peak.value * (1.0 + 2.2 * GAP), row.name
+        peak = found[row.limit.quantity]
+        assert dense <= peak.most * (1.0 + 1e-9), row.limit.quantity
+        assert peak.value >= dense * (1.0 - 1.1 * GAP), row.limit.quantity
+        assert peak.value <= peak.most <= peak.value * (1.0 + 2.2 * GAP), row.limit.quantity
 
 
 def test_a_limit_just_above_a_peak_is_kept_and_one_below_is_not(alpha: Program) -> None:
@@ -66,8 +66,8 @@ def test_a_limit_just_above_a_peak_is_kept_and_one_below_is_not(alpha: Program) 
         assert {excess.quantity for excess in within.excesses} == {name}
         below = verify_program(alpha, make(peaks[name] * 0.997), DRIVES)
         assert not below.kept, name
-        assert [peak.quantity for peak in below.peaks if not peak.kept] == [name]
-        assert below.excesses[0].ratio == pytest.approx(1.0 / 0.997, rel=2e-4)
+        assert [peak.quantity for peak in below.exceeded] == [name]
+        assert below.excesses[0].usage == pytest.approx(1.0 / 0.997, rel=2e-4)
 
 
 def test_the_place_of_an_excess(alpha: Program) -> None:
@@ -86,14 +86,14 @@ def test_the_place_of_an_excess(alpha: Program) -> None:
 
 
 def test_caps_bind_on_their_stretch_only(alpha: Program) -> None:
-    caps = (FeedCap(20.0, 35.0, 100.1), FeedCap(30.0, 31.0, 99.0), FeedCap(0.0, 0.01, 50.0))
-    found = verify_program(alpha, Limits(caps=caps))
+    zones = (FeedZone(20.0, 35.0, 100.1), FeedZone(30.0, 31.0, 99.0), FeedZone(0.0, 0.01, 50.0))
+    found = verify_program(alpha, Limits(zones=zones))
     assert not found.kept
     assert len(found.excesses) == 1
     excess = found.excesses[0]
-    assert (excess.quantity, excess.limit) == ("cap_mm_s", 99.0)
+    assert (excess.quantity, excess.limit.value) == ("cap_mm_s", 99.0)
     assert 30.0 - 1e-9 <= excess.s_mm <= 31.0 + 1e-9
-    slow = verify_program(alpha, Limits(caps=(FeedCap(0.0, 0.01, 50.0),)))
+    slow = verify_program(alpha, Limits(zones=(FeedZone(0.0, 0.01, 50.0),)))
     assert slow.kept
     peak = next(peak for peak in slow.peaks if peak.quantity == "cap_mm_s")
     assert peak.value < 50.0
@@ -112,13 +112,13 @@ def test_a_jump_of_the_acceleration_is_found(alpha: Program) -> None:
     assert not found.kept
     assert found.excesses[0].quantity == "acceleration_step_mm_s2"
     # As a jerk over one period it may be 0.1 % of the limit.
-    assert found.excesses[0].limit == pytest.approx(60000.0 * 1e-3 * 1e-3, rel=1e-12)
+    assert found.excesses[0].limit.value == pytest.approx(60000.0 * 1e-3 * 1e-3, rel=1e-12)
 
 
 def test_the_volts_move_the_plant_along_the_path(alpha: Program) -> None:
     """The plant of docs/theory/numerics.md 13, driven by the volts at every instant, stays on the path."""
     cells = cut(alpha)
-    volts = [row for row in quantities(cells, Limits(), DRIVES) if row.unit == "V"]
+    volts = [row for row in quantities(cells, Limits(), DRIVES) if row.limit.key == "volts"]
     h = 1e-5
     t = np.arange(0.0, alpha.duration_s, h) + 0.5 * h
     t = t[t < alpha.duration_s]
@@ -142,5 +142,5 @@ def test_volts_need_drives(alpha: Program) -> None:
     assert "x_volts" not in {p.quantity for p in verify_program(alpha, Limits()).peaks}
     weak = replace(DRIVES[0], volts_limit=1.0)
     found = verify_program(alpha, Limits(volts=3.0), (weak, DRIVES[1]))
-    limits = {peak.quantity: peak.limit for peak in found.peaks}
+    limits = {peak.quantity: peak.limit.value for peak in found.peaks}
     assert (limits["x_volts"], limits["y_volts"]) == (1.0, 3.0)

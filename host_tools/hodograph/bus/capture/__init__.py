@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What is heard on the bus: frames, recordings, their load, setpoints that jump. Nothing here sends."""
+"""Capture of the bus: frames, recordings, bus load, setpoint step check. Nothing here sends."""

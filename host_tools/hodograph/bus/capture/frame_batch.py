@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Taking frames from the socket of a bus in batches: recvmmsg, outside Python's interpreter lock.
 
-About one system call per thousand frames. The frames stay the raw structures of linux/can.h, for numpy to look at. What
+About one system call per thousand frames. The frames stay the raw structures of linux/can.h, for numpy to read. What
 the kernel says beside a frame comes along: how many frames it had to drop for this socket (SO_RXQ_OVFL) and when it
 got the frame (SO_TIMESTAMP). A local bus sends the time with each frame.
 """
@@ -46,7 +46,7 @@ _STAMP = np.dtype(
 
 
 def open_socket(address: BusAddress, *, timestamps: bool = False) -> socket.socket:
-    """A socket that hears every frame, with a large buffer; frames queue up from here on. Raises BusError."""
+    """A socket that receives every frame, with a large buffer; frames queue up from here on. Raises BusError."""
     listener: socket.socket | None = None
     try:
         if address.is_local:

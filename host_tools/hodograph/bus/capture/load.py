@@ -20,7 +20,7 @@ from .recorder import Recorder
 
 LEAST_LISTEN_S = 0.25
 LONGEST_S = 1.0
-"""What a listener hears is kept so long when nobody asks."""
+"""How long captured frames are kept when nobody asks."""
 
 _CLASSES = (
     ("NMT", 0x000, 0x000),
@@ -92,8 +92,8 @@ def _kinds(identifiers: NDArray[np.uint32]) -> NDArray[np.int64]:
     return kinds
 
 
-class Listener:
-    """For somebody who gets the frames anyway: the load since the last question."""
+class LoadCapture:
+    """Bus load of captured frames since the last question."""
 
     def __init__(self, bitrate: int) -> None:
         self._bitrate = bitrate
@@ -114,7 +114,7 @@ class Listener:
         self._last_s = last_s
 
     def measure(self) -> BusLoad | None:
-        """From the last frame of the last question to the last one heard; None: that is no time."""
+        """From the last frame of the last question to the last one received; None: that is no time."""
         if self._since_s is None or self._last_s <= self._since_s:
             return None
         load = bus_load(np.concatenate(self._heard), self._last_s - self._since_s, self._bitrate)

@@ -250,7 +250,7 @@ def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _
 
 
 def _commanded(control: NDArray[np.uint16]) -> Bool:
-    """Told to follow, in no stretch of enabled setpoints that homes."""
+    """Commanded to follow, in no stretch of enabled setpoints that homes."""
     enabled = (control & _ENABLED) == _ENABLED
     stretch = np.cumsum(~enabled)
     homing = np.unique(stretch[enabled & ((control & _HOMING) != 0)])

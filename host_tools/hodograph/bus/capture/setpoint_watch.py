@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rules of setpoint_check for somebody who hears frames bit by bit: in windows that overlap."""
+"""The rules of setpoint_check for frames that come one after another: in windows that overlap."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .frames import Frames
 from .setpoint_check import Jump, Step, StepLimits, worst_steps
 
 WINDOW = 1000
-"""SYNCs that are looked at together; each verdict has a quarter of them before it and behind it."""
+"""SYNCs that are checked together; each verdict has a quarter of them before it and after it."""
 _STEP, _EDGE = WINDOW // 2, WINDOW // 4
 _MOST_FRAMES = 100_000
 """Kept without a SYNC."""
@@ -59,7 +59,7 @@ class SetpointWatch:
         return found
 
     def close(self) -> list[Step]:
-        """What is left at the end."""
+        """The rest at the end."""
         if not self._kept:
             return []
         kept = np.concatenate(self._kept)

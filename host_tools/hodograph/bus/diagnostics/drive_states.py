@@ -33,7 +33,7 @@ INPUTS = ((0x1, "negative limit"), (0x2, "positive limit"), (0x4, "home switch")
 
 
 def state_of_statusword(statusword: int) -> str:
-    """The state that a statusword (0x6041) tells."""
+    """The state in a statusword (0x6041)."""
     for (mask, coding), name in zip(_CODINGS, DRIVE_STATES, strict=True):
         if statusword & mask == coding:
             return name
@@ -41,7 +41,7 @@ def state_of_statusword(statusword: int) -> str:
 
 
 def state_of_number(number: int) -> str:
-    """The state that object 0x2026 tells: 0 not there, else enum cia402_state + 1."""
+    """The state in object 0x2026: 0 not there, else enum cia402_state + 1."""
     if number == 0:
         return NOT_THERE
     return DRIVE_STATES[number - 1] if number <= len(DRIVE_STATES) else f"unknown ({number})"

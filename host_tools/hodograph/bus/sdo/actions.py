@@ -29,7 +29,7 @@ BOOT_S = 10.0
 
 
 def hold_reached(controller: Controller, wait_s: float = math.inf) -> bool:
-    """Waits for the rest on the path that HOLD asked for; false when the program had ended before."""
+    """Waits for the standstill on the path that HOLD commanded; false when the program had ended before."""
     return controller.wait_for((HELD, READY), wait_s) == HELD
 
 
@@ -65,7 +65,8 @@ def quick_stop_over(controller: Controller, wait_s: float = BOOT_S) -> None:
 
 
 def configure_anew(controller: Controller, wait_s: float = BOOT_S) -> None:
-    """Finds the drives and writes their whole configuration, without a fault: what another node has told them is gone.
+    """Finds the drives and writes their whole configuration, without a fault: what another node has written is
+    overwritten.
 
     Drives at standstill are switched off. Raises RefusedError while axes move, BusError when drives are missing.
     """

@@ -22,7 +22,7 @@ from ..address import BusAddress
 from ..clock import REAL_CLOCK, Clock
 
 TURN_WAIT_S = 30.0
-"""Patience for a turn where nothing else is asked for: mid-way in a job, giving up would cost more than waiting."""
+"""Patience for a turn where nothing else is given: mid-way in a job, giving up would cost more than waiting."""
 _LOOK_S = 0.002
 _SIGN_BYTES = 8
 LOCK_FOLDER = Path("/run/lock")

@@ -123,7 +123,7 @@ class Network(canopen.Network):
 
 
 class _Ended(can.Listener):
-    """Hears that the bus has ended, and leaves it to those who notice themselves."""
+    """Receives that the bus has ended, and leaves it to those who notice themselves."""
 
     def on_message_received(self, msg: can.Message) -> None:
         """See can.Listener."""
@@ -153,7 +153,7 @@ def _open(address: BusAddress, node: int, bitrate: int) -> can.BusABC:
 
 @contextmanager
 def open_network(address: BusAddress, node: int, bitrate: int) -> Iterator[Network]:
-    """A canopen network that hears what `node` says to us. Raises BusError when it can't be opened."""
+    """A canopen network that receives the answers of `node`. Raises BusError when it can't be opened."""
     if address.is_raw:
         check_raw(address)
     try:

@@ -86,7 +86,7 @@ class Node:
         self._turns = Turns(address, node_id, clock)
         self._under_way = False
         self._left_s: float | None = None
-        """What is left of the time that a question may take, None: no limit of its own."""
+        """The rest of the time that a question may take, None: no limit of its own."""
         self._identified = False
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0

@@ -130,7 +130,7 @@ class PathPosition:
 
 @dataclass(frozen=True)
 class Override:
-    """What is asked for; at what rate the program's time runs now; whether the program allows no more here."""
+    """Commanded override; override now; whether it is saturated."""
 
     wanted_percent: int
     actual_percent: float
@@ -172,7 +172,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Status:
-    """Everything that the controller tells, at one instant or nearly so. `timing` is one of TIMINGS.
+    """Everything that the controller reports, at about one instant. `timing` is one of TIMINGS.
 
     `unhomed_nodes`: drives that should have been homed, and were not, when the present or last program was started.
     """

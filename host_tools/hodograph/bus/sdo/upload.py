@@ -46,8 +46,7 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
 
 def require_room(node: Node, image: bytes) -> None:
     """Raises RefusedError when no bank of this controller can hold the program with its records."""
-    from ...program.image import HEADER_SIZE
-    from ...program.memory import memory_bytes
+    from ...program.image import HEADER_SIZE, memory_bytes
 
     if len(image) < HEADER_SIZE:
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limits that leave no feed worth the name: which, where, and what would do; docs/theory/numerics.md 5.6.
+"""Infeasible limits: which they are, where, and what would do; docs/theory/numerics.md 5.6.
 
 Every path without corners can be run inside any limits, if slowly enough. The bounds of slowness are LEAST_FEED_MM_S
 at every place and the longest time that the format knows. What each limit allows is taken at constant feed; of
@@ -9,7 +9,7 @@ accelerations and jerks along the way, by the fastest motion from rest to rest.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cbrt, inf, sqrt
 
 import numpy as np
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from ...errors import PlanError
 from ...spline import PHSpline
-from ..plant import Plant
+from ..kinematics import LEFT, RIGHT, frames
+from ..limits import Limit, Plant
 from ..request import LEAST_FEED_MM_S
-from .bounds import Bounds, Source
-from .curve import LEFT, RIGHT, frames
+from .plan_limits import PlanLimits
 
 Real = NDArray[np.float64]
 
@@ -30,14 +30,14 @@ _BEYOND = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Allowed:
+class LimitedFeed:
     """What one limit alone allows: feed (n,) at points (inf where it does not bind) and the time of the whole.
 
-    `given` is what the user gave. With the feed k times as fast everywhere the limit would have to be
+    `given` is the value in its file. With the feed k times as fast everywhere the limit would have to be
     offset + (given - offset) k^power.
     """
 
-    source: Source
+    limit: Limit
     given: float
     feed: Real
     time_s: float
@@ -47,8 +47,9 @@ class Allowed:
     @property
     def name(self) -> str:
         """Section, key and value, for messages."""
-        less = "" if self.source.share == 1.0 else " (less its reserve)"
-        return f"{self.source.section}: {self.source.key} = {self.given:g}{less}"
+        limit = self.limit
+        less = "" if limit.share == 1.0 else " (less its reserve)"
+        return f"{limit.source}: {limit.words or limit.entry} = {self.given:g}{less}"
 
     def rounded(self, value: float) -> str:
         """A value of the limit, what is above `offset` rounded up to three digits."""
@@ -64,7 +65,7 @@ class Allowed:
 
 
 @dataclass(frozen=True, eq=False)
-class _Volts(Allowed):
+class _VoltsFeed(LimitedFeed):
     """Volts: speed |c1| and T |c2| (n,), what is needed for each feed and feed^2 at points."""
 
     plant: Plant
@@ -73,10 +74,10 @@ class _Volts(Allowed):
 
     def needed(self, feed_mm_s: float, place: int) -> float:
         reach = self.speed[place] * feed_mm_s + self.bend[place] * feed_mm_s**2
-        return self.offset + float(reach) / (self.plant.gain_mm_s_v * self.source.share)
+        return self.offset + float(reach) / (self.plant.gain_mm_s_v * self.limit.share)
 
 
-def check_feasible(spline: PHSpline, bounds: Bounds, longest_s: float) -> None:
+def check_feasible(spline: PHSpline, limits: PlanLimits, longest_s: float) -> None:
     """Raises PlanError where limits allow less than LEAST_FEED_MM_S, or take longer than `longest_s`, each by itself.
 
     The message names all such limits, where each is worst, and the least values that would do.
@@ -84,7 +85,7 @@ def check_feasible(spline: PHSpline, bounds: Bounds, longest_s: float) -> None:
     s = _places(spline)[0]
     slow: dict[str, tuple[float, str]] = {}
     long: dict[str, tuple[float, str]] = {}
-    for one in allowed(spline, bounds):
+    for one in allowed(spline, limits):
         worst = int(np.argmin(one.feed))
         feed = float(one.feed[worst])
         if feed < LEAST_FEED_MM_S:
@@ -93,16 +94,16 @@ def check_feasible(spline: PHSpline, bounds: Bounds, longest_s: float) -> None:
                 f"{one.name} allows {feed:.3g} mm/s at arc length {s[worst]:.6g} mm, less than the "
                 f"{LEAST_FEED_MM_S:g} mm/s that a feed has to be: {one.rounded(least)} would do there"
             )
-            slow[one.source.key] = max(slow.get(one.source.key, (0.0, "")), (least, text))
+            slow[one.limit.entry] = max(slow.get(one.limit.entry, (0.0, "")), (least, text))
         elif one.time_s >= longest_s:
             k = one.time_s / longest_s
             text = too_long(one, s[worst], one.time_s, longest_s, k)
-            long[one.source.key] = max(long.get(one.source.key, (0.0, "")), (one.times(k), text))
+            long[one.limit.entry] = max(long.get(one.limit.entry, (0.0, "")), (one.times(k), text))
     if slow or long:
         raise PlanError("; ".join(text for _, text in (slow or long).values()))
 
 
-def too_long(one: Allowed, s_mm: float, time_s: float, longest_s: float, k: float) -> str:
+def too_long(one: LimitedFeed, s_mm: float, time_s: float, longest_s: float, k: float) -> str:
     """The message for a limit that makes a program last too long; k times as fast is fast enough."""
     return (
         f"{one.name}, lowest at arc length {s_mm:.6g} mm, makes the path take {time_s:.4g} s, longer than the "
@@ -116,58 +117,50 @@ def rounded_up(value: float) -> str:
     return text if float(text) >= value * (1.0 + _HAIR) else f"{value * 1.0051:.3g}"
 
 
-def binding_most(spline: PHSpline, bounds: Bounds) -> tuple[Allowed, float]:
+def binding_most(spline: PHSpline, limits: PlanLimits) -> tuple[LimitedFeed, float]:
     """The limit that by itself takes the longest, and the arc length where it allows least."""
-    found = max(allowed(spline, bounds), key=lambda one: one.time_s)
+    found = max(allowed(spline, limits), key=lambda one: one.time_s)
     return found, float(_places(spline)[0][int(np.argmin(found.feed))])
 
 
-def least_time_s(spline: PHSpline, bounds: Bounds) -> float:
+def least_time_s(spline: PHSpline, limits: PlanLimits) -> float:
     """What the path takes at least."""
-    return max(one.time_s for one in allowed(spline, bounds))
+    return max(one.time_s for one in allowed(spline, limits))
 
 
-def within_reach(spline: PHSpline, bounds: Bounds) -> Bounds:
+def within_reach(spline: PHSpline, limits: PlanLimits) -> PlanLimits:
     """The same with the feed bounded where acceleration and jerk along the path cannot bring it: a bound far beyond
     spoils the numbers of the programs.
     """
     s, _ = _places(spline)
-    _, acceleration, jerk = bounds.sources
     reach = min(
-        float(_reached(s, acceleration, bounds.acceleration_mm_s2, 1.0, 2).feed.min()),
-        float(_reached(s, jerk, bounds.jerk_mm_s3, 1.0, 3).feed.min()),
+        float(_reached(s, limits.acceleration, 1.0, 2).feed.min()),
+        float(_reached(s, limits.jerk, 1.0, 3).feed.min()),
     )
-    return replace(bounds, feed_mm_s=min(bounds.feed_mm_s, _BEYOND * reach))
+    return limits.with_feed(_BEYOND * reach)
 
 
-def allowed(spline: PHSpline, bounds: Bounds) -> Iterator[Allowed]:
+def allowed(spline: PHSpline, limits: PlanLimits) -> Iterator[LimitedFeed]:
     """All limits, one by one, at points of the path."""
     s, side = _places(spline)
-    yield from _along(s, bounds)
+    yield from _along(s, limits)
     f = frames(spline, s, side)
     with np.errstate(divide="ignore"):
-        bend = bounds.centripetal_mm_s2 / np.abs(f.curvature)
-    yield _steady(
-        s, Source("limits", "centripetal_mm_s2"), bounds.centripetal_mm_s2, np.sqrt(bend), 2
-    )
+        bend = limits.centripetal.value / np.abs(f.curvature)
+    yield _steady(s, limits.centripetal, np.sqrt(bend), 2)
     for k, of in enumerate((np.real, np.imag)):
         one, two, three = (np.abs(of(vector)) for vector in (f.r1, f.r2, f.r3))
-        for key, bound, vector, power in (
-            ("velocity_mm_s", bounds.velocity[k], one, 1),
-            ("acceleration_mm_s2", bounds.acceleration[k], two, 2),
-            ("jerk_mm_s3", bounds.jerk[k], three, 3),
+        for limit, vector, power in (
+            (limits.velocity[k], one, 1),
+            (limits.axis_acceleration[k], two, 2),
+            (limits.axis_jerk[k], three, 3),
         ):
-            share = bounds.axis_share if power > 1 else 1.0
-            source = Source(bounds.axis_source(key, k), f"axis.{key} of {'xy'[k]}", share)
             with np.errstate(divide="ignore"):
-                yield _steady(s, source, bound, (bound / vector) ** (1.0 / power), power)
+                yield _steady(s, limit, (limit.value / vector) ** (1.0 / power), power)
             if power > 1:
-                yield _reached(s, source, bound, float(one.max()), power)
-        if bounds.plants is not None:
-            source = Source(
-                bounds.axis_source("volts", k), f"volts of {'xy'[k]}", bounds.axis_share
-            )
-            yield _volts(s, bounds.plants[k], source, one, two)
+                yield _reached(s, limit, float(one.max()), power)
+        if limits.plants is not None and limits.volts is not None:
+            yield _volts(s, limits.plants[k], limits.volts[k], one, two)
 
 
 def _places(spline: PHSpline) -> tuple[Real, NDArray[np.int8]]:
@@ -178,39 +171,36 @@ def _places(spline: PHSpline) -> tuple[Real, NDArray[np.int8]]:
     return s, side.astype(np.int8)
 
 
-def _along(s: Real, bounds: Bounds) -> Iterator[Allowed]:
-    feed, acceleration, jerk = bounds.sources
-    flat = np.ones(s.size)
-    yield _steady(s, feed, bounds.feed_mm_s, bounds.feed_mm_s * flat, 1)
-    for low, high, most in bounds.caps:
-        within = np.where((s >= low) & (s <= high), most, inf)
+def _along(s: Real, limits: PlanLimits) -> Iterator[LimitedFeed]:
+    yield _steady(s, limits.feed, limits.feed.value * np.ones(s.size), 1)
+    for zone in limits.zones:
+        within = np.where((s >= zone.from_mm) & (s <= zone.to_mm), zone.feed_mm_s, inf)
         if not np.isfinite(within).any():  # between two points
-            within[int(np.argmin(np.abs(s - 0.5 * (low + high))))] = most
-        yield _steady(
-            s, Source("limits", f"cap of {low:g} to {high:g} mm, feed_mm_s"), most, within, 1
-        )
-    yield _reached(s, acceleration, bounds.acceleration_mm_s2, 1.0, 2)
-    if jerk.section:
-        yield _reached(s, jerk, bounds.jerk_mm_s3, 1.0, 3)
+            middle = 0.5 * (zone.from_mm + zone.to_mm)
+            within[int(np.argmin(np.abs(s - middle)))] = zone.feed_mm_s
+        yield _steady(s, Limit("feed_mm_s", zone.feed_mm_s, zone=zone), within, 1)
+    yield _reached(s, limits.acceleration, 1.0, 2)
+    if limits.jerk.source:
+        yield _reached(s, limits.jerk, 1.0, 3)
 
 
-def _steady(s: Real, source: Source, bound: float, feed: Real, power: int) -> Allowed:
+def _steady(s: Real, limit: Limit, feed: Real, power: int) -> LimitedFeed:
     slowness = 1.0 / feed
     time_s = float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(s)))
-    return Allowed(source, bound / source.share, feed, time_s, power, 0.0)
+    return LimitedFeed(limit, limit.given, feed, time_s, power, 0.0)
 
 
-def _reached(s: Real, source: Source, bound: float, part: float, power: int) -> Allowed:
+def _reached(s: Real, limit: Limit, part: float, power: int) -> LimitedFeed:
     """From rest to rest inside one acceleration (power 2) or jerk (3), of which the path has at most `part`."""
     length = float(s[-1] - s[0])
-    most = bound / max(part, 1e-12)
+    most = limit.value / max(part, 1e-12)
     peak = sqrt(most * length) if power == 2 else cbrt(most * length**2 / 4.0)
     feed = np.full(s.size, inf)
     feed[int(np.searchsorted(s, s[0] + 0.5 * length))] = peak
-    return Allowed(source, bound / source.share, feed, 2.0 * length / peak, power, 0.0)
+    return LimitedFeed(limit, limit.given, feed, 2.0 * length / peak, power, 0.0)
 
 
-def _volts(s: Real, plant: Plant, source: Source, one: Real, two: Real) -> Allowed:
+def _volts(s: Real, plant: Plant, limit: Limit, one: Real, two: Real) -> LimitedFeed:
     """Reach >= |c1| v + T |c2| v^2 at constant feed v."""
     reach, bend = max(plant.reach_mm_s, 0.0), plant.time_constant_s * two
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -218,5 +208,5 @@ def _volts(s: Real, plant: Plant, source: Source, one: Real, two: Real) -> Allow
         feed = np.where(np.isnan(feed), inf, feed)
         slowness = 1.0 / feed
     time_s = float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(s)))
-    given = plant.friction_volts + (plant.volts - plant.friction_volts) / source.share
-    return _Volts(source, given, feed, time_s, 2, plant.friction_volts, plant, one, bend)
+    given = plant.friction_volts + (plant.volts - plant.friction_volts) / limit.share
+    return _VoltsFeed(limit, given, feed, time_s, 2, plant.friction_volts, plant, one, bend)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A first idea of the feed, good enough to say where knots should be; docs/theory/numerics.md 5.6."""
+"""The first estimate of the feed, and the knots that follow from it; docs/theory/numerics.md 5.6."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...spline import PHSpline
-from ..quantise import LONGEST_PIECE_MM
-from .bounds import Bounds
-from .curve import LEFT, RIGHT, frames
+from ..kinematics import LEFT, RIGHT, frames
+from ..pieces import LONGEST_PIECE_MM
+from .plan_limits import PlanLimits
 
 Real = NDArray[np.float64]
 
@@ -32,10 +32,10 @@ _LEAST_Q = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Sketch:
+class FirstEstimate:
     """q (n,) at arc lengths s (n,), rising; t (n,) when; `step_s` (n,) how long intervals may last.
 
-    pull  the acceleration reckoned with; `fine_s` (n,) how long intervals may last where it changes at once
+    pull  the acceleration assumed; `fine_s` (n,) how long intervals may last where it changes at once
     """
 
     s: Real
@@ -50,49 +50,54 @@ class Sketch:
         return np.asarray(np.interp(s, self.s, self.q))
 
 
-def steady_caps(spline: PHSpline, bounds: Bounds, s: Real) -> Real:
+def steady_limit(spline: PHSpline, limits: PlanLimits, s: Real) -> Real:
     """The greatest q at which a constant feed keeps every limit."""
-    q = _steady_caps(spline, bounds, s, LEFT)
+    q = _steady_limit(spline, limits, s, LEFT)
     joint = np.flatnonzero(np.isin(s, spline.segment_starts_mm))
-    q[joint] = np.minimum(q[joint], _steady_caps(spline, bounds, s[joint], RIGHT))
+    q[joint] = np.minimum(q[joint], _steady_limit(spline, limits, s[joint], RIGHT))
     return q
 
 
-def _steady_caps(spline: PHSpline, bounds: Bounds, s: Real, side: int) -> Real:
-    q: Real = np.full(s.size, bounds.feed_mm_s**2)
+def _steady_limit(spline: PHSpline, limits: PlanLimits, s: Real, side: int) -> Real:
+    q: Real = np.full(s.size, limits.feed.value**2)
     f = frames(spline, s, np.full(s.size, side, dtype=np.int8))
     with np.errstate(divide="ignore"):
-        q = np.minimum(q, bounds.centripetal_mm_s2 / np.abs(f.curvature))
+        q = np.minimum(q, limits.centripetal.value / np.abs(f.curvature))
         for part, velocity, acceleration, jerk in zip(
-            (np.real, np.imag), bounds.velocity, bounds.acceleration, bounds.jerk, strict=True
+            (np.real, np.imag),
+            limits.velocity,
+            limits.axis_acceleration,
+            limits.axis_jerk,
+            strict=True,
         ):
-            q = np.minimum(q, (velocity / np.abs(part(f.r1))) ** 2)
-            q = np.minimum(q, acceleration / np.abs(part(f.r2)))
-            q = np.minimum(q, (jerk / np.abs(part(f.r3))) ** (2.0 / 3.0))
-    for plant in bounds.plants or ():
+            q = np.minimum(q, (velocity.value / np.abs(part(f.r1))) ** 2)
+            q = np.minimum(q, acceleration.value / np.abs(part(f.r2)))
+            q = np.minimum(q, (jerk.value / np.abs(part(f.r3))) ** (2.0 / 3.0))
+    for plant in limits.plants or ():
         q = np.minimum(q, plant.reach_mm_s**2)
-    for low, high, feed in bounds.caps:
-        q[(s >= low) & (s <= high)] = np.minimum(q[(s >= low) & (s <= high)], feed**2)
+    for zone in limits.zones:
+        inside = (s >= zone.from_mm) & (s <= zone.to_mm)
+        q[inside] = np.minimum(q[inside], zone.feed_mm_s**2)
     return q
 
 
-def sketch(
+def first_estimate(
     spline: PHSpline,
-    bounds: Bounds,
+    limits: PlanLimits,
     low: float,
     high: float,
     q_start: float | None,
     period_s: float,
-) -> Sketch:
+) -> FirstEstimate:
     """From `low`, at rest (q_start None) or moving, to rest at `high`."""
-    s = _samples(spline, bounds, low, high)
-    cap = steady_caps(spline, bounds, s)
-    jerk = bounds.least_jerk
+    s = _samples(spline, limits, low, high)
+    most = steady_limit(spline, limits, s)
+    jerk = limits.least_jerk
     reach = (jerk * (high - low) ** 2) ** (1.0 / 3.0)
-    slowness = 1.0 / np.minimum(np.sqrt(cap), reach)
+    slowness = 1.0 / np.minimum(np.sqrt(most), reach)
     typical = (high - low) / float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(s)))
-    pull = min(_SHARE * bounds.least_acceleration, (jerk * typical) ** 0.5)
-    q = cap.copy()
+    pull = min(_SHARE * limits.least_acceleration, (jerk * typical) ** 0.5)
+    q = most.copy()
     q = np.minimum(q, _from_rest(high - s, jerk))
     if q_start is None:
         q = np.minimum(q, _from_rest(s - low, jerk))
@@ -109,7 +114,7 @@ def sketch(
         time[0] = np.cbrt(6.0 * (s[1] - s[0]) / jerk)
     time[-1] = np.cbrt(6.0 * (s[-1] - s[-2]) / jerk)
     t = np.concatenate((np.zeros(1), np.cumsum(time)))
-    return Sketch(s, q, t, *_steps(spline, s, q, t, pull, jerk, period_s), pull)
+    return FirstEstimate(s, q, t, *_steps(spline, s, q, t, pull, jerk, period_s), pull)
 
 
 def _from_rest(way: Real, jerk: float) -> Real:
@@ -117,12 +122,12 @@ def _from_rest(way: Real, jerk: float) -> Real:
     return np.asarray(0.25 * jerk**2 * (6.0 * np.maximum(way, 0.0) / jerk) ** (4.0 / 3.0))
 
 
-def _samples(spline: PHSpline, bounds: Bounds, low: float, high: float) -> Real:
+def _samples(spline: PHSpline, limits: PlanLimits, low: float, high: float) -> Real:
     joints = spline.segment_starts_mm
     first = int(np.searchsorted(joints, low, side="right"))
     last = int(np.searchsorted(joints, high, side="left"))
     edges = np.unique(
-        np.concatenate(([low], joints[first:last], stretch_ends(bounds, low, high), [high]))
+        np.concatenate(([low], joints[first:last], zone_ends(limits, low, high), [high]))
     )
     fine = np.linspace(0.0, 1.0, _SAMPLES + 1)[1:]
     count = max(1, min(16, 96 // max(1, edges.size)))
@@ -134,9 +139,9 @@ def _samples(spline: PHSpline, bounds: Bounds, low: float, high: float) -> Real:
     return np.asarray(s[np.append(True, np.diff(s) > 1e-12 * (high - low))])
 
 
-def stretch_ends(bounds: Bounds, low: float, high: float) -> Real:
-    """Where stretches with caps begin and end, between two arc lengths."""
-    ends = bounds.caps[:, :2].ravel()
+def zone_ends(limits: PlanLimits, low: float, high: float) -> Real:
+    """Where feed zones begin and end, between two arc lengths."""
+    ends = np.array([end for zone in limits.zones for end in (zone.from_mm, zone.to_mm)])
     return np.asarray(ends[(ends > low) & (ends < high)])
 
 
@@ -164,16 +169,16 @@ def _steps(
     return np.maximum(steps, least), np.maximum(beside, least)
 
 
-def refined(sketched: Sketch, s: Real, t: Real, acceleration: Real) -> Sketch:
-    """A sketch with shorter steps beside intervals of a plan in which the acceleration changed much: at arc lengths
+def refined(estimate: FirstEstimate, s: Real, t: Real, acceleration: Real) -> FirstEstimate:
+    """An estimate with shorter steps beside intervals of a plan in which the acceleration changed much: at arc lengths
     s (n,), passed at t (n,), were accelerations (n,).
     """
-    changed = np.abs(np.diff(acceleration)) > _SUDDEN * sketched.pull
+    changed = np.abs(np.diff(acceleration)) > _SUDDEN * estimate.pull
     marked = np.append(changed, False) | np.append(False, changed)
     if not marked.any():
-        return sketched
-    away = _distance(np.interp(sketched.s, s, t), t[marked])
-    return replace(sketched, step_s=np.minimum(sketched.step_s, sketched.fine_s + _GROWTH * away))
+        return estimate
+    away = _distance(np.interp(estimate.s, s, t), t[marked])
+    return replace(estimate, step_s=np.minimum(estimate.step_s, estimate.fine_s + _GROWTH * away))
 
 
 def _distance(t: Real, places: Real) -> Real:
@@ -184,9 +189,9 @@ def _distance(t: Real, places: Real) -> Real:
 
 
 def choose_knots(
-    spline: PHSpline, bounds: Bounds, s: Real, t: Real, step_s: Real, period_s: float
+    spline: PHSpline, limits: PlanLimits, s: Real, t: Real, step_s: Real, period_s: float
 ) -> Real:
-    """Knots in arc length: at joints and ends of stretches where these are far enough apart in time, evenly between."""
+    """Knots in arc length: at joints and ends of zones where these are far enough apart in time, evenly between."""
     low, high = float(s[0]), float(s[-1])
     density = 1.0 / step_s
     count = np.concatenate(
@@ -197,7 +202,7 @@ def choose_knots(
         count *= least / count[-1]
     joints = spline.segment_starts_mm
     joints = joints[(joints > low) & (joints < high)]
-    marks = np.unique(np.concatenate((joints, stretch_ends(bounds, low, high))))
+    marks = np.unique(np.concatenate((joints, zone_ends(limits, low, high))))
     at = np.interp(marks, s, count)
     kept, places, last = [low], [0.0], 0.0
     for mark, place in zip(marks.tolist(), at.tolist(), strict=True):

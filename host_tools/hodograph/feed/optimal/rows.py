@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .motion import Line, Points, acceleration, jerk_by_root
+from .constraints import Constraint, GridKinematics, acceleration, jerk_by_root
 
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -37,7 +37,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class About:
-    """The last feed at the points: p, and its derivatives where they are known (not from a sketch)."""
+    """The last feed at the points: p, and its derivatives where they are known (not from a first estimate)."""
 
     p: Real
     derivatives: tuple[Real, Real] | None = None
@@ -48,12 +48,12 @@ class Selection:
     """Which points make rows: those of `basic` near their limit, others once they were above it; for good.
 
     With `everything` all points make rows: safe, and slow.
-    A sketch, of which nothing is known, has rows at all points of `sketched`.
+    A first estimate, of which nothing is known, has rows at all points of `estimated`.
     So most limits at most points never become rows.
     """
 
     basic: Mask
-    sketched: Mask
+    estimated: Mask
     kept: dict[str, Mask] = field(default_factory=dict)
     last: Real | None = None
     everything: bool = False
@@ -61,7 +61,7 @@ class Selection:
 
     def choose(self, name: str, used: Real | None, among: Mask | None = None) -> Index:
         """Points for the rows of a quantity, of which the last feed used these shares."""
-        basic = self.sketched if used is None else self.basic
+        basic = self.estimated if used is None else self.basic
         wanted = basic if among is None else basic & among
         if self.everything:
             return np.flatnonzero(np.ones_like(wanted) if among is None else among)
@@ -81,13 +81,15 @@ class Selection:
         return np.flatnonzero(np.zeros(p.size, dtype=np.bool_) if self.low is None else self.low)
 
 
-def make_rows(points: Points, about: About, select: Selection, once: Mask) -> Rows:
+def make_rows(points: GridKinematics, about: About, select: Selection, once: Mask) -> Rows:
     """All rows about a feed. `once` (m,): points where accelerations count, not twice at knots."""
     flat: list[Rows] = []
-    for line in points.jerks:
-        flat += _jerk_rows(points, line, about, select)
-    flat += [_acceleration_rows(points, line, about, select, once) for line in points.accelerations]
-    flat += [_volts_rows(points, line, about, select, once) for line in points.volts]
+    for limited in points.jerks:
+        flat += _jerk_rows(points, limited, about, select)
+    flat += [
+        _acceleration_rows(points, limited, about, select, once) for limited in points.accelerations
+    ]
+    flat += [_volts_rows(points, limited, about, select, once) for limited in points.volts]
     flat += _speed_rows(points, about, select)
     return Rows(
         np.concatenate([row.coefficients for row in flat]),
@@ -97,55 +99,59 @@ def make_rows(points: Points, about: About, select: Selection, once: Mask) -> Ro
     )
 
 
-def _jerk_rows(points: Points, line: Line, about: About, select: Selection) -> Iterator[Rows]:
+def _jerk_rows(
+    points: GridKinematics, limited: Constraint, about: About, select: Selection
+) -> Iterator[Rows]:
     used = None
     if about.derivatives is not None:
-        used = jerk_by_root(line, about.p, *about.derivatives) * np.sqrt(about.p) / line.limit
+        used = jerk_by_root(limited, about.p, *about.derivatives) * np.sqrt(about.p) / limited.most
     for sign in (1.0, -1.0):
-        at = select.choose(f"{line.name}{sign:+g}", None if used is None else sign * used)
+        at = select.choose(f"{limited.name}{sign:+g}", None if used is None else sign * used)
         p, d, dd = (b[at] for b in points.basis)
-        by = sign * np.sqrt(about.p[at]) / line.limit
+        by = sign * np.sqrt(about.p[at]) / limited.most
         coefficients = (
-            (line.c3[at] * by + 0.5 / about.p[at])[:, None] * p
-            + (1.5 * line.c2[at] * by)[:, None] * d
-            + (0.5 * line.c1[at] * by)[:, None] * dd
+            (limited.c3[at] * by + 0.5 / about.p[at])[:, None] * p
+            + (1.5 * limited.c2[at] * by)[:, None] * d
+            + (0.5 * limited.c1[at] * by)[:, None] * dd
         )
         one = np.ones(at.size)
         yield Rows(coefficients, points.interval[at], -np.inf * one, 1.5 * one)
 
 
 def _acceleration_rows(
-    points: Points, line: Line, about: About, select: Selection, once: Mask
+    points: GridKinematics, limited: Constraint, about: About, select: Selection, once: Mask
 ) -> Rows:
     used = None
     if about.derivatives is not None:
-        used = np.abs(acceleration(line, about.p, about.derivatives[0])) / line.limit
-    at = select.choose(line.name, used, once)
+        used = np.abs(acceleration(limited, about.p, about.derivatives[0])) / limited.most
+    at = select.choose(limited.name, used, once)
     one = np.ones(at.size)
-    return Rows(_acceleration(points, line, at) / line.limit, points.interval[at], -one, one)
+    return Rows(_acceleration(points, limited, at) / limited.most, points.interval[at], -one, one)
 
 
-def _acceleration(points: Points, line: Line, at: Index) -> Real:
+def _acceleration(points: GridKinematics, limited: Constraint, at: Index) -> Real:
     p, d, _ = points.basis
-    return np.asarray(line.c2[at, None] * p[at] + 0.5 * line.c1[at, None] * d[at])
+    return np.asarray(limited.c2[at, None] * p[at] + 0.5 * limited.c1[at, None] * d[at])
 
 
-def _volts_rows(points: Points, line: Line, about: About, select: Selection, once: Mask) -> Rows:
+def _volts_rows(
+    points: GridKinematics, limited: Constraint, about: About, select: Selection, once: Mask
+) -> Rows:
     """c1 sqrt(p) + lag (acceleration): sqrt by its tangent, which is above it."""
     used = None
     if about.derivatives is not None:
-        pull = line.lag_s * acceleration(line, about.p, about.derivatives[0])
-        used = np.abs(line.c1 * np.sqrt(about.p) + pull) / line.limit
-    at = select.choose(line.name, used, once)
-    half = 0.5 * line.c1[at] * np.sqrt(about.p[at])
+        pull = limited.lag_s * acceleration(limited, about.p, about.derivatives[0])
+        used = np.abs(limited.c1 * np.sqrt(about.p) + pull) / limited.most
+    at = select.choose(limited.name, used, once)
+    half = 0.5 * limited.c1[at] * np.sqrt(about.p[at])
     coefficients = (half / about.p[at])[:, None] * points.basis[0][at]
-    coefficients = coefficients + line.lag_s * _acceleration(points, line, at)
+    coefficients = coefficients + limited.lag_s * _acceleration(points, limited, at)
     one = np.ones(at.size)
-    offset = half / line.limit
-    return Rows(coefficients / line.limit, points.interval[at], -one - offset, one - offset)
+    offset = half / limited.most
+    return Rows(coefficients / limited.most, points.interval[at], -one - offset, one - offset)
 
 
-def _speed_rows(points: Points, about: About, select: Selection) -> list[Rows]:
+def _speed_rows(points: GridKinematics, about: About, select: Selection) -> list[Rows]:
     """Bounds of p where it comes near them, and p above 0 where it does not stay so by itself."""
     high = select.choose("feed", about.p / points.most_p)
     one = np.ones(high.size)

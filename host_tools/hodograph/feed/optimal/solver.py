@@ -22,7 +22,7 @@ _WAYS = ((piqp.sparse_ldlt_cond, 1), (piqp.sparse_ldlt, 10))
 """Backends and rounds of scaling, tried in order. Condensed equations are a third quicker."""
 
 _CURVATURE = 1e-8
-"""A hair of curvature in the objective, in units of the unknowns' own scale: the solution is then unique."""
+"""A small curvature of the objective, in units of the unknowns' own scale: the solution is then unique."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,8 @@ class Problem:
 def solve(problem: Problem, penalty: float | None = None) -> Real | None:
     """The unknowns, or None where there is no solution.
 
-    penalty  rows give way, each interval's by a share of its own that costs this much (in units of the objective)
+    penalty  rows may be exceeded, each interval's by a share of its own that costs this much (in units of the
+    objective)
     """
     scale = problem.scale
     gradient = problem.gradient * scale
@@ -87,7 +88,7 @@ def _matrix(problem: Problem) -> sparse.csc_matrix:
 
 
 def _elastic(task: _Task, interval: Index, penalty: float) -> _Task:
-    """With one more unknown for each interval, at least 0: by how much its rows give way, on either side."""
+    """With one more unknown for each interval, at least 0: by how much its rows are exceeded, on either side."""
     size = int(interval.max()) + 1
     ones = np.ones(interval.size)
     give = sparse.csr_matrix((ones, interval, np.arange(interval.size + 1)), (ones.size, size))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Feed over arc length turned into arc length over time: polynomials of degree 7; docs/theory/numerics.md 5.6.
+"""The track: arc length over time in polynomials of degree 7, and its peaks; docs/theory/numerics.md 5.6.
 
 Each interval becomes a piece with the exact F, F', F'' and F''' at both ends (two-point Hermite): C2, and
 F''' jumps only where the plan's does.
@@ -7,18 +7,31 @@ F''' jumps only where the plan's does.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..pieces import exponents
-from ..quantise import RawPieces
+from ...spline import PHSpline
+from ..kinematics import LEFT, RIGHT, axis_motion, frames
+from ..limits import Limit, Peak
+from ..pieces import RawPieces, derivative_peaks, exponents, round_pieces
+from ..ramp import Ramp
+from .plan_limits import PlanLimits
 from .window import Solution
 
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
+
+_DRIFT_Q40 = 1024
+"""Joints of a program are within so many 2^-40 mm (1e-9 mm) of those of its path."""
+
+_US = np.linspace(0.0, 1.0, 33)
+_FEW_US = np.sort(np.append(np.linspace(0.0, 1.0, 17), (1.0 / 32.0, 31.0 / 32.0)))
+_CHUNK = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +93,19 @@ def joined(parts: Sequence[Ends]) -> Ends:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Pieces: knots in time (n + 1,) in 2^-32 s and in arc length; shape (n, 8): powers of u over each piece, mm,
-    from the piece's start.
+    """The curve of a plan with profile "optimal".
+
+    t_q32, s   knots (n + 1,) in time, 2^-32 s, and in arc length, mm
+    shape      (n, 8): powers of u over each piece, mm, from the piece's start
+    joints_mm  arc lengths of the path's joints, from 0 to its length
+    stretch    what the plan was slowed by in the end, 1.0003 being 0.03 %
     """
 
     t_q32: Int
     s: Real
     shape: Real
+    joints_mm: Real
+    stretch: float = 1.0
 
     @property
     def seconds(self) -> Real:
@@ -94,13 +113,52 @@ class Track:
         return np.asarray(np.diff(self.t_q32) * 2.0**-32)
 
     @property
-    def duration_s(self) -> float:
-        """Of the whole."""
+    def time_s(self) -> float:
+        """Duration of the whole."""
         return float(self.t_q32[-1]) * 2.0**-32
+
+    @property
+    def length_mm(self) -> Fraction:
+        """Length of the path, exactly."""
+        return Fraction(float(self.joints_mm[-1]))
+
+    @property
+    def ramp(self) -> Ramp | None:
+        """None: the feed has no ramp of a profile."""
+        return None
+
+    @property
+    def follows_joints(self) -> bool:
+        """Pieces begin at joints of segments."""
+        return True
+
+    def peaks(self) -> tuple[float, float, float]:
+        """Greatest feed, acceleration and jerk along the path, of the pieces."""
+        raw = self.raw_pieces(round(self.length_mm * 2**40))
+        v, a, j = (float(p.max()) for p in derivative_peaks(raw.duration_q32_s, raw.c_q40))
+        return v, a, j
+
+    def raw_pieces(
+        self, length_q40: int, period_us: int = 0, joints_q40: Int | None = None
+    ) -> RawPieces:
+        """The pieces in integers over exactly `length_q40`, for any period.
+
+        joints_q40  (segments + 1,) of the program: pieces that begin at a joint begin exactly there
+        """
+        starts = np.rint(self.s * 2.0**40).astype(np.int64)
+        if joints_q40 is not None:
+            near = joints_q40[
+                np.clip(np.searchsorted(joints_q40, starts - _DRIFT_Q40), 0, joints_q40.size - 1)
+            ]
+            moved = np.isin(self.s, self.joints_mm) & (np.abs(near - starts) <= _DRIFT_Q40)
+            starts = np.where(moved, near, starts)
+        starts[-1] = length_q40
+        c = round_pieces(self.t_q32, starts, self.shape)
+        return RawPieces(np.diff(self.t_q32), starts[:-1], c, 0.0, 0.0)
 
     def value(self, order: int, t_s: ArrayLike) -> Real:
         """F or a derivative of it at times, held within the motion; where F''' jumps, from after the jump."""
-        t = np.clip(np.asarray(t_s, dtype=np.float64), 0.0, self.duration_s)
+        t = np.clip(np.asarray(t_s, dtype=np.float64), 0.0, self.time_s)
         knots = self.t_q32 * 2.0**-32
         piece = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, self.shape.shape[0] - 1)
         h = self.seconds[piece]
@@ -109,7 +167,11 @@ class Track:
 
 
 def powers(shape: Real, order: int, u: Real) -> Real:
-    """A derivative by u of the polynomials (…, 8) at u (…,)."""
+    """A derivative by u of the polynomials (…, 8) at u (…,).
+
+    scipy's PPoly takes 0.4 to 0.9 of the time, but u = 1 from the next piece; its import takes over 100 times what a
+    plan would save.
+    """
     out = np.zeros(np.broadcast_shapes(shape.shape[:-1], u.shape))
     for k in range(7, order - 1, -1):
         factor = float(np.prod(np.arange(k - order + 1, k + 1)))
@@ -123,13 +185,14 @@ def track_of(raw: RawPieces, length_mm: float) -> Track:
     unit = np.ldexp(raw.duration_q32_s.astype(np.float64), -32 - exponents(raw.duration_q32_s))
     shape = np.zeros((unit.size, 8))
     shape[:, 1:] = raw.c_q40 * 2.0**-40 * unit[:, None] ** np.arange(1, 8)
-    return Track(t_q32, np.append(raw.start_q40 * 2.0**-40, length_mm), shape)
+    ends = np.array([0.0, length_mm])
+    return Track(t_q32, np.append(raw.start_q40 * 2.0**-40, length_mm), shape, ends)
 
 
 def make_track(ends: Ends, stretch: float, joints: Real) -> Track:
     """Pieces of the plan run slower by the factor `stretch` >= 1: what it uses of all limits falls with it.
 
-    joints  arc lengths where knots have to stay exactly, since limited quantities jump there
+    joints  arc lengths of the path's joints; knots there stay exactly, since limited quantities jump
     """
     t = np.concatenate((np.zeros(1), np.cumsum(ends.times.astype(np.longdouble) * stretch)))
     t_q32 = np.rint(t * 2.0**32).astype(np.int64)
@@ -143,7 +206,8 @@ def make_track(ends: Ends, stretch: float, joints: Real) -> Track:
     feed = feed + acceleration * late
     acceleration = acceleration + np.append(j0, 0.0) * late
     feed[-1] = acceleration[-1] = 0.0
-    return Track(t_q32, s, _hermite(np.diff(s), h, feed, acceleration, j0, j1))
+    shape = _hermite(np.diff(s), h, feed, acceleration, j0, j1)
+    return Track(t_q32, s, shape, joints, stretch)
 
 
 def _hermite(way: Real, h: Real, feed: Real, acceleration: Real, j0: Real, j1: Real) -> Real:
@@ -159,3 +223,87 @@ def _hermite(way: Real, h: Real, feed: Real, acceleration: Real, j0: Real, j1: R
     out[:, 6] = 70.0 * p - 34.0 * v + 6.5 * a - j / 2.0
     out[:, 7] = -20.0 * p + 10.0 * v - 2.0 * a + j / 6.0
     return out
+
+
+def find_peaks(spline: PHSpline, limits: PlanLimits, track: Track) -> dict[str, Peak]:
+    """The peak of every limited quantity by its dotted name: where it comes nearest to its limit, from 33 places of
+    each piece, its ends from inside. Volts are those beside friction.
+    """
+    out: dict[str, Peak] = {}
+    for first in range(0, track.shape.shape[0], _CHUNK):
+        part = slice(first, first + _CHUNK)
+        for one in _limited(spline, limits, track, part, _US):
+            usage = one.value / one.most
+            worst = int(np.argmax(usage))
+            most = float(np.broadcast_to(one.most, usage.shape)[worst])
+            found = Peak(
+                replace(one.limit, value=most), float(one.value[worst]), float(one.s[worst])
+            )
+            name = one.limit.dotted
+            if name not in out or found.usage > out[name].usage:
+                out[name] = found
+    return out
+
+
+def piece_usage(spline: PHSpline, limits: PlanLimits, track: Track) -> Real:
+    """The greatest limit usage (n,) of each piece."""
+    out = np.zeros(track.shape.shape[0])
+    for one in _limited(spline, limits, track, slice(None), _FEW_US):
+        out = np.maximum(out, (one.value / one.most).reshape(-1, _FEW_US.size).max(axis=1))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Limited:
+    """Magnitudes (k,) of a quantity at arc lengths (k,), and its limit there: one, or (k,)."""
+
+    limit: Limit
+    value: Real
+    s: Real
+    most: Real | float
+
+
+def _limited(
+    spline: PHSpline, limits: PlanLimits, track: Track, part: slice, us: Real
+) -> Iterator[_Limited]:
+    shape, h = track.shape[part, None, :], track.seconds[part, None]
+    way, v, a, j = ((powers(shape, k, us) / h**k).ravel() for k in range(4))
+    starts, ends = track.s[:-1][part], track.s[1:][part]
+    s = (starts[:, None] + way.reshape(-1, us.size)).ravel()
+    side = np.tile(np.where(us == 0.0, RIGHT, np.where(us == 1.0, LEFT, 0)), starts.size)
+    s = np.where(side == RIGHT, np.repeat(starts, us.size), s)
+    s = np.where(side == LEFT, np.repeat(ends, us.size), s)
+    f = frames(spline, s, side.astype(np.int8))
+    velocity, acceleration, jerk = axis_motion(f, v, a, j)
+    for limit, value in (
+        (Limit("feed_mm_s", limits.feed.value), v),
+        (Limit("acceleration_mm_s2", limits.acceleration.value), a),
+        (Limit("jerk_mm_s3", limits.jerk.value), j),
+        (limits.centripetal, f.curvature * v * v),
+    ):
+        if limit.value < inf:
+            yield _Limited(limit, np.abs(value), s, limit.value)
+    for k, of in enumerate((np.real, np.imag)):
+        for limit, vector in (
+            (limits.velocity[k], velocity),
+            (limits.axis_acceleration[k], acceleration),
+            (limits.axis_jerk[k], jerk),
+        ):
+            if limit.value < inf:
+                yield _Limited(limit, np.abs(of(vector)), s, limit.value)
+        if limits.plants is not None and limits.volts is not None:
+            plant = limits.plants[k]
+            drive = of(velocity) + plant.time_constant_s * of(acceleration)
+            volts = np.abs(drive / plant.gain_mm_s_v)
+            yield _Limited(limits.volts[k], volts, s, limits.volts[k].value)
+    if limits.zones:
+        yield from _in_zones(limits, np.abs(v), s)
+
+
+def _in_zones(limits: PlanLimits, feed: Real, s: Real) -> Iterator[_Limited]:
+    most = np.full(s.size, inf)
+    for zone in limits.zones:
+        within = (s >= zone.from_mm) & (s <= zone.to_mm)
+        most[within] = np.minimum(most[within], zone.feed_mm_s)
+    if np.isfinite(most).any():
+        yield _Limited(Limit("feed_mm_s", inf, zone=limits.zones[0]), feed, s, most)

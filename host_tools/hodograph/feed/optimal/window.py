@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...spline import PHSpline
-from .bounds import Bounds
+from .constraints import GridKinematics, make_points
 from .grid import GAUSS_W, GAUSS_X, Grid, corners, make_grid, squared_feed
-from .knots import Sketch, choose_knots, refined, sketch
-from .motion import Points, make_points
+from .knots import FirstEstimate, choose_knots, first_estimate, refined
+from .plan_limits import PlanLimits
 from .rows import About, Rows, Selection, make_rows
 from .solver import Problem, solve
 
@@ -38,7 +38,7 @@ _PATIENCE = 6
 _MOST_TRIALS = 3
 _TRUSTED = 2
 _TOLERABLE = 5e-3
-_LEAST_SKETCHED = 1e-3
+_LEAST_ESTIMATED = 1e-3
 _PENALTY = 30.0
 """What it costs to be above limits by their own size on one interval, in times that the window takes."""
 
@@ -72,7 +72,7 @@ class Solution:
         return float(self.times.sum())
 
     def squared_feed(self, s: Real) -> Real:
-        """q at arc lengths, above 0 at least by a hair."""
+        """q at arc lengths, above 0 by at least 1e-14 of the greatest."""
         return np.maximum(
             squared_feed(self.grid, self.q, self.slope, s), _LEAST_Q * float(self.q.max())
         )
@@ -82,12 +82,12 @@ class Solution:
 class _Setting:
     """What stays through the rounds on one grid."""
 
-    bounds: Bounds
+    limits: PlanLimits
     grid: Grid
     start: State | None
-    points: Points
+    points: GridKinematics
     basic: NDArray[np.bool_]
-    sketched: NDArray[np.bool_]
+    estimated: NDArray[np.bool_]
     once: NDArray[np.bool_]
     most_q: Real  # (n + 1,)
     gauss: tuple[
@@ -98,7 +98,7 @@ class _Setting:
 
 def plan_window(
     spline: PHSpline,
-    bounds: Bounds,
+    limits: PlanLimits,
     low: float,
     high: float,
     start: State | None,
@@ -110,20 +110,20 @@ def plan_window(
 
     known  an earlier solution that is good up to arc length known_to
     """
-    guess = sketch(spline, bounds, low, high, None if start is None else start.q, period_s)
+    guess = first_estimate(spline, limits, low, high, None if start is None else start.q, period_s)
     s, t, step = guess.s, guess.t, guess.step_s
     best: Solution | None = None
     about: Feed = guess.squared_feed
     if known is not None:
         about = _blend(known, known_to, guess)
     for trial in range(_MOST_TRIALS):
-        knots = choose_knots(spline, bounds, s, t, step, period_s)
+        knots = choose_knots(spline, limits, s, t, step, period_s)
         if known is not None:
             knots = _same_knots(knots, known, known_to)
         last = trial == _MOST_TRIALS - 1
         even = partial(_even, guess, known_to, period_s)
-        setting = _setting(spline, bounds, knots, start)
-        best = _rounds(setting, about, None if last else even)
+        setting = _setting(spline, limits, knots, start)
+        best = _Rounds(setting, about).run(None if last else even)
         if best is None or last or even(best):
             break
         about = best.squared_feed
@@ -134,7 +134,7 @@ def plan_window(
 
 def tightened(found: Solution, tight: Real) -> Solution | None:
     """The same window, on the same knots, with the limits of each interval divided by `tight` (n,)."""
-    return _rounds(replace(found.setting, tight=tight), found.squared_feed, None, found)
+    return _Rounds(replace(found.setting, tight=tight), found.squared_feed, found).run()
 
 
 def _same_knots(knots: Real, known: Solution, known_to: float) -> Real:
@@ -144,8 +144,8 @@ def _same_knots(knots: Real, known: Solution, known_to: float) -> Real:
     return np.concatenate((same, knots[knots > same[-1] + gap])) if same.size > 1 else knots
 
 
-def _blend(known: Solution, known_to: float, guess: Sketch) -> Feed:
-    """A known feed up to a place, a sketched one after it."""
+def _blend(known: Solution, known_to: float, guess: FirstEstimate) -> Feed:
+    """A known feed up to a place, the first estimate after it."""
 
     def feed(s: Real) -> Real:
         old = known.squared_feed(np.minimum(s, known_to))
@@ -154,7 +154,7 @@ def _blend(known: Solution, known_to: float, guess: Sketch) -> Feed:
     return feed
 
 
-def _even(guess: Sketch, known_to: float, period_s: float, found: Solution) -> bool:
+def _even(guess: FirstEstimate, known_to: float, period_s: float, found: Solution) -> bool:
     """Whether intervals last about as long as was wanted, after knots that are given: else knots have to move."""
     wish, s = _refined(guess, found), found.grid.s
     wanted = np.interp(0.5 * (s[1:] + s[:-1]), wish.s, wish.step_s)
@@ -164,7 +164,7 @@ def _even(guess: Sketch, known_to: float, period_s: float, found: Solution) -> b
     return not brief and not (found.times > 2.2 * wanted).any()
 
 
-def _refined(guess: Sketch, found: Solution) -> Sketch:
+def _refined(guess: FirstEstimate, found: Solution) -> FirstEstimate:
     """The wish for steps, now that it is known where the acceleration changes."""
     acceleration = 0.5 * found.slope
     acceleration[-1] = 0.0
@@ -174,7 +174,7 @@ def _refined(guess: Sketch, found: Solution) -> Sketch:
     return refined(guess, found.grid.s, t, acceleration)
 
 
-def _retimed(found: Solution, guess: Sketch, period_s: float) -> tuple[Real, Real, Real]:
+def _retimed(found: Solution, guess: FirstEstimate, period_s: float) -> tuple[Real, Real, Real]:
     grid = found.grid
     u = np.linspace(0.0, 1.0, 9)[1:]
     interval = np.repeat(np.arange(grid.size), u.size)
@@ -190,9 +190,9 @@ def _retimed(found: Solution, guess: Sketch, period_s: float) -> tuple[Real, Rea
     return s, t, np.maximum(step, 1.7 * period_s)
 
 
-def _setting(spline: PHSpline, bounds: Bounds, knots: Real, start: State | None) -> _Setting:
+def _setting(spline: PHSpline, limits: PlanLimits, knots: Real, start: State | None) -> _Setting:
     grid = make_grid(knots, start is None)
-    caps = _interval_caps(bounds, knots)
+    zones = _interval_zones(limits, knots)
     joints = spline.segment_starts_mm
     joints = joints[(joints > knots[0]) & (joints < knots[-1])]
     crossing, u = _inside(grid, joints)
@@ -206,16 +206,16 @@ def _setting(spline: PHSpline, bounds: Bounds, knots: Real, start: State | None)
     )
     sides = np.column_stack((u - _BESIDE, u + _BESIDE)).ravel()
     us = np.concatenate((np.tile(US, grid.size), sides, np.tile(GRADED_US, graded.size)))
-    points = make_points(spline, bounds, grid, interval, us, caps)
+    points = make_points(spline, limits, grid, interval, us, zones)
     basic = np.isin(us, BASIC_US) | (np.arange(us.size) >= grid.size * len(US))
-    sketched = basic & ((us != 0.5) | (grid.grade[interval] != 0))
+    estimated = basic & ((us != 0.5) | (grid.grade[interval] != 0))
     most = np.full(knots.size, np.inf)
     at_start, at_end = points.interval[us == 0.0], points.interval[us == 1.0] + 1
     moving = points.sigma[0] > 0.0
     limit = np.where(moving, points.most_p, np.inf) * np.where(moving, points.sigma[0], 1.0) ** 2
     np.minimum.at(most, at_start, limit[us == 0.0])
     np.minimum.at(most, at_end, limit[us == 1.0])
-    return _Setting(bounds, grid, start, points, basic, sketched, us < 1.0, most, _gauss(grid))
+    return _Setting(limits, grid, start, points, basic, estimated, us < 1.0, most, _gauss(grid))
 
 
 def _gauss(grid: Grid) -> tuple[Index, Real, Real]:
@@ -239,76 +239,92 @@ def _inside(grid: Grid, joints: Real) -> tuple[Index, Real]:
     return interval, (x - grid.x0[interval]) / grid.h[interval]
 
 
-def _interval_caps(bounds: Bounds, knots: Real) -> Real:
-    caps = np.full(knots.size - 1, np.inf)
+def _interval_zones(limits: PlanLimits, knots: Real) -> Real:
+    """The limit of the feed (n,) by zones that touch each interval."""
+    most = np.full(knots.size - 1, np.inf)
     slack = 1e-9 * (knots[-1] - knots[0])
-    for low, high, feed in bounds.caps:
-        first = int(np.searchsorted(knots, low + slack, side="right")) - 1
-        last = int(np.searchsorted(knots, high - slack, side="left"))
-        if last > 0 and first < caps.size:
+    for zone in limits.zones:
+        first = int(np.searchsorted(knots, zone.from_mm + slack, side="right")) - 1
+        last = int(np.searchsorted(knots, zone.to_mm - slack, side="left"))
+        if last > 0 and first < most.size:
             part = slice(max(first, 0), last)
-            caps[part] = np.minimum(caps[part], feed)
-    return caps
+            most[part] = np.minimum(most[part], zone.feed_mm_s)
+    return most
 
 
-def _rounds(
-    setting: _Setting,
-    sketched: Feed,
-    even: Callable[[Solution], bool] | None = None,
-    known: Solution | None = None,
-) -> Solution | None:
-    """Linear programs about the last feed, with further rows where it was above a limit between the others.
+class _Rounds:
+    """Quadratic programs about the last feed, with further rows where it was above a limit between the others.
 
-    One without a solution is solved with limits that give way: the next, about its feed, has one as a rule.
-    even   of a solution: where it is False after _TRUSTED rounds the rest is not worth the effort on these knots
-    known  a solution of nearly the same on the same knots
+    One without a solution is solved with limits that may be exceeded: the next, about its feed, has one as a rule.
     """
-    grid = setting.grid
-    select = Selection(setting.basic, setting.sketched)
-    about = About(_p_of(sketched, setting.points.interval, setting.points.s, setting))
-    inner = About(_p_of(sketched, setting.gauss[0], setting.gauss[1], setting))
-    typical = sketched(grid.s)
-    last_s = np.inf
-    if known is not None:
-        p, d, dd = setting.points.cubic(grid, known.q, known.slope)
-        about = About(np.maximum(p, _LEAST_P), (d, dd))
-        typical, last_s = known.q, known.duration_s
-    best: Solution | None = None
-    gave_way = False
-    for rounds in range(1, _MOST_ROUNDS + 1):
+
+    def __init__(self, setting: _Setting, estimate: Feed, known: Solution | None = None) -> None:
+        """Begins about an estimated feed; known: a solution of nearly the same on the same knots."""
+        self.setting = setting
+        self.select = Selection(setting.basic, setting.estimated)
+        self.about = About(_p_of(estimate, setting.points.interval, setting.points.s, setting))
+        self.inner_p = _p_of(estimate, setting.gauss[0], setting.gauss[1], setting)
+        self.typical_q = estimate(setting.grid.s)
+        self.duration_s = np.inf
+        self.best: Solution | None = None
+        self.exceeded = False
+        if known is not None:
+            p, d, dd = setting.points.cubic(setting.grid, known.q, known.slope)
+            self.about = About(np.maximum(p, _LEAST_P), (d, dd))
+            self.typical_q, self.duration_s = known.q, known.duration_s
+
+    def run(self, even: Callable[[Solution], bool] | None = None) -> Solution | None:
+        """The last solution; None where there is none, or only one above the limits.
+
+        even  of a solution: where it is False after _TRUSTED rounds, further rounds on these knots are useless
+        """
+        for rounds in range(1, _MOST_ROUNDS + 1):
+            unknowns = self._solved()
+            if unknowns is None:
+                return self.best if self._tolerable else None
+            gain = self._take(unknowns[0::2], unknowns[1::2], rounds)
+            assert self.best is not None
+            if rounds == _TRUSTED and even is not None and not even(self.best):
+                return self.best
+            self.select.everything = rounds >= _PATIENCE
+            if self.best.excess <= ALLOWED and abs(gain) < _GAIN * self.duration_s:
+                break
+        moving = self.setting.start is not None
+        return None if self.exceeded and moving and not self._tolerable else self.best
+
+    @property
+    def _tolerable(self) -> bool:
+        return self.best is not None and self.best.excess < _TOLERABLE
+
+    def _solved(self) -> Real | None:
+        """The unknowns of the next program; where a tolerable feed is known already, None rather than exceed limits."""
         problem = _problem(
-            setting,
-            make_rows(setting.points, about, select, setting.once),
-            inner.p,
-            typical,
-            _LEAST_FALL if np.isfinite(last_s) else _LEAST_SKETCHED,
+            self.setting,
+            make_rows(self.setting.points, self.about, self.select, self.setting.once),
+            self.inner_p,
+            self.typical_q,
+            _LEAST_FALL if np.isfinite(self.duration_s) else _LEAST_ESTIMATED,
         )
         found = solve(problem)
-        if found is None:
-            if best is not None and best.excess < _TOLERABLE:
-                return best
-            gave_way = True
-            found = solve(problem, _PENALTY * float(_times(setting, inner.p).sum()))
-        if found is None:
-            return None
-        q, slope = found[0::2], found[1::2]
+        if found is None and not self._tolerable:
+            self.exceeded = True
+            times = _times(self.setting, self.inner_p)
+            found = solve(problem, _PENALTY * float(times.sum()))
+        return found
+
+    def _take(self, q: Real, slope: Real, rounds: int) -> float:
+        """Makes a feed the last one. Returns by how much it is faster than the one before; s."""
+        setting, grid = self.setting, self.setting.grid
         p, d, dd = setting.points.cubic(grid, q, slope)
         excess = _excess(setting, p, d, dd)
-        about = About(np.maximum(p, _LEAST_FALL * about.p), (d, dd))
+        self.about = About(np.maximum(p, _LEAST_FALL * self.about.p), (d, dd))
         p = np.sum(setting.gauss[2] * corners(grid, setting.gauss[0], q, slope), axis=-1)
-        inner = About(np.maximum(p, _LEAST_FALL * inner.p))
-        times = _times(setting, inner.p)
-        typical = q
-        gain, last_s = last_s - float(times.sum()), float(times.sum())
-        best = Solution(grid, q, slope, times, excess, rounds, setting)
-        if rounds == _TRUSTED and even is not None and not even(best):
-            return best
-        select.everything = rounds >= _PATIENCE
-        if excess <= ALLOWED and abs(gain) < _GAIN * last_s:
-            break
-    if gave_way and setting.start is not None and best is not None and best.excess > _TOLERABLE:
-        return None
-    return best
+        self.inner_p = np.maximum(p, _LEAST_FALL * self.inner_p)
+        times = _times(setting, self.inner_p)
+        self.typical_q = q
+        before, self.duration_s = self.duration_s, float(times.sum())
+        self.best = Solution(grid, q, slope, times, excess, rounds, setting)
+        return before - self.duration_s
 
 
 def _p_of(feed: Feed, interval: Index, s: Real, setting: _Setting) -> Real:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reading and writing recordings, the format told by the file's name."""
+"""Reading and writing recordings. The file's name gives the format."""
 
 from __future__ import annotations
 

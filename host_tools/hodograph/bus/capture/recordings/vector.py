@@ -148,7 +148,7 @@ class VectorWriter:
             self._writer.on_message_received(_message(identifier, length, data, time_us))
 
     def _begin(self, first_us: int) -> int:
-        """Sets the time that the file's times are told from, as exactly as python-can reads it back."""
+        """Sets the time that the file's times count from, as exactly as python-can reads it back."""
         whole_s = first_us // 1_000_000
         if isinstance(self._writer, ASCWriter):  # it writes fractions of the start wrongly
             self._writer.log_event("Start of measurement", float(whole_s))

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""A whole path in windows, so that any length takes time and memory in proportion; docs/theory/numerics.md 5.6.
+"""The sequence of planning windows over a whole path; docs/theory/numerics.md 5.6.
 
-Every window is planned to rest at its own end, so whatever comes after it there is a way to stop inside all
-limits: a join can never lead into a dead end. Of each window only the first part is kept, before the place
-where having to stop makes itself felt; the next window begins there with the same F, F', F''.
+Windows make time and memory proportional to length. Every window is planned to rest at its own end, so there always
+is a motion to rest inside all limits. Of each window only the first part is kept, before the stop at its end affects
+it; the next window begins there with the same F, F', F''. A window is planned again where its pieces, not only the
+feed that they stand for, exceed a limit: next to rest and at sudden changes a polynomial of degree 7 differs from the
+feed over arc length that it is made from.
 """
 
 from __future__ import annotations
@@ -15,11 +17,10 @@ from numpy.typing import NDArray
 
 from ...errors import PlanError
 from ...spline import PHSpline
-from .bounds import Bounds
-from .knots import Sketch, sketch
-from .measured import measured
-from .track import Ends, ends_of
-from .window import Solution, State, plan_window
+from .knots import FirstEstimate, first_estimate
+from .plan_limits import PlanLimits
+from .track import Ends, ends_of, make_track, piece_usage
+from .window import Solution, State, plan_window, tightened
 
 Real = NDArray[np.float64]
 
@@ -27,9 +28,15 @@ INTERVALS = 960
 """About so many intervals a window."""
 
 _STOPS = 4.0
-"""What is not kept of a window, in times that stopping takes."""
+"""The rejected end of a window, in times that stopping takes."""
 
 _RETREATS = 4
+
+
+_EXCEEDED = 1.003
+_MOST_TIGHTENED = 3
+_INHERITED = 2
+"""Intervals that what a window begins with binds: their limits stay."""
 
 
 class NothingFoundError(PlanError):
@@ -37,11 +44,11 @@ class NothingFoundError(PlanError):
 
 
 def plan_windows(
-    spline: PHSpline, bounds: Bounds, period_s: float, intervals: int = INTERVALS
+    spline: PHSpline, limits: PlanLimits, period_s: float, intervals: int = INTERVALS
 ) -> Iterator[Ends]:
     """The parts of the plan in order. Raises NothingFoundError."""
     length = spline.length_mm
-    overview = _overview(spline, bounds, period_s)
+    overview = _overview(spline, limits, period_s)
     held: Solution | None = None
     count = 0
     while True:
@@ -49,7 +56,7 @@ def plan_windows(
         if held is not None:
             for _ in range(_RETREATS):
                 start = count
-                found = _continued(spline, bounds, overview, held, start, intervals, period_s)
+                found = _continued(spline, limits, overview, held, start, intervals, period_s)
                 if found is not None:
                     break
                 count = 2 * count // 3
@@ -59,10 +66,10 @@ def plan_windows(
         if found is None:
             low = 0.0 if held is None else float(held.grid.s[-1])
             high = overview.window_end(low, intervals)
-            found = plan_window(spline, bounds, low, high, None, period_s)
+            found = plan_window(spline, limits, low, high, None, period_s)
         if found is None:
             raise NothingFoundError(f"feed: nothing found from arc length {low:g} mm")
-        held = found = measured(spline, found)
+        held = found = _measured(spline, found)
         if found.grid.s[-1] >= length:
             yield ends_of(found, found.grid.size)
             return
@@ -71,7 +78,7 @@ def plan_windows(
 
 def _continued(
     spline: PHSpline,
-    bounds: Bounds,
+    limits: PlanLimits,
     overview: _Overview,
     held: Solution,
     count: int,
@@ -83,7 +90,7 @@ def _continued(
     state = State(float(held.q[count]), float(held.slope[count]))
     high = overview.window_end(low, intervals)
     return plan_window(
-        spline, bounds, low, high, state, period_s, held, _trusted_to(held, overview.stop_s)
+        spline, limits, low, high, state, period_s, held, _trusted_to(held, overview.stop_s)
     )
 
 
@@ -113,13 +120,41 @@ class _Overview:
         return float(np.interp(at + intervals, self.count, self.s))
 
 
-def _overview(spline: PHSpline, bounds: Bounds, period_s: float) -> _Overview:
-    found: Sketch = sketch(spline, bounds, 0.0, spline.length_mm, None, period_s)
+def _overview(spline: PHSpline, limits: PlanLimits, period_s: float) -> _Overview:
+    found: FirstEstimate = first_estimate(spline, limits, 0.0, spline.length_mm, None, period_s)
     density = 1.0 / found.step_s
     count = np.concatenate(
         (np.zeros(1), np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(found.t)))
     )
     feed = float(np.sqrt(found.q.max()))
-    jerk = bounds.least_jerk
-    pull = min(0.7 * bounds.least_acceleration, (jerk * feed) ** 0.5)
+    jerk = limits.least_jerk
+    pull = min(0.7 * limits.least_acceleration, (jerk * feed) ** 0.5)
     return _Overview(found.s, count, feed / pull + pull / jerk)
+
+
+def _measured(spline: PHSpline, found: Solution) -> Solution:
+    """A window, with tighter limits on intervals whose piece is above one by more than 0.3 %."""
+    best, trial = found, found
+    usage = _usage(spline, found)
+    least, tight = usage.max(), np.ones(usage.size)
+    for _ in range(_MOST_TIGHTENED):
+        if usage.max() <= _EXCEEDED:
+            break
+        tight *= np.where(usage > 1.0 + 0.3 * (_EXCEEDED - 1.0), usage, 1.0)
+        tried = tightened(trial, tight)
+        if tried is None:
+            break
+        trial, usage = tried, _usage(spline, tried)
+        if usage.max() < least:
+            best, least = trial, usage.max()
+    return best
+
+
+def _usage(spline: PHSpline, found: Solution) -> Real:
+    track = make_track(ends_of(found, found.grid.size), 1.0, spline.segment_starts_mm)
+    usage = piece_usage(spline, found.setting.limits, track)
+    if found.setting.start is not None:
+        usage[:_INHERITED] = 0.0
+    if found.grid.s[-1] < spline.length_mm:
+        usage[found.grid.grade < 0] = 0.0  # the stop at the end of a window is not kept
+    return usage

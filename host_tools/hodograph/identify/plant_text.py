@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from .fit import Estimate, Plant
+from .plant_fit import Estimate, Plant
 
 
 def plant_text(name: str, plant: Plant) -> str:

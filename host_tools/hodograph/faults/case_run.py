@@ -40,7 +40,7 @@ class Job:
 
 
 @dataclass
-class Record:
+class CaseRun:
     """What happened in a case, for the judge."""
 
     case: Case
@@ -70,8 +70,8 @@ class Record:
 @lru_cache(maxsize=8)
 def load_job(path: Path) -> Job:
     """The program of a path file; raises InputError, PlanError."""
-    chain = load_pipeline(path)
-    machine, image = chain.machine, chain.image
+    pipeline = load_pipeline(path)
+    machine, image = pipeline.machine, pipeline.image
     _, setpoints = NativeProgram(image).setpoints("fixed", machine.counts_per_mm)
     clean = simulate(
         image,
@@ -80,5 +80,5 @@ def load_job(path: Path) -> Job:
         feedforward=machine.plane_feedforward,
         keep_rows=False,
     )
-    longest_us = max(chain.program.stops.worst_us[1:])
+    longest_us = max(pipeline.program.stops.worst_us[1:])
     return Job(machine, image, path.with_name("other.toml"), clean, setpoints, longest_us * 1e-6)

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
-from ..native import RigFault
+from ..native import OfflineFault
 from .fault_rules import Fault
 from .variation import Variation, figure
 
@@ -37,7 +37,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains and feedforward that replace those of the path's machine; what is not given stays.
+    """Gains and feedforward that replace those of the path's machine; the others stay.
 
     `changes`: figure of a drive and its value for x and y; `feed`: the same for fields of Feedforward;
     `interpolation`: how the drives of x and y go from setpoint to setpoint.
@@ -68,7 +68,7 @@ class Run:
     case: Case
     sample: int
     plant: Plant
-    faults: tuple[RigFault, ...]
+    faults: tuple[OfflineFault, ...]
     varied: Varied
 
 

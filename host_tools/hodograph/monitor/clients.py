@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Messages to the browsers. Each has a bounded queue; for one that is too slow the oldest rows give way.
+"""The browsers of the live page: client slots, and a bounded queue of messages for each.
+
+A socket that has not said hello yet only waits; when too many wait, the one that has waited longest goes. A browser
+that only watches is refused when all slots are taken. One with the token always gets a slot: if need be that of the
+oldest browser with the token.
 
 All methods but `publish` belong to the event loop.
 """
@@ -8,9 +12,52 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from .messages import encode
+
+MOST_CLIENTS = 16
+"""Who look on, and as many again who may command."""
+MOST_WAITING = 64
+
+Socket = TypeVar("Socket")
+
+
+class ClientSlots(Generic[Socket]):
+    """The sockets of the server by what they are; `enter` and `seat` give the one that has to go, if any."""
+
+    def __init__(self) -> None:
+        self._waiting: list[Socket] = []
+        self._lookers: list[Socket] = []
+        self._operators: list[Socket] = []
+
+    def enter(self, socket: Socket) -> Socket | None:
+        """Somebody new."""
+        self._waiting.append(socket)
+        return self._waiting.pop(0) if len(self._waiting) > MOST_WAITING else None
+
+    def seat(self, socket: Socket, *, may_command: bool) -> Socket | None:
+        """It has said hello: a browser that only watches is returned itself when there is no slot."""
+        if socket in self._waiting:
+            self._waiting.remove(socket)
+        if may_command:
+            self._operators.append(socket)
+            return self._operators.pop(0) if len(self._operators) > MOST_CLIENTS else None
+        if len(self._lookers) >= MOST_CLIENTS:
+            return socket
+        self._lookers.append(socket)
+        return None
+
+    def leave(self, socket: Socket) -> None:
+        """It has gone."""
+        for group in (self._waiting, self._lookers, self._operators):
+            if socket in group:
+                group.remove(socket)
+
+    def everybody(self) -> list[Socket]:
+        """All sockets there are."""
+        return [*self._waiting, *self._lookers, *self._operators]
+
 
 QUEUE = 100
 """Messages that wait for one browser: some four seconds."""
@@ -36,7 +83,7 @@ class Client:
         self._there.set()
 
     def put(self, text: str) -> None:
-        """Queues a message; the oldest gives way when there is no room."""
+        """Queues a message; the oldest is dropped when there is no space."""
         if len(self._queue) >= QUEUE:
             self._queue.popleft()
             self.dropped += 1

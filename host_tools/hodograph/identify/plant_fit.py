@@ -119,7 +119,7 @@ class _Model:
         return np.stack(columns, axis=1)
 
     def rescale(self, figures: Float) -> None:
-        """Makes the scales what is left over."""
+        """Makes the scales those of the residuals."""
         mm, volts = self.errors(figures)
         self.scale_mm = max(_LEAST_MM, float(np.sqrt(np.mean(mm**2))))
         self.scale_volts = max(_LEAST_VOLTS, float(np.sqrt(np.mean(volts**2))))
@@ -181,7 +181,7 @@ def _first_guess(
 
 
 def _fit(model: _Model, start: Float, rounds: int = _ROUNDS) -> Float:
-    """Figures; in between the scales of both kinds of residuals become what is left over of them."""
+    """Figures; in between the scales of both kinds of residuals become those that remain."""
     low, figures = _LOW[: start.size], start
     for again in range(rounds):
         found = least_squares(

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: MIT
+"""The limited quantities at points of a grid, as functions of the unknown feed; docs/theory/numerics.md 5.6.
+
+With r as a function of x (grid.py) and R1, R2, R3 its derivatives, p = (dx/dt)^2:
+
+    velocity R1 sqrt(p)     acceleration R2 p + R1 p'/2     jerk sqrt(p) (R3 p + 3/2 R2 p' + R1 p''/2)
+
+and the same along the path with sigma in the place of r.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...spline import PHSpline
+from ..kinematics import LEFT, RIGHT, Frames, axis_motion, frames
+from ..limits import Limit
+from .grid import Grid, corners
+from .plan_limits import AxisPair, PlanLimits
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """One limited quantity of a kind: c1, c2, c3 (m,) are derivatives by x of what moves."""
+
+    limit: Limit
+    c1: Real
+    c2: Real
+    c3: Real
+    lag_s: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Of the quantity."""
+        return self.limit.dotted
+
+    @property
+    def most(self) -> float:
+        """The limit's value."""
+        return self.limit.value
+
+
+@dataclass(frozen=True, eq=False)
+class GridKinematics:
+    """Points (m,) on a grid with everything that does not depend on the feed. `zones` (m,): limit of the feed by
+    zones.
+    """
+
+    interval: Index
+    s: Real
+    basis: tuple[Real, Real, Real]
+    sigma: tuple[Real, Real, Real]
+    frame: Frames
+    zones: Real
+    limits: PlanLimits
+
+    @cached_property
+    def _derivatives(self) -> tuple[Complex, Complex, Complex]:
+        return axis_motion(self.frame, *self.sigma)
+
+    def _axes(self) -> tuple[tuple[Real, Real, Real], ...]:
+        d = self._derivatives
+        return tuple((p(d[0]), p(d[1]), p(d[2])) for p in (np.real, np.imag))
+
+    @cached_property
+    def jerks(self) -> tuple[Constraint, ...]:
+        """Limited jerks."""
+        return self._constraints(self.limits.jerk, self.limits.axis_jerk)
+
+    @cached_property
+    def accelerations(self) -> tuple[Constraint, ...]:
+        """Limited accelerations."""
+        return self._constraints(self.limits.acceleration, self.limits.axis_acceleration)
+
+    @cached_property
+    def volts(self) -> tuple[Constraint, ...]:
+        """Limited velocity + lag * acceleration, in mm/s."""
+        plants, limits = self.limits.plants, self.limits.volts
+        if plants is None or limits is None:
+            return ()
+        return tuple(
+            Constraint(replace(limit, value=plant.reach_mm_s), *c, lag_s=plant.time_constant_s)
+            for limit, plant, c in zip(limits, plants, self._axes(), strict=True)
+        )
+
+    @cached_property
+    def speeds(self) -> tuple[Constraint, ...]:
+        """Limited velocities."""
+        feed = Limit("feed_mm_s", self.limits.feed.value)
+        return self._constraints(feed, self.limits.velocity)
+
+    def _constraints(self, along: Limit, axes: AxisPair) -> tuple[Constraint, ...]:
+        out = [] if along.value == inf else [Constraint(along, *self.sigma)]
+        out += [
+            Constraint(limit, *c)
+            for limit, c in zip(axes, self._axes(), strict=True)
+            if limit.value < inf
+        ]
+        return tuple(out)
+
+    @cached_property
+    def most_p(self) -> Real:
+        """Bound (m,) of p from all that limits the feed alone; inf at rest."""
+        s1 = self.sigma[0]
+        with np.errstate(divide="ignore"):
+            most = (self.zones / s1) ** 2
+            for one in self.speeds:
+                most = np.minimum(most, (one.most / np.abs(one.c1)) ** 2)
+            if self.limits.centripetal.value < inf:
+                bend = np.abs(self.frame.curvature) * s1**2
+                most = np.minimum(most, self.limits.centripetal.value / bend)
+        return np.asarray(np.where(s1 > 0.0, most, inf))
+
+    def cubic(self, grid: Grid, q: Real, slope: Real) -> tuple[Real, Real, Real]:
+        """p, p', p'' (m,) of a solution."""
+        values = corners(grid, self.interval, q, slope)
+        p, d, dd = (np.sum(b * values, axis=-1) for b in self.basis)
+        return p, d, dd
+
+    def values(self, p: Real, d: Real, dd: Real) -> dict[str, tuple[Real, float | Real]]:
+        """Every limited quantity by name: its magnitude (m,) and its limit."""
+        root = np.sqrt(np.maximum(p, 0.0))
+        out: dict[str, tuple[Real, float | Real]] = {}
+        for one in self.speeds:
+            out[one.name] = np.abs(one.c1) * root, one.most
+        if np.isfinite(self.zones).any():
+            out["cap_mm_s"] = self.sigma[0] * root, self.zones
+        if self.limits.centripetal.value < inf:
+            out["centripetal_mm_s2"] = (
+                np.abs(self.frame.curvature) * self.sigma[0] ** 2 * p,
+                self.limits.centripetal.value,
+            )
+        for one in self.accelerations:
+            out[one.name] = np.abs(acceleration(one, p, d)), one.most
+        for one in self.volts:
+            drive = one.c1 * root + one.lag_s * acceleration(one, p, d)
+            out[one.name] = np.abs(drive), one.most
+        for one in self.jerks:
+            out[one.name] = np.abs(root * jerk_by_root(one, p, d, dd)), one.most
+        return out
+
+
+def acceleration(limited: Constraint, p: Real, d: Real) -> Real:
+    """c2 p + c1 p'/2."""
+    return limited.c2 * p + 0.5 * limited.c1 * d
+
+
+def jerk_by_root(limited: Constraint, p: Real, d: Real, dd: Real) -> Real:
+    """The jerk over sqrt(p)."""
+    return limited.c3 * p + 1.5 * limited.c2 * d + 0.5 * limited.c1 * dd
+
+
+def make_points(
+    spline: PHSpline, limits: PlanLimits, grid: Grid, interval: Index, u: Real, zones: Real
+) -> GridKinematics:
+    """Points at u in [0, 1] of intervals; at 0 and 1 the limits from inside. `zones` (n,) by interval."""
+    s, s1, s2, s3 = grid.sigma(interval, u)
+    s = np.where(u == 0.0, grid.s[interval], np.where(u == 1.0, grid.s[interval + 1], s))
+    side = np.where(u == 0.0, RIGHT, np.where(u == 1.0, LEFT, 0)).astype(np.int8)
+    return GridKinematics(
+        interval,
+        s,
+        grid.basis(interval, u),
+        (s1, s2, s3),
+        frames(spline, s, side),
+        zones[interval],
+        limits,
+    )

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""All limits of a feed along a path together, from every source; docs/theory/numerics.md 5.6."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import inf
+
+from ..limits import ControllerLimits, FeedZone, Limit, Limits, Plant, Plants, least
+from ..pieces import LONGEST_PIECE_MM
+from ..request import FeedRequest
+
+AxisPair = tuple[Limit, Limit]
+"""Limits of x and y; value inf: none."""
+
+_MOST_BY_ACCELERATION, _MOST_BY_JERK = 2.0**13, 24.0
+"""Greatest feed over the reserve of an acceleration, of a jerk: 2^-16 / s and 2^-8 / s^2 are the least override rate
+and override acceleration of the format, and a factor above 1 and the other one take half of the headroom each;
+docs/theory/numerics.md section 7."""
+
+_PERIODS_TO_FULL_ACCELERATION = 8
+"""Without any limit of the jerk the acceleration still builds up within so many periods."""
+
+_PERIODS_TO_FULL_FEED = 16
+
+
+@dataclass(frozen=True, eq=False)
+class PlanLimits:
+    """The limits of a plan, each the least of its kind, reserves taken off; value inf: none.
+
+    feed, acceleration, jerk, centripetal  along the path. That of the feed may come from an acceleration or a jerk,
+                whose reserve it leaves for a feed hold
+    velocity, axis_acceleration, axis_jerk, volts  of the axes; volts None: not limited
+    plants      of the axes, with the volts that may be used
+    zones       feed zones
+    """
+
+    feed: Limit
+    acceleration: Limit
+    jerk: Limit
+    centripetal: Limit
+    velocity: AxisPair
+    axis_acceleration: AxisPair
+    axis_jerk: AxisPair
+    volts: AxisPair | None
+    plants: Plants | None
+    zones: tuple[FeedZone, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def least_acceleration(self) -> float:
+        """The least limit of any acceleration; inf without one."""
+        volts = (p.reach_mm_s / p.time_constant_s for p in self.plants or ())
+        return min(least((self.acceleration, *self.axis_acceleration)).value, *volts, inf)
+
+    @property
+    def least_jerk(self) -> float:
+        """The least limit of any jerk."""
+        return least((self.jerk, *self.axis_jerk)).value
+
+    @property
+    def least_feed(self) -> float:
+        """The least limit of feed and axis velocities, zones aside."""
+        volts = (p.reach_mm_s for p in self.plants or ())
+        return min(least((self.feed, *self.velocity)).value, *volts, inf)
+
+    def eased(self, least_s: float) -> PlanLimits:
+        """The same with jerks that let all acceleration build up within `least_s` at the soonest."""
+        most = self.least_acceleration / least_s
+        path, x, y = (
+            replace(one, value=min(one.value, most)) for one in (self.jerk, *self.axis_jerk)
+        )
+        return replace(self, jerk=path, axis_jerk=(x, y))
+
+    def with_feed(self, most_mm_s: float) -> PlanLimits:
+        """The same with the feed at most `most_mm_s`."""
+        return replace(self, feed=replace(self.feed, value=min(self.feed.value, most_mm_s)))
+
+
+def gather(
+    request: FeedRequest,
+    limits: Limits,
+    controller: ControllerLimits | None,
+    plants: Plants | None,
+    period_us: int,
+) -> PlanLimits:
+    """The limits of a request: those of the path file, of the controller less its reserve, of the format.
+
+    Always with a finite jerk: where none is given, one that lets full acceleration, or full feed, build up
+    within a few periods.
+    """
+    period_s = 1e-6 * period_us
+    longest = Limit(
+        "feed_mm_s", 0.45 * LONGEST_PIECE_MM / period_s, "format", words="pieces of 32 mm"
+    )
+    requested = Limit("nominal_mm_s", request.nominal_mm_s, "feed")
+    feeds = [*_given(limits, controller, "feed_mm_s"), *_held(limits, controller)]
+    weaker = None if plants is None else _weaker(plants, limits.reserve)
+    found = PlanLimits(
+        least((longest, requested, *feeds)),
+        least(_given(limits, controller, "acceleration_mm_s2")),
+        least(_given(limits, controller, "jerk_mm_s3")),
+        Limit("centripetal_mm_s2", limits.centripetal_mm_s2 or inf),
+        limits.axis_limits("velocity_mm_s"),
+        limits.axis_limits("acceleration_mm_s2"),
+        limits.axis_limits("jerk_mm_s3"),
+        None if weaker is None else _volts(limits, weaker),
+        weaker,
+        limits.zones,
+    )
+    return found if found.least_jerk < inf else _with_jerk(found, period_s)
+
+
+def _with_jerk(limits: PlanLimits, period_s: float) -> PlanLimits:
+    """With a limit of the jerk, where none is given."""
+    peak = limits.least_acceleration
+    if peak < inf:
+        jerk = peak / (_PERIODS_TO_FULL_ACCELERATION * period_s)
+    else:
+        jerk = limits.least_feed / (_PERIODS_TO_FULL_FEED * period_s) ** 2
+    note = (
+        f"no limit bounds the jerk: {jerk:.4g} mm/s^3 is taken, a few periods to full acceleration"
+    )
+    return replace(limits, jerk=Limit("jerk_mm_s3", jerk, ""), notes=(note,))
+
+
+def _weaker(plants: Plants, reserve: float) -> Plants:
+    """Plants that may use a part only of what friction leaves of their volts."""
+    x, y = (
+        replace(one, volts=one.friction_volts + (1.0 - reserve) * (one.volts - one.friction_volts))
+        for one in plants
+    )
+    return x, y
+
+
+def _volts(limits: Limits, weaker: Plants) -> AxisPair:
+    """Limits of the volts beside friction."""
+    x, y = (
+        replace(limit, value=_usable_volts(plant))
+        for limit, plant in zip(limits.volts_limits(weaker), weaker, strict=True)
+    )
+    return x, y
+
+
+def _usable_volts(plant: Plant) -> float:
+    return plant.reach_mm_s / plant.gain_mm_s_v
+
+
+def _given(limits: Limits, controller: ControllerLimits | None, key: str) -> Iterator[Limit]:
+    """The limit along the path of the path file, and that of the controller."""
+    own = getattr(limits, key)
+    yield Limit(key, inf if own is None else own)
+    if controller is not None:
+        yield controller.limit(key)
+
+
+def _held(limits: Limits, controller: ControllerLimits | None) -> Iterator[Limit]:
+    """Feeds up to which the reserve of a limit leaves a feed hold the least override rates that the format has."""
+    for key, by in (
+        ("acceleration_mm_s2", _MOST_BY_ACCELERATION),
+        ("jerk_mm_s3", _MOST_BY_JERK),
+    ):
+        share = limits.reserve * by
+        for k, value in enumerate(getattr(limits.axes, key) or ()):
+            yield Limit(key, value * limits.reserve * by, limits.source(key, k), k, None, share)
+        if controller is not None:
+            free = controller.kept_free
+            value = float(getattr(controller, key)) * free * by
+            yield Limit(key, value, "controller", share=free * by)
