@@ -47,11 +47,11 @@ class Compared:
         return None if self.least_s is None else self.rest_after_s / self.least_s
 
 
-def stops_of(chain: Pipeline, kind: str, instants: int) -> list[Compared]:
+def stops_of(pipeline: Pipeline, kind: str, instants: int) -> list[Compared]:
     """One stop at each instant, with the least time to rest from the state that the plan has there."""
-    image, plan, machine = NativeProgram(chain.image), chain.plan, chain.machine
-    own = LIMITS[kind](plan, stop_terms(machine, chain.file.limits))
-    least = LeastStop(chain.spline_result.spline, own.raised(StopSearch(image).used(own)))
+    image, plan, machine = NativeProgram(pipeline.image), pipeline.plan, pipeline.machine
+    own = LIMITS[kind](plan, stop_terms(machine, pipeline.file.limits))
+    least = LeastStop(pipeline.spline_result.spline, own.raised(StopSearch(image).used(own)))
     period_s = machine.period_us * 1e-6
     out = []
     for share in np.arange(1, instants + 1) / (instants + 1):
@@ -70,10 +70,10 @@ def stops_of(chain: Pipeline, kind: str, instants: int) -> list[Compared]:
 
 def measure(name: str, instants: int, listed: bool) -> dict[str, Any]:
     """Figures of one program."""
-    chain = load_pipeline(ROOT / f"examples/{name}.toml")
+    pipeline = load_pipeline(ROOT / f"examples/{name}.toml")
     out: dict[str, Any] = {}
     for kind in LIMITS:
-        stops = stops_of(chain, kind, instants)
+        stops = stops_of(pipeline, kind, instants)
         ratios = np.array([one.of_least for one in stops if one.of_least is not None])
         out[kind] = {
             "stops": len(stops),
