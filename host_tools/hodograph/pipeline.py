@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 
-from .config import Drive, Machine, PathFile, is_there, load_machine, load_path_file
+from .config import Drive, Machine, PathFile, SpacePathSpec, is_there, load_machine, load_path_file
 from .errors import InputError, PlanError
 from .feed import (
     AxisLimits,
@@ -39,6 +39,11 @@ from .program import (
 )
 from .program.codes import ProgramError
 from .spline import SplineResult, from_control_polygon, through_points
+from .spline.spatial import (
+    SpatialSplineResult,
+    spatial_from_control_polygon,
+    spatial_through_points,
+)
 
 
 def controller_limits(machine: Machine) -> ControllerLimits:
@@ -220,7 +225,7 @@ class Pipeline:
 
     @cached_property
     def spline_result(self) -> SplineResult:
-        """The spline and how it was found."""
+        """The spline and how it was found. Raises PlanError for a path in space."""
         path = self.file.path
         with _named_by(f"{self.file.file}: [path]"):
             if not path.through:
@@ -231,6 +236,25 @@ class Pipeline:
                 ends=path.ends,
                 start_tangent=path.start_tangent,
                 end_tangent=path.end_tangent,
+                knots=path.knots,
+            )
+
+    @cached_property
+    def spatial_spline_result(self) -> SpatialSplineResult | None:
+        """The spline of a path in space and how it was found; None for a path in the plane."""
+        path = self.file.given_path
+        if not isinstance(path, SpacePathSpec):
+            return None
+        with _named_by(f"{self.file.file}: [path]"):
+            if not path.through:
+                return spatial_from_control_polygon(path.points, path.closed)
+            return spatial_through_points(
+                path.points,
+                path.closed,
+                ends=path.ends,
+                start_tangent=path.start_tangent,
+                end_tangent=path.end_tangent,
+                knots=path.knots,
             )
 
     @property
@@ -381,6 +405,11 @@ def _named_by(place: str) -> Iterator[None]:
         raise type(error)(f"{place} {error}") from error
 
 
-def load_pipeline(file: Path, machine: Path | None = None) -> Pipeline:
-    """The pipeline that begins with a path file; raises InputError."""
-    return Pipeline(load_path_file(file), machine)
+def load_pipeline(
+    file: Path, machine: Path | None = None, *, allow_space: bool = False
+) -> Pipeline:
+    """The pipeline that begins with a path file; raises InputError, and PlanError for a path in space unless allowed."""
+    found = load_path_file(file)
+    if not allow_space:
+        found.require_planar()
+    return Pipeline(found, machine)

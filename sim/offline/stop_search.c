@@ -31,8 +31,8 @@
     1e-4 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes; */
 #define SURE_EACH                                                                                  \
     12 /* ticks of a brake between two looks whether the rest of it surely keeps the limits */
-#define SPARE_TIME  1.25 /* of brake_time, */
-#define SPARE_TICKS 10.0 /* and ticks more */
+#define SPARE_TIME    1.25 /* of brake_time, */
+#define SPARE_TICKS   10.0 /* and ticks more */
 #define FEED_ROUNDING 1e-9 /* share of a feed that the plan may be above it */
 #define FASTER                                                                                     \
     0.03 /* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
@@ -42,7 +42,8 @@
 
 /* What is looked at: one over the limits, less the margin; 0: none. */
 struct inverse {
-    double feed; /* share of the path's feed that counts: less than 1 where a little more is allowed */
+    double
+        feed; /* share of the path's feed that counts: less than 1 where a little more is allowed */
     double velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
 };
 

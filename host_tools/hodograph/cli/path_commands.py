@@ -20,21 +20,22 @@ from ..program.check import check
 from ..program.image import LARGEST_BANK, MAGIC, RECORD_BYTES, memory_bytes
 from ..program.stops import stops_dict, stops_text
 from ..simulate import Motion, StoppedRun, last_tick_s, simulate, simulate_stop, write_trace
+from ..spline import PHSpline
+from ..spline.spatial import SpatialPHSpline
 from .output import json_text, note, number, print_json, print_rows, progress, write_file
 
 
 def spline(options: Namespace) -> None:
     """hodograph spline."""
-    pipeline = load_pipeline(options.file)
-    found = pipeline.spline_result
+    pipeline = load_pipeline(options.file, allow_space=True)
+    found = pipeline.spatial_spline_result or pipeline.spline_result
     curve = found.spline
     for line in found.notes:
         note(f"{options.file.name}: {line}")
-    nodes = curve.nodal_points
     result: dict[str, object] = {
         "closed": curve.closed,
         "segments": curve.segment_count,
-        "nodal_points": _pairs(nodes),
+        "nodal_points": _lists(curve.nodal_points),
         "length_mm": curve.length_mm,
         "segment_lengths_mm": curve.segment_lengths_mm.tolist(),
         "newton_iterations": found.newton_iterations,
@@ -45,10 +46,12 @@ def spline(options: Namespace) -> None:
         "bending_ratio": found.bending_ratio,
     }
     if options.at is not None:
-        s = _within("--at", options.at, curve.length_mm, "mm")
-        result["points"] = _pairs(curve.point(s))
-        result["tangents"] = _pairs(curve.tangent(s))
-        result["curvatures"] = np.atleast_1d(curve.curvature(s)).tolist()
+        s = np.atleast_1d(_within("--at", options.at, curve.length_mm, "mm"))
+        result["points"] = _lists(curve.point(s))
+        result["tangents"] = _lists(curve.tangent(s))
+        result["curvatures"] = curve.curvature(s).tolist()
+        if isinstance(curve, SpatialPHSpline):
+            result["torsions"] = curve.torsion(s).tolist()
     if options.json:
         print_json(result)
         return
@@ -61,14 +64,26 @@ def spline(options: Namespace) -> None:
         ]
     )
     if options.at is not None:
-        print(f"{'s mm':>12} {'x mm':>16} {'y mm':>16} {'curvature /mm':>16}")
-        for at, z, k in zip(options.at, curve.point(s), curve.curvature(s), strict=True):
-            print(f"{at:12.6g} {z.real:16.9f} {z.imag:16.9f} {k:16.9f}")
+        _print_places(curve, s)
 
 
-def _pairs(values: NDArray[np.complex128]) -> list[list[float]]:
-    """Complex numbers as [[x, y], …]."""
-    return [[float(v.real), float(v.imag)] for v in np.atleast_1d(values)]
+def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> None:
+    columns = [("curvature /mm", curve.curvature(s))]
+    if isinstance(curve, SpatialPHSpline):
+        columns.append(("torsion /mm", curve.torsion(s)))
+    points = np.array(_lists(curve.point(s)))
+    names = ["x mm", "y mm", "z mm"][: points.shape[1]] + [name for name, _ in columns]
+    print(f"{'s mm':>12} " + " ".join(f"{name:>16}" for name in names))
+    for at, row in zip(s, np.column_stack((points, *(v for _, v in columns))), strict=True):
+        print(f"{at:12.6g} " + " ".join(f"{value:16.9f}" for value in row))
+
+
+def _lists(values: NDArray[np.complex128] | NDArray[np.float64]) -> list[list[float]]:
+    """Points (n,) as [[x, y], …], or points in space (n, 3) as [[x, y, z], …]."""
+    if np.iscomplexobj(values):
+        values = np.stack((values.real, values.imag), axis=-1)
+    found: list[list[float]] = values.tolist()
+    return found
 
 
 def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray:

@@ -4,7 +4,7 @@
 from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive
 from .machine_file import PLANE_AXES, Machine, Supervision, load_machine
-from .path_file import PathFile, PathSpec, load_path_file
+from .path_file import PathFile, PathSpec, SpacePathSpec, load_path_file
 from .table import is_there, read_toml
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "PathFile",
     "PathSpec",
     "Scaling",
+    "SpacePathSpec",
     "Supervision",
     "is_there",
     "load_drive",

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import PlanError
 from ..feed import AxisLimits, FeedRequest, FeedZone, Limits
 from ..feed.limits import GREATEST_RESERVE, LEAST_RESERVE, POLICIES
 from ..feed.request import (
@@ -24,7 +25,7 @@ from ..feed.request import (
     OPTIMAL,
     PROFILES,
 )
-from ..spline import END_NAMES
+from ..spline import END_NAMES, KNOT_NAMES
 from .table import Table, read_toml
 
 COORDINATE_LIMIT_MM = 4096.0
@@ -34,7 +35,7 @@ _SAME_MM = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class PathSpec:
-    """Points (n,) as x + iy in mm, of a control polygon or to go through, and the end conditions."""
+    """Points (n,) as x + iy in mm, of a control polygon or to go through, the end conditions and knots."""
 
     closed: bool
     points: NDArray[np.complex128]
@@ -42,6 +43,20 @@ class PathSpec:
     ends: str
     start_tangent: complex | None
     end_tangent: complex | None
+    knots: str
+
+
+@dataclass(frozen=True, eq=False)
+class SpacePathSpec:
+    """The same in space: points (n, 3) in mm, and directions (3,)."""
+
+    closed: bool
+    points: NDArray[np.float64]
+    through: bool
+    ends: str
+    start_tangent: NDArray[np.float64] | None
+    end_tangent: NDArray[np.float64] | None
+    knots: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +65,28 @@ class PathFile:
 
     file: Path
     name: str
-    path: PathSpec
+    given_path: PathSpec | SpacePathSpec
     feed: FeedRequest | None
     limits: Limits
     machine_file: Path | None
 
+    @property
+    def path(self) -> PathSpec:
+        """The path in the plane; raises PlanError as `require_planar`."""
+        return self.require_planar()
+
+    def require_planar(self) -> PathSpec:
+        """The path in the plane. Raises PlanError for a path in space, which only has a spline so far."""
+        if isinstance(self.given_path, SpacePathSpec):
+            raise PlanError(
+                f"{self.file}: [path] has points [x, y, z]: only the command spline takes a path in space; "
+                "give points [x, y]"
+            )
+        return self.given_path
+
 
 _SECTIONS = ("path", "feed", "limits", "machine")
-_PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent")
+_PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent", "knots")
 _FEED = ("profile", "nominal_mm_s", "ramp_time_s", "n_c", "degree")
 _LIMITS = (
     "feed_mm_s",
@@ -89,14 +118,14 @@ def load_path_file(file: Path) -> PathFile:
     return PathFile(
         file=file,
         name=file.stem,
-        path=path,
+        given_path=path,
         feed=feed,
         limits=limits,
         machine_file=machine.path("file") if machine.has("file") else None,
     )
 
 
-def _path(table: Table) -> PathSpec:
+def _path(table: Table) -> PathSpec | SpacePathSpec:
     through = table.has("through")
     if through and table.has("control_points"):
         raise table.error("through", "is given beside control_points: keep one of the two")
@@ -106,37 +135,47 @@ def _path(table: Table) -> PathSpec:
     for key in ("ends", "start_tangent", "end_tangent"):
         if table.has(key) and (closed or not through):
             raise table.error(key, "applies to open paths with through points only: remove it")
+    if table.has("knots") and not through:
+        raise table.error("knots", "applies to through points only: remove it")
     key = "through" if through else "control_points"
     points = table.points(key, limit=COORDINATE_LIMIT_MM)
     if closed:
         _check_closing(table, key, points)
+    ends = table.choice("ends", END_NAMES, END_NAMES[0])
+    knots = table.choice("knots", KNOT_NAMES, KNOT_NAMES[0])
+    if points.shape[1] == 3:
+        start, end = _direction(table, "start_tangent"), _direction(table, "end_tangent")
+        return SpacePathSpec(closed, points, through, ends, start, end, knots)
     return PathSpec(
         closed=closed,
-        points=points,
+        points=np.asarray(points[:, 0] + 1j * points[:, 1]),
         through=through,
-        ends=table.choice("ends", END_NAMES, END_NAMES[0]),
+        ends=ends,
         start_tangent=_tangent(table, "start_tangent"),
         end_tangent=_tangent(table, "end_tangent"),
+        knots=knots,
     )
 
 
-def _check_closing(table: Table, key: str, points: NDArray[np.complex128]) -> None:
+def _check_closing(table: Table, key: str, points: NDArray[np.float64]) -> None:
     """Refuses a tail that seems meant to repeat the first points of a closed path and does not.
 
     It seems so where the last point, or two of the last three, lie within `_CLOSING` of the median
     distance between consecutive points; exact repeats are left to the spline, which drops them.
     """
-    near = _CLOSING * float(np.median(np.abs(np.diff(points)))) if points.size > 1 else 0.0
+    count = points.shape[0]
+    legs = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    near = _CLOSING * float(np.median(legs)) if count > 1 else 0.0
     for tail in (1, 3):
-        if points.size < tail + 3:
+        if count < tail + 3:
             return
-        misses = np.abs(points[-tail:] - points[:tail])
+        misses = np.linalg.norm(points[-tail:] - points[:tail], axis=1)
         worst = int(np.argmax(misses))
         agree = np.count_nonzero(misses <= near)
         if misses[worst] > _SAME_MM and 2 * agree > tail:
             raise table.error(
                 key,
-                f"do not close: point {points.size - tail + worst} is {misses[worst]:.6g} mm away from "
+                f"do not close: point {count - tail + worst} is {misses[worst]:.6g} mm away from "
                 f"point {worst}, which it seems to repeat: give each point once, or repeat it exactly",
             )
 
@@ -148,6 +187,15 @@ def _tangent(table: Table, key: str) -> complex | None:
     if value == 0:
         raise table.error(key, "must not be [0, 0]: give a direction")
     return value
+
+
+def _direction(table: Table, key: str) -> NDArray[np.float64] | None:
+    if not table.has(key):
+        return None
+    vector = np.array(table.triple(key, low=-1e9, high=1e9))
+    if not vector.any():
+        raise table.error(key, "must not be [0, 0, 0]: give a direction")
+    return vector
 
 
 def _feed(table: Table) -> FeedRequest:

@@ -181,27 +181,40 @@ class Table:
             raise self.error(key, f"holds a number twice: {_show(value)}")
         return found
 
-    def points(self, key: str, *, limit: float) -> NDArray[np.complex128]:
-        """A list of [x, y] as complex numbers x + iy, each component within ±`limit`."""
+    def triple(self, key: str, *, low: float, high: float) -> tuple[float, float, float]:
+        """Three finite numbers from `low` to `high`."""
+        value = self._get(key, _MISSING, "[a, b, c]")
+        if not isinstance(value, list) or len(value) != 3:
+            raise self.error(key, f"must be three numbers [a, b, c], but is {_show(value)}")
+        each = [Table(self.file, self.section, {key: item}, (key,)) for item in value]
+        x, y, z = (one.number(key, low=low, high=high) for one in each)
+        return x, y, z
+
+    def points(self, key: str, *, limit: float) -> NDArray[np.float64]:
+        """A list of [x, y], or of [x, y, z], as an array (n, 2) or (n, 3), each component within ±`limit`."""
         value = self._get(key, _MISSING, "[[x, y], ...]")
         if not isinstance(value, list) or not value:
             raise self.error(key, f"must be a list [[x, y], ...], but is {_show(value)}")
+        size = 3 if isinstance(value[0], list) and len(value[0]) == 3 else 2
         for i, point in enumerate(value):
-            if not isinstance(point, list) or len(point) != 2:
-                raise self.error(key, f"point {i} must be [x, y], but is {_show(point)}")
+            if not isinstance(point, list) or len(point) != size:
+                form = "[x, y, z] like the first" if size == 3 else "[x, y]"
+                raise self.error(key, f"point {i} must be {form}, but is {_show(point)}")
             for coordinate in point:
-                if isinstance(coordinate, bool) or not isinstance(coordinate, (int, float)):
-                    raise self.error(key, f"point {i} holds {_show(coordinate)}: give two numbers")
-                if not math.isfinite(_as_float(coordinate)):
-                    raise self.error(
-                        key, f"point {i} holds {_show(coordinate)}: give two finite numbers"
-                    )
-                if abs(coordinate) > limit:
-                    raise self.error(
-                        key, f"point {i} holds {coordinate:g}: at most {limit:g} mm from 0"
-                    )
-        xy = np.asarray(value, dtype=np.float64)
-        return np.asarray(xy[:, 0] + 1j * xy[:, 1])
+                self._check_coordinate(key, i, coordinate, limit, "three" if size == 3 else "two")
+        return np.asarray(value, dtype=np.float64)
+
+    def _check_coordinate(
+        self, key: str, i: int, coordinate: Any, limit: float, count: str
+    ) -> None:
+        if isinstance(coordinate, bool) or not isinstance(coordinate, (int, float)):
+            raise self.error(key, f"point {i} holds {_show(coordinate)}: give {count} numbers")
+        if not math.isfinite(_as_float(coordinate)):
+            raise self.error(
+                key, f"point {i} holds {_show(coordinate)}: give {count} finite numbers"
+            )
+        if abs(coordinate) > limit:
+            raise self.error(key, f"point {i} holds {coordinate:g}: at most {limit:g} mm from 0")
 
     def table(self, key: str, known: Collection[str], *, required: bool = True) -> Table:
         """The sub-table `key`; empty when it is absent and not required. Its messages begin with [outer.key]."""

@@ -4,9 +4,11 @@
 from .build import SplineResult, from_control_polygon, line, through_points
 from .curve import PHSpline
 from .ends import END_NAMES
+from .knots import KNOT_NAMES
 
 __all__ = [
     "END_NAMES",
+    "KNOT_NAMES",
     "PHSpline",
     "SplineResult",
     "from_control_polygon",

@@ -10,7 +10,8 @@ import numpy as np
 from ..errors import InputError
 from .bernstein import Complex
 from .curve import PHSpline
-from .ends import EndCondition, through_guide
+from .ends import EndCondition, end_shares, end_spans, through_guide
+from .knots import KnotSpans, checked_knots, knot_spans
 from .nodal import Guide, checked_points, control_polygon_guide
 from .solve import solve
 from .start import followed_branch, root_on_branch, starting_values, without_rests
@@ -59,6 +60,7 @@ def through_points(
     ends: str = "cubic",
     start_tangent: complex | None = None,
     end_tangent: complex | None = None,
+    knots: str = "chord",
 ) -> SplineResult:
     """C2 PH quintic spline through given points, one span between neighbours.
 
@@ -69,15 +71,28 @@ def through_points(
         ends = "natural"    no curvature at the ends
         start_tangent, end_tangent   direction there (any length), instead of `ends` at that end
 
-    A closed path is periodic and takes no tangents. Raises InputError and PlanError as above.
+    A closed path is periodic and takes no tangents. `knots`, a name of KNOT_NAMES, says how long a span lasts in the
+    spline's parameter: chord-length knots suit points at any distances. Raises InputError and PlanError as above.
     """
     p, notes = checked_points(points, closed, 3 if closed else 2, "through point")
     start = EndCondition.chosen(ends, start_tangent, "start_tangent", closed)
     end = EndCondition.chosen(ends, end_tangent, "end_tangent", closed)
-    guide = through_guide(p, closed, start, end)
-    first = complex(guide.hodograph[0, 0]) if start.tangent else start.rule(p.size - 1)
-    last = complex(guide.hodograph[-1, 2]) if end.tangent else end.rule(p.size - 1)
-    return _solved(guide, first, last, notes)
+    chords = np.diff(np.append(p, p[0]) if closed else p)
+    spans = None
+    if checked_knots(knots) != "uniform":
+        spans = knot_spans(np.abs(chords), knots, closed)
+    guide = through_guide(p, closed, start, end, spans)
+    first_length, last_length = end_spans(spans)
+    first_share, last_share = end_shares(spans)
+    first = complex(guide.hodograph[0, 0]) / first_length
+    last = complex(guide.hodograph[-1, 2]) / last_length
+    return _solved(
+        guide,
+        first if start.tangent else start.rule(p.size - 1, first_share),
+        last if end.tangent else end.rule(p.size - 1, last_share),
+        notes,
+        spans,
+    )
 
 
 def line(start: complex, end: complex) -> PHSpline:
@@ -89,19 +104,24 @@ def line(start: complex, end: complex) -> PHSpline:
 
 
 def _solved(
-    guide: Guide, first: complex | EndRule, last: complex | EndRule, notes: tuple[str, ...]
+    guide: Guide,
+    first: complex | EndRule,
+    last: complex | EndRule,
+    notes: tuple[str, ...],
+    knots: KnotSpans | None = None,
 ) -> SplineResult:
-    """`first`, `last`: derivative there, or the rule that takes its place (open paths)."""
-    hodograph = without_rests(guide.hodograph, guide.closed)
+    """`first`, `last`: derivative by the parameter there, or the rule that takes its place (open paths)."""
+    length = np.ones((1, 1)) if knots is None else knots.length[:, None]
+    hodograph = without_rests(guide.hodograph / length, guide.closed)
     branch = followed_branch(hodograph)
     chords: Complex = np.diff(guide.nodal_points)
     if guide.closed:
         turns = round(float(branch.node_angle[-1] - branch.node_angle[0]) / (2.0 * np.pi))
-        system = System(chords, cyclic_sign=-1 if turns % 2 else 1)
+        system = System(chords, cyclic_sign=-1 if turns % 2 else 1, knots=knots)
     else:
         start = _end_rule(first, branch.node_angle[:1])
-        system = System(chords, start, _end_rule(last, branch.node_angle[-1:]))
-    solution = solve(system, starting_values(hodograph, branch), hodograph)
+        system = System(chords, start, _end_rule(last, branch.node_angle[-1:]), knots=knots)
+    solution = solve(system, starting_values(hodograph, branch), hodograph * length)
     spline = PHSpline(guide.nodal_points[:-1].copy(), solution.w, guide.closed)
     return SplineResult(
         spline,

@@ -5,22 +5,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from .arclength import EXACT, invert
+from .arclength import ArcLengthChain, evaluate
 from .bernstein import Complex, Real, basis, square, square_modulus
 from .extremum import greatest_curvature
 from .splitting import split_segments
 
-Index = NDArray[np.intp]
-
 
 @dataclass(frozen=True, eq=False)
-class PHSpline:
+class PHSpline(ArcLengthChain):
     """Segments r(xi) = origin + integral of w^2 from 0 to xi, xi in [0, 1]; mm.
 
     origin  (N,) complex, start point of each segment
@@ -58,28 +54,6 @@ class PHSpline:
         return np.asarray(np.cumsum(steps, axis=1))
 
     @cached_property
-    def _arc_coefficients(self) -> Real:
-        steps = np.zeros((self.segment_count, 6))
-        steps[:, 1:] = self.speed_coefficients / 5.0
-        return np.asarray(np.cumsum(steps, axis=1))
-
-    @property
-    def segment_lengths_mm(self) -> Real:
-        """Exact arc length (N,) of each segment."""
-        return self._arc_coefficients[:, 5]
-
-    @cached_property
-    def segment_starts_mm(self) -> Real:
-        """Arc length (N + 1,) at the joints, 0 first, `length_mm` last."""
-        total = np.cumsum(self.segment_lengths_mm.astype(np.longdouble))
-        return np.concatenate((np.zeros(1), total.astype(np.float64)))
-
-    @property
-    def length_mm(self) -> float:
-        """Arc length of the whole path."""
-        return float(self.segment_starts_mm[-1])
-
-    @cached_property
     def nodal_points(self) -> Complex:
         """Joints (N + 1,), from start to end (closed: the first again at the end)."""
         end = self.origin[:1] if self.closed else self.position_coefficients[-1:, 5]
@@ -89,7 +63,7 @@ class PHSpline:
 
     def position(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
         """Points of segments `segment` at `xi` in [0, 1]; mm."""
-        return np.asarray(_evaluate(self.position_coefficients, segment, xi))
+        return np.asarray(evaluate(self.position_coefficients, segment, xi))
 
     def hodograph(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
         """r' = w^2 (8)."""
@@ -101,10 +75,6 @@ class PHSpline:
         w = self._w(segment, xi)
         return np.asarray(w.real * w.real + w.imag * w.imag)
 
-    def arc_length(self, segment: ArrayLike, xi: ArrayLike) -> Real:
-        """Arc length (10) from the start of the segment; mm."""
-        return np.asarray(_evaluate(self._arc_coefficients, segment, xi))
-
     def curvature_at(self, segment: ArrayLike, xi: ArrayLike) -> Real:
         """Signed curvature 2 Im(conj(w) w') / |w|^4, positive to the left; 1/mm."""
         i = np.asarray(segment, dtype=np.intp)
@@ -115,24 +85,9 @@ class PHSpline:
         return np.asarray(2.0 * (np.conj(w) * derivative).imag / (speed * speed))
 
     def _w(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
-        return np.asarray(_evaluate(self.w, segment, xi))
+        return np.asarray(evaluate(self.w, segment, xi))
 
     # By arc length
-
-    def locate(self, s_mm: ArrayLike, tolerance: float = EXACT) -> tuple[Index, Real]:
-        """Segment and xi of the points at arc lengths `s_mm`, to about 1e-13 of the segment, or `tolerance`."""
-        s = np.asarray(s_mm, dtype=np.float64)
-        length = self.length_mm
-        slack = 1e-9 * length
-        if not np.all((s >= -slack) & (s <= length + slack)):
-            worst = s[~((s >= -slack) & (s <= length + slack))].flat[0]
-            raise InputError(f"arc length {worst:g} mm is outside the path, 0 … {length:g} mm")
-        s = np.clip(s, 0.0, length)
-        starts = self.segment_starts_mm
-        segment = np.searchsorted(starts[1:-1], s, side="right")
-        own = (s - starts[segment]).ravel()
-        xi = invert(self._arc_coefficients, self.w, segment.ravel(), own, tolerance)
-        return segment, xi.reshape(s.shape)
 
     def point(self, s_mm: ArrayLike) -> Complex:
         """Points at arc lengths `s_mm`; mm."""
@@ -163,10 +118,3 @@ class PHSpline:
         """
         origin, w = split_segments(self.origin, self.w, max_length_mm, max_speed_ratio)
         return PHSpline(origin, w, self.closed)
-
-
-def _evaluate(coefficients: Any, segment: ArrayLike, xi: ArrayLike) -> Any:
-    x = np.asarray(xi, dtype=np.float64)
-    values = basis(coefficients.shape[1] - 1, x)
-    i = np.asarray(segment, dtype=np.intp)
-    return np.asarray(np.sum(coefficients[i] * values, axis=-1))

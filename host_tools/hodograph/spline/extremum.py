@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from .bernstein import Complex, Real, halves, square_modulus
@@ -21,8 +24,14 @@ def curvature_numerator(w: Complex) -> Real:
     return np.asarray(2.0 * out.imag)
 
 
-def greatest_curvature(w: Complex) -> float:
+def greatest_curvature(
+    w: Any,
+    numerator_of: Callable[[Any], Any] = curvature_numerator,
+    speed_of: Callable[[Any], Real] = square_modulus,
+) -> float:
     """Greatest |curvature| (1/mm) over segments with w (N, 3), to 1e-13 relative.
+
+    In space, with preimages (N, 4, 3) and what becomes of them: curvature is |numerator| / speed^2.
 
     Branch and bound: |kappa| = |A| / sigma^2 lies below max |A_k| / min(sigma_k)^2 of the
     Bernstein coefficients, a bound whose gap shrinks with the square of the interval. Infinite
@@ -30,7 +39,7 @@ def greatest_curvature(w: Complex) -> float:
     """
     best = 0.0
     for _ in range(_MOST_ROUNDS):
-        numerator, speed = np.abs(curvature_numerator(w)), square_modulus(w)
+        numerator, speed = np.abs(numerator_of(w)), speed_of(w)
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = numerator[:, ::2] / speed[:, ::4] ** 2
             bound = numerator.max(axis=1) / np.maximum(speed.min(axis=1), 0.0) ** 2

@@ -132,7 +132,7 @@ def _window(system: System, z: Complex, low: int, high: int) -> System:
     is_open = not system.cyclic_sign
     start = system.start if low == 0 and is_open else _held(around[0])
     end = system.end if high == z.size and is_open else _held(around[-1])
-    return System(system.chords[low:high], start, end)
+    return system.part(low, high, start, end)
 
 
 def _around(system: System, z: Complex, low: int, high: int) -> Complex:
@@ -148,4 +148,6 @@ def _held(value: complex) -> EndRule:
 
 
 def _energy(system: System, z: Complex, low: int, high: int) -> float:
-    return float(Shape(coefficients_between(_around(system, z, low, high)), 2).bending.sum())
+    knots = None if system.knots is None else system.knots.part(low, high)
+    w = coefficients_between(_around(system, z, low, high), knots)
+    return float(Shape(w, 2).bending.sum())

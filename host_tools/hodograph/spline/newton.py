@@ -70,7 +70,7 @@ def continued(system: System, z: Complex) -> Outcome:
     """
     spent = 0
     outcome = Outcome(z, 0, False, 0)
-    begin = system.chords + system.residual(z) / 60.0
+    begin = system.chords + system.residual_mm(z)
     for bulge in _BULGES:
         outcome = _follow(system, z, begin, bulge)
         spent += outcome.iterations

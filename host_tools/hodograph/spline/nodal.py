@@ -9,11 +9,13 @@ handed on as Bernstein coefficients (M, 3) per span.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import InputError
-from .bernstein import Complex
+from .bernstein import Complex, Real
+from .knots import KnotSpans
 
 _REPEATED = 1e-12
 """Points nearer than this share of the largest coordinate are the same."""
@@ -44,33 +46,60 @@ def checked_points(
     Raises InputError: not a list of points, NaN or infinity, a repeated point, half a repeated
     tail, too few points.
     """
-    p = _ordinary(_as_complex(points, what), what)
-    near = max(_NEAREST_MM, _REPEATED * float(np.abs(p).max(initial=0.0)))
+    return _without_repeats(_as_complex(points, what), closed, minimum, what)
+
+
+def checked_space_points(
+    points: object, closed: bool, minimum: int, what: str
+) -> tuple[Real, tuple[str, ...]]:
+    """The same for points in space: real (n, 3)."""
+    try:
+        p = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{what}s must be a list of [x, y, z] of numbers") from error
+    if p.ndim != 2 or p.shape[1] != 3:
+        raise InputError(f"{what}s must be a list of [x, y, z] of numbers")
+    return _without_repeats(p, closed, minimum, what)
+
+
+P = TypeVar("P", Complex, Real)
+
+
+def _without_repeats(points: P, closed: bool, minimum: int, what: str) -> tuple[P, tuple[str, ...]]:
+    p = _ordinary(points, what)
+    near = max(_NEAREST_MM, _REPEATED * float(_size(p).max(initial=0.0)))
     notes: tuple[str, ...] = ()
     tail = 1 if what.startswith("through") else 3
-    if closed and p.size > tail + 2 and _repeated(p, tail, near):
+    if closed and len(p) > tail + 2 and _repeated(p, tail, near):
         dropped = f"the last {tail} {what}s repeat" if tail > 1 else f"the last {what} repeats"
         p, notes = p[:-tail], (f"{dropped} the first: dropped, the path is closed",)
-    if p.size < minimum:
+    if len(p) < minimum:
         kind = "a closed" if closed else "an open"
-        raise InputError(f"{p.size} {what}s: {kind} path needs at least {minimum}")
-    same = np.flatnonzero(np.abs(p[1:] - p[:-1]) <= near)
+        raise InputError(f"{len(p)} {what}s: {kind} path needs at least {minimum}")
+    same = np.flatnonzero(_size(p[1:] - p[:-1]) <= near)
     if same.size:
         k = int(same[0])
-        raise InputError(f"{what} {k + 1} repeats {what} {k} at ({_xy(p[k])}): remove one of them")
+        raise InputError(
+            f"{what} {k + 1} repeats {what} {k} at ({_place(p[k])}): remove one of them"
+        )
     if closed and _repeated(p, 1, near):
-        raise InputError(f"the last {what} repeats the first at ({_xy(p[0])}): remove it")
-    if closed and tail == 3 and p.size > 4 and _repeated(p, 2, near):
+        raise InputError(f"the last {what} repeats the first at ({_place(p[0])}): remove it")
+    if closed and tail == 3 and len(p) > 4 and _repeated(p, 2, near):
         raise InputError(f"the last two {what}s repeat the first two: remove them")
     return p, notes
 
 
-def _ordinary(p: Complex, what: str) -> Complex:
+def _size(p: Complex | Real) -> Real:
+    """Distance (n,) from 0."""
+    return np.asarray(np.abs(p) if p.ndim == 1 else np.linalg.norm(p, axis=1))
+
+
+def _ordinary(p: P, what: str) -> P:
     """`p`; raises InputError where a number is not finite or absurdly large."""
-    bad = np.flatnonzero(~np.isfinite(p))
+    bad = np.flatnonzero(~np.isfinite(_size(p)))
     if bad.size:
-        raise InputError(f"{what} {bad[0]} is not finite: give two ordinary numbers")
-    far = np.flatnonzero(np.abs(p) > _FARTHEST_MM)
+        raise InputError(f"{what} {bad[0]} is not finite: give ordinary numbers")
+    far = np.flatnonzero(_size(p) > _FARTHEST_MM)
     if far.size:
         raise InputError(f"{what} {far[0]} is beyond {_FARTHEST_MM:g} mm: are the units mm?")
     return p
@@ -92,13 +121,14 @@ def _as_complex(points: object, what: str) -> Complex:
     return p
 
 
-def _xy(point: complex) -> str:
-    return f"{point.real:g}, {point.imag:g}"
+def _place(point: Any) -> str:
+    numbers = (point.real, point.imag) if np.iscomplexobj(point) else tuple(point)
+    return ", ".join(f"{value:g}" for value in numbers)
 
 
-def _repeated(p: Complex, tail: int, near: float) -> bool:
+def _repeated(p: Complex | Real, tail: int, near: float) -> bool:
     """Whether the last `tail` points are the first ones."""
-    return bool(np.all(np.abs(p[-tail:] - p[:tail]) <= near))
+    return bool(np.all(_size(p[-tail:] - p[:tail]) <= near))
 
 
 def control_polygon_guide(p: Complex, closed: bool) -> Guide:
@@ -141,7 +171,11 @@ def _open_polygon(p: Complex) -> Guide:
     return Guide(open_nodal_points(p), hodograph, False)
 
 
-def hodograph_from_derivatives(q: Complex, derivative: Complex) -> Complex:
-    """Bernstein hodograph (M, 3) of the cubic Hermite curve with these nodes and derivatives."""
+def hodograph_from_derivatives(
+    q: Complex, derivative: Complex, knots: KnotSpans | None = None
+) -> Complex:
+    """Bernstein hodograph (M, 3) of the cubic Hermite curve with these nodes and derivatives by the parameter."""
     first, last = derivative[:-1], derivative[1:]
+    if knots is not None:
+        first, last = knots.length * first, knots.length * last
     return np.stack((first, 3.0 * (q[1:] - q[:-1]) - first - last, last), axis=-1)

@@ -6,6 +6,8 @@ linearly:
 
     open    z_0 = a z_1 + b z_2 + c     and the same, mirrored, at the end
     closed  z_0 = e z_M,  z_(M+1) = e z_1,  e = +1 or -1
+
+Spans have parameter length 1, as in the paper, or lengths of their own (`knots`): docs/theory/spatial-splines.md 1.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import numpy as np
 
 from .banded import solve_cyclic, solve_tridiagonal
 from .bernstein import Complex
+from .knots import KnotSpans
 
 
 @dataclass(frozen=True)
@@ -35,24 +38,46 @@ def clamped_end(w: complex) -> EndRule:
 NATURAL_END = EndRule(1.0, 0.0, 0.0j)
 """w' = 0 at the end: the curvature vanishes there."""
 
-CUBIC_END = EndRule(2.0, -1.0, 0.0j)
-"""w linear in the end span, which is a PH cubic then. Needs two spans."""
+
+def cubic_end(share: float) -> EndRule:
+    """w linear in the end span, which is a PH cubic then. Needs two spans.
+
+    `share`: KnotSpans.after of the first span, or before of the last; 1/2 for uniform knots.
+    """
+    return EndRule(1.0 + 2.0 * share, -2.0 * share, 0.0j)
 
 
-def coefficients_between(extended: Complex) -> Complex:
-    """Bernstein coefficients (M, 3) of w from z_0 … z_(M+1); paper (11)."""
-    joints = (extended[1:] + extended[:-1]) / 2.0
-    return np.stack((joints[:-1], extended[1:-1], joints[1:]), axis=-1)
+CUBIC_END = cubic_end(0.5)
+
+
+def coefficients_between(extended: Complex, knots: KnotSpans | None = None) -> Complex:
+    """Bernstein coefficients (M, 3) of w from z_0 … z_(M+1), for xi from 0 to 1 on each span; paper (11)."""
+    if knots is None:
+        joints = (extended[1:] + extended[:-1]) / 2.0
+        return np.stack((joints[:-1], extended[1:-1], joints[1:]), axis=-1)
+    parts = np.stack(_mixed(extended, knots), axis=-1)
+    return np.asarray(np.sqrt(knots.length)[:, None] * parts)
+
+
+def _mixed(x: Complex, knots: KnotSpans) -> tuple[Complex, Complex, Complex]:
+    """Bernstein coefficients (M,) of dr/dt = w^2, t the spline's parameter."""
+    first = knots.before * x[:-2] + (1.0 - knots.before) * x[1:-1]
+    last = (1.0 - knots.after) * x[1:-1] + knots.after * x[2:]
+    return first, x[1:-1], last
 
 
 @dataclass(frozen=True)
 class System:
-    """Chords q_i - q_(i-1) (M,) with end rules, or `cyclic_sign` e for a closed curve (0: open)."""
+    """Chords q_i - q_(i-1) (M,) with end rules, or `cyclic_sign` e for a closed curve (0: open).
+
+    Without `knots`, spans have parameter length 1. z is then what the paper has, to the last bit.
+    """
 
     chords: Complex
     start: EndRule = NATURAL_END
     end: EndRule = NATURAL_END
     cyclic_sign: int = 0
+    knots: KnotSpans | None = None
 
     def outer(self, z: Complex) -> tuple[complex, complex]:
         """z_0 and z_(M+1)."""
@@ -72,11 +97,25 @@ class System:
 
     def coefficients(self, z: Complex) -> Complex:
         """Bernstein coefficients (M, 3) of w per span."""
-        return coefficients_between(self.extended(z))
+        return coefficients_between(self.extended(z), self.knots)
+
+    def part(self, low: int, high: int, start: EndRule, end: EndRule) -> System:
+        """The equations of spans low … high - 1 with other ends."""
+        knots = None if self.knots is None else self.knots.part(low, high)
+        return System(self.chords[low:high], start, end, knots=knots)
+
+    def residual_mm(self, z: Complex) -> Complex:
+        """By how much each span misses its chord."""
+        share = 60.0 if self.knots is None else 60.0 / self.knots.length
+        return np.asarray(self.residual(z) / share)
 
     def residual(self, z: Complex) -> Complex:
-        """Left side of (13): 60 times the integral of w^2 over each span, less 60 chords."""
+        """Left side of (13): 60 times the integral of w^2 over each span, less 60 chords; with knots, by length."""
         x = self.extended(z)
+        if self.knots is not None:
+            a, b, c = _mixed(x, self.knots)
+            means = 12.0 * (a * (a + b) + c * (b + c)) + 8.0 * b * b + 4.0 * a * c
+            return np.asarray(means - 60.0 * self.chords / self.knots.length)
         before, after = x[:-2], x[2:]
         out: Complex = (
             3.0 * (before * before + after * after)
@@ -88,11 +127,7 @@ class System:
 
     def newton_step(self, z: Complex, residual: Complex) -> Complex:
         """-J(z)^-1 residual. Raises SingularSystem."""
-        x = self.extended(z)
-        before, after = x[:-2], x[2:]
-        lower = 6.0 * before + after + 13.0 * z
-        upper = 6.0 * after + before + 13.0 * z
-        diagonal = 54.0 * z + 13.0 * (before + after)
+        lower, diagonal, upper = self._derivatives(self.extended(z))
         if self.cyclic_sign:
             lower[0] *= self.cyclic_sign
             upper[-1] *= self.cyclic_sign
@@ -103,3 +138,16 @@ class System:
             upper[0] += self.start.second * lower[0]
             lower[-1] += self.end.second * upper[-1]
         return solve_tridiagonal(lower, diagonal, upper, -residual)
+
+    def _derivatives(self, x: Complex) -> tuple[Complex, Complex, Complex]:
+        """Of each row by the value before, its own and the one behind."""
+        before, z, after = x[:-2], x[1:-1], x[2:]
+        if self.knots is None:
+            lower = 6.0 * before + after + 13.0 * z
+            upper = 6.0 * after + before + 13.0 * z
+            return lower, 54.0 * z + 13.0 * (before + after), upper
+        a, b, c = _mixed(x, self.knots)
+        by_a, by_c = 24.0 * a + 12.0 * b + 4.0 * c, 24.0 * c + 12.0 * b + 4.0 * a
+        by_b = 12.0 * a + 16.0 * b + 12.0 * c
+        share, other = self.knots.before, self.knots.after
+        return share * by_a, (1.0 - share) * by_a + by_b + (1.0 - other) * by_c, other * by_c

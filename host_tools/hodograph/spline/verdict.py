@@ -46,12 +46,16 @@ class Verdict:
 def judge(w: Complex, guide_shape: Shape, closed: bool) -> Verdict:
     """Compare the spline with w (M, 3) with its guide."""
     shape = Shape(w, 2)
-    own, guide = shape.bending, guide_shape.bending
+    extra = _extra_turning(shape, guide_shape, closed)
+    length = square_modulus(w).mean(axis=-1)
+    return compared(shape.bending, guide_shape.bending, extra, length, closed)
+
+
+def compared(own: Real, guide: Real, extra: Real, length: Real, closed: bool) -> Verdict:
+    """From bending energies (M,) of spline and guide, extra turning in windows and lengths of spans."""
     total = float(guide.sum())
     ratio = float(own.sum()) / total if total > 0.0 else 1.0
-    extra = _extra_turning(shape, guide_shape, closed)
-    extra[_windows(own, closed) < _windows(guide, closed)] = 0.0
-    length = square_modulus(w).mean(axis=-1)
+    extra[windows(own, closed) < windows(guide, closed)] = 0.0
     return Verdict(
         max(float(extra.max()), 0.0),
         ratio,
@@ -67,13 +71,13 @@ def _worst_first(size: Real, chosen: NDArray[np.bool_]) -> tuple[int, ...]:
 
 def _extra_turning(shape: Shape, guide_shape: Shape, closed: bool) -> Real:
     """Total turning (M,) beyond the guide's in windows; 0 where a bound rules loops out."""
-    bound = _windows(shape.most_turning, closed)
+    bound = windows(shape.most_turning, closed)
     if float(bound.max()) <= EXTRA_TURNING_RAD:
         return np.zeros(bound.size)
-    return _windows(shape.total_turning - guide_shape.total_turning, closed)
+    return windows(shape.total_turning - guide_shape.total_turning, closed)
 
 
-def _windows(figure: Real, closed: bool) -> Real:
+def windows(figure: Real, closed: bool) -> Real:
     """Sums over a span and its neighbours."""
     if figure.size < 3:
         return np.full(figure.size, figure.sum())

@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,32 @@ def test_spline_at(capsys: pytest.CaptureFixture[str]) -> None:
     np.testing.assert_allclose(found["points"], plain["nodal_points"], atol=1e-9)
     np.testing.assert_allclose(np.hypot(*np.transpose(found["tangents"])), 1, atol=1e-12)
     assert max(map(abs, found["curvatures"])) <= plain["max_curvature_per_mm"] * (1 + 1e-9)
+
+
+def test_spline_in_space(capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(EXAMPLES / "helix.toml")
+    plain = result(capsys, "spline", file, "--json")
+    assert set(plain) == SPLINE_KEYS
+    joints = np.concatenate(([0], np.cumsum(plain["segment_lengths_mm"])))
+    found = result(capsys, "spline", file, "--json", "--at", *(repr(float(s)) for s in joints))
+    assert set(found) == SPLINE_KEYS | {"points", "tangents", "curvatures", "torsions"}
+    np.testing.assert_allclose(found["points"], plain["nodal_points"], atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(found["tangents"], axis=1), 1, atol=1e-12)
+    np.testing.assert_allclose(found["curvatures"][1:-1], 0.0497, rtol=0.03)
+    np.testing.assert_allclose(found["torsions"][1:-1], 0.00396, rtol=0.2)
+    assert main(["spline", file, "--at", "0", "50"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"s mm +x mm +y mm +z mm +curvature /mm +torsion /mm\n", out)
+
+
+@pytest.mark.parametrize("command", ["feed", "compile", "inspect", "verify", "simulate", "report"])
+def test_a_path_in_space_has_no_program_yet(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    assert main([command, str(EXAMPLES / "helix.toml")]) == 3
+    caught = capsys.readouterr()
+    assert caught.out == ""
+    assert re.fullmatch(r".*helix\.toml: \[path\] has points \[x, y, z\]: .*\n", caught.err)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hodograph.config import load_path_file
-from hodograph.errors import InputError
+from hodograph.errors import InputError, PlanError
 from hodograph.feed import AxisLimits, FeedZone
 from hodograph.pipeline import load_pipeline
 
@@ -257,6 +257,48 @@ def test_only_a_path(tmp_path: Path) -> None:
     found = load_path_file(write(tmp_path, text))
     assert found.feed is None
     assert found.machine_file == tmp_path / "no.toml"
+
+
+SPACE = "[path]\nclosed = false\nthrough = [[0, 0, 1], [9, 1, 2.5], [12, 8, 0]]\n"
+
+
+def test_a_path_in_space(tmp_path: Path) -> None:
+    text = SPACE + 'start_tangent = [0, 0, -1]\nknots = "centripetal"\n'
+    found = load_path_file(write(tmp_path, text))
+    path = found.given_path
+    np.testing.assert_array_equal(path.points, [[0, 0, 1], [9, 1, 2.5], [12, 8, 0]])
+    np.testing.assert_array_equal(path.start_tangent, [0, 0, -1])
+    assert path.end_tangent is None
+    assert path.knots == "centripetal"
+    with pytest.raises(PlanError, match=r"points \[x, y, z\]: only the command spline"):
+        found.require_planar()
+
+
+def test_knots_are_chord_lengths_unless_said(tmp_path: Path) -> None:
+    assert load_path_file(write(tmp_path, SPACE)).given_path.knots == "chord"
+    flat = "[path]\nclosed = true\nthrough = [[0,0],[9,1],[12,8]]\n"
+    assert load_path_file(write(tmp_path, flat)).path.knots == "chord"
+    uniform = load_path_file(write(tmp_path, flat + 'knots = "uniform"\n'))
+    assert uniform.path.knots == "uniform"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[9, 1, 2.5]", "[9, 1]", r"point 1 must be \[x, y, z\] like the first, but is \[9, 1\]"),
+        ("[9, 1, 2.5]", "[9, 1, inf]", r"point 1 holds inf: give three finite numbers"),
+        ("[9, 1, 2.5]", "[9, 1, 5000]", r"point 1 holds 5000: at most 4096 mm from 0"),
+        ("[0, 0, 1]", "[0, 0, 1, 2]", r"point 0 must be \[x, y\]"),
+        ("false", "false\nstart_tangent = [0, 1]", r"start_tangent must be three numbers"),
+        ("false", "false\nend_tangent = [0, 0, 0]", r"end_tangent must not be \[0, 0, 0\]"),
+        ("false", "false\nknots = 'even'", r'knots cannot be "even"; use one of: chord'),
+        ("through", "knots = 'chord'\ncontrol_points", r"knots applies to through points only"),
+    ],
+)
+def test_mistakes_in_space(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in SPACE
+    with pytest.raises(InputError, match=message):
+        load_path_file(write(tmp_path, SPACE.replace(old, new, 1)))
 
 
 ROUND = [[0, 0], [9, 1], [12, 8], [5, 12], [-3, 7]]
