@@ -408,7 +408,7 @@ def _named_by(place: str) -> Iterator[None]:
 def load_pipeline(
     file: Path, machine: Path | None = None, *, allow_space: bool = False
 ) -> Pipeline:
-    """The pipeline that begins with a path file; raises InputError, and PlanError for a path in space unless allowed."""
+    """The pipeline that begins with a path file; raises InputError, or PlanError for a path in space if not allowed."""
     found = load_path_file(file)
     if not allow_space:
         found.require_planar()

@@ -42,8 +42,7 @@
 
 /* What is looked at: one over the limits, less the margin; 0: none. */
 struct inverse {
-    double
-        feed; /* share of the path's feed that counts: less than 1 where a little more is allowed */
+    double feed; /* share of the path's feed that counts: a little less than 1 allows more */
     double velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
 };
 
