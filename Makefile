@@ -120,7 +120,7 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c dist check test test-all unit unit-plain pytest run til faults lint format soak bench figures options mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c dist wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak bench figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -190,11 +190,22 @@ figures: build ## draw the figures of the manual anew (docs/images)
 options: build ## write docs/reference/options.md anew from the command line
 	@$(PY) tools/list_options.py
 
-# PLATFORM: of the wheel, where CC and AR build for another platform (docs/guides/install.md)
+# PLATFORM: of the wheel, where CC, AR and LDSHARED build for another platform
 DIST     ?= dist
 PLATFORM ?=
 dist: $(VENV)/.editable ## source distribution and wheel in dist/, the same bytes from the same commit
 	@$(PY) tools/dist/make_release.py $(DIST) $(if $(PLATFORM),--platform $(PLATFORM))
+
+# One compiler for all platforms, which links against the oldest glibc that the platform's name promises.
+ZIG       := $(abspath $(READY))/zig/bin/python -m ziglang
+MACHINES  := x86_64 aarch64
+zig_cc     = $(ZIG) cc -target $(1)-linux-gnu.2.17
+$(READY)/zig/.ready: tools/dist/requirements.lock tools/make_venv.sh | $(READY)/packages
+	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(READY)/zig tools/dist/requirements.lock
+wheels: $(MACHINES:%=wheel-%) ## wheels for Linux (manylinux2014) on x86-64 and aarch64, cross-compiled, in dist/
+$(MACHINES:%=wheel-%): wheel-%: $(VENV)/.editable $(READY)/zig/.ready
+	@CC="$(call zig_cc,$*)" LDSHARED="$(call zig_cc,$*) -shared" AR="$(ZIG) ar" \
+	    $(PY) tools/dist/make_release.py $(DIST) --platform manylinux2014_$*
 
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/bench.py --build $(BUILD)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware` or `flash`. Missing Debian
+A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware`, `flash` or `aarch64`. Missing Debian
 packages are installed when this runs as root or with passwordless sudo; otherwise the command to type is printed and
 the exit status is 1. Standard library only: it runs before anything is installed.
 """
@@ -82,6 +82,7 @@ _PACKAGE_OF = {
     "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf",
     "qemu-system-riscv32": "qemu-system-misc",
+    "qemu-aarch64": "qemu-user",
     "cargo": _cargo_package(),
 }
 
@@ -112,6 +113,11 @@ FIRMWARE = (
     _program("qemu-system-riscv32"),
 )
 FLASH = (_program("openocd"),)
+AARCH64_ROOT = "/usr/aarch64-linux-gnu"
+AARCH64 = (
+    _program("qemu-aarch64"),
+    _file(f"{AARCH64_ROOT}/lib/ld-linux-aarch64.so.1", "libc6-arm64-cross"),
+)
 SETS = {
     "build": BUILD,
     "bus": BUS,
@@ -120,6 +126,7 @@ SETS = {
     "fuzz": FUZZ,
     "firmware": FIRMWARE,
     "flash": FLASH,
+    "aarch64": AARCH64,
 }
 
 

@@ -40,7 +40,9 @@ def machine(**limits: float) -> Machine:
 def pipeline(folder: Path, points: str, profile: str, policy: str, on: Machine) -> Pipeline:
     file = folder / "path.toml"
     limits = f'[limits]\npolicy = "{policy}"\n'
-    file.write_text(f"[path]\nclosed = false\nthrough = {points}\n[feed]\n{FEEDS[profile]}{limits}")
+    file.write_text(
+        f'[path]\nclosed = false\nthrough = {points}\nknots = "uniform"\n[feed]\n{FEEDS[profile]}{limits}'
+    )
     return Pipeline(load_path_file(file), on)
 
 

@@ -47,7 +47,7 @@ def trials(made: Pipeline) -> StopTrials:
 def test_a_bend_without_brakes_does_not_keep_its_piece_from_braking(
     tmp_path: Path, apart_mm: float
 ) -> None:
-    points = f"through = [[0, 0], [10, 0], [{10 + apart_mm}, 0], [20, 5]]"
+    points = f"knots = 'uniform'\nthrough = [[0, 0], [10, 0], [{10 + apart_mm}, 0], [20, 5]]"
     axis = "[limits.axis]\njerk_mm_s3 = 20000\n"
     made = pipeline(tmp_path, points, CONSTANT, axis)
     stops, count = made.program.stops, made.program.piece_count

@@ -52,3 +52,31 @@ def uniform(seed: int) -> Polygon:
     rng = np.random.default_rng([seed, 2])
     n, closed = int(rng.integers(4, 201)), bool(rng.integers(2))
     return rng.uniform(0, 100, n) + 1j * rng.uniform(0, 100, n), closed
+
+
+def walk(seed: int, most_turn_rad: float, sigma: float | None = None) -> NDArray[np.float64]:
+    """5 to 60 points in space; legs of 3 to 15 mm or log-normal, each turned by at most `most_turn_rad`."""
+    rng = np.random.default_rng([seed, 3])
+    count = int(rng.integers(5, 61))
+    direction, points = np.array([1.0, 0.0, 0.0]), [np.zeros(3)]
+    for _ in range(count - 1):
+        across = np.cross(direction, rng.normal(size=3))
+        angle = rng.uniform(0, most_turn_rad)
+        aside = across / np.linalg.norm(across)
+        direction = np.cos(angle) * direction + np.sin(angle) * aside
+        leg = rng.uniform(3, 15) if sigma is None else np.exp(sigma * rng.normal())
+        points.append(points[-1] + leg * direction)
+    return np.array(points)
+
+
+def torus_knot(count: int, p: int = 2, q: int = 3) -> NDArray[np.float64]:
+    """Closed: p times round a torus of radii 30 and 10 mm, q times through its hole; the trefoil by default."""
+    t = 2 * np.pi * np.arange(count) / count
+    ring = 3 + np.cos(q * t)
+    return 10 * np.stack((ring * np.cos(p * t), ring * np.sin(p * t), np.sin(q * t)), axis=-1)
+
+
+def helix(per_turn: int, turns: int = 2) -> NDArray[np.float64]:
+    """Radius 20 mm, rise 2 mm a radian."""
+    t = 2 * np.pi * np.arange(per_turn * turns + 1) / per_turn
+    return np.stack((20 * np.cos(t), 20 * np.sin(t), 2 * t), axis=-1)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from polygons import ALPHA, HEART, smooth
+from polygons import ALPHA, HEART, helix, smooth, torus_knot, walk
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
@@ -33,31 +33,6 @@ from hodograph.spline.spatial.quaternion import (
     turned,
 )
 from hodograph.spline.spatial.system import SpaceSystem, cubic_end, tangent_end
-
-
-def walk(seed, most_turn=2.0, sigma=None):
-    """5 to 40 points; each leg turns by up to `most_turn` rad; legs 3 to 15 mm or log-normal."""
-    rng = np.random.default_rng([seed, 21])
-    count = int(rng.integers(5, 41))
-    direction, points = np.array([1.0, 0.0, 0.0]), [np.zeros(3)]
-    for _ in range(count - 1):
-        axis = np.cross(direction, rng.normal(size=3))
-        turn = Rotation.from_rotvec(axis / np.linalg.norm(axis) * rng.uniform(0, most_turn))
-        direction = turn.apply(direction)
-        leg = rng.uniform(3, 15) if sigma is None else np.exp(sigma * rng.normal())
-        points.append(points[-1] + leg * direction)
-    return np.array(points)
-
-
-def torus_knot(count, p=2, q=3):
-    t = 2 * np.pi * np.arange(count) / count
-    ring = 3 + np.cos(q * t)
-    return 10 * np.stack((ring * np.cos(p * t), ring * np.sin(p * t), np.sin(q * t)), axis=-1)
-
-
-def helix(per_turn, turns=2):
-    t = 2 * np.pi * np.arange(per_turn * turns + 1) / per_turn
-    return np.stack((20 * np.cos(t), 20 * np.sin(t), 2 * t), axis=-1)
 
 
 def lengths(p, closed):
@@ -136,7 +111,7 @@ def test_newton_steps_solve_the_linear_part(closed, count):
 
 
 def test_continuation_finds_what_newton_finds():
-    p = walk(3)
+    p = walk(3, 2.0)
     knots = knot_spans(lengths(p, False), "chord", False)
     free = SpaceEnd.chosen("cubic", None, "start_tangent", False)
     guide = points_guide(p, False, free, free, knots)
@@ -154,7 +129,7 @@ def test_continuation_finds_what_newton_finds():
 
 
 def test_guides_are_scipys_splines():
-    p = walk(1)
+    p = walk(1, 2.0)
     knots = np.clip(np.arange(-3.0, len(p) + 1.0), 0, len(p) - 3)
     reference = BSpline(knots, p, 3)
     guide = polygon_guide(p, False)
@@ -402,7 +377,7 @@ def test_order_of_approximation_of_a_torus_knot():
 
 
 def test_figures_of_shape_are_those_of_a_fine_sum():
-    spline = spatial_through_points(walk(5), False).spline
+    spline = spatial_through_points(walk(5, 1.3), False).spline
     shape = spline_shape(spline.preimage)
     xi = (np.arange(4000) + 0.5) / 4000
     for k in range(spline.segment_count):

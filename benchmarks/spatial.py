@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: MIT
+"""Splines in space: convergence and bending over random walks, order of approximation, criteria, time.
+
+    python benchmarks/spatial.py [--json OUT] [--paths N]
+
+Campaigns: N (200) random walks, seeds 0 … N - 1 of tests/host/spline/polygons.py, for each kind of knots. Prints the
+figures and writes them as one JSON object.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial import cKDTree
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "tests/host/spline"), str(ROOT / "host_tools")]
+
+from polygons import helix, torus_knot, walk  # noqa: E402
+
+from hodograph.errors import PlanError  # noqa: E402
+from hodograph.spline import KNOT_NAMES  # noqa: E402
+from hodograph.spline.knots import knot_spans  # noqa: E402
+from hodograph.spline.spatial import (  # noqa: E402
+    SpatialPHSpline,
+    SpatialSplineResult,
+    spatial_from_control_polygon,
+    spatial_through_points,
+)
+from hodograph.spline.spatial.frame import guide_frame  # noqa: E402
+from hodograph.spline.spatial.guide import SpaceEnd, points_guide  # noqa: E402
+from hodograph.spline.spatial.newton import newton  # noqa: E402
+from hodograph.spline.spatial.quality import spline_shape  # noqa: E402
+from hodograph.spline.spatial.quaternion import phase_between, polar, root, turned  # noqa: E402
+from hodograph.spline.spatial.system import SpaceSystem, cubic_end  # noqa: E402
+
+Real = np.ndarray[Any, np.dtype[np.float64]]
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
+
+
+def campaign(attempt: Callable[[int], SpatialSplineResult], count: int) -> dict[str, Any]:
+    """Convergence and bending over seeds 0 … count - 1."""
+    found, refused = [], 0
+    for seed in range(count):
+        try:
+            found.append(attempt(seed))
+        except PlanError:
+            refused += 1
+    iterations = [result.newton_iterations for result in found]
+    bending = [result.bending_ratio for result in found]
+    return {
+        "paths": count,
+        "solved_percent": 100 * len(found) / count,
+        "iterations_median": float(np.median(iterations)),
+        "iterations_worst": max(iterations),
+        "bending_ratio_median": float(np.median(bending)),
+        "bending_ratio_worst": max(bending),
+    }
+
+
+def campaigns(count: int) -> dict[str, Any]:
+    """Walks of even legs, and of log-normal ones, turning by up to 90, 120 and 180 degrees."""
+    out: dict[str, Any] = {}
+    for degrees in (90, 120, 180):
+        for sigma in (None, 1.0, 2.0, 3.0):
+            for knots in KNOT_NAMES:
+                legs = "even" if sigma is None else f"sigma_{sigma:g}"
+
+                def attempt(
+                    seed: int, turn: float = np.radians(degrees), s: Any = sigma, name: str = knots
+                ) -> SpatialSplineResult:
+                    return spatial_through_points(walk(seed, turn, s), False, knots=name)
+
+                out[f"turns_{degrees}_{legs}_{knots}"] = campaign(attempt, count)
+        for closed in (False, True):
+
+            def polygon(
+                seed: int, turn: float = np.radians(degrees), around: bool = closed
+            ) -> SpatialSplineResult:
+                return spatial_from_control_polygon(walk(seed, turn), around)
+
+            name = f"turns_{degrees}_control_polygon_{'closed' if closed else 'open'}"
+            out[name] = campaign(polygon, count)
+    return out
+
+
+def helix_errors() -> dict[str, Any]:
+    """Greatest errors in the middle half of two turns of a helix."""
+    out = {}
+    for per_turn in (16, 32, 64, 128):
+        spline = spatial_through_points(helix(per_turn), False).spline
+        s = np.linspace(0.25, 0.75, 4001) * spline.length_mm
+        p = spline.point(s)
+        out[f"points_{per_turn}"] = {
+            "radius_mm": float(np.abs(np.hypot(p[:, 0], p[:, 1]) - 20).max()),
+            "curvature_per_mm": float(np.abs(spline.curvature(s) - 20 / 404).max()),
+            "torsion_per_mm": float(np.abs(spline.torsion(s) - 2 / 404).max()),
+        }
+    return out
+
+
+def distance_from(spline: SpatialPHSpline, exact: Real) -> float:
+    """Greatest distance (mm) of the spline from a curve given by many points, its tangents taken from them."""
+    along = np.gradient(exact, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    p = spline.point(np.linspace(0, spline.length_mm, 8001))
+    at = cKDTree(exact).query(p)[1]
+    return float(np.linalg.norm(np.cross(p - exact[at], along[at]), axis=1).max())
+
+
+def knot_errors() -> dict[str, float]:
+    """Distance (mm) of splines through points of the trefoil from it."""
+    exact = torus_knot(400_000)
+    exact = np.vstack((exact[-9:], exact, exact[:9]))
+    return {
+        f"points_{count}": distance_from(
+            spatial_through_points(torus_knot(count), True).spline, exact
+        )
+        for count in (24, 48, 96, 192, 384)
+    }
+
+
+def published() -> SpatialPHSpline:
+    """A PH quintic of Farouki (2019), example 1: ends (0, 0, 0) and (1, 0, 0), their directions, arc length 1.25.
+
+    Farouki, Giannelli, Manni and Sestini (2008), equations (47) to (55), give the quintics with these ends. Of its two
+    free angles the least ones are taken; the end speed is what makes the arc length 1.25.
+    """
+    angles = ((0.65 * np.pi, -0.25 * np.pi), (0.25 * np.pi, 0.25 * np.pi))
+    tangents = np.array(
+        [[np.cos(a), np.sin(a) * np.cos(b), np.sin(a) * np.sin(b)] for a, b in angles]
+    )
+
+    def quintic(speed: float) -> SpatialPHSpline:
+        first, last = root(speed * tangents)
+        last = turned(last, phase_between(last, first))
+        chord = np.array([120.0, 0.0, 0.0])
+        inner = root(chord - 15 * speed * tangents.sum(axis=0) + 10 * polar(first, last))
+        inner = turned(inner, phase_between(inner, first + last))
+        middle = inner / 4 - 0.75 * (first + last)
+        preimage = np.stack((first, middle, last), axis=-1)[None]
+        return SpatialPHSpline(np.zeros((1, 3)), preimage, False)
+
+    low, high = 0.5, 8.0
+    for _ in range(60):
+        speed = (low + high) / 2
+        low, high = (speed, high) if quintic(speed).length_mm < 1.25 else (low, speed)
+    return quintic(low)
+
+
+def published_errors() -> dict[str, float]:
+    """Distance of splines through points of the published curve from it, end tangents given."""
+    curve = published()
+    exact = curve.position(np.zeros(400_001, dtype=int), np.linspace(0, 1, 400_001))
+    out: dict[str, float] = {
+        "arc_length": curve.length_mm,
+        "end_point_error": float(np.abs(exact[-1] - [1, 0, 0]).max()),
+        "bending_energy": float(spline_shape(curve.preimage).bending.sum()),
+    }
+    ends = curve.tangent([0.0, curve.length_mm])
+    for spans in (1, 2, 4, 8, 16, 32):
+        p = curve.position(np.zeros(spans + 1, dtype=int), np.linspace(0, 1, spans + 1))
+        found = spatial_through_points(p, False, "cubic", ends[0], ends[1]).spline
+        out[f"spans_{spans}_distance"] = distance_from(found, exact)
+        out[f"spans_{spans}_bending_energy"] = float(spline_shape(found.preimage).bending.sum())
+    return out
+
+
+def system_through(p: Real) -> SpaceSystem:
+    """The system of an open path with cubic ends and chord-length knots."""
+    knots = knot_spans(np.linalg.norm(np.diff(p, axis=0), axis=1), "chord", False)
+    free = SpaceEnd("cubic", None)
+    guide = points_guide(p, False, free, free, knots)
+    chords, length = np.diff(p, axis=0), knots.length[:, None]
+    frame = guide_frame(guide.hodograph / length[:, :, None], chords / length)
+    ends = cubic_end(float(knots.after[0])), cubic_end(float(knots.before[-1]))
+    return SpaceSystem(chords, knots, frame.middle, *ends)
+
+
+def energies(preimage: Real) -> tuple[float, float]:
+    """Integrals of curvature^2 and of torsion^2 over arc length (1/mm)."""
+    spline = SpatialPHSpline(np.zeros((preimage.shape[0], 3)), preimage, False)
+    segment, xi = np.meshgrid(np.arange(preimage.shape[0]), (NODES + 1) / 2, indexing="ij")
+    speed = spline.speed(segment, xi) * WEIGHTS / 2
+    bending = np.sum(spline.curvature_at(segment, xi) ** 2 * speed)
+    return float(bending), float(np.sum(spline.torsion_at(segment, xi) ** 2 * speed))
+
+
+def compare(p: Real) -> dict[str, tuple[float, float]]:
+    """Energies by four criteria for the freedom that interpolation leaves, the phases of the frame."""
+    system = system_through(p)
+
+    def solution(phases: Real) -> tuple[SpaceSystem, Any]:
+        moved = replace(system, frame=turned(system.frame, np.append(0.0, phases)))
+        return moved, newton(moved, moved.first_guess)
+
+    def energy(phases: Real, torsion: float) -> float:
+        moved, found = solution(phases)
+        if not found.converged:
+            return 1e3
+        bending, twisting = energies(moved.coefficients(found.unknown))
+        return bending + torsion * twisting
+
+    def twist(phases: Real) -> float:
+        moved, found = solution(phases)
+        if not found.converged:
+            return 1e3
+        z = moved.values(found.unknown)
+        return float(np.sum(phase_between(z[1:], z[:-1]) ** 2))
+
+    start = np.zeros(system.frame.shape[0] - 1)
+    aims: dict[str, Callable[[Real], float]] = {
+        "no_twist_between_neighbours": twist,
+        "least_bending": lambda phases: energy(phases, 0.0),
+        "least_bending_and_torsion": lambda phases: energy(phases, 1.0),
+    }
+    phases = {"frame_of_the_guide": start}
+    for name, aim in aims.items():
+        phases[name] = minimize(aim, start, method="BFGS", options={"maxiter": 60}).x
+    out = {}
+    for name, at in phases.items():
+        moved, found = solution(at)
+        out[name] = energies(moved.coefficients(found.unknown))
+    return out
+
+
+def criteria(count: int) -> dict[str, Any]:
+    """Median energies beside those of the guide's frame, over short walks with turns of up to 60 and 120 degrees."""
+    out: dict[str, Any] = {}
+    for degrees in (60, 120):
+        rows = [compare(walk(seed, np.radians(degrees))[:9]) for seed in range(count)]
+        for name in rows[0]:
+            ratios = np.array([np.divide(row[name], row["frame_of_the_guide"]) for row in rows])
+            total = np.array(
+                [np.sum(row[name]) / np.sum(row["frame_of_the_guide"]) for row in rows]
+            )
+            out[f"turns_{degrees}_{name}"] = {
+                "bending_median": float(np.median(ratios[:, 0])),
+                "torsion_median": float(np.median(ratios[:, 1])),
+                "sum_median": float(np.median(total)),
+            }
+    return out
+
+
+def speed() -> dict[str, float]:
+    """Least of three wall times, s."""
+    out = {}
+    for count in (1000, 10_000, 100_000):
+        long = count / 24 * torus_knot(count, 2, 9)
+        works: dict[str, Callable[[], object]] = {
+            "open": lambda p=long: spatial_through_points(p, False),
+            "closed": lambda p=long: spatial_through_points(p, True),
+            "control_polygon": lambda p=long: spatial_from_control_polygon(p, False),
+        }
+        for name, work in works.items():
+            walls = []
+            for _ in range(3):
+                begin = time.perf_counter()
+                work()
+                walls.append(time.perf_counter() - begin)
+            out[f"{name}_{count}_s"] = min(walls)
+    rough = np.cumsum(np.random.default_rng(5).normal(size=(100_000, 3)), axis=0)
+    begin = time.perf_counter()
+    out["random_walk_100000_iterations"] = spatial_through_points(rough, False).newton_iterations
+    out["random_walk_100000_s"] = time.perf_counter() - begin
+    return out
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description="figures of splines in space")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--paths", type=int, default=200)
+    options = parser.parse_args()
+    figures = {
+        "speed": speed(),
+        "helix": helix_errors(),
+        "trefoil_mm": knot_errors(),
+        "published": published_errors(),
+        "walks": campaigns(options.paths),
+        "criteria": criteria(max(options.paths // 10, 1)),
+    }
+    for group, values in figures.items():
+        for name, value in values.items():
+            print(f"spatial.{group}.{name}: {value}", flush=True)
+    if options.json:
+        options.json.write_text(json.dumps({"spatial": figures}, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
