@@ -71,8 +71,8 @@ def _shape(spans: Real, rates: Rates) -> tuple[SpaceShape, NDArray[np.bool_]]:
 
     By Gauss quadrature on 6 points, or 96 where a span turns by more than 0.8 rad or its speed is uneven.
 
-    Except next to a cusp, bending is good to two digits and more. Turning is within 3 %: its integrand almost has a kink
-    where the curvature nearly vanishes.
+    Except next to a cusp, bending is good to two digits and more. Turning is within 3 %: its integrand almost has a
+    kink where the curvature nearly vanishes.
     """
     speed, turning, bending = rates(spans, _SMOOTH[0])
     turned, bent = turning @ _SMOOTH[1], bending @ _SMOOTH[1]
