@@ -130,10 +130,11 @@ def knot_errors() -> dict[str, float]:
 
 
 def published() -> SpatialPHSpline:
-    """A PH quintic of Farouki (2019), example 1: ends (0, 0, 0) and (1, 0, 0), their directions, arc length 1.25.
+    """A PH quintic with the end points and directions of Farouki (2019), example 1, and arc length 1.25.
 
-    Farouki, Giannelli, Manni and Sestini (2008), equations (47) to (55), give the quintics with these ends. Of its two
-    free angles the least ones are taken; the end speed is what makes the arc length 1.25.
+    Farouki, Giannelli, Manni and Sestini (2008), equations (47) to (55), give the quintics with these ends. Both free
+    angles are chosen here (nearest in the fibre), so this is not the curve of a printed figure. Bisection on the arc
+    length finds the end speed.
     """
     angles = ((0.65 * np.pi, -0.25 * np.pi), (0.25 * np.pi, 0.25 * np.pi))
     tangents = np.array(
