@@ -16,7 +16,9 @@
 
 enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, POLL_ALL_MS = 20 };
 
-#define NS_PER_S 1000000000u
+#define NS_PER_S      1000000000u
+#define PACE_AHEAD_NS 2e6 /* of virtual time before real time, where its speed is limited */
+#define PACE_LATE_NS  1e8
 
 /* A packet from a process. */
 union packet {
@@ -359,26 +361,34 @@ static void end_transmissions(struct hub *hub)
     }
 }
 
-/* Milliseconds of real time until this instant may come; 0: it may come now. A simulation that is late does not catch up. */
+/* Real time from now until this instant is due, ns; negative: it is late. */
+static double ahead_ns(const struct hub *hub, uint64_t next_ns, uint64_t real_ns)
+{
+    const double virtual_ns = (double)(next_ns - hub->pace_virtual_ns);
+    return virtual_ns / hub->options.speed - (double)(real_ns - hub->pace_real_ns);
+}
+
+/* Milliseconds of real time until this instant may come; 0: it may come now. Time goes on in steps of PACE_AHEAD_NS, since events are
+ * closer together than a process can sleep. A simulation that is later than PACE_LATE_NS does not catch up. */
 static int pace_ms(struct hub *hub, uint64_t next_ns)
 {
-    const uint64_t real_ns = clock_of(CLOCK_MONOTONIC);
     if (hub->options.speed <= 0.0) {
         return 0;
     }
+    const uint64_t real_ns = clock_of(CLOCK_MONOTONIC);
     if (hub->pace_real_ns == 0u) {
         hub->pace_real_ns = real_ns;
         hub->pace_virtual_ns = hub->time.now_ns;
     }
-    const double ahead_ns = (double)(next_ns - hub->pace_virtual_ns) / hub->options.speed;
-    const double due_ns = (double)hub->pace_real_ns + ahead_ns;
-    if (due_ns <= (double)real_ns) {
+    if (ahead_ns(hub, next_ns, real_ns) < -PACE_LATE_NS) {
         hub->pace_real_ns = real_ns;
         hub->pace_virtual_ns = next_ns;
+    }
+    const double left_ns = ahead_ns(hub, next_ns, real_ns);
+    if (left_ns < PACE_AHEAD_NS) {
         return 0;
     }
-    const double left_ms = (due_ns - (double)real_ns) / 1e6;
-    return left_ms < 1000.0 ? (int)left_ms + 1 : 1000;
+    return left_ns < 1e9 ? (int)(left_ns / 1e6) : 1000;
 }
 
 static void grant(const struct hub *hub, struct participant *next)
