@@ -145,7 +145,7 @@ CHECK_S ?= 40
 check: build $(ASAN_BINS) lint-changed ## what an edit can break, in 90 s: C tests and Python tests that it reaches, lint of what changed
 	@$(PY) tools/run_tests.py --build $(BUILD) --suite check --budget $(CHECK_S)
 
-test: $(TESTED) ## the tests that show whether the tree is sound, C and Python, in 10 min; ends with "N passed, N failed"
+test: $(TESTED) ## the tests that show whether the tree is sound, C and Python, in 15 min; ends with "N passed, N failed"
 	@$(PY) tools/run_tests.py --build $(BUILD)
 
 # One after the other: each has the machine for itself. (By the plain word make: `make -n` would run a line with the variable.)

@@ -152,8 +152,13 @@ def test_guides_are_scipys_splines():
 
 @given(seed=st.integers(0, 10**6), name=st.sampled_from(KNOT_NAMES), closed=st.booleans())
 def test_paths_through_points_are_c2_and_pass_them(seed, name, closed):
+    """Uniform knots may be refused: the leg that closes a walk is long beside its neighbours."""
     p = walk(seed, 1.3)
-    spline = spatial_through_points(p, closed, knots=name).spline
+    try:
+        spline = spatial_through_points(p, closed, knots=name).spline
+    except PlanError:
+        assert (name, closed) == ("uniform", True)
+        return
     first, second = joint_jumps(spline, knot_spans(lengths(p, closed), name, closed))
     assert first < 1e-9
     assert second < 1e-9
