@@ -30,6 +30,7 @@ from polygons import helix, torus_knot, walk  # noqa: E402
 from hodograph.errors import PlanError  # noqa: E402
 from hodograph.spline import KNOT_NAMES  # noqa: E402
 from hodograph.spline.knots import knot_spans  # noqa: E402
+from hodograph.spline.newton import newton  # noqa: E402
 from hodograph.spline.spatial import (  # noqa: E402
     SpatialPHSpline,
     SpatialSplineResult,
@@ -38,7 +39,6 @@ from hodograph.spline.spatial import (  # noqa: E402
 )
 from hodograph.spline.spatial.frame import guide_frame  # noqa: E402
 from hodograph.spline.spatial.guide import SpaceEnd, points_guide  # noqa: E402
-from hodograph.spline.spatial.newton import newton  # noqa: E402
 from hodograph.spline.spatial.quality import spline_shape  # noqa: E402
 from hodograph.spline.spatial.quaternion import phase_between, polar, root, turned  # noqa: E402
 from hodograph.spline.spatial.system import SpaceSystem, cubic_end  # noqa: E402
@@ -208,14 +208,14 @@ def compare(p: Real) -> dict[str, tuple[float, float]]:
         moved, found = solution(phases)
         if not found.converged:
             return 1e3
-        bending, twisting = energies(moved.coefficients(found.unknown))
+        bending, twisting = energies(moved.coefficients(found.z))
         return bending + torsion * twisting
 
     def twist(phases: Real) -> float:
         moved, found = solution(phases)
         if not found.converged:
             return 1e3
-        z = moved.values(found.unknown)
+        z = moved.values(found.z)
         return float(np.sum(phase_between(z[1:], z[:-1]) ** 2))
 
     start = np.zeros(system.frame.shape[0] - 1)
@@ -230,7 +230,7 @@ def compare(p: Real) -> dict[str, tuple[float, float]]:
     out = {}
     for name, at in phases.items():
         moved, found = solution(at)
-        out[name] = energies(moved.coefficients(found.unknown))
+        out[name] = energies(moved.coefficients(found.z))
     return out
 
 

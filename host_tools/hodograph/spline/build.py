@@ -28,7 +28,8 @@ class SplineResult:
                        on windows of 17 spans at most; 0 for smooth input
     changed_sides      near-cusps passed on the other side than the guide's, for less bending
     extra_turning_rad  greatest total turning beyond the guide's within three spans that also bend
-    more bending_ratio      bending energy beside the guide's (cubic B-spline or cubic spline)
+                       more
+    bending_ratio      bending energy beside the guide's (cubic B-spline or cubic spline)
     notes              one line each, for stderr
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Newton-Raphson on the interpolation system, and continuation where it does not converge.
+"""Newton-Raphson on an interpolation system, in the plane or in space, and continuation where it does not converge.
 
 docs/theory/numerics.md sections 2.3 (the iteration, when it stops) and 3.4 (continuation).
 """
@@ -7,12 +7,14 @@ docs/theory/numerics.md sections 2.3 (the iteration, when it stops) and 3.4 (con
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..errors import PlanError
 from .banded import SingularSystem
-from .bernstein import Complex
-from .system import System
+from .bernstein import Real
 
 _ROUNDING = 16.0 * 2.0**-52
 _STAGNATION = 1e-11
@@ -20,29 +22,80 @@ _MOST_STEPS = 20
 _SMALLEST_STRIDE = 2.0**-12
 _BULGES = (0.0, 0.25j, -0.25j)
 
+Unknowns = NDArray[Any]
+"""Unknowns of M spans: (M,) complex in the plane, (M, 3) real in space; residuals and chords likewise."""
 
-@dataclass(frozen=True)
+
+class InterpolationSystem(Protocol):
+    """The equations of a spline: one residual for each span."""
+
+    @property
+    def chords(self) -> Unknowns:
+        """From point to point, mm."""
+        ...
+
+    def with_chords(self, chords: Unknowns) -> Self:
+        """The same system for other chords."""
+        ...
+
+    def residual(self, z: Unknowns) -> Unknowns:
+        """By how much the equations are missed; 0 for the solution."""
+        ...
+
+    def residual_mm(self, z: Unknowns) -> Unknowns:
+        """By how much each span misses its chord."""
+        ...
+
+    def sizes(self, residual: Unknowns) -> Real:
+        """Magnitude (M,) of the residual of each span."""
+        ...
+
+    def largest_term(self, z: Unknowns) -> float:
+        """Magnitude of the largest term that is summed in the residual."""
+        ...
+
+    def newton_step(self, z: Unknowns, residual: Unknowns) -> Unknowns:
+        """-J(z)^-1 residual. Raises SingularSystem."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
 class Outcome:
     """Where the iteration ended: `worst` is the span of the largest residual."""
 
-    z: Complex
+    z: Unknowns
     iterations: int
     converged: bool
     worst: int
 
 
-def newton(system: System, z: Complex, most_steps: int = _MOST_STEPS) -> Outcome:
+def solved(system: InterpolationSystem, z: Unknowns) -> Outcome:
+    """The solution near `z`, by Newton, else by continuation. Raises PlanError naming the span."""
+    outcome = newton(system, z)
+    if not outcome.converged:
+        spent = outcome.iterations
+        outcome = continued(system, z)
+        outcome = replace(outcome, iterations=spent + outcome.iterations)
+    if not (outcome.converged and np.isfinite(outcome.z).all()):
+        raise PlanError(
+            f"no spline found: span {outcome.worst} cannot be fitted; "
+            "move or add points around it so that the path turns less sharply"
+        )
+    return outcome
+
+
+def newton(system: InterpolationSystem, z: Unknowns, most_steps: int = _MOST_STEPS) -> Outcome:
     """Full Newton steps from `z` until the residual is at rounding level.
 
-    Rounding level: 16 units in the last place of the largest term of (13), or less than 1e-11 of
-    it and no longer falling.
+    Rounding level: 16 units in the last place of the largest term, or less than 1e-11 of it and no
+    longer falling.
     """
     previous = np.inf
     residual = system.residual(z)
     for iterations in range(most_steps + 1):
-        size = np.abs(residual)
+        size = system.sizes(residual)
         worst = int(size.argmax())
-        term = 60.0 * float(np.abs(z).max()) ** 2
+        term = system.largest_term(z)
         greatest = float(size[worst])
         if not np.isfinite(greatest + term):
             return Outcome(z, iterations, False, worst)
@@ -61,17 +114,17 @@ def newton(system: System, z: Complex, most_steps: int = _MOST_STEPS) -> Outcome
     return Outcome(z, most_steps, False, worst)
 
 
-def continued(system: System, z: Complex) -> Outcome:
+def continued(system: InterpolationSystem, z: Unknowns) -> Outcome:
     """Follow the solution from chords that `z` solves exactly to the chords of `system`.
 
-    The stride halves where Newton needs more than five steps and doubles again after. Paths that
-    run into a singular point are tried again along a detour through complex multiples of the
-    change.
+    The stride halves where Newton needs more than five steps and doubles again after. Paths in the
+    plane that run into a singular point are tried again along a detour through complex multiples of
+    the change.
     """
     spent = 0
     outcome = Outcome(z, 0, False, 0)
     begin = system.chords + system.residual_mm(z)
-    for bulge in _BULGES:
+    for bulge in _BULGES if np.iscomplexobj(begin) else _BULGES[:1]:
         outcome = _follow(system, z, begin, bulge)
         spent += outcome.iterations
         if outcome.converged:
@@ -79,7 +132,7 @@ def continued(system: System, z: Complex) -> Outcome:
     return replace(outcome, iterations=spent)
 
 
-def _follow(system: System, z: Complex, begin: Complex, bulge: complex) -> Outcome:
+def _follow(system: InterpolationSystem, z: Unknowns, begin: Unknowns, bulge: complex) -> Outcome:
     change = system.chords - begin
     done, stride, spent, worst = 0.0, 0.25, 0, 0
     while done < 1.0:
@@ -87,7 +140,7 @@ def _follow(system: System, z: Complex, begin: Complex, bulge: complex) -> Outco
         share = target + bulge * target * (1.0 - target)
         last = target == 1.0
         chords = system.chords if last else begin + share * change
-        step = newton(replace(system, chords=chords), z, _MOST_STEPS if last else 5)
+        step = newton(system.with_chords(chords), z, _MOST_STEPS if last else 5)
         spent += step.iterations
         if step.converged:
             z, done, stride = step.z, target, 2.0 * stride

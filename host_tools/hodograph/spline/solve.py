@@ -5,12 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ..errors import PlanError
 from .bernstein import Complex
 from .loops import Unlooped, without_loops, without_stubborn_loops
-from .newton import Outcome, continued, newton
+from .newton import solved
 from .quality import Shape
 from .system import System
 from .verdict import Verdict, judge
@@ -84,18 +82,5 @@ def _polished(state: _State, better: Unlooped) -> _State:
 
 
 def _converged(state: _State) -> _State:
-    outcome = newton(state.system, state.z)
-    spent = state.spent + outcome.iterations
-    if not outcome.converged:
-        outcome = continued(state.system, state.z)
-        spent += outcome.iterations
-    _require(outcome)
-    return replace(state, z=outcome.z, spent=spent)
-
-
-def _require(outcome: Outcome) -> None:
-    if not (outcome.converged and np.isfinite(outcome.z).all()):
-        raise PlanError(
-            f"no spline found: span {outcome.worst} cannot be fitted; "
-            "move or add points around it so that the path turns less sharply"
-        )
+    outcome = solved(state.system, state.z)
+    return replace(state, z=outcome.z, spent=state.spent + outcome.iterations)

@@ -12,12 +12,12 @@ Spans have parameter length 1, as in the paper, or lengths of their own (`knots`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .banded import solve_cyclic, solve_tridiagonal
-from .bernstein import Complex
+from .bernstein import Complex, Real
 from .knots import KnotSpans
 
 
@@ -78,6 +78,18 @@ class System:
     end: EndRule = NATURAL_END
     cyclic_sign: int = 0
     knots: KnotSpans | None = None
+
+    def with_chords(self, chords: Complex) -> System:
+        """The same system for other chords (M,)."""
+        return replace(self, chords=chords)
+
+    def sizes(self, residual: Complex) -> Real:
+        """Magnitude (M,) of the residual of each span."""
+        return np.asarray(np.abs(residual))
+
+    def largest_term(self, z: Complex) -> float:
+        """Magnitude of the largest term of (13)."""
+        return 60.0 * float(np.abs(z).max()) ** 2
 
     def outer(self, z: Complex) -> tuple[complex, complex]:
         """z_0 and z_(M+1)."""

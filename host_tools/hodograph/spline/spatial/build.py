@@ -12,11 +12,11 @@ from ..bernstein import Real
 from ..build import SplineResult, from_control_polygon, through_points
 from ..ends import end_shares
 from ..knots import KnotSpans, checked_knots, knot_spans
+from ..newton import solved
 from ..nodal import checked_space_points
 from .curve import SpatialPHSpline, embedded
 from .frame import guide_frame, without_rests
 from .guide import SpaceEnd, SpaceGuide, points_guide, polygon_guide
-from .newton import solved
 from .quality import judge
 from .system import NATURAL_END, SpaceEndRule, SpaceSystem, cubic_end, tangent_end
 
@@ -123,8 +123,8 @@ def _solved(
         tangent_end(frame.end) if end is None else end,
         frame.phase if guide.closed else None,
     )
-    outcome = solved(system)
-    preimage = system.coefficients(outcome.unknown)
+    outcome = solved(system, system.first_guess)
+    preimage = system.coefficients(outcome.z)
     verdict = judge(preimage, hodograph * length[:, :, None], guide.closed)
     if verdict.problem:
         raise PlanError(

@@ -10,7 +10,7 @@ not turn in its fibre against R_i. The two values beyond the ends follow linearl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,18 @@ class SpaceSystem:
     start: SpaceEndRule = NATURAL_END
     end: SpaceEndRule = NATURAL_END
     phase: float | None = None
+
+    def with_chords(self, chords: Real) -> SpaceSystem:
+        """The same system for other chords (M, 3)."""
+        return replace(self, chords=chords)
+
+    def sizes(self, residual: Real) -> Real:
+        """Greatest component (M,) of the residual of each span."""
+        return np.asarray(np.abs(residual).max(axis=1))
+
+    def largest_term(self, unknown: Real) -> float:
+        """Magnitude of the largest term that is summed in the residual."""
+        return 60.0 * float(np.sum(self.values(unknown) ** 2, axis=1).max())
 
     @property
     def first_guess(self) -> Real:
