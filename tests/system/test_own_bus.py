@@ -108,7 +108,7 @@ def test_the_hub_ends_with_the_command(
 ) -> None:
     with own_bus.opened_bus(None, print) as address:
         assert is_served(Path(address.channel))
-        assert own_bus.usual_bus() == str(address)
+        assert own_bus.bus_address(None) == address
     assert not is_served(Path(address.channel))
     assert str(address) in capsys.readouterr().out
 

@@ -26,25 +26,21 @@ def own_path() -> Path:
     return Path(tempfile.gettempdir()) / f"hodograph-{os.getuid()}" / "bus"
 
 
-def usual_bus() -> str:
-    """The bus of a command without --bus, which starts nothing."""
-    given = os.environ.get(BUS_VARIABLE)
-    if given:
-        return given
-    path = own_path()
-    return f"local:{path}" if is_served(path) and not _has_vcan() else DEFAULT_BUS
+def bus_address(given: str | None) -> BusAddress:
+    """The bus of a command that starts nothing; `given` by --bus. Raises InputError."""
+    return _found(given) or parse_address(DEFAULT_BUS)
 
 
 @contextmanager
 def opened_bus(
     given: str | None, note: Callable[[str], None], speed: float | None = 1.0
 ) -> Iterator[BusAddress]:
-    """The bus of a command that can start a simulated machine: the one given, else the usual one; where there is none,
-    the local bus of this user, served until the end of the context in virtual time, `speed` times as fast as real time
-    at most (None: as fast as it can).
+    """The bus of a command that can start a simulated machine: as `bus_address`; where there is none, the local bus of
+    this user, served until the end of the context in virtual time, `speed` times as fast as real time at most (None: as
+    fast as it can). Raises InputError and BusError.
     """
-    address = parse_address(given or usual_bus())
-    if given or os.environ.get(BUS_VARIABLE) or address.is_local or _has_vcan():
+    address = _found(given)
+    if address is not None:
         yield address
         return
     path = own_path()
@@ -52,6 +48,16 @@ def opened_bus(
     with LocalHub(paths=[path], speed=speed) as hub:
         note(f"this kernel has no {DEFAULT_BUS}: using the local bus {hub.address}")
         yield hub.address
+
+
+def _found(given: str | None) -> BusAddress | None:
+    named = given or os.environ.get(BUS_VARIABLE)
+    if named:
+        return parse_address(named)
+    if _has_vcan():
+        return parse_address(DEFAULT_BUS)
+    path = own_path()
+    return BusAddress("local", str(path)) if is_served(path) else None
 
 
 def _has_vcan() -> bool:

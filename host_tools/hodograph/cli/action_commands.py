@@ -7,7 +7,7 @@ import math
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from ..bus.address import parse_address
+from ..bus.own_bus import bus_address
 from ..bus.sdo import actions
 from ..bus.sdo.objects import BOOT, OFF, QUICK_STOP, READY
 from ..errors import InputError
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def configure(options: Namespace) -> None:
     """hodograph configure."""
     _check_configure(options)
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     machine = _machine_of_file(options)
     to = target(options) if machine is None else machine
     node = options.node or to.node
@@ -69,7 +69,7 @@ def _machine_of_file(options: Namespace) -> Machine | None:
 
 def home(options: Namespace) -> None:
     """hodograph home."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     machine = _machine_of_file(options)
     to = target(options) if machine is None else machine
     with reached(address, to.node, to.bitrate, options.wait) as controller:
@@ -84,7 +84,7 @@ def home(options: Namespace) -> None:
 
 def quick_stop(options: Namespace) -> None:
     """hodograph quick-stop."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with commanded(address, to.node, to.bitrate, options.wait, QUICK_STOP) as controller:
         actions.quick_stop_over(controller, options.timeout or actions.BOOT_S)
@@ -93,7 +93,7 @@ def quick_stop(options: Namespace) -> None:
 
 def reset(options: Namespace) -> None:
     """hodograph reset."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with reached(address, to.node, to.bitrate, options.wait) as controller:
         wait_s = options.timeout or actions.BOOT_S

@@ -8,7 +8,8 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from ..bus.address import BusAddress, parse_address
+from ..bus.address import BusAddress
+from ..bus.own_bus import bus_address
 from ..bus.sdo import actions
 from ..bus.sdo.controller import (
     BOOT,
@@ -66,7 +67,7 @@ def stopping(controller: Controller) -> Iterator[None]:
 
 def start(options: Namespace) -> None:
     """hodograph start."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with reached(address, to.node, to.bitrate, options.wait) as controller:
         if options.reset:
@@ -81,7 +82,7 @@ def start(options: Namespace) -> None:
 
 def stop(options: Namespace) -> None:
     """hodograph stop."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with commanded(address, to.node, to.bitrate, options.wait, STOP) as controller:
         was_running = controller.state() in MOVING
@@ -94,7 +95,7 @@ def stop(options: Namespace) -> None:
 
 def hold(options: Namespace) -> None:
     """hodograph hold."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with commanded(address, to.node, to.bitrate, options.wait, HOLD) as controller:
         held = actions.hold_reached(controller, options.timeout or math.inf)
@@ -103,7 +104,7 @@ def hold(options: Namespace) -> None:
 
 def resume(options: Namespace) -> None:
     """hodograph resume."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with reached(address, to.node, to.bitrate, options.wait) as controller:
         controller.command(RESUME)
@@ -112,7 +113,7 @@ def resume(options: Namespace) -> None:
 
 def override(options: Namespace) -> None:
     """hodograph override."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with reached(address, to.node, to.bitrate, options.wait) as controller:
         controller.override(options.percent)

@@ -7,9 +7,9 @@ import asyncio
 from argparse import Namespace
 from pathlib import Path
 
-from ..bus.address import parse_address
 from ..bus.capture.frames import Frames
 from ..bus.capture.setpoint_check import step_limits
+from ..bus.own_bus import bus_address
 from ..config import Machine, load_machine
 from ..errors import InputError
 from ..monitor.decoder import nodes_in
@@ -33,7 +33,7 @@ def monitor(options: Namespace) -> None:
     if options.replay is not None:
         what, layout = _replay(options, machine, image)
     elif machine is not None:
-        what, layout = Live(parse_address(options.bus), machine.node), machine_layout(machine)
+        what, layout = Live(bus_address(options.bus), machine.node), machine_layout(machine)
     else:
         raise InputError("monitor: needs --machine FILE, or a path file as --program")
     asyncio.run(LivePage(what, layout, place, image, note).serve())

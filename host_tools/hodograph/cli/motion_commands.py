@@ -9,10 +9,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..bus.address import BusAddress, parse_address
+from ..bus.address import BusAddress
 from ..bus.capture.recordings import check_suffix
 from ..bus.goto import goto as goto_point
-from ..bus.own_bus import opened_bus
+from ..bus.own_bus import bus_address, opened_bus
 from ..bus.run import BusRun, rig_until_interrupted, run_program, run_session
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.status import loaded_program
@@ -45,7 +45,7 @@ def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
 
 def upload(options: Namespace) -> None:
     """hodograph upload."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     image, machine = _image_and_machine(options)
     node, bitrate = (machine.node, machine.bitrate) if machine else (1, DEFAULT_BITRATE)
     with reached(address, node, bitrate, options.wait) as controller:
@@ -66,7 +66,7 @@ def upload(options: Namespace) -> None:
 
 def goto(options: Namespace) -> None:
     """hodograph goto."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     image: bytes | None = None
     if options.to is None:
         image, named = _image_and_machine(options)

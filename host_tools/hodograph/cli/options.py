@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..bus.address import BUS_VARIABLE, DEFAULT_BUS
-from ..bus.own_bus import usual_bus
 from ..names import KERNELS
 
 
@@ -101,7 +100,6 @@ def bus_name(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> Non
     where = "a local bus of its own" if can_serve else "the local bus of hodograph run or rig"
     parser.add_argument(
         "--bus",
-        default=None if can_serve else usual_bus(),
         metavar="INTERFACE:CHANNEL",
         help=f"as python-can has it (default ${BUS_VARIABLE}, else {DEFAULT_BUS}, else {where})",
     )

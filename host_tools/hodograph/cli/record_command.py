@@ -6,7 +6,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from ..bus.address import BusAddress, check_raw, parse_address
+from ..bus.address import BusAddress, check_raw
 from ..bus.capture.decode import unhomed_starts
 from ..bus.capture.frames import Frames
 from ..bus.capture.recorder import Recorder
@@ -14,6 +14,7 @@ from ..bus.capture.recordings import RecordingWriter, check_suffix
 from ..bus.capture.setpoint_check import Jump, Step, limits_at, step_limits
 from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.clock import REAL_CLOCK, Clock, VirtualClock
+from ..bus.own_bus import bus_address
 from ..bus.processes import virtual_clock
 from ..bus.sdo.configuration import configured_axis_limits, configured_limits, configured_nodes
 from ..bus.sdo.controller import connect
@@ -31,7 +32,7 @@ _ANSWER_S = 1.0
 def record(options: Namespace) -> None:
     """Records; raises RunError when frames are missing or a setpoint jumps."""
     check_suffix(options.file)
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     if not address.is_raw:
         raise BusError(f"{address}: record takes SocketCAN: use socketcan:CHANNEL")
     check_raw(address)

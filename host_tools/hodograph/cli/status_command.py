@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from ..bus.address import BusAddress, parse_address
+from ..bus.address import BusAddress
 from ..bus.capture.load import LEAST_LISTEN_S, BusLoad, LoadMeter
 from ..bus.clock import Clock
+from ..bus.own_bus import bus_address
 from ..bus.sdo.controller import Controller, connect
 from ..bus.sdo.status import Status, snapshot
 from ..bus.status_text import Row, status_line, status_rows
@@ -29,7 +30,7 @@ _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 
 def status(options: Namespace) -> None:
     """hodograph status."""
-    address = parse_address(options.bus)
+    address = bus_address(options.bus)
     to = target(options)
     with ExitStack() as stack:
         controller = stack.enter_context(connect(address, to.node, to.bitrate))
