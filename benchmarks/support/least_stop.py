@@ -19,6 +19,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from hodograph.feed.kinematics import frames
 from hodograph.native.stop_search import StopLimits
 from hodograph.spline import PHSpline
 
@@ -31,7 +32,6 @@ _PARTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Points of an interval at which limits hold."""
 _FEED, _ACCELERATION, _JERK, _TIME_S = 100.0, 2000.0, 50000.0, 0.1
 """Units of the variables, so that they are near one."""
-_BESIDE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -156,22 +156,7 @@ def _frame(spline: PHSpline) -> Any:
     starts = spline.segment_starts_mm
     places = np.concatenate([a + (b - a) * share for a, b in pairwise(starts)])
     places = np.concatenate(([0.0], places, [spline.length_mm]))
-    inside = np.clip(places, _BESIDE, spline.length_mm - _BESIDE)
-    segment, xi = spline.locate(inside)
-    w0, w1, w2 = (spline.w[segment, k] for k in range(3))
-    w = (1 - xi) ** 2 * w0 + 2 * xi * (1 - xi) * w1 + xi**2 * w2
-    first = 2 * ((1 - xi) * (w1 - w0) + xi * (w2 - w1))
-    second = 2 * (w0 - 2 * w1 + w2)
-    sigma = np.abs(w) ** 2
-    turn, turn2 = (w.conj() * first).imag, (w.conj() * second).imag
-    pull = (w.conj() * first).real
-    tangent = w**2 / sigma
-    values = np.stack(
-        (
-            tangent.real,
-            tangent.imag,
-            2 * turn / sigma**2,
-            (2 * turn2 - 8 * turn * pull / sigma) / sigma**3,
-        )
-    )
+    frame = frames(spline, places)
+    slope = (frame.r3 * np.conj(1j * frame.r1)).real
+    values = np.stack((frame.r1.real, frame.r1.imag, frame.curvature, slope))
     return ca.interpolant("frame", "bspline", [places.tolist()], values.ravel(order="F").tolist())

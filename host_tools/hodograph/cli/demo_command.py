@@ -3,22 +3,20 @@
 
 from __future__ import annotations
 
+import re
 import socket
-import subprocess
 import sys
-import tempfile
+import time
 import webbrowser
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import IO
 
 from ..bus.address import BusAddress
 from ..bus.hub import LocalHub
-from ..bus.processes import guarded
+from ..bus.processes import Process
 from ..bus.run import run_program, run_session
 from ..data import EXAMPLES
-from ..errors import BusError
 from ..pipeline import load_pipeline
 from ..report import write_report
 from .motion_commands import print_run
@@ -26,7 +24,8 @@ from .output import note, print_json, progress
 
 _PROGRAM = EXAMPLES / "alpha.toml"
 _WAIT_S = 10.0
-_URL = "http://"
+_LOOK_S = 0.02
+_URL = re.compile(r"http://\S+(?=\s)")
 
 
 def demo(options: Namespace) -> None:
@@ -57,30 +56,14 @@ def _live_page(address: BusAddress) -> Iterator[str]:
     """`hodograph monitor` on this bus as a process of its own; its address. Raises BusError when it does not start."""
     command = [sys.executable, "-m", "hodograph", "monitor", "--bus", str(address)]
     command += ["--program", str(_PROGRAM), "--port", str(_free_port())]
-    with tempfile.TemporaryFile("w+") as said:
-        page = subprocess.Popen(
-            guarded(command), stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        )
-        try:
-            yield _url(page, said)
-        finally:
-            page.terminate()
-            page.wait()
-            if page.stderr is not None:
-                page.stderr.close()
-
-
-def _url(page: subprocess.Popen[str], said: IO[str]) -> str:
-    assert page.stderr is not None
-    for line in page.stderr:
-        said.write(line)
-        if _URL in line:
-            return line[line.index(_URL) :].strip()
-    said.seek(0)
-    lines = said.read().strip().splitlines()
-    raise BusError(
-        f"demo: the live page did not start: {lines[-1] if lines else 'it said nothing'}"
-    )
+    page = Process("live page", command)
+    try:
+        while (found := _URL.search(page.text())) is None:
+            page.check()
+            time.sleep(_LOOK_S)
+        yield found[0]
+    finally:
+        page.end()
 
 
 def _free_port() -> int:
