@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/commands.h"
 
+#include <string.h>
+
 #include "port/port.h"
 
 static enum machine_refusal locked(struct machine *machine,
@@ -14,14 +16,13 @@ static enum machine_refusal locked(struct machine *machine,
 
 /* The start of the program is exactly the image's point; anywhere else the kernel says where. */
 static int prepare(struct controller *controller, int64_t from_q40_mm, struct motion *prepared,
-                   int32_t start_counts[PLANE_AXES])
+                   int32_t start_counts[AXES_MAX])
 {
     const struct program_slot *slot = &controller->slot;
     const int result =
         motion_begin_at(prepared, &slot->program, &controller->config, from_q40_mm, start_counts);
     if (from_q40_mm <= 0) {
-        start_counts[0] = slot->start_counts[0];
-        start_counts[1] = slot->start_counts[1];
+        memcpy(start_counts, slot->start_counts, sizeof slot->start_counts);
     }
     return result;
 }
@@ -34,6 +35,9 @@ static enum machine_refusal program_refusal(struct controller *controller)
     if (!slot->present) {
         return MACHINE_NO_PROGRAM;
     }
+    if (slot->program.header.axis_count > controller->config.axis_count) {
+        return MACHINE_AXES_MISSING;
+    }
     program_slot_refresh(slot, &controller->config);
     return slot->acceptable ? MACHINE_ACCEPTED : MACHINE_OUTSIDE_LIMITS;
 }
@@ -42,7 +46,7 @@ static enum machine_refusal program_refusal(struct controller *controller)
 static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
 {
     struct motion prepared;
-    int32_t start_counts[PLANE_AXES];
+    int32_t start_counts[AXES_MAX];
     if (prepare(controller, from_q40_mm, &prepared, start_counts) != 0) {
         return MACHINE_OUTSIDE_LIMITS;
     }

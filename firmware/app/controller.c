@@ -331,7 +331,7 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
         axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
         if (facts->known[DRIVE_POSITION]) {
             axis_found(axis, (int32_t)facts->value[DRIVE_POSITION],
-                       MACHINE_KEPT_MM * controller->config.counts_per_mm);
+                       MACHINE_KEPT_UNITS * config_counts_per_unit(&controller->config, i));
         } else {
             axis->homed = false;
         }

@@ -353,7 +353,7 @@ static const struct object objects[] = {
     {0x1A00, 0x1A05, 3, 3, SHARED, object_read_setpoint_torque, NULL, NULL, NULL},
     {0x1A06, 0x1A0B, 0, 0, SHARED, object_read_velocity_count, NULL, NULL, NULL},
     {0x1A06, 0x1A0B, 1, 1, SHARED, object_read_velocity_mapped, NULL, NULL, NULL},
-    {0x2000, 0x2000, 2, 23, OWN, object_read_program, NULL, NULL, NULL},
+    {0x2000, 0x2000, 2, 32, OWN, object_read_program, NULL, NULL, NULL},
     {0x2001, 0x2001, 0, 0, OWN, NULL, object_write_command, NULL, object_urgent_command},
     {0x2002, 0x2002, 0, 0, SHARED, object_read_state, NULL, NULL, NULL},
     {0x2003, 0x2003, 1, 4, SHARED, object_read_fault, NULL, NULL, NULL},
@@ -375,7 +375,7 @@ static const struct object objects[] = {
     {0x202B, 0x202B, 1, 6, SHARED, object_read_torque_offset, NULL, NULL, NULL},
     {0x202C, 0x202C, 1, 6, SHARED, object_read_velocity_offset, NULL, NULL, NULL},
     {0x2040, 0x2040, 0, 0, OWN, object_read_timing, NULL, NULL, NULL},
-    {0x2041, 0x2041, 1, 3, OWN, object_read_memory, NULL, NULL, NULL},
+    {0x2041, 0x2041, 1, 5, OWN, object_read_memory, NULL, NULL, NULL},
     {0x2050, 0x2050, 1, 6, OWN, object_read_configuration, object_write_confirmation, NULL, NULL},
     {0x2055, 0x2055, 2, 2, SHARED, object_read_unhomed, NULL, NULL, NULL},
 };

@@ -100,6 +100,9 @@ static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 
 #define STOPS_FIRST 16u /* four numbers of the longest hold, four of the longest fault stop */
 #define FAULT_FIRST 20u
+#define AXES_NUMBER 24u /* then start and end of the axes behind the plane */
+#define START_REST  25u
+#define END_REST    (START_REST + AXES_MAX - PROGRAM_PLANE)
 
 /* The first piece in which a stop takes as long as the header says that one takes at most. */
 static uint32_t longest_piece(const struct program *p, enum program_stop_kind kind,
@@ -144,6 +147,11 @@ static uint64_t place_number(struct controller *controller, uint8_t sub)
 {
     struct program_slot *slot = &controller->slot;
     program_slot_refresh(slot, &controller->config);
+    if (sub >= START_REST) {
+        const int32_t *counts = sub < END_REST ? slot->start_counts : slot->end_counts;
+        const uint32_t axis = PROGRAM_PLANE + (sub - START_REST) % (AXES_MAX - PROGRAM_PLANE);
+        return axis < slot->program.header.axis_count ? (uint64_t)(int64_t)counts[axis] : 0u;
+    }
     const int32_t *counts = sub < 14u ? slot->start_counts : slot->end_counts;
     return (uint64_t)(int64_t)counts[sub & 1u];
 }
@@ -164,6 +172,12 @@ uint64_t object_read_program(struct controller *controller, const struct od_entr
     }
     if (!slot->present) {
         return 0;
+    }
+    if (sub == AXES_NUMBER) {
+        return slot->program.header.axis_count;
+    }
+    if (sub > AXES_NUMBER) {
+        return place_number(controller, sub);
     }
     if (sub >= STOPS_FIRST) {
         return stop_number(&slot->program, sub);

@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "app/bank_record.h"
+#include "app/machine/path_counts.h"
 #include "app/program_table.h"
 #include "core/coefficients.h"
-#include "core/counts.h"
 #include "core/interpolator.h"
 #include "port/port.h"
 
@@ -35,7 +35,13 @@ uint64_t program_slot_memory(uint32_t kernel, uint8_t number)
     case 1:
         return bank_record_room(0);
     case 2:
-        return made_for != NULL ? coefficients_segment_size(made_for) : 0u;
+        return made_for != NULL ? coefficients_segment_size(made_for, PROGRAM_PLANE) : 0u;
+    case 4:
+        return made_for != NULL ? coefficients_segment_size(made_for, PROGRAM_SPACE) : 0u;
+    case 5:
+        return made_for != NULL ? coefficients_segment_size(made_for, PROGRAM_SPACE + 1u) -
+                                      coefficients_segment_size(made_for, PROGRAM_SPACE)
+                                : 0u;
     default:
         return made_for != NULL ? coefficients_piece_size(made_for) : 0u;
     }
@@ -65,17 +71,14 @@ static int check(const struct program_slot *slot, const struct program *program,
                  const struct config *config, struct program_fault *fault)
 {
     struct program_limits limits;
+    if (program->header.axis_count > config->axis_count) {
+        *fault = (struct program_fault){.code = PROGRAM_ERR_AXES, .index = 0};
+        return fault->code;
+    }
     config_limits(config, &limits);
     limits.attend = slot->attend;
     limits.self = slot->self;
     return program_check(program, &limits, fault);
-}
-
-static void to_counts(const struct interpolator_point *point, uint32_t counts_per_mm,
-                      int32_t counts[PLANE_AXES])
-{
-    counts[0] = counts_from_q40_mm(point->x_q40_mm, counts_per_mm);
-    counts[1] = counts_from_q40_mm(point->y_q40_mm, counts_per_mm);
 }
 
 static void find_ends(struct program_slot *slot, const struct config *config)
@@ -85,8 +88,10 @@ static void find_ends(struct program_slot *slot, const struct config *config)
     struct interpolator_point last;
     if (kernel != NULL) {
         interpolator_ends(&slot->program, kernel, &first, &last);
-        to_counts(&first, config->counts_per_mm, slot->start_counts);
-        to_counts(&last, config->counts_per_mm, slot->end_counts);
+        struct path_counts scale;
+        path_counts_init(&scale, &slot->program, config);
+        path_counts_of(&scale, &first, slot->start_counts);
+        path_counts_of(&scale, &last, slot->end_counts);
     }
 }
 
@@ -145,9 +150,12 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
 /* Limits are those of a configuration, and may change; these hold for every program. */
 static bool sound(const struct program *program)
 {
-    static const struct program_limits none = {.min_q40_mm = {INT64_MIN, INT64_MIN},
-                                               .max_q40_mm = {INT64_MAX, INT64_MAX}};
+    struct program_limits none = {.period_us = 0};
     struct program_fault fault;
+    for (uint32_t i = 0; i < PROGRAM_AXES; ++i) {
+        none.min_q40_mm[i] = INT64_MIN;
+        none.max_q40_mm[i] = INT64_MAX;
+    }
     return program_check(program, &none, &fault) == 0;
 }
 

@@ -31,10 +31,11 @@ struct program_slot {
     void (*attend)(
         void *self); /* called with `self` now and then while a program is checked; may be NULL */
     void *self;
-    struct program program;           /* active, when present */
-    struct program_fault refused;     /* last refusal; code 0: none */
-    int32_t start_counts[PLANE_AXES]; /* first and last setpoint with the present configuration */
-    int32_t end_counts[PLANE_AXES];
+    struct program program;       /* active, when present */
+    struct program_fault refused; /* last refusal; code 0: none */
+    int32_t start_counts
+        [AXES_MAX]; /* first and last setpoint with the present configuration: of the program's axes */
+    int32_t end_counts[AXES_MAX];
     unsigned bank;         /* of the active program */
     uint32_t sequence;     /* of its record */
     uint32_t config_crc32; /* of the configuration it was last checked against */
@@ -50,7 +51,8 @@ void program_slot_init(struct program_slot *slot);
  * upload. Costs a whole check of each program it looks at. */
 void program_slot_recover(struct program_slot *slot);
 
-/* Object 0x2041: 1 bytes of a bank for image and records; 2, 3 bytes of the record of a segment, a piece, for a kernel. */
+/* Object 0x2041: 1 bytes of a bank for image and records; for a kernel the record of 2 a segment in the plane, 3 a piece, 4 a
+ * segment in space, 5 and each extra axis of it. */
 uint64_t program_slot_memory(uint32_t kernel, uint8_t number);
 
 enum program_slot_state program_slot_state(const struct program_slot *slot);

@@ -60,7 +60,6 @@ static const struct feedforward_offset *find_offsets(struct tick *tick,
     if (machine->config.feedforward == 0u) {
         return none;
     }
-    memset(offset, 0, AXES_MAX * sizeof offset[0]);
     offsets_step(&tick->offsets, &machine->config,
                  machine_on_path(machine) ? &machine->motion : NULL, offset);
     return offset;
@@ -71,7 +70,7 @@ static void send_setpoints(struct tick *tick, const struct feedforward_offset *o
     struct machine *machine = tick->machine;
     for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
-        axis_setpoint(axis, machine->config.start_tolerance_counts);
+        axis_setpoint(axis, config_tolerance_counts(&machine->config, i));
         if (axis->torque_mapped) {
             axis->torque_offset_permille = offset[i].torque_permille;
             pdo_add_torque(&axis->setpoint, axis->torque_offset_permille);

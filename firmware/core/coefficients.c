@@ -13,8 +13,8 @@ static uint64_t pieces_size(const struct program *p, const struct kernel *kernel
 
 uint64_t coefficients_size(const struct program *p, const struct kernel *kernel)
 {
-    return pieces_size(p, kernel) +
-           (uint64_t)p->header.segment_count * coefficients_segment_size(kernel);
+    return pieces_size(p, kernel) + (uint64_t)p->header.segment_count *
+                                        coefficients_segment_size(kernel, p->header.axis_count);
 }
 
 static void look_ahead(struct program_override ahead[OVERRIDE_WINDOWS], const struct program *p,
@@ -48,7 +48,7 @@ static void make_segment(struct coefficients_segment *out, const struct program 
     out->from_q40_mm = i == 0 ? INT64_MIN : segment.start_q40_mm;
     out->to_q40_mm =
         i + 1u == p->header.segment_count ? INT64_MAX : program_segment_start(p, i + 1u);
-    kernel->segment_set(&out->path, &ph);
+    kernel_path(kernel, ph.axis_count)->segment_set(&out->path, &ph);
 }
 
 int coefficients_make(const struct program *p, const struct kernel *kernel, coefficients_sink *sink,
@@ -70,7 +70,8 @@ int coefficients_make(const struct program *p, const struct kernel *kernel, coef
     memset(&record, 0, sizeof record);
     for (uint32_t i = 0; error == 0 && i < p->header.segment_count; i++) {
         make_segment(&record.segment, p, kernel, i);
-        error = sink(context, record.bytes, coefficients_segment_size(kernel));
+        error =
+            sink(context, record.bytes, coefficients_segment_size(kernel, p->header.axis_count));
     }
     return error;
 }

@@ -43,6 +43,9 @@ struct coefficients_segment {
         struct kernel_fixed_segment fixed;
         struct kernel_float_segment floats;
         struct kernel_double_segment doubles;
+        struct kernel_fixed_space fixed_space;
+        struct kernel_float_space floats_space;
+        struct kernel_double_space doubles_space;
     } path;
 };
 
@@ -52,9 +55,11 @@ static inline uint32_t coefficients_piece_size(const struct kernel *kernel)
     return (uint32_t)(offsetof(struct coefficients_piece, feed) + kernel->piece_size);
 }
 
-static inline uint32_t coefficients_segment_size(const struct kernel *kernel)
+static inline uint32_t coefficients_segment_size(const struct kernel *kernel, uint32_t axis_count)
 {
-    return (uint32_t)(offsetof(struct coefficients_segment, path) + kernel->segment_size);
+    const struct kernel_path *path = kernel_path(kernel, axis_count);
+    return (uint32_t)(offsetof(struct coefficients_segment, path) + path->segment_size +
+                      path->extra_size * program_extra_axes(axis_count));
 }
 
 /* Bytes of all records of a program; may be above 2^32. */
@@ -79,22 +84,25 @@ int coefficients_make_in(struct program *p, const struct kernel *kernel, void *m
 static inline const struct coefficients_piece *
 coefficients_piece_at(const struct program *p, const struct kernel *kernel, uint32_t i)
 {
-    return (const void *)(p->coefficients + (size_t)i * coefficients_piece_size(kernel));
+    const void *at = p->coefficients + (size_t)i * coefficients_piece_size(kernel);
+    return (const struct coefficients_piece *)at; /* C++ wants the cast */
 }
 
 static inline const struct coefficients_segment *
 coefficients_segment_at(const struct program *p, const struct kernel *kernel, uint32_t i)
 {
-    return (const void *)(p->coefficients +
-                          (size_t)p->header.piece_count * coefficients_piece_size(kernel) +
-                          (size_t)i * coefficients_segment_size(kernel));
+    const void *at = p->coefficients +
+                     (size_t)p->header.piece_count * coefficients_piece_size(kernel) +
+                     (size_t)i * coefficients_segment_size(kernel, p->header.axis_count);
+    return (const struct coefficients_segment *)at;
 }
 
 /* The piece behind one that is not the last. */
 static inline const struct coefficients_piece *
 coefficients_piece_next(const struct coefficients_piece *piece, const struct kernel *kernel)
 {
-    return (const void *)((const uint8_t *)piece + coefficients_piece_size(kernel));
+    const void *at = (const uint8_t *)piece + coefficients_piece_size(kernel);
+    return (const struct coefficients_piece *)at;
 }
 
 #endif

@@ -373,7 +373,7 @@ int feed_override_next(struct feed_override *f, struct interpolator *it,
     if (result < 0) {
         return result;
     }
-    *out = f->point;
+    interpolator_point_copy(out, &f->point, it->axis_count);
     return 0;
 }
 

@@ -25,6 +25,13 @@
  * Structs are the caller's, and no function allocates or has state of its own. The image, the records and the structs
  * must stay where they are while a motion uses them; the image and the records must not change.
  *
+ * ## Path axes
+ *
+ * A planar program moves x and y, a spatial one x, y, z and up to three extra axes (docs/reference/protocol.md section 1).
+ * program.header.axis_count says how many; positions, limits and offsets are arrays of PROGRAM_AXES, of which the first
+ * axis_count count. A controller that serves another number says so in program_limits.axis_count, and program_check
+ * refuses the program.
+ *
  * ## Cost
  *
  *   program_check          some 10^3 to 10^4 instructions a segment and piece, more for limits of the axes
@@ -84,13 +91,20 @@
  *         if (error != 0) {
  *             return error;
  *         }
- *         counts[0] = counts_from_q40_mm(point.x_q40_mm, 1000000);
- *         counts[1] = counts_from_q40_mm(point.y_q40_mm, 1000000);
+ *         counts[0] = counts_from_q40_mm(point.position_q40[0], 1000000);
+ *         counts[1] = counts_from_q40_mm(point.position_q40[1], 1000000);
  *         return feed_override_state(&feed) == FEED_ENDED;
  *     }
  */
 #ifndef HODOGRAPH_CORE_HODOGRAPH_H
 #define HODOGRAPH_CORE_HODOGRAPH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 #include "core/coefficients.h"
 #include "core/counts.h"
@@ -100,5 +114,9 @@
 #include "core/kernel.h"
 #include "core/program.h"
 #include "core/program_check.h"
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -40,7 +40,7 @@ static int find_piece(struct interpolator *it, uint64_t time_q42_s, uint32_t mos
 
 static int step_segment(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most)
 {
-    const uint32_t size = coefficients_segment_size(it->kernel);
+    const uint32_t size = it->segment_size;
     const struct coefficients_segment *segment = it->segment;
     uint32_t left = most;
     if (arc_length_q40_mm >= segment->to_q40_mm) {
@@ -79,14 +79,12 @@ static void set_start(struct interpolator_point *start, const struct program *p,
     struct coefficients_segment record;
     struct program_segment segment;
     struct ph_segment ph;
-    int64_t point[2];
+    const struct kernel_path *path = kernel_path(kernel, p->header.axis_count);
     program_segment_get(p, 0, &segment);
     ph_segment_expand(&ph, &segment);
-    kernel->segment_set(&record.path, &ph);
-    kernel->segment_at(&record.path, point, 0);
+    path->segment_set(&record.path, &ph);
+    path->segment_at(&record.path, start->position_q40, 0);
     start->arc_length_q40_mm = 0;
-    start->x_q40_mm = point[0];
-    start->y_q40_mm = point[1];
     start->feed_q32_mm_s = 0;
 }
 
@@ -94,14 +92,28 @@ static void set_end(struct interpolator_point *end, const struct program *p)
 {
     struct program_segment segment;
     struct ph_segment ph;
-    int64_t end_q48[3];
+    int64_t end_q48[PH_AXES];
     program_segment_get(p, p->header.segment_count - 1u, &segment);
     ph_segment_expand(&ph, &segment);
     ph_segment_end(&ph, end_q48);
     end->arc_length_q40_mm = p->header.length_q40_mm;
-    end->x_q40_mm = segment.x_q40_mm + qmath_round(end_q48[PH_X], 8);
-    end->y_q40_mm = segment.y_q40_mm + qmath_round(end_q48[PH_Y], 8);
     end->feed_q32_mm_s = 0;
+    for (uint32_t axis = 0; axis < program_curve_axes(segment.axis_count); axis++) {
+        end->position_q40[axis] =
+            segment.point_q40_mm[axis] + qmath_round(end_q48[PH_X + (int)axis], 8);
+    }
+    for (uint32_t i = 0; i < program_extra_axes(segment.axis_count); i++) {
+        end->position_q40[PROGRAM_SPACE + i] =
+            segment.extra[i].start_q40 + segment.extra[i].b_q40[4];
+    }
+}
+
+void interpolator_point_copy_rest(struct interpolator_point *out,
+                                  const struct interpolator_point *from, uint32_t axis_count)
+{
+    for (uint32_t axis = PROGRAM_PLANE; axis < axis_count && axis < PROGRAM_AXES; axis++) {
+        out->position_q40[axis] = from->position_q40[axis];
+    }
 }
 
 void interpolator_ends(const struct program *p, const struct kernel *kernel,
@@ -121,6 +133,9 @@ int interpolator_begin(struct interpolator *it, const struct program *p)
     }
     it->program = p;
     it->kernel = p->coefficients_for;
+    it->axis_count = p->header.axis_count;
+    it->segment_at = kernel_path(it->kernel, it->axis_count)->segment_at;
+    it->segment_size = coefficients_segment_size(it->kernel, it->axis_count);
     it->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
     it->length_q40_mm = p->header.length_q40_mm;
     it->piece = coefficients_piece_at(p, it->kernel, 0);
@@ -136,7 +151,7 @@ static int beyond(const struct interpolator *it, uint64_t time_q42_s,
     if (time_q42_s < it->duration_q42_s) {
         return INTERPOLATOR_ERR_JUMP;
     }
-    *out = it->end;
+    interpolator_point_copy(out, &it->end, it->axis_count);
     return INTERPOLATOR_END;
 }
 
@@ -147,11 +162,8 @@ static int evaluate_path(struct interpolator *it, int64_t arc_length_q40_mm, uin
     if (find_segment(it, arc_length_q40_mm, most) != INTERPOLATOR_OK) {
         return INTERPOLATOR_ERR_JUMP;
     }
-    int64_t point[2];
-    it->kernel->segment_at(&it->segment->path, point, arc_length_q40_mm);
+    it->segment_at(&it->segment->path, out->position_q40, arc_length_q40_mm);
     out->arc_length_q40_mm = arc_length_q40_mm;
-    out->x_q40_mm = point[0];
-    out->y_q40_mm = point[1];
     return INTERPOLATOR_OK;
 }
 

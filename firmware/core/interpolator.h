@@ -33,15 +33,40 @@ enum interpolator_result {
 /* Unrounded output of a tick, the same units for all kernels. */
 struct interpolator_point {
     int64_t arc_length_q40_mm;
-    int64_t x_q40_mm; /* machine coordinates */
-    int64_t y_q40_mm;
     int64_t feed_q32_mm_s; /* F' at rate 1 */
+    int64_t position_q40
+        [PROGRAM_AXES]; /* machine coordinates of the program's path axes; the others are not written. In
+                                         * mm, in degrees for an extra axis that turns */
 };
+
+/* The positions of the axes behind y, for the next function. */
+void interpolator_point_copy_rest(struct interpolator_point *out,
+                                  const struct interpolator_point *from, uint32_t axis_count);
+
+/* Copies a point of a program with so many path axes. */
+static inline void interpolator_point_copy(struct interpolator_point *out,
+                                           const struct interpolator_point *from,
+                                           uint32_t axis_count)
+{
+    out->arc_length_q40_mm = from->arc_length_q40_mm;
+    out->feed_q32_mm_s = from->feed_q32_mm_s;
+    for (uint32_t axis = 0; axis < PROGRAM_PLANE; axis++) {
+        out->position_q40[axis] = from->position_q40[axis];
+    }
+    if (axis_count > PROGRAM_PLANE) {
+        interpolator_point_copy_rest(out, from, axis_count);
+    }
+}
 
 /* Caller allocates (about 0.1 KiB); contents private. */
 struct interpolator {
     const struct program *program;
     const struct kernel *kernel;
+    void (*segment_at)(const void *segment, int64_t position_q40[],
+                       int64_t arc_length_q40_mm); /* of the kernel, for
+                                                                        the program's axes */
+    uint32_t segment_size;                         /* of a record */
+    uint32_t axis_count;
     const struct coefficients_piece *piece; /* the present ones */
     const struct coefficients_segment *segment;
     uint64_t duration_q42_s;

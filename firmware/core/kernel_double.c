@@ -4,6 +4,7 @@
 #include "core/kernel.h"
 
 #define Q40   1099511627776.0
+#define Q45   35184372088832.0
 #define Q48   281474976710656.0
 #define Q50   1125899906842624.0
 #define STEPS 3
@@ -80,18 +81,15 @@ static void set_inverse(double g[4], double half, double sigma_middle, double si
     g[3] = first + last - 2.0;
 }
 
-void kernel_double_segment_set(void *segment, const struct ph_segment *ph)
+static void set_arc(struct kernel_double_arc *k, const struct ph_segment *ph)
 {
-    struct kernel_double_segment *k = segment;
-    for (int axis = PH_X; axis <= PH_S; axis++) {
-        k->origin_q40_mm[axis] = ph->origin_q40_mm[axis];
-        for (int i = 0; i < 6; i++) {
-            k->c_mm[axis][i] = (double)ph->c_q48_mm[axis][i] / Q48;
-        }
+    k->origin_q40_mm = ph->origin_q40_mm[PH_S];
+    for (int i = 0; i < 6; i++) {
+        k->c_mm[i] = (double)ph->c_q48_mm[PH_S][i] / Q48;
     }
-    int64_t end_q48[3];
+    int64_t end_q48[PH_AXES];
     ph_segment_end(ph, end_q48);
-    double before = k->c_mm[PH_S][0];
+    double before = k->c_mm[0];
     double behind = (double)end_q48[PH_S] / Q48 - before;
     double sigma[3];
     for (int i = 0; i < 3; i++) {
@@ -101,7 +99,23 @@ void kernel_double_segment_set(void *segment, const struct ph_segment *ph)
     set_inverse(k->inverse[1], behind, sigma[1], sigma[2]);
 }
 
-static double first_guess(const struct kernel_double_segment *k, double from_middle)
+static void set_axis(struct kernel_double_axis *k, const struct ph_segment *ph, int axis)
+{
+    k->origin_q40_mm = ph->origin_q40_mm[axis];
+    for (int i = 0; i < 6; i++) {
+        k->c_mm[i] = (double)ph->c_q48_mm[axis][i] / Q48;
+    }
+}
+
+void kernel_double_segment_set(void *segment, const struct ph_segment *ph)
+{
+    struct kernel_double_segment *k = segment;
+    set_arc(&k->arc, ph);
+    set_axis(&k->axes[0], ph, PH_X);
+    set_axis(&k->axes[1], ph, PH_Y);
+}
+
+static double first_guess(const struct kernel_double_arc *k, double from_middle)
 {
     const double *g = from_middle < 0.0 ? k->inverse[0] : k->inverse[1];
     double sign = from_middle < 0.0 ? -1.0 : 1.0;
@@ -126,26 +140,68 @@ static double horner(const double c[6], double z)
     return ((((c[5] * z + c[4]) * z + c[3]) * z + c[2]) * z + c[1]) * z + c[0];
 }
 
-void kernel_double_segment_at(const void *segment, int64_t point_q40_mm[2],
+static double find(const struct kernel_double_arc *k, int64_t arc_length_q40_mm)
+{
+    double s = (double)(arc_length_q40_mm - k->origin_q40_mm) / Q40;
+    double z = first_guess(k, s - k->c_mm[0]);
+    for (int i = 0; i < STEPS; i++) {
+        z = newton_step(k->c_mm, s, z);
+    }
+    return z;
+}
+
+static int64_t coordinate_q40(const struct kernel_double_axis *k, double z)
+{
+    return k->origin_q40_mm + round_scaled(horner(k->c_mm, z), Q40);
+}
+
+void kernel_double_segment_at(const void *segment, int64_t position_q40[],
                               int64_t arc_length_q40_mm)
 {
     const struct kernel_double_segment *k = segment;
-    double s = (double)(arc_length_q40_mm - k->origin_q40_mm[PH_S]) / Q40;
-    double z = first_guess(k, s - k->c_mm[PH_S][0]);
-    for (int i = 0; i < STEPS; i++) {
-        z = newton_step(k->c_mm[PH_S], s, z);
+    double z = find(&k->arc, arc_length_q40_mm);
+    for (uint32_t axis = 0; axis < PROGRAM_PLANE; axis++) {
+        position_q40[axis] = coordinate_q40(&k->axes[axis], z);
     }
-    for (int axis = PH_X; axis <= PH_Y; axis++) {
-        point_q40_mm[axis] = k->origin_q40_mm[axis] + round_scaled(horner(k->c_mm[axis], z), Q40);
+}
+
+void kernel_double_space_set(void *segment, const struct ph_segment *ph)
+{
+    struct kernel_double_space *k = segment;
+    set_arc(&k->arc, ph);
+    for (int axis = 0; axis < (int)PROGRAM_SPACE; axis++) {
+        set_axis(&k->axes[axis], ph, PH_X + axis);
+    }
+    k->extras = program_extra_axes(ph->axis_count);
+    for (uint32_t i = 0; i < k->extras; i++) {
+        for (int power = 0; power < 6; power++) {
+            k->extra[i].c[power] = (double)ph->extra[i].c_q45[power] / Q45;
+        }
+    }
+}
+
+void kernel_double_space_at(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm)
+{
+    const struct kernel_double_space *k = segment;
+    double z = find(&k->arc, arc_length_q40_mm);
+    for (uint32_t axis = 0; axis < PROGRAM_SPACE; axis++) {
+        position_q40[axis] = coordinate_q40(&k->axes[axis], z);
+    }
+    for (uint32_t i = 0; i < k->extras; i++) {
+        position_q40[PROGRAM_SPACE + i] = round_scaled(horner(k->extra[i].c, z), Q40);
     }
 }
 
 const struct kernel kernel_double = {
     .piece_size = sizeof(struct kernel_double_piece),
-    .segment_size = sizeof(struct kernel_double_segment),
     .piece_set = kernel_double_piece_set,
-    .segment_set = kernel_double_segment_set,
     .piece_at = kernel_double_piece_at,
     .piece_acceleration = kernel_double_piece_acceleration,
-    .segment_at = kernel_double_segment_at,
+    .plane = {.segment_size = sizeof(struct kernel_double_segment),
+              .segment_set = kernel_double_segment_set,
+              .segment_at = kernel_double_segment_at},
+    .space = {.segment_size = offsetof(struct kernel_double_space, extra),
+              .extra_size = sizeof(struct kernel_double_extra),
+              .segment_set = kernel_double_space_set,
+              .segment_at = kernel_double_space_at},
 };

@@ -17,10 +17,34 @@ struct kernel_double_piece {
     double per_s;       /* 2^-e */
 };
 
+/* Arc length and its inverse. */
+struct kernel_double_arc {
+    int64_t origin_q40_mm;
+    double c_mm[6];
+    double inverse[2][4]; /* first guess of z, before and behind the middle: scale, then cubic */
+};
+
+struct kernel_double_axis {
+    int64_t origin_q40_mm;
+    double c_mm[6];
+};
+
+/* Of a planar program. */
 struct kernel_double_segment {
-    int64_t origin_q40_mm[3];
-    double c_mm[3][6];
-    double inverse[2][4]; /* first guess of z, behind and before the middle: scale, then cubic */
+    struct kernel_double_arc arc;
+    struct kernel_double_axis axes[PROGRAM_PLANE];
+};
+
+struct kernel_double_extra {
+    double c[6]; /* position in powers of z */
+};
+
+/* Of a spatial program; ends behind its extra axes. */
+struct kernel_double_space {
+    struct kernel_double_arc arc;
+    struct kernel_double_axis axes[PROGRAM_SPACE];
+    uint64_t extras;
+    struct kernel_double_extra extra[PROGRAM_EXTRAS];
 };
 
 void kernel_double_piece_set(void *piece, const struct program_piece *from);
@@ -34,7 +58,11 @@ void kernel_double_segment_set(void *segment, const struct ph_segment *ph);
 
 /* Point at an arc length of this segment (counted from the start of the program; a little outside
  * is allowed: the curve is continued). Within 1e-9 mm. Three Newton steps, always. */
-void kernel_double_segment_at(const void *segment, int64_t point_q40_mm[2],
+void kernel_double_segment_at(const void *segment, int64_t position_q40[],
                               int64_t arc_length_q40_mm);
+
+/* The same for a struct kernel_double_space. */
+void kernel_double_space_set(void *segment, const struct ph_segment *ph);
+void kernel_double_space_at(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm);
 
 #endif

@@ -11,6 +11,7 @@
 #ifndef HODOGRAPH_CORE_KERNEL_FIXED_H
 #define HODOGRAPH_CORE_KERNEL_FIXED_H
 
+#include "core/extra_axis.h"
 #include "core/ph_segment.h"
 
 /* First guess of z by a cubic in t = |s - s(middle)| / (its length), one per half. */
@@ -19,15 +20,37 @@ struct kernel_fixed_inverse {
     int32_t g_q26[3]; /* coefficient k of t^k times 2^k, k = 1 ... 3 */
 };
 
-struct kernel_fixed_segment {
-    int64_t origin_q40_mm[3];
-    int64_t c_q48_mm[3][6];
+/* Arc length and its inverse. */
+struct kernel_fixed_arc {
+    int64_t origin_q40_mm;
+    int64_t c_q48_mm[6];
     int32_t s_q30[6];     /* normalised arc length from the middle */
     int32_t slope_q29[5]; /* its derivative in z: sigma / 2 */
-    int32_t u_q28[3];     /* normalised w */
-    int32_t v_q28[3];
+    int32_t exponent;
     struct kernel_fixed_inverse inverse[2]; /* before and behind the middle */
-    int exponent;
+};
+
+struct kernel_fixed_axis {
+    int64_t origin_q40_mm;
+    int64_t c_q48_mm[6];
+};
+
+/* Of a planar program. */
+struct kernel_fixed_segment {
+    struct kernel_fixed_arc arc;
+    struct kernel_fixed_axis axes[PROGRAM_PLANE];
+    int32_t u_q28[3]; /* normalised w */
+    int32_t v_q28[3];
+};
+
+/* Of a spatial program; ends behind its extra axes. */
+struct kernel_fixed_space {
+    struct kernel_fixed_arc arc;
+    struct kernel_fixed_axis axes[PROGRAM_SPACE];
+    int32_t a_q28[PROGRAM_COMPONENTS][3]; /* normalised preimage */
+    uint32_t extras;
+    uint32_t reserved;
+    struct extra_axis extra[PROGRAM_EXTRAS];
 };
 
 /* The functions have the types of struct kernel: `segment` is a struct kernel_fixed_segment. */
@@ -37,7 +60,11 @@ void kernel_fixed_segment_set(void *segment, const struct ph_segment *ph);
 /* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside
  * is allowed: the curve is continued by its tangent). Within 2^-32 mm by the bound that needs no
  * numerics, 2^-37 mm measured. Two Newton steps with one 32-bit division each, 15 wide products. */
-void kernel_fixed_segment_at(const void *segment, int64_t point_q40_mm[2],
+void kernel_fixed_segment_at(const void *segment, int64_t position_q40[],
                              int64_t arc_length_q40_mm);
+
+/* The same for a struct kernel_fixed_space. */
+void kernel_fixed_space_set(void *segment, const struct ph_segment *ph);
+void kernel_fixed_space_at(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm);
 
 #endif

@@ -8,6 +8,7 @@
 #ifndef HODOGRAPH_CORE_KERNEL_FLOAT_H
 #define HODOGRAPH_CORE_KERNEL_FLOAT_H
 
+#include "core/extra_axis.h"
 #include "core/ph_segment.h"
 
 #define KERNEL_FLOAT_PARTS 4 /* of a segment, of equal length in z, each with its own first guess */
@@ -26,17 +27,38 @@ struct kernel_float_inverse {
     float g[3];
 };
 
-struct kernel_float_segment {
-    int64_t middle_q48_mm[2];  /* the point at z = 0 */
-    int64_t middle_arc_q40_mm; /* arc length there, rounded down, */
-    int32_t middle_rest_q48;   /* and what that leaves */
-    int32_t scale;             /* 2^(48 - q of the polynomials) */
-    int32_t shift;             /* arc length in q48 by this to q30 normalised */
-    struct kernel_float_polynomial p[3];
+/* Arc length and its inverse. */
+struct kernel_float_arc {
+    int64_t middle_q40_mm;   /* arc length at z = 0, rounded down, */
+    int32_t middle_rest_q48; /* and what that leaves */
+    int32_t scale;           /* 2^(48 - q of the polynomials) */
+    int32_t shift;           /* arc length in q48 by this to q30 normalised */
+    struct kernel_float_polynomial p;
     float s[6]; /* normalised arc length from the middle */
+    struct kernel_float_inverse inverse[KERNEL_FLOAT_PARTS];
+};
+
+struct kernel_float_axis {
+    int64_t middle_q48_mm; /* at z = 0 */
+    struct kernel_float_polynomial p;
+};
+
+/* Of a planar program. */
+struct kernel_float_segment {
+    struct kernel_float_arc arc;
+    struct kernel_float_axis axes[PROGRAM_PLANE];
     float u[3]; /* normalised w */
     float v[3];
-    struct kernel_float_inverse inverse[KERNEL_FLOAT_PARTS];
+};
+
+/* Of a spatial program; ends behind its extra axes. */
+struct kernel_float_space {
+    struct kernel_float_arc arc;
+    struct kernel_float_axis axes[PROGRAM_SPACE];
+    float a[PROGRAM_COMPONENTS][3]; /* normalised preimage */
+    float dz_q44; /* 1 / (sigma / 2) where sigma is 1 normalised: arc length in q44 to z in q44 */
+    uint32_t extras;
+    struct extra_axis extra[PROGRAM_EXTRAS];
 };
 
 /* The functions have the types of struct kernel: `segment` is a struct kernel_float_segment. */
@@ -44,7 +66,11 @@ struct kernel_float_segment {
 void kernel_float_segment_set(void *segment, const struct ph_segment *ph);
 
 /* As kernel_fixed_segment_at; within 10 nm. One Newton step, two divisions, six wide products and fifteen narrow ones. */
-void kernel_float_segment_at(const void *segment, int64_t point_q40_mm[2],
+void kernel_float_segment_at(const void *segment, int64_t position_q40[],
                              int64_t arc_length_q40_mm);
+
+/* The same for a struct kernel_float_space. */
+void kernel_float_space_set(void *segment, const struct ph_segment *ph);
+void kernel_float_space_at(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm);
 
 #endif

@@ -7,14 +7,13 @@
 #include "core/real.h"
 
 #define WAY_DEGREE    7
-#define PATH_DEGREE   4 /* of sigma and of both parts of w^2 */
+#define PATH_DEGREE   4 /* of sigma and of the derivatives of all axes */
 #define ORDERS        5 /* of time, in majorants: jerk'' is the fifth derivative of the point */
 #define MOST_PARTS    32u
 #define MOST_HALVINGS 20 /* of a cell */
 #define NEWTON_STEPS  4
 #define CUT_STEPS     30
 #define ROUNDING_BITS 14 /* of each limit, 2^-14 is left for the rounding of numbers here */
-#define AXES          2
 
 enum quantity { VELOCITY, ACCELERATION, JERK, QUANTITIES };
 
@@ -33,16 +32,17 @@ struct way {
 struct path {
     int64_t start_q40_mm;
     struct real length_mm;
-    struct real w[AXES][3];
+    uint32_t axis_count;
+    struct real w[PROGRAM_PLANE][3]; /* of a planar program */
     struct real sigma[PATH_DEGREE + 1];
-    struct real arc[PATH_DEGREE + 1];             /* (arc length from the start) / xi */
-    struct real direction[AXES][PATH_DEGREE + 1]; /* Re w^2, Im w^2 */
+    struct real arc[PATH_DEGREE + 1];                     /* (arc length from the start) / xi */
+    struct real direction[PROGRAM_AXES][PATH_DEGREE + 1]; /* derivatives of the axes */
     struct real least_sigma;
 };
 
-/* Velocity, acceleration and jerk of x and y at an instant, at rate 1. */
+/* Velocity, acceleration and jerk of each axis at an instant, at rate 1. */
 struct motion {
-    struct real of[AXES][QUANTITIES];
+    struct real of[PROGRAM_AXES][QUANTITIES];
 };
 
 /* A stretch of a piece on a segment, u from middle - half to middle + half. */
@@ -57,14 +57,15 @@ struct cell {
 
 struct check {
     const struct program *program;
-    struct real limit[AXES][QUANTITIES]; /* m = 0: none */
-    struct real per_period;              /* 1/s */
+    uint32_t axis_count;
+    struct real limit[PROGRAM_AXES][QUANTITIES]; /* m = 0: none */
+    struct real per_period;                      /* 1/s */
     struct motion last; /* at the end of the stretch before; at rest before the first */
 };
 
 static void set_at_rest(struct motion *out)
 {
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
         for (int k = 0; k < QUANTITIES; k++) {
             out->of[axis][k] = zero;
         }
@@ -144,29 +145,59 @@ static void add_product(struct real out[PATH_DEGREE + 1], const struct real a[3]
     }
 }
 
-static void read_path(struct path *path, const struct program *p, uint32_t i)
+/* Planar: w^2. */
+static void read_plane(struct path *path, const struct program_segment *segment)
 {
-    struct program_segment segment;
-    int64_t e_q50[5][3];
-    program_segment_get(p, i, &segment);
-    path->start_q40_mm = segment.start_q40_mm;
-    to_powers(path->w[0], segment.u_q44);
-    to_powers(path->w[1], segment.v_q44);
-    for (int k = 0; k <= PATH_DEGREE; k++) {
-        path->sigma[k] = zero;
-        path->direction[0][k] = zero;
-        path->direction[1][k] = zero;
+    const struct real *u = path->w[0];
+    const struct real *v = path->w[1];
+    to_powers(path->w[0], segment->a_q44[PROGRAM_U]);
+    to_powers(path->w[1], segment->a_q44[PROGRAM_Q]);
+    add_product(path->sigma, u, u, 1);
+    add_product(path->sigma, v, v, 1);
+    add_product(path->direction[0], u, u, 1);
+    add_product(path->direction[0], v, v, -1);
+    add_product(path->direction[1], u, v, 2);
+}
+
+/* The derivative of an extra axis, from Bernstein coefficients to powers; exact before it is rounded to a real. */
+static void read_extra(struct real out[PATH_DEGREE + 1], const struct program_extra *extra)
+{
+    int64_t d[PATH_DEGREE + 1];
+    d[0] = 5 * extra->b_q40[0];
+    for (int k = 1; k <= PATH_DEGREE; k++) {
+        d[k] = 5 * (extra->b_q40[k] - extra->b_q40[k - 1]);
     }
-    add_product(path->sigma, path->w[0], path->w[0], 1);
-    add_product(path->sigma, path->w[1], path->w[1], 1);
-    for (int k = 0; k <= PATH_DEGREE; k++) {
-        path->arc[k] = real_div(path->sigma[k], real_make(k + 1, 0));
+    out[0] = real_make(d[0], -40);
+    out[1] = real_make(4 * (d[1] - d[0]), -40);
+    out[2] = real_make(6 * (d[2] - 2 * d[1] + d[0]), -40);
+    out[3] = real_make(4 * (d[3] - 3 * (d[2] - d[1]) - d[0]), -40);
+    out[4] = real_make(d[4] - 4 * (d[3] + d[1]) + 6 * d[2] + d[0], -40);
+}
+
+/* Spatial: A i A*. */
+static void read_space(struct path *path, const struct program_segment *segment)
+{
+    struct real a[PROGRAM_COMPONENTS][3];
+    for (uint32_t component = 0; component < PROGRAM_COMPONENTS; component++) {
+        const struct real *own = a[component];
+        to_powers(a[component], segment->a_q44[component]);
+        add_product(path->sigma, own, own, 1);
+        add_product(path->direction[0], own, own, component < (uint32_t)PROGRAM_P ? 1 : -1);
     }
-    add_product(path->direction[0], path->w[0], path->w[0], 1);
-    add_product(path->direction[0], path->w[1], path->w[1], -1);
-    add_product(path->direction[1], path->w[0], path->w[1], 2);
-    /* The least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at least. */
-    ph_segment_hodograph(&segment, e_q50);
+    add_product(path->direction[1], a[PROGRAM_U], a[PROGRAM_Q], 2);
+    add_product(path->direction[1], a[PROGRAM_V], a[PROGRAM_P], 2);
+    add_product(path->direction[2], a[PROGRAM_V], a[PROGRAM_Q], 2);
+    add_product(path->direction[2], a[PROGRAM_U], a[PROGRAM_P], -2);
+    for (uint32_t i = 0; i < program_extra_axes(segment->axis_count); i++) {
+        read_extra(path->direction[PROGRAM_SPACE + i], &segment->extra[i]);
+    }
+}
+
+/* Length and the least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at least. */
+static void read_speed(struct path *path, const struct program_segment *segment)
+{
+    int64_t e_q50[5][PH_AXES];
+    ph_segment_hodograph(segment, e_q50);
     path->length_mm = zero;
     path->least_sigma = real_make(e_q50[0][PH_S], -50);
     for (int k = 0; k < 5; k++) {
@@ -176,6 +207,29 @@ static void read_path(struct path *path, const struct program *p, uint32_t i)
         path->least_sigma = real_less(one, path->least_sigma) != 0 ? one : path->least_sigma;
     }
     path->least_sigma = real_mul(path->least_sigma, real_make(1023, -10));
+}
+
+static void read_path(struct path *path, const struct program *p, uint32_t i)
+{
+    struct program_segment segment;
+    program_segment_get(p, i, &segment);
+    path->start_q40_mm = segment.start_q40_mm;
+    path->axis_count = segment.axis_count;
+    for (int k = 0; k <= PATH_DEGREE; k++) {
+        path->sigma[k] = zero;
+        for (uint32_t axis = 0; axis < path->axis_count; axis++) {
+            path->direction[axis][k] = zero;
+        }
+    }
+    if (path->axis_count == PROGRAM_PLANE) {
+        read_plane(path, &segment);
+    } else {
+        read_space(path, &segment);
+    }
+    for (int k = 0; k <= PATH_DEGREE; k++) {
+        path->arc[k] = real_div(path->sigma[k], real_make(k + 1, 0));
+    }
+    read_speed(path, &segment);
 }
 
 /* --- The motion at an instant --- */
@@ -211,16 +265,12 @@ static void feed_at(const struct cell *cell, struct real x, struct real f[QUANTI
 
 /* With tangent T = w^2 / sigma and curvature kappa: velocity F' T, acceleration (F'' + i kappa F'^2) T, jerk
  * (F''' - kappa^2 F'^3 + i (3 kappa F' F'' + kappa_s F'^3)) T. docs/theory/numerics.md 16. */
-static void motion_at(const struct cell *cell, struct real x, struct motion *out)
+static void motion_in_plane(const struct path *path, struct real xi,
+                            const struct real f[QUANTITIES], struct motion *out)
 {
-    const struct path *path = cell->path;
-    struct real f[QUANTITIES];
-    struct real w[AXES];
-    struct real w1[AXES];
-    feed_at(cell, x, f);
-    const struct real xi =
-        parameter(path, real_add(horner(cell->c, WAY_DEGREE, x), cell->offset_mm));
-    for (int axis = 0; axis < AXES; axis++) {
+    struct real w[PROGRAM_PLANE];
+    struct real w1[PROGRAM_PLANE];
+    for (uint32_t axis = 0; axis < PROGRAM_PLANE; axis++) {
         w[axis] = horner(path->w[axis], 2, xi);
         w1[axis] = real_add(path->w[axis][1], real_times(real_mul(path->w[axis][2], xi), 2));
     }
@@ -249,6 +299,59 @@ static void motion_at(const struct cell *cell, struct real x, struct motion *out
     out->of[1][ACCELERATION] = real_add(real_mul(f[1], ty), real_mul(normal, tx));
     out->of[0][JERK] = real_sub(real_mul(along, tx), real_mul(across, ty));
     out->of[1][JERK] = real_add(real_mul(along, ty), real_mul(across, tx));
+}
+
+/* A polynomial of PATH_DEGREE and its first two derivatives. */
+static void taylor(const struct real c[PATH_DEGREE + 1], struct real x, struct real out[3])
+{
+    struct real value = c[PATH_DEGREE];
+    struct real first = zero;
+    struct real half_second = zero;
+    for (int k = PATH_DEGREE - 1; k >= 0; k--) {
+        half_second = real_add(real_mul(half_second, x), first);
+        first = real_add(real_mul(first, x), value);
+        value = real_add(real_mul(value, x), c[k]);
+    }
+    out[0] = value;
+    out[1] = first;
+    out[2] = real_times(half_second, 2);
+}
+
+/* By the chain rule: sigma(xi) xi' = F' gives the derivatives of xi in time, and these with those of each axis its motion. */
+static void motion_in_space(const struct path *path, struct real xi,
+                            const struct real f[QUANTITIES], struct motion *out)
+{
+    struct real d[3];
+    taylor(path->sigma, xi, d);
+    const struct real per_sigma = real_div(real_make(1, 0), d[0]);
+    const struct real x1 = real_mul(f[0], per_sigma);
+    const struct real square = real_mul(x1, x1);
+    const struct real cube = real_mul(square, x1);
+    const struct real x2 = real_mul(real_sub(f[1], real_mul(d[1], square)), per_sigma);
+    const struct real mixed = real_times(real_mul(x1, x2), 3);
+    const struct real bent = real_add(real_mul(d[2], cube), real_mul(d[1], mixed));
+    const struct real x3 = real_mul(real_sub(f[2], bent), per_sigma);
+    for (uint32_t axis = 0; axis < path->axis_count; axis++) {
+        taylor(path->direction[axis], xi, d);
+        out->of[axis][VELOCITY] = real_mul(d[0], x1);
+        out->of[axis][ACCELERATION] = real_add(real_mul(d[1], square), real_mul(d[0], x2));
+        out->of[axis][JERK] =
+            real_add(real_add(real_mul(d[2], cube), real_mul(d[1], mixed)), real_mul(d[0], x3));
+    }
+}
+
+static void motion_at(const struct cell *cell, struct real x, struct motion *out)
+{
+    const struct path *path = cell->path;
+    struct real f[QUANTITIES];
+    feed_at(cell, x, f);
+    const struct real xi =
+        parameter(path, real_add(horner(cell->c, WAY_DEGREE, x), cell->offset_mm));
+    if (path->axis_count == PROGRAM_PLANE) {
+        motion_in_plane(path, xi, f, out);
+    } else {
+        motion_in_space(path, xi, f, out);
+    }
 }
 
 /* --- Majorants: coefficients that bound those of the Taylor series at every instant of a cell --- */
@@ -342,7 +445,7 @@ static void bend_of(const struct cell *cell, struct motion *out)
     for (int k = 0; k < ORDERS; k++) {
         slope[k] = real_times(xi[k + 1], k + 1);
     }
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < path->axis_count; axis++) {
         struct real direction[ORDERS + 1];
         majorant(polynomial, path->direction[axis], PATH_DEGREE, middle, half);
         compose(direction, polynomial, xi, ORDERS - 1);
@@ -409,8 +512,9 @@ static int take_sample(const struct check *check, const struct cell *cell, struc
                        struct motion *peak)
 {
     struct motion found;
+    set_at_rest(&found);
     motion_at(cell, x, &found);
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         struct real values[QUANTITIES];
         at_all_rates(cell->way, found.of[axis], values);
         for (int k = 0; k < QUANTITIES; k++) {
@@ -427,7 +531,7 @@ static int take_sample(const struct check *check, const struct cell *cell, struc
 static int judge(const struct check *check, const struct motion *peak, const struct motion *rise,
                  uint32_t parts_log2)
 {
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         for (int k = 0; k < QUANTITIES; k++) {
             /* M h^2 / 8 with h = 2 / parts */
             const struct real between = real_scale(rise->of[axis][k], -1 - 2 * (int32_t)parts_log2);
@@ -446,8 +550,9 @@ static int check_cell(const struct check *check, const struct cell *cell, int *c
     struct motion peak;
     int code = 0;
     set_at_rest(&peak);
+    set_at_rest(&bend);
     bend_of(cell, &bend);
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         struct real values[QUANTITIES];
         at_all_rates(cell->way, bend.of[axis], values);
         for (int k = 0; k < QUANTITIES; k++) {
@@ -495,7 +600,7 @@ static void set_cell(struct cell *cell, const struct way *way, const struct path
 static int check_step(const struct check *check, const struct motion *now)
 {
     const struct real share = real_div(real_make(LIMIT_CHECK_STEP_PERMILLE, 0), real_make(1000, 0));
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         struct real step[QUANTITIES];
         for (int k = VELOCITY; k <= ACCELERATION; k++) {
             step[k] = real_abs(real_sub(now->of[axis][k], check->last.of[axis][k]));
@@ -517,6 +622,7 @@ static int check_stretch(struct check *check, const struct way *way, const struc
     struct cell cell;
     struct motion now;
     const struct real width = real_sub(high, low);
+    set_at_rest(&now);
     uint32_t at = 0; /* the cell from at to at + 1 of 2^halvings */
     int32_t halvings = 0;
     set_cell(&cell, way, path, low, high);
@@ -601,7 +707,7 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
 static void set_limits(struct check *check, const struct program_limits *limits)
 {
     const struct real kept = real_make((1 << ROUNDING_BITS) - 1, -ROUNDING_BITS);
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         const struct real jerk = real_make((int64_t)limits->axis_jerk_mm_s3[axis], 0);
         check->limit[axis][VELOCITY] = real_mul(milli(limits->axis_velocity_um_s[axis]), kept);
         check->limit[axis][ACCELERATION] =
@@ -613,7 +719,7 @@ static void set_limits(struct check *check, const struct program_limits *limits)
 static int any_limit(const struct check *check)
 {
     int any = 0;
-    for (int axis = 0; axis < AXES; axis++) {
+    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         for (int k = 0; k < QUANTITIES; k++) {
             any |= check->limit[axis][k].m;
         }
@@ -624,11 +730,10 @@ static int any_limit(const struct check *check)
 int limit_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
 {
     struct motion rest;
-    struct check check;
+    struct check check = {.program = p, .axis_count = p->header.axis_count};
     uint32_t segment = 0;
     int code = 0;
     set_limits(&check, limits);
-    check.program = p;
     set_at_rest(&rest);
     check.last = rest;
     check.per_period = real_div(real_make(1000000, 0), real_make((int64_t)p->header.period_us, 0));

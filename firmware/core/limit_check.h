@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * limit_check: proves that a program keeps the limits of the axes x and y (velocity, acceleration, jerk) at every instant, at every
+ * limit_check: proves that a program keeps the limits of its path axes (velocity, acceleration, jerk) at every instant, at every
  * rate of program time that its override bounds allow. docs/guides/limits.md says what is proved and what is not.
  *
  * It believes nothing of the image but its coefficients. Time is cut into cells: one feed piece on one segment. In a cell every
@@ -8,7 +8,7 @@
  * above the greater one. So samples become a statement about all times. Where M is too great for 32 samples the cell is halved.
  * At the joints of cells a step of velocity or acceleration counts as the jerk that a drive sees: step over period.
  *
- * Integers only (core/real.h): the same verdict on every target. Main loop; no heap, some 2 KiB of stack.
+ * Integers only (core/real.h): the same verdict on every target. Main loop; no heap, some 3 KiB of stack.
  */
 #ifndef HODOGRAPH_CORE_LIMIT_CHECK_H
 #define HODOGRAPH_CORE_LIMIT_CHECK_H

@@ -30,6 +30,11 @@ static int64_t read_i64(const uint8_t *b)
     return (int64_t)read_u64(b);
 }
 
+static int64_t read_i48(const uint8_t *b)
+{
+    return (int64_t)((uint64_t)read_u32(b) << 16 | (uint64_t)read_u16(b + 4) << 48) >> 16;
+}
+
 static void read_header(struct program_header *h, const uint8_t *b)
 {
     h->version = (uint16_t)read_u16(b + 4);
@@ -43,8 +48,9 @@ static void read_header(struct program_header *h, const uint8_t *b)
     h->axis_count = (uint16_t)read_u16(b + 30);
     h->duration_q32_s = read_u64(b + 32);
     h->length_q40_mm = read_i64(b + 40);
-    h->offset_q40_mm[0] = read_i64(b + 48);
-    h->offset_q40_mm[1] = read_i64(b + 56);
+    for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
+        h->offset_q40_mm[axis] = axis < PROGRAM_PLANE ? read_i64(b + 48 + 8 * (size_t)axis) : 0;
+    }
     h->feed_limit_um_s = read_u32(b + 64);
     h->acceleration_limit_um_s2 = read_u32(b + 68);
     h->jerk_limit_mm_s3 = read_u32(b + 72);
@@ -56,18 +62,51 @@ static void read_header(struct program_header *h, const uint8_t *b)
     h->fault_worst_um = read_u32(b + 124);
 }
 
+/* Those of the axes behind y stand behind the header of a planar program. */
+static void read_offsets(struct program_header *h, const uint8_t *b)
+{
+    for (uint32_t axis = PROGRAM_PLANE; axis < h->axis_count; axis++) {
+        h->offset_q40_mm[axis] =
+            read_i64(b + PROGRAM_HEADER_SIZE + 8u * (size_t)(axis - PROGRAM_PLANE));
+    }
+}
+
+uint32_t program_header_size(uint32_t axis_count)
+{
+    return PROGRAM_HEADER_SIZE + 8u * (axis_count - PROGRAM_PLANE);
+}
+
+uint32_t program_segment_size(uint32_t axis_count)
+{
+    return axis_count == PROGRAM_PLANE
+               ? PROGRAM_SEGMENT_SIZE
+               : PROGRAM_SPACE_SIZE + PROGRAM_EXTRA_SIZE * (axis_count - PROGRAM_SPACE);
+}
+
 /* Counts that cannot fit are refused before they are multiplied, so nothing wraps. */
 static int check_size(const struct program_header *h, uint32_t size)
 {
-    if (h->image_size > size || h->image_size < PROGRAM_HEADER_SIZE) {
+    if (h->image_size > size || h->image_size < h->header_size) {
         return PROGRAM_ERR_SIZE;
     }
-    uint64_t need = PROGRAM_HEADER_SIZE + (uint64_t)h->segment_count * PROGRAM_SEGMENT_SIZE +
+    uint64_t need = h->header_size +
+                    (uint64_t)h->segment_count * program_segment_size(h->axis_count) +
                     (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE);
     if (need != h->image_size) {
         return PROGRAM_ERR_SIZE;
     }
     return h->segment_count == 0 || h->piece_count == 0 ? PROGRAM_ERR_COUNT : 0;
+}
+
+static int check_format(const struct program_header *h)
+{
+    if (h->version != PROGRAM_VERSION) {
+        return PROGRAM_ERR_VERSION;
+    }
+    if (h->axis_count < PROGRAM_PLANE || h->axis_count > PROGRAM_AXES) {
+        return PROGRAM_ERR_AXES;
+    }
+    return h->header_size == program_header_size(h->axis_count) ? 0 : PROGRAM_ERR_VERSION;
 }
 
 int program_open(struct program *p, const uint8_t *image, uint32_t size)
@@ -79,13 +118,12 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size)
         return PROGRAM_ERR_MAGIC;
     }
     read_header(&p->header, image);
-    if (p->header.version != PROGRAM_VERSION || p->header.header_size != PROGRAM_HEADER_SIZE) {
-        return PROGRAM_ERR_VERSION;
-    }
-    int err = check_size(&p->header, size);
+    int err = check_format(&p->header);
+    err = err != 0 ? err : check_size(&p->header, size);
     if (err != 0) {
         return err;
     }
+    read_offsets(&p->header, image);
     p->image = image;
     p->coefficients = NULL;
     p->coefficients_for = NULL;
@@ -96,7 +134,8 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size)
 
 static const uint8_t *segment_bytes(const struct program *p, uint32_t i)
 {
-    return p->image + PROGRAM_HEADER_SIZE + (size_t)i * PROGRAM_SEGMENT_SIZE;
+    return p->image + p->header.header_size +
+           (size_t)i * program_segment_size(p->header.axis_count);
 }
 
 static const uint8_t *piece_bytes(const struct program *p, uint32_t i)
@@ -153,15 +192,53 @@ uint64_t program_number(uint8_t code)
     return (uint64_t)eighth_q16[code & 7u] << (code >> 3);
 }
 
+static void read_planar(const uint8_t *b, struct program_segment *out)
+{
+    for (uint32_t axis = 0; axis < PROGRAM_PLANE; axis++) {
+        out->point_q40_mm[axis] = read_i64(b + 8 + 8 * (size_t)axis);
+    }
+    out->point_q40_mm[PROGRAM_PLANE] = 0;
+    for (int k = 0; k < 3; k++) {
+        out->a_q44[PROGRAM_U][k] = read_i64(b + 24 + 16 * k);
+        out->a_q44[PROGRAM_V][k] = 0;
+        out->a_q44[PROGRAM_P][k] = 0;
+        out->a_q44[PROGRAM_Q][k] = read_i64(b + 32 + 16 * k);
+    }
+}
+
+static void read_extra(const uint8_t *b, struct program_extra *out)
+{
+    out->start_q40 = read_i64(b);
+    for (int k = 0; k < 5; k++) {
+        out->b_q40[k] = read_i48(b + 8 + 6 * k);
+    }
+}
+
+static void read_spatial(const uint8_t *b, struct program_segment *out)
+{
+    for (uint32_t axis = 0; axis < PROGRAM_SPACE; axis++) {
+        out->point_q40_mm[axis] = read_i64(b + 8 + 8 * (size_t)axis);
+    }
+    for (size_t k = 0; k < 3; k++) {
+        for (size_t component = 0; component < PROGRAM_COMPONENTS; component++) {
+            out->a_q44[component][k] = read_i48(b + 32 + 24 * k + 6 * component);
+        }
+    }
+    for (uint32_t k = PROGRAM_SPACE; k < out->axis_count; k++) {
+        const size_t extra = k - PROGRAM_SPACE;
+        read_extra(b + PROGRAM_SPACE_SIZE + PROGRAM_EXTRA_SIZE * extra, &out->extra[extra]);
+    }
+}
+
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out)
 {
     const uint8_t *b = segment_bytes(p, i);
     out->start_q40_mm = read_i64(b);
-    out->x_q40_mm = read_i64(b + 8);
-    out->y_q40_mm = read_i64(b + 16);
-    for (int k = 0; k < 3; k++) {
-        out->u_q44[k] = read_i64(b + 24 + 16 * k);
-        out->v_q44[k] = read_i64(b + 32 + 16 * k);
+    out->axis_count = p->header.axis_count;
+    if (out->axis_count == PROGRAM_PLANE) {
+        read_planar(b, out);
+    } else {
+        read_spatial(b, out);
     }
 }
 

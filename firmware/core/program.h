@@ -17,8 +17,14 @@
 
 struct kernel; /* core/kernel.h */
 
-#define PROGRAM_HEADER_SIZE  128u
-#define PROGRAM_SEGMENT_SIZE 72u
+#define PROGRAM_AXES  6u /* greatest number of path axes */
+#define PROGRAM_PLANE 2u /* path axes of a planar program: x, y */
+#define PROGRAM_SPACE 3u /* at least, of a spatial one: x, y, z; those behind them are extra axes */
+#define PROGRAM_EXTRAS       (PROGRAM_AXES - PROGRAM_SPACE)
+#define PROGRAM_HEADER_SIZE  128u /* and 8 for each path axis behind y */
+#define PROGRAM_SEGMENT_SIZE 72u  /* of a planar program */
+#define PROGRAM_SPACE_SIZE   104u /* of a segment of a spatial one, */
+#define PROGRAM_EXTRA_SIZE   38u  /* and for each extra axis */
 #define PROGRAM_PIECE_SIZE   88u
 #define PROGRAM_STOP_SIZE    16u
 #define PROGRAM_VERSION      2u
@@ -33,11 +39,12 @@ struct program_header {
     uint32_t period_us;
     uint32_t segment_count;
     uint32_t piece_count;
-    uint16_t flags; /* PROGRAM_FLAG_... */
-    uint16_t axis_count;
+    uint16_t flags;      /* PROGRAM_FLAG_... */
+    uint16_t axis_count; /* PROGRAM_PLANE ... PROGRAM_AXES */
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
-    int64_t offset_q40_mm[2]; /* for information: already contained in the coordinates */
+    int64_t offset_q40_mm
+        [PROGRAM_AXES]; /* for information: already contained in the coordinates; 0 beyond axis_count */
     uint32_t feed_limit_um_s;
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
@@ -48,14 +55,43 @@ struct program_header {
     uint32_t fault_worst_um;
 };
 
-/* A PH segment, protocol.md 1.2. w = u + iv in Bernstein form, mm^(1/2). */
-struct program_segment {
-    int64_t start_q40_mm; /* arc length at its start */
-    int64_t x_q40_mm;     /* start point */
-    int64_t y_q40_mm;
-    int64_t u_q44[3];
-    int64_t v_q44[3];
+/* Components of the preimage A = u + v i + p j + q k, whose hodograph is A i A*. That of a planar program has u and q only:
+ * w = u + iq. */
+enum program_component { PROGRAM_U, PROGRAM_V, PROGRAM_P, PROGRAM_Q };
+#define PROGRAM_COMPONENTS 4u
+
+/* An extra axis along a segment: a quintic in the parameter of the curve, in mm or degrees. */
+struct program_extra {
+    int64_t start_q40;
+    int64_t b_q40[5]; /* Bezier coefficients 1 ... 5, from the start; number 0 is 0 */
 };
+
+/* A PH segment, protocol.md 1.2. The preimage is in Bernstein form, mm^(1/2). */
+struct program_segment {
+    int64_t start_q40_mm;                /* arc length at its start */
+    int64_t point_q40_mm[PROGRAM_SPACE]; /* start point; z is 0 in a planar program */
+    int64_t a_q44[PROGRAM_COMPONENTS]
+                 [3]; /* by enum program_component; v and p are 0 in a planar one */
+    struct program_extra extra[PROGRAM_EXTRAS]; /* the first axis_count - 3 */
+    uint32_t axis_count;                        /* of the program */
+};
+
+/* Components of the preimage of a program are 0, `step`, ... below PROGRAM_COMPONENTS: u and q, or all. */
+static inline uint32_t program_component_step(uint32_t axis_count)
+{
+    return axis_count > PROGRAM_PLANE ? 1u : (uint32_t)PROGRAM_Q;
+}
+
+static inline uint32_t program_extra_axes(uint32_t axis_count)
+{
+    return axis_count > PROGRAM_SPACE ? axis_count - PROGRAM_SPACE : 0u;
+}
+
+/* Coordinates of the curve itself: x, y, or x, y, z. */
+static inline uint32_t program_curve_axes(uint32_t axis_count)
+{
+    return axis_count > PROGRAM_PLANE ? PROGRAM_SPACE : PROGRAM_PLANE;
+}
 
 #define PROGRAM_LEVELS 7u /* of the override bounds: rates of program time up to which they hold */
 #define PROGRAM_LEVEL_FULL (PROGRAM_LEVELS - 1u) /* the factor */
@@ -102,11 +138,15 @@ struct program {
     const struct kernel *coefficients_for; /* for this kernel; else NULL */
 };
 
-/* Opens an image of `size` bytes: magic, version, header size, counts against the size, CRC. The
+/* Opens an image of `size` bytes: magic, version, axis count, header size, counts against the size, CRC. The
  * buffer may be longer than the image says (a fixed store); never shorter. Cost: the CRC, linear in
  * the size. Returns 0 or a negative PROGRAM_ERR_... of core/program_check.h; *p is then not usable.
  */
 int program_open(struct program *p, const uint8_t *image, uint32_t size);
+
+/* Bytes of the header, and of each segment, of a program with so many path axes. */
+uint32_t program_header_size(uint32_t axis_count);
+uint32_t program_segment_size(uint32_t axis_count);
 
 /* Reads segment or piece number i; i must be below the count of the header. Constant time. */
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);

@@ -47,7 +47,7 @@ static int check_header(const struct program *p, const struct program_limits *li
     if ((h->flags & ~PROGRAM_FLAG_CLOSED) != 0 || !bytes_are_zero(p->image + 76, 4)) {
         return PROGRAM_ERR_FLAGS;
     }
-    if (h->axis_count != 2) {
+    if (limits->axis_count != 0 && limits->axis_count != h->axis_count) {
         return PROGRAM_ERR_AXES;
     }
     if (h->length_q40_mm <= 0 || h->length_q40_mm >= (int64_t)1 << 62) {
@@ -99,7 +99,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_PERIOD, "period not 1000, 2000, 4000 or 8000 us"},
     {PROGRAM_ERR_PERIOD_USED, "period is not the one configured in the controller"},
     {PROGRAM_ERR_FLAGS, "unknown flag, or a reserved field of the header is not 0"},
-    {PROGRAM_ERR_AXES, "axis count is not 2"},
+    {PROGRAM_ERR_AXES, "axis count not 2 ... 6, or not that of the machine"},
     {PROGRAM_ERR_DURATION, "not the sum of the pieces, or not below 2^22 s"},
     {PROGRAM_ERR_LENGTH, "length not in (0, 2^22) mm"},
     {PROGRAM_ERR_NAME, "name not padded with zeros"},

@@ -15,7 +15,7 @@
 
 /* Refusals. The numbers are part of the protocol (object 0x2000 sub 3): never renumber. */
 enum program_error {
-    /* found by program_open */
+    /* found by program_open, which also finds PROGRAM_ERR_AXES */
     PROGRAM_ERR_SIZE = -1,    /* truncated, or sizes and counts do not fit each other */
     PROGRAM_ERR_MAGIC = -2,   /* does not begin with "HDGP" */
     PROGRAM_ERR_VERSION = -3, /* version or header size unknown */
@@ -29,7 +29,7 @@ enum program_error {
     PROGRAM_ERR_PERIOD = -10,      /* period not 1000, 2000, 4000 or 8000 us */
     PROGRAM_ERR_PERIOD_USED = -11, /* period is not the one configured in the controller */
     PROGRAM_ERR_FLAGS = -12,       /* unknown flag, or a reserved field of the header is not 0 */
-    PROGRAM_ERR_AXES = -13,        /* axis count is not 2 */
+    PROGRAM_ERR_AXES = -13,        /* axis count not 2 ... 6, or not that of the machine */
     PROGRAM_ERR_DURATION = -14,    /* not the sum of the pieces, or not below 2^22 s */
     PROGRAM_ERR_LENGTH = -15,      /* length not in (0, 2^22) mm */
     PROGRAM_ERR_NAME = -16,        /* name not padded with zeros */
@@ -83,15 +83,18 @@ enum program_error {
 
 /* What this controller allows. */
 struct program_limits {
+    uint32_t
+        axis_count; /* path axes of the machine; a program with another number is refused; 0: any */
     uint32_t period_us; /* configured period; 0: any allowed one */
     uint32_t feed_um_s; /* 0: no limit; the same for the next two */
     uint32_t acceleration_um_s2;
     uint32_t jerk_mm_s3;
-    int64_t min_q40_mm[2]; /* travel, x and y */
-    int64_t max_q40_mm[2];
-    uint32_t axis_velocity_um_s[2]; /* of x and y, at every rate of program time; 0: no limit */
-    uint32_t axis_acceleration_um_s2[2];
-    uint32_t axis_jerk_mm_s3[2];
+    /* Of the path axes, those of the program; mm are degrees for an extra axis that turns. */
+    int64_t min_q40_mm[PROGRAM_AXES]; /* travel */
+    int64_t max_q40_mm[PROGRAM_AXES];
+    uint32_t axis_velocity_um_s[PROGRAM_AXES]; /* at every rate of program time; 0: no limit */
+    uint32_t axis_acceleration_um_s2[PROGRAM_AXES];
+    uint32_t axis_jerk_mm_s3[PROGRAM_AXES];
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
     /* Called with `self` at every piece by the parts of the check that take long: so a main loop can give signs of life
      * meanwhile. NULL: nobody is. */

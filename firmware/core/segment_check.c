@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/segment_check.h"
 
+#include "core/joint_check.h"
 #include "core/ph_segment.h"
 #include "core/qmath.h"
 #include "core/qwide.h"
@@ -11,7 +12,6 @@
 #define JOIN_Q48        ((int64_t)1 << 14) /* 2^-34 mm */
 #define CLOSED_Q48      ((int64_t)1 << 24) /* 2^-24 mm */
 #define TRAVEL_Q48      ((int64_t)1 << 24) /* rounding of a path that runs along a limit */
-#define DIRECTION_BITS  21                 /* w turns by half the angle: 2^-21 rad */
 #define LONGEST_MM      32
 
 static int within(int64_t a, int64_t limit)
@@ -21,13 +21,22 @@ static int within(int64_t a, int64_t limit)
 
 static int check_ranges(const struct program_segment *g)
 {
-    for (int k = 0; k < 3; k++) {
-        if (!within(g->u_q44[k], W_LIMIT_Q44) || !within(g->v_q44[k], W_LIMIT_Q44)) {
-            return PROGRAM_ERR_W_RANGE;
+    for (uint32_t c = 0; c < PROGRAM_COMPONENTS; c += program_component_step(g->axis_count)) {
+        for (int k = 0; k < 3; k++) {
+            if (!within(g->a_q44[c][k], W_LIMIT_Q44)) {
+                return PROGRAM_ERR_W_RANGE;
+            }
         }
     }
-    if (!within(g->x_q40_mm, POINT_LIMIT_Q40) || !within(g->y_q40_mm, POINT_LIMIT_Q40)) {
-        return PROGRAM_ERR_POINT_RANGE;
+    for (uint32_t axis = 0; axis < program_curve_axes(g->axis_count); axis++) {
+        if (!within(g->point_q40_mm[axis], POINT_LIMIT_Q40)) {
+            return PROGRAM_ERR_POINT_RANGE;
+        }
+    }
+    for (uint32_t k = 0; k < program_extra_axes(g->axis_count); k++) {
+        if (!within(g->extra[k].start_q40, POINT_LIMIT_Q40)) {
+            return PROGRAM_ERR_POINT_RANGE;
+        }
     }
     if (g->start_q40_mm < 0 || g->start_q40_mm >= ARC_LIMIT_Q40) {
         return PROGRAM_ERR_ARC_RANGE;
@@ -35,12 +44,14 @@ static int check_ranges(const struct program_segment *g)
     return 0;
 }
 
-/* sum + weight Re(w_i conj w_j), exact */
+/* sum + weight <A_i, A_j>, exact */
 static struct qwide add_dot(struct qwide sum, const struct program_segment *g, int i, int j,
                             int64_t weight)
 {
-    sum = qwide_add_product(sum, g->u_q44[i], g->u_q44[j], weight);
-    return qwide_add_product(sum, g->v_q44[i], g->v_q44[j], weight);
+    for (uint32_t c = 0; c < PROGRAM_COMPONENTS; c += program_component_step(g->axis_count)) {
+        sum = qwide_add_product(sum, g->a_q44[c][i], g->a_q44[c][j], weight);
+    }
+    return sum;
 }
 
 /* Speed ratio and length, exact: three times the Bernstein coefficients of sigma in q88; a
@@ -78,18 +89,18 @@ static int inside(int64_t a_q48, int64_t min_q40, int64_t max_q40)
 }
 
 /* Bezier control points: each is the one before plus a fifth of the Bernstein coefficient of r'. */
-static int check_travel(const struct program_segment *g, const struct program_limits *limits)
+static int check_curve_travel(const struct program_segment *g, const struct program_limits *limits)
 {
-    int64_t e_q50[5][3];
+    int64_t e_q50[5][PH_AXES];
     ph_segment_hodograph(g, e_q50);
-    for (int axis = PH_X; axis <= PH_Y; axis++) {
-        int64_t point_q48 = (axis == PH_X ? g->x_q40_mm : g->y_q40_mm) * 256;
+    for (uint32_t axis = 0; axis < program_curve_axes(g->axis_count); axis++) {
+        int64_t point_q48 = g->point_q40_mm[axis] * 256;
         for (int k = 0; k <= 5; k++) {
             if (!inside(point_q48, limits->min_q40_mm[axis], limits->max_q40_mm[axis])) {
                 return PROGRAM_ERR_TRAVEL;
             }
             if (k < 5) {
-                int64_t fifth = qmath_fifth(e_q50[k][axis]);
+                int64_t fifth = qmath_fifth(e_q50[k][PH_X + (int)axis]);
                 point_q48 += (k == 2 ? qmath_third(fifth) : fifth) >> 2;
             }
         }
@@ -97,16 +108,21 @@ static int check_travel(const struct program_segment *g, const struct program_li
     return 0;
 }
 
-/* w2 of one and w0 of the next segment are parallel, either sign: the curve's direction is that of
- * w^2. */
-static int same_direction(const struct program_segment *a, const struct program_segment *b)
+static int check_travel(const struct program_segment *g, const struct program_limits *limits)
 {
-    const struct qwide zero = {0, 0};
-    struct qwide cross = qwide_add_product(zero, a->u_q44[2], b->v_q44[0], 1);
-    cross = qwide_add_product(cross, a->v_q44[2], b->u_q44[0], -1);
-    struct qwide dot = qwide_add_product(zero, a->u_q44[2], b->u_q44[0], 1);
-    dot = qwide_add_product(dot, a->v_q44[2], b->v_q44[0], 1);
-    return qwide_compare(qwide_abs(cross), qwide_shift_down(qwide_abs(dot), DIRECTION_BITS)) <= 0;
+    for (uint32_t i = 0; i < program_extra_axes(g->axis_count); i++) {
+        const struct program_extra *extra = &g->extra[i];
+        const int64_t min_q40 = limits->min_q40_mm[PROGRAM_SPACE + i];
+        const int64_t max_q40 = limits->max_q40_mm[PROGRAM_SPACE + i];
+        int fits = inside(extra->start_q40 * 256, min_q40, max_q40);
+        for (int k = 0; k < 5; k++) {
+            fits &= inside((extra->start_q40 + extra->b_q40[k]) * 256, min_q40, max_q40);
+        }
+        if (fits == 0) {
+            return PROGRAM_ERR_TRAVEL;
+        }
+    }
+    return check_curve_travel(g, limits);
 }
 
 /* The end of a segment against where it should be, both relative to its start; |target| < 2^54. */
@@ -123,17 +139,29 @@ static int meets_arc(int64_t start_q40, int64_t end_q48, int64_t target_q40)
     return way_q40 > 0 && way_q40 < ((int64_t)1 << 50) && meets(end_q48, way_q40, JOIN_Q48);
 }
 
-static int meets_point(const struct program_segment *a, const int64_t end_q48[3],
+static int meets_point(const struct program_segment *a, const int64_t end_q48[PH_AXES],
                        const struct program_segment *b, int64_t tolerance_q48)
 {
-    return meets(end_q48[PH_X], b->x_q40_mm - a->x_q40_mm, tolerance_q48) &&
-           meets(end_q48[PH_Y], b->y_q40_mm - a->y_q40_mm, tolerance_q48);
+    for (uint32_t axis = 0; axis < program_curve_axes(a->axis_count); axis++) {
+        if (!meets(end_q48[PH_X + (int)axis], b->point_q40_mm[axis] - a->point_q40_mm[axis],
+                   tolerance_q48)) {
+            return 0;
+        }
+    }
+    for (uint32_t i = 0; i < program_extra_axes(a->axis_count); i++) {
+        const struct program_extra *extra = &a->extra[i];
+        if (!meets(extra->b_q40[4] * 256, b->extra[i].start_q40 - extra->start_q40,
+                   tolerance_q48)) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 static int check_join(const struct program_segment *a, const struct program_segment *b)
 {
     struct ph_segment ph;
-    int64_t end_q48[3];
+    int64_t end_q48[PH_AXES];
     ph_segment_expand(&ph, a);
     ph_segment_end(&ph, end_q48);
     if (!meets_point(a, end_q48, b, JOIN_Q48)) {
@@ -142,14 +170,14 @@ static int check_join(const struct program_segment *a, const struct program_segm
     if (!meets_arc(a->start_q40_mm, end_q48[PH_S], b->start_q40_mm)) {
         return PROGRAM_ERR_JOIN_ARC;
     }
-    return same_direction(a, b) ? 0 : PROGRAM_ERR_JOIN_DIRECTION;
+    return joint_goes_on(a, b) ? 0 : PROGRAM_ERR_JOIN_DIRECTION;
 }
 
 static int check_end(const struct program *p, const struct program_segment *first,
                      const struct program_segment *last)
 {
     struct ph_segment ph;
-    int64_t end_q48[3];
+    int64_t end_q48[PH_AXES];
     ph_segment_expand(&ph, last);
     ph_segment_end(&ph, end_q48);
     if (!meets_arc(last->start_q40_mm, end_q48[PH_S], p->header.length_q40_mm)) {

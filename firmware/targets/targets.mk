@@ -62,7 +62,9 @@ controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/port/common/*.c firmware/can/*.c)
 controller_TARGETS := an385 an386 an500 an505 microbit $(BOARDS)
 
-TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -fstack-usage -DNDEBUG $(INCLUDES)
+# The same bytes wherever the tree and its build lie (tests/system/test_firmware_bytes.py).
+TARGET_PATHS  := -ffile-prefix-map=$(abspath $(BUILD))=build -ffile-prefix-map=$(CURDIR)=.
+TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -fstack-usage -DNDEBUG $(INCLUDES) $(TARGET_PATHS)
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
 
 # What the tick runs: loops of fixed length unrolled. Measured: a quarter fewer instructions.

@@ -26,9 +26,10 @@ const char node_options_help[] =
     "                   encoder_counts_per_rev (1048576), loop_rate_hz (16000),\n"
     "                   counts_per_mm (1000000), position_mm (0), serial (the node),\n"
     "                   vendor (0; another one: the controller takes it for a real drive)\n"
-    "                   interpolation of setpoints: 0 linear, 1 cubic (0)\n"
+    "                   interpolation of setpoints: 0 linear, 1 cubic, 2 none (0)\n"
     "                   speed of the loop: 0 exact, 1 differences of the encoder (0);\n"
     "                   delay_samples from encoder to volts: 0 or 1 (0)\n"
+    "                   integral of the loop: 0 backward, 1 forward Euler (0)\n"
     "                   limit_negative_mm, limit_positive_mm: limit switches, on from there\n"
     "                   outwards (none); home_from_mm, home_to_mm: home switch (none)\n"
     "                   rated_torque_nm (half of what volts_limit gives), rated_current_a (5),\n"
@@ -75,6 +76,7 @@ static const struct key keys[] = {
     {"interpolation", AT(config.interpolation), KEY_U32, false},
     {"speed", AT(config.speed), KEY_U32, false},
     {"delay_samples", AT(config.delay_samples), KEY_U32, false},
+    {"integral", AT(config.integral), KEY_U32, false},
     {"position_mm", AT(position_mm), KEY_NUMBER, false},
     {"limit_negative_mm", AT(equipment.limit_negative_mm), KEY_NUMBER, false},
     {"limit_positive_mm", AT(equipment.limit_positive_mm), KEY_NUMBER, false},

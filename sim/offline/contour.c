@@ -2,6 +2,7 @@
 #include "offline/contour.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "offline/contour_curve.h"
 
@@ -18,22 +19,33 @@ struct foot {
     bool found;
 };
 
+/* Distance of the point from the tangent. In the plane without the square and the root of one number. */
+static double contour_beside(const struct contour *c, const struct view *v, double square)
+{
+    const double z = v->offset[0] * v->first[1] - v->offset[1] * v->first[0];
+    if (c->axes == PROGRAM_PLANE) {
+        return fabs(z) / sqrt(square);
+    }
+    const double x = v->offset[1] * v->first[2] - v->offset[2] * v->first[1];
+    const double y = v->offset[2] * v->first[0] - v->offset[0] * v->first[2];
+    return sqrt((x * x + y * y + z * z) / square);
+}
+
 /* Newton's iteration for the zero of offset . first. Where the distance is not convex (beyond the
  * centre of curvature) the step is that of Gauss and Newton. */
 static struct foot contour_newton(const struct contour *c, struct place start,
-                                  const double point[2])
+                                  const double point[3])
 {
     struct foot foot = {start, 0.0, 0.0, false};
     for (int k = 0; k < CONTOUR_STEPS; k++) {
         struct view v;
-        contour_view(&c->segments[foot.place.segment], foot.place.xi, point, &v);
+        contour_view(c, foot.place, point, &v);
         const double along = contour_dot(v.offset, v.first);
         const double square = contour_dot(v.first, v.first);
         const double full = square - contour_dot(v.offset, v.second);
         const double step = along / (full > 0.25 * square ? full : square);
         if (step * step * square < CONTOUR_STEP_MM * CONTOUR_STEP_MM) {
-            foot.distance_mm =
-                fabs(v.offset[0] * v.first[1] - v.offset[1] * v.first[0]) / sqrt(square);
+            foot.distance_mm = contour_beside(c, &v, square);
             foot.found = true;
             return foot;
         }
@@ -50,14 +62,14 @@ static struct foot contour_newton(const struct contour *c, struct place start,
     return foot;
 }
 
-static double contour_gap_at(const struct contour *c, double arc_length_mm, const double point[2])
+static double contour_gap_at(const struct contour *c, double arc_length_mm, const double point[3])
 {
     return contour_gap(c, contour_place(c, c->cursor, contour_wrap(c, arc_length_mm)), point);
 }
 
 /* Slow and sure: samples the window, then closes in on the best sample by golden sections. */
 static double contour_search(const struct contour *c, double arc_length_mm, double window_mm,
-                             const double point[2])
+                             const double point[3])
 {
     const double golden = 0.61803398874989484820;
     const double half =
@@ -87,7 +99,7 @@ static double contour_search(const struct contour *c, double arc_length_mm, doub
     return gap < least ? gap : least;
 }
 
-double contour_distance_mm(struct contour *c, double arc_length_mm, const double point[2])
+double contour_distance_mm(struct contour *c, double arc_length_mm, const double point[3])
 {
     const double arc =
         arc_length_mm > c->length_mm ? c->length_mm : (arc_length_mm >= 0.0 ? arc_length_mm : 0.0);
@@ -103,12 +115,15 @@ double contour_distance_mm(struct contour *c, double arc_length_mm, const double
 }
 
 void contour_errors_um(struct contour *c, uint32_t n, const int64_t *arc_length_q40_mm,
-                       const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um)
+                       const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,
+                       double *errors_um)
 {
     const double mm_per_count = 1.0 / (double)counts_per_mm;
     for (uint32_t i = 0; i < n; i++) {
-        const double point[2] = {(double)act_counts[2 * i] * mm_per_count,
-                                 (double)act_counts[2 * i + 1] * mm_per_count};
+        double point[3] = {0.0, 0.0, 0.0};
+        for (uint32_t j = 0; j < c->axes; j++) {
+            point[j] = (double)act_counts[(size_t)stride * i + j] * mm_per_count;
+        }
         errors_um[i] = 1000.0 * contour_distance_mm(c, contour_q40(arc_length_q40_mm[i]), point);
     }
 }

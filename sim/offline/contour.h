@@ -28,8 +28,8 @@ struct contour_segment {
     double per_length;   /* 1 / length */
     double slope[2];     /* d(xi)/d(s / length) at both ends */
     double end_speed[2]; /* d(s)/d(xi) at both ends */
-    double origin[2];
-    double r[5][2];
+    double origin[3];
+    double r[5][3];
 };
 
 struct contour {
@@ -38,6 +38,7 @@ struct contour {
     uint32_t cursor; /* where the last commanded arc length was: speeds up the search, changes no
                         result */
     double length_mm;
+    uint32_t axes; /* of the curve: 2, or 3 in space */
     bool closed;
 };
 
@@ -46,13 +47,15 @@ struct contour {
 void contour_begin(struct contour *contour, const struct program *program,
                    struct contour_segment *segments);
 
-/* Distance in mm of point (x, y mm, machine coordinates) from the curve near the commanded arc
+/* Distance in mm of a point (x, y, z in mm, machine coordinates; in the plane z counts for nothing) from the curve near the commanded arc
  * length, which is clamped to the program's. */
-double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[2]);
+double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[3]);
 
 /* n points in bus counts at once: errors in um. arc_length_q40_mm as the interpolator gives it; act_counts
- * holds x, y pairs. */
+ * holds `stride` numbers for each point, one for each path axis of the program, of which those behind z count for nothing: the
+ * contour is that of the curve. */
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
-                       const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um);
+                       const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,
+                       double *errors_um);
 
 #endif

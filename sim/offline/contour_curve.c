@@ -3,54 +3,71 @@
 
 #include <math.h>
 
-static void complex_product(const double a[2], const double b[2], double scale, double out[2])
+/* The hodograph of the preimage A is A i A*, a quadratic form; this is scale times the bilinear one that belongs to it. */
+static void hodograph_product(const double a[4], const double b[4], double scale, double out[3])
 {
-    out[0] = scale * (a[0] * b[0] - a[1] * b[1]);
-    out[1] = scale * (a[0] * b[1] + a[1] * b[0]);
+    out[0] = scale * (a[PROGRAM_U] * b[PROGRAM_U] + a[PROGRAM_V] * b[PROGRAM_V] -
+                      a[PROGRAM_P] * b[PROGRAM_P] - a[PROGRAM_Q] * b[PROGRAM_Q]);
+    out[1] = scale * (a[PROGRAM_U] * b[PROGRAM_Q] + a[PROGRAM_Q] * b[PROGRAM_U] +
+                      a[PROGRAM_V] * b[PROGRAM_P] + a[PROGRAM_P] * b[PROGRAM_V]);
+    out[2] = scale * (a[PROGRAM_V] * b[PROGRAM_Q] + a[PROGRAM_Q] * b[PROGRAM_V] -
+                      a[PROGRAM_U] * b[PROGRAM_P] - a[PROGRAM_P] * b[PROGRAM_U]);
 }
 
-/* w as powers of xi: w = a0 + a1 xi + a2 xi^2. */
-static void contour_powers(const struct program_segment *s, double a[3][2])
+/* The preimage as powers of xi: A = a0 + a1 xi + a2 xi^2. */
+static void contour_powers(const struct program_segment *s, double a[3][4])
 {
     const double unit = 1.0 / 17592186044416.0; /* 2^-44 */
-    for (int j = 0; j < 2; j++) {
-        const int64_t *w = j == 0 ? s->u_q44 : s->v_q44;
+    for (uint32_t j = 0; j < PROGRAM_COMPONENTS; j++) {
+        const int64_t *w = s->a_q44[j];
         a[0][j] = (double)w[0] * unit;
         a[1][j] = (double)(2 * (w[1] - w[0])) * unit;
         a[2][j] = (double)(w[0] - 2 * w[1] + w[2]) * unit;
     }
 }
 
-/* r = integral of w^2. */
-static void contour_integrate(double a[3][2], double r[5][2])
+/* r = integral of the hodograph. */
+static void contour_integrate(double a[3][4], double r[5][3])
 {
-    double part[2];
-    complex_product(a[0], a[0], 1.0, r[0]);
-    complex_product(a[0], a[1], 1.0, r[1]);
-    complex_product(a[1], a[1], 1.0 / 3.0, r[2]);
-    complex_product(a[0], a[2], 2.0 / 3.0, part);
-    r[2][0] += part[0];
-    r[2][1] += part[1];
-    complex_product(a[1], a[2], 0.5, r[3]);
-    complex_product(a[2], a[2], 0.2, r[4]);
+    double part[3];
+    hodograph_product(a[0], a[0], 1.0, r[0]);
+    hodograph_product(a[0], a[1], 1.0, r[1]);
+    hodograph_product(a[1], a[1], 1.0 / 3.0, r[2]);
+    hodograph_product(a[0], a[2], 2.0 / 3.0, part);
+    for (int j = 0; j < 3; j++) {
+        r[2][j] += part[j];
+    }
+    hodograph_product(a[1], a[2], 0.5, r[3]);
+    hodograph_product(a[2], a[2], 0.2, r[4]);
+}
+
+/* |A|^2, which is the parametric speed. */
+static double speed_of(const double a[4])
+{
+    return a[PROGRAM_U] * a[PROGRAM_U] + a[PROGRAM_Q] * a[PROGRAM_Q] + a[PROGRAM_V] * a[PROGRAM_V] +
+           a[PROGRAM_P] * a[PROGRAM_P];
 }
 
 static void contour_expand(const struct program_segment *s, double end_mm,
                            struct contour_segment *out)
 {
-    double a[3][2];
+    double a[3][4];
+    double last[4];
     contour_powers(s, a);
     contour_integrate(a, out->r);
-    const double last[2] = {a[0][0] + a[1][0] + a[2][0], a[0][1] + a[1][1] + a[2][1]};
+    for (uint32_t j = 0; j < PROGRAM_COMPONENTS; j++) {
+        last[j] = a[0][j] + a[1][j] + a[2][j];
+    }
     out->start_mm = contour_q40(s->start_q40_mm);
     out->length_mm = end_mm - out->start_mm;
     out->per_length = 1.0 / out->length_mm;
-    out->end_speed[0] = contour_dot(a[0], a[0]);
-    out->end_speed[1] = contour_dot(last, last);
+    out->end_speed[0] = speed_of(a[0]);
+    out->end_speed[1] = speed_of(last);
     out->slope[0] = out->length_mm / out->end_speed[0];
     out->slope[1] = out->length_mm / out->end_speed[1];
-    out->origin[0] = contour_q40(s->x_q40_mm);
-    out->origin[1] = contour_q40(s->y_q40_mm);
+    for (int j = 0; j < 3; j++) {
+        out->origin[j] = contour_q40(s->point_q40_mm[j]);
+    }
 }
 
 void contour_begin(struct contour *c, const struct program *program,
@@ -60,6 +77,7 @@ void contour_begin(struct contour *c, const struct program *program,
     c->segments = segments;
     c->count = count;
     c->cursor = 0;
+    c->axes = program_curve_axes(program->header.axis_count);
     c->closed = (program->header.flags & PROGRAM_FLAG_CLOSED) != 0;
     c->length_mm = contour_q40(program->header.length_q40_mm);
     double end_mm = c->length_mm;
@@ -124,9 +142,13 @@ struct place contour_place(const struct contour *c, uint32_t hint, double arc_le
     return place;
 }
 
-void contour_view(const struct contour_segment *s, double xi, const double point[2], struct view *v)
+void contour_view(const struct contour *c, struct place place, const double point[3],
+                  struct view *v)
 {
-    for (int j = 0; j < 2; j++) {
+    const struct contour_segment *s = &c->segments[place.segment];
+    const double xi = place.xi;
+    *v = (struct view){.offset = {0.0}};
+    for (uint32_t j = 0; j < c->axes; j++) {
         const double r0 = s->r[0][j], r1 = s->r[1][j], r2 = s->r[2][j], r3 = s->r[3][j],
                      r4 = s->r[4][j];
         v->offset[j] =
@@ -136,10 +158,10 @@ void contour_view(const struct contour_segment *s, double xi, const double point
     }
 }
 
-double contour_gap(const struct contour *c, struct place place, const double point[2])
+double contour_gap(const struct contour *c, struct place place, const double point[3])
 {
     struct view v;
-    contour_view(&c->segments[place.segment], place.xi, point, &v);
+    contour_view(c, place, point, &v);
     return sqrt(contour_dot(v.offset, v.offset));
 }
 

@@ -17,9 +17,9 @@ struct place {
 /* The curve at a place, seen from a point: offset = point - curve, and the first two derivatives of
  * the curve. */
 struct view {
-    double offset[2];
-    double first[2];
-    double second[2];
+    double offset[3];
+    double first[3];
+    double second[3];
 };
 
 static inline double contour_q40(int64_t q40)
@@ -27,9 +27,10 @@ static inline double contour_q40(int64_t q40)
     return (double)q40 * (1.0 / 1099511627776.0);
 }
 
-static inline double contour_dot(const double a[2], const double b[2])
+/* In the plane the third components are 0 and change no bit. */
+static inline double contour_dot(const double a[3], const double b[3])
 {
-    return a[0] * b[0] + a[1] * b[1];
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* Brings an arc length into the program: modulo the length on a closed path, else clamped. */
@@ -39,12 +40,12 @@ double contour_wrap(const struct contour *c, double arc_length_mm);
  * on it being exact. `hint` is the segment to look in first. */
 struct place contour_place(const struct contour *c, uint32_t hint, double arc_length_mm);
 
-/* The curve at xi of a segment, seen from a point. */
-void contour_view(const struct contour_segment *s, double xi, const double point[2],
+/* The curve at a place, seen from a point. */
+void contour_view(const struct contour *c, struct place place, const double point[3],
                   struct view *v);
 
 /* Distance of a point from a place. */
-double contour_gap(const struct contour *c, struct place place, const double point[2]);
+double contour_gap(const struct contour *c, struct place place, const double point[3]);
 
 /* Takes a parameter that has left [0, 1] over into the neighbouring segment, beyond the start of a
  * closed path too. False at the end of an open path: xi is clamped. */

@@ -5,39 +5,46 @@
 
 #include "core/counts.h"
 
-typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 64 ? 1 : -1];
+typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 136 ? 1 : -1];
 
-static int offline_start_point(struct offline *rig, int32_t start[2])
+static int offline_start_point(struct offline *rig, int32_t start[PROGRAM_AXES])
 {
     struct interpolator_point point;
     if (interpolator_at(&rig->interp, 0, &point) < 0) {
         return OFFLINE_ERR_INTERP;
     }
-    start[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
-    start[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
+        start[axis] = counts_from_q40_mm(point.position_q40[axis], rig->counts_per_mm);
+    }
     return 0;
 }
 
 static int offline_drives(struct offline *rig, const struct program *program,
-                          const struct drive_config drives[2])
+                          const struct drive_config *drives)
 {
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
         const int error = drive_init(&rig->drives[axis], &drives[axis]);
         if (error != 0) {
-            return OFFLINE_ERR_DRIVE - 10 * axis + error;
+            return OFFLINE_ERR_DRIVE - 10 * (int)axis + error;
         }
         if (drives[axis].period_us != program->header.period_us) {
             return OFFLINE_ERR_PERIOD;
         }
     }
-    return drives[0].counts_per_mm == drives[1].counts_per_mm ? 0 : OFFLINE_ERR_COUNTS;
+    for (uint32_t axis = 1; axis < rig->axis_count; axis++) {
+        if (drives[axis].counts_per_mm != drives[0].counts_per_mm) {
+            return OFFLINE_ERR_COUNTS;
+        }
+    }
+    return 0;
 }
 
 int offline_begin(struct offline *rig, const struct program *program,
-                  const struct drive_config drives[2], struct contour_segment *segments)
+                  const struct drive_config *drives, struct contour_segment *segments)
 {
     const struct feedforward_gains without = {.period_us = drives[0].period_us};
-    int32_t start[2];
+    int32_t start[PROGRAM_AXES] = {0};
+    rig->axis_count = program->header.axis_count;
     int error = offline_drives(rig, program, drives);
     if (error != 0) {
         return error;
@@ -56,7 +63,7 @@ int offline_begin(struct offline *rig, const struct program *program,
     if (error != 0) {
         return error;
     }
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
         drive_place(&rig->drives[axis], start[axis]);
         rig->latched_counts[axis] = start[axis];
         rig->configs[axis] = drives[axis];
@@ -74,9 +81,9 @@ int offline_begin(struct offline *rig, const struct program *program,
     return 0;
 }
 
-void offline_feedforward(struct offline *rig, const struct feedforward_gains gains[2])
+void offline_feedforward(struct offline *rig, const struct feedforward_gains *gains)
 {
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
         rig->gains[axis] = gains[axis];
         rig->gains[axis].period_us = rig->configs[axis].period_us;
         rig->gains[axis].counts_per_mm = rig->counts_per_mm;
@@ -94,7 +101,7 @@ void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double
 int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
-        if (!offline_fault_ok(&faults[i])) {
+        if (!offline_fault_ok(&faults[i]) || faults[i].axis >= rig->axis_count) {
             return OFFLINE_ERR_FAULT;
         }
     }
@@ -184,17 +191,19 @@ static int offline_command(struct offline *rig, struct offline_row *row)
     }
     row->arc_length_q40_mm = point.arc_length_q40_mm;
     row->feed_q32_mm_s = feed_override_feed_q32(&rig->feed);
-    row->cmd_q40_mm[0] = point.x_q40_mm;
-    row->cmd_q40_mm[1] = point.y_q40_mm;
-    row->set_counts[0] = counts_from_q40_mm(point.x_q40_mm, rig->counts_per_mm);
-    row->set_counts[1] = counts_from_q40_mm(point.y_q40_mm, rig->counts_per_mm);
+    for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
+        const bool follows = axis < rig->axis_count;
+        row->cmd_q40_mm[axis] = follows ? point.position_q40[axis] : 0;
+        row->set_counts[axis] =
+            follows ? counts_from_q40_mm(point.position_q40[axis], rig->counts_per_mm) : 0;
+    }
     row->tick = rig->tick++;
     return 0;
 }
 
 /* As the controller sends it: from the program's first setpoint to its last, the first at rest. */
 static struct feedforward_offset offline_offset(struct offline *rig, const struct offline_row *row,
-                                                int axis)
+                                                uint32_t axis)
 {
     const struct feedforward_offset none = {0, 0};
     if (row->tick == 0) {
@@ -219,8 +228,10 @@ static bool offline_arrives(const struct offline *rig, uint32_t axis)
 /* Begins and ends faults, and latches what arrives. */
 static void offline_latch(struct offline *rig, const struct offline_row *row)
 {
-    const bool moves = row->set_counts[0] != rig->latched_counts[0] ||
-                       row->set_counts[1] != rig->latched_counts[1];
+    bool moves = false;
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
+        moves = moves || row->set_counts[axis] != rig->latched_counts[axis];
+    }
     if (rig->fault_tick >= 0 || moves) {
         rig->fault_tick++;
     }
@@ -229,7 +240,7 @@ static void offline_latch(struct offline *rig, const struct offline_row *row)
         offline_fault_tick(&rig->faults[i], rig->fault_tick, &rig->influences[axis],
                            &rig->drives[axis]);
     }
-    for (uint32_t axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
         if (offline_arrives(rig, axis)) {
             rig->latched_counts[axis] = row->set_counts[axis];
         }
@@ -239,7 +250,7 @@ static void offline_latch(struct offline *rig, const struct offline_row *row)
 static void offline_move_forward(struct offline *rig, const struct offline_row *row)
 {
     offline_latch(rig, row);
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
         struct influence *influence = &rig->influences[axis];
         const struct feedforward_offset offset = offline_offset(rig, row, axis);
         influence_offsets(influence, &rig->drives[axis], &rig->configs[axis],
@@ -259,10 +270,14 @@ static void offline_move(struct offline *rig, struct offline_row *row)
         offline_move_forward(rig, row);
     } else {
         drive_period_pair(&rig->drives[0], &rig->drives[1], row->set_counts);
+        for (uint32_t axis = PROGRAM_PLANE; axis < rig->axis_count; axis++) {
+            drive_period(&rig->drives[axis], row->set_counts[axis]);
+        }
     }
-    for (int axis = 0; axis < 2; axis++) {
-        row->act_counts[axis] = drive_position_counts(&rig->drives[axis]);
-        row->volts_mv[axis] = drive_volts_mv(&rig->drives[axis]);
+    for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
+        const bool follows = axis < rig->axis_count;
+        row->act_counts[axis] = follows ? drive_position_counts(&rig->drives[axis]) : 0;
+        row->volts_mv[axis] = follows ? drive_volts_mv(&rig->drives[axis]) : 0;
     }
 }
 
@@ -275,7 +290,7 @@ int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n)
         }
         offline_move(rig, &rows[i]);
         contour_errors_um(&rig->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
-                          rig->counts_per_mm, &rows[i].contour_error_um);
+                          rig->axis_count, rig->counts_per_mm, &rows[i].contour_error_um);
     }
     return 0;
 }
@@ -297,11 +312,11 @@ int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time
         if (offline_point(interp, time_q42_s[i], &points[i]) != 0) {
             return OFFLINE_ERR_INTERP;
         }
-        if (counts == NULL) {
-            continue;
+        const uint32_t axes = interp->program->header.axis_count;
+        for (uint32_t axis = 0; counts != NULL && axis < axes; axis++) {
+            counts[axes * (size_t)i + axis] =
+                counts_from_q40_mm(points[i].position_q40[axis], counts_per_mm);
         }
-        counts[2 * i] = counts_from_q40_mm(points[i].x_q40_mm, counts_per_mm);
-        counts[2 * i + 1] = counts_from_q40_mm(points[i].y_q40_mm, counts_per_mm);
     }
     return 0;
 }

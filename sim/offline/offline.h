@@ -26,15 +26,15 @@
 #include "plant/drive.h"
 #include "plant/influence.h"
 
-/* One tick; 64 bytes without holes. Python maps it as a numpy record. */
+/* One tick; 136 bytes without holes, 0 for axes beyond those of the program. Python maps it as a numpy record. */
 struct offline_row {
     int64_t arc_length_q40_mm;
-    int64_t feed_q32_mm_s; /* along the path */
-    int64_t cmd_q40_mm[2]; /* unrounded, from the kernel */
+    int64_t feed_q32_mm_s;            /* along the path */
+    int64_t cmd_q40_mm[PROGRAM_AXES]; /* unrounded, from the kernel */
     double contour_error_um;
-    int32_t set_counts[2];
-    int32_t act_counts[2];
-    int16_t volts_mv[2];
+    int32_t set_counts[PROGRAM_AXES];
+    int32_t act_counts[PROGRAM_AXES];
+    int16_t volts_mv[PROGRAM_AXES];
     uint32_t tick;
 };
 
@@ -82,32 +82,33 @@ struct offline {
     struct offline_stop stop;
     int64_t last_q40_mm;
     struct contour contour;
-    struct drive drives[2];
-    struct drive_config configs[2];
-    struct influence influences[2];
-    struct feedforward feedforwards[2];
-    struct feedforward_gains gains[2];
-    double rated_torque_nm[2];
+    uint32_t axis_count; /* of the program */
+    struct drive drives[PROGRAM_AXES];
+    struct drive_config configs[PROGRAM_AXES];
+    struct influence influences[PROGRAM_AXES];
+    struct feedforward feedforwards[PROGRAM_AXES];
+    struct feedforward_gains gains[PROGRAM_AXES];
+    double rated_torque_nm[PROGRAM_AXES];
     bool influenced;                    /* by feedforward, friction or faults */
     const struct offline_fault *faults; /* borrowed */
     uint32_t fault_count;
-    int64_t fault_tick;        /* of the faults; negative before the first motion */
-    int32_t latched_counts[2]; /* the last setpoint that arrived */
+    int64_t fault_tick;                   /* of the faults; negative before the first motion */
+    int32_t latched_counts[PROGRAM_AXES]; /* the last setpoint that arrived */
     uint32_t program_ticks;
     uint32_t counts_per_mm;
     uint32_t tick;
 };
 
 /* Sets up for a program that passed program_check and has coefficient records; segments has room for its
- * segment_count. Returns 0 or an error. */
+ * segment_count, `drives` one for each axis of the program. Returns 0 or an error. */
 int offline_begin(struct offline *rig, const struct program *program,
-                  const struct drive_config drives[2], struct contour_segment *segments);
+                  const struct drive_config *drives, struct contour_segment *segments);
 
-/* The controller's feedforward of both axes (0x2018 ... 0x201A), right after offline_begin; period and
+/* The controller's feedforward of each axis (0x2018 ... 0x201A), right after offline_begin; period and
  * counts per mm in the gains are the rig's. */
-void offline_feedforward(struct offline *rig, const struct feedforward_gains gains[2]);
+void offline_feedforward(struct offline *rig, const struct feedforward_gains *gains);
 
-/* Rated torque of an axis (0, 1; more than 0; drive_config_rated_torque_nm if this is not called), and
+/* Rated torque of an axis (from 0; more than 0; drive_config_rated_torque_nm if this is not called), and
  * Coulomb friction as volts (0 or more; none); right after offline_begin. */
 void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts);
 
@@ -126,7 +127,7 @@ void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
 int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
 
 /* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
- * counts: x, y pairs, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */
+ * counts: those of all axes of a point, one point after the other, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */
 int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
                    uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 

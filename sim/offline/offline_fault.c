@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "offline/offline_fault.h"
 
+#include "core/program.h"
+
 static void offline_fault_begin(const struct offline_fault *fault, struct influence *influence,
                                 const struct drive *drive)
 {
@@ -74,6 +76,7 @@ bool offline_fault_loses(const struct offline_fault *fault, int64_t tick)
 bool offline_fault_ok(const struct offline_fault *fault)
 {
     const double least = fault->kind == OFFLINE_FAULT_SATURATE ? 1e-3 : -2147483648.0;
-    return (int)fault->kind >= 0 && fault->kind < OFFLINE_FAULT_KINDS && fault->axis < 2 &&
-           fault->ticks >= 1 && fault->value >= least && fault->value <= 2147483647.0;
+    return (int)fault->kind >= 0 && fault->kind < OFFLINE_FAULT_KINDS &&
+           fault->axis < PROGRAM_AXES && fault->ticks >= 1 && fault->value >= least &&
+           fault->value <= 2147483647.0;
 }

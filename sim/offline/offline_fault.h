@@ -29,7 +29,7 @@ enum offline_fault_kind {
 
 struct offline_fault {
     enum offline_fault_kind kind;
-    uint32_t axis;  /* 0, 1 */
+    uint32_t axis;  /* from 0 */
     uint32_t at;    /* first tick */
     uint32_t ticks; /* how many, 1 or more; OFFLINE_FAULT_FOR_EVER */
     double value;
@@ -43,7 +43,7 @@ void offline_fault_tick(const struct offline_fault *fault, int64_t tick,
 /* Whether the setpoint that would be latched in this tick is lost. */
 bool offline_fault_loses(const struct offline_fault *fault, int64_t tick);
 
-/* Whether a fault can be carried out: kind, axis, length and value are in range. */
+/* Whether a fault can be carried out: kind, length and value are in range. */
 bool offline_fault_ok(const struct offline_fault *fault);
 
 #endif

@@ -30,7 +30,7 @@
 #define SPARE_SHARE                                                                                \
     1e-4 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes; */
 #define SURE_EACH                                                                                  \
-    12 /* ticks of a brake between two looks whether the rest of it surely keeps the limits */
+    12 /* ticks of a brake between two looks whether the rest of it, or so many ticks, surely keep the limits */
 #define SPARE_TIME    1.25 /* of brake_time, */
 #define SPARE_TICKS   10.0 /* and ticks more */
 #define FEED_ROUNDING 1e-9 /* share of a feed that the plan may be above it */
@@ -43,12 +43,20 @@
 /* What is looked at: one over the limits, less the margin; 0: none. */
 struct inverse {
     double feed; /* share of the path's feed that counts: a little less than 1 allows more */
-    double velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
+    double velocity[PROGRAM_AXES], axis_acceleration[PROGRAM_AXES], axis_jerk[PROGRAM_AXES],
+        reach[PROGRAM_AXES], time_constant[PROGRAM_AXES];
 };
 
 /* A state on the path, at an instant of the program. */
 struct state {
     double s, v, a;
+};
+
+/* An instant of a piece at a feed override: `rate` is a number of override_at(), `slope` the sign of the override's change. */
+struct overridden {
+    uint32_t instant;
+    uint32_t rate;
+    int slope;
 };
 
 /* One piece with the instants looked at. */
@@ -65,14 +73,17 @@ struct piece {
     struct state extreme; /* of the rate 1: greatest speed and acceleration of either sign */
     double factor;        /* greatest rate of program time; */
     double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS],
-        second[PROGRAM_LEVELS]; /* bounds up to these rates */
-    uint32_t suspect;           /* the instant at which a limit was broken last, */
-    uint32_t suspect_rates;     /* and the same at other rates */
-    struct piece *close;        /* the same piece with more instants */
+        second[PROGRAM_LEVELS];         /* bounds up to these rates */
+    uint32_t suspect;                   /* the instant at which a limit was broken last, */
+    struct overridden suspect_override; /* and the same at other feed overrides */
+    struct piece *close;                /* the same piece with more instants */
 };
 
 struct search {
+    uint32_t axis_count;
     const struct stop_row *rows;
+    const struct stop_bend *bends; /* of a spatial program */
+    const struct stop_stretch *segments;
     uint32_t row_count;
     struct inverse inverse;     /* at the rate 1, */
     struct inverse at_any_rate; /* and at others */
@@ -100,18 +111,47 @@ static double over(double limit)
     return 1.0 / (limit * (1.0 - STOP_MARGIN)); /* of HUGE_VAL 0 */
 }
 
-static void segment_row(const double w[3][2], double xi, struct stop_row *row)
+/* Preimage of a segment: Bernstein coefficients by component; u and q, or all four. */
+struct preimage {
+    double a[3][PROGRAM_COMPONENTS];
+    int count;
+};
+
+static void read_preimage(const struct program_segment *segment, struct preimage *out)
 {
-    double value[2];
-    double first[2];
-    double second[2];
-    for (int k = 0; k < 2; k++) {
-        double up = w[1][k] - w[0][k];
-        double bend = w[2][k] - 2.0 * w[1][k] + w[0][k];
-        value[k] = w[0][k] + xi * (2.0 * up + xi * bend);
-        first[k] = 2.0 * (up + xi * bend);
-        second[k] = 2.0 * bend;
+    const uint32_t step = program_component_step(segment->axis_count);
+    out->count = 0;
+    for (uint32_t component = 0; component < PROGRAM_COMPONENTS; component += step) {
+        for (int k = 0; k < 3; k++) {
+            out->a[k][out->count] = ldexp((double)segment->a_q44[component][k], -44);
+        }
+        out->count++;
     }
+}
+
+/* A at xi and its derivatives. */
+struct preimage_at {
+    double value[PROGRAM_COMPONENTS], first[PROGRAM_COMPONENTS], second[PROGRAM_COMPONENTS];
+};
+
+static void evaluate(const struct preimage *w, double xi, struct preimage_at *out)
+{
+    for (int k = 0; k < w->count; k++) {
+        double up = w->a[1][k] - w->a[0][k];
+        double bend = w->a[2][k] - 2.0 * w->a[1][k] + w->a[0][k];
+        out->value[k] = w->a[0][k] + xi * (2.0 * up + xi * bend);
+        out->first[k] = 2.0 * (up + xi * bend);
+        out->second[k] = 2.0 * bend;
+    }
+}
+
+static void planar_row(const struct preimage *w, double xi, struct stop_row *row)
+{
+    struct preimage_at at = {{0}, {0}, {0}};
+    evaluate(w, xi, &at);
+    const double *value = at.value;
+    const double *first = at.first;
+    const double *second = at.second;
     double sigma = value[0] * value[0] + value[1] * value[1];
     double along = value[0] * first[0] + value[1] * first[1];
     double turn = value[0] * first[1] - value[1] * first[0];
@@ -122,16 +162,86 @@ static void segment_row(const double w[3][2], double xi, struct stop_row *row)
     row->slope = (2.0 * turn2 - 8.0 * turn * along / sigma) / (sigma * sigma * sigma);
 }
 
-/* Arc length from the start of the segment: the integral of |w|^2. */
-static double way_to(const double w[3][2], double xi)
+/* What x', y', z' and sigma are of, as symmetric forms of two preimages. */
+static void forms(const double a[PROGRAM_COMPONENTS], const double b[PROGRAM_COMPONENTS],
+                  double out[4])
+{
+    enum { U = PROGRAM_U, V = PROGRAM_V, P = PROGRAM_P, Q = PROGRAM_Q };
+    const double uv = a[U] * b[U] + a[V] * b[V];
+    const double pq = a[P] * b[P] + a[Q] * b[Q];
+    out[0] = uv - pq;
+    out[1] = a[U] * b[Q] + a[Q] * b[U] + a[V] * b[P] + a[P] * b[V];
+    out[2] = a[V] * b[Q] + a[Q] * b[V] - a[U] * b[P] - a[P] * b[U];
+    out[3] = uv + pq;
+}
+
+/* First to third derivative of an extra axis by xi. */
+static void extra_at(const struct program_extra *extra, double xi, double out[3])
+{
+    double d[5];
+    for (int k = 0; k < 5; k++) {
+        d[k] = ldexp(5.0 * (double)(extra->b_q40[k] - (k > 0 ? extra->b_q40[k - 1] : 0)), -40);
+    }
+    const double c1 = 4.0 * (d[1] - d[0]);
+    const double c2 = 6.0 * (d[2] - 2.0 * d[1] + d[0]);
+    const double c3 = 4.0 * (d[3] - 3.0 * d[2] + 3.0 * d[1] - d[0]);
+    const double c4 = d[4] - 4.0 * d[3] + 6.0 * d[2] - 4.0 * d[1] + d[0];
+    out[0] = d[0] + xi * (c1 + xi * (c2 + xi * (c3 + xi * c4)));
+    out[1] = c1 + xi * (2.0 * c2 + xi * (3.0 * c3 + xi * 4.0 * c4));
+    out[2] = 2.0 * c2 + xi * (6.0 * c3 + xi * 12.0 * c4);
+}
+
+/* From derivatives by xi to those by arc length; sigma and its first two derivatives. */
+static void by_arc_length(const double d[3], const double sigma[3], uint32_t axis,
+                          struct stop_bend *bend)
+{
+    const double first = d[0] / sigma[0];
+    const double second = (d[1] - sigma[1] * first) / (sigma[0] * sigma[0]);
+    const double rest = d[2] - sigma[2] * first - 3.0 * sigma[0] * sigma[1] * second;
+    bend->by_mm[0][axis] = first;
+    bend->by_mm[1][axis] = second;
+    bend->by_mm[2][axis] = rest / (sigma[0] * sigma[0] * sigma[0]);
+}
+
+static void spatial_row(const struct program_segment *segment, const struct preimage *w, double xi,
+                        struct stop_row *row, struct stop_bend *bend)
+{
+    struct preimage_at at = {{0}, {0}, {0}}; /* of a spatial segment all components are set */
+    double of[3][4];
+    double mixed[4];
+    evaluate(w, xi, &at);
+    forms(at.value, at.value, of[0]);
+    forms(at.value, at.first, of[1]);
+    forms(at.first, at.first, of[2]);
+    forms(at.value, at.second, mixed);
+    for (int k = 0; k < 4; k++) {
+        of[1][k] *= 2.0;
+        of[2][k] = 2.0 * (of[2][k] + mixed[k]);
+    }
+    const double sigma[3] = {of[0][3], of[1][3], of[2][3]};
+    row->tangent[0] = row->tangent[1] = row->slope = row->curvature = 0.0;
+    for (uint32_t axis = 0; axis < PROGRAM_SPACE; axis++) {
+        const double d[3] = {of[0][axis], of[1][axis], of[2][axis]};
+        by_arc_length(d, sigma, axis, bend);
+        row->curvature = hypot(row->curvature, bend->by_mm[1][axis]);
+    }
+    for (uint32_t i = 0; i < program_extra_axes(segment->axis_count); i++) {
+        double d[3];
+        extra_at(&segment->extra[i], xi, d);
+        by_arc_length(d, sigma, PROGRAM_SPACE + i, bend);
+    }
+}
+
+/* Arc length from the start of the segment: the integral of |A|^2. */
+static double way_to(const struct preimage *w, double xi)
 {
     double b[5] = {0};
-    for (int k = 0; k < 2; k++) {
-        b[0] += w[0][k] * w[0][k];
-        b[1] += w[0][k] * w[1][k];
-        b[2] += (2.0 * w[1][k] * w[1][k] + w[0][k] * w[2][k]) / 3.0;
-        b[3] += w[1][k] * w[2][k];
-        b[4] += w[2][k] * w[2][k];
+    for (int k = 0; k < w->count; k++) {
+        b[0] += w->a[0][k] * w->a[0][k];
+        b[1] += w->a[0][k] * w->a[1][k];
+        b[2] += (2.0 * w->a[1][k] * w->a[1][k] + w->a[0][k] * w->a[2][k]) / 3.0;
+        b[3] += w->a[1][k] * w->a[2][k];
+        b[4] += w->a[2][k] * w->a[2][k];
     }
     /* in powers of xi */
     double c1 = 4.0 * (b[1] - b[0]);
@@ -155,23 +265,88 @@ static double feed_here(const struct stop_limits *limits, const struct stop_row 
     return most < feed ? most : feed;
 }
 
-void stop_rows(const struct program *p, const struct stop_limits *limits, struct stop_row *rows)
+/* --- Bounds of a stretch --- */
+
+static double greater(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static double lesser(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static void stretch_begin(struct stop_stretch *stretch)
+{
+    memset(stretch, 0, sizeof *stretch);
+    stretch->feed_mm_s = HUGE_VAL;
+}
+
+static void stretch_add_bend(struct stop_bend *most, const struct stop_bend *bend, uint32_t axes)
+{
+    for (int order = 0; order < 3; order++) {
+        for (uint32_t k = 0; k < axes; k++) {
+            most->by_mm[order][k] = greater(most->by_mm[order][k], fabs(bend->by_mm[order][k]));
+        }
+    }
+}
+
+static void stretch_add_row(struct stop_stretch *stretch, const struct stop_row *rows,
+                            const struct stop_bend *bends, uint32_t at, uint32_t axes)
+{
+    const struct stop_row *row = &rows[at];
+    stretch->feed_mm_s = lesser(stretch->feed_mm_s, row->feed_mm_s);
+    if (axes != PROGRAM_PLANE) {
+        stretch_add_bend(&stretch->bend, &bends[at], axes);
+        return;
+    }
+    stretch->curvature = greater(stretch->curvature, fabs(row->curvature));
+    stretch->slope = greater(stretch->slope, fabs(row->slope));
+    for (uint32_t k = 0; k < PROGRAM_PLANE; k++) {
+        stretch->tangent[k] = greater(stretch->tangent[k], fabs(row->tangent[k]));
+    }
+}
+
+static void stretch_add(struct stop_stretch *stretch, const struct stop_stretch *other,
+                        uint32_t axes)
+{
+    stretch->feed_mm_s = lesser(stretch->feed_mm_s, other->feed_mm_s);
+    if (axes != PROGRAM_PLANE) {
+        stretch_add_bend(&stretch->bend, &other->bend, axes);
+        return;
+    }
+    stretch->curvature = greater(stretch->curvature, other->curvature);
+    stretch->slope = greater(stretch->slope, other->slope);
+    for (uint32_t k = 0; k < PROGRAM_PLANE; k++) {
+        stretch->tangent[k] = greater(stretch->tangent[k], other->tangent[k]);
+    }
+}
+
+void stop_rows(const struct program *p, const struct stop_limits *limits,
+               const struct stop_path *path)
 {
     for (uint32_t i = 0; i < p->header.segment_count; i++) {
         struct program_segment segment;
-        double w[3][2];
+        struct preimage w;
         program_segment_get(p, i, &segment);
-        for (int k = 0; k < 3; k++) {
-            w[k][0] = ldexp((double)segment.u_q44[k], -44);
-            w[k][1] = ldexp((double)segment.v_q44[k], -44);
-        }
+        read_preimage(&segment, &w);
         for (uint32_t k = 0; k < STOP_ROWS; k++) {
-            struct stop_row *row = &rows[i * STOP_ROWS + k];
+            const uint32_t at = i * STOP_ROWS + k;
+            struct stop_row *row = &path->rows[at];
             double xi = (double)k / (STOP_ROWS - 1u);
-            segment_row((const double (*)[2])w, xi, row);
-            row->s_mm =
-                ldexp((double)segment.start_q40_mm, -40) + way_to((const double (*)[2])w, xi);
+            if (segment.axis_count == PROGRAM_PLANE) {
+                planar_row(&w, xi, row);
+            } else {
+                spatial_row(&segment, &w, xi, row, &path->bends[at]);
+            }
+            row->s_mm = ldexp((double)segment.start_q40_mm, -40) + way_to(&w, xi);
             row->feed_mm_s = feed_here(limits, row);
+        }
+        stretch_begin(&path->segments[i]);
+        for (uint32_t k = 0; k < STOP_ROWS; k++) {
+            stretch_add_row(&path->segments[i], path->rows, path->bends, i * STOP_ROWS + k,
+                            segment.axis_count);
         }
     }
 }
@@ -194,23 +369,18 @@ static uint32_t row_at(const struct search *search, double s)
 
 /* --- What a motion asks of the limits --- */
 
-static double greater(double a, double b)
-{
-    return a > b ? a : b;
-}
-
 static double between(double a, double b, double share)
 {
     return a + (b - a) * share;
 }
 
-/* The motion of both axes: velocity, acceleration, jerk by axis. */
+/* The motion of the axes: velocity, acceleration, jerk by axis. */
 struct axes {
-    double velocity[2], acceleration[2], jerk[2];
+    double velocity[PROGRAM_AXES], acceleration[PROGRAM_AXES], jerk[PROGRAM_AXES];
 };
 
-static void axes_of(const struct stop_row *low, double share, const struct state *at, double j,
-                    struct axes *out)
+static void planar_axes_of(const struct stop_row *low, double share, const struct state *at,
+                           double j, struct axes *out)
 {
     const struct stop_row *high = low + 1;
     double kappa = between(low->curvature, high->curvature, share);
@@ -228,6 +398,30 @@ static void axes_of(const struct stop_row *low, double share, const struct state
     out->jerk[1] = jerk_along * ty + jerk_across * tx;
 }
 
+static void spatial_axes_of(const struct search *search, const struct stop_row *low, double share,
+                            const struct state *at, double j, struct axes *out)
+{
+    const struct stop_bend *bend = &search->bends[low - search->rows];
+    for (uint32_t k = 0; k < search->axis_count; k++) {
+        double first = between(bend[0].by_mm[0][k], bend[1].by_mm[0][k], share);
+        double second = between(bend[0].by_mm[1][k], bend[1].by_mm[1][k], share);
+        double third = between(bend[0].by_mm[2][k], bend[1].by_mm[2][k], share);
+        out->velocity[k] = at->v * first;
+        out->acceleration[k] = at->a * first + at->v * at->v * second;
+        out->jerk[k] = j * first + at->v * (3.0 * at->a * second + at->v * at->v * third);
+    }
+}
+
+static void axes_of(const struct search *search, const struct stop_row *low, double share,
+                    const struct state *at, double j, struct axes *out)
+{
+    if (search->axis_count == PROGRAM_PLANE) {
+        planar_axes_of(low, share, at, j, out);
+    } else {
+        spatial_axes_of(search, low, share, at, j, out);
+    }
+}
+
 static double share_of(const struct stop_row *low, double s)
 {
     double way = low[1].s_mm - low->s_mm;
@@ -236,15 +430,15 @@ static double share_of(const struct stop_row *low, double s)
 }
 
 /* The greatest share of a limit that the motion uses. */
-static double strain(const struct inverse *inverse, const struct stop_row *low,
-                     const struct state *at, double j)
+static double strain(const struct search *search, const struct inverse *inverse,
+                     const struct stop_row *low, const struct state *at, double j)
 {
     struct axes axes;
     double share = share_of(low, at->s);
-    axes_of(low, share, at, j, &axes);
+    axes_of(search, low, share, at, j, &axes);
     double most = at->v * inverse->feed / between(low->feed_mm_s, low[1].feed_mm_s, share);
     most = low->feed_mm_s < NEVER_S * NEVER_S && low[1].feed_mm_s < NEVER_S * NEVER_S ? most : 0.0;
-    for (int k = 0; k < 2; k++) {
+    for (uint32_t k = 0; k < search->axis_count; k++) {
         most = greater(most, fabs(axes.velocity[k]) * inverse->velocity[k]);
         most = greater(most, fabs(axes.acceleration[k]) * inverse->axis_acceleration[k]);
         most = greater(most, fabs(axes.jerk[k]) * inverse->axis_jerk[k]);
@@ -261,8 +455,8 @@ static int brake_begin(struct path_brake *brake, const struct state *from,
                        const struct path_brake_numbers *numbers, double period_s)
 {
     const struct path_state state = {
-        .speed_q56 = (int64_t)ldexp(from->v * period_s, 56),
-        .acceleration_q56 = (int64_t)ldexp(from->a * period_s * period_s, 56),
+        .speed_q56 = (int64_t)(from->v * period_s * 0x1p56),
+        .acceleration_q56 = (int64_t)(from->a * period_s * period_s * 0x1p56),
     };
     return path_brake_begin(brake, &state, numbers);
 }
@@ -286,9 +480,9 @@ static double brake_time(const struct state *from, const struct path_brake_numbe
 static struct state state_of(const struct path_brake *brake, double from_mm, double period_s)
 {
     struct state out = {
-        .s = from_mm + ldexp((double)brake->at.arc_length_q40_mm, -40),
-        .v = ldexp((double)brake->at.speed_q56, -56) / period_s,
-        .a = ldexp((double)brake->at.acceleration_q56, -56) / (period_s * period_s),
+        .s = from_mm + (double)brake->at.arc_length_q40_mm * 0x1p-40,
+        .v = (double)brake->at.speed_q56 * 0x1p-56 / period_s,
+        .a = (double)brake->at.acceleration_q56 * 0x1p-56 / (period_s * period_s),
     };
     return out;
 }
@@ -303,6 +497,14 @@ static struct state moved(const struct state *from, double j, double t)
     return to;
 }
 
+/* The last row at or before an arc length, from an earlier one on. */
+static void pass_rows(const struct search *search, double s, uint32_t *row)
+{
+    while (*row + 2u < search->row_count && search->rows[*row + 1u].s_mm <= s) {
+        (*row)++;
+    }
+}
+
 /* 1 while one tick keeps the limits, looked at in `parts` places. */
 static int tick_keeps(const struct search *search, const struct inverse *inverse,
                       const struct state *from, const struct state *to, uint32_t *row, int parts)
@@ -310,62 +512,100 @@ static int tick_keeps(const struct search *search, const struct inverse *inverse
     double j = (to->a - from->a) / search->period_s;
     for (int k = 0; k < parts; k++) {
         struct state at = moved(from, j, search->period_s * k / parts);
-        while (*row + 2u < search->row_count && search->rows[*row + 1u].s_mm <= at.s) {
-            (*row)++;
-        }
-        if (strain(inverse, &search->rows[*row], &at, j) > 1.0) {
+        pass_rows(search, at.s, row);
+        if (strain(search, inverse, &search->rows[*row], &at, j) > 1.0) {
             return 0;
         }
     }
     return 1;
 }
 
-/* Upper bounds of what a brake does and meets on its whole way. */
+/* Upper bounds of what a brake does, and of the path that it takes. */
 struct extent {
     double speed, acceleration, jerk;
-    double curvature, slope; /* of the path */
-    double feed_mm_s;        /* least feed of the path */
+    struct stop_stretch path;
 };
 
 /* Fills the bounds of the path, from a row up to an arc length. */
 static void extend(const struct search *search, uint32_t row, double to_mm, struct extent *extent)
 {
-    const struct stop_row *at = &search->rows[row];
-    const struct stop_row *last = &search->rows[search->row_count - 1u];
-    double curvature = fabs(at->curvature);
-    double slope = fabs(at->slope);
-    double feed_mm_s = at->feed_mm_s;
+    struct stop_stretch *path = &extent->path;
+    const uint32_t last = search->row_count - 1u;
+    const uint32_t axes = search->axis_count;
+    stretch_begin(path);
+    stretch_add_row(path, search->rows, search->bends, row, axes);
     do {
-        at++;
-        curvature = greater(curvature, fabs(at->curvature));
-        slope = greater(slope, fabs(at->slope));
-        feed_mm_s = at->feed_mm_s < feed_mm_s ? at->feed_mm_s : feed_mm_s;
-    } while (at < last && at->s_mm <= to_mm);
-    extent->curvature = curvature;
-    extent->slope = slope;
-    extent->feed_mm_s = feed_mm_s;
+        row++;
+        while (row % STOP_ROWS == 0u && row + STOP_ROWS <= last &&
+               search->rows[row + STOP_ROWS - 1u].s_mm <= to_mm) {
+            stretch_add(path, &search->segments[row / STOP_ROWS], axes);
+            row += STOP_ROWS;
+        }
+        stretch_add_row(path, search->rows, search->bends, row, axes);
+    } while (row < last && search->rows[row].s_mm <= to_mm);
+}
+
+/* Share of the limits that axes use at most with these bounds. */
+static double axis_share(const struct inverse *inverse, uint32_t k, double velocity,
+                         double acceleration, double jerk)
+{
+    double most = velocity * inverse->velocity[k];
+    most = greater(most, acceleration * inverse->axis_acceleration[k]);
+    most = greater(most, jerk * inverse->axis_jerk[k]);
+    return greater(most, (velocity + inverse->time_constant[k] * acceleration) * inverse->reach[k]);
+}
+
+/* Greatest component along an axis, for an axis that the tangent has at most this component of. */
+static double component(double along, double across, double tangent)
+{
+    return fmin(hypot(along, across), along * tangent + across);
+}
+
+static double planar_share(const struct inverse *inverse, const struct extent *extent)
+{
+    const struct stop_stretch *path = &extent->path;
+    const double normal = path->curvature * extent->speed * extent->speed;
+    const double bent = path->slope * extent->speed * extent->speed;
+    const double jerk_along = extent->jerk + path->curvature * normal * extent->speed;
+    const double jerk_across =
+        (3.0 * path->curvature * extent->acceleration + bent) * extent->speed;
+    double most = 0.0;
+    for (uint32_t k = 0; k < PROGRAM_PLANE; k++) {
+        const double tangent = path->tangent[k];
+        const double acceleration = component(extent->acceleration, normal, tangent);
+        const double jerk = component(jerk_along, jerk_across, tangent);
+        most = greater(most, axis_share(inverse, k, extent->speed * tangent, acceleration, jerk));
+    }
+    return most;
+}
+
+static double spatial_share(const struct search *search, const struct inverse *inverse,
+                            const struct extent *extent)
+{
+    const double v = extent->speed;
+    double most = 0.0;
+    for (uint32_t k = 0; k < search->axis_count; k++) {
+        const double first = extent->path.bend.by_mm[0][k];
+        const double second = extent->path.bend.by_mm[1][k];
+        const double third = extent->path.bend.by_mm[2][k];
+        const double acceleration = extent->acceleration * first + v * v * second;
+        const double jerk =
+            extent->jerk * first + v * (3.0 * extent->acceleration * second + v * v * third);
+        most = greater(most, axis_share(inverse, k, v * first, acceleration, jerk));
+    }
+    return most;
 }
 
 /* 1: no limit is passed anywhere within these bounds. */
-static int extent_keeps(const struct inverse *inverse, const struct extent *extent)
+static int extent_keeps(const struct search *search, const struct inverse *inverse,
+                        const struct extent *extent)
 {
-    const double normal = extent->curvature * extent->speed * extent->speed;
-    const double bent = extent->slope * extent->speed * extent->speed;
-    const double acceleration = hypot(extent->acceleration, normal);
-    const double jerk =
-        hypot(extent->jerk + extent->curvature * normal * extent->speed,
-              (3.0 * extent->curvature * extent->acceleration + bent) * extent->speed);
-    double most = extent->speed * inverse->feed / extent->feed_mm_s;
-    for (int k = 0; k < 2; k++) {
-        const double pull = extent->speed + inverse->time_constant[k] * acceleration;
-        most = greater(most, extent->speed * inverse->velocity[k]);
-        most = greater(most, acceleration * inverse->axis_acceleration[k]);
-        most = greater(most, jerk * inverse->axis_jerk[k]);
-        most = greater(most, pull * inverse->reach[k]);
-    }
-    return most * (1.0 + SPARE_SHARE) <= 1.0;
+    const double along = extent->speed * inverse->feed / extent->path.feed_mm_s;
+    const double axes = search->axis_count == PROGRAM_PLANE
+                            ? planar_share(inverse, extent)
+                            : spatial_share(search, inverse, extent);
+    return greater(along, axes) * (1.0 + SPARE_SHARE) <= 1.0;
 }
-
 /* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`, that begin on the path
  * between a row and an arc length. */
 static void extent_of(const struct search *search, const struct path_brake_numbers *numbers,
@@ -394,7 +634,23 @@ static int surely_keeps(const struct search *search, const struct inverse *inver
     struct extent extent;
     most.a = greater(most.a, 0.0);
     extent_of(search, &brake->numbers, &most, fall, row, &extent);
-    return extent_keeps(inverse, &extent);
+    return extent_keeps(search, inverse, &extent);
+}
+
+/* 1: some ticks of a brake, at[0 ... count], surely keep the limits, by bounds of all of them; 0: that is open. */
+static int ticks_surely_keep(const struct search *search, const struct inverse *inverse,
+                             const struct state *at, int count, uint32_t row)
+{
+    const double period_s = search->period_s;
+    struct extent extent = {.speed = 0.0, .acceleration = fabs(at[0].a), .jerk = 0.0};
+    for (int k = 0; k < count; k++) {
+        const double rise = greater(greater(at[k].a, at[k + 1].a), 0.0);
+        extent.speed = greater(extent.speed, at[k].v + rise * period_s);
+        extent.acceleration = greater(extent.acceleration, fabs(at[k + 1].a));
+        extent.jerk = greater(extent.jerk, fabs(at[k + 1].a - at[k].a) / period_s);
+    }
+    extend(search, row, at[count].s, &extent);
+    return extent_keeps(search, inverse, &extent);
 }
 
 /* 1 while the brake keeps the limits all the way. */
@@ -402,23 +658,35 @@ static int brake_keeps(const struct search *search, const struct inverse *invers
                        const struct path_brake *brake, double from_mm, uint32_t row, double step_s)
 {
     struct path_brake tick = *brake;
-    struct state before = state_of(&tick, from_mm, search->period_s);
-    int parts = (int)ceil(search->period_s / step_s);
-    int ticks = (int)greater(step_s / search->period_s, 1.0);
-    for (int k = 0; !path_brake_rests(&tick); k++) {
-        if (k % SURE_EACH == 0 && surely_keeps(search, inverse, &tick, from_mm, row)) {
+    struct state at[SURE_EACH + 1];
+    const int parts = (int)ceil(search->period_s / step_s);
+    const int each = (int)greater(step_s / search->period_s, 1.0);
+    int done = 0;
+    at[0] = state_of(&tick, from_mm, search->period_s);
+    while (!path_brake_rests(&tick)) {
+        if (surely_keeps(search, inverse, &tick, from_mm, row)) {
             return 1;
         }
-        if (k == 0) {
-            path_brake_first(&tick);
-        } else {
-            path_brake_step(&tick);
+        int count = 0;
+        while (count < SURE_EACH && !path_brake_rests(&tick)) {
+            if (done + count == 0) {
+                path_brake_first(&tick);
+            } else {
+                path_brake_step(&tick);
+            }
+            count++;
+            at[count] = state_of(&tick, from_mm, search->period_s);
         }
-        struct state at = state_of(&tick, from_mm, search->period_s);
-        if (k % ticks == 0 && !tick_keeps(search, inverse, &before, &at, &row, parts)) {
-            return 0;
+        const int surely = ticks_surely_keep(search, inverse, at, count, row);
+        for (int k = 0; k < count && !surely; k++) {
+            if ((done + k) % each == 0 &&
+                !tick_keeps(search, inverse, &at[k], &at[k + 1], &row, parts)) {
+                return 0;
+            }
         }
-        before = at;
+        done += count;
+        at[0] = at[count];
+        pass_rows(search, at[0].s, &row);
     }
     return 1;
 }
@@ -536,7 +804,7 @@ static void piece_look(const struct search *search, const struct program *p, uin
     program_piece_get(p, i, &from);
     piece->seconds = piece_powers(&from, c);
     piece->suspect = 0;
-    piece->suspect_rates = 0;
+    piece->suspect_override = (struct overridden){0, 0, -1};
     piece->left_s = left_s;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
@@ -609,8 +877,8 @@ static int has_room(const struct search *search, const struct state *at,
                     const struct path_brake_numbers *numbers)
 {
     const struct path_state state = {
-        .speed_q56 = (int64_t)ldexp(at->v * search->period_s, 56),
-        .acceleration_q56 = (int64_t)ldexp(at->a * search->period_s * search->period_s, 56),
+        .speed_q56 = (int64_t)(at->v * search->period_s * 0x1p56),
+        .acceleration_q56 = (int64_t)(at->a * search->period_s * search->period_s * 0x1p56),
     };
     return path_brake_fits(&state, numbers, (int64_t)ldexp(search->length_mm - at->s, 40));
 }
@@ -650,22 +918,6 @@ static int times_of(const struct search *search, const struct piece *piece,
     return 1;
 }
 
-/* Whether these brakes keep the limits; the instant that broke one last is looked at first. */
-static int all_keep(const struct search *search, struct piece *piece, const struct times *times,
-                    const struct path_brake_numbers *numbers)
-{
-    for (uint32_t n = 0; n < piece->count; n++) {
-        uint32_t i = (n + piece->suspect) % piece->count;
-        struct path_brake brake;
-        if (times->brakes[i] && brake_begin(&brake, &piece->at[i], numbers, search->period_s) &&
-            !brake_keeps(search, &search->inverse, &brake, piece->at[i].s, piece->row[i], STEP_S)) {
-            piece->suspect = i;
-            return 0;
-        }
-    }
-    return 1;
-}
-
 /* Whether the state has so little speed left, for its deceleration, that no brake need fit: the plan may go on. */
 static int may_wait(const struct search *search, const struct state *at,
                     const struct path_brake_numbers *numbers)
@@ -700,6 +952,27 @@ static void piece_extent(const struct search *search, const struct piece *piece,
     extent_of(search, numbers, &most, a + change, piece->row[0], extent);
 }
 
+/* Whether these brakes keep the limits; the instant that broke one last is looked at first. */
+static int all_keep(const struct search *search, struct piece *piece, const struct times *times,
+                    const struct path_brake_numbers *numbers)
+{
+    struct extent extent;
+    piece_extent(search, piece, numbers, &extent);
+    if (extent_keeps(search, &search->inverse, &extent)) {
+        return 1;
+    }
+    for (uint32_t n = 0; n < piece->count; n++) {
+        uint32_t i = (n + piece->suspect) % piece->count;
+        struct path_brake brake;
+        if (times->brakes[i] && brake_begin(&brake, &piece->at[i], numbers, search->period_s) &&
+            !brake_keeps(search, &search->inverse, &brake, piece->at[i].s, piece->row[i], STEP_S)) {
+            piece->suspect = i;
+            return 0;
+        }
+    }
+    return 1;
+}
+
 /* What a brake has to keep; `surely`: it does. */
 struct keeping {
     const struct inverse *inverse;
@@ -718,42 +991,57 @@ static int state_keeps(const struct search *search, const struct keeping *keepin
     return keeping->surely || brake_keeps(search, keeping->inverse, &brake, at->s, row, FINE_S);
 }
 
-/* The same limits at other rates of program time, also while the rate changes. */
-static int rates_keep(const struct search *search, struct piece *piece,
-                      const struct path_brake_numbers *numbers, const struct extent *extent)
+/* Feed overrides at which brakes are followed, and the same shares of the piece's greatest. */
+static const double SHARES[] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
+                                488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
+                                0.5,         0.25,        0.1};
+#define SHARE_COUNT ((uint32_t)(sizeof SHARES / sizeof SHARES[0]))
+
+/* Feed override number r = 0 ... 2 SHARE_COUNT - 1 of a piece. */
+static double override_at(const struct piece *piece, uint32_t r)
 {
-    static const double rates[] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
-                                   488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
-                                   0.5,         0.25,        0.1};
-    const size_t count = sizeof rates / sizeof rates[0];
-    const struct inverse *inverse = &search->at_any_rate;
-    const struct keeping keeping = {inverse, extent_keeps(inverse, extent)};
-    double little = search->rise_is_cut ? 0.25 * ldexp((double)numbers->deceleration_q56, -56) /
-                                              (search->period_s * search->period_s)
-                                        : HUGE_VAL;
+    return r < SHARE_COUNT ? SHARES[r] : piece->factor * SHARES[r - SHARE_COUNT];
+}
+
+/* Whether a brake out of this state fits and keeps the limits, or need not fit; 1 for a state that there is not. */
+static int overridden_keeps(const struct search *search, const struct piece *piece,
+                            const struct keeping *keeping, const struct overridden *which,
+                            const struct path_brake_numbers *numbers)
+{
+    const double rate = override_at(piece, which->rate);
+    if ((which->rate >= SHARE_COUNT && rate <= 1.0) ||
+        (which->slope > 0 && rate >= piece->factor)) {
+        return 1;
+    }
+    const double deceleration =
+        (double)numbers->deceleration_q56 * 0x1p-56 / (search->period_s * search->period_s);
+    const double little = search->rise_is_cut ? 0.25 * deceleration : HUGE_VAL;
+    struct state from = piece->at[which->instant];
+    const double change = slope_at(piece, rate, which->slope) * from.v;
+    const double more = which->slope < 0 ? -change : which->slope > 0 ? fmin(change, little) : 0.0;
+    const uint32_t row = piece->row[which->instant];
+    from.a = rate * rate * from.a + more;
+    from.v *= rate;
+    return (!keeping->surely &&
+            strain(search, keeping->inverse, &search->rows[row], &from, 0.0) > 1.0) ||
+           state_keeps(search, keeping, &from, row, numbers);
+}
+
+/* The same limits at other feed overrides, also while the override changes. */
+static int overrides_keep(const struct search *search, struct piece *piece,
+                          const struct keeping *keeping, const struct path_brake_numbers *numbers)
+{
+    struct overridden which = piece->suspect_override;
     for (uint32_t n = 0; n < piece->count; n++) {
-        uint32_t i = (n + piece->suspect_rates) % piece->count;
-        for (size_t r = 0; r < 2 * count; r++) {
-            double rate = r < count ? rates[r] : piece->factor * rates[r - count];
-            if (r >= count && rate <= 1.0) {
-                break;
-            }
-            for (int slope = -1; slope <= 1; slope++) {
-                struct state from = piece->at[i];
-                double change = slope_at(piece, rate, slope) * from.v;
-                from.a = rate * rate * from.a + (slope < 0   ? -change
-                                                 : slope > 0 ? fmin(change, little)
-                                                             : 0.0);
-                from.v *= rate;
-                int possible = slope <= 0 || rate < piece->factor;
-                const struct stop_row *row = &search->rows[piece->row[i]];
-                possible = possible && (keeping.surely || strain(inverse, row, &from, 0.0) <= 1.0);
-                if (possible && !state_keeps(search, &keeping, &from, piece->row[i], numbers)) {
-                    piece->suspect_rates = i;
+        for (which.rate = 0; which.rate < 2u * SHARE_COUNT; which.rate++) {
+            for (which.slope = -1; which.slope <= 1; which.slope++) {
+                if (!overridden_keeps(search, piece, keeping, &which, numbers)) {
+                    piece->suspect_override = which;
                     return 0;
                 }
             }
         }
+        which.instant = which.instant + 1u < piece->count ? which.instant + 1u : 0u;
     }
     return 1;
 }
@@ -762,7 +1050,8 @@ static int rates_keep(const struct search *search, struct piece *piece,
 static int close_keep(const struct search *search, struct piece *close,
                       const struct path_brake_numbers *numbers, const struct extent *extent)
 {
-    const struct keeping keeping = {&search->inverse, extent_keeps(&search->inverse, extent)};
+    const struct keeping keeping = {&search->inverse,
+                                    extent_keeps(search, &search->inverse, extent)};
     for (uint32_t n = 0; n < close->count; n++) {
         uint32_t i = (n + close->suspect) % close->count;
         if (!state_keeps(search, &keeping, &close->at[i], close->row[i], numbers)) {
@@ -829,16 +1118,26 @@ struct choice {
     double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
+/* Whether a brake keeps the limits in the state in which other codes broke one last. Most codes that break one do so there. */
+static int suspect_keeps(const struct search *search, const struct piece *piece,
+                         const struct path_brake_numbers *numbers)
+{
+    const struct keeping keeping = {&search->at_any_rate, 0};
+    return overridden_keeps(search, piece, &keeping, &piece->suspect_override, numbers);
+}
+
 static int strictly(const struct search *search, struct piece *piece, const int codes[3])
 {
+    const struct inverse *inverse = &search->at_any_rate;
     struct path_brake_numbers numbers;
     struct extent extent;
-    if (!numbers_of(search, codes, &numbers)) {
+    if (!numbers_of(search, codes, &numbers) || !suspect_keeps(search, piece, &numbers)) {
         return 0;
     }
     piece_extent(search, piece, &numbers, &extent);
+    const struct keeping keeping = {inverse, extent_keeps(search, inverse, &extent)};
     return close_keep(search, piece->close, &numbers, &extent) &&
-           rates_keep(search, piece, &numbers, &extent) && brakes_keep(search, piece, codes);
+           overrides_keep(search, piece, &keeping, &numbers) && brakes_keep(search, piece, codes);
 }
 
 /* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
@@ -850,7 +1149,8 @@ static int better(const struct search *search, struct piece *piece, const int co
     if (!within(piece, codes) || !numbers_of(search, codes, &numbers)) {
         return 0;
     }
-    if (!times_of(search, piece, &numbers, after_s, &times) || times.cost_s >= best->cost_s ||
+    if ((strict && !suspect_keeps(search, piece, &numbers)) ||
+        !times_of(search, piece, &numbers, after_s, &times) || times.cost_s >= best->cost_s ||
         !all_keep(search, piece, &times, &numbers) || (strict && !strictly(search, piece, codes))) {
         return 0;
     }
@@ -971,10 +1271,10 @@ static void search_piece(const struct search *search, struct piece *piece, const
 
 /* --- All of it --- */
 
-static void invert(struct inverse *inverse, const struct stop_limits *limits)
+static void invert(struct inverse *inverse, const struct stop_limits *limits, uint32_t axis_count)
 {
     inverse->feed = 1.0 - FEED_ROUNDING;
-    for (int k = 0; k < 2; k++) {
+    for (uint32_t k = 0; k < axis_count; k++) {
         inverse->velocity[k] = over(limits->axis_velocity[k]);
         inverse->axis_acceleration[k] = over(limits->axis_acceleration[k]);
         inverse->axis_jerk[k] = over(limits->axis_jerk[k]);
@@ -984,25 +1284,30 @@ static void invert(struct inverse *inverse, const struct stop_limits *limits)
 }
 
 static void begin(struct search *search, const struct program *p, const struct stop_limits *limits,
-                  const struct stop_row *rows)
+                  const struct stop_path *path)
 {
-    search->rows = rows;
+    search->axis_count = p->header.axis_count;
+    search->rows = path->rows;
+    search->bends = path->bends;
+    search->segments = path->segments;
     search->row_count = p->header.segment_count * STOP_ROWS;
     search->period_us = p->header.period_us;
     search->period_s = 1e-6 * p->header.period_us;
     search->length_mm = ldexp((double)p->header.length_q40_mm, -40);
     search->rise_is_cut = limits->rise_is_cut;
     search->deceleration = limits->acceleration;
-    invert(&search->inverse, limits);
+    invert(&search->inverse, limits, search->axis_count);
     search->at_any_rate = search->inverse;
     search->at_any_rate.feed /= 1.0 + FASTER;
-    for (int k = 0; k < 2; k++) {
+    for (uint32_t k = 0; k < search->axis_count; k++) {
         search->at_any_rate.velocity[k] /= 1.0 + FASTER;
         search->at_any_rate.reach[k] *= limits->reach_at_pace != 0u ? 0.0 : 1.0;
     }
     for (int k = 0; k < 3; k++) {
         const double *axis = k == 1 ? limits->axis_acceleration : limits->axis_jerk;
-        double limit = fmin(k == 1 ? limits->acceleration : limits->jerk, hypot(axis[0], axis[1]));
+        double all = hypot(axis[0], axis[1]);
+        all = search->axis_count > PROGRAM_PLANE ? hypot(all, axis[2]) : all;
+        double limit = fmin(k == 1 ? limits->acceleration : limits->jerk, all);
         search->most[k] = 0;
         for (int c = 1; c <= GREATEST_CODE; c++) {
             search->most[k] = number_of(k, c) <= limit ? c : search->most[k];
@@ -1055,14 +1360,14 @@ static void choose(const struct search *search, struct piece *piece, const int w
 }
 
 void stop_search(const struct program *p, const struct stop_limits *limits,
-                 const struct stop_row *rows, struct stop_found *found)
+                 const struct stop_path *path, struct stop_found *found)
 {
     struct search search;
     struct piece piece;
     struct piece close;
     double after_s = 0.0;
     double left_s = 0.0;
-    begin(&search, p, limits, rows);
+    begin(&search, p, limits, path);
     int warm[3] = {search.most[0], search.most[1], search.most[2]};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
@@ -1094,10 +1399,10 @@ static void most_of(double *most, double value)
 }
 
 void stop_used(const struct program *p, const struct stop_limits *limits,
-               const struct stop_row *rows, struct stop_limits *used)
+               const struct stop_path *path, struct stop_limits *used)
 {
     struct search search;
-    begin(&search, p, limits, rows);
+    begin(&search, p, limits, path);
     memset(used, 0, sizeof *used);
     for (uint32_t i = 0; i < p->header.piece_count; i++) {
         struct program_piece from;
@@ -1110,14 +1415,14 @@ void stop_used(const struct program *p, const struct stop_limits *limits,
             struct state at = {piece_value(c, u, 0), piece_value(c, u, 1) / seconds,
                                piece_value(c, u, 2) / (seconds * seconds)};
             double j = piece_value(c, u, 3) / (seconds * seconds * seconds);
-            const struct stop_row *row = &rows[row_at(&search, at.s)];
+            const struct stop_row *row = &search.rows[row_at(&search, at.s)];
             struct axes axes;
-            axes_of(row, share_of(row, at.s), &at, j, &axes);
+            axes_of(&search, row, share_of(row, at.s), &at, j, &axes);
             most_of(&used->feed, at.v);
             most_of(&used->acceleration, at.a);
             most_of(&used->jerk, j);
             most_of(&used->centripetal, row->curvature * at.v * at.v);
-            for (int axis = 0; axis < 2; axis++) {
+            for (uint32_t axis = 0; axis < search.axis_count; axis++) {
                 most_of(&used->axis_velocity[axis], axes.velocity[axis]);
                 most_of(&used->axis_acceleration[axis], axes.acceleration[axis]);
                 most_of(&used->axis_jerk[axis], axes.jerk[axis]);

@@ -20,10 +20,31 @@
 /* The path at an arc length, ascending; two rows with one arc length where segments meet. */
 struct stop_row {
     double s_mm;
+    double tangent[2]; /* of a planar program */
+    double curvature;  /* 1/mm; of a spatial program without sign */
+    double slope;      /* of the curvature, 1/mm^2; of a planar program */
+    double feed_mm_s;  /* greatest feed here: caps and centripetal acceleration */
+};
+
+/* How the axes of a spatial program move there: first to third derivative by arc length. */
+struct stop_bend {
+    double by_mm[3][PROGRAM_AXES];
+};
+
+/* The greatest magnitudes on a stretch of the path, and its least feed. */
+struct stop_stretch {
+    double curvature;
+    double slope;
     double tangent[2];
-    double curvature; /* 1/mm */
-    double slope;     /* of the curvature, 1/mm^2 */
-    double feed_mm_s; /* greatest feed here: caps and centripetal acceleration */
+    double feed_mm_s;
+    struct stop_bend bend;
+};
+
+/* The path of a program: segment_count * STOP_ROWS rows and bends. */
+struct stop_path {
+    struct stop_row *rows;
+    struct stop_bend *bends;       /* of a spatial program; not looked at of a planar one */
+    struct stop_stretch *segments; /* one for each, so that bounds of a long stretch are quick */
 };
 
 /* A greatest feed on a stretch of the path. */
@@ -39,11 +60,12 @@ struct stop_limits {
     double acceleration; /* mm/s^2, */
     double jerk;         /* mm/s^3 */
     double centripetal;
-    double axis_velocity[2];
-    double axis_acceleration[2];
-    double axis_jerk[2];
-    double reach[2]; /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
-    double time_constant[2]; /* s */
+    double axis_velocity[PROGRAM_AXES]; /* of the program's path axes */
+    double axis_acceleration[PROGRAM_AXES];
+    double axis_jerk[PROGRAM_AXES];
+    double reach
+        [PROGRAM_AXES]; /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
+    double time_constant[PROGRAM_AXES]; /* s */
     const struct stop_cap *caps;
     uint32_t cap_count;
     uint32_t
@@ -61,17 +83,18 @@ struct stop_found {
     double mean_s;     /* and their mean */
 };
 
-/* Fills segment_count * STOP_ROWS rows; the program has passed program_open. */
-void stop_rows(const struct program *p, const struct stop_limits *limits, struct stop_row *rows);
+/* Fills the path; the program has passed program_open. */
+void stop_rows(const struct program *p, const struct stop_limits *limits,
+               const struct stop_path *path);
 
 /* How far the program itself uses the limits at the rate 1: greatest value of each, limit by limit, in `used`
  * (same fields; caps and time constants as in limits). */
 void stop_used(const struct program *p, const struct stop_limits *limits,
-               const struct stop_row *rows, struct stop_limits *used);
+               const struct stop_path *path, struct stop_limits *used);
 
 /* Searches those of piece_count results that are not known. Linear: about 0.2 ms a piece far from all limits,
  * some 5 ms a piece that uses them. */
 void stop_search(const struct program *p, const struct stop_limits *limits,
-                 const struct stop_row *rows, struct stop_found *found);
+                 const struct stop_path *path, struct stop_found *found);
 
 #endif

@@ -13,11 +13,13 @@
 #define HISTORY       3u
 #define NOISE_MM_S3 20.0 /* of a kernel in third differences at 1 kHz; docs/theory/numerics.md 16 */
 
-/* A motion under commands, with its last setpoints: x, y and arc length in mm. */
+#define ARC PROGRAM_AXES /* behind the axes of a setpoint: its arc length */
+
+/* A motion under commands, with its last setpoints: path axes and arc length in mm. */
 struct course {
     struct feed_override feed;
     struct interpolator interp;
-    double points[HISTORY + 1u][3]; /* the newest first */
+    double points[HISTORY + 1u][PROGRAM_AXES + 1u]; /* the newest first */
     uint32_t count;
     uint32_t brake_ticks; /* of the brake so far; 0: none */
     double begun_with;    /* acceleration along the path when it began */
@@ -44,7 +46,7 @@ static void grow(double *most, double value)
 
 /* --- A tick, beside the limits --- */
 
-static void differences(const struct course *course, int axis, double period_s, double out[3])
+static void differences(const struct course *course, uint32_t axis, double period_s, double out[3])
 {
     double p[HISTORY + 1u];
     for (uint32_t i = 0; i <= HISTORY; i++) {
@@ -58,7 +60,7 @@ static void differences(const struct course *course, int axis, double period_s, 
 static void look_at_axes(const struct course *course, double period_s,
                          const struct stop_limits *limits, struct stop_use *use)
 {
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < course->interp.axis_count; axis++) {
         double d[3];
         differences(course, axis, period_s, d);
         grow(&use->velocity, fabs(d[0]) / limits->axis_velocity[axis]);
@@ -73,7 +75,7 @@ static void look_along(struct course *course, double period_s, const struct stop
                        const struct stop_limits *limits, struct stop_use *use)
 {
     double d[3];
-    differences(course, 2, period_s, d);
+    differences(course, ARC, period_s, d);
     if (course->brake_ticks == 0) {
         course->begun_with = fabs(d[1]);
     } else if (course->brake_ticks > HISTORY) {
@@ -106,9 +108,10 @@ static int step(struct course *course, struct stop_trial *trial)
         return error;
     }
     memmove(course->points[1], course->points[0], HISTORY * sizeof course->points[0]);
-    course->points[0][0] = ldexp((double)point.x_q40_mm, -40);
-    course->points[0][1] = ldexp((double)point.y_q40_mm, -40);
-    course->points[0][2] = ldexp((double)point.arc_length_q40_mm, -40);
+    for (uint32_t axis = 0; axis < course->interp.axis_count; axis++) {
+        course->points[0][axis] = ldexp((double)point.position_q40[axis], -40);
+    }
+    course->points[0][ARC] = ldexp((double)point.arc_length_q40_mm, -40);
     course->count++;
     course->brake_ticks = in_brake(course) || (course->brake_ticks > 0 && at_rest(course))
                               ? course->brake_ticks + 1u

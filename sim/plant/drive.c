@@ -7,10 +7,13 @@ static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
     const double volts_s_rad = c->plant.torque_to_volts * c->pdff.k_pv_nm_s_rad;
     d->pdff.k_pp_rad_s_mm = c->pdff.k_pp_rad_s_mm;
     d->pdff.k_pf_rad_mm = c->pdff.k_pf_rad_mm;
+    /* What the present sample adds to the integral acts in it or not before the next. */
+    const double present =
+        c->integral == DRIVE_INTEGRAL_BACKWARD ? c->pdff.k_iv_per_s * step_s : 0.0;
     d->pdff.step_s = step_s;
-    d->pdff.volts_per_ref = volts_s_rad * (c->pdff.k_vf + c->pdff.k_iv_per_s * step_s);
+    d->pdff.volts_per_ref = volts_s_rad * (c->pdff.k_vf + present);
     d->pdff.volts_per_integral = volts_s_rad * c->pdff.k_iv_per_s;
-    d->pdff.volts_per_speed = volts_s_rad * (1.0 + c->pdff.k_iv_per_s * step_s);
+    d->pdff.volts_per_speed = volts_s_rad * (1.0 + present);
     d->pdff.volts_limit = c->plant.volts_limit;
 }
 
@@ -30,6 +33,7 @@ int drive_init(struct drive *d, const struct drive_config *c)
     d->sample_fraction = 1.0 / (double)d->samples;
     d->samples_per_s = (double)c->loop_rate_hz;
     d->cubic = c->interpolation == DRIVE_CUBIC;
+    d->steps = c->interpolation == DRIVE_NO_INTERPOLATION;
     d->delayed = c->delay_samples != 0;
     d->speed_per_way =
         c->speed == DRIVE_SPEED_EXACT ? 0.0 : d->samples_per_s / c->plant.screw_mm_rad;
@@ -114,6 +118,10 @@ struct drive_command drive_command(struct drive *d, int32_t target_counts)
     c.step_mm = counts * d->mm_per_count * d->sample_fraction;
     c.speed_mm_s = c.step_mm * d->samples_per_s;
     d->target_counts = target_counts;
+    if (d->steps) {
+        c.start_mm = (double)target_counts * d->mm_per_count;
+        c.step_mm = 0.0;
+    }
     if (c.cubic) {
         drive_cubic(d, &c, counts);
     }

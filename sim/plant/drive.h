@@ -6,7 +6,8 @@
  * Use: drive_init, then drive_place (or drive_hold), then for every SYNC j: report
  * drive_position_counts and drive_volts_mv (they are those of the instant of SYNC j), latch the
  * setpoint received since SYNC j-1 and call drive_period with it; the axis is commanded to be there
- * at SYNC j+1, in a straight line from the setpoint before, or along a cubic whose speed has no jumps.
+ * at SYNC j+1, in a straight line from the setpoint before, or along a cubic whose speed has no jumps. A drive without
+ * interpolation commands it at once, at SYNC j.
  *
  * Parking (docs/reference/protocol.md section 3): an axis that has had one target for DRIVE_PARK_PERIODS
  * periods and reads within DRIVE_PARK_INCREMENTS encoder increments of it is put exactly at rest at
@@ -52,8 +53,9 @@ struct drive {
     double samples_per_s;
     uint32_t samples;
     struct drive_state state;
-    bool plain; /* linear interpolation, exact speed, no delay */
+    bool plain; /* no cubic interpolation, exact speed, no delay */
     bool cubic; /* interpolation */
+    bool steps; /* no interpolation */
     bool delayed;
     double speed_per_way; /* rad/s for a mm of difference between two samples; 0: exact speed */
     double
@@ -92,7 +94,8 @@ bool drive_parked(const struct drive *drive);
 
 /* ---- The samples of a period, for callers that compute them themselves (influence.h) ---- */
 
-/* Setpoints of one period, at the beginning of sample i. Linear: start + i * step, at a constant speed.
+/* Setpoints of one period, at the beginning of sample i. Linear: start + i * step, at a constant speed; without
+ * interpolation the step is 0.
  * Cubic: with u = i / samples, start + u (way[0] + u (way[1] + u way[2])). */
 struct drive_command {
     double start_mm;

@@ -68,11 +68,14 @@ int drive_config_check(const struct drive_config *c)
     if (c->plant.time_constant_s * (double)c->loop_rate_hz < 1.0) {
         return DRIVE_ERR_STEP;
     }
-    if (c->interpolation > DRIVE_CUBIC) {
+    if (c->interpolation > DRIVE_NO_INTERPOLATION) {
         return DRIVE_ERR_INTERPOLATION;
     }
     if (c->speed > DRIVE_SPEED_DIFFERENCES || c->delay_samples > 1) {
         return DRIVE_ERR_SENSING;
+    }
+    if (c->integral > DRIVE_INTEGRAL_FORWARD) {
+        return DRIVE_ERR_INTEGRAL;
     }
     return 0;
 }
@@ -94,9 +97,11 @@ const char *drive_error_text(int code)
     case DRIVE_ERR_STEP:
         return "the plant's time constant is shorter than one servo sample";
     case DRIVE_ERR_INTERPOLATION:
-        return "interpolation must be 0 (linear) or 1 (cubic)";
+        return "interpolation must be 0 (linear), 1 (cubic) or 2 (none)";
     case DRIVE_ERR_SENSING:
         return "speed must be 0 (exact) or 1 (differences), delay_samples 0 or 1";
+    case DRIVE_ERR_INTEGRAL:
+        return "integral must be 0 (backward) or 1 (forward)";
     default:
         return "unknown error";
     }

@@ -21,11 +21,16 @@ struct drive_pdff {
     double k_vf;
 };
 
-/* How the drive goes from one setpoint to the next (docs/theory/numerics.md section 13). */
-enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1 };
+/* How the drive goes from one setpoint to the next (docs/theory/numerics.md section 13): in a straight line, along a
+ * cubic, or not at all: the setpoint is the command from the beginning of its period. */
+enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1, DRIVE_NO_INTERPOLATION = 2 };
 
 /* Where the loop has its speed from: the motor itself, or the way of the last servo sample by the encoder. */
 enum drive_speed { DRIVE_SPEED_EXACT = 0, DRIVE_SPEED_DIFFERENCES = 1 };
+
+/* Which errors of the speed the loop's integral counts: those of all samples with the present one (backward Euler), or
+ * without it (forward Euler). */
+enum drive_integral { DRIVE_INTEGRAL_BACKWARD = 0, DRIVE_INTEGRAL_FORWARD = 1 };
 
 struct drive_config {
     struct drive_plant plant;
@@ -37,6 +42,7 @@ struct drive_config {
     uint32_t interpolation;          /* enum drive_interpolation */
     uint32_t speed;                  /* enum drive_speed */
     uint32_t delay_samples;          /* 0 or 1: servo samples from reading the encoder to volts */
+    uint32_t integral;               /* enum drive_integral */
 };
 
 enum drive_error {
@@ -47,6 +53,7 @@ enum drive_error {
     DRIVE_ERR_STEP = -5, /* the time constant is shorter than one servo sample */
     DRIVE_ERR_INTERPOLATION = -6, /* no enum drive_interpolation */
     DRIVE_ERR_SENSING = -7,       /* no enum drive_speed, or a delay of more than one sample */
+    DRIVE_ERR_INTEGRAL = -8,      /* no enum drive_integral */
 };
 
 /* 0, or the first enum drive_error that applies. */

@@ -9,7 +9,7 @@
  * shows: program_open
  * mutant: core/program.c: h->image_size > size || =>
  * mutant: core/program.c: NULL || size < PROGRAM_HEADER_SIZE => NULL || size < 64
- * mutant: core/program.c: (uint64_t)h->segment_count * PROGRAM_SEGMENT_SIZE => h->segment_count * PROGRAM_SEGMENT_SIZE
+ * mutant: core/program.c: (uint64_t)h->segment_count * program_segment_size => h->segment_count * program_segment_size
  */
 #include <stdlib.h>
 
@@ -64,7 +64,13 @@ void harness(void)
         const struct program_header *h = &p.header;
         prove(h->segment_count > 0 && h->piece_count > 0);
         prove(p.size == h->image_size && p.size <= size);
-        prove(p.size == 128 + 72 * (uint64_t)h->segment_count + 104 * (uint64_t)h->piece_count);
+        prove(h->axis_count >= PROGRAM_PLANE && h->axis_count <= PROGRAM_AXES);
+        uint32_t extras = h->axis_count > 3u ? h->axis_count - 3u : 0u;
+        uint32_t segment = program_segment_size(h->axis_count);
+        prove(segment == (h->axis_count == 2u ? 72u : 104u + 38u * extras));
+        prove(h->header_size == 112u + 8u * h->axis_count);
+        prove(p.size == h->header_size + (uint64_t)h->segment_count * segment +
+                            (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE));
         reached();
     }
 }

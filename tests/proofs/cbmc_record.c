@@ -2,7 +2,7 @@
 /*
  * Segments and pieces lie inside the image: every record begins where it has its whole length before the end of an
  * image of up to 256 KiB (a bank of the STM32G474) that program_open accepts, and its readers stay inside the record.
- * (For any size: 128 + 72 i + 72 <= 128 + 72 n as i < n; a line that SAT solvers find hard with 32 bits.)
+ * (For any size: h + s i + s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.)
  *
  * prover: cbmc
  * options: --unwind 40
@@ -10,6 +10,8 @@
  * shows: read_u16 read_u32 read_u64 segment_bytes piece_bytes
  * mutant: core/program.c: b[81u + k] => b[82u + k]
  * mutant: core/program.c: b + 32 + 16 * k => b + 40 + 16 * k
+ * mutant: core/program.c: b + 32 + 24 * k + 6 * component => b + 40 + 24 * k + 6 * component
+ * mutant: core/program.c: b + 8 + 6 * k => b + 14 + 6 * k
  * mutant: core/program.c: need != h->image_size => need < h->image_size
  */
 #include "core/program.c"
@@ -24,9 +26,8 @@ uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 
 const uint8_t *some_segment(const struct program *p, uint32_t i)
 {
-    (void)p;
     (void)i;
-    return __CPROVER_allocate(PROGRAM_SEGMENT_SIZE, 0);
+    return __CPROVER_allocate(program_segment_size(p->header.axis_count), 0);
 }
 
 const uint8_t *some_piece(const struct program *p, uint32_t i)
@@ -39,6 +40,7 @@ const uint8_t *some_piece(const struct program *p, uint32_t i)
 static void readers(void)
 {
     struct program p;
+    p.header.axis_count = (uint16_t)any_between(PROGRAM_PLANE, PROGRAM_AXES);
     struct program_segment g;
     struct program_piece c;
     struct program_override bounds;
@@ -50,22 +52,25 @@ static void readers(void)
     program_piece_override(&p, i, &bounds);
 }
 
-static void places(void)
+/* In a program with so many path axes. */
+static void places(uint32_t axis_count)
 {
     struct program_header h;
     uint32_t size = nondet_uint32();
+    uint32_t segment_size = program_segment_size(axis_count);
     uint32_t i = nondet_uint32();
     __CPROVER_assume(size <= 1u << 18);
+    h.axis_count = (uint16_t)axis_count;
+    h.header_size = (uint16_t)program_header_size(axis_count);
     h.image_size = nondet_uint32();
     h.segment_count = nondet_uint32();
     h.piece_count = nondet_uint32();
     if (check_size(&h, size) != 0) {
         return;
     }
-    uint64_t pieces = PROGRAM_HEADER_SIZE + (uint64_t)h.segment_count * PROGRAM_SEGMENT_SIZE;
+    uint64_t pieces = h.header_size + (uint64_t)h.segment_count * segment_size;
     if (i < h.segment_count) {
-        prove(PROGRAM_HEADER_SIZE + (uint64_t)i * PROGRAM_SEGMENT_SIZE + PROGRAM_SEGMENT_SIZE <=
-              size);
+        prove(h.header_size + (uint64_t)i * segment_size + segment_size <= size);
     }
     if (i < h.piece_count) {
         prove(pieces + (uint64_t)i * PROGRAM_PIECE_SIZE + PROGRAM_PIECE_SIZE <= size);
@@ -76,5 +81,7 @@ static void places(void)
 void harness(void)
 {
     readers();
-    places();
+    for (uint32_t axis_count = PROGRAM_PLANE; axis_count <= PROGRAM_AXES; axis_count++) {
+        places(axis_count);
+    }
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What check_speed lets through is bounded as segment_bounds.h says: the five coefficients of sigma are positive, the
+ * What check_speed lets through of a planar program is bounded as segment_bounds.h says: the five coefficients of sigma are positive, the
  * greatest is at most twice the least and a fifteenth of their sum at most 32, so each of them is at most 3 * 64. The
  * products stand for what eva_product.c shows of them.
  *
@@ -52,14 +52,17 @@ struct qwide some_product(struct qwide sum, int64_t a, int64_t b, int64_t weight
 void harness(void)
 {
     struct program_segment g;
+    const int64_t *u = g.a_q44[PROGRAM_U];
+    const int64_t *q = g.a_q44[PROGRAM_Q];
+    g.axis_count = PROGRAM_PLANE;
     for (int k = 0; k < 3; k++) {
-        g.u_q44[k] = any_between(-W_MOST_Q44, W_MOST_Q44);
-        g.v_q44[k] = any_between(-W_MOST_Q44, W_MOST_Q44);
+        g.a_q44[PROGRAM_U][k] = any_between(-W_MOST_Q44, W_MOST_Q44);
+        g.a_q44[PROGRAM_Q][k] = any_between(-W_MOST_Q44, W_MOST_Q44);
     }
     if (check_speed(&g) == 0) {
-        prove(size_of(g.u_q44[0]) <= END_MOST && size_of(g.v_q44[0]) <= END_MOST);
-        prove(size_of(g.u_q44[2]) <= END_MOST && size_of(g.v_q44[2]) <= END_MOST);
-        prove(size_of(g.u_q44[1]) <= MIDDLE_MOST && size_of(g.v_q44[1]) <= MIDDLE_MOST);
+        prove(size_of(u[0]) <= END_MOST && size_of(q[0]) <= END_MOST);
+        prove(size_of(u[2]) <= END_MOST && size_of(q[2]) <= END_MOST);
+        prove(size_of(u[1]) <= MIDDLE_MOST && size_of(q[1]) <= MIDDLE_MOST);
         reached();
     }
 }

@@ -10,14 +10,14 @@
  * instead: core/qmath.h: (int64_t)((uint64_t)a << (shift & 63)) => a * ((int64_t)1 << shift)
  * instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a < INT32_MIN ? INT32_MIN : a > INT32_MAX ? INT32_MAX : (int32_t)a; int32_t low = 0;
  * instead: core/kernel_fixed.c: end_q48[PH_S] - ph->c_q48_mm[PH_S][0] => behind_q48
- * instead: core/kernel_fixed.c: s_q48 - k->c_q48_mm[PH_S][0] => from_middle_q48
- * instead: core/kernel_fixed.c: (1 << 25) - qmath_mul_hi(uu + vv, inverse_q27) => small((1 << 25) - qmath_mul_hi(uu + vv, inverse_q27))
+ * instead: core/kernel_fixed.c: s_q48 - k->c_q48_mm[0] => from_middle_q48
+ * instead: core/kernel_fixed.c: (1 << 25) - qmath_mul_hi(sigma_q30, inverse_q27) => small((1 << 25) - qmath_mul_hi(sigma_q30, inverse_q27))
  * instead: core/kernel_fixed.c: value = qmath_mul_hi(value, z) - s_q30 => value = half(qmath_mul_hi(value, z), z) - s_q30
  * assumes: slope_reciprocal_q15 quadratic first_guess qmath_third qmath_fifth
  * mutant: core/kernel_fixed.c: qmath_shift(i * c, i - 20 - n) => qmath_shift(i * c, i - 18 - n)
  * mutant: core/kernel_fixed.c: quadratic(k->v_q28, z) * 8 => quadratic(k->v_q28, z) * 16
  * mutant: core/kernel_fixed.c: reciprocal_q15 * (1 << 11) => reciprocal_q15 * (1 << 13)
- * mutant: core/kernel_fixed.c: int32_t rest_q44 = qmath_clamp32(( => int32_t rest_q44 = ((
+ * mutant: core/kernel_fixed.c: qmath_clamp32(place.rest_q48_mm >> 4) => (place.rest_q48_mm >> 4)
  * mutant: core/kernel_fixed.c: (uint32_t)(a_q30 >> 14) => (uint32_t)(a_q30 >> 28)
  */
 #include "kernel_bounds.h"
@@ -28,7 +28,7 @@
 
 /*@ assigns \result \from *k, z;
     ensures RECIPROCAL_LEAST_Q15 <= \result <= RECIPROCAL_MOST_Q15; */
-static int32_t slope_reciprocal_q15(const struct kernel_fixed_segment *k, int32_t z);
+static int32_t slope_reciprocal_q15(const struct kernel_fixed_arc *k, int32_t z);
 
 /*@ requires \initialized(c + (0 .. 2));
     assigns \result \from c[0 .. 2], z;
@@ -42,7 +42,7 @@ static int32_t quadratic(const int32_t c[3], int32_t z);
     behavior behind: assumes 0 <= s_q30 <= FAR_Q30; ensures 0 <= \result;
     behavior far_behind: assumes FAR_Q30 < s_q30; ensures FAR_Z_Q31 <= \result;
     complete behaviors; disjoint behaviors; */
-static int32_t first_guess(const struct kernel_fixed_segment *k, int32_t s_q30);
+static int32_t first_guess(const struct kernel_fixed_arc *k, int32_t s_q30);
 
 static int64_t behind_q48;
 static int64_t from_middle_q48;
@@ -67,7 +67,7 @@ static int32_t half(int32_t value_q30, int32_t z)
 #include "core/kernel_fixed.c"
 
 /* What the reciprocal is taken of: the sums stay in range. */
-static void add_up_slope(const struct kernel_fixed_segment *k, int32_t z)
+static void add_up_slope(const struct kernel_fixed_arc *k, int32_t z)
 {
     int32_t slope = k->slope_q29[4];
     for (int i = 3; i >= 0; i--) {
@@ -89,7 +89,7 @@ static void evaluate(const struct ph_segment *ph, int64_t most_q48)
     int64_t far = 5 * POWER(48 + ph->exponent) / 4;
     int64_t outside = most_q48 + POWER(15);
     kernel_fixed_segment_set(&k, ph);
-    add_up_slope(&k, (int32_t)any_between(INT32_MIN, INT32_MAX));
+    add_up_slope(&k.arc, (int32_t)any_between(INT32_MIN, INT32_MAX));
     if (outside <= far) {
         at(&k, -outside, outside);
         return;
@@ -104,12 +104,13 @@ static void set_origin(struct ph_segment *ph)
     ph->origin_q40_mm[PH_X] = any_between(-POWER(52), POWER(52));
     ph->origin_q40_mm[PH_Y] = any_between(-POWER(52), POWER(52));
     ph->origin_q40_mm[PH_S] = 0;
+    ph->axis_count = PROGRAM_PLANE;
 }
 
 /* Bernstein coefficients of sigma in [least, most], those of x and y as |w0|^2, |w2|^2 <= most and |w1|^2 <= 2 most say. */
 static void expand(struct ph_segment *ph, int64_t least, int64_t most)
 {
-    int64_t e[5][3];
+    int64_t e[5][PH_AXES];
     for (int k = 0; k < 5; k++) {
         int64_t times = k == 2 ? 3 : 1;
         int64_t across = k == 2 ? 5 * most : k == 1 || k == 3 ? most / 2 * 3 : most;
@@ -117,7 +118,7 @@ static void expand(struct ph_segment *ph, int64_t least, int64_t most)
         e[k][PH_X] = any_between(-across, across);
         e[k][PH_Y] = any_between(-across, across);
     }
-    for (int axis = PH_X; axis <= PH_S; axis++) {
+    for (int axis = PH_S; axis <= PH_Y; axis++) {
         centre(e, axis, ph->c_q48_mm[axis]);
     }
     ph->c_q48_mm[PH_S][0] = any_between(least / 8 - 16, most / 8 + 16);
@@ -136,8 +137,8 @@ static void segment(int exponent, int64_t from, int64_t to)
     set_origin(&ph);
     expand(&ph, unit / 64 * from - 32, most);
     for (int k = 0; k < 3; k++) {
-        ph.u_q44[k] = any_between(-5 * w, 5 * w);
-        ph.v_q44[k] = any_between(-5 * w, 5 * w);
+        ph.a_q44[PROGRAM_U][k] = any_between(-5 * w, 5 * w);
+        ph.a_q44[PROGRAM_Q][k] = any_between(-5 * w, 5 * w);
     }
     ph.exponent = exponent;
     evaluate(&ph, most / 8 + 16);

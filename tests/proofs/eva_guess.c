@@ -24,7 +24,7 @@ static int32_t last_q26;
 #include "core/kernel_fixed.c"
 
 /* first_guess asks for t only: with this scale it is as wide as s_q30 / 2. */
-static void guess(struct kernel_fixed_segment *k, int64_t from, int64_t to)
+static void guess(struct kernel_fixed_arc *k, int64_t from, int64_t to)
 {
     int32_t s_q30 = (int32_t)any_between(from, to);
     k->inverse[1].scale_q26 = 1 << 30;
@@ -35,7 +35,7 @@ static void guess(struct kernel_fixed_segment *k, int64_t from, int64_t to)
 }
 
 /* t is the greatest there is where s is beyond FAR_Q30, as no segment's scale is below 2. */
-static void guess_far(struct kernel_fixed_segment *k)
+static void guess_far(struct kernel_fixed_arc *k)
 {
     int64_t s_q30 = any_between(FAR_Q30, INT32_MAX);
     k->inverse[1].scale_q26 = (int32_t)any_between(POWER(27) - POWER(18), POWER(30));
@@ -47,7 +47,7 @@ static void guess_far(struct kernel_fixed_segment *k)
 
 static void cubic(int64_t first, int64_t last, int64_t width)
 {
-    struct kernel_fixed_segment k;
+    struct kernel_fixed_arc k;
     first_q26 = (int32_t)any_between(first, first + width);
     last_q26 = (int32_t)any_between(last, last + width);
     set_inverse(&k.inverse[0], 1 << 29, 1 << 29, 1 << 29);

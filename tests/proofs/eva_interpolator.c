@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The interpolator and the coefficient records of a program, for any program of three segments and pieces that passed the
- * checks, any kernel, wherever the cursor is, and any times: no segment, piece or record is asked for that there is not, nothing overflows.
+ * The interpolator and the coefficient records of a program, for any program of three segments and pieces and of two to six
+ * path axes that passed the checks, any kernel, wherever the cursor is, and any times: no segment, piece or record is asked for that there is not, nothing overflows.
  *
  * prover: eva
  * options: -eva-slevel 60
@@ -20,10 +20,14 @@
 #include "ramp_contracts.h"
 #include "segment_bounds.h"
 
+/*@ predicate extra_in_range(struct program_segment *g, integer k) =
+      -POINT_MOST < g->extra[k].start_q40 < POINT_MOST && -(1 << 47) <= g->extra[k].b_q40[4] < (1 << 47); */
+
 /*@ requires i < p->header.segment_count;
     assigns *out \from i;
     ensures \initialized(out) && 0 <= out->start_q40_mm < (1 << 62);
-    ensures -(1 << 52) < out->x_q40_mm < (1 << 52) && -(1 << 52) < out->y_q40_mm < (1 << 52) && is_bounded(out); */
+    ensures point_in_range(out) && is_bounded(out) && out->axis_count == p->header.axis_count;
+    ensures extra_in_range(out, 0) && extra_in_range(out, 1) && extra_in_range(out, 2); */
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
 
 /*@ requires i < p->header.segment_count;
@@ -42,16 +46,17 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
 int64_t program_piece_start(const struct program *p, uint32_t i);
 
 /*@ requires \initialized(segment) && is_bounded(segment);
-    assigns *ph \from \nothing;
-    ensures \initialized(ph); */
+    assigns *ph \from *segment;
+    ensures \initialized(ph) && ph->axis_count == segment->axis_count; */
 void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segment);
 
 /* A segment is 32 mm long at most. */
 /*@ requires \initialized(ph);
-    assigns end_q48_mm[0 .. 2] \from \nothing;
-    ensures \initialized(end_q48_mm + (0 .. 2));
-    ensures -(1 << 60) < end_q48_mm[0] < (1 << 60) && -(1 << 60) < end_q48_mm[1] < (1 << 60); */
-void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[3]);
+    assigns end_q48_mm[0 .. 3] \from *ph;
+    ensures \initialized(end_q48_mm + (0 .. 3));
+    ensures -(1 << 60) < end_q48_mm[1] < (1 << 60) && -(1 << 60) < end_q48_mm[2] < (1 << 60);
+    ensures -(1 << 60) < end_q48_mm[3] < (1 << 60); */
+void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[PH_AXES]);
 
 #include "core/interpolator.c"
 #include "core/kernel.c"
@@ -69,7 +74,17 @@ static void piece_set(void *piece, const struct program_piece *from)
 static void segment_set(void *segment, const struct ph_segment *from)
 {
     struct kernel_fixed_segment *k = segment;
-    k->exponent = from->exponent;
+    k->arc.exponent = from->exponent;
+}
+
+static void space_set(void *segment, const struct ph_segment *from)
+{
+    struct kernel_fixed_space *k = segment;
+    k->arc.exponent = from->exponent;
+    k->extras = program_extra_axes(from->axis_count);
+    for (uint32_t i = 0; i < k->extras; i++) {
+        k->extra[i].scale = 1;
+    }
 }
 
 static void piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s)
@@ -89,21 +104,35 @@ static int64_t piece_acceleration(const void *piece, uint64_t t_q42_s)
     return any_between(INT64_MIN, INT64_MAX);
 }
 
-static void segment_at(const void *segment, int64_t point_q40_mm[2], int64_t arc_length_q40_mm)
+static void segment_at(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm)
 {
     const struct kernel_fixed_segment *k = segment;
-    point_q40_mm[0] = k->exponent;
-    point_q40_mm[1] = arc_length_q40_mm;
+    position_q40[0] = k->arc.exponent;
+    position_q40[1] = arc_length_q40_mm;
+}
+
+static void space_at(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm)
+{
+    const struct kernel_fixed_space *k = segment;
+    segment_at(segment, position_q40, arc_length_q40_mm);
+    position_q40[2] = arc_length_q40_mm;
+    for (uint32_t i = 0; i < k->extras; i++) {
+        position_q40[PROGRAM_SPACE + i] = k->extra[i].scale;
+    }
 }
 
 static const struct kernel any_kernel = {
     .piece_size = sizeof(struct feed_piece),
-    .segment_size = sizeof(struct kernel_fixed_segment),
     .piece_set = piece_set,
-    .segment_set = segment_set,
     .piece_at = piece_at,
     .piece_acceleration = piece_acceleration,
-    .segment_at = segment_at,
+    .plane = {.segment_size = sizeof(struct kernel_fixed_segment),
+              .segment_set = segment_set,
+              .segment_at = segment_at},
+    .space = {.segment_size = offsetof(struct kernel_fixed_space, extra),
+              .extra_size = sizeof(struct extra_axis),
+              .segment_set = space_set,
+              .segment_at = space_at},
 };
 
 const struct kernel *const kernels_linked[KERNELS] = {&any_kernel, NULL, NULL};
@@ -188,22 +217,32 @@ static void interpolate(const struct program *p)
     interpolator_at(&it, any_time(), &point);
 }
 
-int main(void)
+/* With so many path axes. */
+static void program_of(uint32_t axis_count)
 {
     static uint8_t image[1];
     struct program p;
     Frama_C_make_unknown((char *)&p.header, sizeof p.header);
     p.image = image;
+    p.header.axis_count = (uint16_t)axis_count;
     p.header.segment_count = COUNT;
     p.header.piece_count = COUNT;
     p.header.period_us = (uint32_t)1000 << any_between(0, 3);
     p.header.duration_q32_s = (uint64_t)any_between(1, POWER(54) - 1);
     p.header.length_q40_mm = any_between(1, POWER(62) - 1);
+    filled = 0;
     if (coefficients_make(&p, &any_kernel, take, records) == 0) {
         prove(filled == coefficients_size(&p, &any_kernel) && filled <= sizeof records);
         coefficients_attach(&p, &any_kernel, (const uint8_t *)records);
         interpolate(&p);
         reached();
     }
+}
+
+int main(void)
+{
+    program_of(PROGRAM_PLANE);
+    program_of(PROGRAM_SPACE);
+    program_of(PROGRAM_AXES);
     return 0;
 }

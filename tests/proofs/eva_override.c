@@ -139,7 +139,7 @@ static void ask_all(struct feed_override *f)
 
 static void tick(struct feed_override *f, struct interpolator *it)
 {
-    struct interpolator_point out = {0, 0, 0, 0}; /* unchanged where the tick fails */
+    struct interpolator_point out = {0}; /* unchanged where the tick fails */
     place(f);
     if (feed_override_next(f, it, &out) == 0) {
         prove(IS_ARC(out.arc_length_q40_mm));
@@ -158,6 +158,8 @@ int main(void)
     Frama_C_make_unknown((char *)&record, sizeof record);
     p.image = image;
     p.size = sizeof image;
+    p.header.header_size = PROGRAM_HEADER_SIZE;
+    p.header.axis_count = (uint16_t)any_between(PROGRAM_PLANE, PROGRAM_AXES);
     p.header.segment_count = 0;
     p.header.piece_count = COUNT;
     p.header.length_q40_mm = any_between(1, POWER(62) - 1);

@@ -47,6 +47,8 @@ int main(void)
     Frama_C_make_unknown((char *)&p.header, sizeof p.header);
     p.image = image;
     p.size = sizeof image;
+    p.header.header_size = PROGRAM_HEADER_SIZE;
+    p.header.axis_count = PROGRAM_PLANE; /* of more axes, pieces begin elsewhere: cbmc_record.c */
     p.header.segment_count = 0;
     p.header.piece_count = 4;
     p.header.period_us = (uint32_t)any_between(1000, 8000);

@@ -65,6 +65,8 @@ int main(void)
     Frama_C_make_unknown((char *)&p.header, sizeof p.header);
     p.image = image;
     p.size = sizeof image;
+    p.header.header_size = PROGRAM_HEADER_SIZE;
+    p.header.axis_count = (uint16_t)any_between(PROGRAM_PLANE, PROGRAM_AXES);
     p.header.segment_count = 0;
     p.header.piece_count = COUNT;
     p.header.period_us = (uint32_t)any_between(1000, 8000);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The fixed kernel on a segment below all resolution, whose arc length is replaced: as eva_fixed.c, with nothing taken
- * for granted.
+ * The fixed kernel on a segment below all resolution, whose arc length is replaced, in the plane and in space: as
+ * eva_fixed.c, with nothing taken for granted.
  *
  * prover: eva
  * options: -eva-slevel 20 -warn-signed-downcast
@@ -22,19 +22,24 @@ int main(void)
 {
     struct ph_segment ph;
     struct kernel_fixed_segment k;
-    int64_t point[2];
+    struct kernel_fixed_space in_space;
+    int64_t point[PROGRAM_SPACE];
     int64_t most = POWER(50 + PH_LEAST_EXPONENT);
-    for (int axis = PH_X; axis <= PH_S; axis++) {
+    for (int axis = PH_S; axis < PH_AXES; axis++) {
         ph.origin_q40_mm[axis] = axis == PH_S ? 0 : any_between(-POWER(52), POWER(52));
         for (int i = 0; i < 6; i++) {
             ph.c_q48_mm[axis][i] = any_between(-most, most);
         }
     }
     make_straight(&ph);
+    ph.axis_count = PROGRAM_PLANE;
     kernel_fixed_segment_set(&k, &ph);
+    ph.axis_count = PROGRAM_SPACE;
+    kernel_fixed_space_set(&in_space, &ph);
     //@ loop unroll 40;
     for (int64_t at = -POWER(7); at <= POWER(7) + POWER(5); at += 16) { /* it is 2^5 long */
         kernel_fixed_segment_at(&k, point, any_between(at, at + 15));
+        kernel_fixed_space_at(&in_space, point, any_between(at, at + 15));
     }
     reached();
     return 0;

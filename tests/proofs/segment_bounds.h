@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What follows from the rules of protocol.md 1.2 for the size of w, rounded up: docs/theory/numerics.md section 15.1.
- * cbmc_speed.c shows that check_speed lets nothing else through.
+ * What follows from the rules of protocol.md 1.2 for the size of the preimage, rounded up: docs/theory/numerics.md section
+ * 15.1. cbmc_speed.c shows that check_speed lets nothing else through in a planar program; in a spatial one no component
+ * has more than 48 bits, which is less.
  */
 #ifndef HODOGRAPH_SEGMENT_BOUNDS_H
 #define HODOGRAPH_SEGMENT_BOUNDS_H
@@ -9,16 +10,26 @@
 #include "core/program.h"
 
 #define W_MOST_Q44  (((int64_t)1 << 50) - 1) /* 64 */
-#define END_MOST    ((int64_t)129 << 40)     /* 8.0625: u, v of w0 and w2 in q44 */
-#define MIDDLE_MOST ((int64_t)51 << 42)      /* 12.75: of w1 */
+#define END_MOST    ((int64_t)129 << 40)     /* 8.0625: components of A0 and A2 in q44 */
+#define MIDDLE_MOST ((int64_t)51 << 42)      /* 12.75: of A1 */
+#define POINT_MOST  ((int64_t)1 << 52)       /* below this */
 
 /* clang-format off */
-/*@ predicate in_range(struct program_segment *g) =
-      \forall integer k; 0 <= k < 3 ==> -W_MOST_Q44 <= g->u_q44[k] <= W_MOST_Q44 && -W_MOST_Q44 <= g->v_q44[k] <= W_MOST_Q44;
+/*@ predicate component_in_range(struct program_segment *g, integer c) =
+      -W_MOST_Q44 <= g->a_q44[c][0] <= W_MOST_Q44 && -W_MOST_Q44 <= g->a_q44[c][1] <= W_MOST_Q44 &&
+      -W_MOST_Q44 <= g->a_q44[c][2] <= W_MOST_Q44;
+    predicate component_is_bounded(struct program_segment *g, integer c) =
+      -END_MOST <= g->a_q44[c][0] <= END_MOST && -MIDDLE_MOST <= g->a_q44[c][1] <= MIDDLE_MOST &&
+      -END_MOST <= g->a_q44[c][2] <= END_MOST;
+    predicate in_range(struct program_segment *g) =
+      component_in_range(g, PROGRAM_U) && component_in_range(g, PROGRAM_V) &&
+      component_in_range(g, PROGRAM_P) && component_in_range(g, PROGRAM_Q);
     predicate is_bounded(struct program_segment *g) =
-      -END_MOST <= g->u_q44[0] <= END_MOST && -END_MOST <= g->v_q44[0] <= END_MOST &&
-      -END_MOST <= g->u_q44[2] <= END_MOST && -END_MOST <= g->v_q44[2] <= END_MOST &&
-      -MIDDLE_MOST <= g->u_q44[1] <= MIDDLE_MOST && -MIDDLE_MOST <= g->v_q44[1] <= MIDDLE_MOST;
+      component_is_bounded(g, PROGRAM_U) && component_is_bounded(g, PROGRAM_V) &&
+      component_is_bounded(g, PROGRAM_P) && component_is_bounded(g, PROGRAM_Q);
+    predicate point_in_range(struct program_segment *g) =
+      -POINT_MOST < g->point_q40_mm[0] < POINT_MOST && -POINT_MOST < g->point_q40_mm[1] < POINT_MOST &&
+      -POINT_MOST < g->point_q40_mm[2] < POINT_MOST;
 */
 /* clang-format on */
 

@@ -15,7 +15,8 @@ enum {
     CONFIGURATION = 0x2004,
     NODE = 0x2005,
     TRAVEL_MIN = 0x2006,
-    TRAVEL_MAX = 0x2007
+    TRAVEL_MAX = 0x2007,
+    COUNTS_PER_UNIT = 0x2033,
 };
 
 /* Sub-indices of CONFIGURATION. */
@@ -60,6 +61,7 @@ static const struct axis_field axis_fields[] = {
     AXIS_FIELD(0x2030, velocity_limit_um_s),
     AXIS_FIELD(0x2031, acceleration_limit_um_s2),
     AXIS_FIELD(0x2032, jerk_limit_mm_s3),
+    AXIS_FIELD(COUNTS_PER_UNIT, counts_per_unit),
     AXIS_FIELD(0x2051, expected_vendor),
     AXIS_FIELD(0x2052, expected_product),
     AXIS_FIELD(0x2053, expected_revision),
@@ -125,15 +127,29 @@ static uint32_t crc_of(const struct od *od, uint8_t axis_count)
     return crc;
 }
 
-/* feed * time * scale, in 32-bit steps that hold the largest result at UINT32_MAX. */
-static uint32_t lag_counts(const struct config *config)
+static uint32_t at_most_u32(uint64_t value)
 {
-    const uint64_t lag_nm = (uint64_t)config->feed_limit_um_s * CONFIG_LAG_MS; /* um/s * ms */
+    return value < UINT32_MAX ? (uint32_t)value : UINT32_MAX;
+}
+
+/* speed * time * scale, in 32-bit steps that hold the largest result at UINT32_MAX. */
+static uint32_t lag_counts(const struct config *config, uint8_t axis)
+{
+    const struct config_axis *own = &config->axis[axis];
+    const bool turns = own->counts_per_unit != 0u;
+    const uint64_t lag_nm = (uint64_t)(turns ? own->velocity_limit_um_s : config->feed_limit_um_s) *
+                            CONFIG_LAG_MS; /* um/s * ms */
     if (lag_nm == 0u || lag_nm > UINT32_MAX) {
         return UINT32_MAX;
     }
-    const uint64_t counts = qmath_div_u64(lag_nm * config->counts_per_mm, 1000000u);
-    return counts < UINT32_MAX ? (uint32_t)counts : UINT32_MAX;
+    return at_most_u32(qmath_div_u64(lag_nm * config_counts_per_unit(config, axis), 1000000u));
+}
+
+static uint32_t turn_tolerance_counts(const struct config *config, uint8_t axis)
+{
+    const uint64_t scaled =
+        (uint64_t)config->start_tolerance_counts * config->axis[axis].counts_per_unit;
+    return at_most_u32(qmath_div_u64(scaled, config->counts_per_mm));
 }
 
 static void read_window(struct config *config, uint8_t axis)
@@ -141,7 +157,7 @@ static void read_window(struct config *config, uint8_t axis)
     const struct config_axis *own = &config->axis[axis];
     const bool set = own->following_window_counts != UINT32_MAX;
     const uint32_t timeout_us = own->following_timeout_ms * 1000u;
-    config->apart_counts[axis] = set ? own->following_window_counts : lag_counts(config);
+    config->apart_counts[axis] = set ? own->following_window_counts : lag_counts(config, axis);
     config->apart_syncs[axis] = (set ? timeout_us / config->period_us : 0u) + CONFIG_APART_SYNCS;
 }
 
@@ -168,6 +184,7 @@ void config_read(struct config *config, const struct od *od)
         config->travel_max_counts[i] = (int32_t)number(od, TRAVEL_MAX, sub);
         read_axis(&config->axis[i], od, sub);
         read_window(config, i);
+        config->turn_tolerance_counts[i] = turn_tolerance_counts(config, i);
     }
     config->crc32 = crc_of(od, config->axis_count);
 }
@@ -182,6 +199,9 @@ bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value)
     }
     if (index == CONFIGURATION && sub == SUB_COUNTS_PER_MM) {
         return value >= 1u && value <= CONFIG_COUNTS_PER_MM_MAX;
+    }
+    if (index == COUNTS_PER_UNIT) {
+        return value <= CONFIG_COUNTS_PER_MM_MAX;
     }
     return true;
 }
@@ -206,8 +226,8 @@ bool config_same_zero(const struct config *first, const struct config *second, u
     const struct config_axis *a = &first->axis[axis];
     const struct config_axis *b = &second->axis[axis];
     return first->node[axis] == second->node[axis] &&
-           first->counts_per_mm == second->counts_per_mm && a->homing_method == b->homing_method &&
-           a->home_offset_counts == b->home_offset_counts &&
+           config_counts_per_unit(first, axis) == config_counts_per_unit(second, axis) &&
+           a->homing_method == b->homing_method && a->home_offset_counts == b->home_offset_counts &&
            a->encoder_increments == b->encoder_increments &&
            a->feed_constant_counts == b->feed_constant_counts &&
            a->gear_motor_revolutions == b->gear_motor_revolutions &&
@@ -233,16 +253,18 @@ static int64_t q40_from_counts(int32_t counts, uint32_t counts_per_mm, bool upwa
 
 void config_limits(const struct config *config, struct program_limits *limits)
 {
+    limits->axis_count = 0; /* any: those beyond the program's hold their position */
     limits->period_us = config->period_us;
     limits->feed_um_s = config->feed_limit_um_s;
     limits->acceleration_um_s2 = config->acceleration_limit_um_s2;
     limits->jerk_mm_s3 = config->jerk_limit_mm_s3;
     limits->stop_time_ms = config->stop_time_ms;
-    for (uint8_t i = 0; i < PLANE_AXES; ++i) {
+    for (uint8_t i = 0; i < AXES_MAX; ++i) {
+        const uint32_t counts_per_unit = config_counts_per_unit(config, i);
         limits->min_q40_mm[i] =
-            q40_from_counts(config->travel_min_counts[i], config->counts_per_mm, true);
+            q40_from_counts(config->travel_min_counts[i], counts_per_unit, true);
         limits->max_q40_mm[i] =
-            q40_from_counts(config->travel_max_counts[i], config->counts_per_mm, false);
+            q40_from_counts(config->travel_max_counts[i], counts_per_unit, false);
         limits->axis_velocity_um_s[i] = config->axis[i].velocity_limit_um_s;
         limits->axis_acceleration_um_s2[i] = config->axis[i].acceleration_limit_um_s2;
         limits->axis_jerk_mm_s3[i] = config->axis[i].jerk_limit_mm_s3;

@@ -10,8 +10,8 @@
 #include "canopen/od.h"
 #include "core/program_check.h"
 
-#define AXES_MAX   6u
-#define PLANE_AXES 2u /* axes 0 and 1 follow the path, the others hold */
+/* Those of a program are the first ones, in the order of its path; the others hold their position. */
+#define AXES_MAX PROGRAM_AXES
 
 /* Above it the conversion of travel limits to q40 mm would leave 64 bits. */
 #define CONFIG_COUNTS_PER_MM_MAX 8388608u
@@ -50,6 +50,8 @@ struct config_axis {
     uint32_t expected_vendor; /* 0x1018 subs 1 ... 3 of the drive; 0: any */
     uint32_t expected_product;
     uint32_t expected_revision;
+    uint32_t
+        counts_per_unit; /* of an axis that is not measured in mm but in degrees; 0: counts_per_mm */
 };
 
 struct config {
@@ -57,7 +59,7 @@ struct config {
     uint32_t feed_limit_um_s;
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
-    uint32_t start_tolerance_counts;
+    uint32_t start_tolerance_counts; /* of axes in mm */
     uint32_t counts_per_mm;
     int32_t travel_min_counts[AXES_MAX];
     int32_t travel_max_counts[AXES_MAX];
@@ -72,8 +74,11 @@ struct config {
     uint8_t missed_max;  /* so many answers in a row may be missed */
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
     uint32_t crc32;      /* of the objects; docs/reference/protocol.md section 3.4 */
+    uint32_t turn_tolerance_counts
+        [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
     /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following window
-     * and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit (without one: UINT32_MAX). */
+     * and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit, of an axis in degrees at its own
+     * velocity limit (without one: UINT32_MAX). */
     uint32_t apart_counts[AXES_MAX];
     uint32_t apart_syncs[AXES_MAX];
 };
@@ -92,6 +97,20 @@ bool config_concerns_drives(uint16_t index, uint8_t sub);
 
 /* True for all objects above. Pure. */
 bool config_contains(uint16_t index);
+
+/* Counts of a millimetre, or of a degree of an axis that turns. Pure. */
+static inline uint32_t config_counts_per_unit(const struct config *config, uint32_t axis)
+{
+    const uint32_t own = config->axis[axis].counts_per_unit;
+    return own != 0u ? own : config->counts_per_mm;
+}
+
+/* Start tolerance of an axis. Pure. */
+static inline uint32_t config_tolerance_counts(const struct config *config, uint32_t axis)
+{
+    const bool turns = config->axis[axis].counts_per_unit != 0u;
+    return turns ? config->turn_tolerance_counts[axis] : config->start_tolerance_counts;
+}
 
 /* Whether positions of an axis mean the same in both: the zero that homing found under one still holds under the
  * other. Pure. */

@@ -62,6 +62,7 @@ enum machine_refusal {
     MACHINE_NO_HOMING_MODE = 10,  /* an axis shall be homed whose drive has no homing mode */
     MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */
     MACHINE_NOT_CONFIGURED = 12,  /* neither configured since power-on nor restored */
+    MACHINE_AXES_MISSING = 18,    /* the program has more path axes than are configured */
     MACHINE_NOT_HOMED = 13,       /* an axis with a homing method has no zero */
     MACHINE_ENDING = 17,          /* the controller is being shut down */
     MACHINE_NOT_IN_TIME = 16,     /* drives are real, and the port cannot keep ticks in time */
@@ -86,7 +87,7 @@ enum machine_refusal {
 #define MACHINE_GAP_US(period_us) (2u * (period_us) + (period_us) / 8u)
 
 /* A drive found again is taken for one that kept its zero only when it stands so near to where it was seen last. */
-#define MACHINE_KEPT_MM 1u
+#define MACHINE_KEPT_UNITS 1u /* mm, degrees */
 
 /* Drives that are not simulated are never waited for: what is later than this is missed. */
 #define MACHINE_REAL_WAIT_MAX_MS 5u
@@ -148,7 +149,7 @@ uint8_t machine_unhomed(const struct machine *machine);
 /* Starts a prepared motion whose first setpoint is at start_counts: copied, if the axes are
  * enabled, stand still and are within the configured tolerance. */
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
-                                   const int32_t start_counts[PLANE_AXES]);
+                                   const int32_t start_counts[AXES_MAX]);
 
 /* Homing, from OFF to OFF. In between the mainline sets each axis's `goal` and `control_extra`
  * (under the lock); the targets follow the positions. It has failed when the state has left HOMING

@@ -43,7 +43,7 @@ const struct axis *machine_not_arrived(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (axis_apart(axis) > machine->config.start_tolerance_counts) {
+        if (axis_apart(axis) > config_tolerance_counts(&machine->config, i)) {
             return axis;
         }
     }

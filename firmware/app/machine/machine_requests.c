@@ -149,7 +149,8 @@ uint8_t machine_unhomed(const struct machine *machine)
 }
 
 static enum machine_refusal start_refusal(const struct machine *machine,
-                                          const int32_t start_counts[PLANE_AXES])
+                                          const struct motion *prepared,
+                                          const int32_t start_counts[AXES_MAX])
 {
     const enum machine_refusal refusal = not_available(machine);
     if (refusal != MACHINE_ACCEPTED) {
@@ -158,14 +159,14 @@ static enum machine_refusal start_refusal(const struct machine *machine,
     if (machine->state != MACHINE_READY) {
         return MACHINE_DRIVES_OFF;
     }
-    if (machine->config.axis_count < PLANE_AXES) {
-        return MACHINE_DRIVES_MISSING;
+    if (machine->config.axis_count < motion_axis_count(prepared)) {
+        return MACHINE_AXES_MISSING;
     }
     if (!machine->unhomed_allowed && machine_unhomed(machine) != 0u) {
         return MACHINE_NOT_HOMED;
     }
-    const uint32_t tolerance_counts = machine->config.start_tolerance_counts;
-    for (uint8_t i = 0; i < PLANE_AXES; ++i) {
+    for (uint32_t i = 0; i < motion_axis_count(prepared); ++i) {
+        const uint32_t tolerance_counts = config_tolerance_counts(&machine->config, i);
         if (axis_distance(&machine->axes[i], start_counts[i]) > tolerance_counts) {
             return MACHINE_AWAY_FROM_START;
         }
@@ -179,9 +180,9 @@ static enum machine_refusal start_refusal(const struct machine *machine,
 }
 
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
-                                   const int32_t start_counts[PLANE_AXES])
+                                   const int32_t start_counts[AXES_MAX])
 {
-    const enum machine_refusal refusal = start_refusal(machine, start_counts);
+    const enum machine_refusal refusal = start_refusal(machine, prepared, start_counts);
     if (refusal == MACHINE_ACCEPTED) {
         machine->motion = *prepared;
         machine->unhomed_axes = machine_unhomed(machine);

@@ -62,13 +62,13 @@ static void step_enabling(struct machine *machine)
 /* Without a point there is nothing to brake along. */
 static void next_targets(struct machine *machine)
 {
-    int32_t target_counts[PLANE_AXES];
+    int32_t target_counts[AXES_MAX];
     const int result = motion_step(&machine->motion, target_counts);
     if (result < 0) {
         machine_raise_quick(machine, EMCY_SOFTWARE, 0, (uint32_t)-result);
         return;
     }
-    for (uint8_t i = 0; i < PLANE_AXES; ++i) {
+    for (uint32_t i = 0; i < motion_axis_count(&machine->motion); ++i) {
         machine->axes[i].target_counts = target_counts[i];
     }
     machine->statistics.program_tick = machine->motion.setpoints - 1u;

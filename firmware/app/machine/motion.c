@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-#include "core/counts.h"
 #include "core/program_time.h"
 
 #define FEED_MAX_Q32_MM_S (INT64_MAX / 1000) /* 2^31 um/s */
@@ -11,7 +10,7 @@
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config)
 {
     memset(motion, 0, sizeof *motion);
-    motion->counts_per_mm = config->counts_per_mm;
+    path_counts_init(&motion->scale, program, config);
     const int result = interpolator_begin(&motion->interp, program);
     if (result == 0) {
         feed_override_begin(&motion->feed, program, config->period_us, 0);
@@ -19,16 +18,9 @@ int motion_begin(struct motion *motion, const struct program *program, const str
     return result;
 }
 
-static void to_counts(const struct motion *motion, const struct interpolator_point *point,
-                      int32_t counts[PLANE_AXES])
-{
-    counts[0] = counts_from_q40_mm(point->x_q40_mm, motion->counts_per_mm);
-    counts[1] = counts_from_q40_mm(point->y_q40_mm, motion->counts_per_mm);
-}
-
 int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
-                    int32_t start_counts[PLANE_AXES])
+                    int32_t start_counts[AXES_MAX])
 {
     const int result = motion_begin(motion, program, config);
     if (result < 0) {
@@ -38,18 +30,18 @@ int motion_begin_at(struct motion *motion, const struct program *program,
     feed_override_begin(&motion->feed, program, config->period_us, time_q42_s);
     (void)interpolator_seek(&motion->interp, time_q42_s >> 10);
     (void)interpolator_at_q42(&motion->interp, time_q42_s, &motion->point);
-    to_counts(motion, &motion->point, start_counts);
+    path_counts_of(&motion->scale, &motion->point, start_counts);
     return 0;
 }
 
-int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES])
+int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX])
 {
     const int result = feed_override_next(&motion->feed, &motion->interp, &motion->point);
     if (result < 0) {
         return result;
     }
     motion->setpoints++;
-    to_counts(motion, &motion->point, target_counts);
+    path_counts_of(&motion->scale, &motion->point, target_counts);
     return 0;
 }
 

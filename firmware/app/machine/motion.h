@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * motion: a program on its way: what its plan and the commands make of a tick, point on the path and targets of the
- * plane's axes.
+ * axes that follow it.
  *
  * Prepared by the mainline, then owned by the tick (under the port's lock).
  */
@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "app/machine/config.h"
+#include "app/machine/path_counts.h"
 #include "core/feed_override.h"
 #include "core/interpolator.h"
 
@@ -20,7 +21,7 @@ struct motion {
     struct feed_override feed;
     struct interpolator_point point; /* of the last setpoint */
     uint32_t setpoints;              /* given so far */
-    uint32_t counts_per_mm;
+    struct path_counts scale;
 };
 
 /* Sets up the first setpoint. The program must have passed program_check; it must stay while the
@@ -31,10 +32,17 @@ int motion_begin(struct motion *motion, const struct program *program, const str
  * Mainline. */
 int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
-                    int32_t start_counts[PLANE_AXES]);
+                    int32_t start_counts[AXES_MAX]);
 
-/* The next setpoint. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged. Timer. */
-int motion_step(struct motion *motion, int32_t target_counts[PLANE_AXES]);
+/* The next setpoint: targets of the program's path axes. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.
+ * Timer. */
+int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX]);
+
+/* How many axes follow the path: the first ones of the machine. Pure. */
+static inline uint32_t motion_axis_count(const struct motion *motion)
+{
+    return motion->scale.axis_count;
+}
 
 /* Asks for a stop along the path inside the program's limits, or the machine's. Under the lock. */
 void motion_stop(struct motion *motion);

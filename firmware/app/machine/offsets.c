@@ -9,12 +9,12 @@ void offsets_init(struct offsets *offsets)
     memset(offsets, 0, sizeof *offsets);
 }
 
-static struct feedforward_gains gains_of(const struct config *config, uint8_t axis)
+static struct feedforward_gains gains_of(const struct config *config, uint32_t axis)
 {
     const struct config_axis *own = &config->axis[axis];
     return (struct feedforward_gains){
         .period_us = config->period_us,
-        .counts_per_mm = config->counts_per_mm,
+        .counts_per_mm = config_counts_per_unit(config, axis),
         .velocity_permille = own->velocity_permille,
         .torque_per_acceleration_q16 = own->torque_per_acceleration_q16,
         .torque_per_velocity_q16 = own->torque_per_velocity_q16,
@@ -22,20 +22,20 @@ static struct feedforward_gains gains_of(const struct config *config, uint8_t ax
 }
 
 void offsets_step(struct offsets *offsets, const struct config *config, const struct motion *motion,
-                  struct feedforward_offset offset[PLANE_AXES])
+                  struct feedforward_offset offset[AXES_MAX])
 {
     const uint32_t seen = offsets->setpoints;
-    memset(offset, 0, PLANE_AXES * sizeof offset[0]);
+    memset(offset, 0, AXES_MAX * sizeof offset[0]);
     offsets->setpoints = motion != NULL ? motion->setpoints : 0u;
     if (motion == NULL || motion->setpoints == seen) {
         return;
     }
-    const int64_t point_q40_mm[PLANE_AXES] = {motion->point.x_q40_mm, motion->point.y_q40_mm};
-    for (uint8_t i = 0; i < PLANE_AXES; ++i) {
+    const int64_t *position_q40 = motion->point.position_q40;
+    for (uint32_t i = 0; i < motion_axis_count(motion); ++i) {
         const struct feedforward_gains gains = gains_of(config, i);
         if (seen == 0u) { /* a motion begins at rest */
-            feedforward_begin(&offsets->axes[i], point_q40_mm[i]);
+            feedforward_begin(&offsets->axes[i], position_q40[i]);
         }
-        offset[i] = feedforward_next(&offsets->axes[i], &gains, point_q40_mm[i]);
+        offset[i] = feedforward_next(&offsets->axes[i], &gains, position_q40[i]);
     }
 }

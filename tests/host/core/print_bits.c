@@ -50,7 +50,9 @@ int main(int argc, char **argv)
         if (interpolator_at_q42(&it, override_plan_tick(&plan, &clock), &point) < 0) {
             return 3;
         }
-        crc = add(add(crc, point.x_q40_mm), point.y_q40_mm);
+        for (uint32_t axis = 0; axis < p.header.axis_count; axis++) {
+            crc = add(crc, point.position_q40[axis]);
+        }
         crc = add(add(crc, point.arc_length_q40_mm), point.feed_q32_mm_s);
     }
     printf("%08lx\n", (unsigned long)crc);

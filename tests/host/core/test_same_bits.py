@@ -17,7 +17,15 @@ from marks import long
 ROOT = Path(__file__).resolve().parents[3]
 FIRMWARE = ROOT / "firmware"
 PROGRAMS = ROOT / "tests" / "data" / "programs"
-NAMES = ("alpha_exponential", "heart_exponential", "star_minimax", "line_slow", "line_tiny")
+NAMES = (
+    "alpha_exponential",
+    "heart_exponential",
+    "star_minimax",
+    "line_slow",
+    "line_tiny",
+    "space3",
+    "space6",
+)
 COMPILERS = [c for c in ("gcc", "clang", "clang-14") if shutil.which(c)]
 BUILDS = [(c, o) for c in COMPILERS for o in ("-O0", "-O2", "-O3")]
 

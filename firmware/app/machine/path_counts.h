@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: MIT */
+/* path_counts: the point of a program in counts of its path axes. */
+#ifndef APP_MACHINE_PATH_COUNTS_H
+#define APP_MACHINE_PATH_COUNTS_H
+
+#include <stdint.h>
+
+#include "app/machine/config.h"
+#include "core/counts.h"
+#include "core/interpolator.h"
+
+struct path_counts {
+    uint32_t axis_count;                             /* of the program: 2 ... AXES_MAX */
+    uint32_t per_mm;                                 /* of the axes that draw the path */
+    uint32_t per_unit[PROGRAM_AXES - PROGRAM_SPACE]; /* of the extra axes, which may turn */
+};
+
+void path_counts_init(struct path_counts *scale, const struct program *program,
+                      const struct config *config);
+
+/* Those behind y, for the next function. */
+void path_counts_rest(const struct path_counts *scale, const struct interpolator_point *point,
+                      int32_t counts[AXES_MAX]);
+
+/* Counts of the program's path axes; the others are left as they are. */
+static inline void path_counts_of(const struct path_counts *scale,
+                                  const struct interpolator_point *point, int32_t counts[AXES_MAX])
+{
+    counts[0] = counts_from_q40_mm(point->position_q40[0], scale->per_mm);
+    counts[1] = counts_from_q40_mm(point->position_q40[1], scale->per_mm);
+    if (scale->axis_count > PROGRAM_PLANE) {
+        path_counts_rest(scale, point, counts);
+    }
+}
+
+#endif
