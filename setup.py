@@ -29,6 +29,7 @@ NEEDED = (
     "hodograph/data/examples/*.toml",
     "hodograph/data/examples/machines/*.toml",
     "hodograph/data/examples/drives/*.toml",
+    "hodograph/data/template/*.toml",
     "hodograph/monitor/page/index.html",
     "hodograph/monitor/page/page.js",
     "hodograph/monitor/page/style.css",

@@ -66,6 +66,12 @@ INTERRUPTED_EXIT_STATUS = 130
 """Exit status after Ctrl-C (128 + SIGINT), as shells have it."""
 
 
+def brief(text: str) -> str:
+    """Text of a file, to be quoted within a message: its first 40 characters, printable and on one line."""
+    line = "".join(each if each.isprintable() else "?" for each in " ".join(text[:400].split()))
+    return line if len(line) <= 40 else line[:37] + "..."
+
+
 def one_line(error: Exception) -> str:
     """An error of somebody else's, to be quoted within a message of ours."""
     return " ".join(str(error).split()) or type(error).__name__

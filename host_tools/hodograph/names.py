@@ -1,14 +1,45 @@
 # SPDX-License-Identifier: MIT
-"""Words that the command line, files and the bus share; no imports, so that `--help` is quick."""
+"""Words that the command line, files and the bus share; no heavy imports, so that `--help` is quick."""
+
+from __future__ import annotations
+
+from pathlib import Path
 
 KERNELS = ("fixed", "float", "double")
 """Number kernels, in the order of their codes in object 0x2004 sub 5."""
 
-INTERPOLATIONS = ("linear", "cubic")
+AXES = ("x", "y", "z", "a", "b", "c")
+"""What the axes of a path are called where no machine names them."""
+
+INTERPOLATIONS = ("linear", "cubic", "none")
 """How a simulated drive goes from setpoint to setpoint, in the order of enum drive_interpolation."""
 
 SPEEDS = ("exact", "differences")
 """Where a simulated drive's loop has its speed from, in the order of enum drive_speed."""
 
+INTEGRALS = ("backward", "forward")
+"""Whether a simulated drive's integral counts the present sample, in the order of enum drive_integral."""
+
+SHELLS = ("bash", "zsh", "fish")
+"""Shells that there is completion for."""
+
 PACES = ("real-time", "fast")
 """How a controller process of a simulated machine may tick."""
+
+GCODE_SUFFIXES = (".ngc", ".nc", ".gcode", ".tap")
+DRAWING_SUFFIXES = (".dxf", ".svg")
+POINT_SUFFIXES = (".csv", ".txt")
+TOOLPATH_SUFFIXES = (*GCODE_SUFFIXES, *DRAWING_SUFFIXES, *POINT_SUFFIXES)
+"""Names of toolpath files end so, in any case of letters."""
+
+STANDARD_INPUT = "-"
+"""Stands for G-code from standard input."""
+
+
+def is_toolpath(file: Path) -> bool:
+    """Whether a FILE of a command is a toolpath; "-" is G-code from standard input."""
+    return file.suffix.lower() in TOOLPATH_SUFFIXES or str(file) == STANDARD_INPUT
+
+
+LENGTH_UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "in": 25.4}
+"""Units of drawings and points, as the command line has them."""

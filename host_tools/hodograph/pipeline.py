@@ -3,14 +3,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
+from typing import TypeVar
 
-from .config import Drive, Machine, PathFile, SpacePathSpec, is_there, load_machine, load_path_file
+from .config import (
+    PLANE_AXES,
+    SPACE_AXES,
+    Drive,
+    Machine,
+    PathFile,
+    PathSpec,
+    SpacePathSpec,
+    is_there,
+    load_machine,
+    load_path_file,
+)
 from .errors import InputError, PlanError
 from .feed import (
     AxisLimits,
@@ -20,12 +32,14 @@ from .feed import (
     Limits,
     Peak,
     Plant,
+    Plants,
     Replan,
     ineffective_limits,
     plan_path,
     replan,
 )
 from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
+from .names import AXES
 from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
@@ -38,12 +52,15 @@ from .program import (
     fit_plan,
 )
 from .program.codes import ProgramError
-from .spline import SplineResult, from_control_polygon, through_points
+from .spline import PHSpline, SplineResult, from_control_polygon, through_points
 from .spline.spatial import (
     SpatialSplineResult,
     spatial_from_control_polygon,
     spatial_through_points,
 )
+from .spline.spatial.curve import SpatialPHSpline, embedded
+
+_Found = TypeVar("_Found", SplineResult, SpatialSplineResult)
 
 
 def controller_limits(machine: Machine) -> ControllerLimits:
@@ -57,42 +74,46 @@ def controller_limits(machine: Machine) -> ControllerLimits:
 
 
 def axis_limits(machine: Machine) -> AxisLimits:
-    """The limits of the machine's axes x and y. Raises InputError: it has one axis only."""
-    x, y = machine.plane
+    """The limits of the axes that follow a path. Raises InputError: there is only one axis."""
+    axes = machine.path_axes
     return AxisLimits(
-        velocity_mm_s=(x.velocity_mm_s, y.velocity_mm_s),
-        acceleration_mm_s2=(x.acceleration_mm_s2, y.acceleration_mm_s2),
-        jerk_mm_s3=(x.jerk_mm_s3, y.jerk_mm_s3),
+        velocity_mm_s=tuple(axis.velocity_mm_s for axis in axes),
+        acceleration_mm_s2=tuple(axis.acceleration_mm_s2 for axis in axes),
+        jerk_mm_s3=tuple(axis.jerk_mm_s3 for axis in axes),
     )
 
 
-def plants(machine: Machine | None, limits: Limits) -> tuple[Plant, Plant] | None:
-    """The plants of x and y with the volts that their drives have, or `limits` gives them; None where neither is known.
+def axis_names(machine: Machine) -> tuple[str, ...]:
+    """What the axes that follow a path are called: x, y in the plane, the machine's own names in space."""
+    axes = machine.path_axes
+    return AXES[:PLANE_AXES] if len(axes) == PLANE_AXES else tuple(axis.name for axis in axes)
+
+
+def plants(machine: Machine | None, limits: Limits) -> Plants | None:
+    """The plants of the axes with the volts that their drives have, or `limits` gives them; None: neither is known.
 
     Raises InputError: volts are limited, and an axis has no drive file, or its friction takes them all.
     """
-    known = machine is not None and all(axis.drive is not None for axis in machine.plane)
+    known = machine is not None and all(axis.drive is not None for axis in machine.path_axes)
     if limits.volts is None and not known:
         return None
     if machine is None:
         raise InputError(
             '[limits] volts needs a machine: add [machine] file = "..." or use --machine FILE'
         )
-    x, y = (_plant(drive, limits.volts) for drive in machine.models(machine.plane))
-    return x, y
+    return tuple(_plant(drive, limits.volts) for drive in machine.models(machine.path_axes))
 
 
-def drive_plants(machine: Machine) -> tuple[Plant, Plant] | None:
-    """The plants of x and y with all the volts of their drives, None when one of them has no drive file, or no volts
+def drive_plants(machine: Machine) -> Plants | None:
+    """The plants of the axes with all the volts of their drives, None when one of them has no drive file, or no volts
     left beside its friction.
     """
-    known = [axis.drive for axis in machine.plane if axis.drive is not None]
-    if len(known) < len(machine.plane) or any(
+    known = [axis.drive for axis in machine.path_axes if axis.drive is not None]
+    if len(known) < len(machine.path_axes) or any(
         drive.volts_limit <= (drive.equipment.friction_volts or 0.0) for drive in known
     ):
         return None
-    x, y = (_plant(drive, drive.volts_limit) for drive in known)
-    return x, y
+    return tuple(_plant(drive, drive.volts_limit) for drive in known)
 
 
 def stop_terms(machine: Machine, limits: Limits) -> StopTerms:
@@ -124,30 +145,20 @@ def _plant(drive: Drive, volts: float | None) -> Plant:
 
 def program_limits(machine: Machine) -> ProgramLimits:
     """What the controller of this machine checks a program against. Raises InputError: it has one axis only."""
-    low, high = (
-        tuple(round(mm * 2**40) for mm in ends)
-        for ends in (
-            [axis.travel_min_mm for axis in machine.plane],
-            [axis.travel_max_mm for axis in machine.plane],
-        )
-    )
+    axes = machine.path_axes
     return ProgramLimits(
         period_us=machine.period_us,
         feed_um_s=round(machine.feed_mm_s * 1000),
         acceleration_um_s2=round(machine.acceleration_mm_s2 * 1000),
         jerk_mm_s3=round(machine.jerk_mm_s3),
-        min_q40_mm=(low[0], low[1]),
-        max_q40_mm=(high[0], high[1]),
+        min_q40_mm=tuple(round(axis.travel_min_mm * 2**40) for axis in axes),
+        max_q40_mm=tuple(round(axis.travel_max_mm * 2**40) for axis in axes),
         stop_time_ms=machine.stop_time_ms,
-        axis_velocity_um_s=_of_plane(machine, "velocity_mm_s", 1000),
-        axis_acceleration_um_s2=_of_plane(machine, "acceleration_mm_s2", 1000),
-        axis_jerk_mm_s3=_of_plane(machine, "jerk_mm_s3", 1),
+        axis_velocity_um_s=tuple(round(axis.velocity_mm_s * 1000) for axis in axes),
+        axis_acceleration_um_s2=tuple(round(axis.acceleration_mm_s2 * 1000) for axis in axes),
+        axis_jerk_mm_s3=tuple(round(axis.jerk_mm_s3) for axis in axes),
+        axis_count=len(axes),
     )
-
-
-def _of_plane(machine: Machine, name: str, units: int) -> tuple[int, int]:
-    x, y = (round(getattr(axis, name) * units) for axis in machine.plane)
-    return x, y
 
 
 def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault | None:
@@ -157,10 +168,9 @@ def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault 
 
 def proved_limits(machine: Machine) -> str:
     """The limits that the controller of this machine has proved of each program that it accepts."""
-    x, y = machine.plane
     return ", ".join(
         f"{axis.name} {axis.velocity_mm_s:g} mm/s {axis.acceleration_mm_s2:g} mm/s^2 {axis.jerk_mm_s3:g} mm/s^3"
-        for axis in (x, y)
+        for axis in machine.path_axes
     )
 
 
@@ -226,11 +236,27 @@ class Pipeline:
     @cached_property
     def spline_result(self) -> SplineResult:
         """The spline and how it was found. Raises PlanError for a path in space."""
-        path = self.file.path
+        return self._solved(self.file.path, from_control_polygon, through_points)
+
+    @cached_property
+    def spatial_spline_result(self) -> SpatialSplineResult | None:
+        """The spline of a path in space and how it was found; None for a path in the plane."""
+        path = self.file.given_path
+        if not isinstance(path, SpacePathSpec):
+            return None
+        return self._solved(path, spatial_from_control_polygon, spatial_through_points)
+
+    def _solved(
+        self,
+        path: PathSpec | SpacePathSpec,
+        from_polygon: Callable[..., _Found],
+        through: Callable[..., _Found],
+    ) -> _Found:
+        """The spline of a path by one of these two; their errors name the file."""
         with _named_by(f"{self.file.file}: [path]"):
             if not path.through:
-                return from_control_polygon(path.points, path.closed)
-            return through_points(
+                return from_polygon(path.points, path.closed)
+            return through(
                 path.points,
                 path.closed,
                 ends=path.ends,
@@ -239,23 +265,30 @@ class Pipeline:
                 knots=path.knots,
             )
 
+    @property
+    def found_spline(self) -> SplineResult | SpatialSplineResult:
+        """The spline of a path in the plane or in space, and how it was found."""
+        return self.spatial_spline_result or self.spline_result
+
     @cached_property
-    def spatial_spline_result(self) -> SpatialSplineResult | None:
-        """The spline of a path in space and how it was found; None for a path in the plane."""
-        path = self.file.given_path
-        if not isinstance(path, SpacePathSpec):
-            return None
-        with _named_by(f"{self.file.file}: [path]"):
-            if not path.through:
-                return spatial_from_control_polygon(path.points, path.closed)
-            return spatial_through_points(
-                path.points,
-                path.closed,
-                ends=path.ends,
-                start_tangent=path.start_tangent,
-                end_tangent=path.end_tangent,
-                knots=path.knots,
+    def curve(self) -> PHSpline | SpatialPHSpline:
+        """What the axes follow: the spline; at z = 0 where a path in the plane runs on a machine with an axis z.
+
+        Raises InputError: the machine has too few axes for the path, or axes that nothing moves.
+        """
+        spline, machine = self.found_spline.spline, self.machine_or_none
+        axes = spline.axes if machine is None else len(machine.path_axes)
+        if axes < spline.axes:
+            raise InputError(
+                f"{self.file.file}: [path] has points [x, y, z], but only two axes of the machine follow a path: "
+                'name three of them, path = ["x", "y", "z"], at the top of its file, or give points [x, y]'
             )
+        if axes > SPACE_AXES:
+            raise InputError(
+                f"{self.file.file}: {axes} axes of the machine follow a path, and [path] moves {spline.axes}: "
+                "name two or three axes in path = [...] at the top of the machine's file"
+            )
+        return embedded(spline, 0.0) if isinstance(spline, PHSpline) and axes > 2 else spline
 
     @property
     def feed(self) -> FeedRequest:
@@ -282,15 +315,14 @@ class Pipeline:
         machine = self.machine_or_none
         if machine is None:
             return self.file.limits
-        return replace(self.file.limits, machine=axis_limits(machine))
+        return self.file.limits.on_machine(axis_names(machine), axis_limits(machine))
 
     @cached_property
     def peaks(self) -> dict[str, Peak]:
         """Where every limited quantity of the plan comes nearest to its limit."""
         plan, machine, limits = self.plan, self.machine_or_none, self.limits
         controller = controller_limits(machine) if machine is not None else None
-        spline = self.spline_result.spline
-        return plan_peaks(plan, spline, limits, controller, plants(machine, limits))
+        return plan_peaks(plan, self.curve, limits, controller, plants(machine, limits))
 
     @cached_property
     def _timed_plan(self) -> tuple[FeedPlan, float]:
@@ -300,7 +332,7 @@ class Pipeline:
 
     def _planned(self, limits: Limits) -> FeedPlan:
         feed, machine = self.feed, self.machine_or_none
-        spline = self.spline_result.spline
+        spline = self.curve
         controller = controller_limits(machine) if machine is not None else None
         period_us = machine.period_us if machine is not None else 1000
         with _named_by(f"{self.file.file}:"):
@@ -343,7 +375,7 @@ class Pipeline:
     def _compiled(self, plan: FeedPlan) -> Compilation:
         machine = self.machine
         limits = program_limits(machine)
-        spline = self.spline_result.spline
+        spline = self.curve
         with _named_by(f"{self.file.file}:"):
             return compile_path(
                 spline,
@@ -388,12 +420,12 @@ class Pipeline:
     def notes(self, plan: FeedPlan) -> tuple[str, ...]:
         """What the user should know about the spline and about a plan for it, one line each."""
         excesses = tuple(f"feed: {excess.excess_text}" for excess in plan.excesses)
-        limits = self.file.limits
-        length_mm = self.spline_result.spline.length_mm
+        limits, found = self.limits, self.found_spline
+        length_mm = found.spline.length_mm
         idle = ineffective_limits(
             limits, self.feed, length_mm, plants(self.machine_or_none, limits)
         )
-        return (*self.spline_result.notes, *plan.notes, *excesses, *idle)
+        return (*found.notes, *plan.notes, *excesses, *idle)
 
 
 @contextmanager

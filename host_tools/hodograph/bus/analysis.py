@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bustime import RecordedLoad, machine_bus_time, recorded_load
-from ..config import PLANE_AXES, Machine
+from ..config import Machine
 from ..errors import RunError
 from ..native import NativeProgram
 from ..simulate import Motion, analyse, settling_ticks
@@ -104,7 +104,7 @@ def _stretch(frames: Frames, image: bytes, machine: Machine, kernel: str) -> Fra
         rows = np.stack(
             [_targets(frames, sync_at[begin : end + 1], RPDO1 + n) for n in machine.nodes], axis=1
         )
-        first = program_tick(rows[:, :PLANE_AXES], setpoints)
+        first = program_tick(rows[:, : setpoints.shape[1]], setpoints)
         if first is not None:
             last = first + program.ticks + settling_ticks(machine.period_us) + REACHED_AFTER
             start = sync_at[max(begin, begin + first - _AROUND)]
@@ -158,16 +158,16 @@ def _motion(
         volts_mv = np.zeros(ticks.targets.shape, dtype=np.int16)
     else:
         volts_mv = ticks.volts_mv
-    plane = np.s_[:, :PLANE_AXES]
-    found = program_tick(ticks.targets[plane], setpoints)
-    first = first_tick(ticks.targets[plane], setpoints) if found is None else found
+    path = np.s_[:, : setpoints.shape[1]]
+    found = program_tick(ticks.targets[path], setpoints)
+    first = first_tick(ticks.targets[path], setpoints) if found is None else found
     count = program.ticks + settling_ticks(machine.period_us)
     reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
     motion = analyse(
         image,
-        ticks.targets[plane][first : first + count],
-        ticks.actual[plane][reached],
-        volts_mv[plane][reached],
+        ticks.targets[path][first : first + count],
+        ticks.actual[path][reached],
+        volts_mv[path][reached],
         kernel=kernel,
         counts_per_mm=machine.counts_per_mm,
     )

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import BusError
-from ..names import INTERPOLATIONS, SPEEDS
+from ..names import INTEGRALS, INTERPOLATIONS, SPEEDS
 from .address import BusAddress
 from .clock import VirtualClock, hub_clock
 
 if TYPE_CHECKING:
-    from ..config import Drive, Machine
+    from ..config import Axis, Drive, Machine
 
 CONTROLLER, DRIVE = "hodograph-controller", "hodograph-drive"
 END_S = 8.0
@@ -77,13 +77,13 @@ def drive_command(machine: Machine, address: BusAddress) -> list[str]:
     """Command line of the one process that simulates all drives."""
     command = [str(find_program(DRIVE)), "--bus", address.channel]
     for axis, drive in zip(machine.axes, machine.models(machine.axes), strict=True):
-        command += ["--axis", _axis_text(axis.node, drive, machine)]
+        command += ["--axis", _axis_text(axis, drive)]
     return command
 
 
-def _axis_text(node: int, drive: Drive, machine: Machine) -> str:
+def _axis_text(axis: Axis, drive: Drive) -> str:
     values: dict[str, float] = {
-        "node": node,
+        "node": axis.node,
         "gain_rad_s_v": drive.gain_rad_s_v,
         "time_constant_s": drive.time_constant_s,
         "screw_mm_rad": drive.screw_mm_rad,
@@ -96,11 +96,12 @@ def _axis_text(node: int, drive: Drive, machine: Machine) -> str:
         "k_vf": drive.k_vf,
         "encoder_counts_per_rev": drive.encoder_counts_per_rev,
         "loop_rate_hz": drive.loop_rate_hz,
-        "counts_per_mm": machine.counts_per_mm,
+        "counts_per_mm": axis.counts_per_unit,
         "position_mm": 0,
         "interpolation": INTERPOLATIONS.index(drive.interpolation),
         "speed": SPEEDS.index(drive.speed),
         "delay_samples": drive.delay_samples,
+        "integral": INTEGRALS.index(drive.integral),
         **drive.equipment.given(),
     }
     return ",".join(f"{key}={value:.17g}" for key, value in values.items())

@@ -16,6 +16,7 @@ from ..simulate import settling_ticks
 from .address import BusAddress, check_raw, is_virtual
 from .analysis import REACHED_AFTER, BusRun, analyse_recording, first_tick, measured_pace
 from .capture.decode import unhomed_starts
+from .capture.frames import Frames
 from .capture.recorder import Recorder
 from .capture.recordings import write_recording
 from .goto import goto
@@ -26,9 +27,13 @@ from .signals import unbroken
 
 __all__ = [
     "BusRun",
+    "Recorded",
     "RunSession",
+    "analysed",
+    "bring_up",
     "first_tick",
     "measured_pace",
+    "record_program",
     "rig_until_interrupted",
     "run_program",
     "run_session",
@@ -118,14 +123,49 @@ def run_program(
     Raises RefusedError, BusError, and RunError when the recording is incomplete, a setpoint jumps, or the setpoints are
     not those that the same kernel gives here.
     """
-    controller = at.controller
     program = NativeProgram(image)
-    _, setpoints = program.setpoints(kernel, machine.counts_per_mm)
-    controller.configure(machine, kernel)
-    controller.override(100)
-    controller.enable()
-    start_counts = int(setpoints[0, 0]), int(setpoints[0, 1])
-    goto(controller, machine, start_counts, unhomed=unhomed)
+    _, start = program.setpoints(kernel, machine.counts_per_mm, 0, 1)
+    bring_up(at, machine, kernel)
+    goto(at.controller, machine, start[0].tolist(), unhomed=unhomed)
+    recorded = record_program(at, machine, image, progress, unhomed=unhomed)
+    return analysed(at, machine, image, kernel, recorded, record)
+
+
+def bring_up(at: RunSession, machine: Machine, kernel: str) -> None:
+    """Configures the controller, sets the override to 100 % and switches the drives on."""
+    at.controller.configure(machine, kernel)
+    at.controller.override(100)
+    at.controller.enable()
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """What was on the bus from a little before a program's start until its axes had settled.
+
+    dropped  frames that the kernel of this computer dropped
+    misses   deadline misses of the controller
+    took_s   from the start to standstill, by the clock of the bus
+    """
+
+    frames: Frames
+    dropped: int
+    misses: int
+    took_s: float
+
+
+def record_program(
+    at: RunSession,
+    machine: Machine,
+    image: bytes,
+    progress: Progress | None = None,
+    *,
+    unhomed: bool = False,
+) -> Recorded:
+    """Uploads a program at whose start the axes stand, starts it, and waits until they stand again.
+
+    Raises RefusedError, BusError, and RunError for a fault.
+    """
+    controller = at.controller
     controller.upload(image)
     with Recorder(controller.address) as recorder:
         _await_syncs(controller, _REST_TICKS)
@@ -136,22 +176,34 @@ def run_program(
         behind = settling_ticks(machine.period_us) + REACHED_AFTER + _MARGIN_TICKS
         _await_syncs(controller, behind)
     misses = controller.read(STATISTICS, _MISSES)  # of this run: start sets it to 0
-    if recorder.dropped:
+    return Recorded(recorder.frames(), recorder.dropped, misses, took_s)
+
+
+def analysed(
+    at: RunSession,
+    machine: Machine,
+    image: bytes,
+    kernel: str,
+    recorded: Recorded,
+    record: Path | None = None,
+) -> BusRun:
+    """The run that was recorded; its frames are kept in `record`. Raises RunError as `run_program` does."""
+    if recorded.dropped:
         raise RunError(
-            f"the kernel dropped {recorder.dropped} frames of the recording: run again, as root if you can "
+            f"the kernel dropped {recorded.dropped} frames of the recording: run again, as root if you can "
             "(larger receive buffer)"
         )
-    frames = recorder.frames()
+    frames = recorded.frames
     if record is not None:
-        write_recording(record, frames, controller.address.name)
+        write_recording(record, frames, at.controller.address.name)
     motion, load = analyse_recording(frames, image, machine, kernel)
     return BusRun(
         motion=motion,
-        bus=str(controller.address),
-        deadline_misses=misses,
-        pace=at.pace or measured_pace(motion, took_s),
+        bus=str(at.controller.address),
+        deadline_misses=recorded.misses,
+        pace=at.pace or measured_pace(motion, recorded.took_s),
         frames=int(frames.size),
-        wall_s=took_s,
+        wall_s=recorded.took_s,
         load=load,
         unhomed_starts=unhomed_starts(frames, machine.node),
     )

@@ -91,10 +91,10 @@ def _gains(table: Table) -> Gains:
     interpolation = None
     if table.has("machine"):
         machine = load_machine(table.present("machine"))
-        drives = machine.models(machine.plane)
+        drives = machine.models(machine.require_plane("campaign"))
         changes |= gains_of((drives[0], drives[1]), _PDFF)
         interpolation = drives[0].interpolation, drives[1].interpolation
-        x, y = (axis.feedforward for axis in machine.plane)
+        x, y = (axis.feedforward for axis in machine.require_plane("campaign"))
         feed |= {name: (getattr(x, name), getattr(y, name)) for name in _FEED}
     changes |= {name: _both(table, name, 1e6) for name in _PDFF if table.has(name)}
     forward = table.table("feedforward", _FEED, required=False)
@@ -199,8 +199,8 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
 
 
 def _plant(machine: Machine, kernel: str | None) -> Plant:
-    x, y = machine.plane
-    drives = machine.models(machine.plane)
+    x, y = machine.require_plane("campaign")
+    drives = machine.models((x, y))
     return Plant(
         drives=(drives[0], drives[1]),
         feedforward=(x.feedforward, y.feedforward),

@@ -80,7 +80,7 @@ class OnDask:
                     result = future.result()
                 except dask.KilledWorker as error:
                     raise RunError(
-                        f"campaign: workers died over the same task ({one_line(error)}): look at their memory and "
+                        f"campaign: workers died over the same task ({one_line(error)}): check their memory and "
                         "their logs; given again, the command goes on where it was"
                     ) from None
                 running.update(self._submit(function, waiting, 1))

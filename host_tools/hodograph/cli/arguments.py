@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""The arguments of every command, in four families: without a bus, moving, operating, and watching the bus."""
+"""The arguments of every command, in five families: to begin with, without a bus, moving, operating, watching."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser
 from pathlib import Path
 
-from ..names import INTERPOLATIONS, PACES
+from ..names import INTERPOLATIONS, PACES, SHELLS
 from . import options
 from .options import (
     Command,
     at_least_one,
+    bit_rate,
     count,
     finite,
     node_number,
@@ -21,6 +22,28 @@ from .options import (
     positive,
     seconds,
 )
+
+
+def _init(command: Command) -> None:
+    init = command("init", "write a machine file, a path file and a drive file to begin with")
+    init.add_argument(
+        "folder", metavar="DIR", type=Path, nargs="?", default=Path(), help="default: here"
+    )
+
+
+def _schema(command: Command) -> None:
+    schema = command("schema", "print the JSON schema of an input file, for editors")
+    schema.add_argument(
+        "name", metavar="NAME", nargs="?", help="path, machine, drive, campaign or scenario"
+    )
+    schema.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="write DIR/NAME.schema.json (default: all)"
+    )
+
+
+def _completion(command: Command) -> None:
+    completion = command("completion", "print what a shell needs to complete commands and options")
+    completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help="bash, zsh or fish")
 
 
 def _spline(command: Command) -> None:
@@ -40,8 +63,9 @@ def _feed(command: Command) -> None:
 
 def _compile(command: Command) -> None:
     compile_ = command("compile", "make the program image that the controller runs")
-    options.file(compile_)
+    options.file(compile_, what="path file (TOML), or a toolpath of one section")
     options.machine(compile_)
+    options.toolpath(compile_)
     options.json(compile_)
     compile_.add_argument(
         "-o", "--output", type=Path, metavar="IMAGE", help="default: FILE with .hdgp, here"
@@ -66,9 +90,19 @@ def _verify(command: Command) -> None:
     )
 
 
+def _import(command: Command) -> None:
+    import_ = command("import", "show what becomes of a toolpath of another program")
+    options.file(import_, what=options.TOOLPATH)
+    options.machine(import_)
+    options.toolpath(import_)
+    import_.add_argument("-o", "--output", type=Path, metavar="TOML", help="write it there")
+    options.json(import_)
+
+
 def _simulate(command: Command) -> None:
     simulate = command("simulate", "run a path without a bus, as fast as it goes")
-    options.file(simulate)
+    options.file(simulate, what=f"path file (TOML), or {options.TOOLPATH}")
+    options.toolpath(simulate)
     options.machine(simulate)
     options.kernel(simulate)
     options.json(simulate)
@@ -106,7 +140,7 @@ def _report(command: Command) -> None:
 
 def _campaign(command: Command) -> None:
     campaign = command("campaign", "make many simulated runs on all cores, or on a cluster")
-    options.file(campaign, what="campaign file")
+    options.file(campaign, what="campaign file (TOML)")
     campaign.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="default: FILE without .toml, here"
     )
@@ -212,7 +246,7 @@ def _identify(command: Command) -> None:
 
 
 _OFFLINE = (
-    *(_spline, _feed, _compile, _inspect, _verify, _simulate, _report),
+    *(_spline, _feed, _compile, _inspect, _verify, _import, _simulate, _report),
     *(_campaign, _identify, _tune, _paper, _dbc),
 )
 
@@ -234,6 +268,9 @@ def _goto(command: Command) -> None:
     goto.add_argument(
         "--to", type=finite, nargs=2, metavar=("X", "Y"), help="move there instead (machine mm)"
     )
+    goto.add_argument(
+        "--z", type=finite, metavar="Z", help="with --to: of the third axis that draws paths"
+    )
     options.unhomed(goto)
     options.machine(goto)
     options.bus(goto)
@@ -242,9 +279,15 @@ def _goto(command: Command) -> None:
 
 def _run(command: Command) -> None:
     run = command("run", "run paths on the bus, record and analyse")
-    options.file(run, many=True)
+    options.file(run, many=True, what=f"path file (TOML), or {options.TOOLPATH}")
     options.unhomed(run)
     options.machine(run)
+    options.toolpath(run)
+    run.add_argument(
+        "--no-stops",
+        action="store_true",
+        help="of a toolpath: do not wait for Enter at program stops and tool changes (M0, M1, M6)",
+    )
     options.bus(run, can_serve=True)
     options.kernel(run)
     options.json(run)
@@ -332,6 +375,31 @@ def _hold(command: Command) -> None:
             options.timeout(parser_, "as long as braking takes")
 
 
+def _scan(command: Command) -> None:
+    scan = command("scan", "find the nodes on a bus, and what its drives say of themselves")
+    options.bus_name(scan)
+    scan.add_argument(
+        "--bitrate", type=bit_rate, default=1_000_000, metavar="N", help="bit/s (default 1000000)"
+    )
+    options.answer_wait(scan)
+    scan.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="write a commented machine file"
+    )
+    scan.add_argument("--force", action="store_true", help="replace a file that is there")
+    options.json(scan)
+
+
+def _check(command: Command) -> None:
+    check = command(
+        "check", "ask drives, object by object, whether they can do what a machine needs"
+    )
+    check.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
+    options.bus_name(check)
+    options.answer_wait(check)
+    check.add_argument("--all", action="store_true", help="print what is as needed, too")
+    options.json(check)
+
+
 def _machine_file(parser: ArgumentParser, then: str = "") -> None:
     """FILE, which may be left out; `then` says what is done with it."""
     parser.add_argument(
@@ -415,7 +483,18 @@ def _status(command: Command) -> None:
     )
 
 
-_OPERATING = (_start, _stop, _hold, _home, _configure, _quick_stop, _override, _status)
+_OPERATING = (
+    _scan,
+    _check,
+    _start,
+    _stop,
+    _hold,
+    _home,
+    _configure,
+    _quick_stop,
+    _override,
+    _status,
+)
 
 
 def _monitor(command: Command) -> None:
@@ -467,6 +546,22 @@ def _replay(command: Command) -> None:
     options.json(replay)
 
 
+def _latency(command: Command) -> None:
+    latency = command("latency", "measure how late the ticks of a controller are on this computer")
+    latency.add_argument(
+        "--bus",
+        metavar="INTERFACE:CHANNEL",
+        help="listen to the controller there (default: one started here, on a local bus in real time)",
+    )
+    latency.add_argument(
+        "--machine", type=Path, metavar="FILE", help="for the period (default: an example, 1000 us)"
+    )
+    latency.add_argument(
+        "--seconds", type=seconds, default=10.0, metavar="S", help="for so long (default 10)"
+    )
+    options.json(latency)
+
+
 def _faults(command: Command) -> None:
     faults = command("faults", "inject faults into simulated machines and judge what comes of it")
     faults.add_argument(
@@ -495,8 +590,9 @@ def _faults(command: Command) -> None:
     options.json(faults)
 
 
-_WATCHING = (_monitor, _record, _replay, _faults)
+_WATCHING = (_monitor, _record, _replay, _latency, _faults)
+_BEGINNING = (_init, _schema, _completion)
 
 
-ALL = (*_OFFLINE, *_MOVING, *_OPERATING, *_WATCHING)
+ALL = (*_BEGINNING, *_OFFLINE, *_MOVING, *_OPERATING, *_WATCHING)
 """Functions that add a command, in the order of `hodograph --help`."""

@@ -9,22 +9,30 @@ import signal
 import sys
 import traceback
 from collections.abc import Sequence
+from contextlib import nullcontext
 from importlib import import_module
 from types import FrameType
 
 from ..errors import INTERRUPTED_EXIT_STATUS, HodographError
-from .output import note
+from .output import WANTED, complain
 from .parser import make_parser
+from .waiting import waiting
 
 TERMINATED_EXIT_STATUS = 143
 """Exit status after SIGTERM (128 + SIGTERM)."""
 
 
 _MODULES = {
+    **dict.fromkeys(("init", "schema"), "start_commands"),
     **dict.fromkeys(("spline", "feed", "compile", "inspect", "simulate"), "path_commands"),
-    **dict.fromkeys(("upload", "goto", "run", "rig"), "motion_commands"),
+    **dict.fromkeys(("upload", "goto", "rig"), "motion_commands"),
+    "run": "run_command",
     **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
+    "completion": "completion",
+    **dict.fromkeys(("scan", "check"), "commission_commands"),
+    "import": "toolpath_commands",
     "demo": "demo_command",
+    "latency": "latency_command",
     "verify": "verify_command",
     "status": "status_command",
     "record": "record_command",
@@ -39,6 +47,25 @@ _MODULES = {
     **dict.fromkeys(("report", "paper"), "report_commands"),
 }
 """Where each command is; only its module is imported, since some take a second to load."""
+
+
+_COMPUTING = frozenset(
+    (
+        *(
+            "spline",
+            "feed",
+            "compile",
+            "inspect",
+            "simulate",
+            "import",
+            "verify",
+            "replay",
+            "report",
+        ),
+        *("paper", "tune", "identify", "upload", "goto", "run", "campaign"),
+    )
+)
+"""Commands that a terminal shows the time of, while they compute."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -77,14 +104,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> None:
-    module = import_module(f"{__package__}.{_MODULES[options.command]}")
-    module.COMMANDS[options.command](options)
+    command = options.command
+    WANTED.notes = not options.quiet
+    WANTED.progress = not (options.quiet or options.no_progress)
+    shown = WANTED.progress and command in _COMPUTING
+    with waiting(command) if shown else nullcontext():
+        module = import_module(f"{__package__}.{_MODULES[command]}")
+        module.COMMANDS[command](options)
 
 
 def _end(message: str, status: int, debug: bool) -> int:
     if debug:
         traceback.print_exc()
-    note(" ".join(message.split()))
+    complain(" ".join(message.split()))
     return status
 
 

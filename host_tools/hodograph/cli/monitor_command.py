@@ -10,9 +10,10 @@ from pathlib import Path
 from ..bus.capture.frames import Frames
 from ..bus.capture.setpoint_check import step_limits
 from ..bus.own_bus import bus_address
-from ..config import Machine, load_machine
+from ..config import PLANE_AXES, SPACE_AXES, Machine, load_machine
 from ..errors import InputError
 from ..monitor.decoder import nodes_in
+from ..monitor.derived import ProgramPath
 from ..monitor.pump import Layout
 from ..monitor.security import make_token
 from ..monitor.session import Live, LivePage, PageAddress, Replay
@@ -61,7 +62,15 @@ def _recorded_layout(frames: Frames, image: bytes | None) -> Layout:
     nodes = nodes_in(frames)
     names = tuple("xyzabc"[i] if i < 6 else str(node) for i, node in enumerate(nodes))
     period_us = NativeProgram(image).period_us if image is not None else _USUAL_PERIOD_US
-    return Layout(names, nodes, _USUAL_COUNTS_PER_MM, period_us, DEFAULT_BITRATE)
+    return Layout(
+        names=names,
+        nodes=nodes,
+        counts_per_unit=(_USUAL_COUNTS_PER_MM,) * len(nodes),
+        units=("mm",) * len(nodes),
+        drawn=PLANE_AXES if image is None else ProgramPath(image, _USUAL_COUNTS_PER_MM).axes,
+        period_us=period_us,
+        bitrate=DEFAULT_BITRATE,
+    )
 
 
 def machine_layout(machine: Machine) -> Layout:
@@ -69,7 +78,9 @@ def machine_layout(machine: Machine) -> Layout:
     return Layout(
         names=tuple(axis.name for axis in machine.axes),
         nodes=tuple(axis.node for axis in machine.axes),
-        counts_per_mm=machine.counts_per_mm,
+        counts_per_unit=tuple(axis.counts_per_unit for axis in machine.axes),
+        units=tuple(axis.unit for axis in machine.axes),
+        drawn=min(machine.path_count, SPACE_AXES),
         period_us=machine.period_us,
         bitrate=machine.bitrate,
         limits=step_limits(machine),
@@ -83,7 +94,7 @@ def _image_and_machine(options: Namespace) -> tuple[bytes | None, Machine | None
     image = read_image(options.program)
     if image is not None:
         return image, machine
-    pipeline = load_pipeline(options.program, options.machine)
+    pipeline = load_pipeline(options.program, options.machine, allow_space=True)
     return pipeline.image, pipeline.machine
 
 

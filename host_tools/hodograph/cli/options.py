@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..bus.address import BUS_VARIABLE, DEFAULT_BUS
-from ..names import KERNELS
+from ..names import KERNELS, LENGTH_UNITS_MM
 
 
 def finite(text: str) -> float:
@@ -41,6 +41,19 @@ def positive(text: str) -> float:
     return value
 
 
+def length_unit(text: str) -> float:
+    """A unit of length, in mm."""
+    if text in LENGTH_UNITS_MM:
+        return LENGTH_UNITS_MM[text]
+    try:
+        return positive(text)
+    except argparse.ArgumentTypeError:
+        names = ", ".join(LENGTH_UNITS_MM)
+        raise argparse.ArgumentTypeError(
+            f'"{text}" is no unit: one of {names}, or a number of mm'
+        ) from None
+
+
 def node_or_own(text: str) -> int:
     """A node number, or 0."""
     if not text.isdigit() or int(text) > 127:
@@ -66,6 +79,13 @@ def at_least_one(text: str) -> int:
     """A number of things of which there must be one."""
     if not text.isdigit() or not 1 <= int(text) <= 1000:
         raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 1 to 1000')
+    return int(text)
+
+
+def bit_rate(text: str) -> int:
+    """A bit rate of CAN."""
+    if not text.isdigit() or not 10_000 <= int(text) <= 1_000_000:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a bit rate from 10000 to 1000000')
     return int(text)
 
 
@@ -113,6 +133,17 @@ def bus(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> None:
     )
 
 
+def answer_wait(parser: argparse.ArgumentParser) -> None:
+    """--wait, for nodes."""
+    parser.add_argument(
+        "--wait",
+        type=seconds,
+        default=0.5,
+        metavar="S",
+        help="how long to wait for answers (default 0.5)",
+    )
+
+
 def controller(parser: argparse.ArgumentParser) -> None:
     """--controller."""
     parser.add_argument(
@@ -147,12 +178,18 @@ def unhomed(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def file(parser: argparse.ArgumentParser, *, many: bool = False, what: str = "path file") -> None:
+TOOLPATH = "toolpath: G-code (.ngc .nc .gcode .tap, or - for standard input), .dxf, .svg, points (.csv .txt)"
+"""What FILE is, for help."""
+
+
+def file(
+    parser: argparse.ArgumentParser, *, many: bool = False, what: str = "path file (TOML)"
+) -> None:
     """FILE."""
     if many:
-        parser.add_argument("files", metavar="FILE", type=Path, nargs="+", help=f"{what} (TOML)")
+        parser.add_argument("files", metavar="FILE", type=Path, nargs="+", help=what)
     else:
-        parser.add_argument("file", metavar="FILE", type=Path, help=f"{what} (TOML)")
+        parser.add_argument("file", metavar="FILE", type=Path, help=what)
 
 
 def json(parser: argparse.ArgumentParser) -> None:
@@ -165,6 +202,40 @@ def machine(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--machine", type=Path, metavar="FILE", help="machine file instead of the one FILE names"
     )
+
+
+def toolpath(parser: argparse.ArgumentParser) -> None:
+    """--tolerance, --feed, and what drawings and points do not say themselves."""
+    parser.add_argument(
+        "--tolerance",
+        type=finite,
+        metavar="MM",
+        help="of a toolpath: how far curves may be from it (default 0.01; 0: stop at the end of each move)",
+    )
+    parser.add_argument(
+        "--feed",
+        type=positive,
+        metavar="MM/S",
+        help="of a toolpath, instead of its own feeds; drawings need it",
+    )
+    for name, text in (
+        ("layer", "of a drawing: this layer only (may be repeated: in this order)"),
+        ("id", "of a drawing: this element only, by its id or handle (may be repeated)"),
+    ):
+        parser.add_argument(f"--{name}", action="append", default=[], metavar="NAME", help=text)
+    for name, unit, text in (
+        ("gap", "MM", "of a drawing: ends of contours so near are joined (default 0.01)"),
+        ("lift", "MM", "of a drawing: rapid moves are so far above it (default 0: beside it)"),
+        ("scale", "K", "of a drawing or of points: lengths times this"),
+    ):
+        parser.add_argument(f"--{name}", type=finite, metavar=unit, help=text)
+    parser.add_argument(
+        "--unit",
+        type=length_unit,
+        metavar="UNIT",
+        help="of a drawing or of points: mm, cm, m, um, in, or a number of mm (default: as the file says)",
+    )
+    parser.add_argument("--closed", action="store_true", help="of points: back to the first one")
 
 
 def kernel(parser: argparse.ArgumentParser) -> None:

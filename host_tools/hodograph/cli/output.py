@@ -9,16 +9,37 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from .waiting import held, is_terminal, remove_line
 
 LINE_AFTER_S, LINE_EVERY_S = 5.0, 10.0
 """Of progress where there is no terminal."""
 
 
+@dataclass
+class Wanted:
+    """What stderr shows beside errors: --quiet and --no-progress."""
+
+    notes: bool = True
+    progress: bool = True
+
+
+WANTED = Wanted()
+"""Of the command that runs in this process."""
+
+
 def note(text: str) -> None:
     """One line for the user, on stderr."""
+    if WANTED.notes:
+        complain(text)
+
+
+def complain(text: str) -> None:
+    """One line for the user, on stderr, whatever is wanted: why a command fails."""
+    remove_line()
     print(f"hodograph: {text}", file=sys.stderr)
 
 
@@ -43,6 +64,27 @@ def aligned(rows: Sequence[tuple[str, str]], least: int = 0) -> list[str]:
     return [f"{name:<{width}}  {value}" for name, value in rows]
 
 
+def duration_text(seconds: float) -> str:
+    """A time for people: "12.3 ms", "4.56789 s", "2 min 5.3 s", "1 h 2 min 5 s"."""
+    if 0.0 < seconds < 0.1:
+        return f"{seconds * 1e3:.3g} ms"
+    if seconds < 60.0:
+        return f"{number(seconds)} s"
+    minutes, rest = divmod(round(seconds, 1), 60.0)
+    if minutes < 60:
+        return f"{minutes:.0f} min {rest:.1f} s"
+    hours, minutes = divmod(round(seconds) // 60, 60)
+    return f"{hours} h {minutes} min {round(seconds) % 60} s"
+
+
+def size_text(size: int) -> str:
+    """A number of bytes for people: "7672 bytes", "129008 bytes (126 KiB)"."""
+    for unit, power in (("GiB", 30), ("MiB", 20), ("KiB", 10)):
+        if size >= 10 * 2**power:
+            return f"{size} bytes ({size / 2**power:.3g} {unit})"
+    return f"{size} bytes"
+
+
 def number(value: float) -> str:
     """A number for people: six digits, no exponent where it can be avoided."""
     if value and (abs(value) >= 1e6 or abs(value) < 1e-4) and math.isfinite(value):
@@ -56,17 +98,24 @@ def progress(title: str, unit: str, total: int | None = None) -> Iterator[Callab
 
     Call the result with what is done so far.
     """
-    if not sys.stderr.isatty():
+    if not WANTED.progress:
+        yield _nothing
+        return
+    if not is_terminal(sys.stderr):
         yield _Lines(title, unit, total)
         return
     from tqdm import tqdm
 
-    with tqdm(total=total, desc=title, unit=unit, leave=False, delay=0.3) as bar:
+    with held(), tqdm(total=total, desc=title, unit=unit, leave=False, delay=0.3) as bar:
 
         def advance(done: int) -> None:
             bar.update(done - bar.n)
 
         yield advance
+
+
+def _nothing(done: int) -> None:
+    del done
 
 
 class _Lines:

@@ -21,6 +21,14 @@ EPILOG = (
 )
 
 
+EVERYWHERE = (
+    (("-q", "--quiet"), "nothing on stderr but errors"),
+    (("--no-progress",), "no progress on stderr"),
+    (("--debug",), "show tracebacks (or HODOGRAPH_DEBUG=1)"),
+)
+"""Options that may stand before the command or behind it."""
+
+
 class _Parser(argparse.ArgumentParser):
     """Raises InputError with one line instead of printing usage."""
 
@@ -38,13 +46,18 @@ def make_parser() -> argparse.ArgumentParser:
     """The whole command line."""
     parser = _Parser(prog="hodograph", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action="version", version=f"hodograph {__version__}")
-    parser.add_argument(
-        "--debug", action="store_true", help="show tracebacks (or HODOGRAPH_DEBUG=1)"
-    )
+    everywhere = _Parser(add_help=False)
+    for names, text in EVERYWHERE:
+        parser.add_argument(*names, action="store_true", help=text)
+        everywhere.add_argument(
+            *names, action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
+        )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
 
     def command(name: str, text: str) -> argparse.ArgumentParser:
-        return commands.add_parser(name, help=text, description=text.capitalize() + ".")
+        return commands.add_parser(
+            name, help=text, description=f"{text[:1].upper()}{text[1:]}.", parents=[everywhere]
+        )
 
     for add in arguments.ALL:
         add(command)

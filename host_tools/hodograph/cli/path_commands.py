@@ -13,22 +13,34 @@ from ..bustime import require_fit
 from ..config import Machine
 from ..errors import HodographError, InputError
 from ..feed import FeedPlan
+from ..names import is_toolpath
 from ..native import NativeProgram
-from ..pipeline import Pipeline, load_pipeline
+from ..pipeline import Pipeline, axis_names, load_pipeline
 from ..program import Program, decode, inspect_dict, inspect_text
-from ..program.check import check
+from ..program.check import check, coefficients_in_range
 from ..program.image import LARGEST_BANK, MAGIC, RECORD_BYTES, memory_bytes
 from ..program.stops import stops_dict, stops_text
 from ..simulate import Motion, StoppedRun, last_tick_s, simulate, simulate_stop, write_trace
 from ..spline import PHSpline
 from ..spline.spatial import SpatialPHSpline
-from .output import json_text, note, number, print_json, print_rows, progress, write_file
+from .output import (
+    duration_text,
+    json_text,
+    note,
+    number,
+    print_json,
+    print_rows,
+    progress,
+    size_text,
+    write_file,
+)
+from .toolpath_commands import refuse_toolpath_options, section_pipeline, simulate_toolpath
 
 
 def spline(options: Namespace) -> None:
     """hodograph spline."""
     pipeline = load_pipeline(options.file, allow_space=True)
-    found = pipeline.spatial_spline_result or pipeline.spline_result
+    found = pipeline.found_spline
     curve = found.spline
     for line in found.notes:
         note(f"{options.file.name}: {line}")
@@ -102,7 +114,7 @@ def print_notes(pipeline: Pipeline, plan: FeedPlan) -> None:
 
 def feed(options: Namespace) -> None:
     """hodograph feed."""
-    pipeline = load_pipeline(options.file, options.machine)
+    pipeline = load_pipeline(options.file, options.machine, allow_space=True)
     plan = pipeline.plan
     print_notes(pipeline, plan)
     result: dict[str, object] = {
@@ -136,8 +148,8 @@ def feed(options: Namespace) -> None:
             ("profile", plan.profile + slope),
             ("feed", f"{number(plan.feed_mm_s)} mm/s"),
             *ramps,
-            ("duration", f"{number(plan.duration_s)} s"),
-            ("planned in", f"{pipeline.planning_s:.3g} s"),
+            ("duration", duration_text(plan.duration_s)),
+            ("planned in", duration_text(pipeline.planning_s)),
             ("peak acceleration", f"{number(plan.peak_acceleration_mm_s2)} mm/s^2"),
             ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
         ]
@@ -170,7 +182,11 @@ def _program_of(pipeline: Pipeline) -> Program | None:
 
 def compile_(options: Namespace) -> None:
     """hodograph compile."""
-    pipeline = load_pipeline(options.file, options.machine)
+    if is_toolpath(options.file):
+        pipeline = section_pipeline(options)
+    else:
+        refuse_toolpath_options(options, options.file)
+        pipeline = load_pipeline(options.file, options.machine, allow_space=True)
     require_fit(pipeline.machine)
     image = pipeline.image
     print_notes(pipeline, pipeline.compilation.plan)
@@ -182,7 +198,7 @@ def compile_(options: Namespace) -> None:
         print_json({"file": str(output), "bytes": len(image)} | inspect_dict(program))
         return
     print(
-        f"{output}: {len(image)} bytes, {program.segment_count} segments, {program.piece_count} feed "
+        f"{output}: {size_text(len(image))}, {program.segment_count} segments, {program.piece_count} feed "
         f"pieces, {program.ticks} ticks of {program.period_us} us"
     )
     for line in stops_text(program.stops, program.piece_starts_mm):
@@ -228,9 +244,11 @@ def inspect(options: Namespace) -> None:
     """hodograph inspect."""
     image = read_image(options.file)
     if image is None:
-        program = load_pipeline(options.file, options.machine).program
+        program = load_pipeline(options.file, options.machine, allow_space=True).program
     else:
         program = decode_file(options.file, image)
+    if not coefficients_in_range(program):
+        raise InputError(f"{options.file}: {_unsound(program)}")
     try:
         with np.errstate(divide="raise", invalid="raise", over="raise"):
             found = inspect_dict(program)
@@ -258,18 +276,23 @@ def simulate_chain(pipeline: Pipeline, kernel: str | None, *, keep_rows: bool = 
     with progress("simulate", "tick", pipeline.program.ticks) as bar:
         return simulate(
             image,
-            machine.models(machine.plane),
+            machine.models(machine.path_axes),
             kernel=kernel or machine.kernel,
             counts_per_mm=machine.counts_per_mm,
-            feedforward=machine.plane_feedforward,
+            feedforward=machine.path_feedforward,
             keep_rows=keep_rows,
             progress=lambda done, total: bar(done),
+            names=axis_names(machine),
         )
 
 
 def simulate_(options: Namespace) -> None:
     """hodograph simulate."""
-    pipeline = load_pipeline(options.file, options.machine)
+    if is_toolpath(options.file):
+        simulate_toolpath(options)
+        return
+    refuse_toolpath_options(options, options.file)
+    pipeline = load_pipeline(options.file, options.machine, allow_space=True)
     times = {"hold": options.hold_at, "stop": options.stop_at, "fault": options.fault_at}
     for kind, values in times.items():
         _within(f"--{kind}-at", values, last_tick_s(pipeline.program), "s")
@@ -303,12 +326,13 @@ def _stopped(pipeline: Pipeline, kernel: str | None, kind: str, at_s: float) -> 
     machine = pipeline.machine
     return simulate_stop(
         NativeProgram(pipeline.image),
-        machine.models(machine.plane),
+        machine.models(machine.path_axes),
         kind,
         at_s,
         kernel=kernel or machine.kernel,
         counts_per_mm=machine.counts_per_mm,
-        feedforward=machine.plane_feedforward,
+        feedforward=machine.path_feedforward,
+        names=axis_names(machine),
     )
 
 
@@ -331,7 +355,7 @@ def _print_stops(stops: list[StoppedRun]) -> None:
 
 def volts_words(motion: Motion) -> str:
     """The greatest voltage of a run, for people."""
-    return "not told by the drives" if motion.max_volts is None else f"{motion.max_volts:.3f} V"
+    return "not reported by the drives" if motion.max_volts is None else f"{motion.max_volts:.3f} V"
 
 
 def motion_rows(motion: Motion) -> list[tuple[str, str]]:

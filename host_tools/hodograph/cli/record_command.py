@@ -16,8 +16,15 @@ from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.clock import REAL_CLOCK, Clock, VirtualClock
 from ..bus.own_bus import bus_address
 from ..bus.processes import virtual_clock
-from ..bus.sdo.configuration import configured_axis_limits, configured_limits, configured_nodes
+from ..bus.sdo.configuration import (
+    configured_axis_limits,
+    configured_counts,
+    configured_limits,
+    configured_nodes,
+)
 from ..bus.sdo.controller import connect
+from ..bus.sdo.objects import PROGRAM
+from ..config import PLANE_AXES
 from ..errors import BusError, HodographError, RunError
 from .output import note, print_json
 from .targets import DEFAULT_BITRATE
@@ -67,7 +74,7 @@ class _Recording:
         self._options = options
         self._watch = SetpointWatch(None if machine is None else machine.nodes)
         self.unhomed_starts = 0
-        self._worst: dict[tuple[str, tuple[int, ...]], Step] = {}
+        self._worst: dict[tuple[str, tuple[int, ...], tuple[int, ...]], Step] = {}
         self._writer = RecordingWriter(options.file, address.name)
         self._virtual: VirtualClock | None = None
         try:
@@ -118,9 +125,10 @@ class _Recording:
 
     def _look(self, steps: list[Step]) -> None:
         for step in steps:
-            known = self._worst.get((step.rule, step.axes))
+            kind = step.rule, step.axes, step.group
+            known = self._worst.get(kind)
             if known is None or known.needed < step.needed:
-                self._worst[step.rule, step.axes] = step
+                self._worst[kind] = step
 
     @property
     def frame_count(self) -> int:
@@ -154,10 +162,14 @@ def _jumps(
             controller.require(_ANSWER_S)
             nodes = configured_nodes(controller)
             of_axes = configured_axis_limits(controller, len(nodes))
-            seen = [
-                axis for axis, node in zip(of_axes, nodes, strict=True) if node in recording.nodes
-            ]
-            limits = limits_at(*configured_limits(controller), axes=seen)
+            counts = configured_counts(controller, len(nodes))
+            seen = [axis for axis, node in enumerate(nodes) if node in recording.nodes]
+            limits = limits_at(
+                *configured_limits(controller),
+                axes=[of_axes[axis] for axis in seen],
+                axis_counts=[counts[axis] for axis in seen],
+                path=controller.read(PROGRAM, 24) or PLANE_AXES,
+            )
     except HodographError as error:
         note(f"setpoints were not checked, --machine FILE says what is allowed: {error}")
         return None

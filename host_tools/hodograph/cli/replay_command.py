@@ -21,7 +21,11 @@ def replay(options: Namespace) -> None:
 
     check_suffix(options.recording)
     image = read_image(options.file)
-    pipeline = None if image is not None else load_pipeline(options.file, options.machine)
+    pipeline = (
+        None
+        if image is not None
+        else load_pipeline(options.file, options.machine, allow_space=True)
+    )
     if pipeline is not None:
         image, machine = pipeline.image, pipeline.machine
         print_notes(pipeline, pipeline.compilation.plan)

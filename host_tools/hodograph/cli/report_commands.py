@@ -14,7 +14,7 @@ def report(options: Namespace) -> None:
     """hodograph report."""
     from ..report import write_report
 
-    pipelines = [load_pipeline(file, options.machine) for file in options.files]
+    pipelines = [load_pipeline(file, options.machine, allow_space=True) for file in options.files]
     cases = []
     for pipeline in pipelines:
         print_notes(pipeline, pipeline.plan)

@@ -59,7 +59,7 @@ def tune(options: Namespace) -> None:
 
 def _with_feedforward(machine: Machine, forward: tuple[Feedforward, Feedforward]) -> Machine:
     """The machine as it is to be: offsets take room on the bus."""
-    plane = zip(machine.plane, forward, strict=True)
+    plane = zip(machine.require_plane("tune"), forward, strict=True)
     told = tuple(replace(axis, feedforward=own) for axis, own in plane)
     return replace(machine, axes=(*told, *machine.axes[len(told) :]))
 

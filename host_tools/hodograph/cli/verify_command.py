@@ -35,7 +35,7 @@ _MOST_LINES = 20
 
 def verify(options: Namespace) -> None:
     """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
-    pipeline = load_pipeline(options.file, options.machine)
+    pipeline = load_pipeline(options.file, options.machine, allow_space=True)
     machine = pipeline.machine_or_none
     native = _planned(pipeline) if options.program is None else _given(options.program)
     program = decode_file(options.program or options.file, native.image)
@@ -84,9 +84,7 @@ def _planned(pipeline: Pipeline) -> NativeProgram:
     if pipeline.machine_or_none is not None:
         return pipeline.accepted
     options = ProgramOptions(pipeline.file.name)
-    return NativeProgram(
-        encode(compile_program(pipeline.spline_result.spline, pipeline.plan, options))
-    )
+    return NativeProgram(encode(compile_program(pipeline.curve, pipeline.plan, options)))
 
 
 def _given(file: Path) -> NativeProgram:
@@ -98,11 +96,11 @@ def _given(file: Path) -> NativeProgram:
 
 
 def _drives(machine: Machine | None) -> tuple[Drive, ...]:
-    """Those of x and y, none when one of them is not known."""
+    """Those of the axes that follow the path, none when one of them is not known."""
     if machine is None or len(machine.axes) < PLANE_AXES:
         return ()
-    known = [axis.drive for axis in machine.plane if axis.drive is not None]
-    return tuple(known) if len(known) == PLANE_AXES else ()
+    known = [axis.drive for axis in machine.path_axes if axis.drive is not None]
+    return tuple(known) if len(known) == len(machine.path_axes) else ()
 
 
 def _document(

@@ -3,12 +3,13 @@
 
 from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive
-from .machine_file import PLANE_AXES, Machine, Supervision, load_machine
+from .machine_file import PLANE_AXES, SPACE_AXES, Machine, Supervision, load_machine
 from .path_file import PathFile, PathSpec, SpacePathSpec, load_path_file
 from .table import is_there, read_toml
 
 __all__ = [
     "PLANE_AXES",
+    "SPACE_AXES",
     "Axis",
     "Drive",
     "Feedforward",

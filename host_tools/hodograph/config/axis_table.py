@@ -7,11 +7,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..errors import InputError
 from .drive_file import Drive, load_drive
 from .table import Table
 
 MAX_AXES = 6
-COUNTS_PER_MM_MAX = 2**23
+UNITS = ("mm", "deg")
+"""What an axis is measured in: an axis in degrees turns."""
+COUNTS_PER_UNIT_MAX = 2**23
 """The controller's own bound (firmware/app/machine/config.h)."""
 I32_MAX, U32_MAX = 2**31 - 1, 2**32 - 1
 HOMING_METHODS = (0, 17, 18, 19, 20, 21, 22, 35, 37)
@@ -20,7 +23,7 @@ HOMING_METHODS = (0, 17, 18, 19, 20, 21, 22, 35, 37)
 
 @dataclass(frozen=True)
 class Homing:
-    """How `hodograph home` finds this axis' zero; method 0: not at all."""
+    """How `hodograph home` finds this axis' zero; method 0: not at all. Degrees instead of mm where the axis turns."""
 
     method: int = 0
     offset_mm: float = 0.0
@@ -31,7 +34,10 @@ class Homing:
 
 @dataclass(frozen=True)
 class Feedforward:
-    """What the controller sends beside the target: a share of its velocity, torque in per mille of the rated one."""
+    """What the controller sends beside the target: a share of its velocity, torque in per mille of the rated one.
+
+    Of an axis that turns, torque is for 1000 deg/s^2 and 1000 deg/s in place of m/s^2 and m/s.
+    """
 
     velocity: float = 0.0
     torque_permille_s2_m: float = 0.0
@@ -82,6 +88,7 @@ class Axis:
     """One axis: CANopen node, travel limits in machine coordinates, limits of its motion, what is written to its
     drive, and its model.
 
+    An axis that turns (`unit` "deg") has degrees where the names of its fields, and of its drive's model, say mm.
     No program moves the axis beyond its velocity, acceleration and jerk: plans keep them, and the controller proves it
     before it accepts a program (docs/guides/limits.md).
 
@@ -90,7 +97,9 @@ class Axis:
     """
 
     name: str
+    unit: str
     node: int
+    counts_per_unit: int
     travel_min_mm: float
     travel_max_mm: float
     velocity_mm_s: float
@@ -105,9 +114,15 @@ class Axis:
     scaling: Scaling
     identity: Identity
 
+    @property
+    def turns(self) -> bool:
+        """Whether it is measured in degrees."""
+        return self.unit == "deg"
+
 
 _AXIS = (
     "name",
+    "unit",
     "node",
     "travel_mm",
     "velocity_mm_s",
@@ -134,111 +149,173 @@ _SCALING = (
 )
 
 
-def read_axes(
-    root: Table, controller_node: int, acceleration_mm_s2: float
-) -> tuple[tuple[Axis, ...], int]:
-    """The axes of a machine file and their common counts per mm.
+class _AxisTable:
+    """One [[axis]], or a table in it, of an axis that is measured in `unit`: its keys are asked for by what they are
+    called in mm.
+    """
+
+    def __init__(self, table: Table, unit: str) -> None:
+        """Raises InputError: the table has a key of the other unit."""
+        self.table, self.unit = table, unit
+        other = UNITS[1 - UNITS.index(unit)]
+        for name in (*_AXIS, *_HOMING, *_FEEDFORWARD):
+            wrong = in_unit(name, other)
+            if wrong != self.key(name) and table.has(wrong):
+                does = "turns" if unit == "deg" else "does not turn"
+                raise table.error(
+                    wrong, f'does not fit: the axis {does}, use {self.key(name)} or another "unit"'
+                )
+
+    def key(self, name: str) -> str:
+        """A key as the file has it for this unit."""
+        return in_unit(name, self.unit)
+
+    def has(self, name: str) -> bool:
+        """Whether the file gives this key."""
+        return self.table.has(self.key(name))
+
+    def number(self, name: str, default: float | None = None, *, low: float, high: float) -> float:
+        """As Table.number."""
+        if default is None:
+            return self.table.number(self.key(name), low=low, high=high)
+        return self.table.number(self.key(name), default, low=low, high=high)
+
+    def error(self, name: str, message: str) -> InputError:
+        """As Table.error."""
+        return self.table.error(self.key(name), message)
+
+    def inner(self, name: str, known: tuple[str, ...], *, required: bool = True) -> _AxisTable:
+        """A table in this one."""
+        return _AxisTable(self.table.table(name, _in_units(known), required=required), self.unit)
+
+
+def in_unit(name: str, unit: str) -> str:
+    """The key of an axis in this unit that is called `name` in mm."""
+    if name.startswith("torque_permille"):
+        return name if unit == "mm" else name.removesuffix("m") + "kdeg"
+    return "_".join(unit if word == "mm" else word for word in name.split("_"))
+
+
+def _in_units(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The keys in both units, each once; those in mm first, as near keys are looked for in this order."""
+    return tuple(dict.fromkeys(in_unit(name, unit) for unit in UNITS for name in names))
+
+
+def read_axes(root: Table, controller_node: int, acceleration_mm_s2: float) -> tuple[Axis, ...]:
+    """The axes of a machine file, in its order.
 
     `acceleration_mm_s2`, the controller's limit, is what quick stops brake with where nothing else is said.
     """
-    tables = root.tables("axis", _AXIS)
+    tables = root.tables("axis", _in_units(_AXIS))
     if len(tables) > MAX_AXES:
         raise tables[-1].error("name", f"makes {len(tables)} axes: a machine has 1 to {MAX_AXES}")
+    keyed = [_AxisTable(table, table.choice("unit", UNITS, "mm")) for table in tables]
     counts = [
-        t.integer("counts_per_mm", 1_000_000, low=1000, high=COUNTS_PER_MM_MAX) for t in tables
+        table.table.integer(
+            table.key("counts_per_mm"), 1_000_000, low=1000, high=COUNTS_PER_UNIT_MAX
+        )
+        for table in keyed
     ]
-    if len(set(counts)) != 1:
-        raise tables[-1].error("counts_per_mm", "must be the same for all axes")
-    axes = tuple(_axis(t, counts[0], acceleration_mm_s2) for t in tables)
-    taken = {controller_node: "the controller"}
+    straight = [(t, n) for t, n in zip(keyed, counts, strict=True) if t.unit == "mm"]
+    if len({n for _, n in straight}) > 1:
+        raise straight[-1][0].error("counts_per_mm", "must be the same for all axes")
+    axes = tuple(_axis(t, n, acceleration_mm_s2) for t, n in zip(keyed, counts, strict=True))
+    taken: dict[int, str] = {controller_node: "the controller"}
     for axis, table in zip(axes, tables, strict=True):
         if axis.node in taken:
             raise table.error("node", f"{axis.node} is taken by {taken[axis.node]}")
         taken[axis.node] = f"axis {axis.name}"
-    return axes, counts[0]
+    return axes
 
 
-def _axis(table: Table, counts_per_mm: int, acceleration_mm_s2: float) -> Axis:
-    low, high = table.pair("travel_mm", low=-4096, high=4096)
+def _axis(keyed: _AxisTable, counts_per_unit: int, acceleration_mm_s2: float) -> Axis:
+    table, unit = keyed.table, keyed.unit
+    travel = keyed.key("travel_mm")
+    low, high = table.pair(travel, low=-4096, high=4096)
     if not low < high:
-        raise table.error("travel_mm", f"must be [least, greatest], but is [{low:g}, {high:g}]")
-    reach = I32_MAX / counts_per_mm
+        raise table.error(travel, f"must be [least, greatest], but is [{low:g}, {high:g}]")
+    reach = I32_MAX / counts_per_unit
     if max(abs(low), abs(high)) > reach:
-        raise table.error("travel_mm", f"leaves the ±{reach:.1f} mm that i32 counts can express")
+        raise table.error(travel, f"leaves the ±{reach:.1f} {unit} that i32 counts can express")
     drive = load_drive(table.present("drive")) if table.has("drive") else None
-    steepest = math.floor(1000 * U32_MAX / counts_per_mm) / 1000
+    acceleration = _motion_limit(keyed, "acceleration_mm_s2", 0.1, 4e6)
+    steepest = math.floor(1000 * U32_MAX / counts_per_unit) / 1000
     window = None
-    if table.has("following_window_mm"):
-        window = _counted(table, "following_window_mm", 0, counts_per_mm)
+    if keyed.has("following_window_mm"):
+        window = _counted(keyed, "following_window_mm", 0, counts_per_unit)
+    usual_stop = acceleration if keyed.unit == "deg" else acceleration_mm_s2
     return Axis(
         name=table.text("name"),
+        unit=unit,
         node=table.integer("node", low=1, high=127),
+        counts_per_unit=counts_per_unit,
         travel_min_mm=low,
         travel_max_mm=high,
-        velocity_mm_s=_motion_limit(table, "velocity_mm_s", 0.01, 4000),
-        acceleration_mm_s2=_motion_limit(table, "acceleration_mm_s2", 0.1, 4e6),
-        jerk_mm_s3=_motion_limit(table, "jerk_mm_s3", 1, 4e9),
+        velocity_mm_s=_motion_limit(keyed, "velocity_mm_s", 0.01, 4000),
+        acceleration_mm_s2=acceleration,
+        jerk_mm_s3=_motion_limit(keyed, "jerk_mm_s3", 1, 4e9),
         drive=drive,
         following_window_mm=window,
         following_timeout_ms=table.integer(
             "following_timeout_ms", 0 if window is None else 10, low=0, high=65535
         ),
         quick_stop_mm_s2=_counted(
-            table, "quick_stop_mm_s2", min(acceleration_mm_s2, steepest), counts_per_mm
+            keyed, "quick_stop_mm_s2", min(usual_stop, steepest), counts_per_unit
         ),
-        homing=_homing(table, counts_per_mm, reach),
-        feedforward=_feedforward(table),
-        scaling=_scaling(table, drive, counts_per_mm),
+        homing=_homing(keyed, counts_per_unit, reach),
+        feedforward=_feedforward(keyed),
+        scaling=_scaling(table, drive, counts_per_unit),
         identity=_identity(table),
     )
 
 
-def _motion_limit(table: Table, key: str, low: float, high: float) -> float:
-    if not table.has(key):
+def _motion_limit(table: _AxisTable, name: str, low: float, high: float) -> float:
+    if not table.has(name):
+        keys = [table.key(key) for key in ("velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")]
         raise table.error(
-            key,
-            "is missing: add what the axis may do (velocity_mm_s, acceleration_mm_s2 and jerk_mm_s3)",
+            name,
+            f"is missing: add what the axis may do ({keys[0]}, {keys[1]} and {keys[2]})",
         )
-    return table.number(key, low=low, high=high)
+    return table.number(name, low=low, high=high)
 
 
-def _counted(table: Table, key: str, default: float, counts_per_mm: int) -> float:
+def _counted(table: _AxisTable, name: str, default: float, counts_per_unit: int) -> float:
     """A positive length, speed or acceleration that is sent as u32 in counts."""
-    value = table.number(key, default, low=1e-6, high=1e9)
-    if not 1 <= value * counts_per_mm <= U32_MAX:
+    value = table.number(name, default, low=1e-6, high=1e9)
+    if not 1 <= value * counts_per_unit <= U32_MAX:
         raise table.error(
-            key,
-            f"must be from {1 / counts_per_mm:g} to {U32_MAX / counts_per_mm:.1f} "
-            f"(u32 in counts, {counts_per_mm} a mm), but is {value:g}",
+            name,
+            f"must be from {1 / counts_per_unit:g} to {U32_MAX / counts_per_unit:.1f} "
+            f"(u32 in counts, {counts_per_unit} a {table.unit}), but is {value:g}",
         )
     return value
 
 
-def _homing(axis: Table, counts_per_mm: int, reach_mm: float) -> Homing:
+def _homing(axis: _AxisTable, counts_per_unit: int, reach_mm: float) -> Homing:
     if not axis.has("homing"):
         return Homing()
-    table, usual = axis.table("homing", _HOMING), Homing()
-    method = table.integer("method", low=-128, high=127)
+    table, usual = axis.inner("homing", _HOMING), Homing()
+    method = table.table.integer("method", low=-128, high=127)
     if method not in HOMING_METHODS:
         known = ", ".join(map(str, HOMING_METHODS))
         raise table.error("method", f"must be one of {known}, but is {method}")
-    speed = _counted(table, "speed_mm_s", usual.speed_mm_s, counts_per_mm)
-    slow = _counted(table, "slow_mm_s", min(usual.slow_mm_s, speed), counts_per_mm)
+    speed = _counted(table, "speed_mm_s", usual.speed_mm_s, counts_per_unit)
+    slow = _counted(table, "slow_mm_s", min(usual.slow_mm_s, speed), counts_per_unit)
     if slow > speed:
-        raise table.error("slow_mm_s", f"is {slow:g}, above speed_mm_s = {speed:g}")
+        raise table.error("slow_mm_s", f"is {slow:g}, above {table.key('speed_mm_s')} = {speed:g}")
     return Homing(
         method=method,
         offset_mm=table.number("offset_mm", usual.offset_mm, low=-reach_mm, high=reach_mm),
         speed_mm_s=speed,
         slow_mm_s=slow,
         acceleration_mm_s2=_counted(
-            table, "acceleration_mm_s2", usual.acceleration_mm_s2, counts_per_mm
+            table, "acceleration_mm_s2", usual.acceleration_mm_s2, counts_per_unit
         ),
     )
 
 
-def _feedforward(axis: Table) -> Feedforward:
-    table = axis.table("feedforward", _FEEDFORWARD, required=False)
+def _feedforward(axis: _AxisTable) -> Feedforward:
+    table = axis.inner("feedforward", _FEEDFORWARD, required=False)
     return Feedforward(
         velocity=table.number("velocity", 0.0, low=0, high=2),
         torque_permille_s2_m=table.number("torque_permille_s2_m", 0.0, low=-32767, high=32767),
@@ -252,7 +329,7 @@ def _identity(axis: Table) -> Identity:
     return Identity(**given)
 
 
-def _scaling(axis: Table, drive: Drive | None, counts_per_mm: int) -> Scaling:
+def _scaling(axis: Table, drive: Drive | None, counts_per_unit: int) -> Scaling:
     if not axis.has("scaling"):
         return Scaling()
     table = axis.table("scaling", _SCALING)
@@ -260,7 +337,7 @@ def _scaling(axis: Table, drive: Drive | None, counts_per_mm: int) -> Scaling:
     def number(key: str, default: int) -> int:
         return table.integer(key, default, low=0, high=U32_MAX)
 
-    feed = number("feed_counts_per_rev", _feed_of(drive, counts_per_mm))
+    feed = number("feed_counts_per_rev", _feed_of(drive, counts_per_unit))
     geared = table.has("gear_motor_revolutions") or table.has("gear_shaft_revolutions")
     motor = number("gear_motor_revolutions", int(geared))
     shaft = number("gear_shaft_revolutions", int(geared))
@@ -271,5 +348,5 @@ def _scaling(axis: Table, drive: Drive | None, counts_per_mm: int) -> Scaling:
     return Scaling(number("encoder_increments_per_rev", 0), feed, motor, shaft)
 
 
-def _feed_of(drive: Drive | None, counts_per_mm: int) -> int:
-    return 0 if drive is None else round(2 * math.pi * drive.screw_mm_rad * counts_per_mm)
+def _feed_of(drive: Drive | None, counts_per_unit: int) -> int:
+    return 0 if drive is None else round(2 * math.pi * drive.screw_mm_rad * counts_per_unit)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from ..names import INTERPOLATIONS, SPEEDS
+from ..names import INTEGRALS, INTERPOLATIONS, SPEEDS
 from .table import Table, read_toml
 
 
@@ -50,11 +50,14 @@ class Drive:
     encoder_counts_per_rev: int
     loop_rate_hz: int
     interpolation: str = "linear"
-    """How it goes from setpoint to setpoint: "linear" or "cubic" (docs/theory/numerics.md section 13)."""
+    """How it goes from setpoint to setpoint: "linear", "cubic", or "none": the setpoint is the command at once
+    (docs/theory/numerics.md section 13)."""
     speed: str = "exact"
     """Of the motor for the loop: "exact", or "differences" of the encoder between two servo samples."""
     delay_samples: int = 0
     """Servo samples from the encoder to the volts, 0 or 1."""
+    integral: str = "backward"
+    """Euler's method of the loop's integral: "backward", with the present sample, or "forward", without it."""
     equipment: Equipment = Equipment()
 
     @property
@@ -67,34 +70,48 @@ class Drive:
 
 _SECTIONS = ("plant", "pdff", "encoder", "servo", "equipment")
 _PLANT = ("gain_rad_s_v", "time_constant_s", "screw_mm_rad", "torque_to_volts", "volts_limit")
-_PDFF = ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s", "k_pf_rad_mm", "k_vf")
+_PDFF = ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s", "k_pf_rad_mm", "k_vf", "integral")
+MOTOR_GAINS = {"k_pp_rad_s_mm": "k_pp_per_s", "k_pf_rad_mm": "k_pf"}
+"""Gains that a drive file may give in radians of the motor instead: there they are larger by `screw_mm_rad`."""
 
 
 def load_drive(file: Path) -> Drive:
     """The drive that a TOML file describes; raises InputError."""
     root = Table(file, "", read_toml(file), _SECTIONS)
     plant = root.table("plant", _PLANT)
-    pdff = root.table("pdff", _PDFF)
+    pdff = root.table("pdff", (*_PDFF, *MOTOR_GAINS.values()))
+    screw_mm_rad = plant.number("screw_mm_rad", low=1e-4, high=1e3)
     encoder = root.table("encoder", ("counts_per_rev", "speed"), required=False)
     servo = root.table("servo", ("loop_rate_hz", "interpolation", "delay_samples"), required=False)
     return Drive(
         gain_rad_s_v=plant.number("gain_rad_s_v", low=1e-3, high=1e6),
         time_constant_s=plant.number("time_constant_s", low=1e-5, high=1e3),
-        screw_mm_rad=plant.number("screw_mm_rad", low=1e-4, high=1e3),
+        screw_mm_rad=screw_mm_rad,
         torque_to_volts=plant.number("torque_to_volts", low=1e-6, high=1e6),
         volts_limit=plant.number("volts_limit", low=1e-3, high=32.767),
-        k_pp_rad_s_mm=pdff.number("k_pp_rad_s_mm", low=0, high=1e6),
+        k_pp_rad_s_mm=_by_way(pdff, "k_pp_rad_s_mm", screw_mm_rad),
         k_pv_nm_s_rad=pdff.number("k_pv_nm_s_rad", low=0, high=1e6),
         k_iv_per_s=pdff.number("k_iv_per_s", low=0, high=1e6),
-        k_pf_rad_mm=pdff.number("k_pf_rad_mm", low=0, high=1e6),
+        k_pf_rad_mm=_by_way(pdff, "k_pf_rad_mm", screw_mm_rad),
         k_vf=pdff.number("k_vf", low=0, high=1e3),
         encoder_counts_per_rev=encoder.integer("counts_per_rev", 2**20, low=16, high=2**26),
         loop_rate_hz=_loop_rate(servo),
         interpolation=servo.choice("interpolation", INTERPOLATIONS, "linear"),
         speed=encoder.choice("speed", SPEEDS, "exact"),
         delay_samples=servo.integer("delay_samples", 0, low=0, high=1),
+        integral=pdff.choice("integral", INTEGRALS, "backward"),
         equipment=_equipment(root),
     )
+
+
+def _by_way(pdff: Table, name: str, screw_mm_rad: float) -> float:
+    """A gain per mm of way, given so or in radians of the motor."""
+    by_motor = MOTOR_GAINS[name]
+    if not pdff.has(by_motor):
+        return pdff.number(name, low=0, high=1e6)
+    if pdff.has(name):
+        raise pdff.error(by_motor, f"and {name} are one gain in two units: give one of them")
+    return pdff.number(by_motor, low=0, high=1e6) / screw_mm_rad
 
 
 def _equipment(root: Table) -> Equipment:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..names import KERNELS
-from .axis_table import Axis, Feedforward, read_axes
+from .axis_table import MAX_AXES, Axis, Feedforward, read_axes
 from .drive_file import Drive
 from .table import Table, read_toml
 
-PLANE_AXES = 2
-"""The first two axes follow the path, the rest hold their position."""
+PLANE_AXES, SPACE_AXES = 2, 3
+"""Axes that draw a path in the plane and in space. Further axes of a path follow it in the same parameter."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,9 @@ class Machine:
     """What a machine file says. The limits are the controller's own: they always bind.
 
     stop_time_ms  a program whose fault stop may take longer is refused
+    offset_mm     one number for each axis of the path
+    axes          first those that follow the path, in its order; then those that hold their position, as in the file
+    path_count    how many of them follow the path
     """
 
     file: Path
@@ -44,10 +47,10 @@ class Machine:
     reserve: float
     stop_time_ms: int
     start_tolerance_mm: float
-    offset_mm: complex
-    counts_per_mm: int
+    offset_mm: tuple[float, ...]
     supervision: Supervision
     axes: tuple[Axis, ...]
+    path_count: int
     program_bytes: int | None = None
     """Room for a program in the controller's memory (0x2041 sub 1), for `compile`'s warning; None: not known."""
 
@@ -72,19 +75,44 @@ class Machine:
         return any(axis.feedforward.velocity for axis in self.axes)
 
     @property
-    def plane(self) -> tuple[Axis, Axis]:
-        """The axes that follow a path, x and y. Raises InputError: there is only one axis."""
+    def counts_per_mm(self) -> int:
+        """Of the axes in mm, which all have the same; of a machine that only turns, of its first axis."""
+        straight = [axis for axis in self.axes if not axis.turns]
+        return (straight or self.axes)[0].counts_per_unit
+
+    @property
+    def path_axes(self) -> tuple[Axis, ...]:
+        """The axes that follow a path, in its order: two in the plane; three in space, and up to three more.
+
+        Raises InputError: there is only one axis, or one of those that draw the path turns.
+        """
         if len(self.axes) < PLANE_AXES:
             raise InputError(
                 f"{self.file}: has one axis ({self.axes[0].name}), a path needs two: add a second [[axis]]"
             )
-        return self.axes[0], self.axes[1]
+        return _drawn(self.file, self.axes[: self.path_count])
+
+    def require_plane(self, what: str) -> tuple[Axis, Axis]:
+        """The two axes of a path, for a command that knows no more. Raises InputError: there are more, or one."""
+        axes = self.path_axes
+        if len(axes) > PLANE_AXES:
+            names = ", ".join(axis.name for axis in axes)
+            raise InputError(
+                f"{self.file}: {what} takes two path axes, but these follow a path: {names}; name two in path = [...]"
+            )
+        return axes[0], axes[1]
+
+    @property
+    def path_feedforward(self) -> tuple[Feedforward, ...] | None:
+        """The feedforward of the axes that follow a path; None: they have none."""
+        forward = tuple(axis.feedforward for axis in self.path_axes)
+        return forward if any(f.velocity or f.has_torque for f in forward) else None
 
     @property
     def plane_feedforward(self) -> tuple[Feedforward, Feedforward] | None:
-        """The feedforward of the axes that follow a path; None: they have none."""
-        x, y = (axis.feedforward for axis in self.plane)
-        return (x, y) if any(f.velocity or f.has_torque for f in (x, y)) else None
+        """That of the two axes of a path in the plane."""
+        forward = self.path_feedforward
+        return None if forward is None else (forward[0], forward[1])
 
     def models(self, axes: Sequence[Axis]) -> tuple[Drive, ...]:
         """The drives of these axes as simulated. Raises InputError: one has no drive file."""
@@ -97,7 +125,7 @@ class Machine:
         return tuple(axis.drive for axis in axes if axis.drive is not None)
 
 
-_SECTIONS = ("bus", "controller", "supervision", "work", "axis")
+_SECTIONS = ("path", "bus", "controller", "supervision", "work", "axis")
 _CONTROLLER = (
     "node",
     "kernel",
@@ -120,7 +148,8 @@ def load_machine(file: Path) -> Machine:
     work = root.table("work", ("offset_mm",), required=False)
     node = controller.integer("node", 1, low=1, high=127)
     acceleration_mm_s2 = controller.number("acceleration_mm_s2", low=0.1, high=4e6)
-    axes, counts_per_mm = read_axes(root, node, acceleration_mm_s2)
+    given = read_axes(root, node, acceleration_mm_s2)
+    path = _path(root, given)
     return Machine(
         file=file,
         bitrate=bus.integer("bitrate", 1_000_000, low=10_000, high=1_000_000),
@@ -133,12 +162,49 @@ def load_machine(file: Path) -> Machine:
         reserve=controller.number("reserve", 0.1, low=0, high=0.9),
         stop_time_ms=controller.integer("stop_time_ms", 250, low=1, high=60_000),
         start_tolerance_mm=controller.number("start_tolerance_mm", 0.005, low=1e-6, high=10),
-        offset_mm=complex(*work.pair("offset_mm", (0.0, 0.0), low=-4096, high=4096)),
-        counts_per_mm=counts_per_mm,
+        offset_mm=_offset(work, max(len(path), PLANE_AXES)),
         supervision=_supervision(root),
-        axes=axes,
+        axes=path + tuple(axis for axis in given if axis not in path),
+        path_count=len(path),
         program_bytes=controller.integer("program_bytes", 0, low=0, high=2**32 - 1) or None,
     )
+
+
+def _path(root: Table, axes: tuple[Axis, ...]) -> tuple[Axis, ...]:
+    """The axes that `path` names; without it the first two."""
+    if not root.has("path"):
+        return axes[:PLANE_AXES]
+    names = root.texts("path")
+    by_name = {axis.name: axis for axis in axes}
+    for i, name in enumerate(names):
+        if name not in by_name:
+            raise root.error("path", f'names "{name}", but the axes are {", ".join(by_name)}')
+        if sum(axis.name == name for axis in axes) > 1:
+            raise root.error(
+                "path", f'names "{name}", which two axes are called: give each its own'
+            )
+        if name in names[:i]:
+            raise root.error("path", f'names "{name}" twice')
+    if len(names) < PLANE_AXES:
+        raise root.error("path", f"names one axis: it takes two, or three to {MAX_AXES}")
+    return _drawn(root.file, tuple(by_name[name] for name in names))
+
+
+def _drawn(file: Path, path: tuple[Axis, ...]) -> tuple[Axis, ...]:
+    """The axes of a path again. Raises InputError: one of those that draw it turns."""
+    for axis in path[:SPACE_AXES]:
+        if axis.turns:
+            raise InputError(
+                f"{file}: path: axis {axis.name} turns, but a path is drawn by the first "
+                f"{'two' if len(path) == PLANE_AXES else 'three'} of its axes: name axes in mm there"
+            )
+    return path
+
+
+def _offset(work: Table, count: int) -> tuple[float, ...]:
+    if not work.has("offset_mm"):
+        return (0.0,) * count
+    return work.vector("offset_mm", count, low=-4096, high=4096)
 
 
 def _period(bus: Table) -> int:

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PlanError
+from ..errors import InputError, PlanError
 from ..feed import AxisLimits, FeedRequest, FeedZone, Limits
 from ..feed.limits import GREATEST_RESERVE, LEAST_RESERVE, POLICIES
 from ..feed.request import (
@@ -25,10 +25,12 @@ from ..feed.request import (
     OPTIMAL,
     PROFILES,
 )
+from ..names import AXES, is_toolpath
 from ..spline import END_NAMES, KNOT_NAMES
 from .table import Table, read_toml
 
 COORDINATE_LIMIT_MM = 4096.0
+
 _CLOSING = 1e-3
 _SAME_MM = 1e-9
 
@@ -76,10 +78,10 @@ class PathFile:
         return self.require_planar()
 
     def require_planar(self) -> PathSpec:
-        """The path in the plane. Raises PlanError for a path in space, which only has a spline so far."""
+        """The path in the plane. Raises PlanError for a path in space, for what knows the plane only."""
         if isinstance(self.given_path, SpacePathSpec):
             raise PlanError(
-                f"{self.file}: [path] has points [x, y, z]: only the command spline takes a path in space; "
+                f"{self.file}: [path] has points [x, y, z]: this command takes a path in the plane; "
                 "give points [x, y]"
             )
         return self.given_path
@@ -110,11 +112,16 @@ _FEEDS, _ACCELERATIONS, _JERKS = (
 
 def load_path_file(file: Path) -> PathFile:
     """The path file `file`; raises InputError. The machine file is named, not looked for."""
+    if is_toolpath(file):
+        raise InputError(
+            f"{file}: is a toolpath, which only import, simulate, compile and run take: give a path file"
+        )
     root = Table(file, "", read_toml(file), _SECTIONS)
     machine = root.table("machine", ("file",), required=False)
     path = _path(root.table("path", _PATH))
     feed = _feed(root.table("feed", _FEED)) if root.has("feed") else None
-    limits = _limits(root.table("limits", _LIMITS, required=False))
+    axes = 3 if isinstance(path, SpacePathSpec) else 2
+    limits = _limits(root.table("limits", _LIMITS, required=False), axes)
     return PathFile(
         file=file,
         name=file.stem,
@@ -220,7 +227,7 @@ def _n_c(table: Table) -> float | Literal["optimise"]:
     return table.number("n_c", low=0, high=GREATEST_N_C)
 
 
-def _limits(table: Table) -> Limits:
+def _limits(table: Table, axes: int) -> Limits:
     return Limits(
         feed_mm_s=table.optional_number("feed_mm_s", **_FEEDS),
         acceleration_mm_s2=table.optional_number("acceleration_mm_s2", **_ACCELERATIONS),
@@ -228,17 +235,18 @@ def _limits(table: Table) -> Limits:
         policy=table.choice("policy", POLICIES, "respect"),
         centripetal_mm_s2=table.optional_number("centripetal_mm_s2", **_ACCELERATIONS),
         volts=table.optional_number("volts", low=1e-3, high=1e3),
-        axis=_axis_limits(table.table("axis", _AXIS_LIMITS, required=False)),
+        axis=_axis_limits(table.table("axis", _AXIS_LIMITS, required=False), axes),
+        names=AXES[:axes],
         reserve=table.number("reserve", Limits.reserve, low=LEAST_RESERVE, high=GREATEST_RESERVE),
         zones=tuple(_zone(one) for one in table.tables("cap", _CAP, required=False)),
     )
 
 
-def _axis_limits(table: Table) -> AxisLimits:
+def _axis_limits(table: Table, axes: int) -> AxisLimits:
     return AxisLimits(
-        velocity_mm_s=table.optional_per_axis("velocity_mm_s", **_FEEDS),
-        acceleration_mm_s2=table.optional_per_axis("acceleration_mm_s2", **_ACCELERATIONS),
-        jerk_mm_s3=table.optional_per_axis("jerk_mm_s3", **_JERKS),
+        velocity_mm_s=table.optional_per_axis("velocity_mm_s", axes, **_FEEDS),
+        acceleration_mm_s2=table.optional_per_axis("acceleration_mm_s2", axes, **_ACCELERATIONS),
+        jerk_mm_s3=table.optional_per_axis("jerk_mm_s3", axes, **_JERKS),
     )
 
 

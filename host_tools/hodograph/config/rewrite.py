@@ -11,8 +11,8 @@ from typing import Any
 
 import tomlkit
 
-from .axis_table import Feedforward
-from .drive_file import Drive
+from .axis_table import Feedforward, in_unit
+from .drive_file import MOTOR_GAINS, Drive
 from .machine_file import Machine
 
 _KEYS = {
@@ -32,15 +32,16 @@ def rewritten(
 ) -> dict[Path, str]:
     """The texts of the machine file `output` and of drive files beside it, by path; nothing is written.
 
-    `drives` and `feedforward` are by axis; the other axes keep theirs. `by` says in the drive files who changed them.
+    `drives` and `feedforward` are by axis, as in `machine.axes`; the other axes keep theirs. `by` says in the drive
+    files who changed them.
     """
     document = _parsed(machine.file)
-    tables: Any = document["axis"]
+    tables: Any = {int(table["node"]): table for table in document["axis"]}
     texts: dict[Path, str] = {}
     for index, axis in enumerate(machine.axes):
-        table = tables[index]
+        table = tables[axis.node]
         if index in feedforward:
-            _feedforward(table, feedforward[index])
+            _feedforward(table, feedforward[index], axis.unit)
         if axis.drive is None:
             continue
         source = machine.file.parent / Path(str(table["drive"])).expanduser()
@@ -60,11 +61,20 @@ def drive_text(source: Path, given: Drive, wanted: Drive) -> str:
     for section, keys in _KEYS.items():
         for key in keys:
             if getattr(wanted, key) != getattr(given, key):
-                _section(document, section)[key] = getattr(wanted, key)
+                _set_figure(_section(document, section), key, wanted)
     friction = wanted.equipment.friction_volts
     if friction != given.equipment.friction_volts:
         _section(document, "equipment")["friction_volts"] = friction or 0.0
     return tomlkit.dumps(document)
+
+
+def _set_figure(section: Any, key: str, wanted: Drive) -> None:
+    """A gain that the file gives in radians of the motor stays in that unit."""
+    by_motor = MOTOR_GAINS.get(key)
+    if by_motor is not None and by_motor in section:
+        section[by_motor] = getattr(wanted, key) * wanted.screw_mm_rad
+    else:
+        section[key] = getattr(wanted, key)
 
 
 def _parsed(file: Path) -> tomlkit.TOMLDocument:
@@ -78,13 +88,13 @@ def _section(document: tomlkit.TOMLDocument, name: str) -> Any:
     return document[name]
 
 
-def _feedforward(axis: Any, forward: Feedforward) -> None:
+def _feedforward(axis: Any, forward: Feedforward, unit: str) -> None:
     table = axis.get("feedforward")
     fresh = table is None
     if fresh:
         table = tomlkit.table()
     for name in _FORWARD:
-        table[name] = getattr(forward, name)
+        table[in_unit(name, unit)] = getattr(forward, name)
     if fresh:
         table.add(tomlkit.nl())
         axis["feedforward"] = table

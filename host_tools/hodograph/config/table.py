@@ -26,6 +26,7 @@ MAX_FILE_BYTES = 64 * 2**20
 """A configuration file above this size is refused unread (10^5 points take about 4 MB)."""
 
 _MISSING: Any = object()
+_COUNTS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
 def read_toml(file: Path) -> dict[str, Any]:
@@ -117,14 +118,15 @@ class Table:
         """As `number`; None when the file does not give the key."""
         return self.number(key, low=low, high=high) if self.has(key) else None
 
-    def optional_per_axis(self, key: str, *, low: float, high: float) -> tuple[float, float] | None:
-        """A number for x and y alike, or two [x, y]; None when the file does not give the key."""
+    def optional_per_axis(
+        self, key: str, count: int, *, low: float, high: float
+    ) -> tuple[float, ...] | None:
+        """A number for all axes alike, or one for each of `count`; None when the file does not give the key."""
         if not self.has(key):
             return None
         if isinstance(self._data[key], (list, tuple)):
-            return self.pair(key, low=low, high=high)
-        both = self.number(key, low=low, high=high)
-        return both, both
+            return self.vector(key, count, low=low, high=high)
+        return (self.number(key, low=low, high=high),) * count
 
     def integer(self, key: str, default: int = _MISSING, *, low: int, high: int) -> int:
         """A whole number from `low` to `high`, both included."""
@@ -159,16 +161,30 @@ class Table:
             raise self.error(key, f"must be true or false, but is {_show(value)}")
         return value
 
+    def texts(self, key: str) -> tuple[str, ...]:
+        """A list of one or more texts that are not empty."""
+        value = self._get(key, _MISSING, '["a", "b", ...]')
+        if not isinstance(value, list) or not value:
+            raise self.error(key, f"must be a list of texts, but is {_show(value)}")
+        return tuple(Table(self.file, self.section, {key: v}, (key,)).text(key) for v in value)
+
     def pair(
         self, key: str, default: tuple[float, float] = _MISSING, *, low: float, high: float
     ) -> tuple[float, float]:
         """Two finite numbers from `low` to `high`."""
-        value = self._get(key, default, "[a, b]")
-        if not isinstance(value, (list, tuple)) or len(value) != 2:
-            raise self.error(key, f"must be two numbers [a, b], but is {_show(value)}")
-        one = Table(self.file, self.section, {key: value[0]}, (key,))
-        two = Table(self.file, self.section, {key: value[1]}, (key,))
-        return one.number(key, low=low, high=high), two.number(key, low=low, high=high)
+        if key not in self._data and default is not _MISSING:
+            return default
+        one, two = self.vector(key, 2, low=low, high=high)
+        return one, two
+
+    def vector(self, key: str, count: int, *, low: float, high: float) -> tuple[float, ...]:
+        """So many (2 to 6) finite numbers from `low` to `high`."""
+        form = f"[{', '.join('abcdef'[:count])}]"
+        value = self._get(key, _MISSING, form)
+        if not isinstance(value, (list, tuple)) or len(value) != count:
+            raise self.error(key, f"must be {_COUNTS[count]} numbers {form}, but is {_show(value)}")
+        each = [Table(self.file, self.section, {key: item}, (key,)) for item in value]
+        return tuple(one.number(key, low=low, high=high) for one in each)
 
     def numbers(self, key: str, *, low: float = -1e9, high: float = 1e9) -> tuple[float, ...]:
         """A list of one or more finite numbers from `low` to `high`, each another."""
@@ -183,11 +199,7 @@ class Table:
 
     def triple(self, key: str, *, low: float, high: float) -> tuple[float, float, float]:
         """Three finite numbers from `low` to `high`."""
-        value = self._get(key, _MISSING, "[a, b, c]")
-        if not isinstance(value, list) or len(value) != 3:
-            raise self.error(key, f"must be three numbers [a, b, c], but is {_show(value)}")
-        each = [Table(self.file, self.section, {key: item}, (key,)) for item in value]
-        x, y, z = (one.number(key, low=low, high=high) for one in each)
+        x, y, z = self.vector(key, 3, low=low, high=high)
         return x, y, z
 
     def points(self, key: str, *, limit: float) -> NDArray[np.float64]:

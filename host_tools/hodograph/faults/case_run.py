@@ -70,14 +70,14 @@ class CaseRun:
 @lru_cache(maxsize=8)
 def load_job(path: Path) -> Job:
     """The program of a path file; raises InputError, PlanError."""
-    pipeline = load_pipeline(path)
+    pipeline = load_pipeline(path, allow_space=True)
     machine, image = pipeline.machine, pipeline.image
     _, setpoints = NativeProgram(image).setpoints("fixed", machine.counts_per_mm)
     clean = simulate(
         image,
-        machine.models(machine.plane),
+        machine.models(machine.path_axes),
         counts_per_mm=machine.counts_per_mm,
-        feedforward=machine.plane_feedforward,
+        feedforward=machine.path_feedforward,
         keep_rows=False,
     )
     longest_us = max(pipeline.program.stops.worst_us[1:])

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..bus.capture.setpoint_check import find_jumps, find_rough_starts, step_limits
+from ..config import SPACE_AXES
 from ..native import Contour, NativeProgram
 from .case_record import CaseRecord, Emergency
 from .case_run import REST_TOLERANCE_COUNTS, CaseRun
@@ -152,9 +153,9 @@ def _bad_setpoints(record: CaseRun, evidence: CaseRecord) -> list[str]:
     bad += find_rough_starts(frames, machine.nodes, REST_TOLERANCE_COUNTS)[:3]
     if not evidence.moved:
         return bad
-    (x, x_sent), (y, y_sent) = evidence.setpoints()[:2]
-    sent = x_sent & y_sent
-    points = np.unique(np.stack([x[sent], y[sent]], axis=1), axis=0)
+    drawn = evidence.setpoints()[: min(record.job.setpoints.shape[1], SPACE_AXES)]
+    sent = np.logical_and.reduce([axis_sent for _, axis_sent in drawn])
+    points = np.unique(np.stack([axis[sent] for axis, _ in drawn], axis=1), axis=0)
     worst_mm = _distance_mm(record, points)
     if worst_mm > _PATH_TOLERANCE_MM:
         bad.append(f"a setpoint is {worst_mm * 1e6:.1f} nm away from the curve")
@@ -165,12 +166,12 @@ def _distance_mm(record: CaseRun, points: np.ndarray[tuple[int, int], np.dtype[n
     program = NativeProgram(record.job.image)
     rows, nominal = program.setpoints("fixed", record.job.machine.counts_per_mm)
     contour, worst = Contour(program), 0.0
-    place = nominal[:, 0] + 1j * nominal[:, 1]
-    for x, y in points.tolist():
-        near = int(np.argmin(np.abs(place - complex(x, y))))
+    places = nominal[:, : points.shape[1]].astype(np.float64)
+    scale = record.job.machine.counts_per_mm
+    for point in points:
+        near = int(np.argmin(np.sum((places - point) ** 2, axis=1)))
         arc_mm = float(rows["arc_length_q40_mm"][near]) * 2.0**-40
-        scale = record.job.machine.counts_per_mm
-        worst = max(worst, abs(contour.distance_mm(arc_mm, x / scale, y / scale)))
+        worst = max(worst, abs(contour.distance_mm(arc_mm, *(point / scale))))
     return worst
 
 

@@ -1,26 +1,25 @@
 # SPDX-License-Identifier: MIT
 """Path kinematics: velocity, acceleration and jerk of the axes that follow from a curve and a motion along it.
 
-`frames` has the derivatives of a PH curve by arc length, `axis_motion` the chain rule; docs/theory/numerics.md 5.6.
+`spline.frames` has the derivatives of a curve by arc length, `axis_motion` the chain rule; docs/theory/numerics.md 5.6.
+Arrays of all A axes have the axis as first index.
 `sample` applies them to feed pieces, in cells (one piece on one segment of the path); how far a quantity may rise
 between samples is taken from its second differences. docs/theory/numerics.md section 7.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..spline import PHSpline
+from ..spline.frames import Curve, Frames, frames
 from .limits import Limits, Plants
 from .pieces import exponents
 
 Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Int = NDArray[np.int64]
 
 INTERVALS = 12
@@ -32,47 +31,8 @@ _PARTS = 4
 _ROUNDS = 3
 
 
-LEFT, RIGHT = -1, 1
-"""Sides of a joint of segments: PH quintic splines are C2, the slope of the curvature jumps there."""
-
-_AT_JOINT = 1e-9
-_CLOSE = 1e-11
-
-
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """r_s, r_ss and r_sss as x + iy, and the curvature, at points of any shape; mm."""
-
-    r1: Complex
-    r2: Complex
-    r3: Complex
-    curvature: Real
-
-
-def frames(spline: PHSpline, s_mm: Real, side: NDArray[np.int8] | None = None) -> Frames:
-    """At arc lengths `s_mm` (any shape); at joints those of the segment to the LEFT or RIGHT, by `side`."""
-    segment, xi = spline.locate(np.clip(s_mm, 0.0, spline.length_mm), _CLOSE)
-    if side is not None:
-        back = (xi < _AT_JOINT) & (side == LEFT) & (segment > 0)
-        on = (xi > 1.0 - _AT_JOINT) & (side == RIGHT) & (segment < spline.segment_count - 1)
-        segment = segment - back + on
-        xi = np.where(back, 1.0, np.where(on, 0.0, xi))
-    w0, w1, w2 = np.moveaxis(spline.w[segment], -1, 0)
-    w = w0 * (1.0 - xi) ** 2 + 2.0 * w1 * xi * (1.0 - xi) + w2 * xi * xi
-    first = 2.0 * ((w1 - w0) * (1.0 - xi) + (w2 - w1) * xi)
-    second = 2.0 * (w2 - 2.0 * w1 + w0)
-    sigma = w.real * w.real + w.imag * w.imag
-    turn = (np.conj(w) * first).imag
-    growth = 2.0 * (np.conj(w) * first).real
-    curvature = 2.0 * turn / sigma**2
-    slope = (2.0 * (np.conj(w) * second).imag / sigma**2 - 4.0 * turn * growth / sigma**3) / sigma
-    tangent = w * w / sigma
-    normal = 1j * tangent
-    return Frames(tangent, curvature * normal, slope * normal - curvature**2 * tangent, curvature)
-
-
-def axis_motion(frame: Frames, d1: Real, d2: Real, d3: Real) -> tuple[Complex, Complex, Complex]:
-    """The first three derivatives of the point, from those of the arc length by the same variable."""
+def axis_motion(frame: Frames, d1: Real, d2: Real, d3: Real) -> tuple[Real, Real, Real]:
+    """The first three derivatives (A, …) of the axes, from those of the arc length (…,) by the same variable."""
     return (
         frame.r1 * d1,
         frame.r1 * d2 + frame.r2 * d1**2,
@@ -103,7 +63,7 @@ class PathBounds:
     `kept`: the plan keeps them; else they only keep factors above 1 from exceeding more of them.
     """
 
-    spline: PHSpline
+    spline: Curve
     limits: Limits
     plants: Plants | None = None
     kept: bool = True
@@ -118,17 +78,17 @@ class PathBounds:
 
 @dataclass(frozen=True, eq=False)
 class PathKinematics:
-    """The motion of feed pieces along a path, in C cells with K samples each: `piece` (C,); the others (C, K), those
-    of the point as x + iy; mm, s.
+    """The motion of feed pieces along a path, in C cells with K samples each: `piece` (C,), those of the axes
+    (A, C, K), the others (C, K); mm, s.
     """
 
     piece: Int
     arc_mm: Real
     feed: Real
     centripetal: Real
-    velocity: Complex
-    acceleration: Complex
-    jerk: Complex
+    velocity: Real
+    acceleration: Real
+    jerk: Real
 
 
 def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> PathKinematics:
@@ -150,9 +110,7 @@ def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> PathK
             break
     else:
         found.append(_evaluate(bounds.spline, track, cells))
-    return PathKinematics(
-        *(np.concatenate(parts) for parts in zip(*map(_fields, found), strict=True))
-    )
+    return _joined(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +140,7 @@ def _track(pieces: Pieces) -> _ArcLength:
     return _ArcLength(np.ldexp(pieces.start_q40.astype(np.float64), -40), way, seconds)
 
 
-def _evaluate(spline: PHSpline, track: _ArcLength, cells: _Cells) -> PathKinematics:
+def _evaluate(spline: Curve, track: _ArcLength, cells: _Cells) -> PathKinematics:
     piece = cells.piece
     share = np.linspace(_BESIDE, 1.0 - _BESIDE, INTERVALS + 1)
     u = cells.low[:, None] + (cells.high - cells.low)[:, None] * share
@@ -200,7 +158,7 @@ def _rough(limits: Limits, samples: PathKinematics, filled: bool) -> NDArray[np.
         (samples.acceleration, limits.axes.acceleration_mm_s2),
         (samples.jerk, limits.axes.jerk_mm_s3),
     ):
-        for one, limit in zip(per_axis(values), both or (), strict=False):
+        for one, limit in zip(values, both or (), strict=False):
             rise = np.abs(np.diff(one, 2, axis=1)).max(axis=1) / 8.0
             near = np.abs(one).max(axis=1) + rise > (1.0 - 2.0 * limits.reserve) * limit
             rough |= (near | filled) & (rise > _ROUGH * limits.reserve * limit)
@@ -214,12 +172,21 @@ def _divided(cells: _Cells) -> _Cells:
     return _Cells(np.repeat(cells.piece, _PARTS), low.ravel(), (low + width / _PARTS).ravel())
 
 
-def _fields(samples: PathKinematics) -> tuple[NDArray[np.generic], ...]:
-    return tuple(getattr(samples, one.name) for one in fields(samples))
+def _sampled(samples: PathKinematics) -> tuple[Real, ...]:
+    """All but `piece`."""
+    along = samples.arc_mm, samples.feed, samples.centripetal
+    return (*along, samples.velocity, samples.acceleration, samples.jerk)
+
+
+def _joined(parts: list[PathKinematics]) -> PathKinematics:
+    piece = np.concatenate([part.piece for part in parts])
+    columns = zip(*map(_sampled, parts), strict=True)
+    return PathKinematics(piece, *(np.concatenate(column, axis=-2) for column in columns))
 
 
 def _taken(samples: PathKinematics, which: NDArray[np.bool_]) -> PathKinematics:
-    return PathKinematics(*(values[which] for values in _fields(samples)))  # type: ignore[arg-type]
+    taken = (values[..., which, :] for values in _sampled(samples))
+    return PathKinematics(samples.piece[which], *taken)
 
 
 def raised(values: Real) -> Real:
@@ -254,12 +221,6 @@ def _value(way: Real, u: Real, order: int) -> Real:
         factor = float(np.prod(np.arange(power - order + 1, power + 1)))
         out = out * u + factor * way[:, power, None]
     return out
-
-
-def per_axis(values: Complex) -> Iterator[Real]:
-    """x, then y."""
-    yield values.real
-    yield values.imag
 
 
 def least_of_pieces(samples: PathKinematics, values: Real, count: int) -> Real:

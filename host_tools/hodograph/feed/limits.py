@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from math import inf, isfinite
 
 from ..errors import InputError
+from ..names import AXES
 from .request import FeedRequest
 
 POLICIES = ("respect", "report")
@@ -21,10 +22,8 @@ MACHINE_SHARE = 0.998
 """Of the machine's axis limits: what plans use. The rest is for rounding, and for the controller's bounds between the
 places that it evaluates (docs/guides/limits.md)."""
 
-PerAxis = tuple[float, float]
-"""One value for x, one for y."""
-
-AXES = ("x", "y")
+PerAxis = tuple[float, ...]
+"""One value for each axis that follows the path, in the order of the path; inf: no limit."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Limit:
     key     what is bounded, with its unit, as files name it: "feed_mm_s", "velocity_mm_s", "volts" …
     value   the greatest magnitude, a reserve already taken off; inf: none
     source  section that gives it: "limits" or "feed" of the path file, "machine", "controller", "drive", "format"
-    axis    0: x, 1: y; None: along the path
+    axis    name of the limited axis; None: along the path
     zone    where on the path it applies; None: everywhere
     share   `value` over the value given in the file; below 1 where a reserve is kept
     words   the reason for a limit that no file gives
@@ -59,7 +58,7 @@ class Limit:
     key: str
     value: float
     source: str = "limits"
-    axis: int | None = None
+    axis: str | None = None
     zone: FeedZone | None = None
     share: float = 1.0
     words: str = ""
@@ -74,24 +73,24 @@ class Limit:
         """The limited quantity: "feed_mm_s", "x_velocity_mm_s", "cap_mm_s" (the feed in a zone)."""
         if self.zone is not None:
             return "cap_mm_s"
-        return self.key if self.axis is None else f"{AXES[self.axis]}_{self.key}"
+        return self.key if self.axis is None else f"{self.axis}_{self.key}"
 
     @property
     def dotted(self) -> str:
         """The same as a plan's JSON has it: "feed_mm_s", "axis.velocity_mm_s.x", "volts.x"."""
-        return self.quantity if self.axis is None else f"{self._table}{self.key}.{AXES[self.axis]}"
+        return self.quantity if self.axis is None else f"{self._table}{self.key}.{self.axis}"
 
     @property
     def entry(self) -> str:
         """The key in its file: "axis.velocity_mm_s of x"."""
         if self.axis is not None:
-            return f"{self._table}{self.key} of {AXES[self.axis]}"
+            return f"{self._table}{self.key} of {self.axis}"
         return self._zone + self.key
 
     @property
     def name(self) -> str:
         """The same in notes: "axis x velocity_mm_s"."""
-        return self._zone + self.key if self.axis is None else f"axis {AXES[self.axis]} {self.key}"
+        return self._zone + self.key if self.axis is None else f"axis {self.axis} {self.key}"
 
     @property
     def reason(self) -> str:
@@ -186,23 +185,22 @@ class Plant:
         return self.gain_mm_s_v * (self.volts - self.friction_volts)
 
 
-Plants = tuple[Plant, Plant]
-"""Of x and y."""
+Plants = tuple[Plant, ...]
+"""Of each axis that follows the path."""
 
 
 def as_drives_limit(plants: Plants | None) -> Plants | None:
     """The same with all volts that the drives have; None: these are not known."""
     if plants is None or any(plant.volts_limit == inf for plant in plants):
         return None
-    x, y = (replace(plant, volts=plant.volts_limit) for plant in plants)
-    return x, y
+    return tuple(replace(plant, volts=plant.volts_limit) for plant in plants)
 
 
 @dataclass(frozen=True)
 class AxisLimits:
     """Limits of the motion of each axis, of a path file ([limits.axis]) or a machine file ([[axis]]); None: no limit.
 
-    Raises InputError.
+    In the order in which the axes follow the path; inf: no limit of this axis. Raises InputError.
     """
 
     velocity_mm_s: PerAxis | None = None
@@ -212,7 +210,8 @@ class AxisLimits:
     def __post_init__(self) -> None:
         for one in fields(self):
             for value in getattr(self, one.name) or ():
-                _above_zero(f"limits.axis: {one.name}", value)
+                if value != inf:
+                    _above_zero(f"limits.axis: {one.name}", value)
 
     @property
     def any(self) -> bool:
@@ -230,13 +229,13 @@ class AxisLimits:
 
 
 def _scaled(both: PerAxis | None, share: float) -> PerAxis | None:
-    return None if both is None else (both[0] * share, both[1] * share)
+    return None if both is None else tuple(value * share for value in both)
 
 
 def _lower(a: PerAxis | None, b: PerAxis | None) -> PerAxis | None:
     if a is None or b is None:
         return b if a is None else a
-    return min(a[0], b[0]), min(a[1], b[1])
+    return tuple(min(pair) for pair in zip(a, b, strict=True))
 
 
 @dataclass(frozen=True)
@@ -247,12 +246,13 @@ class Limits:
     centripetal_mm_s2   feed^2 times curvature
     volts               of each axis by the plant of its drive file (docs/theory/numerics.md 13), along the path;
                         the drive's own volts_limit where that is less
-    axis                of the motion of x and y
+    axis                of the motion of the axes
     zones               feed zones; where several meet, the least feed
     reserve             share of the axes' accelerations, jerks and volts that plans leave free, so that hold, resume
                         and override keep these limits too (docs/theory/numerics.md section 7)
 
-    machine             of the motion of x and y by the machine file: they always bind
+    machine             of the motion of the axes by the machine file: they always bind
+    names               of the axes that follow the path, in its order
 
     policy "respect": the feed is lowered until the profile keeps all limits; "report": it runs as requested and what
     exceeds is listed, but the machine's limits are kept. Profile "optimal" always keeps them. Raises InputError.
@@ -268,8 +268,11 @@ class Limits:
     zones: tuple[FeedZone, ...] = ()
     reserve: float = LEAST_RESERVE
     machine: AxisLimits = field(default_factory=AxisLimits)
+    names: tuple[str, ...] = AXES[:2]
 
     def __post_init__(self) -> None:
+        for table in (self.axis, self.machine):
+            self._check_count(table)
         for name in _SCALARS:
             value = getattr(self, name)
             if value is not None:
@@ -281,6 +284,38 @@ class Limits:
                 f"limits: reserve {self.reserve:g} is not in {LEAST_RESERVE:g} … {GREATEST_RESERVE:g}"
             )
 
+    def _check_count(self, table: AxisLimits) -> None:
+        for one in fields(table):
+            given = getattr(table, one.name)
+            if given is not None and len(given) != len(self.names):
+                raise InputError(
+                    f"limits.axis: {one.name} has {len(given)} values, the path has the axes "
+                    f"{', '.join(self.names)}: give one number for all, or one for each"
+                )
+
+    def of_axes(self, count: int) -> Limits:
+        """The same for a path that `count` axes follow. Raises InputError: they are for another number of axes."""
+        if len(self.names) == count:
+            return self
+        if self.axis.any or self.machine.any or self.names != AXES[:2]:
+            raise InputError(
+                f"limits: are for the axes {', '.join(self.names)}, the path has {count} axes"
+            )
+        return replace(self, names=AXES[:count])
+
+    def on_machine(self, names: tuple[str, ...], machine: AxisLimits) -> Limits:
+        """The same on a machine with path axes of these names; those that the path file does not know are not limited
+        by it.
+        """
+        each = (getattr(self.axis, one.name) for one in fields(self.axis))
+        own = AxisLimits(
+            *(
+                given and (given + (inf,) * (len(names) - len(given)))[: len(names)]
+                for given in each
+            )
+        )
+        return replace(self, axis=own, machine=machine, names=names)
+
     @property
     def bind(self) -> bool:
         """Whether one of them bounds the motion everywhere; zones alone do not."""
@@ -288,51 +323,49 @@ class Limits:
 
     @property
     def axes(self) -> AxisLimits:
-        """What a plan keeps of x and y: the path file's, and MACHINE_SHARE of the machine's where that is less."""
+        """What a plan keeps of the axes: the path file's, and MACHINE_SHARE of the machine's where that is less."""
         return self.axis.and_of(self.machine.scaled(MACHINE_SHARE))
 
     @property
     def axes_whole(self) -> AxisLimits:
-        """What a motion has to keep of x and y: the same, with the whole of the machine's."""
+        """What a motion has to keep of the axes: the same, with the whole of the machine's."""
         return self.axis.and_of(self.machine)
 
     @property
     def of_machine(self) -> Limits:
         """The machine's only."""
-        return Limits(reserve=self.reserve, machine=self.machine)
+        return Limits(reserve=self.reserve, machine=self.machine, names=self.names)
 
     def source(self, name: str, axis: int) -> str:
-        """Source of the limit of an axis (0: x) that binds: "limits" (path file), "machine", or "drive" (volts)."""
+        """Source of the limit of axis number `axis` that binds: "limits" (path file), "machine", or "drive" (volts)."""
         if name == "volts":
             return "drive" if self.volts is None else "limits"
         own, used = getattr(self.axis, name), getattr(self.axes, name)
         return "limits" if own is not None and own[axis] == used[axis] else "machine"
 
-    def axis_limits(self, key: str) -> tuple[Limit, Limit]:
-        """The limits of x and y that a plan keeps, the reserve taken off accelerations and jerks; value inf: none."""
-        both = getattr(self.axes, key) or (inf, inf)
+    def axis_limits(self, key: str) -> tuple[Limit, ...]:
+        """The limits of the axes that a plan keeps, the reserve taken off accelerations and jerks; value inf: none."""
+        each = getattr(self.axes, key) or (inf,) * len(self.names)
         share = 1.0 if key == "velocity_mm_s" else 1.0 - self.reserve
-        x, y = (
-            Limit(key, share * value, self.source(key, k) if value < inf else "", k, None, share)
-            for k, value in enumerate(both)
+        return tuple(
+            Limit(key, share * value, self.source(key, k) if value < inf else "", name, None, share)
+            for k, (name, value) in enumerate(zip(self.names, each, strict=True))
         )
-        return x, y
 
-    def volts_limits(self, plants: Plants) -> tuple[Limit, Limit]:
+    def volts_limits(self, plants: Plants) -> tuple[Limit, ...]:
         """The limits of the volts beside friction that a plan keeps, the reserve taken off."""
         share = 1.0 - self.reserve
-        x, y = (
+        return tuple(
             Limit(
                 "volts",
                 share * (plant.reach_mm_s / plant.gain_mm_s_v),
                 self.source("volts", k),
-                k,
+                name,
                 None,
                 share,
             )
-            for k, plant in enumerate(plants)
+            for k, (name, plant) in enumerate(zip(self.names, plants, strict=True))
         )
-        return x, y
 
 
 _SCALARS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "centripetal_mm_s2", "volts")
@@ -375,7 +408,7 @@ def ineffective_limits(
 ) -> Iterator[str]:
     """One line for each part of `limits` that changes nothing on a path of `length_mm`.
 
-    plants  of x and y with the volts that their drives allow; None: no volts are limited
+    plants  of the axes with the volts that their drives allow; None: no volts are limited
     """
     if request.optimal and limits.policy == "report":
         yield (
@@ -387,7 +420,7 @@ def ineffective_limits(
                 f"limits: cap {number} begins at {zone.from_mm:g} mm, behind the end of the path at "
                 f"{length_mm:.6g} mm: it does nothing"
             )
-    for axis, plant in zip(AXES, plants or (), strict=False):
+    for axis, plant in zip(limits.names, plants or (), strict=False):
         if limits.volts is not None and plant.volts < limits.volts:
             yield (
                 f"limits: volts {limits.volts:g} is more than the drive of {axis} has: "

@@ -27,7 +27,6 @@ from .kinematics import (
     PathKinematics,
     Pieces,
     least_of_pieces,
-    per_axis,
     raised,
     sample,
 )
@@ -218,12 +217,13 @@ class Headroom:
         return sample(self.bounds, self.pieces, filled=True)
 
     @cached_property
-    def axes(self) -> tuple[Axis, Axis]:
-        """x and y."""
+    def axes(self) -> tuple[Axis, ...]:
+        """Those that follow the path."""
         samples, limits = self._samples, self.bounds.limits.axes
-        free = (np.inf, np.inf)
-        plants = self.bounds.plants or (None, None)
-        out = [
+        count = len(samples.velocity)
+        free = (np.inf,) * count
+        plants = self.bounds.plants or (None,) * count
+        return tuple(
             Axis(
                 raised(v) + _TINY,
                 raised(a) + _TINY,
@@ -236,15 +236,9 @@ class Headroom:
                 plants[k],
             )
             for k, (v, a, j) in enumerate(
-                zip(
-                    per_axis(samples.velocity),
-                    per_axis(samples.acceleration),
-                    per_axis(samples.jerk),
-                    strict=True,
-                )
+                zip(samples.velocity, samples.acceleration, samples.jerk, strict=True)
             )
-        ]
-        return out[0], out[1]
+        )
 
     def factor(self) -> Real:
         """f (M,), below 1 where a limit is exceeded at an override of 1."""

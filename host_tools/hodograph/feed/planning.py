@@ -10,7 +10,7 @@ from fractions import Fraction
 from math import log
 
 from ..errors import PlanError
-from ..spline import PHSpline
+from ..spline.frames import Curve
 from .kinematics import PathBounds
 from .limits import ControllerLimits, FeedZone, Limit, Limits, Peak, Plants, as_drives_limit
 from .pieces import RawPieces, derivative_peaks
@@ -59,7 +59,7 @@ def plan_feed(
 
 
 def plan_path(
-    spline: PHSpline,
+    spline: Curve,
     request: FeedRequest,
     limits: Limits,
     controller: ControllerLimits | None = None,
@@ -71,6 +71,7 @@ def plan_path(
     axes, curvature, volts (`plants`) and feed zones too. Under "report" these are listed where they are exceeded, and
     only the machine's are kept.
     """
+    limits = limits.of_axes(spline.axes)
     plan = plan_feed(spline.length_mm, request, limits, controller, period_us=period_us)
     respect = limits.policy == "respect"
     bounds = PathBounds(spline, limits, plants, kept=respect)

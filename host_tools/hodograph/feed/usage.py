@@ -10,7 +10,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from .kinematics import PathBounds, PathKinematics, Pieces, per_axis, raised, sample
+from .kinematics import PathBounds, PathKinematics, Pieces, raised, sample
 from .limits import Limit, Peak
 
 Real = NDArray[np.float64]
@@ -45,7 +45,7 @@ def _of_axes(bounds: PathBounds, motion: PathKinematics) -> Limited:
         ("jerk_mm_s3", motion.jerk),
     ):
         limits = bounds.limits.axis_limits(key)
-        for limit, one in zip(limits, per_axis(values), strict=True):
+        for limit, one in zip(limits, values, strict=True):
             if limit.value < inf:
                 yield limit, raised(one)
 
@@ -54,7 +54,7 @@ def _volts(bounds: PathBounds, motion: PathKinematics) -> Limited:
     if bounds.plants is None:
         return
     limits = bounds.limits.volts_limits(bounds.plants)
-    axes = zip(per_axis(motion.velocity), per_axis(motion.acceleration), strict=True)
+    axes = zip(motion.velocity, motion.acceleration, strict=True)
     for limit, plant, (v, a) in zip(limits, bounds.plants, axes, strict=True):
         yield limit, raised(v + plant.time_constant_s * a) / plant.gain_mm_s_v
 

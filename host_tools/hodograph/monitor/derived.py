@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,20 +46,26 @@ class ProgramPath:
         self.duration_s = program.duration_q32_s / 2**32
         self._arc_mm, self._points_mm = _table(program)
         self._tangents = _tangents(self._arc_mm, self._points_mm)
+        self.axes = self._points_mm.shape[1]
+        """That draw the curve: 2 in the plane, 3 in space."""
         self._last_mm: float | None = None
         self._last_counts: Floats | None = None
 
     def drawing(self) -> Floats:
-        """Points of the curve in mm, (n, 2), at equal distances, the last one included."""
+        """Points of the curve in mm, (n, 2) or in space (n, 3), at equal distances, the last one included."""
         arcs = np.linspace(0.0, self.length_mm, min(DRAWN_POINTS, self._arc_mm.size))
         return self._at(arcs, self._points_mm)
 
     def contour_errors_um(self, targets: Floats, actual: Floats) -> Floats:
-        """Distance of the positions (n, 2) from the curve, in um, beside the setpoints (n, 2), all in counts.
+        """Distance of the positions (n, A) from the curve, in um, beside the setpoints (n, A), all in counts; A is
+        `axes`, or more: what is behind them counts for nothing.
 
         NaN where the setpoint is not on the curve, or something did not come.
         """
         errors = np.full(targets.shape[0], np.nan)
+        if targets.shape[1] < self.axes:
+            return errors
+        targets, actual = targets[:, : self.axes], actual[:, : self.axes]
         there = np.flatnonzero(np.isfinite(targets).all(axis=1) & np.isfinite(actual).all(axis=1))
         if there.size == 0:
             return errors
@@ -127,7 +134,7 @@ def _table(program: NativeProgram) -> tuple[Floats, Floats]:
     points = program.points("double", times)
     arcs = points["arc_length_q40_mm"] / 2**40
     fresh = np.concatenate([[True], np.diff(arcs) > 0])
-    xy = np.stack([points["x_q40_mm"], points["y_q40_mm"]], axis=1) / 2**40
+    xy = points["position_q40"][:, :2] / 2**40
     return np.asarray(arcs[fresh]), np.asarray(xy[fresh])
 
 
@@ -146,7 +153,10 @@ _LONGEST_GAP = 1000
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """One row a tick: time since the first SYNC, positions in mm, and figures in the units of their names."""
+    """One row a tick: time since the first SYNC, positions in mm, and figures in the units of their names.
+
+    An axis that turns has degrees for mm, and thousandths of a degree for um.
+    """
 
     t_s: Floats
     cmd_mm: Floats  # (n, axes)
@@ -173,8 +183,11 @@ def derivative_weights(half: int, order: int, derivative: int) -> Floats:
 class Derivation:
     """Keeps the rows that later ticks are still needed for between two calls of `feed`."""
 
-    def __init__(self, axes: int, counts_per_mm: int, period_us: int) -> None:
-        self._counts_per_mm = counts_per_mm
+    def __init__(self, counts_per_unit: Sequence[int], drawn: int, period_us: int) -> None:
+        """`counts_per_unit`: of a mm or a degree, by axis; `drawn`: how many of the axes draw the path."""
+        axes = len(counts_per_unit)
+        self._counts_per_unit = np.asarray(counts_per_unit, dtype=np.float64)
+        self._drawn = min(drawn, axes)
         self._dt_s = period_us / 1e6
         self._half = max(_LEAST_HALF, round(_HALF_WINDOW_S / self._dt_s))
         self._weights = [derivative_weights(self._half, _ORDER, d) for d in (1, 2, 3)]
@@ -218,18 +231,18 @@ class Derivation:
         targets = self._targets[first:last]
         actual = self._actual[first + REACHED_AFTER : last + REACHED_AFTER]
         contour = np.full(last - first, np.nan)
-        if path is not None and last > first and self._axes >= 2:
-            contour = path.contour_errors_um(targets[:, :2], actual[:, :2])
+        if path is not None and last > first:
+            contour = path.contour_errors_um(targets, actual)
         feed, acceleration, jerk = self._motion(first, last)
         return Rows(
             t_s=np.asarray(self._sync[first:last] * self._dt_s, dtype=np.float64),
-            cmd_mm=targets / self._counts_per_mm,
-            act_mm=actual / self._counts_per_mm,
+            cmd_mm=targets / self._counts_per_unit,
+            act_mm=actual / self._counts_per_unit,
             feed_mm_s=feed,
             acceleration_mm_s2=acceleration,
             jerk_mm_s3=jerk,
             contour_um=contour,
-            following_um=(targets - actual) * (1000.0 / self._counts_per_mm),
+            following_um=(targets - actual) * (1000.0 / self._counts_per_unit),
         )
 
     def _motion(self, first: int, last: int) -> tuple[Floats, Floats, Floats]:
@@ -237,7 +250,8 @@ class Derivation:
         none = np.empty(0)
         if last <= first:
             return none, none, none
-        window = self._targets[first - self._half : last + self._half, :2] / self._counts_per_mm
+        drawn = np.s_[first - self._half : last + self._half, : self._drawn]
+        window = self._targets[drawn] / self._counts_per_unit[: self._drawn]
         chords = np.hypot.reduce(np.diff(window, axis=0), axis=1)
         missing = np.isnan(chords)
         way = _windows(np.nancumsum(chords), self._half)

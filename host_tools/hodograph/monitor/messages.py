@@ -39,7 +39,7 @@ MOST_GROUPS = 100
 """Groups in a message at most: at full pace, and after a stall of more than a second, they become longer."""
 POINT_S = 0.004
 MOST_POINTS = 250
-"""The same for the points of the plane."""
+"""The same for the points of the path."""
 
 
 def encode(message: dict[str, Any]) -> str:
@@ -54,13 +54,12 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
 
 
 def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
-    """The program's curve to draw; `note` says why there is none, or what is odd about it."""
+    """The program's curve to draw, in space with z; `note` says why there is none, or what is odd about it."""
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}
     if path is not None:
         points = path.drawing()
         message |= {
-            "x": numbers(points[:, 0], 5),
-            "y": numbers(points[:, 1], 5),
+            **{name: numbers(column, 5) for name, column in zip("xyz", points.T, strict=False)},
             "name": path.name,
             "length_mm": path.length_mm,
             "duration_s": path.duration_s,
@@ -69,8 +68,12 @@ def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
     return message
 
 
-def rows_message(rows: Rows, period_s: float, age_ms: float | None) -> dict[str, Any]:
-    """The rows of one look, decimated. `age_ms`: how old the newest frame in it is."""
+def rows_message(
+    rows: Rows, period_s: float, age_ms: float | None, drawn: int = 2
+) -> dict[str, Any]:
+    """The rows of one look, decimated. `age_ms`: how old the newest frame in it is. `drawn`: how many axes draw the
+    path, whose positions the points have.
+    """
     starts = group_starts(rows.count, round(GROUP_S / period_s), MOST_GROUPS)
     message: dict[str, Any] = {
         "type": "rows",
@@ -83,8 +86,8 @@ def rows_message(rows: Rows, period_s: float, age_ms: float | None) -> dict[str,
         message[name] = [numbers(low, digits), numbers(high, digits)]
     points = group_starts(rows.count, round(POINT_S / period_s), MOST_POINTS)
     if rows.cmd_mm.shape[1] >= 2:
-        message["cmd"] = [numbers(rows.cmd_mm[points, i], 5) for i in (0, 1)]
-        message["act"] = [numbers(rows.act_mm[points, i], 5) for i in (0, 1)]
+        message["cmd"] = [numbers(column, 5) for column in rows.cmd_mm[points, :drawn].T]
+        message["act"] = [numbers(column, 5) for column in rows.act_mm[points, :drawn].T]
     return message
 
 

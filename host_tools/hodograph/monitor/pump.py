@@ -39,7 +39,11 @@ class Layout:
 
     names: tuple[str, ...]
     nodes: tuple[int, ...]
-    counts_per_mm: int
+    counts_per_unit: tuple[int, ...]
+    """Of a mm, or of a degree where the axis turns."""
+    units: tuple[str, ...]
+    drawn: int
+    """How many of the axes draw a path: 2 in the plane, 3 in space."""
     period_us: int
     bitrate: int
     limits: StepLimits | None = None
@@ -99,7 +103,7 @@ class Pump:
         path = None
         if image is not None:
             try:
-                path = ProgramPath(image, self._layout.counts_per_mm)
+                path = ProgramPath(image, self._layout.counts_per_unit[0])
             except InputError as error:
                 note = str(error)
         self._path = path
@@ -107,7 +111,7 @@ class Pump:
 
     def _fresh_derivation(self) -> Derivation:
         layout = self._layout
-        return Derivation(len(layout.nodes), layout.counts_per_mm, layout.period_us)
+        return Derivation(layout.counts_per_unit, layout.drawn, layout.period_us)
 
     def _work(self) -> None:
         while not self._ending.is_set():
@@ -158,7 +162,9 @@ class Pump:
         rows = self._derivation.feed(samples, self._path)
         if rows.count:
             age_ms = None if taken.now_us is None else (taken.now_us - newest_us) / 1000
-            self._publish(rows_message(rows, self._layout.period_us / 1e6, age_ms))
+            self._publish(
+                rows_message(rows, self._layout.period_us / 1e6, age_ms, self._layout.drawn)
+            )
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S
             self._publish(self._drives(samples))
@@ -179,7 +185,7 @@ class Pump:
         drives = []
         for axis, (name, node) in enumerate(zip(layout.names, layout.nodes, strict=True)):
             word = int(samples.statuswords[-1, axis])
-            actual = samples.actual[-1, axis] / layout.counts_per_mm
+            actual = samples.actual[-1, axis] / layout.counts_per_unit[axis]
             drives.append(
                 {
                     "name": name,

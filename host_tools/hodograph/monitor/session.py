@@ -167,6 +167,8 @@ class LivePage:
             else str(what.address),
             "axes": list(self._layout.names),
             "nodes": list(self._layout.nodes),
+            "units": list(self._layout.units),
+            "drawn": self._layout.drawn,
             "period_us": self._layout.period_us,
             "loopback": is_loopback(self._place.host),
         }

@@ -21,10 +21,12 @@ class Contour:
         self.pointer = ffi.new("struct contour *")
         lib.contour_begin(self.pointer, program.pointer, self._segments)
 
-    def distance_mm(self, arc_length_mm: float, x_mm: float, y_mm: float) -> float:
+    def distance_mm(
+        self, arc_length_mm: float, x_mm: float, y_mm: float, z_mm: float = 0.0
+    ) -> float:
         """Distance of a point from the curve near the commanded arc length, mm."""
         _, lib = library()
-        return float(lib.contour_distance_mm(self.pointer, arc_length_mm, [x_mm, y_mm]))
+        return float(lib.contour_distance_mm(self.pointer, arc_length_mm, [x_mm, y_mm, z_mm]))
 
     def errors_um(
         self,
@@ -32,18 +34,27 @@ class Contour:
         act_counts: NDArray[np.int32],
         counts_per_mm: int,
     ) -> NDArray[np.float64]:
-        """Contour errors in um, (n,), of encoder positions (n, 2) beside commanded arc lengths (n,)."""
+        """Contour errors in um, (n,), of encoder positions (n, A) beside commanded arc lengths (n,).
+
+        A is 2 in the plane and at least 3 in space; what is behind z counts for nothing.
+        """
         ffi, lib = library()
         arc = np.ascontiguousarray(arc_length_q40_mm, dtype=np.int64)
         act = np.ascontiguousarray(act_counts, dtype=np.int32)
-        if act.shape != (arc.size, 2):
-            raise ValueError(f"act_counts has shape {act.shape}, not ({arc.size}, 2)")
+        axes = int(self.pointer.axes)
+        if (
+            act.ndim != 2
+            or act.shape[0] != arc.size
+            or act.shape[1] not in ((2,) if axes == 2 else (3, 4, 5, 6))
+        ):
+            raise ValueError(f"act_counts has shape {act.shape}, not ({arc.size}, {axes})")
         errors = np.empty(arc.size, dtype=np.float64)
         lib.contour_errors_um(
             self.pointer,
             arc.size,
             ffi.from_buffer("int64_t[]", arc),
             ffi.from_buffer("int32_t[]", act),
+            act.shape[1],
             counts_per_mm,
             ffi.from_buffer("double[]", errors),
         )

@@ -8,6 +8,7 @@ struct program_header {
     uint32_t segment_count;
     uint32_t piece_count;
     uint16_t flags;
+    uint16_t axis_count;
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
     ...;
@@ -17,9 +18,9 @@ struct program {
     ...;
 };
 struct program_limits {
-    uint32_t period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
-    int64_t min_q40_mm[2], max_q40_mm[2];
-    uint32_t axis_velocity_um_s[2], axis_acceleration_um_s2[2], axis_jerk_mm_s3[2];
+    uint32_t axis_count, period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
+    int64_t min_q40_mm[6], max_q40_mm[6];
+    uint32_t axis_velocity_um_s[6], axis_acceleration_um_s2[6], axis_jerk_mm_s3[6];
     uint32_t stop_time_ms;
     ...;
 };
@@ -48,11 +49,12 @@ struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece);
 struct kernel;
 const struct kernel *kernel_find(uint32_t number);
 uint64_t coefficients_size(const struct program *p, const struct kernel *kernel);
-int coefficients_make_in(struct program *p, const struct kernel *kernel, void *memory, uint64_t size);
+int coefficients_make_in(struct program *p, const struct kernel *kernel, void *memory,
+                         uint64_t size);
 
 /* core/interpolator.h */
 struct interpolator_point {
-    int64_t arc_length_q40_mm, x_q40_mm, y_q40_mm, feed_q32_mm_s;
+    int64_t arc_length_q40_mm, feed_q32_mm_s, position_q40[6];
 };
 struct interpolator {
     ...;
@@ -72,13 +74,15 @@ struct feed_override {
     uint32_t phase;
     ...;
 };
-void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us, uint64_t time_q42_s);
+void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
+                         uint64_t time_q42_s);
 void feed_override_hold(struct feed_override *f);
 void feed_override_resume(struct feed_override *f);
 void feed_override_set(struct feed_override *f, uint32_t percent);
 void feed_override_stop(struct feed_override *f);
 void feed_override_fault_stop(struct feed_override *f);
-int feed_override_next(struct feed_override *f, struct interpolator *it, struct interpolator_point *out);
+int feed_override_next(struct feed_override *f, struct interpolator *it,
+                       struct interpolator_point *out);
 int feed_override_state(const struct feed_override *f);
 int feed_override_late(const struct feed_override *f);
 uint64_t feed_override_time_q42(const struct feed_override *f);
@@ -96,7 +100,8 @@ struct drive_pdff {
 struct drive_config {
     struct drive_plant plant;
     struct drive_pdff pdff;
-    uint32_t encoder_counts_per_rev, loop_rate_hz, counts_per_mm, period_us, interpolation, speed, delay_samples;
+    uint32_t encoder_counts_per_rev, loop_rate_hz, counts_per_mm, period_us, interpolation, speed,
+        delay_samples, integral;
 };
 struct drive {
     ...;
@@ -114,13 +119,15 @@ struct contour_segment {
     ...;
 };
 struct contour {
+    uint32_t axes;
     ...;
 };
 void contour_begin(struct contour *contour, const struct program *program,
                    struct contour_segment *segments);
-double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[2]);
+double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[3]);
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
-                       const int32_t *act_counts, uint32_t counts_per_mm, double *errors_um);
+                       const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,
+                       double *errors_um);
 
 /* offline/offline_fault.h */
 enum offline_fault_kind {
@@ -141,23 +148,23 @@ struct offline_fault {
 struct offline_row {
     int64_t arc_length_q40_mm;
     int64_t feed_q32_mm_s;
-    int64_t cmd_q40_mm[2];
+    int64_t cmd_q40_mm[6];
     double contour_error_um;
-    int32_t set_counts[2];
-    int32_t act_counts[2];
-    int16_t volts_mv[2];
+    int32_t set_counts[6];
+    int32_t act_counts[6];
+    int16_t volts_mv[6];
     uint32_t tick;
 };
 struct offline {
     ...;
 };
-int offline_begin(struct offline *rig, const struct program *program, const struct drive_config drives[2],
-                  struct contour_segment *segments);
+int offline_begin(struct offline *rig, const struct program *program,
+                  const struct drive_config *drives, struct contour_segment *segments);
 struct feedforward_gains {
     uint32_t period_us, counts_per_mm, velocity_permille;
     int32_t torque_per_acceleration_q16, torque_per_velocity_q16;
 };
-void offline_feedforward(struct offline *rig, const struct feedforward_gains gains[2]);
+void offline_feedforward(struct offline *rig, const struct feedforward_gains *gains);
 void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts);
 int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count);
 enum offline_order_kind {
@@ -180,21 +187,41 @@ int offline_orders(struct offline *rig, const struct offline_order *orders, uint
 void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
 int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
 int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
-               uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
+                   uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 void offline_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);
 void offline_counts(uint32_t n, const int64_t *q40_mm, uint32_t counts_per_mm, int32_t *counts);
-enum offline_error { OFFLINE_ERR_COEFFICIENTS, OFFLINE_ERR_PERIOD, OFFLINE_ERR_COUNTS, OFFLINE_ERR_FAULT, OFFLINE_ERR_DRIVE, OFFLINE_ERR_INTERP, ... };
+enum offline_error {
+    OFFLINE_ERR_COEFFICIENTS,
+    OFFLINE_ERR_PERIOD,
+    OFFLINE_ERR_COUNTS,
+    OFFLINE_ERR_FAULT,
+    OFFLINE_ERR_DRIVE,
+    OFFLINE_ERR_INTERP,
+    ...
+};
 
 /* offline/stop_search.h */
 struct stop_row {
-    double s_mm, tangent[2], curvature, slope, feed_mm_s;
+    double s_mm;
+    ...;
+};
+struct stop_bend {
+    double by_mm[3][6];
+};
+struct stop_stretch {
+    ...;
+};
+struct stop_path {
+    struct stop_row *rows;
+    struct stop_bend *bends;
+    struct stop_stretch *segments;
 };
 struct stop_cap {
     double from_mm, to_mm, feed_mm_s;
 };
 struct stop_limits {
     double feed, acceleration, jerk, centripetal;
-    double axis_velocity[2], axis_acceleration[2], axis_jerk[2], reach[2], time_constant[2];
+    double axis_velocity[6], axis_acceleration[6], axis_jerk[6], reach[6], time_constant[6];
     const struct stop_cap *caps;
     uint32_t cap_count, reach_at_pace, rise_is_cut;
 };
@@ -205,10 +232,10 @@ struct stop_found {
     double worst_s, mean_s;
 };
 #define STOP_ROWS ...
-void stop_rows(const struct program *p, const struct stop_limits *limits, struct stop_row *rows);
-void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
+void stop_rows(const struct program *p, const struct stop_limits *limits, const struct stop_path *path);
+void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
                struct stop_limits *used);
-void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_row *rows,
+void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
                  struct stop_found *found);
 
 /* offline/stop_trial.h */

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..names import INTERPOLATIONS, SPEEDS
+from ..names import INTEGRALS, INTERPOLATIONS, SPEEDS
 from .library import library, text
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def drive_config(drive: Drive, counts_per_mm: int, period_us: int) -> dict[str, 
         "interpolation": INTERPOLATIONS.index(drive.interpolation),
         "speed": SPEEDS.index(drive.speed),
         "delay_samples": drive.delay_samples,
+        "integral": INTEGRALS.index(drive.integral),
     }
 
 

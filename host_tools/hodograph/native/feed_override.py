@@ -32,11 +32,12 @@ class PlanStep:
 
 @dataclass(frozen=True)
 class Step:
-    """A tick: arc length and point of the setpoint (mm), feed along the path (mm/s), rate of program time."""
+    """A tick: arc length of the setpoint (mm), position of each path axis (mm, or degrees), feed along the path (mm/s),
+    rate of program time.
+    """
 
     arc_mm: float
-    x_mm: float
-    y_mm: float
+    position: tuple[float, ...]
     feed_mm_s: float
     rate: float
 
@@ -48,6 +49,7 @@ class FeedOverride:
         """Raises InputError: a program that does not pass the controller's check, no such kernel."""
         ffi, self._lib = library()
         self._program = program  # keeps the image alive
+        self._axes = program.axis_count
         self._period_s = 1e-6 * program.period_us
         self._interp = ffi.new("struct interpolator *")
         self._point = ffi.new("struct interpolator_point *")
@@ -62,8 +64,7 @@ class FeedOverride:
         own = self._point
         return Step(
             own.arc_length_q40_mm * 2.0**-40,
-            own.x_q40_mm * 2.0**-40,
-            own.y_q40_mm * 2.0**-40,
+            tuple(own.position_q40[axis] * 2.0**-40 for axis in range(self._axes)),
             self._lib.feed_override_feed_q32(self._feed) * 2.0**-32,
             self._lib.feed_override_actual_q30(self._feed) * 2.0**-30,
         )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import HodographError, InputError
 from .drive import drive_config
 from .library import library, text
-from .program import NativeProgram
+from .program import AXES, NativeProgram
 
 if TYPE_CHECKING:
     from ..config.axis_table import Feedforward
@@ -23,15 +23,16 @@ ROW = np.dtype(
     [
         ("arc_length_q40_mm", "<i8"),
         ("feed_q32_mm_s", "<i8"),
-        ("cmd_q40_mm", "<i8", (2,)),
+        ("cmd_q40_mm", "<i8", (AXES,)),
         ("contour_error_um", "<f8"),
-        ("set_counts", "<i4", (2,)),
-        ("act_counts", "<i4", (2,)),
-        ("volts_mv", "<i2", (2,)),
+        ("set_counts", "<i4", (AXES,)),
+        ("act_counts", "<i4", (AXES,)),
+        ("volts_mv", "<i2", (AXES,)),
         ("tick", "<u4"),
     ]
 )
-"""One tick, struct offline_row of sim/offline/offline.h: setpoint k beside the drives' report for SYNC k+2."""
+"""One tick, struct offline_row of sim/offline/offline.h: setpoint k beside the drives' report for
+SYNC k+2. Axes beyond those of the program are 0."""
 
 
 FAULT_KINDS = ("encoder-freeze", "encoder-jump", "saturate", "load", "setpoint-lost")
@@ -46,7 +47,7 @@ FOR_EVER = 2**32 - 1
 
 @dataclass(frozen=True)
 class OfflineFault:
-    """What happens to an axis (0, 1) for `ticks` ticks from tick `at` on (sim/offline/offline_fault.h).
+    """What happens to an axis (from 0) for `ticks` ticks from tick `at` on (sim/offline/offline_fault.h).
 
     `value`: bus counts of a jump, volts of a voltage limit or load. Ticks count as in
     docs/reference/protocol.md section 4.
@@ -85,15 +86,15 @@ class RigStop:
 
 
 class OfflineSimulation:
-    """Interpolator, two drives and contour error; begins with the drives parked at the start point."""
+    """Interpolator, the drives of a program's axes and contour error; begins with these parked at the start."""
 
     def __init__(
         self,
         program: NativeProgram,
         kernel: str,
-        drives: tuple[Drive, Drive],
+        drives: Sequence[Drive],
         counts_per_mm: int,
-        feedforward: tuple[Feedforward, Feedforward] | None = None,
+        feedforward: Sequence[Feedforward] | None = None,
         faults: Sequence[OfflineFault] = (),
         orders: Sequence[OfflineOrder] = (),
     ) -> None:
@@ -110,7 +111,7 @@ class OfflineSimulation:
         error = lib.offline_begin(
             self._rig,
             prepared,
-            ffi.new("struct drive_config[2]", configs),
+            ffi.new("struct drive_config[]", configs),
             self._segments,
         )
         if error != 0:
@@ -122,14 +123,14 @@ class OfflineSimulation:
         if feedforward is not None:
             lib.offline_feedforward(
                 self._rig,
-                ffi.new("struct feedforward_gains[2]", [_gains(axis) for axis in feedforward]),
+                ffi.new("struct feedforward_gains[]", [_gains(axis) for axis in feedforward]),
             )
 
         self._faults = ffi.new("struct offline_fault[]", [_fault(fault) for fault in faults])
         if lib.offline_faults(self._rig, self._faults, len(faults)) != 0:
             raise InputError(
                 f"simulation: cannot carry out the faults {list(faults)}: "
-                "axis 0 or 1, ticks from 1 on, volts of a limit above 0"
+                "an axis of the program, ticks from 1 on, volts of a limit above 0"
             )
 
         self._orders = ffi.new("struct offline_order[]", [_order(order) for order in orders])

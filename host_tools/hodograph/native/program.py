@@ -13,35 +13,42 @@ from ..errors import HodographError, InputError
 from ..names import KERNELS
 from .library import library, text
 
+AXES = 6
+"""Greatest number of path axes, PROGRAM_AXES of core/program.h."""
+
 POINT = np.dtype(
     [
         ("arc_length_q40_mm", "<i8"),
-        ("x_q40_mm", "<i8"),
-        ("y_q40_mm", "<i8"),
         ("feed_q32_mm_s", "<i8"),
+        ("position_q40", "<i8", (AXES,)),
     ]
 )
-"""One interpolated point, struct interpolator_point of core/interpolator.h: unrounded output of a kernel."""
+"""One interpolated point, struct interpolator_point of core/interpolator.h: unrounded output of a kernel.
+
+`position_q40` is 0 beyond the program's path axes; mm * 2^40, or degrees * 2^40 of an extra axis that turns.
+"""
 
 
 @dataclass(frozen=True)
 class NativeLimits:
     """What a controller allows: struct program_limits. 0 stands for no limit, but of the travel.
 
-    Those of travel and axes are (x, y), travel in mm * 2^40; period in us, feed and velocity in um/s, acceleration in
-    um/s^2, jerk in mm/s^3.
+    Those of travel and axes have one number for each path axis, travel in mm * 2^40; period in us, feed and velocity in
+    um/s, acceleration in um/s^2, jerk in mm/s^3. Axes that are not given have no limits. `axis_count` is the number of
+    path axes of the machine (0: any).
     """
 
     period_us: int = 0
     feed_um_s: int = 0
     acceleration_um_s2: int = 0
     jerk_mm_s3: int = 0
-    min_q40_mm: tuple[int, int] = (-(2**52), -(2**52))
-    max_q40_mm: tuple[int, int] = (2**52, 2**52)
+    min_q40_mm: tuple[int, ...] = ()
+    max_q40_mm: tuple[int, ...] = ()
     stop_time_ms: int = 0
-    axis_velocity_um_s: tuple[int, int] = (0, 0)
-    axis_acceleration_um_s2: tuple[int, int] = (0, 0)
-    axis_jerk_mm_s3: tuple[int, int] = (0, 0)
+    axis_velocity_um_s: tuple[int, ...] = ()
+    axis_acceleration_um_s2: tuple[int, ...] = ()
+    axis_jerk_mm_s3: tuple[int, ...] = ()
+    axis_count: int = 0
 
 
 @dataclass(frozen=True)
@@ -87,6 +94,11 @@ class NativeProgram:
         return int(self.pointer.header.period_us)
 
     @property
+    def axis_count(self) -> int:
+        """Number of path axes: 2 in the plane, 3 and more in space."""
+        return int(self.pointer.header.axis_count)
+
+    @property
     def segment_count(self) -> int:
         """Number of PH segments."""
         return int(self.pointer.header.segment_count)
@@ -106,10 +118,7 @@ class NativeProgram:
         """The controller's check of all rules; None: accepted, so that it may be interpolated as well."""
         ffi, lib = library()
         given = limits or NativeLimits()
-        c_limits = ffi.new(
-            "struct program_limits *",
-            {name: getattr(given, name) for name in given.__dataclass_fields__},
-        )
+        c_limits = ffi.new("struct program_limits *", _limits(given))
         fault = ffi.new("struct program_fault *")
         code = lib.program_check(self.pointer, c_limits, fault)
         if code == 0:
@@ -162,7 +171,7 @@ class NativeProgram:
         ffi, lib = library()
         program = self.prepared(kernel)
         times = np.ascontiguousarray(times_q42_s, dtype=np.uint64)
-        points = np.empty(times.size, dtype=POINT)
+        points = np.zeros(times.size, dtype=POINT)
         interp = ffi.new("struct interpolator *")
         begun = lib.interpolator_begin(interp, program)
         made = begun or lib.offline_points(
@@ -180,10 +189,19 @@ class NativeProgram:
     def setpoints(
         self, kernel: str, counts_per_mm: int, tick0: int = 0, count: int | None = None
     ) -> tuple[NDArray[np.void], NDArray[np.int32]]:
-        """Points (n,) of POINT and setpoints in counts (n, 2) of `count` ticks from `tick0` on."""
+        """Points (n,) of POINT and setpoints in counts (n, axis_count) of `count` ticks from `tick0` on."""
         points = self.points(kernel, self.tick_times_q42_s(tick0, count))
-        xy = np.stack([points["x_q40_mm"], points["y_q40_mm"]], axis=1)
-        return points, counts_from_q40_mm(xy, counts_per_mm)
+        return points, counts_from_q40_mm(
+            points["position_q40"][:, : self.axis_count], counts_per_mm
+        )
+
+
+def _limits(given: NativeLimits) -> dict[str, object]:
+    """As cffi takes a struct program_limits: axes that are not given have all travel that an image can have."""
+    fields = {name: getattr(given, name) for name in given.__dataclass_fields__}
+    for name, far in (("min_q40_mm", -(2**52)), ("max_q40_mm", 2**52)):
+        fields[name] = (*fields[name], *[far] * (AXES - len(fields[name])))
+    return fields
 
 
 def counts_from_q40_mm(q40_mm: NDArray[np.int64], counts_per_mm: int) -> NDArray[np.int32]:

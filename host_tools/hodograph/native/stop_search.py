@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from itertools import zip_longest
 from math import inf
 from typing import Any
 
@@ -11,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .library import library
-from .program import NativeProgram
+from .program import AXES, NativeProgram
 
-FREE = (inf, inf)
+FREE: tuple[float, ...] = (inf, inf)
 
 
 @dataclass(frozen=True)
 class StopLimits:
-    """What a brake has to keep; inf: no limit. mm and s; those of axes (x, y).
+    """What a brake has to keep; inf: no limit. mm and s; those of axes have one number
+    for each path axis, missing ones: no limit.
 
     feed, acceleration, jerk   along the path; the numbers of a brake never exceed the last two
     reach                      of |velocity + time_constant * acceleration| of the axis
@@ -31,11 +33,11 @@ class StopLimits:
     acceleration: float = inf
     jerk: float = inf
     centripetal: float = inf
-    axis_velocity: tuple[float, float] = FREE
-    axis_acceleration: tuple[float, float] = FREE
-    axis_jerk: tuple[float, float] = FREE
-    reach: tuple[float, float] = FREE
-    time_constant: tuple[float, float] = (0.0, 0.0)
+    axis_velocity: tuple[float, ...] = FREE
+    axis_acceleration: tuple[float, ...] = FREE
+    axis_jerk: tuple[float, ...] = FREE
+    reach: tuple[float, ...] = FREE
+    time_constant: tuple[float, ...] = (0.0, 0.0)
     caps: tuple[tuple[float, float, float], ...] = ()
     reach_at_pace: bool = False
     rise_is_cut: bool = False
@@ -47,7 +49,7 @@ class StopLimits:
 
         def greater(limit: Any, use: Any) -> Any:
             if isinstance(limit, tuple):
-                return tuple(greater(*pair) for pair in zip(limit, use, strict=True))
+                return tuple(greater(*pair) for pair in zip_longest(limit, use, fillvalue=inf))
             return max(limit, use * _MARGIN)
 
         values = {name: greater(getattr(self, name), getattr(used, name)) for name in _RAISED}
@@ -70,11 +72,15 @@ class StopSearch:
         ffi, lib = library()
         given = limits_struct(limits)
         found = ffi.new("struct stop_limits *")
-        lib.stop_used(self._program.pointer, given[0], self._rows(given), found)
+        path = self._path(given)
+        lib.stop_used(self._program.pointer, given[0], path[0], found)
         values: dict[str, Any] = {}
         for name in _RAISED:
             value = getattr(found, name)
-            values[name] = float(value) if isinstance(value, float) else (value[0], value[1])
+            axes = self._program.axis_count
+            values[name] = (
+                float(value) if isinstance(value, float) else tuple(value[k] for k in range(axes))
+            )
         return StopLimits(**values)
 
     def codes(
@@ -95,14 +101,20 @@ class StopSearch:
         if before is not None:
             for one, codes in zip(found, before.tolist(), strict=True):
                 one.before = codes
-        lib.stop_search(self._program.pointer, own[0], self._rows(own), found)
+        path = self._path(own)
+        lib.stop_search(self._program.pointer, own[0], path[0], found)
         return np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
 
-    def _rows(self, given: tuple[Any, Any]) -> Any:
+    def _path(self, given: tuple[Any, Any]) -> tuple[Any, tuple[Any, ...]]:
+        """The struct stop_path and what it points to, which must be kept as long."""
         ffi, lib = library()
-        rows = ffi.new("struct stop_row[]", self._program.segment_count * lib.STOP_ROWS)
-        lib.stop_rows(self._program.pointer, given[0], rows)
-        return rows
+        count = self._program.segment_count * lib.STOP_ROWS
+        rows = ffi.new("struct stop_row[]", count)
+        bends = ffi.new("struct stop_bend[]", count if self._program.axis_count > 2 else 0)
+        segments = ffi.new("struct stop_stretch[]", self._program.segment_count)
+        path = ffi.new("struct stop_path *", (rows, bends, segments))
+        lib.stop_rows(self._program.pointer, given[0], path)
+        return path, (rows, bends, segments)
 
 
 def limits_struct(limits: StopLimits) -> tuple[Any, Any]:
@@ -111,7 +123,12 @@ def limits_struct(limits: StopLimits) -> tuple[Any, Any]:
     caps = ffi.new("struct stop_cap[]", [tuple(cap) for cap in limits.caps])
     own = ffi.new("struct stop_limits *")
     for one in fields(limits):
-        if one.name != "caps":
-            setattr(own, one.name, getattr(limits, one.name))
+        value = getattr(limits, one.name)
+        if one.name == "caps":
+            continue
+        if isinstance(value, tuple):
+            free = 0.0 if one.name == "time_constant" else inf
+            value = (*value, *[free] * (AXES - len(value)))
+        setattr(own, one.name, value)
     own.caps, own.cap_count = caps, len(limits.caps)
     return own, caps

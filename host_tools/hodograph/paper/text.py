@@ -21,6 +21,8 @@ _NAMES = {
     "chord_jerk_mm_s3": "same differences, worst of the path (jerk)",
     "contour_error_um": "largest contour error",
     "max_volts": "largest drive voltage",
+    "contour_error_delayed_um": "contour error, one sample of delay",
+    "max_volts_delayed": "voltage, one sample of delay",
     "vector_acceleration_mm_s2": "acceleration vector at constant feed",
     "axis_acceleration_mm_s2": "acceleration of one axis",
     "vector_jerk_mm_s3": "jerk vector at constant feed",
@@ -40,7 +42,9 @@ def quantity_name(key: str) -> str:
 def comparison_text(comparison: dict[str, Any]) -> str:
     """All curves side by side."""
     curves = list(comparison)
-    head = f"{'':<44}" + "".join(f"{name:>12} paper {name + ' ours':>13}" for name in curves)
+    head = f"{'':<44}" + "".join(
+        f"{name:>12} paper {name + ' ours':>13}{'1 ms loop':>12}" for name in curves
+    )
     lines = [head]
     for key in comparison[curves[0]]:
         if key == _LEFT_OUT:
@@ -49,6 +53,7 @@ def comparison_text(comparison: dict[str, Any]) -> str:
         title = quantity_name(key) + (f", {unit}" if unit else "")
         cells = "".join(
             f"{shown(comparison[name][key]['paper']):>18} {shown(comparison[name][key]['ours']):>13}"
+            f"{shown(comparison[name][key]['ours_1ms']):>12}"
             for name in curves
         )
         lines.append(f"{title:<44}{cells}")

@@ -8,7 +8,10 @@ sums) is decided here in exact integers.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +26,21 @@ from ..feed.pieces import (
     way_excess,
 )
 from ..spline.bernstein import square
+from ..spline.spatial.curve import hodograph_of
+from ..spline.spatial.quaternion import polar
 from .check_stops import stop_fault
 from .codes import ProgramError
-from .geometry import WAY_SCALE, segment_ways
-from .image import Program, ProgramLimits, ReservedFields, decode, open_fault, reserved_fields
+from .geometry import PREIMAGE_LIMIT, WAY_SCALE, segment_ways
+from .image import (
+    PLANE_AXES,
+    Program,
+    ProgramLimits,
+    ReservedFields,
+    decode,
+    open_fault,
+    reserved_fields,
+)
+from .wide import Wide, product, scaled, wide
 
 Int = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -79,63 +93,81 @@ def highest_feed(low_q40: Int, high_q40: Int, pieces: FeedPieces) -> Real:
 
 Bool = NDArray[np.bool_]
 Rule = tuple[Bool, int, ProgramError]
-Big = NDArray[np.object_]
 
-W_LIMIT_Q44 = 64 << 44
 POINT_LIMIT_Q40 = 4096 << 40
 ARC_LIMIT_Q40 = 1 << 62
-JOIN_Q88 = WAY_SCALE << (88 - 34)
-CLOSE_Q88 = WAY_SCALE << (88 - 24)
+JOIN_WAY = wide(WAY_SCALE << (88 - 34))
+CLOSE_WAY = wide(WAY_SCALE << (88 - 24))
+LONGEST_WAY = wide(32 * WAY_SCALE << 88)
 DIRECTION_RAD = 2.0**-20
-TO_Q88 = WAY_SCALE << 48
 TRAVEL_SLACK_Q40 = 2.0**16
 """A path may run along a travel limit: 2^-24 mm of rounding are allowed."""
 
+_FAR_Q40 = 2.0**50
+"""No segment is as long: differences above are not looked into, so that nothing overflows."""
+
+# Three times the Bernstein coefficients of the square of a quadratic.
+_SIGMA3 = (
+    np.array([[3, 0, 0], [0, 0, 0], [0, 0, 0]]),
+    np.array([[0, 3, 0], [0, 0, 0], [0, 0, 0]]),
+    np.array([[0, 0, 1], [0, 2, 0], [0, 0, 0]]),
+    np.array([[0, 0, 0], [0, 0, 3], [0, 0, 0]]),
+    np.array([[0, 0, 0], [0, 0, 0], [0, 0, 3]]),
+)
+
+
+def coefficients_in_range(program: Program) -> bool:
+    """Whether the preimages keep the range of the format. Of others no curve can be computed."""
+    return not np.any(_beyond(program.a_q44, _preimage_limit_q44(program)))
+
+
+def _preimage_limit_q44(program: Program) -> int:
+    return PREIMAGE_LIMIT[len(program.a_q44)] << 44
+
 
 def segment_faults(
-    program: Program, ways: tuple[Big, Big, Big], limits: ProgramLimits | None
+    program: Program, ways: tuple[Wide, ...], limits: ProgramLimits | None
 ) -> list[Rule]:
     """What is wrong with the segments and their joints, in the order of the controller."""
     code = ProgramError
-    u, v = program.u_q44, program.v_q44
-    wide = _bool((_beyond(u, W_LIMIT_Q44) | _beyond(v, W_LIMIT_Q44)).any(axis=1))
-    far = _beyond(program.x_q40, POINT_LIMIT_Q40) | _beyond(program.y_q40, POINT_LIMIT_Q40)
+    limit = _preimage_limit_q44(program)
+    drawn = program.point_q40[: len(ways) - 1]
     outside = _bool((program.start_q40 < 0) | (program.start_q40 >= ARC_LIMIT_Q40))
-    sigma = _sigma3(u.astype(object), v.astype(object))
-    low, high = sigma.min(axis=1), sigma.max(axis=1)
-    x, y, s = (a.astype(object) * TO_Q88 for a in (program.x_q40, program.y_q40, program.start_q40))
-    gap_x, gap_y, gap_s = _gap(x, ways[0]), _gap(y, ways[1]), _gap(s, ways[2])
-    apart = (np.abs(gap_x) > JOIN_Q88) | (np.abs(gap_y) > JOIN_Q88)
-    arc = (np.abs(gap_s) > JOIN_Q88) | (np.diff(program.start_q40.astype(object)) <= 0)
+    sigma = _sigma3(program.a_q44)
+    apart = [_apart(point, way) for point, way in zip(drawn, ways, strict=False)]
+    backwards = program.start_q40[1:] <= program.start_q40[:-1]
     out: list[Rule] = [
-        (wide, 0, code.W_RANGE),
-        (far, 0, code.POINT_RANGE),
+        (_bool(_beyond(program.a_q44, limit).any(axis=(0, 2))), 0, code.W_RANGE),
+        (_bool(_beyond(drawn, POINT_LIMIT_Q40).any(axis=0)), 0, code.POINT_RANGE),
         (outside, 0, code.ARC_RANGE),
-        (_bool(low <= 0), 0, code.SIGMA),
-        (_bool(high > 2 * low), 0, code.SIGMA_RATIO),
-        (_bool(ways[2] > 32 * (WAY_SCALE << 88)), 0, code.SEGMENT_LONG),
+        (_any(one <= wide(0) for one in sigma), 0, code.SIGMA),
+        (_any(~(a <= b.doubled()) for a in sigma for b in sigma), 0, code.SIGMA_RATIO),
+        (_bool(~(ways[-1] <= LONGEST_WAY)), 0, code.SEGMENT_LONG),
     ]
     if limits is not None:
         out.append((_leaves(program, limits), 0, code.TRAVEL))
     return [
         *out,
         (_bool(program.start_q40[:1] != 0), 0, code.SEGMENT_FIRST),
-        (_bool(apart), 1, code.JOIN_POINT),
-        (_bool(arc), 1, code.JOIN_ARC),
-        (_turned(u, v), 1, code.JOIN_DIRECTION),
+        (_any(apart), 1, code.JOIN_POINT),
+        (_bool(_apart(program.start_q40, ways[-1]) | backwards), 1, code.JOIN_ARC),
+        (_turned(program.a_q44), 1, code.JOIN_DIRECTION),
     ]
 
 
-def end_faults(program: Program, ways: tuple[Big, Big, Big]) -> list[Rule]:
+def end_faults(program: Program, ways: tuple[Wide, ...]) -> list[Rule]:
     """What is wrong with the end of the path."""
     last = program.segment_count - 1
-    x, y = int(program.x_q40[last] - program.x_q40[0]), int(program.y_q40[last] - program.y_q40[0])
-    missing = (program.length_q40 - int(program.start_q40[last])) * TO_Q88
-    off = abs(missing - ways[2][last]) > JOIN_Q88 or missing <= 0
-    open_by = max(abs(x * TO_Q88 + ways[0][last]), abs(y * TO_Q88 + ways[1][last]))
+    missing = program.length_q40 - int(program.start_q40[last])
+    off = missing <= 0 or bool(_apart(np.array([0, missing]), ways[-1][last:])[0])
+    away = program.point_q40[:, 0] - program.point_q40[:, last]
+    open_end = [
+        _apart(np.array([0, way]), own[last:], CLOSE_WAY)[0]
+        for way, own in zip(away, ways[:-1], strict=False)
+    ]
     return [
         (np.array([off]), last, ProgramError.SEGMENT_END),
-        (np.array([program.closed and open_by > CLOSE_Q88]), last, ProgramError.NOT_CLOSED),
+        (np.array([program.closed and any(open_end)]), last, ProgramError.NOT_CLOSED),
     ]
 
 
@@ -155,37 +187,48 @@ def _bool(values: object) -> Bool:
     return np.asarray(values, dtype=np.bool_)
 
 
-def _sigma3(u: Big, v: Big) -> Big:
-    """Three times the Bernstein coefficients (N, 5) of |w|^2, q88, exactly."""
-    columns = (
-        3 * (u[:, 0] * u[:, 0] + v[:, 0] * v[:, 0]),
-        3 * (u[:, 0] * u[:, 1] + v[:, 0] * v[:, 1]),
-        2 * (u[:, 1] * u[:, 1] + v[:, 1] * v[:, 1]) + u[:, 0] * u[:, 2] + v[:, 0] * v[:, 2],
-        3 * (u[:, 1] * u[:, 2] + v[:, 1] * v[:, 2]),
-        3 * (u[:, 2] * u[:, 2] + v[:, 2] * v[:, 2]),
-    )
-    return np.stack(columns, axis=1)
+def _any(masks: Iterable[Bool]) -> Bool:
+    return _bool(np.logical_or.reduce(list(masks)))
 
 
-def _gap(start: Big, way: Big) -> Big:
-    return np.asarray(start[:-1] + way[:-1] - start[1:])
+def _sigma3(a_q44: Int) -> list[Wide]:
+    """Three times the Bernstein coefficients of sigma, five of (N,), q88, exactly."""
+    return [reduce(add, (product(one, one, weights) for one in a_q44)) for weights in _SIGMA3]
 
 
-def _turned(u: Int, v: Int) -> Bool:
-    """Directions of w^2 at the joints differ by more than 2^-20 rad (twice the angle between the w)."""
-    end = u[:-1, 2].astype(np.float64) + 1j * v[:-1, 2]
-    start = u[1:, 0].astype(np.float64) + 1j * v[1:, 0]
-    return np.asarray(np.abs(np.angle((np.conj(end) * start) ** 2)) > DIRECTION_RAD)
+def _apart(starts_q40: Int, ways: Wide, most: Wide = JOIN_WAY) -> Bool:
+    """Whether each way ends further than `most` from where the next one starts."""
+    far = np.abs(np.diff(starts_q40.astype(np.float64))) > _FAR_Q40
+    step = np.where(far, 0, starts_q40[1:] - starts_q40[:-1])
+    gap = ways[: len(step)] - scaled(step, WAY_SCALE, 48)
+    return _bool(far | ~gap.within(most))
+
+
+def _turned(a_q44: Int) -> Bool:
+    """Directions at the joints differ by more than 2^-20 rad."""
+    end, start = (one.astype(np.float64) for one in (a_q44[:, :-1, 2], a_q44[:, 1:, 0]))
+    if len(a_q44) == 2:  # twice the angle between the w
+        before, after = end[0] + 1j * end[1], start[0] + 1j * start[1]
+        return np.asarray(np.abs(np.angle((np.conj(before) * after) ** 2)) > DIRECTION_RAD)
+    before, after = (polar(one.T, one.T) for one in (end * 2.0**-44, start * 2.0**-44))
+    across = np.linalg.norm(np.cross(before, after), axis=1)
+    return np.asarray(np.arctan2(across, np.sum(before * after, axis=1)) > DIRECTION_RAD)
 
 
 def boxes_q40(program: Program) -> tuple[Real, Real]:
-    """Lowest and highest corner (N, 2) of the boxes of the segments' six Bezier points."""
-    w = np.asarray((program.u_q44 + 1j * program.v_q44) * 2.0**-44, dtype=np.complex128)
-    steps = np.rint(square(w).view(np.float64).reshape(-1, 5, 2) * (2.0**40 / 5.0))
-    start = np.stack((program.x_q40, program.y_q40), axis=1).astype(np.float64)
-    points = np.concatenate(
-        (start[:, None, :], start[:, None, :] + np.cumsum(steps, axis=1)), axis=1
-    )
+    """Lowest and highest corner (N, A) of the boxes of the segments' six Bezier points."""
+    start = program.point_q40.T.astype(np.float64)
+    if program.axis_count == PLANE_AXES:
+        u, q = program.a_q44
+        w = np.asarray((u + 1j * q) * 2.0**-44, dtype=np.complex128)
+        direction = square(w).view(np.float64).reshape(-1, 5, 2)
+    else:
+        direction = np.moveaxis(
+            hodograph_of(np.ldexp(np.moveaxis(program.a_q44, 0, 1).astype(np.float64), -44)), 1, 2
+        )
+    steps = np.cumsum(np.rint(direction * (2.0**40 / 5.0)), axis=1)
+    steps = np.concatenate((steps, np.moveaxis(program.extra_q40, 0, 2)), axis=2)
+    points = np.concatenate((start[:, None, :], start[:, None, :] + steps), axis=1)
     return points.min(axis=1), points.max(axis=1)
 
 
@@ -377,7 +420,7 @@ def check_image(image: bytes, limits: ProgramLimits | None = None) -> Fault | No
     return _check(decode(image), limits, reserved_fields(image))
 
 
-_CLEAN = ReservedFields(flags=True, axes=True, name=True, stops=None)
+_CLEAN = ReservedFields(flags=True, name=True, stops=None)
 
 
 def _check(
@@ -386,7 +429,7 @@ def _check(
     header = _header_fault(program, limits, reserved)
     if header is not None:
         return Fault(header, 0)
-    ways = segment_ways(program.u_q44, program.v_q44)
+    ways = segment_ways(program.a_q44)
     return (
         _first(segment_faults(program, ways, limits))
         or _first(end_faults(program, ways))
@@ -427,7 +470,7 @@ def _header_fault(
         return ProgramError.PERIOD_USED
     if not reserved.flags:
         return ProgramError.FLAGS
-    if not reserved.axes:
+    if limits is not None and limits.axis_count not in (0, program.axis_count):
         return ProgramError.AXES
     if not 0 < program.length_q40 < LONGEST_Q40_MM:
         return ProgramError.LENGTH

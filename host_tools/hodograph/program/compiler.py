@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import ceil
 
@@ -13,6 +14,8 @@ from ..errors import InputError, PlanError
 from ..feed import FeedPlan, FeedZone, Replan, replan
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
+from ..spline.frames import Curve
+from ..spline.spatial import SpatialPHSpline
 from .check import LEAST_FEED_MM_S, Fault, boxes_q40, brief_pairs, check
 from .codes import ProgramError
 from .geometry import quantise
@@ -45,12 +48,13 @@ class Compilation:
 class ProgramOptions:
     """What a program holds beside path and feed.
 
-    `limits` of the controller, travel included; without, only the rules of the format are checked. `period_us`, when
-    given, must be the plan's. `stops`: what its stops keep beside the plan's limits.
+    `offset_mm`: work offset of each axis of the path; (): none. `limits` of the controller, travel included; without,
+    only the rules of the format are checked. `period_us`, when given, must be the plan's. `stops`: what its stops keep
+    beside the plan's limits.
     """
 
     name: str = ""
-    offset_mm: complex = 0j
+    offset_mm: tuple[float, ...] = ()
     limits: ProgramLimits | None = None
     period_us: int | None = None
     stops: StopTerms = field(default_factory=StopTerms)
@@ -59,13 +63,15 @@ class ProgramOptions:
 _USUAL = ProgramOptions()
 
 
-def compile_program(spline: PHSpline, plan: FeedPlan, options: ProgramOptions = _USUAL) -> Program:
+def compile_program(
+    spline: PHSpline | SpatialPHSpline, plan: FeedPlan, options: ProgramOptions = _USUAL
+) -> Program:
     """The program of `compile_path` for a profile with ramps, for callers that need nothing else."""
     return compile_path(spline, plan, options).program
 
 
 def compile_path(
-    spline: PHSpline,
+    spline: PHSpline | SpatialPHSpline,
     plan: FeedPlan,
     options: ProgramOptions = _USUAL,
     replan: Replan = replan,
@@ -96,38 +102,35 @@ def compile_path(
         closed=spline.closed,
         duration_q32_s=pieces.total_q32_s,
         length_q40=length_q40,
-        offset_x_q40=round(offset_mm.real * 2**40),
-        offset_y_q40=round(offset_mm.imag * 2**40),
+        offset_q40=tuple(round(mm * 2**40) for mm in offset_mm or (0.0,) * spline.axes),
         feed_limit_um_s=_limit(plan.limits.feed_mm_s, 1000.0),
         acceleration_limit_um_s2=_limit(plan.limits.acceleration_mm_s2, 1000.0),
         jerk_limit_mm_s3=_limit(plan.limits.jerk_mm_s3, 1.0),
         start_q40=geometry.start_q40[:-1],
-        x_q40=geometry.x_q40,
-        y_q40=geometry.y_q40,
-        u_q44=geometry.u_q44,
-        v_q44=geometry.v_q44,
+        point_q40=geometry.point_q40,
+        a_q44=geometry.a_q44,
         pieces=pieces,
         stops=no_stops(len(pieces)),
     )
     program = plan_stops(program, plan, options.stops)
     fault = check(program, options.limits)
     if fault is not None:
-        raise PlanError(_advice(fault, program, options.limits, spline))
+        raise PlanError(_advice(fault, program, options.limits, spline, plan.limits.names))
     return Compilation(program, plan, plan.notes, geometry.drift_mm)
 
 
-def fit_plan(spline: PHSpline, plan: FeedPlan, replan: Replan) -> FeedPlan:
+def fit_plan(spline: PHSpline | SpatialPHSpline, plan: FeedPlan, replan: Replan) -> FeedPlan:
     """The plan that `compile_path` makes a program of: made again with a lower feed where segments are too short for
     it.
 
     Raises PlanError as `compile_path` does for them, and InputError for a path beyond the format.
     """
-    geometry = quantise(spline, 0j)
+    geometry = quantise(spline)
     return _fit_feed(plan, geometry.start_q40, spline, replan)[0]
 
 
 def _fit_feed(
-    plan: FeedPlan, joints_q40: Int, spline: PHSpline, replan: Replan
+    plan: FeedPlan, joints_q40: Int, spline: Curve, replan: Replan
 ) -> tuple[FeedPlan, FeedPieces]:
     """The plan with its feed low enough for the segments, and its pieces over their exact length."""
     length_q40 = int(joints_q40[-1])
@@ -158,7 +161,7 @@ def _fit_feed(
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
 
 
-def _span(spline: PHSpline, joints_q40: Int, segment: int) -> tuple[int, float]:
+def _span(spline: Curve, joints_q40: Int, segment: int) -> tuple[int, float]:
     """The span of the path that a segment belongs to, and the arc length in mm where the segment starts."""
     place_mm = float(joints_q40[segment]) * 2.0**-40
     return int(np.searchsorted(spline.segment_starts_mm, place_mm + 1e-9, side="right")), place_mm
@@ -169,7 +172,13 @@ def _limit(value: float | None, scale: float) -> int:
     return 0 if value is None else max(1, min(ceil(value * scale * (1.0 - 1e-12)), _U32_MAX))
 
 
-def _advice(fault: Fault, program: Program, limits: ProgramLimits | None, spline: PHSpline) -> str:
+def _advice(
+    fault: Fault,
+    program: Program,
+    limits: ProgramLimits | None,
+    spline: Curve,
+    names: Sequence[str],
+) -> str:
     text = f"program: {fault.code.text} ({fault.code.name}, {fault.place})"
     if fault.code is not ProgramError.TRAVEL or limits is None:
         return text
@@ -178,7 +187,7 @@ def _advice(fault: Fault, program: Program, limits: ProgramLimits | None, spline
     axes = ", ".join(
         f"{axis} {low:.6g} … {high:.6g} mm (travel {travel_low * 2.0**-40:g} … {travel_high * 2.0**-40:g})"
         for axis, low, high, travel_low, travel_high in zip(
-            "xy", lowest, highest, limits.min_q40_mm, limits.max_q40_mm, strict=True
+            names, lowest, highest, limits.min_q40_mm, limits.max_q40_mm, strict=True
         )
     )
     return f"{text}: in span {span} its box is {axes}; change [work] offset_mm or the path"

@@ -20,11 +20,10 @@ DIGITS = 50
 
 @dataclass(frozen=True)
 class ExactPoint:
-    """Arc length, point, feed and its derivatives as mpmath numbers; mm, s."""
+    """Arc length, point (by axis), feed and its derivatives as mpmath numbers; mm, s."""
 
     arc_length_mm: Any
-    x_mm: Any
-    y_mm: Any
+    point_mm: tuple[Any, ...]
     feed_mm_s: Any
     acceleration_mm_s2: Any
     jerk_mm_s3: Any
@@ -48,8 +47,7 @@ class ExactProgram:
         """The point at a time in 2^-42 s, as ticks have it, clipped to the program."""
         with mpmath.workdps(DIGITS):
             s, feed, acceleration, jerk = self._arc_length(time_q42_s)
-            x, y = self._point(s)
-            return ExactPoint(s, x, y, feed, acceleration, jerk)
+            return ExactPoint(s, self._point(s), feed, acceleration, jerk)
 
     def _arc_length(self, time_q42_s: int) -> tuple[Any, Any, Any, Any]:
         time = min(max(int(time_q42_s), 0), self._times[-1] << 10)
@@ -64,26 +62,26 @@ class ExactProgram:
             c = [k * v for k, v in enumerate(c)][1:]
         return values[0], values[1], values[2], values[3]
 
-    def _point(self, s: Any) -> tuple[Any, Any]:
+    def _point(self, s: Any) -> tuple[Any, ...]:
         p = self._program
         key = int(mpmath.floor(mpmath.ldexp(s, 40)))
         i = min(max(bisect_right(self._starts, key) - 1, 0), len(self._starts) - 1)
-        w = [
-            mpmath.mpc(mpmath.ldexp(int(u), -44), mpmath.ldexp(int(v), -44))
-            for u, v in zip(p.u_q44[i], p.v_q44[i], strict=True)
-        ]
+        a = [[mpmath.ldexp(int(b), -44) for b in one[i]] for one in p.a_q44]
         way = s - mpmath.ldexp(self._starts[i], -40)
-        sigma = _square(w, [mpmath.conj(b) for b in w])
-        xi = way / mpmath.re(sum(sigma) / 5)
+        direction, sigma = _direction(a), _sum(*(_product(one, one) for one in a))
+        xi = way / (sum(sigma) / 5)
         for _ in range(12):
-            move = (mpmath.re(_integral(sigma, xi)) - way) / mpmath.re(_bernstein(sigma, xi))
+            move = (_integral(sigma, xi) - way) / _bernstein(sigma, xi)
             xi -= move
             if abs(move) < mpmath.mpf(10) ** (5 - DIGITS):
                 break
-        r = _integral(_square(w, w), xi)
-        return (
-            mpmath.ldexp(int(p.x_q40[i]), -40) + mpmath.re(r),
-            mpmath.ldexp(int(p.y_q40[i]), -40) + mpmath.im(r),
+        ways = [_integral(one, xi) for one in direction]
+        for extra in p.extra_q40:
+            own = [mpmath.mpf(0), *(mpmath.ldexp(int(b), -40) for b in extra[i])]
+            ways.append(_bernstein(own, xi))
+        return tuple(
+            mpmath.ldexp(int(start), -40) + one
+            for start, one in zip(p.point_q40[:, i], ways, strict=True)
         )
 
 
@@ -95,7 +93,24 @@ def _horner(c: list[Any], tau: Any) -> Any:
     return value
 
 
-def _square(a: list[Any], b: list[Any]) -> list[Any]:
+def _direction(a: list[Any]) -> list[Any]:
+    """Bernstein coefficients of r' by axis: w^2 of u, q, or A i A* of u, v, p, q."""
+    if len(a) == 2:
+        u, q = a
+        return [_sum(_product(u, u), _product(q, q), sign=-1), _sum(_product(u, q), _product(u, q))]
+    u, v, p, q = a
+    across = _sum(_product(u, q), _product(v, p)), _sum(_product(v, q), _product(u, p), sign=-1)
+    along = _sum(_product(u, u), _product(v, v)), _sum(_product(p, p), _product(q, q))
+    return [_sum(*along, sign=-1), *(_sum(one, one) for one in across)]
+
+
+def _sum(*terms: list[Any], sign: int = 1) -> list[Any]:
+    """The first plus the others times `sign`."""
+    first, *others = terms
+    return [c + sign * sum(more) for c, *more in zip(first, *others, strict=True)]
+
+
+def _product(a: list[Any], b: list[Any]) -> list[Any]:
     """Bernstein coefficients of the product of two quadratics."""
     return [
         a[0] * b[0],

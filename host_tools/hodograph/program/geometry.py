@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A spline as the integer segments of a program, in exact integer arithmetic; docs/theory/numerics.md section 8.
-
-Products of q44 numbers are q88 and need up to 104 bits: numpy object arrays of Python integers, about
-1 us a segment and product.
-"""
+"""A spline as the integer segments of a program, in exact integer arithmetic; docs/theory/numerics.md section 8."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,48 +11,50 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..spline import PHSpline
+from ..spline.spatial import SpatialPHSpline
+from .wide import Wide, product
 
 Int = NDArray[np.int64]
-Big = NDArray[np.object_]
+Real = NDArray[np.float64]
 
 WAY_SCALE = 15
 """Ways of segments are exact multiples of 2^-88 / 15 mm."""
 
+# 15 times the integral of a b is, for quadratics in Bernstein form,
+# 3 a0 b0 + 3 a2 b2 + 2 a1 b1 + 3/2 (a0 b1 + a1 b0 + a1 b2 + a2 b1) + 1/2 (a0 b2 + a2 b0).
+_TWICE = np.array([[6, 3, 1], [3, 4, 3], [1, 3, 6]], dtype=np.int64)
+_SQUARE = np.array([[3, 3, 1], [0, 2, 3], [0, 0, 3]], dtype=np.int64)
+"""Weights of 30 times the integral of a b, and of 15 times that of a^2."""
 
-def segment_ways(u_q44: Int, v_q44: Int) -> tuple[Big, Big, Big]:
-    """Integral over [0, 1] of Re w^2, Im w^2 and |w|^2 of each segment (N,), times 15 * 2^88.
 
-    15 times the integral of a b is, for quadratics in Bernstein form,
-    3 a0 b0 + 3 a2 b2 + 2 a1 b1 + 3/2 (a0 b1 + a1 b0 + a1 b2 + a2 b1) + 1/2 (a0 b2 + a2 b0).
+def segment_ways(a_q44: Int) -> tuple[Wide, ...]:
+    """Integral over [0, 1] of r' by axis, and of sigma last, of each segment (N,), times 15 * 2^88.
+
+    a_q44  (2, N, 3): w = u + iq, r' = w^2; or (4, N, 3): A = u + v i + p j + q k, r' = A i A*
     """
-    u, v = u_q44.astype(object), v_q44.astype(object)
-    uu, vv, uv2 = _double_inner(u, u), _double_inner(v, v), _double_inner(u, v)
-    return (uu - vv) // 2, uv2, (uu + vv) // 2
-
-
-def _double_inner(a: Big, b: Big) -> Big:
-    """30 times the integral of the product; even when a is b."""
-    cross = a[:, 0] * b[:, 1] + a[:, 1] * (b[:, 0] + b[:, 2]) + a[:, 2] * b[:, 1]
-    ends = a[:, 0] * b[:, 2] + a[:, 2] * b[:, 0]
-    return np.asarray(
-        6 * (a[:, 0] * b[:, 0] + a[:, 2] * b[:, 2]) + 4 * a[:, 1] * b[:, 1] + 3 * cross + ends
+    squares = [product(one, one, _SQUARE) for one in a_q44]
+    if len(a_q44) == 2:
+        u, q = a_q44
+        return squares[0] - squares[1], product(u, q, _TWICE), squares[0] + squares[1]
+    u, v, p, q = a_q44
+    first, second = squares[0] + squares[1], squares[2] + squares[3]
+    return (
+        first - second,
+        product(u, q, _TWICE) + product(v, p, _TWICE),
+        product(v, q, _TWICE) - product(u, p, _TWICE),
+        first + second,
     )
 
 
-def way_to_q40(way: Big) -> Int:
+def way_to_q40(way: Wide) -> Int:
     """Ways (integers over 15 * 2^88) rounded to 2^-40 mm."""
-    unit = WAY_SCALE << 48
-    return np.asarray((2 * way + unit) // (2 * unit), dtype=np.int64)
-
-
-def cumulative(way: Big) -> Big:
-    """Ways at the joints (N + 1,), 0 first, exactly."""
-    out = np.zeros(way.size + 1, dtype=object)
-    out[1:] = np.add.accumulate(way)
-    return out
+    low = way.low + (WAY_SCALE << 47)
+    return np.asarray(way.high + (way.high + (low >> 48)) // WAY_SCALE)
 
 
 LONGEST_SEGMENT_MM = 31.875
+PREIMAGE_LIMIT = {2: 64, 4: 8}
+"""Components of the preimage are below this, by their number."""
 _ANCHOR_Q40 = 16
 """Points may be moved to those of the ideal curve by this much per joint, 2^-36 mm."""
 
@@ -65,32 +64,43 @@ class Geometry:
     """Integer segments, and the greatest distance of a start point from the ideal curve."""
 
     start_q40: Int  # (N + 1,), the last is the length
-    x_q40: Int
-    y_q40: Int
-    u_q44: Int
-    v_q44: Int
+    point_q40: Int  # (A, N)
+    a_q44: Int  # (2, N, 3) or (4, N, 3)
     drift_mm: float
 
 
-def quantise(path: PHSpline, offset_mm: complex) -> Geometry:
-    """Segments of a path: w rounded, then everything else from exact sums of the rounded w. Raises InputError."""
+def quantise(path: PHSpline | SpatialPHSpline, offset_mm: Sequence[float] = ()) -> Geometry:
+    """Segments of a path: its preimage rounded, then everything else from exact sums of the rounded one.
+
+    offset_mm  work offset of each axis; (): none. Raises InputError.
+    """
     spline = path.split(LONGEST_SEGMENT_MM, 2.0)
-    far = np.abs(np.concatenate((spline.origin, [offset_mm])))
+    origin, preimage = _real(spline)
+    offset = np.asarray(offset_mm if len(offset_mm) else np.zeros(len(origin)), dtype=np.float64)
+    far = np.linalg.norm(np.column_stack((origin, offset)), axis=0)
     if not np.all(far < 8192.0):
         raise InputError("path or work offset: a coordinate is beyond the 4096 mm of the format")
-    if np.abs(spline.w.view(np.float64)).max(initial=0.0) >= 2.0**18:
+    if np.abs(preimage).max(initial=0.0) >= 2.0**6:
         raise InputError("path: a segment is too long for the format")
-    u = np.rint(spline.w.real * 2.0**44).astype(np.int64)
-    v = np.rint(spline.w.imag * 2.0**44).astype(np.int64)
-    dx, dy, ds = (cumulative(way) for way in segment_ways(u, v))
-    x, x_drift = _anchored(way_to_q40(dx)[:-1], spline.origin.real, offset_mm.real)
-    y, y_drift = _anchored(way_to_q40(dy)[:-1], spline.origin.imag, offset_mm.imag)
-    return Geometry(way_to_q40(ds), x, y, u, v, float(np.hypot(x_drift, y_drift).max()))
+    a_q44 = np.rint(preimage * 2.0**44).astype(np.int64)
+    *ways, along = (way_to_q40(way.sums()) for way in segment_ways(a_q44))
+    columns = [
+        _anchored(way[:-1], ideal, by)
+        for way, ideal, by in zip(ways, origin, offset.tolist(), strict=True)
+    ]
+    drift = np.linalg.norm([apart for _, apart in columns], axis=0)
+    return Geometry(along, np.stack([point for point, _ in columns]), a_q44, float(drift.max()))
 
 
-def _anchored(
-    way_q40: Int, ideal_mm: NDArray[np.float64], offset_mm: float
-) -> tuple[Int, NDArray[np.float64]]:
+def _real(spline: PHSpline | SpatialPHSpline) -> tuple[Real, Real]:
+    """Origins (A, N) and components of the preimage (2, N, 3) or (4, N, 3)."""
+    if isinstance(spline, PHSpline):
+        origin, w = spline.origin, spline.w
+        return np.stack((origin.real, origin.imag)), np.stack((w.real, w.imag))
+    return spline.origin.T, np.moveaxis(spline.preimage, 1, 0)
+
+
+def _anchored(way_q40: Int, ideal_mm: Real, offset_mm: float) -> tuple[Int, Real]:
     """Start points from exact ways, drawn to the ideal ones as far as joints stay within 2^-36 mm."""
     offset = round(offset_mm * 2**40)
     ideal = np.rint(ideal_mm * 2.0**40).astype(np.int64)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ Int = NDArray[np.int64]
 MAGIC = b"HDGP"
 VERSION = 2
 HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE, STOP_SIZE = 128, 72, 88, 16
+"""Those of header and segment are a planar program's; `header_size` and `segment_size` know the others."""
+PLANE_AXES, SPACE_AXES, MOST_AXES = 2, 3, 6
 FLAG_CLOSED = 1
 NAME_SIZE = 32
 
@@ -37,6 +39,10 @@ _PIECE = np.dtype(
         ("second", "u1", LEVELS),
     ]
 )
+_I48 = np.dtype([("low", "<u4"), ("high", "<i2")])
+_PLANAR_SEGMENT = np.dtype([("start", "<i8"), ("point", "<i8", 2), ("a", "<i8", (3, 2))])
+_SPATIAL_SEGMENT = [("start", "<i8"), ("point", "<i8", 3), ("a", _I48, (3, 4))]
+_EXTRA_AXIS = np.dtype([("start", "<i8"), ("b", _I48, 5)])
 _STOP = np.dtype([("codes", "u1", (2, 3)), ("reserved", "<u2"), ("bound_us", "<u4", 2)])
 
 
@@ -44,9 +50,13 @@ _STOP = np.dtype([("codes", "u1", (2, 3)), ("reserved", "<u2"), ("bound_us", "<u
 class Program:
     """A program as the image has it: integers in the Q formats of docs/reference/protocol.md.
 
-    start_q40, x_q40, y_q40  (N,) arc length and point at the start of each segment, mm
-    u_q44, v_q44             (N, 3) Bernstein coefficients of w = u + iv, mm^(1/2)
-    pieces                   the M feed pieces, and `stops` for each of them
+    start_q40  (N,) arc length at the start of each segment, mm
+    point_q40  (A, N) the point there, by axis: x, y in the plane; x, y, z and the extra axes in space
+    a_q44      Bernstein coefficients of the preimage, mm^(1/2): in the plane (2, N, 3) those of w = u + iq, in space
+               (4, N, 3) those of A = u + v i + p j + q k
+    extra_q40  (A - 3, N, 5) Bezier coefficients 1 … 5 of the extra axes from the segment's start; mm, degrees
+    offset_q40 work offset of each axis, already contained
+    pieces     the M feed pieces, and `stops` for each of them
     Limits of 0 mean none.
     """
 
@@ -55,18 +65,26 @@ class Program:
     closed: bool
     duration_q32_s: int
     length_q40: int
-    offset_x_q40: int
-    offset_y_q40: int
+    offset_q40: tuple[int, ...]
     feed_limit_um_s: int
     acceleration_limit_um_s2: int
     jerk_limit_mm_s3: int
     start_q40: Int
-    x_q40: Int
-    y_q40: Int
-    u_q44: Int
-    v_q44: Int
+    point_q40: Int
+    a_q44: Int
     pieces: FeedPieces
     stops: Stops
+    extra_q40: Int = field(default_factory=lambda: np.zeros((0, 0, 5), dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        if not len(self.extra_q40):
+            none = np.zeros((0, self.segment_count, 5), dtype=np.int64)
+            object.__setattr__(self, "extra_q40", none)
+
+    @property
+    def axis_count(self) -> int:
+        """A: how many axes follow the path."""
+        return int(self.point_q40.shape[0])
 
     @property
     def segment_count(self) -> int:
@@ -81,7 +99,7 @@ class Program:
     @property
     def image_size(self) -> int:
         """Bytes of the image."""
-        return _size(self.segment_count, self.piece_count)
+        return _size(self.axis_count, self.segment_count, self.piece_count)
 
     @property
     def ticks(self) -> int:
@@ -115,9 +133,7 @@ def encode(program: Program) -> bytes:
     """The image. Writes what it is given, right or wrong (`check` judges); raises InputError for
     values that the fields cannot hold.
     """
-    segments = np.empty((program.segment_count, 9), dtype="<i8")
-    segments[:, 0], segments[:, 1], segments[:, 2] = program.start_q40, program.x_q40, program.y_q40
-    segments[:, 3::2], segments[:, 4::2] = program.u_q44, program.v_q44
+    segments = _segments(program)
     pieces = np.zeros(program.piece_count, dtype=_PIECE)
     own = program.pieces
     pieces["duration"], pieces["start"], pieces["c"] = own.duration_q32_s, own.start_q40, own.c_q40
@@ -135,18 +151,17 @@ def encode(program: Program) -> bytes:
         head = _HEADER.pack(
             MAGIC,
             VERSION,
-            HEADER_SIZE,
+            header_size(program.axis_count),
             program.image_size,
             0,
             program.period_us,
             program.segment_count,
             program.piece_count,
             FLAG_CLOSED if program.closed else 0,
-            2,
+            program.axis_count,
             program.duration_q32_s,
             program.length_q40,
-            program.offset_x_q40,
-            program.offset_y_q40,
+            *program.offset_q40[:PLANE_AXES],
             program.feed_limit_um_s,
             program.acceleration_limit_um_s2,
             program.jerk_limit_mm_s3,
@@ -156,7 +171,7 @@ def encode(program: Program) -> bytes:
             program.stops.worst_um[0],
             program.stops.worst_us[1],
             program.stops.worst_um[1],
-        )
+        ) + struct.pack(f"<{program.axis_count - PLANE_AXES}q", *program.offset_q40[PLANE_AXES:])
     except struct.error as error:
         raise InputError(f"program: a header field does not fit the format: {error}") from None
     return with_crc(head + body)
@@ -176,10 +191,13 @@ def decode(image: bytes) -> Program:
     if fault is not None:
         raise InputError(f"program image: {fault.text} ({fault.name}): compile it again")
     head = _HEADER.unpack_from(image)
-    segment_count, piece_count = head[6], head[7]
-    after = HEADER_SIZE + SEGMENT_SIZE * segment_count
-    segments = np.frombuffer(image, "<i8", 9 * segment_count, HEADER_SIZE).reshape(-1, 9)
-    segments = segments.astype(np.int64)
+    segment_count, piece_count, axes = head[6], head[7], head[9]
+    begin = header_size(axes)
+    after = begin + segment_size(axes) * segment_count
+    segments = np.frombuffer(image, _segment_type(axes), segment_count, begin)
+    extra = [segments[f"extra{k}"] for k in range(axes - SPACE_AXES)]
+    points = [segments["point"].T, *(one["start"][None] for one in extra)]
+    a = segments["a"] if axes == PLANE_AXES else _from_i48(segments["a"])
     raw = np.frombuffer(image, _PIECE, piece_count, after)
     pieces = FeedPieces(
         raw["duration"].astype(np.int64),
@@ -202,23 +220,69 @@ def decode(image: bytes) -> Program:
         closed=bool(head[8] & FLAG_CLOSED),
         duration_q32_s=head[10],
         length_q40=head[11],
-        offset_x_q40=head[12],
-        offset_y_q40=head[13],
+        offset_q40=(
+            *head[12:14],
+            *struct.unpack_from(f"<{axes - PLANE_AXES}q", image, HEADER_SIZE),
+        ),
         feed_limit_um_s=head[14],
         acceleration_limit_um_s2=head[15],
         jerk_limit_mm_s3=head[16],
-        start_q40=segments[:, 0],
-        x_q40=segments[:, 1],
-        y_q40=segments[:, 2],
-        u_q44=segments[:, 3::2],
-        v_q44=segments[:, 4::2],
+        start_q40=segments["start"].astype(np.int64),
+        point_q40=np.concatenate(points).astype(np.int64),
+        a_q44=np.ascontiguousarray(np.moveaxis(a, 2, 0), dtype=np.int64),
         pieces=pieces,
         stops=stops,
+        extra_q40=np.array([_from_i48(one["b"]) for one in extra], dtype=np.int64).reshape(
+            max(axes - SPACE_AXES, 0), segment_count, 5
+        ),
     )
 
 
-def _size(segments: int, pieces: int) -> int:
-    return HEADER_SIZE + SEGMENT_SIZE * segments + (PIECE_SIZE + STOP_SIZE) * pieces
+def header_size(axes: int) -> int:
+    """Bytes of the header of a program that so many axes follow."""
+    return HEADER_SIZE + 8 * (axes - PLANE_AXES)
+
+
+def segment_size(axes: int) -> int:
+    """Bytes of one of its segments."""
+    return _segment_type(axes).itemsize
+
+
+def _segment_type(axes: int) -> np.dtype[np.void]:
+    if axes == PLANE_AXES:
+        return _PLANAR_SEGMENT
+    extra = [(f"extra{k}", _EXTRA_AXIS) for k in range(axes - SPACE_AXES)]
+    return np.dtype([*_SPATIAL_SEGMENT, *extra])
+
+
+def _segments(program: Program) -> NDArray[np.void]:
+    """As the image has them."""
+    axes = program.axis_count
+    out = np.zeros(program.segment_count, dtype=_segment_type(axes))
+    drawn = PLANE_AXES if axes == PLANE_AXES else SPACE_AXES
+    out["start"], out["point"] = program.start_q40, program.point_q40[:drawn].T
+    a = np.moveaxis(program.a_q44, 0, 2)
+    out["a"] = a if axes == PLANE_AXES else _to_i48(a)
+    for k in range(axes - SPACE_AXES):
+        out[f"extra{k}"]["start"] = program.point_q40[SPACE_AXES + k]
+        out[f"extra{k}"]["b"] = _to_i48(program.extra_q40[k])
+    return out
+
+
+def _to_i48(values: Int) -> NDArray[np.void]:
+    if np.abs(values).max(initial=0) >= 1 << 47:
+        raise InputError("program: a coefficient does not fit the 48 bits of the format")
+    out = np.empty(values.shape, dtype=_I48)
+    out["low"], out["high"] = values & 0xFFFFFFFF, values >> 32
+    return out
+
+
+def _from_i48(values: NDArray[np.void]) -> Int:
+    return np.asarray((values["high"].astype(np.int64) << 32) | values["low"].astype(np.int64))
+
+
+def _size(axes: int, segments: int, pieces: int) -> int:
+    return header_size(axes) + segment_size(axes) * segments + (PIECE_SIZE + STOP_SIZE) * pieces
 
 
 def open_fault(image: bytes) -> ProgramError | None:
@@ -228,9 +292,14 @@ def open_fault(image: bytes) -> ProgramError | None:
     head = _HEADER.unpack_from(image)
     if head[0] != MAGIC:
         return ProgramError.MAGIC
-    if head[1] != VERSION or head[2] != HEADER_SIZE:
+    axes = head[9]
+    if head[1] != VERSION:
         return ProgramError.VERSION
-    size = _size(head[6], head[7])
+    if not PLANE_AXES <= axes <= MOST_AXES:
+        return ProgramError.AXES
+    if head[2] != header_size(axes):
+        return ProgramError.VERSION
+    size = _size(axes, head[6], head[7])
     if head[3] != size or len(image) < size:
         return ProgramError.SIZE
     if head[6] == 0 or head[7] == 0:
@@ -242,12 +311,11 @@ def open_fault(image: bytes) -> ProgramError | None:
 
 @dataclass(frozen=True, eq=False)
 class ReservedFields:
-    """What an image says beside a `Program`: whether flags and reserved bytes of the header, the axis count
-    and the padding of the name are as they must be, and where reserved fields of stops are not 0 (None: nowhere).
+    """What an image says beside a `Program`: whether flags and reserved bytes of the header and the padding of the
+    name are as they must be, and where reserved fields of stops are not 0 (None: nowhere).
     """
 
     flags: bool
-    axes: bool
     name: bool
     stops: NDArray[np.bool_] | None
 
@@ -256,11 +324,10 @@ def reserved_fields(image: bytes) -> ReservedFields:
     """The same of an image that opens."""
     head = _HEADER.unpack_from(image)
     name = head[18]
-    after = HEADER_SIZE + SEGMENT_SIZE * head[6]
+    after = header_size(head[9]) + segment_size(head[9]) * head[6]
     stops = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])["reserved"]
     return ReservedFields(
         flags=not (head[8] & ~FLAG_CLOSED or head[17]),
-        axes=head[9] == 2,
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
         stops=stops != 0,
     )
@@ -271,20 +338,23 @@ class ProgramLimits:
     """What a controller allows, in the units of the protocol; 0 for all but the travel: any.
 
     stop_time_ms  greatest bound of a fault stop
+    axis_count    path axes of the machine; 0: any
 
-    Those of the axes, (x, y), are proved by the controller's own check only (firmware/core/limit_check.h).
+    Those of the axes, in the order of the path, are proved by the controller's own check only
+    (firmware/core/limit_check.h).
     """
 
     period_us: int
     feed_um_s: int
     acceleration_um_s2: int
     jerk_mm_s3: int
-    min_q40_mm: tuple[int, int]
-    max_q40_mm: tuple[int, int]
+    min_q40_mm: tuple[int, ...]
+    max_q40_mm: tuple[int, ...]
     stop_time_ms: int = 0
-    axis_velocity_um_s: tuple[int, int] = (0, 0)
-    axis_acceleration_um_s2: tuple[int, int] = (0, 0)
-    axis_jerk_mm_s3: tuple[int, int] = (0, 0)
+    axis_velocity_um_s: tuple[int, ...] = (0, 0)
+    axis_acceleration_um_s2: tuple[int, ...] = (0, 0)
+    axis_jerk_mm_s3: tuple[int, ...] = (0, 0)
+    axis_count: int = 0
 
 
 RECORD_BYTES = {"fixed": (288, 208), "float": (272, 208), "double": (248, 176)}

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..feed.pieces import derivative_peaks
+from ..names import AXES
 from .geometry import segment_ways, way_to_q40
 from .image import VERSION, Program
 from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
@@ -19,7 +20,9 @@ def inspect_dict(program: Program) -> dict[str, Any]:
     """What a program holds, as plain numbers in mm and s, for JSON."""
     pieces = program.pieces
     feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)
-    dx, dy, _ = (way_to_q40(way) for way in segment_ways(program.u_q44, program.v_q44))
+    *ways, _ = (int(way_to_q40(way)[0]) for way in segment_ways(program.a_q44[:, -1:]))
+    ways += [int(one) for one in program.extra_q40[:, -1, -1]]
+    end = [int(last) + way for last, way in zip(program.point_q40[:, -1], ways, strict=True)]
     return {
         "name": program.name,
         "version": VERSION,
@@ -31,12 +34,9 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "ticks": program.ticks,
         "duration_s": program.duration_s,
         "length_mm": program.length_mm,
-        "offset_mm": [program.offset_x_q40 * 2.0**-40, program.offset_y_q40 * 2.0**-40],
-        "start_mm": [float(program.x_q40[0]) * 2.0**-40, float(program.y_q40[0]) * 2.0**-40],
-        "end_mm": [
-            float(program.x_q40[-1] + dx[-1]) * 2.0**-40,
-            float(program.y_q40[-1] + dy[-1]) * 2.0**-40,
-        ],
+        "offset_mm": [one * 2.0**-40 for one in program.offset_q40],
+        "start_mm": (program.point_q40[:, 0] * 2.0**-40).tolist(),
+        "end_mm": [one * 2.0**-40 for one in end],
         "feed_limit_mm_s": program.feed_limit_um_s / 1000 or None,
         "acceleration_limit_mm_s2": program.acceleration_limit_um_s2 / 1000 or None,
         "jerk_limit_mm_s3": float(program.jerk_limit_mm_s3) or None,
@@ -62,12 +62,13 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         )
         if d[name] is not None
     )
+    names = AXES[: program.axis_count]
     lines = [
         f"program   {d['name'] or '(no name)'}, format {d['version']}, {d['image_bytes']} bytes",
         f"path      {'closed' if d['closed'] else 'open'}, {d['length_mm']:.9f} mm in {d['segments']} segments",
-        f"from      ({d['start_mm'][0]:.9f}, {d['start_mm'][1]:.9f}) mm",
-        f"to        ({d['end_mm'][0]:.9f}, {d['end_mm'][1]:.9f}) mm",
-        f"offset    ({d['offset_mm'][0]:g}, {d['offset_mm'][1]:g}) mm, contained",
+        f"from      ({', '.join(f'{mm:.9f}' for mm in d['start_mm'])}) mm",
+        f"to        ({', '.join(f'{mm:.9f}' for mm in d['end_mm'])}) mm",
+        f"offset    ({', '.join(f'{mm:g}' for mm in d['offset_mm'])}) mm, contained",
         f"time      {d['duration_s']:.9f} s in {d['pieces']} pieces, {d['ticks']} ticks of {d['period_us']} us",
         f"limits    {limits or 'none given'}",
         f"peaks     feed {d['peak_feed_mm_s']:.6g} mm/s, acceleration {d['peak_acceleration_mm_s2']:.6g} "
@@ -76,7 +77,9 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         f"second {d['override_second_least_per_s2']:.4g} /s^2 (tightest)",
         *stops_text(program.stops, program.piece_starts_mm),
         "",
-        " segment       start mm           x mm           y mm      length mm",
+        " segment       start mm"
+        + "".join(f"{one + ' mm':>15}" for one in names)
+        + "      length mm",
         *_rows(_segment_rows(program), full),
         "",
         "   piece     duration s       start mm  feed mm/s  peak acc  peak jerk  factor    rate  second",
@@ -90,11 +93,8 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
 
 def _segment_rows(program: Program) -> list[str]:
     joints = np.append(program.start_q40, program.length_q40) * 2.0**-40
-    x, y = program.x_q40 * 2.0**-40, program.y_q40 * 2.0**-40
-    return [
-        f"{i:8d} {joints[i]:14.6f} {x[i]:14.6f} {y[i]:14.6f} {joints[i + 1] - joints[i]:14.6f}"
-        for i in range(program.segment_count)
-    ]
+    rows = np.column_stack((joints[:-1], program.point_q40.T * 2.0**-40, np.diff(joints)))
+    return [f"{i:8d} " + " ".join(f"{mm:14.6f}" for mm in row) for i, row in enumerate(rows)]
 
 
 def _piece_rows(program: Program) -> list[str]:

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ..errors import PlanError
 from ..feed import AxisLimits, FeedPlan, Plants
+from ..feed.limits import PerAxis
 from ..feed.pieces import halved
 from ..native.program import NativeProgram
 from ..native.stop_bounds import stop_bounds
-from ..native.stop_search import FREE, StopLimits, StopSearch
+from ..native.stop_search import StopLimits, StopSearch
 from .check_stops import END_TICKS, own_bounds
 from .image import Program, encode
 from .stops import DECELERATION, FAULT, HOLD, Stops, no_stops
@@ -36,7 +37,7 @@ MOST_MISSES = 2
 class StopTerms:
     """What stops have to keep beside the limits of a plan.
 
-    plants        of x and y with the volts that the path file gives them; for holds. None: any
+    plants        of the axes with the volts that the path file gives them; for holds. None: any
     drives        the same with all the volts that their drives have; for fault stops. None: any
     axis          limits of the machine's axes, for both
     stop_time_ms  greatest bound of a fault stop; 0: any
@@ -222,7 +223,7 @@ def _checked(program: Program, terms: StopTerms) -> Program:
 def hold_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
     """What feed hold and stop keep: the limits of the path file and of the machine."""
     own = plan.limits
-    machine = fault_limits(plan, StopTerms(axis=terms.axis))
+    machine, axes = fault_limits(plan, StopTerms(axis=terms.axis)), len(own.names)
     return replace(
         machine,
         feed=_least(own.feed_mm_s, machine.feed),
@@ -233,8 +234,8 @@ def hold_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
         axis_acceleration=_both(own.axis.acceleration_mm_s2, machine.axis_acceleration),
         axis_jerk=_both(own.axis.jerk_mm_s3, machine.axis_jerk),
         caps=tuple((cap.from_mm, cap.to_mm, cap.feed_mm_s) for cap in own.zones),
-        reach=_reach(terms.plants),
-        time_constant=_time_constants(terms.plants),
+        reach=_reach(terms.plants, axes),
+        time_constant=_time_constants(terms.plants, axes),
         reach_at_pace=False,
         rise_is_cut=True,
     )
@@ -242,16 +243,17 @@ def hold_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
 
 def fault_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
     """What fault stops keep: the limits of the machine."""
-    machine = plan.controller
+    machine, axes = plan.controller, len(plan.limits.names)
+    free = (inf,) * axes
     return StopLimits(
         feed=machine.feed_mm_s,
         acceleration=machine.acceleration_mm_s2,
         jerk=machine.jerk_mm_s3,
-        axis_velocity=_both(terms.axis.velocity_mm_s, FREE),
-        axis_acceleration=_both(terms.axis.acceleration_mm_s2, FREE),
-        axis_jerk=_both(terms.axis.jerk_mm_s3, FREE),
-        reach=_reach(terms.drives),
-        time_constant=_time_constants(terms.drives),
+        axis_velocity=_both(terms.axis.velocity_mm_s, free),
+        axis_acceleration=_both(terms.axis.acceleration_mm_s2, free),
+        axis_jerk=_both(terms.axis.jerk_mm_s3, free),
+        reach=_reach(terms.drives, axes),
+        time_constant=_time_constants(terms.drives, axes),
         reach_at_pace=True,
     )
 
@@ -260,13 +262,14 @@ def _least(limit: float | None, other: float) -> float:
     return other if limit is None else min(limit, other)
 
 
-def _both(limit: tuple[float, float] | None, other: tuple[float, float]) -> tuple[float, float]:
-    return other if limit is None else (min(limit[0], other[0]), min(limit[1], other[1]))
+def _both(limit: PerAxis | None, other: PerAxis) -> PerAxis:
+    """The lower of two limits of each axis."""
+    return other if limit is None else tuple(min(pair) for pair in zip(limit, other, strict=True))
 
 
-def _reach(plants: Plants | None) -> tuple[float, float]:
-    return FREE if plants is None else (plants[0].reach_mm_s, plants[1].reach_mm_s)
+def _reach(plants: Plants | None, axes: int) -> PerAxis:
+    return (inf,) * axes if plants is None else tuple(plant.reach_mm_s for plant in plants)
 
 
-def _time_constants(plants: Plants | None) -> tuple[float, float]:
-    return (0.0, 0.0) if plants is None else (plants[0].time_constant_s, plants[1].time_constant_s)
+def _time_constants(plants: Plants | None, axes: int) -> PerAxis:
+    return (0.0,) * axes if plants is None else tuple(plant.time_constant_s for plant in plants)

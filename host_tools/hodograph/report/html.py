@@ -12,10 +12,12 @@ from ..paper import compare, quantity_name, shown
 from ..paper.compare import CASES
 from ..pipeline import Pipeline, proved_limits
 from ..simulate import Motion
+from ..spline.spatial import SpatialPHSpline
 from .feed_figures import feed_figure, search_figure
 from .page import Figure, file_name, render, write_page
 from .path_figures import joint_figure, polygon_figure
 from .run_figures import contour_figure, drive_figure
+from .space_figures import space_contour_figure, space_path_figure
 from .style import styled
 
 Case = tuple[Pipeline, Motion, BusRun | None]
@@ -49,12 +51,9 @@ def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _case(pipeline: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, Any]:
     plan = pipeline.compilation.plan
     source = "recorded on the bus" if run is not None else "simulated"
+    in_space = isinstance(pipeline.curve, SpatialPHSpline)
     figures = [
-        Figure(
-            "path",
-            "Control polygon, nodal points and the C2 PH quintic spline; curvature (paper, figure 1).",
-            polygon_figure(pipeline),
-        ),
+        _space_path(pipeline) if in_space else _plane_path(pipeline),
         Figure(
             "feed",
             "Feed, tangential acceleration and jerk of the plain quintic profile and of the one used "
@@ -66,25 +65,16 @@ def _case(pipeline: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, A
     if search is not None:
         caption = "Progress of the pattern search for n_c (paper, figure 3)."
         figures.append(Figure("search", caption, search))
-    figures += [
-        Figure(
-            "joints",
-            "First and second differences of chord speed over the period at constant feed (paper, figure 5). "
-            "The dashed curve is what the shortening of chords on a curve gives by itself.",
-            joint_figure(pipeline, plan),
-        ),
-        Figure(
-            "contour",
-            f"Commanded and actual path, the worst place enlarged, and the contour error along the run, {source} "
-            "(paper, figure 7).",
-            contour_figure(pipeline, motion),
-        ),
+    figures += (
+        _space_run(pipeline, motion, source) if in_space else _plane_run(pipeline, motion, source)
+    )
+    figures.append(
         Figure(
             "drives",
             f"Following error and voltage by axis, {source}.",
             drive_figure(pipeline, motion),
-        ),
-    ]
+        )
+    )
     return {
         "name": pipeline.file.name,
         "anchor": file_name(pipeline.file.name, "path"),
@@ -94,6 +84,44 @@ def _case(pipeline: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, A
         "figures": figures,
         "load": _load(run),
     }
+
+
+def _plane_path(pipeline: Pipeline) -> Figure:
+    return Figure(
+        "path",
+        "Control polygon, nodal points and the C2 PH quintic spline; curvature (paper, figure 1).",
+        polygon_figure(pipeline),
+    )
+
+
+def _space_path(pipeline: Pipeline) -> Figure:
+    caption = "Given points and the C2 PH quintic spline in an isometric view; curvature."
+    return Figure("path", caption, space_path_figure(pipeline))
+
+
+def _plane_run(pipeline: Pipeline, motion: Motion, source: str) -> list[Figure]:
+    return [
+        Figure(
+            "joints",
+            "First and second differences of chord speed over the period at constant feed (paper, figure 5). "
+            "The dashed curve is what the shortening of chords on a curve gives by itself.",
+            joint_figure(pipeline, pipeline.compilation.plan),
+        ),
+        Figure(
+            "contour",
+            f"Commanded and actual path, the worst place enlarged, and the contour error along the run, {source} "
+            "(paper, figure 7).",
+            contour_figure(pipeline, motion),
+        ),
+    ]
+
+
+def _space_run(pipeline: Pipeline, motion: Motion, source: str) -> list[Figure]:
+    caption = (
+        "Commanded and actual path in an isometric view and three projections, and the contour error along the run, "
+        f"{source}."
+    )
+    return [Figure("contour", caption, space_contour_figure(pipeline, motion))]
 
 
 def _misses(run: BusRun | None) -> str:
@@ -131,7 +159,7 @@ def _render(cases: Sequence[Case], shown_cases: list[dict[str, Any]]) -> str:
 def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
     rows: dict[str, list[str]] = {}
     for pipeline, motion, run in cases:
-        plan, spline = pipeline.compilation.plan, pipeline.spline_result.spline
+        plan, spline = pipeline.compilation.plan, pipeline.curve
         values = {
             "path": f"{'closed' if spline.closed else 'open'}, {spline.segment_count} segments",
             "length, mm": f"{spline.length_mm:.4f}",
@@ -159,6 +187,9 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
     return list(rows.items())
 
 
+_SIDES = ("paper", "ours", "ours_1ms")
+
+
 def _comparison(cases: Sequence[Case]) -> dict[str, Any] | None:
     if not {pipeline.file.name for pipeline, _, _ in cases} & set(CASES):
         return None
@@ -168,7 +199,7 @@ def _comparison(cases: Sequence[Case]) -> dict[str, Any] | None:
         {
             "name": quantity_name(key),
             "unit": found[curves[0]][key]["unit"],
-            "cells": [shown(found[c][key][side]) for c in curves for side in ("paper", "ours")],
+            "cells": [shown(found[c][key][side]) for c in curves for side in _SIDES],
         }
         for key in found[curves[0]]
     ]

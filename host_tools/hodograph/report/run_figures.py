@@ -16,6 +16,7 @@ ALLOWED_UM = 30.0
 
 _ZOOM_FACTOR = 5.0
 _LEAST_ZOOM_UM = 5.0
+_COLORS = (BLUE, GREEN, ORANGE, RED, GREY, SOFT)
 
 
 def contour_figure(pipeline: Pipeline, motion: Motion) -> bytes:
@@ -27,7 +28,7 @@ def contour_figure(pipeline: Pipeline, motion: Motion) -> bytes:
     worst = int(np.argmax(motion.contour_error_um))
     _plane(plane, pipeline, motion, worst)
     _zoom(zoom, motion, worst)
-    _error(error, motion, worst)
+    error_axes(error, motion, worst)
     return png(figure)
 
 
@@ -71,7 +72,8 @@ def _foot(curve_um: np.ndarray) -> np.ndarray:
     return np.asarray(feet[np.argmin(np.sum(feet * feet, axis=1))])
 
 
-def _error(axes: Axes, motion: Motion, worst: int) -> None:
+def error_axes(axes: Axes, motion: Motion, worst: int) -> None:
+    """The contour error over the time of a run; `worst` is its greatest row."""
     t_s, error = motion.t_s, motion.contour_error_um
     axes.fill_between(t_s, error, color=BLUE, alpha=0.18, linewidth=0)
     axes.plot(t_s, error, color=BLUE, linewidth=1.3)
@@ -101,10 +103,11 @@ def _error(axes: Axes, motion: Motion, worst: int) -> None:
 def drive_figure(pipeline: Pipeline, motion: Motion) -> bytes:
     """Following error and voltage of each axis."""
     figure, (following, volts) = pyplot.subplots(2, 1, figsize=(9.6, 4.8), sharex=True)
-    for i, (axis, color) in enumerate(zip(pipeline.machine.plane, (BLUE, GREEN), strict=True)):
+    path_axes = pipeline.machine.path_axes
+    for i, (axis, color) in enumerate(zip(path_axes, _COLORS, strict=False)):
         following.plot(motion.t_s, motion.following_error_um[:, i], color=color, label=axis.name)
         volts.plot(motion.t_s, motion.volts[:, i], color=color, label=axis.name)
-    limits = [axis.drive.volts_limit for axis in pipeline.machine.plane if axis.drive is not None]
+    limits = [axis.drive.volts_limit for axis in path_axes if axis.drive is not None]
     if limits and (motion.max_volts or 0.0) > 0.5 * (limit := min(limits)):
         for sign in (-1, 1):
             volts.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
@@ -112,7 +115,7 @@ def drive_figure(pipeline: Pipeline, motion: Motion) -> bytes:
     volts.set_ylabel("drive voltage, V")
     volts.set_xlabel("time, s")
     following.set_title(f"{pipeline.file.name}: following error and voltage of the axes")
-    following.legend(loc="upper right", ncols=2)
+    following.legend(loc="upper right", ncols=len(path_axes))
     for axes in (following, volts):
         axes.margins(x=0)
     return png(figure)

@@ -106,7 +106,7 @@ def contour_figure(tuning: Tuning, path: PathResult, pipeline: Pipeline) -> byte
     """Contour error along a path, as given and tuned, of the plant as modelled."""
     machine = tuning.machine
     figure, axes = pyplot.subplots(figsize=(9.6, 3.4))
-    given = machine.models(machine.plane), machine.plane_feedforward
+    given = machine.models(machine.require_plane("tune")), machine.plane_feedforward
     for name, color, (drives, forward) in (
         ("as given", GREY, given),
         ("tuned", BLUE, (tuning.drives, tuning.feedforward)),

@@ -6,9 +6,12 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..names import AXES
 
 SETTLING_S = 0.2
 """Time after the last tick that maxima count, hashes and traces do not (docs/reference/protocol.md section 2)."""
@@ -27,7 +30,8 @@ class Motion:
     """A run. Row k: setpoint k, and what the drives reported for SYNC k+2, when it is reached.
 
     `rows` has `native.ROW` records: the program's ticks, then the settling time; it is empty when the run
-    did not keep them. Hashes are over i32 little-endian x, y of the program's ticks. The following error
+    did not keep them. Arrays of all A axes that follow the path, `names`, are (n, A). Hashes are over i32 little-endian
+    x, y (…) of the program's ticks. The following error
     is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
     the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not tell their volts.
     """
@@ -43,6 +47,10 @@ class Motion:
     rms_contour_error_um: float
     max_following_error_um: float
     max_volts: float | None
+    names: tuple[str, ...] = AXES[:2]
+
+    def _by_axis(self, field: str) -> NDArray[Any]:
+        return self.rows[field][:, : len(self.names)]
 
     def summary(self) -> dict[str, object]:
         """The keys that tools may rely on in `--json` output."""
@@ -83,23 +91,28 @@ class Motion:
 
     @property
     def cmd_mm(self) -> NDArray[np.float64]:
-        """Commanded point from the kernel, unrounded, mm, (n, 2)."""
-        return self.rows["cmd_q40_mm"] * _Q40
+        """Commanded point from the kernel, unrounded, mm, (n, A)."""
+        return self._by_axis("cmd_q40_mm") * _Q40
 
     @property
     def set_mm(self) -> NDArray[np.float64]:
-        """Setpoint as it goes over the bus, mm, (n, 2)."""
-        return self.rows["set_counts"] / self.counts_per_mm
+        """Setpoint as it goes over the bus, mm, (n, A)."""
+        return self.set_counts / self.counts_per_mm
+
+    @property
+    def set_counts(self) -> NDArray[np.int32]:
+        """The same in counts."""
+        return self._by_axis("set_counts")
 
     @property
     def act_mm(self) -> NDArray[np.float64]:
-        """Encoder position, mm, (n, 2)."""
-        return self.rows["act_counts"] / self.counts_per_mm
+        """Encoder position, mm, (n, A)."""
+        return self._by_axis("act_counts") / self.counts_per_mm
 
     @property
     def following_error_um(self) -> NDArray[np.float64]:
-        """Setpoint less position, by axis, um, (n, 2)."""
-        difference = self.rows["set_counts"].astype(np.int64) - self.rows["act_counts"]
+        """Setpoint less position, by axis, um, (n, A)."""
+        difference = self.set_counts.astype(np.int64) - self._by_axis("act_counts")
         return np.asarray(difference * (1000.0 / self.counts_per_mm))
 
     @property
@@ -109,16 +122,17 @@ class Motion:
 
     @property
     def volts(self) -> NDArray[np.float64]:
-        """Drive voltage by axis, V, (n, 2)."""
-        return self.rows["volts_mv"] / 1000.0
+        """Drive voltage by axis, V, (n, A)."""
+        return self._by_axis("volts_mv") / 1000.0
 
 
 class Tally:
     """Gathers hashes and maxima, chunk by chunk, so that a run of any length needs bounded memory."""
 
-    def __init__(self, ticks: int, counts_per_mm: int) -> None:
-        """Of a program with `ticks` ticks; what is added beyond them counts as settling."""
+    def __init__(self, ticks: int, counts_per_mm: int, names: tuple[str, ...] = AXES[:2]) -> None:
+        """Of a program with `ticks` ticks and these axes; what is added beyond the ticks counts as settling."""
         self._left = ticks
+        self._names = names
         self._um_per_count = 1000.0 / counts_per_mm
         self._setpoints = hashlib.sha256()
         self._encoders = hashlib.sha256()
@@ -132,11 +146,12 @@ class Tally:
         """The next rows, of `native.ROW`."""
         counted = rows[: self._left]
         self._left -= counted.size
-        self._setpoints.update(counted["set_counts"].tobytes())
-        self._encoders.update(counted["act_counts"].tobytes())
+        path = np.s_[:, : len(self._names)]
+        self._setpoints.update(counted["set_counts"][path].tobytes())
+        self._encoders.update(counted["act_counts"][path].tobytes())
         if rows.size == 0:
             return
-        behind = np.abs(rows["set_counts"].astype(np.int64) - rows["act_counts"])
+        behind = np.abs(rows["set_counts"][path].astype(np.int64) - rows["act_counts"][path])
         self._following_counts = max(self._following_counts, int(behind.max()))
         self._contour_um = max(self._contour_um, float(rows["contour_error_um"].max()))
         contour_um = counted["contour_error_um"]
@@ -144,7 +159,9 @@ class Tally:
             (contour_um * contour_um).tolist()
         )  # the same on every processor
         self._rows += counted.size
-        self._volts_mv = max(self._volts_mv, int(np.abs(rows["volts_mv"].astype(np.int32)).max()))
+        self._volts_mv = max(
+            self._volts_mv, int(np.abs(rows["volts_mv"][path].astype(np.int32)).max())
+        )
 
     def motion(
         self, *, kernel: str, period_us: int, counts_per_mm: int, ticks: int, rows: NDArray[np.void]
@@ -162,4 +179,5 @@ class Tally:
             rms_contour_error_um=math.sqrt(self._contour_um2 / max(self._rows, 1)),
             max_following_error_um=self._following_counts * self._um_per_count,
             max_volts=self._volts_mv / 1000.0,
+            names=self._names,
         )

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError
+from ..names import AXES
 from ..native import ROW, Contour, NativeProgram
 from .motion import Motion, Tally, settling_ticks
 
@@ -19,11 +22,12 @@ def analyse(
     *,
     kernel: str,
     counts_per_mm: int = 1_000_000,
+    names: Sequence[str] | None = None,
 ) -> Motion:
     """The `Motion` of a recording, as `simulate` gives it.
 
-    All three arrays are (n, 2), x and y; row k holds setpoint k and what the drives reported for SYNC
-    k+2, n being the program's ticks and 0.2 s of settling (`settling_ticks`). The commanded points
+    All three arrays are (n, A), by axis (`names`, default x, y, …); row k holds setpoint k and what the drives
+    reported for SYNC k+2, n being the program's ticks and 0.2 s of settling (`settling_ticks`). The commanded points
     are computed again by the kernel that the controller used, and compared with the setpoints.
 
     Raises RunError when rows are missing or a setpoint is not the kernel's, InputError for a bad image.
@@ -38,15 +42,16 @@ def analyse(
     rows = np.zeros(wanted, dtype=ROW)
     rows["arc_length_q40_mm"] = points["arc_length_q40_mm"]
     rows["feed_q32_mm_s"] = points["feed_q32_mm_s"]
-    rows["cmd_q40_mm"] = np.stack([points["x_q40_mm"], points["y_q40_mm"]], axis=1)
-    rows["set_counts"] = set_counts[:wanted]
-    rows["act_counts"] = act_counts[:wanted]
-    rows["volts_mv"] = volts_mv[:wanted]
+    axes = program.axis_count
+    rows["cmd_q40_mm"][:, :axes] = points["position_q40"][:, :axes]
+    rows["set_counts"][:, :axes] = set_counts[:wanted]
+    rows["act_counts"][:, :axes] = act_counts[:wanted]
+    rows["volts_mv"][:, :axes] = volts_mv[:wanted]
     rows["tick"] = np.arange(wanted)
     rows["contour_error_um"] = Contour(program).errors_um(
-        rows["arc_length_q40_mm"], rows["act_counts"], counts_per_mm
+        rows["arc_length_q40_mm"], act_counts[:wanted], counts_per_mm
     )
-    tally = Tally(program.ticks, counts_per_mm)
+    tally = Tally(program.ticks, counts_per_mm, tuple(names or AXES[:axes]))
     tally.add(rows)
     return tally.motion(
         kernel=kernel,

@@ -10,11 +10,22 @@ import numpy as np
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import InputError
+from ..names import AXES
 from ..native import ROW, NativeProgram, OfflineFault, OfflineSimulation
 from .motion import Motion, Tally, settling_ticks
 
 CHUNK_TICKS = 16384
 """Ticks a call of the C side: small enough to stay in cache, and between two checks for Ctrl-C."""
+
+
+def axis_names(
+    program: NativeProgram, drives: Sequence[Drive], names: Sequence[str] | None
+) -> tuple[str, ...]:
+    """The names of the axes of a program. Raises InputError: it has other axes than there are drives."""
+    count = program.axis_count
+    if len(drives) != count:
+        raise InputError(f"simulate: needs the drives of {count} axes, not {len(drives)}")
+    return AXES[:count] if names is None else tuple(names)
 
 
 def simulate(
@@ -23,26 +34,24 @@ def simulate(
     *,
     kernel: str = "fixed",
     counts_per_mm: int = 1_000_000,
-    feedforward: tuple[Feedforward, Feedforward] | None = None,
+    feedforward: Sequence[Feedforward] | None = None,
     faults: Sequence[OfflineFault] = (),
     keep_rows: bool = True,
     progress: Callable[[int, int], None] | None = None,
+    names: Sequence[str] | None = None,
 ) -> Motion:
-    """Run a program image with drives (x, y) that begin parked at its start point.
+    """Run a program image with the drives of its axes, which begin parked at its start point.
 
     Gives the same setpoints and encoder positions as a run on the bus, bit for bit. `keep_rows=False`
     bounds the memory of very long runs: hashes and maxima only. `progress(done, all)` is called
     after each chunk. An image that is run often may be given opened. `faults` act on the axes; nobody supervises them.
-    Raises InputError: image, kernel or drive figures not acceptable.
+    `names` are those of the axes (default x, y, …). Raises InputError: image, kernel or drive figures not acceptable.
     """
-    if len(drives) != 2:
-        raise InputError(f"simulate: needs the drives of 2 axes, not {len(drives)}")
     program = image if isinstance(image, NativeProgram) else NativeProgram(image)
-    rig = OfflineSimulation(
-        program, kernel, (drives[0], drives[1]), counts_per_mm, feedforward, faults
-    )
+    names = axis_names(program, drives, names)
+    rig = OfflineSimulation(program, kernel, drives, counts_per_mm, feedforward, faults)
     total = program.ticks + settling_ticks(program.period_us)
-    tally = Tally(program.ticks, counts_per_mm)
+    tally = Tally(program.ticks, counts_per_mm, names)
     rows = np.empty(total if keep_rows else min(total, CHUNK_TICKS), dtype=ROW)
     for first in range(0, total, CHUNK_TICKS):
         count = min(CHUNK_TICKS, total - first)

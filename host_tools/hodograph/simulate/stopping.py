@@ -18,12 +18,12 @@ from ..native import ROW, NativeProgram, OfflineSimulation
 from ..native.offline import OfflineOrder
 from ..program import Program
 from .motion import Motion, Tally, settling_ticks
+from .simulation import axis_names
 
 STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
 """Kinds of a stop, and of the OfflineOrder that asks for it."""
 
 _HISTORY = 3
-_AXES = ("x", "y")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +73,14 @@ def simulate_stop(
     *,
     kernel: str = "fixed",
     counts_per_mm: int = 1_000_000,
-    feedforward: tuple[Feedforward, Feedforward] | None = None,
+    feedforward: Sequence[Feedforward] | None = None,
+    names: Sequence[str] | None = None,
 ) -> StoppedRun:
     """A run as `simulate` makes it, that is stopped `at_s` after its first setpoint: the setpoint of this time is the
     first that follows. Raises InputError: a time outside the program, and as `simulate`.
     """
     period_s = program.period_us * 1e-6
-    if len(drives) != len(_AXES):
-        raise InputError(f"simulate: needs the drives of 2 axes, not {len(drives)}")
+    names = axis_names(program, drives, names)
     end_s = last_tick_s(program)
     if not 0.0 <= at_s <= end_s * (1.0 + 1e-12):
         raise InputError(f"{kind} at {at_s:g} s: must be from 0 to {end_s:.9g} s")
@@ -88,7 +88,7 @@ def simulate_stop(
     rig = OfflineSimulation(
         program,
         kernel,
-        (drives[0], drives[1]),
+        tuple(drives),
         counts_per_mm,
         feedforward,
         orders=(OfflineOrder(STOP_ORDERS[kind], tick),),
@@ -100,7 +100,7 @@ def simulate_stop(
     if stop is None or stop.rest_tick is None:
         raise HodographError(f"simulation: {kind} at {at_s:g} s never came to rest: report a bug")
     rows = rows[: stop.rest_tick + 1 + settling]
-    tally = Tally(stop.rest_tick + 1, counts_per_mm)
+    tally = Tally(stop.rest_tick + 1, counts_per_mm, names)
     tally.add(rows)
     motion = tally.motion(
         kernel=kernel,
@@ -126,7 +126,7 @@ def _peaks(motion: Motion, tick: int, rest_tick: int) -> dict[str, float]:
     rows = slice(begin, rest_tick + 1 + _HISTORY)
     period_s = motion.period_us * 1e-6
     columns = {"": motion.arc_length_mm[rows]}
-    columns |= {f"{axis}_": motion.cmd_mm[rows, k] for k, axis in enumerate(_AXES)}
+    columns |= {f"{axis}_": motion.cmd_mm[rows, k] for k, axis in enumerate(motion.names)}
     peaks = {}
     for name, values in columns.items():
         padded = np.concatenate((np.repeat(values[:1], _HISTORY if begin == 0 else 0), values))
@@ -136,7 +136,7 @@ def _peaks(motion: Motion, tick: int, rest_tick: int) -> dict[str, float]:
             found = np.diff(padded, order) / period_s**order
             peaks[name + quantity] = _greatest(found)
     after = slice(tick, None)
-    for k, axis in enumerate(_AXES):
+    for k, axis in enumerate(motion.names):
         peaks[f"{axis}_volts"] = _greatest(motion.volts[after, k])
     peaks["contour_error_um"] = _greatest(motion.contour_error_um[after])
     return peaks

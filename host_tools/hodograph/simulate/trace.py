@@ -3,15 +3,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
+from ..names import AXES
 from .motion import Motion
 
-TRACE_HEADER = (
-    "tick,t_s,arc_length_mm,feed_mm_s,x_cmd_mm,y_cmd_mm,x_set_counts,y_set_counts,"
-    "x_act_mm,y_act_mm,contour_error_um,x_volts,y_volts"
-)
+
+def trace_header(names: Sequence[str]) -> str:
+    """The first line of a trace of axes with these names."""
+    columns = ["tick", "t_s", "arc_length_mm", "feed_mm_s"]
+    for quantity in ("cmd_mm", "set_counts", "act_mm"):
+        columns += [f"{name}_{quantity}" for name in names]
+    return ",".join([*columns, "contour_error_um", *(f"{name}_volts" for name in names)])
+
+
+TRACE_HEADER = trace_header(AXES[:2])
+"""That of a path in the plane."""
 
 _CHUNK = 65536
 
@@ -29,14 +38,14 @@ def write_trace(motion: Motion, file: Path) -> None:
         motion.arc_length_mm,
         motion.feed_mm_s,
         *motion.cmd_mm.T,
-        *motion.rows["set_counts"].T,
+        *motion.set_counts.T,
         *motion.act_mm.T,
         motion.contour_error_um,
         *motion.volts.T,
     ]
     try:
         with file.open("w", encoding="ascii", newline="\n") as out:
-            out.write(TRACE_HEADER + "\n")
+            out.write(trace_header(motion.names) + "\n")
             for first in range(0, motion.ticks, _CHUNK):
                 part = slice(first, min(first + _CHUNK, motion.ticks))
                 texts = [map(repr, column[part].tolist()) for column in columns]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -17,10 +18,12 @@ from .solve import solve
 from .start import followed_branch, root_on_branch, starting_values, without_rests
 from .system import EndRule, System, clamped_end
 
+Spline = TypeVar("Spline")
+
 
 @dataclass(frozen=True)
-class SplineResult:
-    """A spline, how it was found and how good it is; docs/theory/numerics.md 3.5.
+class FoundSpline(Generic[Spline]):
+    """A spline in the plane or in space, how it was found and how good it is; docs/theory/numerics.md 3.5.
 
     newton_iterations  linear systems of the whole spline solved, those of continuation and of
                        polishing after changes included
@@ -33,13 +36,16 @@ class SplineResult:
     notes              one line each, for stderr
     """
 
-    spline: PHSpline
+    spline: Spline
     newton_iterations: int
     trial_iterations: int = 0
     changed_sides: int = 0
     extra_turning_rad: float = 0.0
     bending_ratio: float = 1.0
     notes: tuple[str, ...] = ()
+
+
+SplineResult = FoundSpline[PHSpline]
 
 
 def from_control_polygon(points: object, closed: bool) -> SplineResult:

@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arclength import ArcLengthChain, evaluate
+from .arclength import ArcLengthChain, Index, evaluate
 from .bernstein import Complex, Real, basis, square, square_modulus
 from .extremum import greatest_curvature
+from .frames import Frames
 from .splitting import split_segments
 
 
@@ -31,6 +32,11 @@ class PHSpline(ArcLengthChain):
     origin: Complex
     w: Complex
     closed: bool
+
+    @property
+    def axes(self) -> int:
+        """2: x and y follow it."""
+        return 2
 
     @property
     def segment_count(self) -> int:
@@ -83,6 +89,25 @@ class PHSpline(ArcLengthChain):
         derivative = np.sum(slope * basis(1, np.asarray(xi, dtype=np.float64)), axis=-1)
         speed = w.real * w.real + w.imag * w.imag
         return np.asarray(2.0 * (np.conj(w) * derivative).imag / (speed * speed))
+
+    def frames_at(self, segment: Index, xi: Real) -> Frames:
+        """Derivatives by arc length of segments `segment` at `xi`."""
+        w0, w1, w2 = np.moveaxis(self.w[segment], -1, 0)
+        w = w0 * (1.0 - xi) ** 2 + 2.0 * w1 * xi * (1.0 - xi) + w2 * xi * xi
+        first = 2.0 * ((w1 - w0) * (1.0 - xi) + (w2 - w1) * xi)
+        second = 2.0 * (w2 - 2.0 * w1 + w0)
+        sigma = w.real * w.real + w.imag * w.imag
+        turn = (np.conj(w) * first).imag
+        growth = 2.0 * (np.conj(w) * first).real
+        curvature = 2.0 * turn / sigma**2
+        slope = (
+            2.0 * (np.conj(w) * second).imag / sigma**2 - 4.0 * turn * growth / sigma**3
+        ) / sigma
+        tangent = w * w / sigma
+        normal = 1j * tangent
+        vectors = tangent, curvature * normal, slope * normal - curvature**2 * tangent
+        r1, r2, r3 = (np.stack((vector.real, vector.imag)) for vector in vectors)
+        return Frames(r1, r2, r3, curvature)
 
     def _w(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
         return np.asarray(evaluate(self.w, segment, xi))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -29,9 +30,16 @@ PLANAR = Image(square, square_modulus)
 
 
 def split_segments(
-    origin: Any, w: Any, max_length_mm: float, max_speed_ratio: float, image: Image = PLANAR
+    origin: Any,
+    w: Any,
+    max_length_mm: float,
+    max_speed_ratio: float,
+    image: Image = PLANAR,
+    max_component: float = inf,
 ) -> tuple[Any, Any]:
     """Origins (K,) and w (K, 3) of the halved segments, in order; see PHSpline.split.
+
+    max_component  greatest magnitude of a component of the preimage, mm^(1/2)
 
     In space, origins (K, 3) and preimages (K, 4, 3) with their `image`. The pieces of one segment carry on from its
     own origin: each start is origin + integral of r', so nothing drifts along the path. Raises InputError for limits
@@ -51,7 +59,8 @@ def split_segments(
                 f"span {source[k]}: the curve all but stops at ({_place(origin[k])}) mm (a cusp): "
                 "move the points around it"
             )
-        split = uneven | (length > max_length_mm)
+        wide = np.abs(w).reshape(len(w), -1).max(axis=1) > max_component
+        split = uneven | (length > max_length_mm) | wide
         if not split.any():
             return origin, w
         origin, w, source = _halved(origin, w, source, split, image)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Toolpaths: moves and machine commands, read from files that other programs wrote.
 
-`moves` holds the moves and machine commands, which are the same for every kind of file. `gcode` reads G-code. Fitting
-curves to the moves is not part of this package.
+`moves` holds the moves and machine commands, which are the same for every kind of file. `gcode` reads G-code, `svg` and
+`dxf` read drawings, `points` reads points. `fit` makes curves of the moves.
 """

@@ -154,6 +154,7 @@ def loop_of(drive: Drive) -> Loop:
     decay = math.exp(-h / t)
     lost = -math.expm1(-h / t)
     volts = drive.torque_to_volts * drive.k_pv_nm_s_rad
+    present = drive.k_iv_per_s * h if drive.integral == "backward" else 0.0
     return Loop(
         step_s=h,
         speed_from_speed=decay,
@@ -162,9 +163,9 @@ def loop_of(drive: Drive) -> Loop:
         position_from_volts=g * drive.gain_rad_s_v * (h - t * lost),
         k_pp_rad_s_mm=drive.k_pp_rad_s_mm,
         k_pf_rad_mm=drive.k_pf_rad_mm,
-        volts_per_ref=volts * (drive.k_vf + drive.k_iv_per_s * h),
+        volts_per_ref=volts * (drive.k_vf + present),
         volts_per_integral=volts * drive.k_iv_per_s,
-        volts_per_speed=volts * (1 + drive.k_iv_per_s * h),
+        volts_per_speed=volts * (1 + present),
         newton_per_volt=1000.0 / (drive.torque_to_volts * g),
         speed_per_way=0.0 if drive.speed == "exact" else 1 / (h * g),
         delay_samples=drive.delay_samples,

@@ -47,7 +47,7 @@ def tune(
 
     Raises PlanError: not possible; InputError: no model, or a path that is wrong.
     """
-    x, y = machine.models(machine.plane)
+    x, y = machine.models(machine.require_plane("tune"))
     given: Drives = (x, y)
     drives = (_interpolated(x, asked), _interpolated(y, asked))
     programs = [(pipeline.image, machine.counts_per_mm) for pipeline in pipelines]
@@ -60,10 +60,12 @@ def tune(
         real = pole_for_stiffness(drives, natural, asked.damping, asked.stiffness_n_um)
         poles = Poles(natural, asked.damping, real)
     sides = [_side(*_tuned(drive, poles, asked.velocity)) for drive in drives]
-    before = [_side(axis.drive, axis.feedforward) for axis in machine.plane if axis.drive]
+    before = [
+        _side(axis.drive, axis.feedforward) for axis in machine.require_plane("tune") if axis.drive
+    ]
     axes = [
         AxisResult(axis.name, old, new)
-        for axis, old, new in zip(machine.plane, before, sides, strict=True)
+        for axis, old, new in zip(machine.require_plane("tune"), before, sides, strict=True)
     ]
     result = Tuning(machine, poles, (axes[0], axes[1]), (), tried)
     return replace(result, paths=tuple(_path(pipeline, result, given) for pipeline in pipelines))

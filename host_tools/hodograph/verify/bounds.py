@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Cells, speed_power
+from .cells import Cells
 from .instants import Motion
 from .polynomials import bernstein, shifted, taylor_bounds
 
@@ -37,9 +37,9 @@ def bends(cells: Cells) -> Motion:
         acceleration=24.0 * way[4],
         jerk=120.0 * way[5],
         centripetal=2.0 * turn[2],
-        axis_velocity=(2.0 * axes[0][2], 2.0 * axes[1][2]),
-        axis_acceleration=(6.0 * axes[0][3], 6.0 * axes[1][3]),
-        axis_jerk=(24.0 * axes[0][4], 24.0 * axes[1][4]),
+        axis_velocity=tuple(2.0 * one[2] for one in axes),
+        axis_acceleration=tuple(6.0 * one[3] for one in axes),
+        axis_jerk=tuple(24.0 * one[4] for one in axes),
     )
 
 
@@ -47,21 +47,16 @@ class _Geometry:
     """Over the stretch of curve in each cell: bounds of |derivative k| / k! in xi, and 1 / sigma."""
 
     def __init__(self, cells: Cells) -> None:
-        w = cells.curve.w[cells.segment]
+        curve, segment = cells.curve, cells.segment
         low = cells.xi.min(axis=1)
         width = np.maximum(cells.xi.max(axis=1) - low, _LEAST_WIDTH)
-        sigma = shifted(np.stack([speed_power(w, k) for k in range(5)], axis=1), low, width)
+        sigma = shifted(curve.speed(segment), low, width)
         self.inverse = 1.0 / bernstein(sigma).min(axis=1)
         self.speed = taylor_bounds(sigma, width, 4)
-        a0, a1, a2 = w.T
-        direction = np.stack((a0 * a0, 2 * a0 * a1, a1 * a1 + 2 * a0 * a2, 2 * a1 * a2, a2 * a2), 1)
         self.direction = [
-            taylor_bounds(shifted(np.ascontiguousarray(part), low, width), width, 4)
-            for part in (direction.real, direction.imag)
+            taylor_bounds(shifted(one, low, width), width, 4) for one in curve.directions(segment)
         ]
-        products = (np.conj(a0) * a1, 2.0 * np.conj(a0) * a2, np.conj(a1) * a2)
-        turn = np.stack([2.0 * one.imag for one in products], axis=1)
-        self.turn = taylor_bounds(shifted(turn, low, width), width, 2)
+        self.turn = taylor_bounds(shifted(curve.turn(segment), low, width), width, 2)
 
 
 def _parameter(way: Series, geometry: _Geometry) -> Series:

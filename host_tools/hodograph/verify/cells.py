@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..program import Program
+from .curves import Curve, curve_of
 from .polynomials import shifted, values
 
 Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Int = NDArray[np.int64]
 
 _BISECTIONS = 56
-_NEWTON_STEPS = 6
 _BRIEF_S = 1e-12
 
 
@@ -75,45 +74,6 @@ class Cells:
             way=shifted(self.way[cell], first * width, width),
         )
         return replace(part, xi=part.curve.ends(part.segment, part.way))
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """The segments of a program in powers of xi: w (N, 3) and the arc length within the segment (N, 6), mm."""
-
-    start_mm: Real
-    w: Complex
-    arc: Real
-
-    def parameter(self, segment: Int, arc_mm: Real) -> Real:
-        """xi at an arc length within the segment, both (K,). Newton; docs/theory/numerics.md 12 says why it
-        converges."""
-        arc = self.arc[segment]
-        xi = arc_mm / arc.sum(axis=1)
-        for _ in range(_NEWTON_STEPS):
-            xi = xi - (values(arc, xi) - arc_mm) / values(arc, xi, 1)
-        return np.asarray(xi)
-
-    def ends(self, segment: Int, way: Real) -> Real:
-        """xi at u = 0 and 1 of cells, (C, 2)."""
-        first, last = (self.parameter(segment, end) for end in (way[:, 0], way.sum(axis=1)))
-        return np.stack((first, last), axis=1)
-
-
-def curve_of(program: Program) -> Curve:
-    """The exact geometry of a program, in doubles."""
-    bernstein = 2.0**-44 * (program.u_q44 + 1j * program.v_q44)
-    b0, b1, b2 = bernstein.T
-    w: Complex = np.stack((b0, 2.0 * (b1 - b0), b0 - 2.0 * b1 + b2), axis=1)
-    sigma = np.stack([speed_power(w, k) for k in range(5)], axis=1)
-    arc: Real = np.concatenate((np.zeros((len(w), 1)), sigma / np.arange(1.0, 6.0)), axis=1)
-    return Curve(np.ldexp(program.start_q40.astype(np.float64), -40), w, arc)
-
-
-def speed_power(w: Complex, power: int) -> Real:
-    """Coefficient of xi^power of sigma = |w|^2, (N,)."""
-    pairs = [(j, power - j) for j in range(3) if 0 <= power - j <= 2]
-    return np.asarray(sum((w[:, j] * np.conj(w[:, k])).real for j, k in pairs))
 
 
 def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Many polynomials at once: values, shifted intervals, and bounds from Bernstein coefficients.
 
-Arrays of coefficients are (C, n + 1): ascending powers, one row a polynomial. A polynomial lies between the least
+Arrays of coefficients are (C, n + 1): ascending powers, one row a polynomial; real, or complex where only
+magnitudes count. A polynomial lies between the least
 and the greatest of its Bernstein coefficients (Farouki 2012, section 3), so bounds here are certain, to rounding.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 from functools import cache
 from math import comb
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +26,7 @@ def values(coefficients: Real, x: Real, order: int = 0) -> Real:
     return out
 
 
-def shifted(coefficients: Real, start: Real, width: Real) -> Real:
+def shifted(coefficients: Any, start: Real, width: Real) -> Any:
     """The same polynomials in u, x = start + width u, (C, n + 1)."""
     degree = coefficients.shape[1] - 1
     out = np.empty_like(coefficients)
@@ -36,7 +38,7 @@ def shifted(coefficients: Real, start: Real, width: Real) -> Real:
     return out
 
 
-def bernstein(coefficients: Real, order: int = 0) -> Real:
+def bernstein(coefficients: Any, order: int = 0) -> Any:
     """Bernstein coefficients over [0, 1] of the derivative `order` divided by order!, (C, n + 1 - order)."""
     degree = coefficients.shape[1] - 1
     if order > degree:
@@ -45,7 +47,7 @@ def bernstein(coefficients: Real, order: int = 0) -> Real:
     return np.asarray((coefficients[:, order:] * scale) @ _to_bernstein(degree - order))
 
 
-def taylor_bounds(coefficients: Real, width: Real, orders: int) -> Real:
+def taylor_bounds(coefficients: Any, width: Real, orders: int) -> Real:
     """Bounds (orders + 1, C) over u in [0, 1] of |derivative k| / k!, per x where u = x / width."""
     return np.stack(
         [np.abs(bernstein(coefficients, k)).max(axis=1) / width**k for k in range(orders + 1)]

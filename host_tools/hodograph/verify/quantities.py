@@ -18,8 +18,6 @@ from .instants import Motion
 
 Real = NDArray[np.float64]
 
-AXES = ("x", "y")
-
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
@@ -34,15 +32,19 @@ class Quantity:
 
 
 def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Quantity]:
-    """All that can be limited; volts only with the `drives` of both axes. Raises InputError: limited without."""
-    if limits.volts is not None and len(drives) != len(AXES):
-        raise InputError("limits: volts needs a machine whose axes x and y have drive files")
+    """All that can be limited; volts only with the `drives` of all axes. Raises InputError: limited without."""
+    names = limits.names
+    if limits.volts is not None and len(drives) != len(names):
+        raise InputError(
+            f"limits: volts needs a machine whose axes {_listed(names)} have drive files"
+        )
     whole = limits.axes_whole
 
     def row(
         key: str, value: float | None, of: Callable[[Motion], Real], axis: int | None = None
     ) -> Quantity:
-        limit = Limit(key, inf if value is None else value, axis=axis)
+        name = None if axis is None else names[axis]
+        limit = Limit(key, inf if value is None else value, axis=name)
         return Quantity(limit, of, None if value is None else np.full(len(cells), value))
 
     out = [
@@ -51,7 +53,7 @@ def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Qu
         row("jerk_mm_s3", limits.jerk_mm_s3, lambda m: m.jerk),
         row("centripetal_mm_s2", limits.centripetal_mm_s2, lambda m: m.centripetal),
     ]
-    for k in range(len(AXES)):
+    for k in range(len(names)):
         out += [
             row(key, None if both is None else both[k], _of_axis(field, k), k)
             for key, field, both in (
@@ -67,6 +69,10 @@ def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Qu
         limit = Limit("feed_mm_s", inf, zone=limits.zones[0])
         out.append(Quantity(limit, lambda m: m.feed, _in_zones(cells, limits.zones)))
     return out
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _of_axis(field: str, axis: int) -> Callable[[Motion], Real]:

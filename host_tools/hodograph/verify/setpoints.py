@@ -84,7 +84,7 @@ def _stretches(program: NativeProgram) -> Iterator[dict[str, Int]]:
         out = {}
         for kernel in KERNELS:
             points = program.points(kernel, times)
-            xy = np.stack((points["x_q40_mm"], points["y_q40_mm"]), axis=1)
+            xy = points["position_q40"][:, :2]
             out[kernel] = np.pad(xy, (pad, (0, 0)), mode="edge")
         yield out
 

@@ -54,8 +54,9 @@ class Verification:
 def verify_program(program: Program, limits: Limits, drives: Sequence[Drive] = ()) -> Verification:
     """Checks every instant of a program that passes `program.check`; the machine's limits count where they are lower.
 
-    `drives` of x and y turn motion into volts. Raises InputError: volts are limited, and there are no drives.
+    `drives` of the axes turn motion into volts. Raises InputError: volts are limited, and there are no drives.
     """
+    limits = limits.of_axes(program.axis_count)
     cells = cut(program, [end for zone in limits.zones for end in (zone.from_mm, zone.to_mm)])
     rows = quantities(cells, limits, drives)
     scale = scales(cells, rows)

@@ -12,7 +12,7 @@ acceleration  | |d_k| - |d_(k-1)| | <= a T^2: the second difference of arc lengt
               s theta^2 / 24 (theta: the turn of the path within the step), so where the path turns, that much
               is added for both; theta counts up to half a radian, so that a step aside is not excused by its own turn.
 turn          |d_k - d_(k-1)| <= sqrt(a^2 + n^2) T^2, where the program's greatest normal acceleration n is known. It
-              holds for each axis, so it is checked too while only one of the plane's drives follows.
+              holds for each axis, so it is checked too while only some of the path's drives follow.
 axis          Of each axis by itself, as far as the limits of the machine's axes are known: the first, second and third
               difference are means of velocity, acceleration and jerk over one to three periods, so at most v T, a T^2
               and j T^3. Rounding adds 1, 2 and 4 counts, and as much for the kernel's own error. Acceleration and jerk
@@ -21,8 +21,9 @@ axis          Of each axis by itself, as far as the limits of the machine's axes
               a difference may reach over two. A recording that begins in motion shows no jerk before its third step.
 
 Where a SYNC passed without a setpoint the drive stood at its target, and the next setpoint is the step of one period:
-that is what the drive makes of it. One garbled statusword in a row does not hide a drive that follows. Axes beyond the
-plane hold their position: they are checked for speed and acceleration, and by their own limits, one by one.
+that is what the drive makes of it. One garbled statusword in a row does not hide a drive that follows. A path in space
+is drawn by three axes, with sqrt(3) in place of sqrt(2). Axes beyond those that draw the path are checked by their own
+limits, one by one; those that hold their position for speed and acceleration too.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ if TYPE_CHECKING:
 SPEED, ACCELERATION, TURN = "speed", "acceleration", "turn"
 AXIS_RULES = ("axis speed", "axis acceleration", "axis jerk")
 """By the number of differences less one."""
-_PLANE = 2
+_DRAWN = (2, 3)
+"""So many axes may draw a path: in the plane, in space."""
 _ROUNDING_COUNTS = 2 * math.sqrt(2.0)
 _ENABLED, _HOMING = 0x0F, 0x10
 _STATE_MASK, _OPERATION_ENABLED = 0x6F, 0x27
@@ -70,12 +72,17 @@ class StepLimits:
     normal: float = math.inf
     axes: tuple[AxisSteps, ...] = ()
     """Of each axis; none where they are not known."""
+    path: int = 2
+    """So many axes follow a path: the first three at most draw it."""
 
-    def of(self, rule: str, axes: tuple[int, ...]) -> float:
-        """What a rule allows to these axes, which count from 1."""
+    def of(self, rule: str, group: tuple[int, ...]) -> float:
+        """What a rule allows to this group of axes, which count from 1."""
         if rule in AXIS_RULES:
-            axis = axes[0] - 1
+            axis = group[0] - 1
             return self.axes[axis][AXIS_RULES.index(rule)] if axis < len(self.axes) else math.inf
+        holds = len(group) == 1 and group[0] > self.path
+        if not holds and len(group) != min(self.path, _DRAWN[-1]):
+            return math.inf
         if rule == TURN:
             return math.hypot(self.acceleration, self.normal)
         return self.speed if rule == SPEED else self.acceleration
@@ -90,6 +97,8 @@ class Step:
     rule: str
     found_counts: float
     aside_counts: float
+    group: tuple[int, ...]
+    """All axes that the rule looked at; `axes` are those of them that followed."""
 
     @property
     def needed(self) -> float:
@@ -98,7 +107,7 @@ class Step:
 
     def jump(self, limits: StepLimits) -> Jump:
         """What is said of it where it breaks the limit."""
-        allowed = limits.of(self.rule, self.axes) + self.aside_counts
+        allowed = limits.of(self.rule, self.group) + self.aside_counts
         return Jump(self.sync, self.axes, self.rule, self.found_counts, allowed)
 
 
@@ -113,7 +122,8 @@ class Jump:
     allowed_counts: float
 
     def __str__(self) -> str:
-        names = " and ".join(str(axis) for axis in self.axes)
+        *before, last = (str(axis) for axis in self.axes)
+        names = f"{', '.join(before)} and {last}" if before else last
         return (
             f"setpoint jump at SYNC {self.sync} of the recording, axis {names}: {self.rule} "
             f"{self.found_counts:.1f} counts, allowed {self.allowed_counts:.1f}"
@@ -125,11 +135,13 @@ def step_limits(machine: Machine, setpoints: NDArray[np.int32] | None = None) ->
     normal = math.inf
     if setpoints is not None:
         second = np.diff(setpoints.astype(np.float64), n=2, axis=0)
-        normal = float(np.hypot(*second.T).max(initial=0.0))
+        normal = float(np.linalg.norm(second[:, : _DRAWN[-1]], axis=1).max(initial=0.0))
     return limits_at(
         *(machine.feed_mm_s, machine.acceleration_mm_s2, machine.period_us, machine.counts_per_mm),
         normal,
         [(a.velocity_mm_s, a.acceleration_mm_s2, a.jerk_mm_s3) for a in machine.axes],
+        [axis.counts_per_unit for axis in machine.axes],
+        machine.path_count,
     )
 
 
@@ -140,29 +152,37 @@ def limits_at(
     counts_per_mm: int,
     normal: float = math.inf,
     axes: Sequence[tuple[float, float, float]] = (),
+    axis_counts: Sequence[int] = (),
+    path: int = 2,
 ) -> StepLimits:
     """Limits of speed and acceleration along the path and of velocity, acceleration and jerk of each axis, 0: none, in
-    the units of steps.
+    the units of steps. `axis_counts`: counts of a unit of each axis; `path`: how many follow the path.
     """
     period_s = period_us * 1e-6
     speed = feed_mm_s * period_s * counts_per_mm
     acceleration = acceleration_mm_s2 * period_s**2 * counts_per_mm
     units = (period_s, _JOINTS * period_s**2, _JOINTS * period_s**3)
     of_axes = [
-        [limit * counts_per_mm * unit or math.inf for limit, unit in zip(axis, units, strict=True)]
-        for axis in axes
+        [limit * counts * unit or math.inf for limit, unit in zip(axis, units, strict=True)]
+        for axis, counts in zip(axes, axis_counts, strict=True)
     ]
     return StepLimits(
-        speed or math.inf, acceleration or math.inf, normal, tuple((v, a, j) for v, a, j in of_axes)
+        *(speed or math.inf, acceleration or math.inf, normal),
+        tuple((v, a, j) for v, a, j in of_axes),
+        min(path, len(axes) or path),
     )
 
 
+class SetpointJumpError(RunError):
+    """A setpoint jumps."""
+
+
 def require_no_jump(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> None:
-    """Raises RunError with the first step that breaks a limit."""
+    """Raises SetpointJumpError with the first step that breaks a limit."""
     jumps = find_jumps(frames, nodes, limits)
     if jumps:
         more = f" ({len(jumps) - 1} more)" if len(jumps) > 1 else ""
-        raise RunError(f"{jumps[0]}{more}")
+        raise SetpointJumpError(f"{jumps[0]}{more}")
 
 
 def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list[Jump]:
@@ -287,7 +307,8 @@ class _Measured:
 
     def step(self, row: int) -> Step:
         names = tuple(axis + 1 for axis, f in zip(self.axes, self.followed[row], strict=True) if f)
-        return Step(row + 1, names, self.rule, float(self.value[row]), float(self.aside[row]))
+        found, aside = float(self.value[row]), float(self.aside[row])
+        return Step(row + 1, names, self.rule, found, aside, self.names)
 
     def beyond(self, limit: float) -> list[Step]:
         over = self.checked & (self.value > limit + self.aside)
@@ -308,9 +329,9 @@ def _measured(frames: Frames, nodes: Sequence[int]) -> list[_Measured]:
     if sync_at.size < 2:
         return []
     steps = _steps(frames, sync_at, nodes)
-    groups = [tuple(range(min(_PLANE, len(nodes))))]
-    groups += [(axis,) for axis in range(_PLANE, len(nodes))]
-    rules = [rule for group in groups if group for rule in _rules(steps.of(group), group)]
+    groups = [tuple(range(count)) for count in _DRAWN if count <= len(nodes)]
+    groups += [(axis,) for axis in range(len(nodes)) if axis >= _DRAWN[0] or len(nodes) == 1]
+    rules = [rule for group in groups for rule in _rules(steps.of(group), group)]
     return rules + [
         rule for axis in range(len(nodes)) for rule in _axis_rules(steps.of((axis,)), (axis,))
     ]
@@ -344,7 +365,8 @@ def _rules(steps: _Steps, axes: tuple[int, ...]) -> list[_Measured]:
     bow = (length + length_before) * turned**2 / 24
     change = np.linalg.norm(now - before, axis=1)
     ones, some = np.ones_like(length), np.any(followed[1:], axis=1)
-    once, twice = _ROUNDING_COUNTS * ones, 2 * _ROUNDING_COUNTS * ones
+    rounding = max(_ROUNDING_COUNTS, 2 * math.sqrt(len(axes)))
+    once, twice = rounding * ones, 2 * rounding * ones
     return [
         _Measured(SPEED, axes, length, once, some, followed[1:]),
         _Measured(

@@ -83,7 +83,7 @@ class SetpointWatch:
 
 def jumps(steps: Sequence[Step], limits: StepLimits) -> list[Jump]:
     """Those that break a limit."""
-    return [step.jump(limits) for step in steps if step.needed > limits.of(step.rule, step.axes)]
+    return [step.jump(limits) for step in steps if step.needed > limits.of(step.rule, step.group)]
 
 
 def _is_relevant(frames: Frames) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

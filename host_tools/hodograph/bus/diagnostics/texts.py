@@ -63,6 +63,8 @@ REFUSALS = {
     "with --store it is there after the next power-on too",
     13: "axes with a homing method are not homed since their drive's power-on: hodograph home, or --unhomed on purpose",
     17: "the controller is being ended: start it again",
+    18: "the program has more path axes than are configured: configure the machine it was compiled for "
+    "(hodograph configure MACHINE), or compile it for this one",
     16: "the drives are real and this computer does not permit real-time priority: run the controller with "
     "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }

@@ -23,7 +23,6 @@ WINDOW_OFF = 2**32 - 1
 
 def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
     """What the objects of the controller have to hold."""
-    counts = machine.counts_per_mm
     supervision = machine.supervision
     wanted: list[tuple[Object, int]] = [
         ((objects.PERIOD, None), machine.period_us),
@@ -33,7 +32,7 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
         ((CONFIGURATION, 4), round(machine.jerk_mm_s3)),
         ((CONFIGURATION, 5), KERNELS.index(kernel)),
         ((CONFIGURATION, 6), machine.start_tolerance_counts),
-        ((CONFIGURATION, 7), counts),
+        ((CONFIGURATION, 7), machine.counts_per_mm),
         ((CONFIGURATION, 8), supervision.answer_wait_ms),
         ((CONFIGURATION, 9), supervision.missed_max),
         ((CONFIGURATION, 10), supervision.setpoint_timeout_ms),
@@ -41,7 +40,7 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
         ((CONFIGURATION, 11), feedforward_bits(machine)),
     ]
     for sub, axis in enumerate(machine.axes, start=1):
-        wanted += [((index, sub), value) for index, value in _axis(axis, counts)]
+        wanted += [((index, sub), value) for index, value in _axis(axis)]
     return wanted
 
 
@@ -89,9 +88,19 @@ def feedforward_bits(machine: Machine) -> int:
     return objects.FEEDFORWARD_TORQUE * torque + objects.FEEDFORWARD_VELOCITY * velocity
 
 
-def _axis(axis: Axis, counts_per_mm: int) -> Iterator[tuple[int, int]]:
-    def counts(mm: float) -> int:
-        return round(mm * counts_per_mm)
+def configured_counts(controller: Node, axes: int) -> tuple[int, ...]:
+    """Counts of a mm, or of a degree of an axis that turns, for each axis as they are now. Raises BusError."""
+    common = controller.read(CONFIGURATION, 7)
+    return tuple(
+        controller.read(objects.COUNTS_PER_UNIT, axis) or common for axis in range(1, axes + 1)
+    )
+
+
+def _axis(axis: Axis) -> Iterator[tuple[int, int]]:
+    def counts(units: float) -> int:
+        return round(units * axis.counts_per_unit)
+
+    yield objects.COUNTS_PER_UNIT, axis.counts_per_unit if axis.turns else 0
 
     yield objects.AXIS_NODE, axis.node
     yield objects.TRAVEL_MINIMUM, counts(axis.travel_min_mm)

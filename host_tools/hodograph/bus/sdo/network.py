@@ -132,14 +132,22 @@ class _Ended(can.Listener):
         """See can.Listener."""
 
 
-def _filters(node: int) -> list[dict[str, Any]]:
+_ALL = 0x780
+"""Mask of a service, whatever the node."""
+
+
+def _filters(node: int | None) -> list[dict[str, Any]]:
+    if node is None:
+        return [
+            {"can_id": base, "can_mask": _ALL, "extended": False} for base in (0x080, 0x580, 0x700)
+        ]
     return [
         {"can_id": base + node, "can_mask": 0x7FF, "extended": False}
         for base in (0x080, 0x580, 0x700)
     ]
 
 
-def _open(address: BusAddress, node: int, bitrate: int) -> can.BusABC:
+def _open(address: BusAddress, node: int | None, bitrate: int) -> can.BusABC:
     if address.is_local:
         return LocalBus(address.channel, can_filters=_filters(node))
     options: dict[str, Any] = {} if address.is_socketcan else {"bitrate": bitrate}
@@ -152,8 +160,10 @@ def _open(address: BusAddress, node: int, bitrate: int) -> can.BusABC:
 
 
 @contextmanager
-def open_network(address: BusAddress, node: int, bitrate: int) -> Iterator[Network]:
-    """A canopen network that receives the answers of `node`. Raises BusError when it can't be opened."""
+def open_network(address: BusAddress, node: int | None, bitrate: int) -> Iterator[Network]:
+    """A canopen network that receives the answers of `node`, None: of all nodes, and SYNC. Raises BusError when it
+    can't be opened.
+    """
     if address.is_raw:
         check_raw(address)
     try:

@@ -22,6 +22,7 @@ from ..diagnostics.texts import (
     detail_text,
     fault_words,
 )
+from .configuration import configured_counts
 from .controller import Controller
 from .objects import (
     ACTUAL,
@@ -139,7 +140,10 @@ class Override:
 
 @dataclass(frozen=True)
 class AxisStatus:
-    """One drive, as the controller sees it. The following error is the drive's own (0x60F4)."""
+    """One drive, as the controller sees it. The following error is the drive's own (0x60F4).
+
+    mm and um are degrees and thousandths of a degree where the axis turns.
+    """
 
     node: int
     state: str
@@ -216,9 +220,11 @@ def snapshot(controller: Controller) -> Status:
         statistics = Statistics(**controller.statistics())
         timing = controller.read(TIMING)
     with controller.turn():
-        counts_per_mm = controller.read(CONFIGURATION, 7)
         axis_count = controller.read(CONFIGURATION, 1)
-        axes = tuple(_axis(controller, i, counts_per_mm) for i in range(1, axis_count + 1))
+        axes = tuple(
+            _axis(controller, i, counts)
+            for i, counts in enumerate(configured_counts(controller, axis_count), start=1)
+        )
     return Status(
         bus=str(controller.address),
         node=controller.node_id,
@@ -282,7 +288,7 @@ def _longest(found: Mapping[str, int]) -> LongestStop:
     )
 
 
-def _axis(controller: Controller, i: int, counts_per_mm: int) -> AxisStatus:
+def _axis(controller: Controller, i: int, counts_per_unit: int) -> AxisStatus:
     error = controller.read(DRIVE_ERROR, i)
     words = fault_words(error) if error else None
     inputs = controller.read(DIGITAL_INPUTS, i)
@@ -290,9 +296,9 @@ def _axis(controller: Controller, i: int, counts_per_mm: int) -> AxisStatus:
         node=controller.read(AXIS_NODE, i),
         state=state_of_number(controller.read(DRIVE_STATE, i)),
         statusword=controller.read(STATUSWORD, i),
-        actual_mm=controller.read(ACTUAL, i) / counts_per_mm,
-        target_mm=controller.read(TARGET, i) / counts_per_mm,
-        following_error_um=1000 * controller.read(FOLLOWING_ERROR, i) / counts_per_mm,
+        actual_mm=controller.read(ACTUAL, i) / counts_per_unit,
+        target_mm=controller.read(TARGET, i) / counts_per_unit,
+        following_error_um=1000 * controller.read(FOLLOWING_ERROR, i) / counts_per_unit,
         missed_tpdos=controller.read(MISSED_TPDOS, i),
         digital_inputs=inputs,
         inputs_on=inputs_on(inputs),

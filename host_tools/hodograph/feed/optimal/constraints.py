@@ -17,14 +17,13 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ...spline import PHSpline
-from ..kinematics import LEFT, RIGHT, Frames, axis_motion, frames
+from ...spline.frames import LEFT, RIGHT, Curve, Frames, frames
+from ..kinematics import axis_motion
 from ..limits import Limit
 from .grid import Grid, corners
-from .plan_limits import AxisPair, PlanLimits
+from .plan_limits import PerAxis, PlanLimits
 
 Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Index = NDArray[np.intp]
 
 
@@ -64,12 +63,9 @@ class GridKinematics:
     limits: PlanLimits
 
     @cached_property
-    def _derivatives(self) -> tuple[Complex, Complex, Complex]:
-        return axis_motion(self.frame, *self.sigma)
-
     def _axes(self) -> tuple[tuple[Real, Real, Real], ...]:
-        d = self._derivatives
-        return tuple((p(d[0]), p(d[1]), p(d[2])) for p in (np.real, np.imag))
+        """Derivatives by x of each axis."""
+        return tuple(zip(*axis_motion(self.frame, *self.sigma), strict=True))
 
     @cached_property
     def jerks(self) -> tuple[Constraint, ...]:
@@ -89,7 +85,7 @@ class GridKinematics:
             return ()
         return tuple(
             Constraint(replace(limit, value=plant.reach_mm_s), *c, lag_s=plant.time_constant_s)
-            for limit, plant, c in zip(limits, plants, self._axes(), strict=True)
+            for limit, plant, c in zip(limits, plants, self._axes, strict=True)
         )
 
     @cached_property
@@ -98,11 +94,11 @@ class GridKinematics:
         feed = Limit("feed_mm_s", self.limits.feed.value)
         return self._constraints(feed, self.limits.velocity)
 
-    def _constraints(self, along: Limit, axes: AxisPair) -> tuple[Constraint, ...]:
+    def _constraints(self, along: Limit, axes: PerAxis) -> tuple[Constraint, ...]:
         out = [] if along.value == inf else [Constraint(along, *self.sigma)]
         out += [
             Constraint(limit, *c)
-            for limit, c in zip(axes, self._axes(), strict=True)
+            for limit, c in zip(axes, self._axes, strict=True)
             if limit.value < inf
         ]
         return tuple(out)
@@ -160,7 +156,7 @@ def jerk_by_root(limited: Constraint, p: Real, d: Real, dd: Real) -> Real:
 
 
 def make_points(
-    spline: PHSpline, limits: PlanLimits, grid: Grid, interval: Index, u: Real, zones: Real
+    spline: Curve, limits: PlanLimits, grid: Grid, interval: Index, u: Real, zones: Real
 ) -> GridKinematics:
     """Points at u in [0, 1] of intervals; at 0 and 1 the limits from inside. `zones` (n,) by interval."""
     s, s1, s2, s3 = grid.sigma(interval, u)

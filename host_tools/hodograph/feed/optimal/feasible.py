@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PlanError
-from ...spline import PHSpline
-from ..kinematics import LEFT, RIGHT, frames
+from ...spline.frames import LEFT, RIGHT, Curve, frames
 from ..limits import Limit, Plant
 from ..request import LEAST_FEED_MM_S
 from .plan_limits import PlanLimits
@@ -77,7 +76,7 @@ class _VoltsFeed(LimitedFeed):
         return self.offset + float(reach) / (self.plant.gain_mm_s_v * self.limit.share)
 
 
-def check_feasible(spline: PHSpline, limits: PlanLimits, longest_s: float) -> None:
+def check_feasible(spline: Curve, limits: PlanLimits, longest_s: float) -> None:
     """Raises PlanError where limits allow less than LEAST_FEED_MM_S, or take longer than `longest_s`, each by itself.
 
     The message names all such limits, where each is worst, and the least values that would do.
@@ -117,18 +116,18 @@ def rounded_up(value: float) -> str:
     return text if float(text) >= value * (1.0 + _HAIR) else f"{value * 1.0051:.3g}"
 
 
-def binding_most(spline: PHSpline, limits: PlanLimits) -> tuple[LimitedFeed, float]:
+def binding_most(spline: Curve, limits: PlanLimits) -> tuple[LimitedFeed, float]:
     """The limit that by itself takes the longest, and the arc length where it allows least."""
     found = max(allowed(spline, limits), key=lambda one: one.time_s)
     return found, float(_places(spline)[0][int(np.argmin(found.feed))])
 
 
-def least_time_s(spline: PHSpline, limits: PlanLimits) -> float:
+def least_time_s(spline: Curve, limits: PlanLimits) -> float:
     """What the path takes at least."""
     return max(one.time_s for one in allowed(spline, limits))
 
 
-def within_reach(spline: PHSpline, limits: PlanLimits) -> PlanLimits:
+def within_reach(spline: Curve, limits: PlanLimits) -> PlanLimits:
     """The same with the feed bounded where acceleration and jerk along the path cannot bring it: a bound far beyond
     spoils the numbers of the programs.
     """
@@ -140,7 +139,7 @@ def within_reach(spline: PHSpline, limits: PlanLimits) -> PlanLimits:
     return limits.with_feed(_BEYOND * reach)
 
 
-def allowed(spline: PHSpline, limits: PlanLimits) -> Iterator[LimitedFeed]:
+def allowed(spline: Curve, limits: PlanLimits) -> Iterator[LimitedFeed]:
     """All limits, one by one, at points of the path."""
     s, side = _places(spline)
     yield from _along(s, limits)
@@ -148,8 +147,8 @@ def allowed(spline: PHSpline, limits: PlanLimits) -> Iterator[LimitedFeed]:
     with np.errstate(divide="ignore"):
         bend = limits.centripetal.value / np.abs(f.curvature)
     yield _steady(s, limits.centripetal, np.sqrt(bend), 2)
-    for k, of in enumerate((np.real, np.imag)):
-        one, two, three = (np.abs(of(vector)) for vector in (f.r1, f.r2, f.r3))
+    for k, vectors in enumerate(zip(f.r1, f.r2, f.r3, strict=True)):
+        one, two, three = map(np.abs, vectors)
         for limit, vector, power in (
             (limits.velocity[k], one, 1),
             (limits.axis_acceleration[k], two, 2),
@@ -163,7 +162,7 @@ def allowed(spline: PHSpline, limits: PlanLimits) -> Iterator[LimitedFeed]:
             yield _volts(s, limits.plants[k], limits.volts[k], one, two)
 
 
-def _places(spline: PHSpline) -> tuple[Real, NDArray[np.int8]]:
+def _places(spline: Curve) -> tuple[Real, NDArray[np.int8]]:
     u = np.linspace(0.0, 1.0, _SAMPLES + 1)
     joints = spline.segment_starts_mm
     s = (joints[:-1, None] + np.diff(joints)[:, None] * u).ravel()

@@ -11,8 +11,8 @@ from ..limits import ControllerLimits, FeedZone, Limit, Limits, Plant, Plants, l
 from ..pieces import LONGEST_PIECE_MM
 from ..request import FeedRequest
 
-AxisPair = tuple[Limit, Limit]
-"""Limits of x and y; value inf: none."""
+PerAxis = tuple[Limit, ...]
+"""Limits of the axes that follow the path; value inf: none."""
 
 _MOST_BY_ACCELERATION, _MOST_BY_JERK = 2.0**13, 24.0
 """Greatest feed over the reserve of an acceleration, of a jerk: 2^-16 / s and 2^-8 / s^2 are the least override rate
@@ -40,10 +40,10 @@ class PlanLimits:
     acceleration: Limit
     jerk: Limit
     centripetal: Limit
-    velocity: AxisPair
-    axis_acceleration: AxisPair
-    axis_jerk: AxisPair
-    volts: AxisPair | None
+    velocity: PerAxis
+    axis_acceleration: PerAxis
+    axis_jerk: PerAxis
+    volts: PerAxis | None
     plants: Plants | None
     zones: tuple[FeedZone, ...]
     notes: tuple[str, ...] = ()
@@ -68,10 +68,10 @@ class PlanLimits:
     def eased(self, least_s: float) -> PlanLimits:
         """The same with jerks that let all acceleration build up within `least_s` at the soonest."""
         most = self.least_acceleration / least_s
-        path, x, y = (
+        path, *axes = (
             replace(one, value=min(one.value, most)) for one in (self.jerk, *self.axis_jerk)
         )
-        return replace(self, jerk=path, axis_jerk=(x, y))
+        return replace(self, jerk=path, axis_jerk=tuple(axes))
 
     def with_feed(self, most_mm_s: float) -> PlanLimits:
         """The same with the feed at most `most_mm_s`."""
@@ -127,20 +127,18 @@ def _with_jerk(limits: PlanLimits, period_s: float) -> PlanLimits:
 
 def _weaker(plants: Plants, reserve: float) -> Plants:
     """Plants that may use a part only of what friction leaves of their volts."""
-    x, y = (
+    return tuple(
         replace(one, volts=one.friction_volts + (1.0 - reserve) * (one.volts - one.friction_volts))
         for one in plants
     )
-    return x, y
 
 
-def _volts(limits: Limits, weaker: Plants) -> AxisPair:
+def _volts(limits: Limits, weaker: Plants) -> PerAxis:
     """Limits of the volts beside friction."""
-    x, y = (
+    return tuple(
         replace(limit, value=_usable_volts(plant))
         for limit, plant in zip(limits.volts_limits(weaker), weaker, strict=True)
     )
-    return x, y
 
 
 def _usable_volts(plant: Plant) -> float:
@@ -163,7 +161,8 @@ def _held(limits: Limits, controller: ControllerLimits | None) -> Iterator[Limit
     ):
         share = limits.reserve * by
         for k, value in enumerate(getattr(limits.axes, key) or ()):
-            yield Limit(key, value * limits.reserve * by, limits.source(key, k), k, None, share)
+            held, source = value * limits.reserve * by, limits.source(key, k)
+            yield Limit(key, held, source, limits.names[k], None, share)
         if controller is not None:
             free = controller.kept_free
             value = float(getattr(controller, key)) * free * by

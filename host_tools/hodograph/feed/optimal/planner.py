@@ -11,7 +11,7 @@ from math import inf
 import numpy as np
 
 from ...errors import InputError, PlanError
-from ...spline import PHSpline
+from ...spline.frames import Curve
 from ..kinematics import PathBounds
 from ..limits import ControllerLimits, FeedZone, Limits, Peak, Plants
 from ..plan import FeedPlan, assumed_controller
@@ -35,7 +35,7 @@ _POWER = {"acceleration_mm_s2": 2, "centripetal_mm_s2": 2, "jerk_mm_s3": 3}
 
 
 def plan_optimal(
-    spline: PHSpline,
+    spline: Curve,
     request: FeedRequest,
     limits: Limits,
     controller: ControllerLimits | None = None,
@@ -51,6 +51,7 @@ def plan_optimal(
     """
     check_period(period_us)
     check_length(spline.length_mm)
+    limits = limits.of_axes(spline.axes)
     if not limits.bind:
         raise InputError(
             'feed: profile "optimal" has no limit to obey: name a machine, or add one to [limits]'
@@ -99,17 +100,17 @@ def _widened(track: Track, zone: FeedZone) -> FeedZone:
 
 def plan_peaks(
     plan: FeedPlan,
-    spline: PHSpline,
+    spline: Curve,
     limits: Limits,
     controller: ControllerLimits | None,
     plants: Plants | None,
 ) -> dict[str, Peak]:
     """Where every limited quantity of a plan, of any profile, comes nearest to its limit, by name."""
-    found = gather(plan.request, limits, controller, plants, plan.period_us)
+    found = gather(plan.request, limits.of_axes(spline.axes), controller, plants, plan.period_us)
     return find_peaks(spline, found, track_of(plan.raw, spline.length_mm))
 
 
-def _run(spline: PHSpline, limits: PlanLimits, period_s: float) -> Track:
+def _run(spline: Curve, limits: PlanLimits, period_s: float) -> Track:
     """The curve of the plan.
 
     Where limits are so far apart that no feed is found, or a poor one, with jerks that let the acceleration build up
@@ -138,13 +139,13 @@ def _run(spline: PHSpline, limits: PlanLimits, period_s: float) -> Track:
     return best
 
 
-def _track(spline: PHSpline, limits: PlanLimits, ends: Ends) -> Track:
+def _track(spline: Curve, limits: PlanLimits, ends: Ends) -> Track:
     track = make_track(ends, 1.0, spline.segment_starts_mm)
     stretch = _needed_stretch(find_peaks(spline, limits, track))
     return track if stretch == 1.0 else make_track(ends, stretch, spline.segment_starts_mm)
 
 
-def _too_long(spline: PHSpline, limits: PlanLimits, duration_s: float) -> str:
+def _too_long(spline: Curve, limits: PlanLimits, duration_s: float) -> str:
     """Several limits together make the path take too long: raised alike, all let it be so much faster exactly."""
     one, s_mm = binding_most(spline, limits)
     k = 1.05 * duration_s / LONGEST_S

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PlanError
-from ...spline import PHSpline
+from ...spline.frames import Curve
 from .knots import FirstEstimate, first_estimate
 from .plan_limits import PlanLimits
 from .track import Ends, ends_of, make_track, piece_usage
@@ -44,7 +44,7 @@ class NothingFoundError(PlanError):
 
 
 def plan_windows(
-    spline: PHSpline, limits: PlanLimits, period_s: float, intervals: int = INTERVALS
+    spline: Curve, limits: PlanLimits, period_s: float, intervals: int = INTERVALS
 ) -> Iterator[Ends]:
     """The parts of the plan in order. Raises NothingFoundError."""
     length = spline.length_mm
@@ -77,7 +77,7 @@ def plan_windows(
 
 
 def _continued(
-    spline: PHSpline,
+    spline: Curve,
     limits: PlanLimits,
     overview: _Overview,
     held: Solution,
@@ -120,7 +120,7 @@ class _Overview:
         return float(np.interp(at + intervals, self.count, self.s))
 
 
-def _overview(spline: PHSpline, limits: PlanLimits, period_s: float) -> _Overview:
+def _overview(spline: Curve, limits: PlanLimits, period_s: float) -> _Overview:
     found: FirstEstimate = first_estimate(spline, limits, 0.0, spline.length_mm, None, period_s)
     density = 1.0 / found.step_s
     count = np.concatenate(
@@ -132,7 +132,7 @@ def _overview(spline: PHSpline, limits: PlanLimits, period_s: float) -> _Overvie
     return _Overview(found.s, count, feed / pull + pull / jerk)
 
 
-def _measured(spline: PHSpline, found: Solution) -> Solution:
+def _measured(spline: Curve, found: Solution) -> Solution:
     """A window, with tighter limits on intervals whose piece is above one by more than 0.3 %."""
     best, trial = found, found
     usage = _usage(spline, found)
@@ -150,7 +150,7 @@ def _measured(spline: PHSpline, found: Solution) -> Solution:
     return best
 
 
-def _usage(spline: PHSpline, found: Solution) -> Real:
+def _usage(spline: Curve, found: Solution) -> Real:
     track = make_track(ends_of(found, found.grid.size), 1.0, spline.segment_starts_mm)
     usage = piece_usage(spline, found.setting.limits, track)
     if found.setting.start is not None:

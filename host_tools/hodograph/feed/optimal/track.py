@@ -15,8 +15,8 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...spline import PHSpline
-from ..kinematics import LEFT, RIGHT, axis_motion, frames
+from ...spline.frames import LEFT, RIGHT, Curve, frames
+from ..kinematics import axis_motion
 from ..limits import Limit, Peak
 from ..pieces import RawPieces, derivative_peaks, exponents, round_pieces
 from ..ramp import Ramp
@@ -225,7 +225,7 @@ def _hermite(way: Real, h: Real, feed: Real, acceleration: Real, j0: Real, j1: R
     return out
 
 
-def find_peaks(spline: PHSpline, limits: PlanLimits, track: Track) -> dict[str, Peak]:
+def find_peaks(spline: Curve, limits: PlanLimits, track: Track) -> dict[str, Peak]:
     """The peak of every limited quantity by its dotted name: where it comes nearest to its limit, from 33 places of
     each piece, its ends from inside. Volts are those beside friction.
     """
@@ -245,7 +245,7 @@ def find_peaks(spline: PHSpline, limits: PlanLimits, track: Track) -> dict[str, 
     return out
 
 
-def piece_usage(spline: PHSpline, limits: PlanLimits, track: Track) -> Real:
+def piece_usage(spline: Curve, limits: PlanLimits, track: Track) -> Real:
     """The greatest limit usage (n,) of each piece."""
     out = np.zeros(track.shape.shape[0])
     for one in _limited(spline, limits, track, slice(None), _FEW_US):
@@ -264,7 +264,7 @@ class _Limited:
 
 
 def _limited(
-    spline: PHSpline, limits: PlanLimits, track: Track, part: slice, us: Real
+    spline: Curve, limits: PlanLimits, track: Track, part: slice, us: Real
 ) -> Iterator[_Limited]:
     shape, h = track.shape[part, None, :], track.seconds[part, None]
     way, v, a, j = ((powers(shape, k, us) / h**k).ravel() for k in range(4))
@@ -283,17 +283,17 @@ def _limited(
     ):
         if limit.value < inf:
             yield _Limited(limit, np.abs(value), s, limit.value)
-    for k, of in enumerate((np.real, np.imag)):
-        for limit, vector in (
+    for k in range(len(velocity)):
+        for limit, values in (
             (limits.velocity[k], velocity),
             (limits.axis_acceleration[k], acceleration),
             (limits.axis_jerk[k], jerk),
         ):
             if limit.value < inf:
-                yield _Limited(limit, np.abs(of(vector)), s, limit.value)
+                yield _Limited(limit, np.abs(values[k]), s, limit.value)
         if limits.plants is not None and limits.volts is not None:
             plant = limits.plants[k]
-            drive = of(velocity) + plant.time_constant_s * of(acceleration)
+            drive = velocity[k] + plant.time_constant_s * acceleration[k]
             volts = np.abs(drive / plant.gain_mm_s_v)
             yield _Limited(limits.volts[k], volts, s, limits.volts[k].value)
     if limits.zones:

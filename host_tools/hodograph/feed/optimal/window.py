@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...spline import PHSpline
+from ...spline.frames import Curve
 from .constraints import GridKinematics, make_points
 from .grid import GAUSS_W, GAUSS_X, Grid, corners, make_grid, squared_feed
 from .knots import FirstEstimate, choose_knots, first_estimate, refined
@@ -97,7 +97,7 @@ class _Setting:
 
 
 def plan_window(
-    spline: PHSpline,
+    spline: Curve,
     limits: PlanLimits,
     low: float,
     high: float,
@@ -190,7 +190,7 @@ def _retimed(found: Solution, guess: FirstEstimate, period_s: float) -> tuple[Re
     return s, t, np.maximum(step, 1.7 * period_s)
 
 
-def _setting(spline: PHSpline, limits: PlanLimits, knots: Real, start: State | None) -> _Setting:
+def _setting(spline: Curve, limits: PlanLimits, knots: Real, start: State | None) -> _Setting:
     grid = make_grid(knots, start is None)
     zones = _interval_zones(limits, knots)
     joints = spline.segment_starts_mm

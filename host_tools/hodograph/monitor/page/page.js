@@ -46,7 +46,17 @@ function draw() {
   }
 }
 
-function makeCharts(axes) {
+/** A path in space can be looked at from several sides. */
+function offerViews(inSpace, names) {
+  $("side-label").hidden = !inSpace;
+  plane.names = names.slice(0, 3);
+  for (const option of $("side").options) {
+    if (option.value !== "isometric") option.textContent = [...option.value].map((axis) => names["xyz".indexOf(axis)]).join("–");
+  }
+  plane.look(inSpace ? $("side").value : "xy");
+}
+
+function makeCharts(axes, units) {
   $("charts").replaceChildren();
   const one = (title, unit, digits, least, signed, series) =>
     new Chart($("charts"), { title, unit, digits, least, signed, lines: [{ series, label: "", colour: "act" }] });
@@ -56,7 +66,7 @@ function makeCharts(axes) {
     one("Jerk along the path", "mm/s³", 0, 100, true, "jerk"),
     one("Contour error", "µm", 2, 1, false, "contour"),
     new Chart($("charts"), {
-      title: "Following error", unit: "µm", digits: 2, least: 1, signed: true,
+      title: "Following error", unit: units.includes("deg") ? "µm, 0.001°" : "µm", digits: 2, least: 1, signed: true,
       lines: axes.map((name, i) => ({ series: `following${i}`, label: `${name} `, colour: COLOURS[i] })),
     }),
   ];
@@ -82,7 +92,8 @@ function addRows(message, live) {
 const handlers = {
   hello(message) {
     store.setAxes(message.axes.length);
-    makeCharts(message.axes);
+    makeCharts(message.axes, message.units);
+    offerViews(message.drawn > 2, message.axes);
     panel.hello(message);
     $("event-rows").replaceChildren();
   },
@@ -90,7 +101,7 @@ const handlers = {
   history: ({ messages }) => messages.forEach((m) => (m.type === "rows" ? addRows(m, false) : handlers[m.type](m))),
   restart: () => store.clear(),
   path(message) {
-    plane.setPath(message.x, message.y);
+    plane.setPath(message.x, message.y, message.z);
     panel.name = message.name;
     panel.lengthMm = message.length_mm;
     $("path-note").textContent = message.note;
@@ -176,6 +187,7 @@ $("pause").addEventListener("click", () => {
   $("pause").setAttribute("aria-pressed", String(frozenAt !== null));
   redraw();
 });
+$("side").addEventListener("change", () => plane.look($("side").value));
 $("magnify").addEventListener("change", () => { plane.magnify = Number($("magnify").value); redraw(); });
 $("follow").addEventListener("change", () => { plane.follow = $("follow").checked; redraw(); });
 $("fit").addEventListener("click", () => plane.fit());

@@ -19,10 +19,12 @@ export class Panel {
     this.connected = false;
     this.reasons = new Map(); // why something is not as it should be; the first one is shown
     this.following = [];
+    this.units = [];
   }
 
   hello(message) {
     this.mayCommand = message.may_command;
+    this.units = message.units;
     this.replay = message.mode === "replay";
     $("controls").hidden = this.replay;
     $("replay").hidden = !this.replay;
@@ -105,7 +107,8 @@ export class Panel {
     $("drive-rows").replaceChildren(...message.drives.map((drive, i) => {
       const bad = /fault|silent|quick/.test(drive.state);
       return row([drive.name, `axis${i % 3}`], [String(drive.node)], [drive.state, bad ? "bad-text" : ""],
-        [text(drive.actual_mm, 6), "number"], [text(this.following[i], 2), "number"]);
+        [`${text(drive.actual_mm, 6)} ${this.units[i] === "deg" ? "°" : "mm"}`, "number"],
+        [`${text(this.following[i], 2)} ${this.units[i] === "deg" ? "m°" : "µm"}`, "number"]);
     }));
     if (this.replay) {
       facts([

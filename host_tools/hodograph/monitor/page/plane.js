@@ -1,16 +1,30 @@
 // SPDX-License-Identifier: MIT
-// The path in the plane: the program's curve, where the setpoints went, where the axes went.
+// The path: the program's curve, where the setpoints went, where the axes went. A path in space is projected.
 
 import { digitsOf, prepare, roundUp } from "./scale.js";
 
 const MARGIN = 0.08;
-const KEYS = { "+": "in", "=": "in", "-": "out", 0: "fit", ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down" };
+const TURN = Math.PI / 12;
+const ELEVATION = Math.atan(Math.SQRT1_2); // of the isometric view
+const FLAT = { xy: [[1, 0, 0], [0, 1, 0]], xz: [[1, 0, 0], [0, 0, 1]], yz: [[0, 1, 0], [0, 0, 1]] };
+const KEYS = { "+": "in", "=": "in", "-": "out", 0: "fit", ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down", "[": "turnLeft", "]": "turnRight" };
+
+/** Where x, y and z point to on the screen, to the right and upwards, seen from this azimuth. */
+export function isometric(azimuth) {
+  const sin = Math.sin(ELEVATION);
+  return [[-Math.sin(azimuth), Math.cos(azimuth), 0], [-Math.cos(azimuth) * sin, -Math.sin(azimuth) * sin, Math.cos(ELEVATION)]];
+}
+
+const along = (direction, x, y, z) => direction[0] * x + direction[1] * y + (direction[2] ? direction[2] * z : 0);
 
 export class Plane {
   constructor(canvas, redraw) {
     this.canvas = canvas;
     this.redraw = redraw;
-    this.path = { x: [], y: [] };
+    this.path = { x: [], y: [], z: [] };
+    this.names = ["x", "y", "z"];
+    this.azimuth = -Math.PI / 4;
+    this.side = "xy";
     this.magnify = 1;
     this.follow = false;
     this.view = null; // {x, y: middle in mm; scale: pixels a mm}; null: fitted
@@ -20,9 +34,32 @@ export class Plane {
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
-  setPath(x, y) {
-    this.path = { x, y };
+  /** A path in the plane has no z: it is drawn at 0. */
+  setPath(x, y, z) {
+    this.path = { x, y, z: z ?? x.map(() => 0) };
     this.redraw();
+  }
+
+  /** "xy", "xz", "yz", or "isometric", which `turn` turns. */
+  look(side) {
+    this.side = side;
+    this.fit();
+  }
+
+  turn(angle) {
+    if (this.side !== "isometric") return;
+    this.azimuth += angle;
+    this.fit();
+  }
+
+  get directions() {
+    return FLAT[this.side] ?? isometric(this.azimuth);
+  }
+
+  /** A point of the ring on the screen, in mm; `what`: c commanded, a actual. */
+  at(points, what, i) {
+    const place = [0, 1, 2].map((axis) => points.get(what + "xyz"[axis], i));
+    return this.directions.map((direction) => along(direction, ...place));
   }
 
   fit() {
@@ -32,38 +69,38 @@ export class Plane {
 
   draw(points, colours) {
     const { context, width, height } = prepare(this.canvas);
-    const view = this.look(points, width, height);
+    const view = this.seen(points, width, height);
     this.shown = view;
     const px = (x) => width / 2 + (x - view.x) * view.scale;
     const py = (y) => height / 2 - (y - view.y) * view.scale;
-    grid(context, view, width, height, px, py, colours);
+    if (this.side in FLAT) grid(context, view, width, height, px, py, colours);
+    else triad(context, this.directions, this.names, height, colours);
     context.lineJoin = context.lineCap = "round";
     this.curve(context, px, py, colours);
-    this.trail(context, points, "cx", "cy", 1, px, py, colours.cmd, 1);
-    this.trail(context, points, "ax", "ay", this.magnify, px, py, colours.act, 1.8);
+    this.trail(context, points, "c", 1, px, py, colours.cmd, 1);
+    this.trail(context, points, "a", this.magnify, px, py, colours.act, 1.8);
     this.tool(context, points, px, py, colours);
     this.canvas.dataset.points = String(points.end);
   }
 
-  look(points, width, height) {
+  seen(points, width, height) {
     const view = this.view ?? this.whole(points, width, height);
     if (!this.follow || points.end === 0) return view;
-    const [x, y] = at(points, "cx", "cy", points.end - 1);
+    const [x, y] = this.at(points, "c", points.end - 1);
     return Number.isNaN(x + y) ? view : { ...view, x, y };
   }
 
   whole(points, width, height) {
-    const { x, y } = this.path;
     const box = [Infinity, Infinity, -Infinity, -Infinity];
     const take = (px, py) => {
       if (Number.isNaN(px + py)) return;
       box[0] = Math.min(box[0], px); box[1] = Math.min(box[1], py);
       box[2] = Math.max(box[2], px); box[3] = Math.max(box[3], py);
     };
-    x.forEach((value, i) => take(value, y[i]));
+    this.curvePoints((px, py) => take(px, py));
     const step = Math.max(1, Math.floor((points.end - points.start) / 500));
-    for (let i = points.start; i < points.end; i += step) take(...at(points, "cx", "cy", i));
-    if (points.end) take(...at(points, "cx", "cy", points.end - 1));
+    for (let i = points.start; i < points.end; i += step) take(...this.at(points, "c", i));
+    if (points.end) take(...this.at(points, "c", points.end - 1));
     if (box[0] === Infinity) return { x: 0, y: 0, scale: width / 100 };
     const room = 1 - 2 * MARGIN;
     const scale = Math.min((room * width) / Math.max(box[2] - box[0], 1), (room * height) / Math.max(box[3] - box[1], 1));
@@ -71,23 +108,27 @@ export class Plane {
   }
 
   curve(context, px, py, colours) {
-    const { x, y } = this.path;
     context.strokeStyle = colours.program;
     context.lineWidth = 6;
     context.beginPath();
-    x.forEach((value, i) => context.lineTo(px(value), py(y[i])));
+    this.curvePoints((x, y) => context.lineTo(px(x), py(y)));
     context.stroke();
   }
 
+  curvePoints(take) {
+    const { x, y, z } = this.path, [right, up] = this.directions;
+    x.forEach((value, i) => take(along(right, value, y[i], z[i]), along(up, value, y[i], z[i])));
+  }
+
   /** Positions, `magnify` times as far from the commanded ones as they are. */
-  trail(context, points, nameX, nameY, magnify, px, py, colour, lineWidth) {
+  trail(context, points, what, magnify, px, py, colour, lineWidth) {
     context.strokeStyle = colour;
     context.lineWidth = lineWidth;
     context.beginPath();
     let lastX = NaN, lastY = NaN;
     for (let i = points.start; i < points.end; i += 1) {
-      const [cx, cy] = at(points, "cx", "cy", i);
-      const [ax, ay] = at(points, nameX, nameY, i);
+      const [cx, cy] = this.at(points, "c", i);
+      const [ax, ay] = this.at(points, what, i);
       const x = px(cx + magnify * (ax - cx)), y = py(cy + magnify * (ay - cy));
       if (Number.isNaN(x + y)) { lastX = NaN; continue; }
       if (Number.isNaN(lastX)) context.moveTo(x, y);
@@ -101,7 +142,7 @@ export class Plane {
 
   tool(context, points, px, py, colours) {
     if (points.end === 0) return;
-    const [x, y] = at(points, "ax", "ay", points.end - 1);
+    const [x, y] = this.at(points, "a", points.end - 1);
     if (Number.isNaN(x + y)) return;
     context.beginPath();
     context.arc(px(x), py(y), 6, 0, 2 * Math.PI);
@@ -149,6 +190,7 @@ export class Plane {
       fit: () => this.fit(),
       left: () => this.move(step, 0), right: () => this.move(-step, 0),
       up: () => this.move(0, step), down: () => this.move(0, -step),
+      turnLeft: () => this.turn(-TURN), turnRight: () => this.turn(TURN),
     };
     const action = actions[KEYS[event.key]];
     if (!action || event.ctrlKey || event.metaKey) return;
@@ -157,8 +199,22 @@ export class Plane {
   }
 }
 
-function at(points, nameX, nameY, i) {
-  return [points.get(nameX, i), points.get(nameY, i)];
+/** The directions of the three axes, in the lower left corner. */
+function triad(context, [right, up], names, height, colours) {
+  const length = 30, x0 = 45, y0 = height - 45;
+  context.font = "11px system-ui, sans-serif";
+  context.lineWidth = 1.5;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.strokeStyle = context.fillStyle = colours.soft;
+  names.forEach((name, axis) => {
+    const dx = length * right[axis], dy = -length * up[axis];
+    context.beginPath();
+    context.moveTo(x0, y0);
+    context.lineTo(x0 + dx, y0 + dy);
+    context.stroke();
+    context.fillText(name, x0 + 1.35 * dx, y0 + 1.35 * dy);
+  });
 }
 
 function grid(context, view, width, height, px, py, colours) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the plots draw: the last groups of each series and the last points of the plane, in rings of fixed size.
+// What the plots draw: the last groups of each series and the last points of the path, in rings of fixed size.
 
 const GROUPS = 8192;
 const POINTS = 12288;
@@ -40,7 +40,7 @@ export class Store {
     const series = [...this.names, ...Array.from({ length: axes }, (_, i) => `following${i}`)];
     this.series = series;
     this.groups = new Ring(GROUPS, ["t", ...series.flatMap((name) => [`${name}.low`, `${name}.high`])]);
-    this.points = new Ring(POINTS, ["cx", "cy", "ax", "ay"]);
+    this.points = new Ring(POINTS, ["cx", "cy", "cz", "ax", "ay", "az"]);
     this.changes = 0;
   }
 
@@ -61,7 +61,11 @@ export class Store {
       this.groups.put(row);
     });
     const { cmd, act } = message;
-    if (cmd) cmd[0].forEach((x, i) => this.points.put({ cx: x, cy: cmd[1][i], ax: act[0][i], ay: act[1][i] }));
+    if (cmd) {
+      cmd[0].forEach((x, i) => this.points.put({
+        cx: x, cy: cmd[1][i], cz: cmd[2]?.[i] ?? 0, ax: act[0][i], ay: act[1][i], az: act[2]?.[i] ?? 0,
+      }));
+    }
     this.changes += 1;
   }
 

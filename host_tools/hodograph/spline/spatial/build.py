@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ...errors import PlanError
 from ..bernstein import Real
-from ..build import SplineResult, from_control_polygon, through_points
+from ..build import FoundSpline, SplineResult, from_control_polygon, through_points
 from ..ends import end_shares
 from ..knots import KnotSpans, checked_knots, knot_spans
 from ..newton import solved
@@ -20,18 +18,7 @@ from .guide import SpaceEnd, SpaceGuide, points_guide, polygon_guide
 from .quality import judge
 from .system import NATURAL_END, SpaceEndRule, SpaceSystem, cubic_end, tangent_end
 
-
-@dataclass(frozen=True)
-class SpatialSplineResult:
-    """A spline in space, how it was found and how good it is: SplineResult tells what the figures mean."""
-
-    spline: SpatialPHSpline
-    newton_iterations: int
-    trial_iterations: int = 0
-    changed_sides: int = 0
-    extra_turning_rad: float = 0.0
-    bending_ratio: float = 1.0
-    notes: tuple[str, ...] = ()
+SpatialSplineResult = FoundSpline[SpatialPHSpline]
 
 
 def spatial_from_control_polygon(points: object, closed: bool) -> SpatialSplineResult:
@@ -85,15 +72,8 @@ def _level(p: Real) -> bool:
 
 
 def _embedded(found: SplineResult, height_mm: float, notes: tuple[str, ...]) -> SpatialSplineResult:
-    return SpatialSplineResult(
-        embedded(found.spline, height_mm),
-        found.newton_iterations,
-        found.trial_iterations,
-        found.changed_sides,
-        found.extra_turning_rad,
-        found.bending_ratio,
-        notes,
-    )
+    own = {"spline": embedded(found.spline, height_mm), "notes": notes}
+    return SpatialSplineResult(**vars(found) | own)
 
 
 def _free_end(condition: SpaceEnd, share: float, spans: int) -> SpaceEndRule | None:

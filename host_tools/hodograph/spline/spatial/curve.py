@@ -9,12 +9,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arclength import ArcLengthChain, evaluate
+from ..arclength import ArcLengthChain, Index, evaluate
 from ..bernstein import Real
 from ..curve import PHSpline
 from ..extremum import greatest_curvature
+from ..frames import Frames
 from ..splitting import Image, split_segments
 from .quaternion import polar
+
+_GREATEST_COMPONENT = 8.0 - 2.0**-40
+"""Of A in a program: it has 48 bits for one, 44 of them behind the point (docs/reference/protocol.md 1.2)."""
 
 _STRAIGHT = 1e-12
 """Curvature times the length of its segment below which a segment counts as straight: it has no torsion there."""
@@ -36,6 +40,11 @@ class SpatialPHSpline(ArcLengthChain):
     origin: Real
     preimage: Real
     closed: bool
+
+    @property
+    def axes(self) -> int:
+        """3: x, y and z follow it."""
+        return 3
 
     @property
     def segment_count(self) -> int:
@@ -77,8 +86,7 @@ class SpatialPHSpline(ArcLengthChain):
 
     def speed(self, segment: ArrayLike, xi: ArrayLike) -> Real:
         """sigma = |A|^2, mm per unit of xi."""
-        a = evaluate(self.preimage, segment, xi)
-        return np.asarray(np.sum(a * a, axis=-1))
+        return np.asarray(evaluate(self.speed_coefficients, segment, xi))
 
     def curvature_at(self, segment: ArrayLike, xi: ArrayLike) -> Real:
         """Curvature |r' x r''| / sigma^3, never negative; 1/mm."""
@@ -97,6 +105,22 @@ class SpatialPHSpline(ArcLengthChain):
         with np.errstate(divide="ignore", invalid="ignore"):
             torsion = np.sum(cross * third, axis=-1) / area
         return np.asarray(np.where(straight, 0.0, torsion))
+
+    def frames_at(self, segment: Index, xi: Real) -> Frames:
+        """Derivatives by arc length of segments `segment` at `xi`; the curvature is a magnitude."""
+        a0, a1, a2 = np.moveaxis(self.preimage[segment], (-1, -2), (0, 1))
+        rest = 1.0 - xi
+        a = a0 * (rest * rest) + (2.0 * xi * rest) * a1 + (xi * xi) * a2
+        first = 2.0 * ((a1 - a0) * rest + (a2 - a1) * xi)
+        second = 2.0 * (a2 - 2.0 * a1 + a0)
+        sigma, growth = _inner(a, a), 2.0 * _inner(a, first)
+        bend = 2.0 * (_inner(first, first) + _inner(a, second))
+        r1 = _image(a, a) / sigma
+        # sigma r_ss and sigma^2 r_sss follow from r' = sigma r_s by differentiation.
+        r2 = (2.0 * _image(a, first) - growth * r1) / sigma**2
+        r3 = 2.0 * (_image(first, first) + _image(a, second)) - bend * r1
+        r3 = r3 / sigma**3 - (3.0 * growth / sigma**2) * r2
+        return Frames(r1, r2, r3, np.sqrt(_inner(r2, r2)))
 
     def _is_straight(self, segment: ArrayLike, xi: ArrayLike) -> NDArray[np.bool_]:
         length = self.segment_lengths_mm[np.asarray(segment, dtype=np.intp)]
@@ -128,11 +152,26 @@ class SpatialPHSpline(ArcLengthChain):
         return greatest_curvature(self.preimage, curvature_numerator, speed_of)
 
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> SpatialPHSpline:
-        """The same curve in shorter segments; as PHSpline.split."""
+        """The same curve in shorter segments; as PHSpline.split, and with components of A below 8."""
         origin, preimage = split_segments(
-            self.origin, self.preimage, max_length_mm, max_speed_ratio, _IMAGE
+            self.origin,
+            self.preimage,
+            max_length_mm,
+            max_speed_ratio,
+            _IMAGE,
+            _GREATEST_COMPONENT,
         )
         return SpatialPHSpline(origin, preimage, self.closed)
+
+
+def _inner(a: Real, b: Real) -> Real:
+    """Scalar product (…,) of vectors (A, …)."""
+    return np.asarray(np.sum(a * b, axis=0))
+
+
+def _image(a: Real, b: Real) -> Real:
+    """(a i b* + b i a*) / 2 (3, …) of quaternions (4, …), as `polar`."""
+    return np.moveaxis(polar(np.moveaxis(a, 0, -1), np.moveaxis(b, 0, -1)), -1, 0)
 
 
 def hodograph_of(preimage: Real) -> Real:

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""Machines on a bus: a local bus, and the controller as an object."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Literal
+
+from ..bus.goto import goto
+from ..bus.hub import LocalHub
+from ..bus.own_bus import bus_address
+from ..bus.run import RunSession, run_program, run_session
+from ..bus.sdo import actions
+from ..bus.sdo.controller import BOOT, DISABLE, HOLD, OFF, READY, RESUME
+from ..bus.sdo.status import read_status
+from ..native import NativeProgram
+from .machine import Machine
+from .program import Program, Run
+
+Pace = Literal["real-time", "fast"]
+Note = Callable[[str], None]
+
+
+def _silent(text: str) -> None:
+    del text
+
+
+@contextmanager
+def local_bus(speed: float | None = None) -> Iterator[str]:
+    """A CAN bus within this computer, for simulated machines; needs neither root nor CAN in the kernel.
+
+    Gives its name, for `connect`. Its time is virtual: `speed` times as fast as real time at most (None: as fast as it
+    can).
+
+    >>> with local_bus() as bus:
+    ...     bus.startswith("local:")
+    True
+    """
+    with LocalHub(speed=speed) as hub:
+        yield str(hub.address)
+
+
+class Controller:
+    """The controller of a machine, on a bus; made by `connect`.
+
+    Every method raises BusError when the controller does not answer, RefusedError when it says no, RunError for a
+    fault in motion.
+    """
+
+    def __init__(self, session: RunSession, machine: Machine) -> None:
+        self._session, self._machine = session, machine
+        self._node = session.controller
+
+    @property
+    def simulated(self) -> bool:
+        """Whether `connect` started it, with simulated drives."""
+        return self._session.rig is not None
+
+    def configure(self) -> bool:
+        """Brings its configuration to that of the machine; returns whether anything was written."""
+        machine = self._machine._file
+        return self._node.configure(machine, machine.kernel)
+
+    def home(self, wait_s: float = math.inf) -> None:
+        """Finds the zero of every axis that has a homing method; drives are off before and after."""
+        actions.home(self._node, wait_s)
+
+    def enable(self) -> None:
+        """Switches the drives on; returns at standstill."""
+        self._node.enable()
+
+    def disable(self) -> None:
+        """Switches the drives off, at standstill."""
+        self._node.command(DISABLE)
+        self._node.wait_for((OFF, BOOT), actions.BOOT_S)
+
+    def upload(self, program: Program) -> None:
+        """Sends a program, which then is the loaded one. On a refusal the one before stays."""
+        self._node.upload(program.image)
+
+    def goto_start(self, program: Program, *, unhomed: bool = False) -> float:
+        """Moves straight to the start of a program, with the drives on, then loads it; returns the way in mm.
+
+        unhomed   also where axes with a homing method are not homed
+        """
+        machine = self._machine._file
+        native = NativeProgram(program.image)
+        _, first = native.setpoints(machine.kernel, machine.counts_per_mm, 0, 1)
+        start = tuple(int(counts) for counts in first[0])
+        way_mm = goto(self._node, machine, start, unhomed=unhomed)
+        self.upload(program)
+        return way_mm
+
+    def start(self, *, from_mm: float | None = None, unhomed: bool = False) -> None:
+        """Starts the loaded program; returns at once.
+
+        from_mm   from rest at this arc length, where the axes have to stand
+        """
+        self._node.start(from_mm=from_mm, unhomed=unhomed)
+
+    def wait(self, wait_s: float = math.inf) -> None:
+        """Returns when the program has ended, or has been stopped."""
+        self._node.wait_for((READY,), wait_s)
+
+    def hold(self, wait_s: float = math.inf) -> bool:
+        """Comes to standstill on the path, and waits for it; false: the program had ended before."""
+        self._node.command(HOLD)
+        return actions.hold_reached(self._node, wait_s)
+
+    def resume(self) -> None:
+        """Goes on after `hold`."""
+        self._node.command(RESUME)
+
+    def stop(self) -> None:
+        """Comes to standstill on the path for good, and waits for it. Without effect where nothing moves."""
+        self._node.stop_and_wait()
+
+    def reset(self) -> bool:
+        """Resets a fault; the drives are off then. False: there was none."""
+        return actions.reset(self._node)
+
+    def override(self, percent: int) -> None:
+        """Sets the feed override, 0 … 200, for this and later programs."""
+        self._node.override(percent)
+
+    def status(self) -> dict[str, Any]:
+        """State of controller, drives and program, with the keys of `hodograph status --json` but `bus_load`."""
+        return read_status(self._node)
+
+    def sleep(self, seconds: float) -> None:
+        """Waits by the clock of the bus, which is not this computer's on a local bus."""
+        self._node.clock.sleep(seconds)
+
+    def run(self, program: Program, *, unhomed: bool = False) -> Run:
+        """Configures, switches the drives on, moves to the start, uploads, runs, records and analyses.
+
+        Raises RunError, beside the faults of a motion, where the recorded setpoints are not those of the program.
+        """
+        machine = program.machine._file
+        kernel = machine.kernel
+        found = run_program(self._session, machine, program.image, kernel, unhomed=unhomed)
+        return Run(found.motion, found.bus, found.deadline_misses)
+
+
+@contextmanager
+def connect(
+    machine: Machine,
+    bus: str | None = None,
+    *,
+    pace: Pace = "real-time",
+    wait_s: float = 2.0,
+    note: Note | None = None,
+) -> Iterator[Controller]:
+    """The machine's controller on a bus. A virtual bus without one gets a simulated machine until the context ends.
+
+    bus      "socketcan:can0", a name from `local_bus`, or another that `hodograph --bus` takes; None: the one that
+             commands without --bus take
+    pace     of a controller started here: "fast" ticks as soon as the drives have answered
+    wait_s   how long to wait for the controller
+    note     takes lines for the user; None: nobody does
+
+    On an error the axes are stopped. Raises BusError, and RefusedError while the axes move by somebody else.
+
+    >>> from hodograph import load_plan, example_file
+    >>> program = load_plan(example_file("star")).program()
+    >>> with local_bus() as bus, connect(program.machine, bus) as controller:
+    ...     run = controller.run(program)
+    >>> run.setpoints_sha256 == program.simulate().setpoints_sha256
+    True
+    """
+    with run_session(machine._file, bus_address(bus), pace, wait_s, note or _silent) as session:
+        yield Controller(session, machine)

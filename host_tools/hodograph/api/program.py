@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""Programs: what a controller runs, and their runs with simulated drives or on a bus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from pathlib import Path as FilePath
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..native import NativeProgram
+from ..pipeline import controller_verdict
+from ..simulate import Motion, simulate
+from .machine import Machine
+
+Real = NDArray[np.float64]
+Kernel = Literal["fixed", "float", "double"]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run of a program: row k belongs to setpoint k, n rows in all, for A path axes. Maxima count 0.2 s of settling
+    after the last setpoint too.
+
+    bus               where it ran; None: offline
+    deadline_misses   ticks that the controller missed; None offline
+    """
+
+    _motion: Motion = field(repr=False)
+    bus: str | None = None
+    deadline_misses: int | None = None
+
+    @property
+    def t_s(self) -> Real:
+        """Time of each setpoint (n,)."""
+        return self._motion.t_s[: self._motion.ticks]
+
+    @property
+    def arc_length_mm(self) -> Real:
+        """Commanded arc length (n,)."""
+        return self._motion.arc_length_mm[: self._motion.ticks]
+
+    @property
+    def feed_mm_s(self) -> Real:
+        """Commanded feed (n,)."""
+        return self._motion.feed_mm_s[: self._motion.ticks]
+
+    @property
+    def commanded_mm(self) -> Real:
+        """Point of the number kernel, before it is rounded to counts (n, A)."""
+        return self._motion.cmd_mm[: self._motion.ticks]
+
+    @property
+    def setpoints_counts(self) -> NDArray[np.int32]:
+        """Setpoints as they go to the drives (n, A)."""
+        return self._motion.set_counts[: self._motion.ticks].copy()
+
+    @property
+    def actual_mm(self) -> Real:
+        """Encoder position when setpoint k should be reached (n, A)."""
+        return self._motion.act_mm[: self._motion.ticks]
+
+    @property
+    def following_error_um(self) -> Real:
+        """Setpoint less position (n, A)."""
+        return self._motion.following_error_um[: self._motion.ticks]
+
+    @property
+    def contour_error_um(self) -> Real:
+        """Distance of the encoder position from the exact path (n,)."""
+        return self._motion.contour_error_um[: self._motion.ticks]
+
+    @property
+    def greatest_contour_error_um(self) -> float:
+        """Of the whole run, settling included."""
+        return self._motion.max_contour_error_um
+
+    @property
+    def greatest_following_error_um(self) -> float:
+        """Of one axis, settling included."""
+        return self._motion.max_following_error_um
+
+    @property
+    def setpoints_sha256(self) -> str:
+        """Of all setpoints; equal offline and on every bus."""
+        return self._motion.setpoints_sha256
+
+    @property
+    def encoders_sha256(self) -> str:
+        """Of all encoder positions; with simulated drives equal offline and on every bus."""
+        return self._motion.encoders_sha256
+
+    def __repr__(self) -> str:
+        where = "offline" if self.bus is None else f"on {self.bus}"
+        return f"Run({self._motion.ticks} setpoints, {where})"
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A program image for a machine; made by `Plan.program` or `load_program`.
+
+    image     the bytes that the controller gets (docs/reference/protocol.md section 1)
+
+    Raises InputError for an image that the machine's controller would refuse.
+
+    >>> from hodograph import Limits, Machine, Path
+    >>> path = Path.through([[0, 0], [20, 0], [35, 10], [35, 30]])
+    >>> program = path.plan(Limits(feed_mm_s=100), machine=Machine.example()).program()
+    >>> program.period_us
+    1000
+    >>> run = program.simulate()
+    >>> run.setpoints_counts.shape == (program.ticks, 2)
+    True
+    """
+
+    image: bytes = field(repr=False)
+    machine: Machine
+
+    def __post_init__(self) -> None:
+        fault = controller_verdict(self._native, self.machine._file)
+        if fault is not None:
+            raise InputError(
+                f"program image: {fault.text} (code {fault.code}, number {fault.index}): "
+                "make it again for this machine"
+            )
+
+    @cached_property
+    def _native(self) -> NativeProgram:
+        return NativeProgram(self.image)
+
+    @property
+    def ticks(self) -> int:
+        """Number of setpoints."""
+        return self._native.ticks
+
+    @property
+    def period_us(self) -> int:
+        """Time between setpoints."""
+        return self._native.period_us
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the motion; the last setpoint is at its end or less than a period behind."""
+        return self._native.duration_q32_s * 2.0**-32
+
+    def setpoints_counts(self, kernel: Kernel | None = None) -> NDArray[np.int32]:
+        """All setpoints in counts (ticks, A), as the controller computes them. `kernel` None: the machine's."""
+        machine = self.machine._file
+        _, counts = self._native.setpoints(kernel or machine.kernel, machine.counts_per_mm)
+        return counts
+
+    def simulate(self, kernel: Kernel | None = None) -> Run:
+        """Runs it with simulated drives, without a bus, as fast as it goes. `kernel` None: the machine's.
+
+        Raises InputError when an axis of the machine has no drive file.
+        """
+        machine = self.machine._file
+        return Run(
+            simulate(
+                self._native,
+                machine.models(machine.path_axes),
+                kernel=kernel or machine.kernel,
+                counts_per_mm=machine.counts_per_mm,
+                feedforward=machine.path_feedforward,
+            )
+        )
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes the image. Raises OSError."""
+        FilePath(file).write_bytes(self.image)
+
+
+def load_program(file: str | PathLike[str], machine: Machine) -> Program:
+    """A program image from a file (.hdgp), for a machine. Raises InputError."""
+    try:
+        image = FilePath(file).read_bytes()
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+    return Program(image, machine)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Commands that ask drives without a controller: scan, check."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterator
+
+from ..bus.address import BusAddress
+from ..bus.own_bus import bus_address
+from ..bustime import require_fit
+from ..commission import (
+    DriveFacts,
+    Finding,
+    NodeReader,
+    check_axis,
+    found_nodes,
+    machine_text,
+    opened_bus,
+    read_facts,
+    require_no_controller,
+)
+from ..commission.check import FAULT, OK
+from ..commission.drive_facts import MODES
+from ..config import load_machine
+from ..config.axis_table import MAX_AXES
+from ..errors import BusError
+from .output import note, print_json, write_files
+
+
+def scan(options: Namespace) -> None:
+    """hodograph scan."""
+    address = bus_address(options.bus)
+    with opened_bus(address, options.bitrate) as network:
+        require_no_controller(network, address)
+        nodes = found_nodes(network, options.wait)
+        found = [read_facts(NodeReader(network, node)) for node in nodes]
+    if not found:
+        raise BusError(
+            f"{address}: no node answers in {options.wait:g} s: is the power on, and the bit rate right?"
+        )
+    drives = [facts for facts in found if facts.is_drive]
+    if options.output is not None:
+        _write(options, address, drives)
+    if options.json:
+        told = None if options.output is None else str(options.output)
+        print_json({"bus": str(address), "nodes": [f.json() for f in found], "file": told})
+        return
+    for facts in found:
+        for line in _lines(facts):
+            print(line)
+    if options.output is not None:
+        print(options.output)
+
+
+def _write(options: Namespace, address: BusAddress, drives: list[DriveFacts]) -> None:
+    if not drives:
+        raise BusError(
+            f"{address}: no drive by CiA 402 among the nodes: no machine file is written"
+        )
+    if len(drives) > MAX_AXES:
+        note(f"{len(drives)} drives: the file has the first {MAX_AXES}, as a machine has no more")
+    text = machine_text(drives, options.bitrate, str(address))
+    write_files({options.output: text}, force=options.force)
+
+
+def _lines(facts: DriveFacts) -> Iterator[str]:
+    names = [text for text in (facts.name, facts.hardware, facts.software) if text]
+    kind = "drive" if facts.is_drive else f"no drive (device type 0x{facts.device_type:08X})"
+    yield f"node {facts.node}: {kind}{', ' if names else ''}{', '.join(names)}"
+    numbers = (facts.vendor, facts.product, facts.revision, facts.serial)
+    told = ["-" if number is None else f"0x{number:08X}" for number in numbers]
+    yield "  vendor {}, product {}, revision {}, serial {}".format(*told)
+    if not facts.is_drive:
+        return
+    modes = [MODES.get(mode, str(mode)) for mode in facts.modes]
+    yield f"  modes: {', '.join(modes) or 'not told'}"
+    for text, value in (
+        ("encoder increments a turn", facts.encoder_increments),
+        ("gear", facts.gear_ratio),
+        ("counts a turn of the shaft", facts.feed_counts),
+        ("position counts", facts.position_counts),
+        ("least position counts", facts.limit_min_counts),
+        ("greatest position counts", facts.limit_max_counts),
+        ("following error window counts", facts.window_counts),
+        ("quick stop counts/s^2", facts.quick_stop_counts_s2),
+    ):
+        if value is not None:
+            yield f"  {text}: {value:.15g}"
+    if facts.error_code:
+        yield f"  error code 0x{facts.error_code:04X}"
+
+
+def check(options: Namespace) -> None:
+    """hodograph check."""
+    machine = load_machine(options.file)
+    require_fit(machine)
+    address = bus_address(options.bus)
+    findings: dict[str, list[Finding]] = {}
+    with opened_bus(address, machine.bitrate) as network:
+        require_no_controller(network, address)
+        there = found_nodes(network, options.wait, machine.nodes)
+        for axis in machine.axes:
+            if axis.node in there:
+                findings[axis.name] = check_axis(NodeReader(network, axis.node), axis, machine)
+            else:
+                text = f"node {axis.node} does not answer in {options.wait:g} s: power, wiring, node number, bit rate?"
+                findings[axis.name] = [Finding(0x1000, 0, FAULT, text)]
+    faults = {
+        name: [one for one in found if one.verdict == FAULT] for name, found in findings.items()
+    }
+    if options.json:
+        axes = [
+            {
+                "name": axis.name,
+                "node": axis.node,
+                "objects": [f.json() for f in findings[axis.name]],
+            }
+            for axis in machine.axes
+        ]
+        print_json({"bus": str(address), "able": not any(faults.values()), "axes": axes})
+    else:
+        for axis in machine.axes:
+            _print_axis(f"axis {axis.name}, node {axis.node}", findings[axis.name], options.all)
+    bad = [name for name, found in faults.items() if found]
+    if bad:
+        first = faults[bad[0]][0]
+        raise BusError(
+            f"{options.file}: {'axis' if len(bad) == 1 else 'axes'} {', '.join(bad)} cannot do what the machine "
+            f"needs: {first.name}: {first.text}"
+        )
+
+
+def _print_axis(title: str, findings: list[Finding], everything: bool) -> None:
+    count = sum(finding.verdict == OK for finding in findings)
+    print(f"{title}: {count} of {len(findings)} objects are as needed")
+    for finding in findings:
+        if everything or finding.verdict != OK:
+            value = "" if finding.value is None else f"0x{finding.value:X}"
+            print(f"  {finding.verdict:<6}{finding.name:<13} {value:>12}  {finding.text}")
+
+
+COMMANDS = {"scan": scan, "check": check}

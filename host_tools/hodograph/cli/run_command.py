@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT
+"""hodograph run: path files and toolpaths on the bus."""
+
+from __future__ import annotations
+
+import select
+import sys
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from ..bus.address import BusAddress
+from ..bus.capture.recordings import check_suffix
+from ..bus.own_bus import opened_bus
+from ..bus.run import BusRun, RunSession, run_program, run_session
+from ..bustime import require_fit
+from ..config import Machine
+from ..errors import BusError, InputError
+from ..job import write_job_trace
+from ..job_run import JobRun, Look, PreparedJob, operator_stops, prepared, run_job
+from ..names import is_toolpath
+from ..pipeline import Pipeline, load_pipeline
+from ..simulate import write_trace
+from .motion_commands import print_run
+from .output import duration_text, note, number, print_json, print_rows, progress
+from .path_commands import print_notes
+from .toolpath_commands import job_rows, refuse_toolpath_options, toolpath_job
+
+Task = Pipeline | PreparedJob
+"""What is made of a FILE: a path file's program, or the programs of a toolpath."""
+
+
+def run(options: Namespace) -> None:
+    """hodograph run."""
+    with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
+        _run_all(options, address)
+
+
+def _run_all(options: Namespace, address: BusAddress) -> None:
+    if not address.is_raw:
+        raise BusError(
+            f"{address}: run records at full bus load, which takes SocketCAN: use socketcan:CHANNEL "
+            "(slcand makes one of a serial adapter)"
+        )
+    _check_outputs(options)
+    tasks = [_task(options, file) for file in options.files]
+    runs = [_run_one(task, address, options) for task in tasks]
+    if options.trace is not None:
+        _write_trace(runs[0], options.trace)
+    if options.report is not None:
+        _write_report(tasks, runs, options.report)
+    if options.json:
+        _print_json(options.files, runs)
+        return
+    for file, found in zip(options.files, runs, strict=True):
+        if isinstance(found, BusRun):
+            print_run(str(file), found)
+        else:
+            _print_job_run(str(file), found)
+
+
+def _check_outputs(options: Namespace) -> None:
+    """Raises InputError: what is to be written cannot be."""
+    if options.trace is not None and len(options.files) > 1:
+        raise InputError("--trace: takes one FILE; run the others by themselves")
+    if options.record is not None:
+        check_suffix(options.record)
+        if len(options.files) > 1:
+            raise InputError("--record: takes one FILE; run the others by themselves")
+    if options.report is not None:
+        for file in filter(is_toolpath, options.files):
+            raise InputError(f"{file}: --report takes path files only: use --trace and --json")
+
+
+def _task(options: Namespace, file: Path) -> Task:
+    """Everything that can be wrong with the input shows here, before anything moves."""
+    if not is_toolpath(file):
+        refuse_toolpath_options(options, file)
+        if options.no_stops:
+            raise InputError(f"{file}: --no-stops is for toolpaths, not for path files")
+        pipeline = load_pipeline(file, options.machine, allow_space=True)
+        require_fit(pipeline.machine)
+        pipeline.image  # noqa: B018
+        return pipeline
+    job = toolpath_job(options, file)
+    require_fit(job.machine)
+    if not options.no_stops and not sys.stdin.isatty():
+        for line, code in operator_stops(job):
+            raise InputError(
+                f"{file}:{line}: {code} waits for the operator, and standard input is no terminal: "
+                "add --no-stops to go on without waiting"
+            )
+    return prepared(job, options.kernel or job.machine.kernel)
+
+
+def _run_one(task: Task, address: BusAddress, options: Namespace) -> BusRun | JobRun:
+    if isinstance(task, PreparedJob):
+        with (
+            _session(task.job.machine, address, options) as at,
+            progress(f"run {task.job.file.name}", "tick", task.ticks) as bar,
+        ):
+            operator = _pass if options.no_stops else _await_enter
+            return run_job(at, task, operator, bar, options.record, unhomed=options.unhomed)
+    machine = task.machine
+    print_notes(task, task.compilation.plan)
+    with (
+        _session(machine, address, options) as at,
+        progress(f"run {task.file.name}", "tick", task.program.ticks) as bar,
+    ):
+        kernel = options.kernel or machine.kernel
+        return run_program(
+            at, machine, task.image, kernel, bar, options.record, unhomed=options.unhomed
+        )
+
+
+@contextmanager
+def _session(machine: Machine, address: BusAddress, options: Namespace) -> Iterator[RunSession]:
+    with run_session(
+        machine, address, options.pace or "real-time", options.wait, note, options.controller
+    ) as at:
+        if options.pace is not None and at.pace is None:
+            note("--pace has no effect on a controller that is running already")
+        if options.controller is not None and at.pace is None:
+            note("--controller has no effect where one is running already")
+        yield at
+
+
+def _pass(text: str, look: Look) -> None:
+    look()
+    note(f"{text}: passed without waiting (--no-stops)")
+
+
+def _await_enter(text: str, look: Look) -> None:
+    note(f"{text}: waits for Enter; Ctrl-C ends the job")
+    while True:
+        look()
+        if select.select([sys.stdin], [], [], 0.0)[0]:
+            if not sys.stdin.readline():
+                raise InputError(f"{text}: standard input has ended: the job ends here")
+            return
+
+
+def _write_trace(found: BusRun | JobRun, file: Path) -> None:
+    if isinstance(found, BusRun):
+        write_trace(found.motion, file)
+    else:
+        write_job_trace(found.motion, file)
+
+
+def _write_report(tasks: list[Task], runs: list[BusRun | JobRun], folder: Path) -> None:
+    from ..report import write_report
+
+    cases = [
+        (task, found.motion, found)
+        for task, found in zip(tasks, runs, strict=True)
+        if isinstance(task, Pipeline) and isinstance(found, BusRun)
+    ]
+    note(f"report: {write_report(cases, folder)}")
+
+
+def _print_json(files: list[Path], runs: list[BusRun | JobRun]) -> None:
+    results: list[dict[str, Any]] = [found.summary() for found in runs]
+    if len(results) == 1:
+        print_json(results[0])
+    else:
+        print_json([{"file": str(f)} | found for f, found in zip(files, results, strict=True)])
+
+
+def _print_job_run(title: str, found: JobRun) -> None:
+    """A job's results for people."""
+    motion = found.motion
+    wall_s = sum(one.wall_s for one in found.runs)
+    frames = sum(one.frames for one in found.runs)
+    errors_um = max(one.motion.max_contour_error_um for one in found.runs)
+    rows = [
+        ("bus", f"{found.runs[0].bus}, pace {found.runs[0].pace}, {frames} frames"),
+        ("time", f"{duration_text(wall_s)} for {duration_text(motion.duration_s)} of motion"),
+        ("deadline misses", str(sum(one.deadline_misses or 0 for one in found.runs))),
+        *job_rows(motion.job),
+        ("greatest contour error", f"{errors_um:.3f} um"),
+    ]
+    print(title)
+    print_rows([(f"  {name}", value) for name, value in rows])
+    print(f"{'section':>8} {'lines':>15} {'s':>9} {'contour um':>11}  setpoints SHA-256")
+    for k, (section, one) in enumerate(zip(motion.job.sections, found.runs, strict=True), 1):
+        lines = f"{section.first_line} … {section.last_line}"
+        own = one.motion
+        print(
+            f"{k:8} {lines:>15} {number(own.ticks * own.period_us / 1e6):>9} "
+            f"{own.max_contour_error_um:11.3f}  {own.setpoints_sha256}"
+        )
+
+
+COMMANDS = {"run": run}

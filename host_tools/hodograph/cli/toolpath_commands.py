@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: MIT
+"""Commands on toolpaths of other programs: import, and simulate of such a file."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from dataclasses import asdict
+from enum import Enum
+from pathlib import Path
+
+from ..config import load_machine
+from ..errors import InputError
+from ..job import DEFAULT_TOLERANCE_MM, Job, JobSection, load_job, simulate_job, write_job_trace
+from ..names import TOOLPATH_SUFFIXES, is_toolpath
+from ..pipeline import Pipeline
+from ..toolpath.files import ReadOptions
+from ..toolpath.moves import Command
+from .output import note, number, print_json, print_rows, progress, write_file
+
+_OPTIONS = ("tolerance", "feed", "layer", "id", "gap", "lift", "scale", "unit", "closed")
+
+
+def refuse_toolpath_options(options: Namespace, file: Path) -> None:
+    """Raises InputError: options of toolpaths are given with a path file."""
+    for name in _OPTIONS:
+        if getattr(options, name) not in (None, [], False):
+            raise InputError(f"{file}: --{name} is for toolpaths, not for path files: leave it out")
+
+
+def toolpath_job(options: Namespace, file: Path) -> Job:
+    """The job of a file on options.machine, its notes on stderr. Raises InputError: no machine."""
+    if options.machine is None:
+        raise InputError(f"{file}: a toolpath names no machine: add --machine FILE")
+    tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
+    reading = ReadOptions(
+        feed_mm_s=options.feed,
+        layers=tuple(options.layer),
+        ids=tuple(options.id),
+        gap_mm=options.gap,
+        lift_mm=options.lift,
+        scale=options.scale,
+        unit_mm=options.unit,
+        closed=options.closed,
+    )
+    job = load_job(file, load_machine(options.machine), tolerance_mm, reading)
+    for line in job.notes:
+        note(line)
+    return job
+
+
+def require_toolpath(file: Path) -> None:
+    """Raises InputError: the name of a file is not that of a toolpath."""
+    if not is_toolpath(file):
+        raise InputError(
+            f"{file}: no toolpath by the end of its name: rename it to end in one of "
+            f"{' '.join(TOOLPATH_SUFFIXES)}, or give - for G-code from standard input"
+        )
+
+
+def section_pipeline(options: Namespace) -> Pipeline:
+    """The pipeline of a toolpath that is one section. Raises PlanError: it has several."""
+    return toolpath_job(options, options.file).only_section(str(options.command)).pipeline
+
+
+def simulate_toolpath(options: Namespace) -> None:
+    """hodograph simulate of a toolpath."""
+    for kind in ("hold", "stop", "fault"):
+        if getattr(options, f"{kind}_at"):
+            raise InputError(
+                f"--{kind}-at: is for path files; a toolpath runs from its start to its end"
+            )
+    job = toolpath_job(options, options.file)
+    with progress("simulate", "section", len(job.sections)) as bar:
+        run = simulate_job(
+            job,
+            options.kernel,
+            keep_rows=options.trace is not None,
+            progress=lambda done, total: bar(done),
+        )
+    if options.trace is not None:
+        write_job_trace(run, options.trace)
+    if options.json:
+        print_json(run.summary())
+        return
+    print_rows(
+        [
+            *job_rows(job),
+            ("duration", f"{number(run.duration_s)} s, {run.ticks} ticks, without dwells"),
+            ("planned in", f"{run.planning_s:.3g} s, fitted in {job.fit_s:.3g} s"),
+        ]
+    )
+
+
+def import_(options: Namespace) -> None:
+    """hodograph import."""
+    require_toolpath(options.file)
+    job = toolpath_job(options, options.file)
+    found = imported(job)
+    if options.output is not None:
+        write_file(options.output, _toml(found).encode())
+    if options.json:
+        print_json(found)
+    elif options.output is None:
+        print_rows(
+            [*job_rows(job), ("duration", f"{number(sum(map(_duration_s, job.sections)))} s")]
+        )
+        print(
+            f"{'section':>8} {'lines':>15} {'length mm':>12} {'segments':>9} {'bound um':>9} {'s':>9}"
+        )
+        for k, one in enumerate(job.sections, start=1):
+            print(
+                f"{k:8} {f'{one.first_line} … {one.last_line}':>15} {number(one.fitted.curve.length_mm):>12} "
+                f"{one.fitted.curve.segment_count:9} {1000.0 * one.fitted.deviation_mm:9.3f} "
+                f"{number(_duration_s(one)):>9}"
+            )
+
+
+def job_rows(job: Job) -> list[tuple[str, str]]:
+    """What became of a toolpath, for people."""
+    return [
+        (
+            "toolpath",
+            f"{job.lines} lines that move, {len(job.sections)} sections from rest to rest",
+        ),
+        ("curves", f"{job.segments} PH segments, {number(job.length_mm)} mm"),
+        ("deviation", f"below {job.deviation_um:.3f} um, certified"),
+        ("dwells", f"{number(job.dwell_s)} s"),
+    ]
+
+
+def _duration_s(section: JobSection) -> float:
+    return section.pipeline.plan.duration_s
+
+
+def imported(job: Job) -> dict[str, object]:
+    """A job as JSON and TOML have it: its figures, its sections, and what happens at which place."""
+    sections = [
+        {
+            "first_line": one.first_line,
+            "last_line": one.last_line,
+            "tolerance_mm": one.tolerance_mm,
+            "length_mm": one.fitted.curve.length_mm,
+            "segments": one.fitted.curve.segment_count,
+            "deviation_bound_um": 1000.0 * one.fitted.deviation_mm,
+            "duration_s": _duration_s(one),
+        }
+        for one in job.sections
+    ]
+    events = [
+        {"section": k} | _event(command) | ({} if at is None else {"at_mm": at})
+        for k, one in enumerate(job.sections, start=1)
+        for at, command in [*((None, c) for c in one.before), *one.events]
+    ]
+    last = [{"section": len(sections) + 1} | _event(command) for command in job.after]
+    return {
+        "file": str(job.file),
+        **job.summary(),
+        "duration_s": sum(map(_duration_s, job.sections)),
+        "notes": list(job.notes),
+        "section": sections,
+        "event": [*events, *last],
+    }
+
+
+def _event(command: Command) -> dict[str, object]:
+    own = {
+        name: value.name.lower() if isinstance(value, Enum) else value
+        for name, value in asdict(command).items()
+    }
+    return {"command": type(command).__name__, **own}
+
+
+def _toml(found: dict[str, object]) -> str:
+    """TOML of a dict of scalars, lists of texts, and lists of tables."""
+    lines = [
+        f"{key} = {json.dumps(value)}" for key, value in found.items() if not _is_tables(value)
+    ]
+    for key, value in found.items():
+        if _is_tables(value):
+            assert isinstance(value, list)
+            for table in value:
+                lines += ["", f"[[{key}]]", *(f"{k} = {json.dumps(v)}" for k, v in table.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
+
+
+COMMANDS = {"import": import_}

@@ -1,0 +1,485 @@
+# SPDX-License-Identifier: MIT
+"""A job: programs of a toolpath, each from rest to rest, one after the other.
+
+A toolpath becomes sections, a section a curve within the tolerance, a curve a program. What happens between the
+sections (dwells, spindle, outputs, tool changes) is kept with its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .config import Machine, PathFile, SpacePathSpec
+from .errors import InputError, PlanError
+from .feed import FeedPlan, FeedRequest, FeedZone, Limits
+from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
+from .pipeline import Pipeline
+from .program.geometry import quantise
+from .simulate import Motion, simulate
+from .spline.build import FoundSpline
+from .spline.curve import PHSpline
+from .spline.spatial import SpatialPHSpline
+from .toolpath.files import ReadOptions, is_gcode, read_toolpath
+from .toolpath.fit.fitting import FittedPath, Tolerance, fit
+from .toolpath.fit.sections import Section, Toolpath, cut_at, divided
+from .toolpath.fit.speeds import MotionLimits
+from .toolpath.moves import (
+    AnalogOutput,
+    Command,
+    Coolant,
+    DigitalOutput,
+    Dwell,
+    Message,
+    Spindle,
+    ToolChange,
+)
+
+Real = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+DEFAULT_TOLERANCE_MM = 0.01
+GREATEST_TOLERANCE_MM = 10.0
+
+_MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
+"""Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
+
+_UNHEEDED: dict[tuple[type[Command], ...], str] = {
+    (Spindle,): "spindle (M3, M4, M5)",
+    (Coolant,): "coolant (M7, M8, M9)",
+    (ToolChange,): "tool change (M6)",
+    (DigitalOutput, AnalogOutput): "outputs (M62 to M65, M67, M68)",
+}
+_LONGEST_NAME = 40
+
+
+@dataclass(frozen=True, eq=False)
+class SectionPipeline(Pipeline):
+    """A pipeline whose curve is that of a section."""
+
+    fitted: FittedPath | None = None
+
+    @cached_property
+    def found_spline(self) -> FoundSpline[PHSpline] | FoundSpline[SpatialPHSpline]:
+        """The curve, in the plane where only two axes of the machine follow a path."""
+        assert self.fitted is not None
+        curve = self.fitted.curve
+        if len(self.machine.path_axes) > 2:
+            return FoundSpline(curve, 0)
+        return FoundSpline(_in_plane(curve), 0)
+
+    def _planned(self, limits: Limits) -> FeedPlan:
+        """The plan; with more reserve where a piece would have none left for the least override rate."""
+        plan = super()._planned(limits)
+        joints_q40 = quantise(self.curve, ()).start_q40
+        for reserve in _MORE_RESERVE:
+            pieces = plan.pieces_over(int(joints_q40[-1]), joints_q40)
+            if min(pieces.override_rate_codes.min(), pieces.override_second_codes.min()) > 0:
+                break
+            plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
+        return plan
+
+
+def _in_plane(curve: SpatialPHSpline) -> PHSpline:
+    """A curve whose z does not change, without it."""
+    w = curve.preimage[:, 0] + 1j * curve.preimage[:, 3]
+    return PHSpline(curve.origin[:, 0] + 1j * curve.origin[:, 1], w, False)
+
+
+@dataclass(frozen=True, eq=False)
+class JobSection:
+    """A section with its program.
+
+    before  commands that happen at rest, before it starts
+    events  commands on the way, with the arc lengths in mm where they happen
+    """
+
+    fitted: FittedPath
+    tolerance_mm: float
+    pipeline: SectionPipeline
+    before: tuple[Command, ...]
+    events: tuple[tuple[float, Command], ...]
+
+    @property
+    def first_line(self) -> int:
+        """Source line of its first move."""
+        return int(self.fitted.reference.line[0])
+
+    @property
+    def last_line(self) -> int:
+        """Source line of its last move."""
+        return int(self.fitted.reference.line[-1])
+
+    def lines_summary(self) -> dict[str, object]:
+        """Its source lines, for JSON."""
+        return {"first_line": self.first_line, "last_line": self.last_line}
+
+    def line_at(self, s_mm: Real) -> Int:
+        """Source lines (n,) of places of the curve at arc lengths (n,)."""
+        reference = self.fitted.reference
+        starts = self.fitted.arc_length_at(reference.place_mm[:-1])
+        at = np.searchsorted(starts, s_mm, side="right") - 1
+        return np.asarray(reference.line[np.clip(at, 0, reference.count - 1)])
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """All sections of a toolpath, on a machine.
+
+    after  commands that happen at rest at the end
+    notes  one line for each thing that the user should know
+    fit_s  wall time that reading and fitting took
+    """
+
+    file: Path
+    machine: Machine
+    sections: tuple[JobSection, ...]
+    after: tuple[Command, ...]
+    notes: tuple[str, ...]
+    fit_s: float
+
+    @property
+    def deviation_um(self) -> float:
+        """Bound of the distance between the programmed path and the curves, both ways."""
+        return 1000.0 * max(section.fitted.deviation_mm for section in self.sections)
+
+    @property
+    def lines(self) -> int:
+        """Source lines that move the machine."""
+        lines = np.concatenate([section.fitted.reference.line for section in self.sections])
+        return int(np.unique(lines).size)
+
+    @property
+    def segments(self) -> int:
+        """PH segments of all curves."""
+        return sum(section.fitted.curve.segment_count for section in self.sections)
+
+    @property
+    def length_mm(self) -> float:
+        """Length of all curves."""
+        return sum(section.fitted.curve.length_mm for section in self.sections)
+
+    @property
+    def dwell_s(self) -> float:
+        """Standstill that the toolpath asks for."""
+        return sum(command.duration_s for command in self._at_rest if isinstance(command, Dwell))
+
+    @property
+    def _at_rest(self) -> Iterator[Command]:
+        for section in self.sections:
+            yield from section.before
+        yield from self.after
+
+    def summary(self) -> dict[str, object]:
+        """What became of the toolpath, for JSON."""
+        return {
+            "lines": self.lines,
+            "sections": len(self.sections),
+            "segments": self.segments,
+            "length_mm": self.length_mm,
+            "dwell_s": self.dwell_s,
+            "deviation_bound_um": self.deviation_um,
+        }
+
+    def only_section(self, command: str) -> JobSection:
+        """The section of a job that has one. Raises PlanError: it has several."""
+        if len(self.sections) != 1:
+            second = self.sections[1].first_line
+            raise PlanError(
+                f"{self.file}: has {len(self.sections)} sections from rest to rest (the second from line {second}), "
+                f"but {command} takes one program: simulate and run take them all"
+            )
+        return self.sections[0]
+
+
+def load_job(
+    file: Path,
+    machine: Machine,
+    tolerance_mm: float = DEFAULT_TOLERANCE_MM,
+    reading: ReadOptions | None = None,
+) -> Job:
+    """The job of a toolpath file.
+
+    tolerance_mm  greatest distance between programmed path and curve; 0: stop at the end of each move
+    reading       how the file is read; its feed replaces those of the file, rapid moves keep theirs
+    Raises InputError (naming file and line) and PlanError.
+    """
+    begin = perf_counter()
+    if not 0.0 <= tolerance_mm <= GREATEST_TOLERANCE_MM:
+        raise InputError(
+            f"--tolerance {tolerance_mm:g}: must be from 0 to {GREATEST_TOLERANCE_MM:g} mm"
+        )
+    reading, notes = reading or ReadOptions(), list[str]()
+    path = divided(_commands(file, reading, notes), tolerance_mm, str(file))
+    if not path.sections:
+        raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
+    maker = _Maker(file, machine, reading.feed_mm_s, notes)
+    sections = tuple(made for section in path.sections for made in maker.made(section))
+    notes += _unheeded(path, file)
+    return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
+
+
+def _commands(file: Path, reading: ReadOptions, notes: list[str]) -> Iterator[Command]:
+    """The commands of a file; what the reader of a drawing or of points says goes to `notes`. Raises InputError."""
+    for command in read_toolpath(file, reading):
+        if isinstance(command, Message) and not is_gcode(file):
+            place = f"{file}:{command.line}" if command.line else str(file)
+            notes.append(f"{place}: {command.text}")
+        else:
+            yield command
+
+
+def _unheeded(path: Toolpath, file: Path) -> Iterator[str]:
+    """Notes on commands that the machine does not obey, one for each kind."""
+    at_rest = [command for section in path.sections for command in section.before]
+    on_the_way = [event.command for section in path.sections for event in section.events]
+    lines: dict[str, list[int]] = {}
+    for command in [*at_rest, *path.after, *on_the_way]:
+        for kinds, text in _UNHEEDED.items():
+            if isinstance(command, kinds):
+                lines.setdefault(text, []).append(command.line)
+    for text, where in lines.items():
+        more = f" and {len(where) - 1} more" if len(where) > 1 else ""
+        yield f"{file}:{min(where)}: {text}{more}: the machine has none, it moves as if they were done"
+
+
+@dataclass(frozen=True, eq=False)
+class _Maker:
+    """Makes sections of a job."""
+
+    file: Path
+    machine: Machine
+    feed_mm_s: float | None
+    notes: list[str]
+
+    def made(self, section: Section) -> Iterator[JobSection]:
+        """The section, or its parts where no curve was found within the tolerance."""
+        if self.feed_mm_s is not None:
+            reference = section.reference
+            feed = np.where(reference.feed_mm_s < inf, self.feed_mm_s, inf)
+            section = replace(section, reference=replace(reference, feed_mm_s=feed))
+        self._check_plane(section)
+        found = fit(section.reference, Tolerance(section.tolerance_mm, self._limits))
+        if isinstance(found, FittedPath):
+            yield self._section(section, found)
+            return
+        reference, chord = section.reference, found.chord
+        first, last = (int(reference.line[chord[k]]) for k in (0, -1))
+        self.notes.append(
+            f"{self.file}:{first}: no curve was found within the tolerance"
+            + (f" up to line {last}" if last != first else "")
+            + ": exact stops there"
+        )
+        if reference.count == 1:
+            raise PlanError(
+                f"{self.file}:{first}: a straight line could not be fitted: please report this file"
+            )
+        places = np.union1d(reference.place_mm[chord], reference.place_mm[chord + 1])
+        for part in cut_at(section, places):
+            yield from self.made(replace(part))
+
+    @property
+    def _limits(self) -> MotionLimits:
+        axes = self.machine.path_axes
+        return MotionLimits(
+            min(self.machine.feed_mm_s, *(axis.velocity_mm_s for axis in axes)),
+            min(self.machine.acceleration_mm_s2, *(axis.acceleration_mm_s2 for axis in axes)),
+            min(self.machine.jerk_mm_s3, *(axis.jerk_mm_s3 for axis in axes)),
+        )
+
+    def _check_plane(self, section: Section) -> None:
+        if len(self.machine.path_axes) > 2:
+            return
+        height = section.reference.point[:, 2]
+        moved = np.flatnonzero(height[1:] != height[:-1])
+        if moved.size:
+            raise InputError(
+                f"{self.file}:{section.reference.line[moved[0]]}: the move changes Z, but only two axes of "
+                f'{self.machine.file.name} follow a path: name three of them, path = ["x", "y", "z"], at its top'
+            )
+
+    def _section(self, section: Section, fitted: FittedPath) -> JobSection:
+        nominal, zones = _feeds(fitted)
+        first = int(section.reference.line[0])
+        nodes = np.asarray(fitted.curve.nodal_points)
+        file = PathFile(
+            file=Path(f"{self.file}:{first}"),
+            name=self.file.stem[:_LONGEST_NAME],
+            given_path=SpacePathSpec(False, nodes, True, "natural", None, None, "chord"),
+            feed=FeedRequest(OPTIMAL, nominal),
+            limits=Limits(zones=zones),
+            machine_file=None,
+        )
+        self._check_travel(section, fitted)
+        places = fitted.arc_length_at(np.array([event.place_mm for event in section.events]))
+        events = tuple(
+            (float(s), event.command) for s, event in zip(places, section.events, strict=True)
+        )
+        pipeline = SectionPipeline(file, self.machine, fitted)
+        return JobSection(fitted, section.tolerance_mm, pipeline, section.before, events)
+
+    def _check_travel(self, section: Section, fitted: FittedPath) -> None:
+        """Raises PlanError, naming the line, where the curve leaves the travel of an axis."""
+        coefficients = fitted.curve.position_coefficients
+        for k, axis in enumerate(self.machine.path_axes[:3]):
+            offset = self.machine.offset_mm[k]
+            low = coefficients[:, k].min(axis=1) + offset
+            high = coefficients[:, k].max(axis=1) + offset
+            out = (low < axis.travel_min_mm) | (high > axis.travel_max_mm)
+            if not out.any():
+                continue
+            programmed = section.reference.point[1:, k] + offset
+            beyond = (programmed < axis.travel_min_mm) | (programmed > axis.travel_max_mm)
+            chord = _chord_of(fitted, int(np.argmax(out)))
+            line = section.reference.line[int(np.argmax(beyond)) if beyond.any() else chord]
+            raise PlanError(
+                f"{self.file}:{line}: {axis.name} goes to {low.min():.6g} … {high.max():.6g} mm with the work offset, "
+                f"its travel is {axis.travel_min_mm:g} … {axis.travel_max_mm:g} mm: "
+                "change [work] offset_mm, or the program"
+            )
+
+
+def _chord_of(fitted: FittedPath, segment: int) -> int:
+    """The chord of the reference where a segment of the curve begins."""
+    reference = fitted.reference
+    at = int(np.searchsorted(reference.place_mm, fitted.place_mm[segment], side="right")) - 1
+    return min(at, reference.count - 1)
+
+
+def _feeds(fitted: FittedPath) -> tuple[float, tuple[FeedZone, ...]]:
+    """The nominal feed and the feed zones of a section."""
+    reference = fitted.reference
+    feed = np.where(reference.feed_mm_s <= GREATEST_FEED_MM_S, reference.feed_mm_s, inf)
+    feed = np.maximum(feed, LEAST_FEED_MM_S)
+    nominal = float(feed.max())
+    edges = np.flatnonzero(np.append(True, feed[1:] != feed[:-1]))
+    ends = np.append(edges[1:], reference.count)
+    zones = []
+    for first, last in zip(edges.tolist(), ends.tolist(), strict=True):
+        value = float(feed[first])
+        low, high = fitted.arc_length_at(reference.place_mm[[first, last]]).tolist()
+        if value < nominal and high > low:
+            zones.append(FeedZone(low, high, value))
+    return nominal, tuple(zones)
+
+
+@dataclass(frozen=True, eq=False)
+class JobMotion:
+    """A run of a job: the motions of its sections, one behind the other.
+
+    The last point of a section is the first one of the next and counts once. Dwells are not part of it.
+    """
+
+    job: Job
+    motions: tuple[Motion, ...]
+    planning_s: float
+
+    @property
+    def period_s(self) -> float:
+        """Time between two ticks."""
+        return self.motions[0].period_us / 1e6
+
+    @property
+    def ticks(self) -> int:
+        """Of all sections."""
+        return 1 + sum(motion.ticks - 1 for motion in self.motions)
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the motion, from the first tick to the last, without dwells."""
+        return (self.ticks - 1) * self.period_s
+
+    def summary(self) -> dict[str, object]:
+        """The keys that tools may rely on in `--json` output."""
+        return self.job.summary() | {
+            "duration_s": self.duration_s,
+            "ticks": self.ticks,
+            "planning_s": self.planning_s,
+            "fit_s": self.job.fit_s,
+            "max_contour_error_um": max(motion.max_contour_error_um for motion in self.motions),
+            "max_following_error_um": max(motion.max_following_error_um for motion in self.motions),
+            "section": [
+                section.lines_summary() | motion.summary()
+                for section, motion in zip(self.job.sections, self.motions, strict=True)
+            ],
+        }
+
+
+def simulate_job(
+    job: Job,
+    kernel: str | None = None,
+    *,
+    keep_rows: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> JobMotion:
+    """Plans, compiles and runs every section. Errors name file and line."""
+    machine = job.machine
+    begin = perf_counter()
+    images = [section.pipeline.accepted for section in job.sections]
+    planning_s = perf_counter() - begin
+    motions = []
+    for done, image in enumerate(images):
+        motions.append(
+            simulate(
+                image,
+                machine.models(machine.path_axes),
+                kernel=kernel or machine.kernel,
+                counts_per_mm=machine.counts_per_mm,
+                feedforward=machine.path_feedforward,
+                keep_rows=keep_rows,
+            )
+        )
+        if progress is not None:
+            progress(done + 1, len(images))
+    return JobMotion(job, tuple(motions), planning_s)
+
+
+def write_job_trace(run: JobMotion, file: Path) -> None:
+    """One row a tick: tick, t_s, source line, arc length, feed, commanded and actual positions of the axes.
+
+    Positions are in the program's own coordinates: without the work offset. Raises InputError.
+    """
+    machine = run.job.machine
+    names = [axis.name for axis in machine.path_axes]
+    header = [
+        *("tick", "t_s", "line", "arc_length_mm", "feed_mm_s"),
+        *(f"{name}_cmd_mm" for name in names),
+        *(f"{name}_act_mm" for name in names),
+    ]
+    try:
+        with file.open("w", encoding="ascii", newline="\n") as out:
+            out.write(",".join(header) + "\n")
+            for row in _trace_rows(run):
+                out.write(row)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def _trace_rows(run: JobMotion) -> Iterator[str]:
+    tick, passed_mm = 0, 0.0
+    offset = np.array(run.job.machine.offset_mm)
+    for index, (section, motion) in enumerate(zip(run.job.sections, run.motions, strict=True)):
+        first = 1 if index else 0
+        rows = slice(first, motion.ticks)
+        own = motion.arc_length_mm[rows]
+        count = own.size
+        columns = [
+            np.arange(tick, tick + count),
+            np.arange(tick, tick + count) * run.period_s,
+            section.line_at(own),
+            passed_mm + own,
+            motion.feed_mm_s[rows],
+            *(motion.cmd_mm[rows] - offset).T,
+            *(motion.act_mm[rows] - offset).T,
+        ]
+        texts = [map(repr, column.tolist()) for column in columns]
+        yield from (",".join(row) + "\n" for row in zip(*texts, strict=True))
+        tick += count
+        passed_mm += section.fitted.curve.length_mm

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: MIT
+"""A job on the bus: its sections one after the other, and what happens at rest between them.
+
+Each section is a program: it is uploaded where the axes stand, started, recorded and analysed. Dwells are waited for,
+program stops and tool changes are left to the operator, messages are said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from .bus.capture.setpoint_check import SetpointJumpError
+from .bus.goto import goto
+from .bus.run import BusRun, Progress, Recorded, RunSession, analysed, bring_up, record_program
+from .bus.sdo.controller import READY
+from .errors import PlanError, RunError
+from .job import Job, JobMotion
+from .native import NativeProgram
+from .program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes
+from .toolpath.moves import Command, Dwell, Message, ProgramStop, ToolChange
+
+_LOOK_S = 0.1
+_START_COUNTS = 2
+"""So far off its start a section begins at once: the rounding of the end of the one before."""
+
+Look = Callable[[], None]
+"""Waits a little and raises what has gone wrong on the bus meanwhile."""
+
+Operator = Callable[[str, Look], None]
+"""Tells the operator why the job stops, and returns when it may go on; calls the second one while it waits."""
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedJob:
+    """A job with the programs of its sections, all of which the controller accepts."""
+
+    job: Job
+    kernel: str
+    programs: tuple[NativeProgram, ...]
+    planning_s: float
+
+    @property
+    def ticks(self) -> int:
+        """Of all sections."""
+        return sum(program.ticks for program in self.programs)
+
+
+@dataclass(frozen=True, eq=False)
+class JobRun:
+    """A recorded run of a job."""
+
+    motion: JobMotion
+    runs: tuple[BusRun, ...]
+
+    def summary(self) -> dict[str, object]:
+        """The keys that tools may rely on in `hodograph run --json`: of the whole, and of each section."""
+        misses = [run.deadline_misses or 0 for run in self.runs]
+        return self.motion.summary() | {
+            "bus": self.runs[0].bus,
+            "pace": self.runs[0].pace,
+            "deadline_misses": sum(misses),
+            "frames": sum(run.frames for run in self.runs),
+            "unhomed_starts": sum(run.unhomed_starts for run in self.runs),
+            "section": [
+                section.lines_summary() | run.summary()
+                for section, run in zip(self.motion.job.sections, self.runs, strict=True)
+            ],
+        }
+
+
+def prepared(job: Job, kernel: str) -> PreparedJob:
+    """Plans and compiles every section, so that whatever can be wrong shows before anything moves.
+
+    Raises InputError, and PlanError: a section that no controller of this machine has room for.
+    """
+    begin = perf_counter()
+    programs = []
+    for section in job.sections:
+        program = section.pipeline.accepted
+        needed = memory_bytes(program.image, *RECORD_BYTES[kernel])
+        room = job.machine.program_bytes or LARGEST_BANK
+        if needed > room:
+            raise PlanError(
+                f"{job.file}:{section.first_line}: the section up to line {section.last_line} takes {needed} bytes of "
+                f"a controller, which has {room}: divide it by a dwell (G4 P0), or raise --tolerance"
+            )
+        programs.append(program)
+    return PreparedJob(job, kernel, tuple(programs), perf_counter() - begin)
+
+
+def operator_stops(job: Job) -> Iterator[tuple[int, str]]:
+    """Where a job waits for the operator: source line, and the code of it."""
+    for section in job.sections:
+        yield from _stops(section.before)
+    yield from _stops(job.after)
+
+
+def _stops(commands: Sequence[Command]) -> Iterator[tuple[int, str]]:
+    for command in commands:
+        if isinstance(command, ProgramStop):
+            yield command.line, "M1" if command.optional else "M0"
+        elif isinstance(command, ToolChange):
+            yield command.line, f"M6 T{command.tool}"
+
+
+def run_job(
+    at: RunSession,
+    made: PreparedJob,
+    operator: Operator,
+    progress: Progress | None = None,
+    record: Path | None = None,
+    *,
+    unhomed: bool = False,
+) -> JobRun:
+    """Runs a job from wherever the axes stand.
+
+    record  keeps the frames; of a job with several sections one file each, NAME.1.log, NAME.2.log, …
+
+    A job ends at a fault, a stop, or a setpoint that jumps. Where a section came to its end but its recording is not
+    that of its program (a hold, a feed override), the job goes on, and ends with that error.
+    Raises RefusedError, BusError and RunError, naming file and line.
+    """
+    job = made.job
+    bring_up(at, job.machine, made.kernel)
+    runs: list[BusRun] = []
+    failure: RunError | None = None
+    passed = 0
+    for number, (section, program) in enumerate(zip(job.sections, made.programs, strict=True), 1):
+        if number == 1:
+            _to_start(at, made, program, unhomed)
+        _rest(at, job, section.before, operator)
+        place = f"{job.file}:{section.first_line}: section {number} of {len(job.sections)}"
+        _to_start(at, made, program, unhomed)
+        done = passed
+        recorded = record_program(
+            at,
+            job.machine,
+            program.image,
+            None if progress is None else _shifted(progress, done),
+            unhomed=unhomed,
+        )
+        _require_end(at, made, program, place)
+        passed += program.ticks
+        _say(at, job, [command for _, command in section.events])
+        try:
+            runs.append(_analysed(at, made, program, recorded, _record_of(record, number, job)))
+        except SetpointJumpError as error:
+            raise RunError(f"{place}: {error}") from None
+        except RunError as error:
+            failure = failure or RunError(f"{place}: {error}")
+    _rest(at, job, job.after, operator)
+    if failure is not None:
+        raise failure
+    motion = JobMotion(job, tuple(run.motion for run in runs), made.planning_s)
+    return JobRun(motion, tuple(runs))
+
+
+def _shifted(progress: Progress, done: int) -> Progress:
+    return lambda tick: progress(done + tick)
+
+
+def _record_of(record: Path | None, number: int, job: Job) -> Path | None:
+    if record is None or len(job.sections) == 1:
+        return record
+    return record.with_name(f"{record.stem}.{number}{record.suffix}")
+
+
+def _analysed(
+    at: RunSession,
+    made: PreparedJob,
+    program: NativeProgram,
+    recorded: Recorded,
+    record: Path | None,
+) -> BusRun:
+    return analysed(at, made.job.machine, program.image, made.kernel, recorded, record)
+
+
+def _setpoint(made: PreparedJob, program: NativeProgram, tick: int) -> list[int]:
+    counts_per_mm = made.job.machine.counts_per_mm
+    _, setpoints = program.setpoints(made.kernel, counts_per_mm, tick, 1)
+    found: list[int] = setpoints[0].tolist()
+    return found
+
+
+def _off_counts(at: RunSession, place: list[int]) -> int:
+    """How far the targets are from a place, in counts of the axis that is farthest."""
+    return int(np.abs(np.subtract(at.controller.targets(len(place)), place)).max())
+
+
+def _to_start(at: RunSession, made: PreparedJob, program: NativeProgram, unhomed: bool) -> None:
+    start = _setpoint(made, program, 0)
+    if _off_counts(at, start) > _START_COUNTS:
+        goto(at.controller, made.job.machine, start, unhomed=unhomed)
+
+
+def _require_end(at: RunSession, made: PreparedJob, program: NativeProgram, place: str) -> None:
+    """Raises RunError: the axes stand, but not where the program ends."""
+    if _off_counts(at, _setpoint(made, program, program.ticks)) > 0:
+        raise RunError(f"{place}: stopped before its end: the job ends here")
+
+
+def _rest(at: RunSession, job: Job, commands: Sequence[Command], operator: Operator) -> None:
+    """What happens at rest, in its order. Commands that the machine has nothing for are passed."""
+    for command in commands:
+        _say(at, job, [command])
+        if isinstance(command, Dwell):
+            _dwell(at, command.duration_s)
+        for line, code in _stops([command]):
+            operator(f"{job.file}:{line}: {code}", lambda: _look(at, _LOOK_S))
+
+
+def _say(at: RunSession, job: Job, commands: Sequence[Command]) -> None:
+    """Tells the messages among commands. Those on the way of a section are told at its end."""
+    for command in commands:
+        if isinstance(command, Message):
+            at.note(f"{job.file}:{command.line}: {command.text}")
+
+
+def _dwell(at: RunSession, duration_s: float) -> None:
+    end_s = at.controller.clock.now_s() + duration_s
+    while (left_s := end_s - at.controller.clock.now_s()) > 0.0:
+        _look(at, min(left_s, _LOOK_S))
+
+
+def _look(at: RunSession, wait_s: float) -> None:
+    """Waits at rest. Raises RunError for a fault, BusError: the drives are off, or the controller is gone."""
+    if at.rig is not None:
+        at.rig.check()
+    at.controller.wait_for((READY,), 0.0)
+    at.controller.clock.sleep(wait_s)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""Toolpath files of every kind, told apart by the ends of their names.
+
+for command in read_toolpath(Path("part.dxf"), ReadOptions(feed_mm_s=20.0)):
+    ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+from ..names import (
+    DRAWING_SUFFIXES,
+    GCODE_SUFFIXES,
+    POINT_SUFFIXES,
+    STANDARD_INPUT,
+)
+from .drawing import DrawingOptions
+from .dxf import read_dxf
+from .gcode import read_gcode
+from .moves import Command
+from .points import PointOptions, read_points
+from .svg import read_svg
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How a file is read that does not say all itself. None and empty: not given.
+
+    feed_mm_s  feed: drawings need it, points where they have no column of it; G-code has its own
+    layers     drawings: only these layers, in this order
+    ids        drawings: only elements with these identities (SVG: id, DXF: handle)
+    gap_mm     drawings: ends of contours that are this near are joined
+    lift_mm    drawings: how far above the drawing rapid moves are
+    scale      drawings and points: by which lengths are multiplied
+    unit_mm    drawings and points: length of a unit
+    closed     points: back to the first point
+    """
+
+    feed_mm_s: float | None = None
+    layers: tuple[str, ...] = ()
+    ids: tuple[str, ...] = ()
+    gap_mm: float | None = None
+    lift_mm: float | None = None
+    scale: float | None = None
+    unit_mm: float | None = None
+    closed: bool = False
+
+
+_OPTIONS_OF = {
+    "--layer": ("layers", DRAWING_SUFFIXES),
+    "--id": ("ids", DRAWING_SUFFIXES),
+    "--gap": ("gap_mm", DRAWING_SUFFIXES),
+    "--lift": ("lift_mm", DRAWING_SUFFIXES),
+    "--scale": ("scale", (*DRAWING_SUFFIXES, *POINT_SUFFIXES)),
+    "--unit": ("unit_mm", (*DRAWING_SUFFIXES, *POINT_SUFFIXES)),
+    "--closed": ("closed", POINT_SUFFIXES),
+}
+"""Options of the command line: their field of ReadOptions, and the kinds of files that they are for."""
+
+
+def is_gcode(file: Path) -> bool:
+    """Whether a toolpath is G-code, whose messages are for the operator; others tell what was left out."""
+    return file.suffix.lower() in GCODE_SUFFIXES or str(file) == STANDARD_INPUT
+
+
+def read_toolpath(file: Path, options: ReadOptions) -> Iterator[Command]:
+    """The commands of a file; the last one is ProgramEnd.
+
+    Raises InputError: the file cannot be read, has no feed, or an option is not for its kind; ToolpathError, when the
+    iterator comes to the place: what has no meaning.
+    """
+    _check_options(file, options)
+    suffix = file.suffix.lower()
+    if suffix in DRAWING_SUFFIXES:
+        read = read_dxf if suffix == ".dxf" else read_svg
+        yield from read(file, _drawing_options(file, options))
+    else:
+        yield from _read_lines(file, options)
+
+
+def _check_options(file: Path, options: ReadOptions) -> None:
+    """Raises InputError: an option is not for files of this kind."""
+    for option, (name, suffixes) in _OPTIONS_OF.items():
+        if getattr(options, name) not in (None, (), False) and file.suffix.lower() not in suffixes:
+            raise InputError(f"{file}: {option} is for {', '.join(suffixes)}: leave it out")
+
+
+def _drawing_options(file: Path, options: ReadOptions) -> DrawingOptions:
+    if options.feed_mm_s is None:
+        raise InputError(f"{file}: a drawing has no feed: add --feed MM/S")
+    given = {
+        name: value
+        for name in ("gap_mm", "lift_mm", "scale")
+        if (value := getattr(options, name)) is not None
+    }
+    return DrawingOptions(
+        options.feed_mm_s,
+        unit_mm=options.unit_mm,
+        layers=options.layers,
+        ids=options.ids,
+        **given,
+    )
+
+
+def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
+    """The commands of G-code or points, which are read as streams."""
+    from_input = str(file) == STANDARD_INPUT
+    place: Path | int = 0 if from_input else file
+    try:
+        with open(
+            place, encoding="utf-8", errors="surrogateescape", closefd=not from_input
+        ) as lines:
+            if is_gcode(file):
+                yield from read_gcode(lines, str(file))
+            else:
+                yield from read_points(lines, str(file), _point_options(options))
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from None
+
+
+def _point_options(options: ReadOptions) -> PointOptions:
+    return PointOptions(
+        feed_mm_s=options.feed_mm_s,
+        unit_mm=1.0 if options.unit_mm is None else options.unit_mm,
+        scale=1.0 if options.scale is None else options.scale,
+        closed=options.closed,
+    )

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Proof of how far a curve and the programmed path are apart, for every point of both.
+
+docs/theory/toolpath-fitting.md section 6. The curve is replaced by chords, with a bound of how far they are off. The
+distance of a point from a chord is convex, so a whole chord is no farther from another one than the farther of its
+ends. Chords for which that is too much are halved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...spline.spatial import SpatialPHSpline
+from .reference import Reference, distance_to_chord
+
+Real = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_CHORD_SHARE = 0.005
+_MOST_PIECES = 4096
+_HALVINGS = 16
+_BESIDE = (2, 6)
+"""Neighbours that are looked at on either side, at first and after a halving."""
+
+_SURE = 4
+"""Halvings after which the chords around a chord surely are those nearest to it."""
+
+ROUNDING_MM = 5e-9
+"""What the rounding of a program (2^-34 mm), its kernel (1 nm) and this proof add, with room to spare."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chords:
+    """Chords between points (n, 3), off by `error_mm` (n,), at places (n + 1,) that the other chain counts in too."""
+
+    start: Real
+    end: Real
+    error_mm: Real
+    place_mm: Real
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Bounds of the distance, mm.
+
+    curve      (segments,) from each segment of the curve to the programmed path
+    reference  (chords,) from each chord of the programmed path to the curve
+    """
+
+    curve: Real
+    reference: Real
+
+    @property
+    def worst_mm(self) -> float:
+        """Bound for both paths."""
+        return float(max(self.curve.max(), self.reference.max())) + ROUNDING_MM
+
+
+def certify(
+    curve: SpatialPHSpline, place_mm: Real, reference: Reference, tolerance_mm: float
+) -> Certificate:
+    """How far curve and reference are apart, exactly enough to say whether it is `tolerance_mm`.
+
+    place_mm  (segments + 1,) rising places of the reference that belong to the joints of the curve
+    """
+    inside = np.diff(np.searchsorted(reference.place_mm, place_mm))
+    fine, segment = _curve_chords(curve, place_mm, inside, _CHORD_SHARE * tolerance_mm)
+    programmed, chord = _reference_chords(reference, fine.place_mm)
+    to_reference = _directed(fine, programmed, tolerance_mm)
+    to_curve = _directed(programmed, fine, tolerance_mm)
+    by_segment, by_chord = np.zeros(curve.segment_count), np.zeros(reference.count)
+    np.maximum.at(by_segment, segment, to_reference)
+    np.maximum.at(by_chord, chord, to_curve)
+    return Certificate(by_segment, by_chord)
+
+
+def _curve_chords(
+    curve: SpatialPHSpline, place_mm: Real, least: Index, error_mm: float
+) -> tuple[Chords, Index]:
+    """Chords of the curve, `least` (segments,) of each segment or more, and the segment of each.
+
+    A chord over a share h of xi is off by at most h^2 / 8 times the greatest |r''|.
+    """
+    bend = 4.0 * np.diff(curve.hodograph_coefficients, axis=2)
+    most = np.sqrt(np.sum(bend * bend, axis=1)).max(axis=1)
+    pieces = np.clip(np.ceil(np.sqrt(most / (8.0 * error_mm))), 1, _MOST_PIECES).astype(np.intp)
+    pieces = np.maximum(pieces, least)
+    segment = np.repeat(np.arange(pieces.size), pieces)
+    inner = np.arange(segment.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    share = 1.0 / pieces[segment]
+    begin, end = inner * share, (inner + 1) * share
+    width = np.diff(place_mm)[segment]
+    passed = curve.arc_length(segment, begin) / curve.segment_lengths_mm[segment]
+    place = np.append(place_mm[segment] + width * passed, place_mm[-1])
+    return (
+        Chords(
+            curve.position(segment, begin),
+            curve.position(segment, np.minimum(end, 1.0)),
+            (most / 8.0)[segment] * share**2,
+            place,
+        ),
+        segment,
+    )
+
+
+def _reference_chords(reference: Reference, places: Real) -> tuple[Chords, Index]:
+    """The chords of the reference cut at `places`, and which each is part of."""
+    own = reference.place_mm
+    cut = np.unique(np.concatenate((own, places[(places > 0.0) & (places < own[-1])])))
+    chord = np.clip(np.searchsorted(own, cut[:-1], side="right") - 1, 0, reference.count - 1)
+    along = np.diff(reference.point, axis=0)[chord]
+    length = reference.length_mm[chord]
+    ends = []
+    for at in (cut[:-1], cut[1:]):
+        share = np.clip((at - own[chord]) / length, 0.0, 1.0)
+        point = reference.point[chord] + share[:, None] * along
+        ends.append(np.where((at >= own[chord + 1])[:, None], reference.point[chord + 1], point))
+    return Chords(ends[0], ends[1], reference.sag_mm[chord], cut), chord
+
+
+def _directed(of: Chords, to: Chords, tolerance_mm: float) -> Real:
+    """Bound (n,) of the distance from every point of each chord of `of` to `to`; halved where above the tolerance."""
+    found = np.zeros(of.start.shape[0])
+    owner = np.arange(found.size)
+    start, end, low, high = of.start, of.end, of.place_mm[:-1], of.place_mm[1:]
+    for halving in range(_HALVINGS + 1):
+        beside = _BESIDE[min(halving, 1)]
+        bound, least = _nearest(start, end, 0.5 * (low + high), to, beside)
+        bound, least = bound + of.error_mm[owner], least + of.error_mm[owner]
+        # Where an end itself is too far from all chords around, halving proves nothing more.
+        far = (bound > tolerance_mm) & ((least <= tolerance_mm) | (halving < _SURE))
+        if halving == _HALVINGS or not far.any():
+            np.maximum.at(found, owner, bound)
+            break
+        np.maximum.at(found, owner[~far], bound[~far])
+        start, end, low, high = (part[far] for part in (start, end, low, high))
+        owner = owner[far]
+        middle, place = 0.5 * (start + end), 0.5 * (low + high)
+        start, end = np.concatenate((start, middle)), np.concatenate((middle, end))
+        low, high = np.concatenate((low, place)), np.concatenate((place, high))
+        owner = np.concatenate((owner, owner))
+    return found
+
+
+def _nearest(start: Real, end: Real, place: Real, to: Chords, beside: int) -> tuple[Real, Real]:
+    """Distance (n,) of chords to the nearest of the chords around the same place, that one's error added; and what
+    the farther one of their ends alone has.
+    """
+    count = to.start.shape[0]
+    at = np.searchsorted(to.place_mm, place, side="right") - 1
+    best, first, last = (np.full(place.size, np.inf) for _ in range(3))
+    for offset in range(-beside, beside + 1):
+        other = np.clip(at + offset, 0, count - 1)
+        a, b = to.start[other], to.end[other]
+        from_start = distance_to_chord(start, a, b) + to.error_mm[other]
+        from_end = distance_to_chord(end, a, b) + to.error_mm[other]
+        best = np.minimum(best, np.maximum(from_start, from_end))
+        first, last = np.minimum(first, from_start), np.minimum(last, from_end)
+    return best, np.maximum(first, last)

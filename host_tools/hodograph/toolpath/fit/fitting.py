@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: MIT
+"""From a programmed path to a curve of continuous curvature within a certified tolerance.
+
+docs/theory/toolpath-fitting.md.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import HodographError
+from ...spline.spatial import SpatialPHSpline, spatial_through_points
+from ...spline.spatial.curve import hodograph_of
+from .certificate import ROUNDING_MM, Certificate, certify
+from .chain import Segments, corner_segments, straightened, with_lines
+from .corners import SHAPES, extent
+from .reference import Reference
+from .smoothing import Stations, smoothed
+from .speeds import MotionLimits, speeds
+from .stations import Outline, Places, outline, stations, tightened
+
+Real = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_CORNER_SHARE, _ROOM_SHARE = 0.985, 0.94
+"""Of the tolerance: for corner curves, and for stations of smoothed stretches."""
+
+_LEG_SHARE = 0.98
+_ENDS = 4.0
+_BARRIER = 1e-6
+_POWER = 5
+_ROUNDS = 4
+_REPAIRS = 12
+_MOST_FOR_TWO = 20_000
+_SLOW_SHARE = 0.5
+_SAMPLES = 3
+_LESS_ROOM = 0.75
+_THIN_SHARE = 0.01
+_THIN_ROUNDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPath:
+    """A curve from rest to rest, and how it belongs to the programmed path.
+
+    curve         at most `certificate.worst_mm` from the reference, and the reference from it
+    place_mm      (segments + 1,) places of the reference at the joints of the curve
+    """
+
+    reference: Reference
+    curve: SpatialPHSpline
+    place_mm: Real
+    certificate: Certificate
+
+    @property
+    def deviation_mm(self) -> float:
+        """Bound of the distance between both paths."""
+        return self.certificate.worst_mm
+
+    def arc_length_at(self, place_mm: Real) -> Real:
+        """Arc lengths (n,) of the curve that belong to places of the reference."""
+        return np.asarray(np.interp(place_mm, self.place_mm, self.curve.segment_starts_mm))
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How a path may be changed: by `tolerance_mm` at most, so that a motion inside `limits` is fast."""
+
+    tolerance_mm: float
+    limits: MotionLimits
+
+
+@dataclass(frozen=True, eq=False)
+class Unfit:
+    """Chords (n,) of a reference around which no curve was found."""
+
+    chord: Index
+
+
+def fit(reference: Reference, how: Tolerance) -> FittedPath | Unfit:
+    """The curve of a reference without turns beyond SHARPEST_RAD, and that begins and ends at rest.
+
+    Smoothing weighs its cost with estimated speeds. Of a path that is not very long, two curves are made, for estimates
+    with the programmed feeds and with lower ones; the one that should take less time is taken.
+    """
+    limits = how.limits
+    slow = _SLOW_SHARE * limits.acceleration_mm_s2**2 / limits.jerk_mm_s3
+    caps = [limits.feed_mm_s]
+    if reference.count <= _MOST_FOR_TWO and slow < min(caps[0], float(reference.feed_mm_s.max())):
+        caps.append(slow)
+    found = [_fit(reference, how, cap) for cap in caps]
+    good = [one for one in found if isinstance(one, FittedPath)]
+    return min(good, key=lambda one: _estimated_s(one, limits)) if good else found[0]
+
+
+def _estimated_s(path: FittedPath, limits: MotionLimits) -> float:
+    """The time that a path should take, roughly."""
+    curve = path.curve
+    segment = np.repeat(np.arange(curve.segment_count), _SAMPLES)
+    xi = np.tile(np.arange(_SAMPLES) / _SAMPLES, curve.segment_count)
+    point = np.concatenate((curve.position(segment, xi), curve.nodal_points[-1:]))
+    place = curve.segment_starts_mm[segment] + curve.arc_length(segment, xi)
+    place = np.append(place, curve.length_mm)
+    reference = path.reference
+    chord = np.searchsorted(path.arc_length_at(reference.place_mm), place, side="right") - 1
+    feed = reference.feed_mm_s[np.clip(chord, 0, reference.count - 1)]
+    speed = speeds(point, place, np.minimum(feed, limits.feed_mm_s), limits)
+    return float(np.sum(2.0 * np.diff(place) / (speed[1:] + speed[:-1])))
+
+
+def _fit(reference: Reference, how: Tolerance, cap_mm_s: float) -> FittedPath | Unfit:
+    """A curve for estimated speeds of at most `cap_mm_s`."""
+    path = outline(reference, how.tolerance_mm)
+    plan = _Plan.of(path, how, cap_mm_s)
+    room = _ROOM_SHARE
+    plan = plan.with_stretches(room)
+    bad = np.zeros(0, dtype=np.intp)
+    for _ in range(_REPAIRS):
+        segments, failed = plan.segments()
+        if failed.size:
+            plan, bad = plan.tightened(failed[:, 0], failed[:, 1]), _chords(reference, failed)
+            continue
+        own = with_lines(segments, path.point[0], path.point[-1], float(reference.place_mm[-1]))
+        curve = SpatialPHSpline(own.origin, own.preimage, False)
+        place = np.append(own.low, own.high[-1])
+        found = certify(curve, place, reference, how.tolerance_mm - ROUNDING_MM)
+        limit = how.tolerance_mm - ROUNDING_MM
+        wide, missed = found.curve > limit, found.reference > limit
+        if not (wide.any() or missed.any()):
+            return FittedPath(reference, curve, place, found)
+        low = np.concatenate((own.low[wide], reference.place_mm[:-1][missed]))
+        high = np.concatenate((own.high[wide], reference.place_mm[1:][missed]))
+        bad = _chords(reference, np.stack((low, high), axis=1))
+        plan = plan.tightened(low, high)
+    return Unfit(bad)
+
+
+def _chords(reference: Reference, spans: Real) -> Index:
+    """The chords that lie in one of the spans (n, 2) of places."""
+    low = np.searchsorted(reference.place_mm, spans[:, 0], side="right") - 1
+    high = np.searchsorted(reference.place_mm, spans[:, 1], side="left")
+    count = np.zeros(reference.count + 1)
+    np.add.at(count, np.clip(low, 0, reference.count - 1), 1)
+    np.add.at(count, np.clip(high, 1, reference.count), -1)
+    return np.flatnonzero(np.cumsum(count)[:-1] > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """What a section is made of: corners at single vertices, and stretches of stations between long legs."""
+
+    path: Outline
+    how: Tolerance
+    cap_mm_s: float
+    corner: Index
+    shape: Index
+    size: Real
+    spans: tuple[tuple[int, int, float, float], ...]
+    stretches: list[Places] = field(default_factory=list)
+    known: list[Segments | None] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, path: Outline, how: Tolerance, cap_mm_s: float) -> _Plan:
+        long, reach = path.anchored, path.reach_mm
+        leg, count = path.leg_mm, path.leg_mm.size
+        both = reach[:-1] + reach[1:]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.where(both > 0.0, _LEG_SHARE * leg / both, 0.0)
+            near, far = share * reach[:-1], share * reach[1:]
+        vertex = np.arange(1, count)
+        alone = vertex[long[:-1] & long[1:] & (path.turn_rad[1:-1] > 0.0)]
+        room = np.minimum(far[alone - 1], near[alone])
+        off = np.maximum(path.off_mm[alone - 1], path.off_mm[alone])
+        size = _CORNER_SHARE * how.tolerance_mm - off
+        shape = np.full(alone.size, len(SHAPES) - 1, dtype=np.intp)
+        for k in range(len(SHAPES) - 2, -1, -1):
+            shape[extent(path.turn_rad[alone], k) * size <= room] = k
+        spans = []
+        short = np.flatnonzero(~long)
+        runs = np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if short.size else []
+        for run in runs:
+            first, last = int(run[0]), int(run[-1])
+            before = after = 0.0
+            if first > 0:
+                before = min(far[first - 1], _ENDS * reach[first])
+                first -= 1
+            if last < count - 1:
+                after = min(near[last + 1], _ENDS * reach[last + 1])
+                last += 1
+            spans.append((first, last, float(before), float(after)))
+        return cls(path, how, cap_mm_s, alone, shape, size, tuple(spans))
+
+    def with_stretches(self, share: float) -> _Plan:
+        """With stations on the stretches, which have `share` of the tolerance as room."""
+        room = share * self.how.tolerance_mm
+        made = [
+            stations(self.path, first, last, (before, after), room)
+            for first, last, before, after in self.spans
+        ]
+        return replace(self, stretches=made, known=[None] * len(made))
+
+    def tightened(self, low: Real, high: Real) -> _Plan:
+        """With less room, and more stations, in stretches that reach between places low (n,) and high (n,)."""
+        made = [
+            tightened(one, low, high, _LESS_ROOM, self.how.tolerance_mm) for one in self.stretches
+        ]
+        known = [
+            segments if one is old else None
+            for one, old, segments in zip(made, self.stretches, self.known, strict=True)
+        ]
+        return replace(self, stretches=made, known=known)
+
+    def segments(self) -> tuple[Segments, Real]:
+        """The curves between the straight lines, and the places (n, 2) of stretches for which there is none."""
+        parts = [self._corners(k) for k in range(len(SHAPES)) if (self.shape == k).any()]
+        new = [index for index, known in enumerate(self.known) if known is None]
+        failed = []
+        if new:
+            for index, (points, place) in zip(new, self._smoothed(new), strict=True):
+                try:
+                    self.known[index] = self._stretch(index, points, place)
+                except HodographError:
+                    failed.append((float(place[0]), float(place[-1])))
+        none = Segments(
+            *(np.zeros(shape) for shape in ((0, 3), (0, 3), (0, 4, 3), (0,), (0,))),
+        )
+        found = [known for known in self.known if known is not None]
+        return Segments.joined((none, *parts, *found)), np.array(failed).reshape(-1, 2)
+
+    def _corners(self, shape: int) -> Segments:
+        own = self.shape == shape
+        at = self.corner[own]
+        direction, path = self.path.direction, self.path
+        return corner_segments(
+            path.point[at],
+            direction[at - 1],
+            direction[at],
+            path.place_mm[at],
+            shape,
+            self.size[own],
+        )
+
+    def _smoothed(self, which: list[int]) -> list[tuple[Real, Real]]:
+        """Points (n, 3) and places (n,) of these stretches."""
+        stretches = [self.stretches[index] for index in which]
+        place = np.concatenate([one.place_mm for one in stretches])
+        count = [one.place_mm.size for one in stretches]
+        group = np.repeat(np.arange(len(count)), count)
+        own = Stations(
+            np.concatenate([one.point for one in stretches]),
+            _normals(np.concatenate([one.direction for one in stretches])),
+            np.concatenate([one.room_mm for one in stretches]),
+        )
+        limits = self.how.limits
+        feed = np.minimum(self.path.feed_at(place), self.cap_mm_s)
+        shift = np.zeros((place.size, own.normal.shape[2]))
+        moved, at = own.point, place
+        speed = speeds(moved, at, feed, limits)
+        for _ in range(_ROUNDS):
+            weight = speed**_POWER / limits.jerk_mm_s3**2
+            shift = smoothed(own, at, weight, group, _BARRIER, 0.9 * shift)
+            moved = own.moved(shift)
+            at = _arc_places(moved, place, group)
+            speed = speeds(moved, at, feed, limits)
+        edges = np.cumsum([0, *count])
+        return [(moved[a:b], place[a:b]) for a, b in itertools.pairwise(edges)]
+
+    def _stretch(self, index: int, points: Real, place: Real) -> Segments:
+        first, last, before, after = self.spans[index]
+        points, place = _thinned(points, place, _THIN_SHARE * self.how.tolerance_mm)
+        direction = self.path.direction
+        found = spatial_through_points(
+            points,
+            False,
+            ends="natural",
+            start_tangent=direction[first] if before > 0.0 else None,
+            end_tangent=direction[last] if after > 0.0 else None,
+        ).spline
+        preimage, spans = found.preimage.copy(), np.linalg.norm(np.diff(points, axis=0), axis=1)
+        if before > 0.0:
+            preimage[:3] = straightened(preimage[:3], spans[:3], direction[first])
+        if after > 0.0:
+            reverse = straightened(preimage[:-4:-1, :, ::-1], spans[:-4:-1], direction[last])
+            preimage[-3:] = reverse[::-1, :, ::-1]
+        joint = points[0] + np.concatenate(
+            (np.zeros((1, 3)), np.cumsum(hodograph_of(preimage).mean(axis=2), axis=0))
+        )
+        joint[3:-3] = points[3:-3]
+        joint[-1] = points[-1]
+        return Segments(joint[:-1], joint[1:], preimage, place[:-1], place[1:])
+
+
+def _arc_places(moved: Real, place: Real, group: Index) -> Real:
+    """Arc lengths (n,) of the moved stations; between groups as far apart as before."""
+    step = np.linalg.norm(np.diff(moved, axis=0), axis=1)
+    step = np.where(np.diff(group) > 0, np.maximum(np.diff(place), 1e-6), step)
+    return np.concatenate((place[:1], place[0] + np.cumsum(step)))
+
+
+def _normals(direction: Real) -> Real:
+    """Unit normals (n, 3, m) of directions (n, 3): one in the plane if all keep z, else two."""
+    flat = np.stack((-direction[:, 1], direction[:, 0], np.zeros(direction.shape[0])), axis=1)
+    if not direction[:, 2].any():
+        return np.asarray(flat[:, :, None])
+    axis = np.eye(3)[np.argmin(np.abs(direction), axis=1)]
+    first = np.cross(direction, axis)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack((first, np.cross(direction, first)), axis=2)
+
+
+def _thinned(points: Real, place: Real, off_mm: float) -> tuple[Real, Real]:
+    """Stations without those that a cubic through their neighbours meets anyway."""
+    for _ in range(_THIN_ROUNDS):
+        count = place.size
+        if count < 9:
+            break
+        at = np.arange(3, count - 3, 2)
+        s = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+        around = np.stack([at - 3, at - 1, at + 1, at + 3])
+        x = s[around] - s[at]
+        guess = np.zeros((at.size, 3))
+        for j in range(4):
+            others = [k for k in range(4) if k != j]
+            weight = np.prod([x[k] / (x[k] - x[j]) for k in others], axis=0)
+            guess += weight[:, None] * points[around[j]]
+        error = np.linalg.norm(guess - points[at], axis=1)
+        gap = s[at + 1] - s[at - 1]
+        beside = np.minimum(
+            s[at - 1] - s[np.maximum(at - 3, 0)], s[np.minimum(at + 3, count - 1)] - s[at + 1]
+        )
+        drop = at[(error <= off_mm) & (gap <= 2.5 * beside)]
+        if not drop.size:
+            break
+        points, place = np.delete(points, drop, axis=0), np.delete(place, drop)
+    return points, place

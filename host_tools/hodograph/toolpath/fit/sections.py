@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: MIT
+"""Sections of a toolpath: what is passed from rest to rest, and what happens at the stops between.
+
+docs/theory/toolpath-fitting.md section 1.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...errors import InputError
+from ..moves import (
+    AXES,
+    ORIGIN,
+    AnalogOutput,
+    ArcMove,
+    Blending,
+    Command,
+    Coolant,
+    DigitalOutput,
+    Dwell,
+    Message,
+    Move,
+    OverrideSwitch,
+    PathMode,
+    Position,
+    ProgramEnd,
+    ProgramStop,
+    Spindle,
+    SplineMove,
+    StraightMove,
+    ToolChange,
+    ToolSelect,
+)
+from .corners import SHARPEST_RAD
+from .reference import Reference, ReferenceBuilder
+from .stations import outline
+
+SAG_SHARE = 0.01
+"""Of the tolerance: how far the chords of an arc or a spline may be off."""
+
+EXACT_MM = 1e-3
+"""Deviation of arcs and splines where moves are to be followed exactly."""
+
+_STOPS = (Dwell, Spindle, Coolant, ToolChange, ProgramStop)
+_SHORTEST_MM = 2.0**-9
+
+
+@dataclass(frozen=True, eq=False)
+class PathEvent:
+    """A command that happens in motion, where the programmed path has the place `place_mm`."""
+
+    place_mm: float
+    command: Command
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Moves from rest to rest.
+
+    reference     the programmed path
+    tolerance_mm  how far the curve may be from it
+    before        commands that happen at rest, before the section starts
+    events        commands that happen on the way
+    """
+
+    reference: Reference
+    tolerance_mm: float
+    before: tuple[Command, ...] = ()
+    events: tuple[PathEvent, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Toolpath:
+    """All sections, and the commands that happen at rest at the end."""
+
+    sections: tuple[Section, ...]
+    after: tuple[Command, ...]
+
+
+@dataclass
+class _Divider:
+    """Collects moves until something asks for a stop."""
+
+    file: str
+    asked_mm: float
+    builder: ReferenceBuilder
+    sections: list[Section] = field(default_factory=list)
+    before: list[Command] = field(default_factory=list)
+    events: list[PathEvent] = field(default_factory=list)
+    blending: Blending = Blending.CONTINUOUS
+    tolerance_mm: float = 0.0
+    moved: bool = False
+
+    def take(self, command: Command) -> None:
+        if isinstance(command, StraightMove | ArcMove | SplineMove):
+            self._move(command)
+        elif isinstance(command, PathMode):
+            self._mode(command)
+        elif isinstance(command, _STOPS):
+            self.stop()
+            self.before.append(command)
+        elif isinstance(command, DigitalOutput | AnalogOutput):
+            self._output(command)
+        elif isinstance(command, ToolSelect | OverrideSwitch | Message):
+            self.before.append(command) if not self.moved else self._on_the_way(command)
+        elif isinstance(command, ProgramEnd):
+            self.stop()
+            self.before.append(command)
+
+    def _move(self, move: Move) -> None:
+        for name, begin, end in zip(AXES[3:], self.builder.position[3:], move.end[3:], strict=True):
+            if begin != end:
+                raise InputError(
+                    f"{self.file}:{move.line}: the move turns {name.upper()}: "
+                    "moves of A, B and C have no path yet: leave them out"
+                )
+        self.builder.add(move)
+        self.moved = True
+        if self.blending is not Blending.CONTINUOUS or self.tolerance_mm == 0.0:
+            self.stop()
+
+    def _mode(self, mode: PathMode) -> None:
+        own = [self.asked_mm]
+        own += [
+            one
+            for one in (mode.tolerance_mm, mode.fit_tolerance_mm)
+            if one is not None and one > 0.0
+        ]
+        tolerance = min(own)
+        if mode.blending is not self.blending or tolerance != self.tolerance_mm:
+            self.stop()
+        self.blending = mode.blending
+        self.tolerance_mm = tolerance
+        self.builder = ReferenceBuilder(self.builder.position, SAG_SHARE * self.section_tolerance)
+
+    @property
+    def section_tolerance(self) -> float:
+        """Deviation that a section may have."""
+        if self.blending is Blending.CONTINUOUS and self.tolerance_mm > 0.0:
+            return self.tolerance_mm
+        return min(self.tolerance_mm or EXACT_MM, EXACT_MM)
+
+    def _output(self, command: DigitalOutput | AnalogOutput) -> None:
+        if command.synchronised:
+            self._on_the_way(command)
+        else:
+            self.stop()
+            self.before.append(command)
+
+    def _on_the_way(self, command: Command) -> None:
+        self.events.append(PathEvent(self.builder.length_mm, command))
+
+    def stop(self) -> None:
+        """Whatever comes next starts from rest."""
+        if not self.moved:
+            return
+        reference = self.builder.reference()
+        if reference.count and float(reference.place_mm[-1]) >= _SHORTEST_MM:
+            whole = Section(
+                reference, self.section_tolerance, tuple(self.before), tuple(self.events)
+            )
+            self.sections.extend(_without_reversals(whole))
+            self.before, self.events = [], []
+            begin = self.builder.position
+        else:  # too short to be run: the next section makes it good
+            begin = self.builder.start
+        self.builder = ReferenceBuilder(begin, SAG_SHARE * self.section_tolerance)
+        self.moved = False
+
+
+def divided(
+    commands: Iterable[Command], tolerance_mm: float, file: str, start: Position = ORIGIN
+) -> Toolpath:
+    """The sections of a toolpath.
+
+    tolerance_mm  how far curves may be from the programmed path; 0: exact stops everywhere. What a toolpath asks for
+                  itself (G64 P) counts where it is less
+    Raises InputError, naming file and line: moves that have no path.
+    """
+    divider = _Divider(
+        file, tolerance_mm, ReferenceBuilder(start, SAG_SHARE * (tolerance_mm or EXACT_MM))
+    )
+    divider.tolerance_mm = tolerance_mm
+    for command in commands:
+        divider.take(command)
+    divider.stop()
+    return Toolpath(tuple(divider.sections), tuple(divider.before))
+
+
+def _without_reversals(section: Section) -> Iterator[Section]:
+    """The section cut where it turns so sharply that a stop costs no more than a curve."""
+    path = outline(section.reference, section.tolerance_mm)
+    sharp = path.place_mm[path.turn_rad > SHARPEST_RAD]
+    yield from cut_at(section, sharp)
+
+
+def cut_at(section: Section, places: np.ndarray) -> Iterator[Section]:
+    """The section in parts, with stops at points of the reference that have these places."""
+    own = section.reference.place_mm
+    at = np.unique(np.searchsorted(own, places))
+    edges = [0, *(int(k) for k in at if 0 < k < section.reference.count), section.reference.count]
+    before = section.before
+    for first, last in itertools.pairwise(edges):
+        low, high = float(own[first]), float(own[last])
+        final = last == edges[-1]
+        events = tuple(
+            PathEvent(event.place_mm - low, event.command)
+            for event in section.events
+            if low <= event.place_mm < high or (final and event.place_mm == high)
+        )
+        yield Section(section.reference.part(first, last), section.tolerance_mm, before, events)
+        before = ()

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: MIT
+"""Where a path is divided: at long straight lines, and into stations that smoothing may move.
+
+docs/theory/toolpath-fitting.md section 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .corners import SHARPEST_RAD, extent
+from .reference import Reference, distance_to_chord
+
+Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+THIN_SHARE = 0.06
+"""Of the tolerance: how far a point that is left out may lie from the chord that passes it."""
+
+_THIN_ROUNDS = 12
+_GRADES = np.array([0.4, 1.0, 2.4, 6.0, 15.0])
+"""Stations beside a vertex, in multiples of the room that its corner curve would take."""
+
+_MIDDLE = 0.2
+"""A leg longer than this share of the room at its ends has a station in its middle."""
+
+_LONG = 4.0
+"""A leg this many times as long as the room that corners at its ends need at least is left alone between them."""
+
+_MOST_TIMES = 8.0
+_LESS_ELSEWHERE = 0.99
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The vertices of a section that are kept.
+
+    point     (n + 1, 3) mm
+    place_mm  (n + 1,) where they are on the reference
+    off_mm    (n,) how far points that were left out lie from each leg
+    turn_rad  (n + 1,) change of direction; 0 at the ends
+    reach_mm  (n + 1,) how far a corner curve would take each leg; 0 at the ends and where it goes straight on
+    reference   that it is the outline of
+    """
+
+    point: Real
+    place_mm: Real
+    off_mm: Real
+    turn_rad: Real
+    reach_mm: Real
+    reference: Reference
+
+    def feed_at(self, place_mm: Real) -> Real:
+        """Programmed feed (n,) at places of the reference."""
+        own = self.reference
+        chord = np.searchsorted(own.place_mm, place_mm, side="right") - 1
+        return np.asarray(own.feed_mm_s[np.clip(chord, 0, own.count - 1)])
+
+    @property
+    def leg_mm(self) -> Real:
+        """Length (n,) of the legs."""
+        return np.asarray(np.linalg.norm(np.diff(self.point, axis=0), axis=1))
+
+    @property
+    def direction(self) -> Real:
+        """Unit vectors (n, 3) along the legs."""
+        return np.asarray(np.diff(self.point, axis=0) / self.leg_mm[:, None])
+
+    @property
+    def anchored(self) -> Flags:
+        """Legs (n,) so long that the corners at both ends leave a part of them alone."""
+        return np.asarray(self.leg_mm >= _LONG * (self.reach_mm[1:] + self.reach_mm[:-1]))
+
+
+def turns(point: Real) -> Real:
+    """Change of direction (n,) at points (n, 3), 0 at the ends; rad."""
+    leg = np.diff(point, axis=0)
+    leg = leg / np.linalg.norm(leg, axis=1)[:, None]
+    out = np.zeros(point.shape[0])
+    before, after = leg[:-1], leg[1:]
+    cross = np.linalg.norm(np.cross(before, after), axis=1)
+    out[1:-1] = np.arctan2(cross, np.sum(before * after, axis=1))
+    return out
+
+
+def outline(reference: Reference, tolerance_mm: float) -> Outline:
+    """The vertices of a reference, without those that lie on the way between their neighbours."""
+    point, place, off = _thinned(reference, THIN_SHARE * tolerance_mm)
+    turn = turns(point)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(turn > 0.0, tolerance_mm * extent(np.minimum(turn, SHARPEST_RAD)), 0.0)
+    return Outline(point, place, off, turn, reach, reference)
+
+
+def _thinned(reference: Reference, off_mm: float) -> tuple[Real, Real, Real]:
+    """Kept points, their places, and how far what lies between is from the legs."""
+    point, place = reference.point, reference.place_mm
+    off = np.zeros(reference.count)
+    for _ in range(_THIN_ROUNDS):
+        if point.shape[0] < 3:
+            break
+        aside = distance_to_chord(point[1:-1], point[:-2], point[2:])
+        total = aside + np.maximum(off[:-1], off[1:])
+        drop = np.zeros(point.shape[0], dtype=np.bool_)
+        drop[1:-1] = total <= off_mm
+        # No two neighbours in one round: of each run every second one.
+        run = np.arange(drop.size) - np.maximum.accumulate(np.where(drop, 0, np.arange(drop.size)))
+        drop &= run % 2 == 1
+        if not drop.any():
+            break
+        at = np.flatnonzero(drop)
+        off[at - 1] = total[at - 1]
+        off = np.delete(off, at)
+        point, place = point[~drop], place[~drop]
+    return point, place, off
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Stations of a stretch: points (n, 3), directions (n, 3), places (n,) on the reference, room (n,) in mm."""
+
+    point: Real
+    direction: Real
+    place_mm: Real
+    room_mm: Real
+
+
+def stations(
+    path: Outline, first: int, last: int, ends: tuple[float, float], room_mm: float
+) -> Places:
+    """Stations from leg `first` to leg `last`, of whose far parts only `ends` mm are taken.
+
+    A stretch that begins at a long leg begins `ends[0]` before its first inner vertex; 0: with the vertex itself.
+    """
+    before, after = ends
+    vertex = np.arange(first + (before > 0.0), last + 1 + (after == 0.0))
+    legs = np.arange(first, last + 1)
+    length, direction = path.leg_mm[legs], path.direction[legs]
+    low = np.zeros(legs.size)
+    high = length.copy()
+    if before > 0.0:
+        low[0] = length[0] - before
+    if after > 0.0:
+        high[-1] = after
+    reach = np.minimum(
+        path.reach_mm, np.concatenate((path.leg_mm, [np.inf]))[: path.reach_mm.size] * _MOST_TIMES
+    )
+    reach = np.where(path.reach_mm > 0.0, reach, np.inf)
+    near = reach[legs, None] * _GRADES
+    far = length[:, None] - reach[legs + 1, None] * _GRADES[::-1]
+    half = 0.5 * length[:, None]
+    use_near, use_far = near < 0.9 * half, far > 1.1 * half
+    bulging = length > _MIDDLE * np.minimum(reach[legs], reach[legs + 1])
+    middle = (use_near.any(axis=1) | use_far.any(axis=1) | bulging)[:, None]
+    along = np.concatenate((near, half, far), axis=1)
+    use = np.concatenate((use_near, middle, use_far), axis=1)
+    use &= (along > low[:, None]) & (along < high[:, None])
+    leg, _ = np.nonzero(use)
+    own = along[use]
+    unit = np.concatenate((direction[:1], direction, direction[-1:]))
+    tangent = unit[:-1] + unit[1:]
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    base, scale = path.place_mm[legs], np.diff(path.place_mm)[legs] / length
+    parts_point = [path.point[vertex], path.point[legs[leg]] + own[:, None] * direction[leg]]
+    parts_direction = [tangent[vertex - first], direction[leg]]
+    parts_place = [path.place_mm[vertex], base[leg] + own * scale[leg]]
+    off = np.concatenate((path.off_mm[legs][:1], path.off_mm[legs], path.off_mm[legs][-1:]))
+    parts_room = [
+        room_mm - np.maximum(off[:-1], off[1:])[vertex - first],
+        room_mm - path.off_mm[legs[leg]],
+    ]
+    for used, leg_at, at in ((before > 0.0, 0, low[0]), (after > 0.0, legs.size - 1, high[-1])):
+        if used:
+            parts_point.append((path.point[legs[leg_at]] + at * direction[leg_at])[None])
+            parts_direction.append(direction[leg_at][None])
+            parts_place.append(np.array([base[leg_at] + at * scale[leg_at]]))
+            parts_room.append(np.zeros(1))
+    place = np.concatenate(parts_place)
+    order = np.argsort(place, kind="stable")
+    room = np.concatenate(parts_room)[order]
+    room[[0, -1]] = 0.0
+    return Places(
+        np.concatenate(parts_point)[order],
+        np.concatenate(parts_direction)[order],
+        place[order],
+        room,
+    )
+
+
+def tightened(one: Places, low: Real, high: Real, share: float, least_mm: float) -> Places:
+    """With less room, and more stations, from places low (n,) to high (n,); stations `least_mm` apart at least.
+
+    All others lose a little room too: else what sticks out may only wander along the path.
+    """
+    place = one.place_mm
+    first = np.clip(np.searchsorted(place, low, side="right") - 1, 0, place.size - 1)
+    last = np.clip(np.searchsorted(place, high, side="left"), 0, place.size - 1)
+    inside = (high >= place[0]) & (low <= place[-1])
+    between = _covered(first[inside], last[inside], place.size)[:-1]
+    if not between.any():
+        return one
+    hit = np.append(between, False) | np.append(False, between)
+    hit[1:] |= hit[:-1].copy()
+    hit[:-1] |= hit[1:].copy()
+    room = np.where(hit, share, _LESS_ELSEWHERE) * one.room_mm
+    at = np.flatnonzero(between & (np.diff(place) > 2.0 * least_mm))
+    leg = one.point[at + 1] - one.point[at]
+    most = np.maximum(room[at], room[at + 1])
+    return Places(
+        np.insert(one.point, at + 1, one.point[at] + 0.5 * leg, axis=0),
+        np.insert(one.direction, at + 1, leg / np.linalg.norm(leg, axis=1)[:, None], axis=0),
+        np.insert(place, at + 1, 0.5 * (place[at] + place[at + 1])),
+        np.insert(room, at + 1, most),
+    )
+
+
+def _covered(first: NDArray[np.intp], last: NDArray[np.intp], count: int) -> Flags:
+    """Which of `count` places lie in first … last - 1 of one of the spans."""
+    change = np.zeros(count + 1, dtype=np.intp)
+    np.add.at(change, first, 1)
+    np.add.at(change, np.maximum(last, first), -1)
+    return np.asarray(np.cumsum(change)[:-1] > 0)
