@@ -120,13 +120,13 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c dist wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak bench figures options mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak bench compare share figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1\t\2/p' $(filter %Makefile %.mk,$(MAKEFILE_LIST)) | awk -F'\t' '{printf "  %-10s %s\n", $$1, $$2}'
 
-build: c $(VENV)/.editable $(if $(wildcard host_tools/hodograph/native/build_native.py),native) ## prepare everything: packages, .venv, C programs, Python module
+build: c library $(VENV)/.editable $(if $(wildcard host_tools/hodograph/native/build_native.py),native) ## prepare everything: packages, .venv, C programs, Python module
 	@true
 
 HOST_LIBS := $(LIBS:%=$(BUILD)/host/libhodograph_%.a)
@@ -187,8 +187,9 @@ faults: build ## inject faults into simulated machines, judge what comes of them
 figures: build ## draw the figures of the manual anew (docs/images)
 	@$(PY) tools/draw_figures.py
 
-options: build ## write docs/reference/options.md anew from the command line
+options: build ## write docs/reference/options.md and python-api.md anew, from the command line and the docstrings
 	@$(PY) tools/list_options.py
+	@$(PY) tools/list_api.py
 
 # PLATFORM: of the wheel, where CC, AR and LDSHARED build for another platform
 DIST     ?= dist
@@ -207,8 +208,21 @@ $(MACHINES:%=wheel-%): wheel-%: $(VENV)/.editable $(READY)/zig/.ready
 	@CC="$(call zig_cc,$*)" LDSHARED="$(call zig_cc,$*) -shared" AR="$(ZIG) ar" \
 	    $(PY) tools/dist/make_release.py $(DIST) --platform manylinux2014_$*
 
+$(READY)/site/.ready: tools/site/requirements.lock tools/make_venv.sh | $(READY)/packages
+	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(READY)/site tools/site/requirements.lock
+site: $(READY)/site/.ready ## the manual as a static site with search: build/site/index.html
+	@$(READY)/site/bin/python tools/site/make_site.py $(BUILD)/site
+	@echo "$(BUILD)/site/index.html"
+
+share: build ## man page and shell completion in build/share, from the help
+	@$(PY) tools/make_share.py $(BUILD)/share
+
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/bench.py --build $(BUILD)
+
+compare: build ## the same toolpaths planned by Hodograph, LinuxCNC, TOPP-RA and Ruckig; figures also in build/compare.json
+	@$(PYTHON) tools/packages.py compare
+	@$(PY) benchmarks/peers/compare.py --json $(BUILD)/compare.json $(if $(ONLY),--only $(ONLY))
 
 # AREA: some of those that tools/mutants.py --list names; COUNT mistakes for each
 AREA  ?= core
@@ -368,20 +382,21 @@ include tests/proofs/proofs.mk
 include firmware/targets/targets.mk
 include tools/target/count.mk
 include tests/target/target.mk
+include packaging/packaging.mk
 
 ## ---- lint ------------------------------------------------------------------------------------------
 
-C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/target/*.c)
+C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/target/*.c packaging/library/*.c examples/embed/*.c)
 PY_TREES   := $(wildcard host_tools tools tests benchmarks setup.py)
 JS_FILES   := $(wildcard host_tools/hodograph/monitor/page/*.js)
 SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)
 LINTED_C   := $(OWN_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC)
 # Every C file under the warning flags of gcc and of clang; the fuzz drivers too, though not linked.
 LINT_OBJ   := $(foreach v,host clang,$(call object_of,$(v),$(LINTED_C) $(OD_C)))
-LINT_PARTS := warnings tidy cppcheck misra clang-format ruff mypy shellcheck js directions eds
+LINT_PARTS := warnings tidy cppcheck misra clang-format ruff mypy shellcheck js directions symbols eds
 .PHONY: $(LINT_PARTS:%=lint-%)
 
-lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, MISRA C, formats, ruff, mypy, directions, EDS files
+lint: $(LINT_PARTS:%=lint-%) ## compilers' warnings, clang-tidy, cppcheck, MISRA C, formats, ruff, mypy, directions, names, EDS files
 	@echo "lint: all is well"
 
 lint-warnings: $(LINT_OBJ)
@@ -407,8 +422,8 @@ lint-ruff: $(VENV)/.ready
 	$(call say,ruff,$(PY_TREES))
 	$(Q)$(VENV)/bin/ruff check --quiet $(PY_TREES) tools/with-vcan && $(VENV)/bin/ruff format --quiet --diff $(PY_TREES) tools/with-vcan
 lint-mypy: $(VENV)/.editable
-	$(call say,mypy,host_tools tools)
-	$(Q)$(VENV)/bin/mypy --no-error-summary host_tools/hodograph tools
+	$(call say,mypy,host_tools tools benchmarks)
+	$(Q)$(VENV)/bin/mypy --no-error-summary host_tools/hodograph tools benchmarks
 lint-shellcheck: $(READY)/packages-lint
 	$(call say,shell,$(SH_FILES))
 	$(Q)shellcheck $(SH_FILES)
@@ -418,6 +433,9 @@ lint-js: $(READY)/packages-lint
 lint-directions:
 	$(call say,who,may use whom)
 	$(Q)$(PYTHON) tools/check_directions.py
+lint-symbols: $(HOST_LIBS)
+	$(call say,names,of the libraries)
+	$(Q)$(PYTHON) tools/check_symbols.py $(HOST_LIBS)
 
 # The same for what differs from the last commit and was not linted as it is now; of the C files only those themselves,
 # not those that include them. Ruff, mypy and the directions are quick enough for the whole tree.

@@ -30,7 +30,7 @@ def measure(name: str, pace: str) -> dict[str, Any]:
     address = parse_address("socketcan:vcan0")
     with run_session(pipeline.machine, address, pace, 5.0, print) as at:
         run = run_program(at, pipeline.machine, pipeline.image, pipeline.machine.kernel)
-    drives = pipeline.machine.models(pipeline.machine.plane)
+    drives = pipeline.machine.models(pipeline.machine.path_axes)
     expected = simulate(pipeline.image, drives, kernel=pipeline.machine.kernel).summary()
     got = run.summary()
     return {

@@ -92,7 +92,9 @@ def piece_errors(feed: float, ramp: float) -> dict[str, Any]:
 def circles(count: int) -> PHSpline:
     """`count` segments of 4 mm on circles."""
     turn = np.exp(1j * np.arange(2 * count + 1) * np.pi / 500)
-    w = 2.0 * np.stack((turn[:-1:2], turn[1::2], turn[2::2]), axis=1)
+    w = np.asarray(
+        2.0 * np.stack((turn[:-1:2], turn[1::2], turn[2::2]), axis=1), dtype=np.complex128
+    )
     a, b, c = w[:, 0], w[:, 1], w[:, 2]
     ways = (3 * a * a + 3 * a * b + 2 * b * b + a * c + 3 * b * c + 3 * c * c) / 15
     return PHSpline(

@@ -50,7 +50,7 @@ LENGTHS_MM = (31.0, 20.0, 5.0, 1.0, 0.1, 1e-3, 1e-6)
 class Point(ctypes.Structure):
     """struct interpolator_point."""
 
-    _fields_ = [(name, ctypes.c_int64) for name in ("arc", "x", "y", "feed")]
+    _fields_ = [(name, ctypes.c_int64) for name in ("arc", "feed", "x", "y", "z", "a", "b", "c")]
 
 
 class Core:

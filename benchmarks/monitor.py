@@ -32,7 +32,7 @@ LOOK_TICKS = 40
 def traffic() -> tuple[bytes, Frames]:
     """Program image and frames of the alpha, run and begun again."""
     pipeline = load_pipeline(EXAMPLES / "alpha.toml", None)
-    motion = simulate(pipeline.image, pipeline.machine.models(pipeline.machine.plane))
+    motion = simulate(pipeline.image, pipeline.machine.models(pipeline.machine.path_axes))
     rows = motion.rows
     frames = np.zeros((LAPS * len(rows), FRAMES_A_TICK), dtype=FRAME_DTYPE)
     frames["id"] = [0x080, 0x202, 0x203, 0x182, 0x183]
@@ -53,7 +53,7 @@ def main() -> None:
     options = parser.parse_args()
     image, frames = traffic()
     path = ProgramPath(image, 1_000_000)
-    decoder, derivation = Decoder((2, 3)), Derivation(2, 1_000_000, 1000)
+    decoder, derivation = Decoder((2, 3)), Derivation((1_000_000,) * 2, 2, 1000)
     ticks, size = len(frames) // FRAMES_A_TICK, 0
     begun = time.thread_time()
     for part in np.split(

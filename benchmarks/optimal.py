@@ -27,6 +27,7 @@ from toppra_bound import bound  # noqa: E402
 
 from hodograph.errors import HodographError  # noqa: E402
 from hodograph.feed import Limits  # noqa: E402
+from hodograph.native.program import NativeProgram  # noqa: E402
 from hodograph.pipeline import Pipeline, controller_limits, load_pipeline, plants  # noqa: E402
 from hodograph.verify import sampled, verify_program  # noqa: E402
 
@@ -104,12 +105,15 @@ def task_of(pipeline: Pipeline) -> Task:
     limits, own = pipeline.file.limits, controller_limits(pipeline.machine)
     kept = 1.0 - own.kept_free
 
-    def least(name: str) -> float:
-        given = getattr(limits, name)
-        return min(given or np.inf, kept * getattr(own, name))
+    def least(given: float | None, most: float) -> float:
+        return min(given or np.inf, kept * most)
 
-    names = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
-    bound_by: Limits = replace(limits, **{name: least(name) for name in names})
+    bound_by = replace(
+        limits,
+        feed_mm_s=least(limits.feed_mm_s, own.feed_mm_s),
+        acceleration_mm_s2=least(limits.acceleration_mm_s2, own.acceleration_mm_s2),
+        jerk_mm_s3=least(limits.jerk_mm_s3, own.jerk_mm_s3),
+    )
     return Task(pipeline.spline_result.spline, bound_by, plants(pipeline.machine, limits))
 
 
@@ -153,8 +157,12 @@ def planned(case: Case, reserve: float, folder: Path) -> dict[str, Any] | None:
         return None
     planning_s = time.perf_counter() - begin
     machine = pipeline.machine
-    found = verify_program(pipeline.program, pipeline.file.limits, machine.models(machine.plane))
-    jerks = next(one for one in sampled(pipeline.image) if one.kernel == "fixed").jerk_mm_s3
+    found = verify_program(
+        pipeline.program, pipeline.file.limits, machine.models(machine.path_axes)
+    )
+    jerks = next(
+        one for one in sampled(NativeProgram(pipeline.image)) if one.kernel == "fixed"
+    ).jerk_mm_s3
     return {
         "duration_s": duration_s,
         "segments": spline.segment_count,

@@ -34,6 +34,7 @@ def example(name: str, laps: int = 1) -> tuple[bytes, tuple[Drive, Drive]]:
     """Program image and drives of an example, its control polygon repeated if asked."""
     path = load_path_file(EXAMPLES / f"{name}.toml")
     assert path.machine_file is not None
+    assert path.feed is not None
     machine = load_machine(path.machine_file)
     points = path.path.points
     if laps > 1:
@@ -44,7 +45,7 @@ def example(name: str, laps: int = 1) -> tuple[bytes, tuple[Drive, Drive]]:
     )
     plan = plan_feed(spline.length_mm, path.feed, path.limits, controller)
     image = encode(compile_program(spline, plan, ProgramOptions(name=name)))
-    x, y = machine.models(machine.plane)
+    x, y = machine.models(machine.path_axes)
     return image, (x, y)
 
 

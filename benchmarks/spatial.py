@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -258,9 +259,9 @@ def speed() -> dict[str, float]:
     for count in (1000, 10_000, 100_000):
         long = count / 24 * torus_knot(count, 2, 9)
         works: dict[str, Callable[[], object]] = {
-            "open": lambda p=long: spatial_through_points(p, False),
-            "closed": lambda p=long: spatial_through_points(p, True),
-            "control_polygon": lambda p=long: spatial_from_control_polygon(p, False),
+            "open": partial(spatial_through_points, long, False),
+            "closed": partial(spatial_through_points, long, True),
+            "control_polygon": partial(spatial_from_control_polygon, long, False),
         }
         for name, work in works.items():
             walls = []

@@ -15,10 +15,12 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 Row = tuple[int, int, int, float, float]
 
@@ -80,10 +82,13 @@ def campaign(polygon: Callable[[int], Polygon], count: int) -> dict[str, Any]:
     }
 
 
-def wavy(count: int) -> np.ndarray[Any, np.dtype[np.complex128]]:
+def wavy(count: int) -> NDArray[np.complex128]:
     """A long smooth polygon with legs of about 6 mm."""
     t = np.arange(count) / count
-    return count * (1 + 0.3 * np.cos(14 * np.pi * t)) * np.exp(2j * np.pi * t)
+    points: NDArray[np.complex128] = (
+        count * (1 + 0.3 * np.cos(14 * np.pi * t)) * np.exp(2j * np.pi * t)
+    )
+    return points
 
 
 def seconds(work: Callable[[], object], repeats: int) -> tuple[float, float]:
@@ -108,7 +113,7 @@ def speed() -> dict[str, Any]:
         p = wavy(count)
         for closed in (False, True):
             name = "closed" if closed else "open"
-            wall, cpu = seconds(lambda p=p, closed=closed: from_control_polygon(p, closed), 5)
+            wall, cpu = seconds(partial(from_control_polygon, p, closed), 5)
             out[f"{name}_{count}_s"] = wall
             out[f"{name}_{count}_cpu_us_per_point"] = 1e6 * cpu / count
     p, _ = uniform_long(100_000)

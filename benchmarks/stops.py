@@ -56,7 +56,7 @@ def stops_of(pipeline: Pipeline, kind: str, instants: int) -> list[Compared]:
     out = []
     for share in np.arange(1, instants + 1) / (instants + 1):
         tick = int(np.ceil(share * plan.duration_s / period_s))
-        run = simulate_stop(image, machine.models(machine.plane), kind, tick * period_s)
+        run = simulate_stop(image, machine.models(machine.path_axes), kind, tick * period_s)
         before_s = (tick - 1) * period_s
         motion = (plan.arc_length, plan.feed, plan.acceleration)
         state = State(*(float(quantity(before_s)) for quantity in motion))

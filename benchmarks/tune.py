@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hodograph.config import Drive, load_machine
+from hodograph.config import Drive, Machine, load_machine
 from hodograph.config.axis_table import Feedforward
 from hodograph.identify import Stretch, identify_axis
 from hodograph.native import AxisInputs, Contour, NativeProgram
@@ -48,18 +48,26 @@ Drives = tuple[Drive, Drive]
 Forward = tuple[Feedforward, Feedforward] | None
 
 
+def forward_of(machine: Machine) -> Forward:
+    """The feedforward of its axes x and y."""
+    if machine.path_feedforward is None:
+        return None
+    x, y = machine.path_feedforward
+    return x, y
+
+
 def loops() -> dict[str, tuple[Drives, Forward]]:
     """Drives and feedforward by name, but the paper's, which each path has its own of."""
     machine, example = (load_machine(MACHINES / f"{n}.toml") for n in ("paper_alpha", "tuned"))
-    x, y = example.models(example.plane)
+    x, y = example.models(example.path_axes)
     late = [replace(drive, speed="differences", delay_samples=1) for drive in (x, y)]
-    axes = [replace(axis, drive=d) for axis, d in zip(machine.plane, late, strict=True)]
+    axes = [replace(axis, drive=d) for axis, d in zip(machine.path_axes, late, strict=True)]
     asked = Asked(bandwidth_hz=TUNED_HZ, damping=TUNED_DAMPING)
     same = tune(machine, [], replace(asked, interpolation="linear"))
     lines = tune(machine, [], Asked(LINES_HZ, LINES_DAMPING, interpolation="linear"))
     sensed = tune(replace(machine, axes=tuple(axes)), [], asked)
     return {
-        "tuned": ((x, y), example.plane_feedforward),
+        "tuned": ((x, y), forward_of(example)),
         "same_poles_linear": (same.drives, same.feedforward),
         "tuned_linear": (lines.drives, lines.feedforward),
         "tuned_late": (sensed.drives, sensed.feedforward),
@@ -139,7 +147,7 @@ def contours() -> dict[str, Any]:
     tuned = loops()
     for name in PATHS:
         pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
-        x, y = pipeline.machine.models(pipeline.machine.plane)
+        x, y = pipeline.machine.models(pipeline.machine.path_axes)
         paper: tuple[Drives, Forward] = ((x, y), None)
         figures[name] = {}
         for loop, (drives, forward) in {"paper": paper, **tuned}.items():
@@ -168,17 +176,17 @@ def sensitivity() -> dict[str, Any]:
     """Contour errors by path, plant and loop, um, and whether the voltage limit was met."""
     figures: dict[str, Any] = {}
     example = load_machine(MACHINES / "tuned.toml")
-    x, y = example.models(example.plane)
+    x, y = example.models(example.path_axes)
     with tempfile.TemporaryDirectory() as folder:
         files = [EXAMPLES / f"{name}.toml" for name in PATHS]
         files += [weaker_volts(name, Path(folder)) for name in PATHS if "optimal" in name]
         for file in files:
             pipeline = load_pipeline(file)
-            own_x, own_y = pipeline.machine.models(pipeline.machine.plane)
+            own_x, own_y = pipeline.machine.models(pipeline.machine.path_axes)
             loops = {
                 "paper": ((own_x, own_y), None),
                 "no_offsets": ((x, y), None),
-                "tuned": ((x, y), example.plane_feedforward),
+                "tuned": ((x, y), forward_of(example)),
             }
             found: dict[str, Any] = {"duration_s": pipeline.plan.duration_s}
             for loop, (drives, forward) in loops.items():
@@ -196,7 +204,7 @@ def plants() -> dict[str, Any]:
     figures: dict[str, Any] = {}
     for name in ("alpha", "heart"):
         pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
-        given = pipeline.machine.models(pipeline.machine.plane)
+        given = pipeline.machine.models(pipeline.machine.path_axes)
         for friction in (0.0, 0.2):
             truth = [
                 replace(d, equipment=replace(d.equipment, friction_volts=friction)) for d in given

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """draw_figures.py [--check] [--output DIR]: the figures of the manual (docs/images), from the programs themselves.
 
-Draws path, feed, phase plane of a stop, state machine and bus timing as SVG files. With --check nothing is written; the
-exit status is 1 when a figure in DIR is not the one that would be drawn.
+Draws path, feed, phase plane of a stop, state machine, bus timing and the figures of the tutorial as SVG files. With
+--check nothing is written; the exit status is 1 when a figure in DIR is not the one that would be drawn.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from __future__ import annotations
 import argparse
 import io
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
+import tutorial
 from hodograph.bustime.frame_bits import worst_bits
 from hodograph.native import NativeProgram
 from hodograph.native.feed_override import FeedOverride, State
@@ -314,6 +317,13 @@ FIGURES: dict[str, Any] = {
 }
 
 
+def tutorial_figures() -> Iterator[tuple[str, Figure]]:
+    """The figures that the blocks of the tutorial draw."""
+    for result in tutorial.run(tutorial.PAGE.read_text(encoding="utf-8")):
+        if result.cell.image is not None:
+            yield result.cell.image, result.figure
+
+
 def main() -> int:
     """Draws or compares all figures."""
     parser = argparse.ArgumentParser(
@@ -327,8 +337,9 @@ def main() -> int:
     options.output.mkdir(parents=True, exist_ok=True)
     other = []
     with styled(), mpl.rc_context({"svg.hashsalt": "hodograph", "svg.fonttype": "none"}):
-        for name, draw in FIGURES.items():
-            file, text = options.output / f"{name}.svg", svg(draw())
+        drawn = ((name, draw()) for name, draw in FIGURES.items())
+        for name, figure in chain(drawn, tutorial_figures()):
+            file, text = options.output / f"{name}.svg", svg(figure)
             if not options.check:
                 file.write_text(text, encoding="utf-8")
             elif not file.exists() or file.read_text(encoding="utf-8") != text:

@@ -12,13 +12,16 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from hodograph.cli.parser import make_parser
+from hodograph.cli.parser import EVERYWHERE, make_parser
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "options.md"
 HEAD = """# Options of every command
 
 Generated from the command line by `make options`; do not edit. [cli.md](cli.md) explains the commands.
-Every command also takes `-h`.
+Every command also takes `-h`, and, before its name or behind it:
+
+| option | meaning |
+| --- | --- |
 """
 
 
@@ -63,7 +66,7 @@ def section(command: str, purpose: str, parser: argparse.ArgumentParser) -> Iter
 
 def page() -> str:
     """The whole page."""
-    lines = [HEAD.rstrip()]
+    lines = [HEAD.rstrip(), *(f"| `{', '.join(names)}` | {text} |" for names, text in EVERYWHERE)]
     for action in make_parser()._actions:
         if isinstance(action, argparse._SubParsersAction):
             purposes = {choice.dest: choice.help or "" for choice in action._choices_actions}

@@ -40,11 +40,31 @@ NOT_PLAIN = {
 STOP: tuple[str, ...] = ()
 
 
-def motion_part(build: Path, target: str, kernel: str, kind: str = "override") -> Longest:
-    """Ready to be asked for functions of setpoints.elf with this kernel; `kind` is of NOT_PLAIN."""
-    others = [f"kernel_{k}_segment_at" for k in emulator.KERNELS if k != kernel]
+# What a tick does not call, by what is said of the program's path axes.
+PATHS: dict[str, tuple[str, ...]] = {
+    "2": ("interpolator_point_copy_rest", "path_counts_rest"),
+    "3": ("extras_at",),
+    "6": (),
+}
+
+
+# Loops over axes, and the axes that come before them.
+OVER_AXES = {"interpolator_point_copy_rest": 2, "path_counts_rest": 3}
+
+SPATIAL = ("3", "6")
+SPATIAL_GOALS = {("an386", "float", "3"): 720, ("an386", "float", "6"): 950}
+
+
+def motion_part(
+    build: Path, target: str, kernel: str, kind: str = "override", axes: str = "2"
+) -> Longest:
+    """Ready to be asked for functions of setpoints.elf with this kernel; `kind` is of NOT_PLAIN, `axes` of PATHS."""
+    own = f"kernel_{kernel}_{'segment' if axes == '2' else 'space'}_at"
+    paths = (f"kernel_{k}_{p}_at" for k in emulator.KERNELS for p in ("segment", "space"))
+    others = [*(path for path in paths if path != own), *PATHS[axes]]
     rules = ROOT / "firmware/targets/loops.toml"
     bounds = Bounds.read(rules, *others, *NOT_PLAIN.get(kind, STOP))
+    bounds.rounds.update({name: max(int(axes) - own, 0) for name, own in OVER_AXES.items()})
     return Longest(Image(build / "firmware" / target / "setpoints.elf"), bounds)
 
 
@@ -78,7 +98,20 @@ def table(build: Path) -> str:
                 )
                 rows.append(f"| {name} | {kind} | {path} | {seen} | {goal} |")
                 name = ""
+            for axes in SPATIAL:
+                path = motion_part(build, target.name, kernel, "plain", axes).of(ENTRY)
+                rows.append(
+                    f"|  | plain, {axes} axes | {path} |  |  | {_goal(target.name, kernel, axes, path)} |"
+                )
     return "".join(f"{row}\n" for row in rows)
+
+
+def _goal(target: str, kernel: str, axes: str, path: int) -> str:
+    """What is wanted of a spatial tick."""
+    goal = SPATIAL_GOALS.get((target, kernel, axes))
+    if goal is None:
+        return ""
+    return f"{goal}: kept" if path <= goal else f"{goal}: missed by {path / goal - 1:.0%}"
 
 
 def document(build: Path, text: str) -> str:
@@ -124,6 +157,7 @@ def main() -> int:
     parser.add_argument(
         "--update", action="store_true", help="the tables of docs/validation/wcet.md"
     )
+    parser.add_argument("--axes", choices=PATHS, default="2", help="path axes of the program")
     parser.add_argument("--build", type=Path, default=Path("build"))
     options = parser.parse_args()
     try:
@@ -131,7 +165,7 @@ def main() -> int:
             update(options.build)
         else:
             kind = "stop" if options.stop else "plain" if options.plain else "override"
-            show(motion_part(options.build, options.target, options.kernel, kind))
+            show(motion_part(options.build, options.target, options.kernel, kind, options.axes))
     except LongestError as error:
         print(f"longest_path: {error}", file=sys.stderr)
         return 1

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware`, `flash` or `aarch64`. Missing Debian
-packages are installed when this runs as root or with passwordless sudo; otherwise the command to type is printed and
-the exit status is 1. Standard library only: it runs before anything is installed.
+A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware`, `flash`, `aarch64`, `deb`,
+`clean-root` or `container`. Missing Debian packages are installed when this runs as root or with passwordless sudo;
+otherwise the command to type is printed and the exit status is 1. Standard library only: it runs before anything is
+installed.
 """
 
 from __future__ import annotations
@@ -75,6 +76,8 @@ _PACKAGE_OF = {
     "ip": "iproute2",
     "insmod": "kmod",
     "taskset": "util-linux",
+    "unshare": "util-linux",
+    "linuxcnc": "linuxcnc-uspace",
     "ar": "binutils",
     "node": "nodejs",
     "candump": "can-utils",
@@ -83,6 +86,8 @@ _PACKAGE_OF = {
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf",
     "qemu-system-riscv32": "qemu-system-misc",
     "qemu-aarch64": "qemu-user",
+    "dpkg-buildpackage": "dpkg-dev",
+    "dh": "debhelper",
     "cargo": _cargo_package(),
 }
 
@@ -101,7 +106,11 @@ BUILD = (
     Need("the Python modules venv and ensurepip", _has_venv, "python3-venv"),
     *BUS,
 )
-TEST = (_program("chromium"), _program("candump"), _program("cansend"), _program("cargo"))
+TEST = (
+    *(_program("chromium"), _program("candump"), _program("cansend"), _program("cargo")),
+    *(_program("zsh"), _program("fish"), _program("mandoc")),
+    *(_program("cmake"), _program("g++"), _program("pkg-config")),
+)
 LINT = (_program("clang"), _program("cppcheck"), _program("shellcheck"), _program("node"))
 FUZZ = (_program("clang"), Need("libFuzzer", _has_libfuzzer, "libclang-rt-dev"))
 FIRMWARE = (
@@ -118,6 +127,11 @@ AARCH64 = (
     _program("qemu-aarch64"),
     _file(f"{AARCH64_ROOT}/lib/ld-linux-aarch64.so.1", "libc6-arm64-cross"),
 )
+DEB = (_program("dpkg-buildpackage"), _program("dh"))
+# A clean root, to try packages in, and containers.
+CLEAN_ROOT = (_program("mmdebstrap"),)
+CONTAINER = (_program("buildah"), *CLEAN_ROOT)
+COMPARE = (_program("linuxcnc"), _program("unshare"))
 SETS = {
     "build": BUILD,
     "bus": BUS,
@@ -127,6 +141,10 @@ SETS = {
     "firmware": FIRMWARE,
     "flash": FLASH,
     "aarch64": AARCH64,
+    "deb": DEB,
+    "clean-root": CLEAN_ROOT,
+    "container": CONTAINER,
+    "compare": COMPARE,
 }
 
 

@@ -57,7 +57,7 @@ class Soak:
         self.dropped = 0
 
     def _simulated(self, pipeline: Pipeline) -> tuple[str, str]:
-        drives = [axis.drive for axis in self.machine.plane if axis.drive is not None]
+        drives = [axis.drive for axis in self.machine.path_axes if axis.drive is not None]
         counts = self.machine.counts_per_mm
         motion = simulate(pipeline.image, drives, kernel=KERNEL, counts_per_mm=counts)
         return motion.setpoints_sha256, motion.encoders_sha256

@@ -36,7 +36,7 @@ class Task:
 
     spline: PHSpline
     limits: Limits
-    plants: tuple[Plant, Plant] | None
+    plants: tuple[Plant, ...] | None
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ class _Program:
         base, length = spline.segment_starts_mm[k], spline.segment_lengths_mm[k]
         _, xi = spline.locate(base + np.clip(s, 1e-9 * length, (1 - 1e-9) * length))
         point = _Curve(spline, k).frame(xi)
-        pairs = [
+        pairs: list[tuple[Real, float | None]] = [
             (v, limits.feed_mm_s),
             (a, limits.acceleration_mm_s2),
             (j, limits.jerk_mm_s3),
@@ -270,9 +270,9 @@ class _Program:
             acceleration = a * point.r1[i] + v**2 * point.r2[i]
             jerk = j * point.r1[i] + 3 * v * a * point.r2[i] + v**3 * point.r3[i]
             pairs += [
-                (v * point.r1[i], axis.velocity_mm_s and axis.velocity_mm_s[i]),
-                (acceleration, axis.acceleration_mm_s2 and axis.acceleration_mm_s2[i]),
-                (jerk, axis.jerk_mm_s3 and axis.jerk_mm_s3[i]),
+                (v * point.r1[i], axis.velocity_mm_s[i] if axis.velocity_mm_s else None),
+                (acceleration, axis.acceleration_mm_s2[i] if axis.acceleration_mm_s2 else None),
+                (jerk, axis.jerk_mm_s3[i] if axis.jerk_mm_s3 else None),
             ]
             if self.task.plants is not None:
                 plant = self.task.plants[i]

@@ -19,9 +19,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from hodograph.feed.kinematics import frames
 from hodograph.native.stop_search import StopLimits
 from hodograph.spline import PHSpline
+from hodograph.spline.frames import frames
 
 Real = NDArray[np.float64]
 
@@ -82,13 +82,13 @@ class LeastStop:
             within += self._asked(s_u, v_u, a_u, jl + slope * u)
         self._equal_count = sum(row.shape[0] for row in equal)
         rows = equal + [row / (limit * self._raise) for row, limit in within]
-        problem = {
+        problem: dict[str, Any] = {
             "x": ca.vertcat(time, s, v, a, left, right),
             "f": time,
             "g": ca.vertcat(*rows),
         }
         self._row_count = problem["g"].shape[0]
-        quiet = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+        quiet: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
         return ca.nlpsol(
             "stop", "ipopt", problem, quiet | {"ipopt.max_iter": 400, "ipopt.tol": 1e-6}
         )
@@ -157,6 +157,7 @@ def _frame(spline: PHSpline) -> Any:
     places = np.concatenate([a + (b - a) * share for a, b in pairwise(starts)])
     places = np.concatenate(([0.0], places, [spline.length_mm]))
     frame = frames(spline, places)
-    slope = (frame.r3 * np.conj(1j * frame.r1)).real
-    values = np.stack((frame.r1.real, frame.r1.imag, frame.curvature, slope))
+    tx, ty = frame.r1
+    slope = tx * frame.r3[1] - ty * frame.r3[0]
+    values = np.stack((tx, ty, frame.curvature, slope))
     return ca.interpolant("frame", "bspline", [places.tolist()], values.ravel(order="F").tolist())

@@ -50,8 +50,8 @@ int main(int argc, char **argv)
             }
             const uint64_t time_q42_s = override_plan_tick(&plan, &clock);
             (void)interpolator_at_piece(&it, clock.record, time_q42_s, &point);
-            sum += counts_from_q40_mm(point.x_q40_mm, COUNTS_PER_MM);
-            sum += counts_from_q40_mm(point.y_q40_mm, COUNTS_PER_MM);
+            sum += counts_from_q40_mm(point.position_q40[0], COUNTS_PER_MM);
+            sum += counts_from_q40_mm(point.position_q40[1], COUNTS_PER_MM);
             ticks++;
         }
     }

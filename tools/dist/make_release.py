@@ -63,9 +63,8 @@ def checked_out(folder: Path) -> Path:
     return tree
 
 
-def normalised(archive: Path, out: Path, time_s: int) -> Path:
+def normalised(archive: Path, target: Path, time_s: int) -> Path:
     """The same archive with its members in order, of nobody, at one time."""
-    target = out / archive.name
     with (
         tarfile.open(archive) as source,
         target.open("wb") as raw,
@@ -81,6 +80,15 @@ def normalised(archive: Path, out: Path, time_s: int) -> Path:
     return target
 
 
+def put(file: Path, out: Path) -> Path:
+    """A copy of a file in `out`, there as a whole or not at all: `make wheels` makes several releases at a time."""
+    target = out / file.name
+    with tempfile.NamedTemporaryFile(dir=out, prefix=f".{file.name}.", delete=False) as part:
+        part.write(file.read_bytes())
+    Path(part.name).chmod(0o644)
+    return Path(part.name).replace(target)
+
+
 def make_release(out: Path, platform: str | None) -> list[Path]:
     """Source distribution and wheel in `out`."""
     out.mkdir(parents=True, exist_ok=True)
@@ -88,7 +96,8 @@ def make_release(out: Path, platform: str | None) -> list[Path]:
     with tempfile.TemporaryDirectory(prefix="hodograph-dist-") as folder:
         work = Path(folder)
         backend("build_sdist", checked_out(work), work, time_s)
-        source = normalised(next(work.glob("hodograph-*.tar.gz")), out, time_s)
+        made = next(work.glob("hodograph-*.tar.gz"))
+        source = normalised(made, work / f"normalised-{made.name}", time_s).replace(made)
         with tarfile.open(source) as archive:
             archive.extractall(work / "source", filter="data")
         (tree,) = (work / "source").iterdir()
@@ -97,9 +106,7 @@ def make_release(out: Path, platform: str | None) -> list[Path]:
                 settings.write(f"\n[bdist_wheel]\nplat_name = {platform}\n")
         backend("build_wheel", tree, work, time_s)
         wheel = next(work.glob("hodograph-*.whl"))
-        target = out / wheel.name
-        target.write_bytes(wheel.read_bytes())
-    return [source, target]
+        return [put(source, out), put(wheel, out)]
 
 
 def main() -> int:

@@ -37,7 +37,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 from testing.cache import Stamps, content, digest, tree  # noqa: E402
 
 PROOFS = ROOT / "tests" / "proofs"
-LIMIT_S = 120  # of processor time, for one run of a prover
+LIMIT_S = 300  # of processor time, for one run of a prover
 PATIENCE = (
     40  # times that, of wall time: only what waits for nothing gets there, however busy the machine
 )

@@ -80,9 +80,17 @@ def _thumb_branch(image: Image, function: Function, index: int, name: str) -> Ef
         return Effect(falls=name == "blx", indirect=not returns)
     target = _target(instruction)
     if name in ("bl", "blx"):
+        if target is not None and _inside(function, target):
+            return Effect(branch=target, falls=False)  # ARMv6-M: a jump too far for `b`
         table = target is not None and image.function_at(target).name.startswith("__gnu_thumb1")
         return Effect(jump=True, falls=False) if table else Effect(call=target)
     return Effect(branch=target, falls=name != "b")
+
+
+def _inside(function: Function, address: int) -> bool:
+    """Behind the first instruction of the function, where no call goes."""
+    own = function.instructions
+    return own[0].address < address <= own[-1].address
 
 
 def _holds_the_way_back(function: Function, index: int) -> bool:

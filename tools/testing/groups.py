@@ -53,6 +53,7 @@ class Groups:
         environment = os.environ | {
             "HODOGRAPH_RECORD": str(record),
             "HODOGRAPH_GROUP": group,
+            "OPENBLAS_NUM_THREADS": "1",  # a group has a process for each core
             "PYTHONPATH": os.pathsep.join(
                 [str(self.root / "tools"), *filter(None, [os.environ.get("PYTHONPATH")])]
             ),

@@ -30,10 +30,19 @@ SETTINGS = ("pyproject.toml", "requirements.lock")
 _NATIVE_USER = "host_tools/hodograph/native/library.py"
 _NATIVE = "host_tools/hodograph/native/_native.abi3.so"
 # All that a process started by a test can be made of; folders are looked at as a whole.
-OF_PROCESSES = ("host_tools", "tools", "firmware", "sim", "examples", "build/bin", _NATIVE)
+OF_PROCESSES = (
+    "host_tools",
+    "tools",
+    "firmware",
+    "sim",
+    "examples",
+    "packaging",
+    "build/bin",
+    _NATIVE,
+)
 # What the programs below build/ are made of that only `make test` brings up to date: images, sanitized programs.
 OF_IMAGES = ("firmware", "sim", "tests/target", "Makefile")
-_UP_TO_DATE = ("build/bin/",)  # what `make check` builds
+_UP_TO_DATE = ("build/bin/", "build/library/")  # what `make check` builds
 _KEPT_TRACES = 6  # states of the tree for which the tests of a file are known to have passed
 
 

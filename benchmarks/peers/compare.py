@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""`make compare`: the same toolpaths planned by Hodograph and by its peers, side by side in one run.
+
+    compare.py [--json OUT] [--only NAME ...]
+
+Each motion is sampled at 1 kHz. Printed of each: cycle time, greatest distance from the programmed path (both ways),
+greatest velocity, acceleration and jerk of an axis, ticks beyond the limits of the axes, and the wall time of planning
+(of LinuxCNC, which plans while it runs, there is none). docs/validation/compare.md says how each peer is set up.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hodograph.toolpath.fit.reference import ReferenceBuilder
+from hodograph.toolpath.gcode import read_gcode
+from hodograph.toolpath.moves import ORIGIN, ArcMove, SplineMove, StraightMove
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from peers import linuxcnc, ruckig_stops, toppra_spline
+from peers.motion import AxisLimits, Motion, deviation_um
+from peers.toolpaths import Toolpath, toolpaths
+
+Real = NDArray[np.float64]
+
+ROOT = Path(__file__).resolve().parents[2]
+MACHINE = ROOT / "examples" / "machines" / "mill.toml"
+LIMITS = AxisLimits(200.0, 2000.0, 50_000.0)
+FEEDS_MM_MIN = (6000.0, 12_000.0)
+TOLERANCE_MM = 0.01
+_SAG_MM = 1e-5
+
+
+@dataclass(frozen=True)
+class Row:
+    """What is measured of one motion."""
+
+    toolpath: str
+    feed_mm_min: float
+    peer: str
+    cycle_s: float
+    deviation_um: float
+    velocity_mm_s: float
+    acceleration_mm_s2: float
+    jerk_mm_s3: float
+    ticks_beyond_acceleration: int
+    ticks_beyond_jerk: int
+    planning_s: float | None
+
+
+Runner = Callable[[Toolpath, Path], tuple[Motion, float | None]]
+
+
+def main() -> int:
+    """Exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--only", nargs="*", default=[], help="these toolpaths")
+    options = parser.parse_args()
+    print(
+        f"axes: {LIMITS.velocity_mm_s:g} mm/s, {LIMITS.acceleration_mm_s2:g} mm/s^2, {LIMITS.jerk_mm_s3:g} mm/s^3 "
+        f"(those that limit it); tolerance {1000 * TOLERANCE_MM:g} um; LinuxCNC {linuxcnc.version()}, TOPP-RA "
+        f"{toppra_spline.version()}, Ruckig {ruckig_stops.version()}"
+    )
+    print(_HEAD)
+    rows = []
+    for row in _rows(options.only):
+        rows.append(row)
+        print(_line(row), flush=True)
+    if options.json is not None:
+        options.json.write_text(json.dumps([vars(row) for row in rows], indent=1) + "\n")
+    return 0
+
+
+def _rows(only: list[str]) -> Iterator[Row]:
+    with tempfile.TemporaryDirectory() as folder:
+        for feed in FEEDS_MM_MIN:
+            for toolpath in toolpaths(feed):
+                if only and toolpath.name not in only:
+                    continue
+                file = Path(folder, f"{toolpath.name.replace(' ', '_')}_{feed:g}.ngc")
+                file.write_text(toolpath.text, encoding="utf-8")
+                path_mm = programmed_path(file)
+                for name, run in _peers(toolpath):
+                    yield _measured(toolpath, name, *run(toolpath, file), path_mm)
+
+
+def _peers(toolpath: Toolpath) -> Iterator[tuple[str, Runner]]:
+    yield "Hodograph", _hodograph
+    yield "LinuxCNC", _linuxcnc
+    if toolpath.smooth:
+        yield "TOPP-RA", _toppra
+    if toolpath.name == "zigzag":
+        yield "Ruckig", _ruckig
+
+
+def _measured(
+    toolpath: Toolpath, peer: str, motion: Motion, planning_s: float | None, path_mm: Real
+) -> Row:
+    return Row(
+        toolpath.name,
+        toolpath.feed_mm_min,
+        peer,
+        motion.duration_s,
+        deviation_um(motion, path_mm),
+        motion.peak(1),
+        motion.peak(2),
+        motion.peak(3),
+        motion.ticks_beyond(2, LIMITS.acceleration_mm_s2),
+        motion.ticks_beyond(3, LIMITS.jerk_mm_s3 or np.inf),
+        planning_s,
+    )
+
+
+def programmed_path(file: Path) -> Real:
+    """The programmed path as chords (n, 3) that are off by at most 10 nm."""
+    builder = ReferenceBuilder(ORIGIN, _SAG_MM)
+    with file.open(encoding="utf-8", errors="replace") as source:
+        for command in read_gcode(source, file.name):
+            if isinstance(command, StraightMove | ArcMove | SplineMove):
+                builder.add(command)
+    return np.asarray(builder.reference().point)
+
+
+def _hodograph(_: Toolpath, file: Path) -> tuple[Motion, float | None]:
+    trace = file.with_suffix(".csv")
+    command = [
+        *(sys.executable, "-m", "hodograph", "simulate", str(file), "--machine", str(MACHINE)),
+        *("--tolerance", f"{TOLERANCE_MM:g}", "--trace", str(trace), "--json"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    said: dict[str, Any] = json.loads(done.stdout)
+    with trace.open(newline="") as rows:
+        found = [[float(row[f"{axis}_cmd_mm"]) for axis in "xyz"] for row in csv.DictReader(rows)]
+    return Motion.trimmed(np.array(found)), float(said["planning_s"])
+
+
+def _linuxcnc(_: Toolpath, file: Path) -> tuple[Motion, float | None]:
+    return linuxcnc.run(file, LIMITS, f"G64 P{TOLERANCE_MM:g}"), None
+
+
+def _toppra(toolpath: Toolpath, file: Path) -> tuple[Motion, float | None]:
+    path_mm = programmed_path(file)
+    begin = perf_counter()
+    motion = toppra_spline.run(path_mm, toolpath.feed_mm_s, LIMITS)
+    return motion, perf_counter() - begin
+
+
+def _ruckig(toolpath: Toolpath, file: Path) -> tuple[Motion, float | None]:
+    path_mm = programmed_path(file)
+    begin = perf_counter()
+    motion = ruckig_stops.run(path_mm, toolpath.feed_mm_s, LIMITS)
+    return motion, perf_counter() - begin
+
+
+_HEAD = (
+    f"{'toolpath':<18}{'F':>6} {'planner':<10}{'cycle s':>9}{'off um':>8}{'mm/s':>8}{'mm/s^2':>8}{'mm/s^3':>9}"
+    f"{'ticks beyond':>14}{'plan s':>8}"
+)
+
+
+def _line(row: Row) -> str:
+    planning = "-" if row.planning_s is None else f"{row.planning_s:.2f}"
+    beyond = f"{row.ticks_beyond_acceleration}, {row.ticks_beyond_jerk}"
+    return (
+        f"{row.toolpath:<18}{row.feed_mm_min:>6g} {row.peer:<10}{row.cycle_s:>9.3f}{row.deviation_um:>8.2f}"
+        f"{row.velocity_mm_s:>8.1f}{row.acceleration_mm_s2:>8.0f}{row.jerk_mm_s3:>9.0f}{beyond:>14}{planning:>8}"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""Cycle times of toolpaths beside those that were measured with LinuxCNC, and the certified deviation.
+
+    python benchmarks/toolpaths.py [--json OUT] [--only NAME…] [--folder DIR…]
+
+The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the plans; a run takes them rounded
+up to ticks. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with its S-curve planner and 50000 mm/s^3.
+Files that are in none of the folders are left out, with a line that says so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "host_tools")]
+
+from hodograph.config import load_machine  # noqa: E402
+from hodograph.job import load_job  # noqa: E402
+from hodograph.toolpath.files import ReadOptions  # noqa: E402
+
+MILL = ROOT / "examples" / "machines" / "mill.toml"
+FOLDERS = (
+    ROOT.parent / "shared" / "toolpaths",
+    ROOT / "build" / "linuxcnc" / "root" / "usr" / "share" / "linuxcnc" / "ncfiles",
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A file at a feed, and the cycle times of others in s; goals are ratios to the S-curve planner."""
+
+    file: str
+    feed_mm_s: float
+    scurve_s: float | None
+    without_jerk_s: float
+    goal: float
+    lines: int | None = None
+
+
+ROWS = (
+    Row("zigzag_f6000.ngc", 100.0, 3.832, 3.182, 0.98),
+    Row("zigzag_f12000.ngc", 200.0, 3.769, 3.012, 0.98),
+    Row("rrect_f6000.ngc", 100.0, 5.155, 3.217, 0.75),
+    Row("rrect_f12000.ngc", 200.0, 4.016, 2.019, 0.75),
+    Row("heart05_f6000.ngc", 100.0, 8.707, 3.057, 0.6),
+    Row("heart05_f12000.ngc", 200.0, 8.617, 1.933, 0.6),
+    Row("spiral.ngc", 100.0, 62.97, 17.35, 0.6),
+    Row("spiral.ngc", 200.0, None, 11.91, 0.6),
+    Row("3D_Chips.ngc", 100.0, 88.13, 32.13, 0.6, lines=2000),
+    Row("3D_Chips.ngc", 200.0, None, 26.53, 0.6, lines=2000),
+)
+
+
+def found(name: str, folders: list[Path]) -> Path | None:
+    """The file of this name in the first folder that has it."""
+    return next((folder / name for folder in folders if (folder / name).is_file()), None)
+
+
+def first_lines(file: Path, lines: int | None, folder: Path) -> Path:
+    """The file, or a copy of its first lines."""
+    if lines is None:
+        return file
+    text = file.read_text(encoding="utf-8", errors="surrogateescape").splitlines(keepends=True)
+    copy = folder / file.name
+    copy.write_text("".join([*text[:lines], "M2\n"]), encoding="utf-8", errors="surrogateescape")
+    return copy
+
+
+def measured(row: Row, file: Path) -> dict[str, object]:
+    """The figures of one row."""
+    begin = time.process_time()
+    job = load_job(file, load_machine(MILL), reading=ReadOptions(feed_mm_s=row.feed_mm_s))
+    fit_s = time.process_time() - begin
+    begin = time.process_time()
+    duration_s = sum(section.pipeline.plan.duration_s for section in job.sections)
+    return {
+        "file": row.file,
+        "feed_mm_s": row.feed_mm_s,
+        "duration_s": duration_s,
+        "ratio": None if row.scurve_s is None else duration_s / row.scurve_s,
+        "goal": row.goal,
+        "ratio_without_jerk": duration_s / row.without_jerk_s,
+        "fit_s": fit_s,
+        "plan_s": time.process_time() - begin,
+    } | job.summary()
+
+
+def results(names: list[str] | None, folders: list[Path]) -> Iterator[dict[str, object]]:
+    """All rows whose files are there."""
+    with tempfile.TemporaryDirectory() as folder:
+        for row in ROWS:
+            if names and not any(name in row.file for name in names):
+                continue
+            file = found(row.file, folders)
+            if file is None:
+                print(f"{row.file}: in none of the folders, left out", file=sys.stderr)
+                continue
+            yield measured(row, first_lines(file, row.lines, Path(folder)))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--only", nargs="+")
+    parser.add_argument("--folder", type=Path, nargs="+", default=list(FOLDERS))
+    options = parser.parse_args()
+    print(
+        "| file, mm/s | time, s | S-curve planner | goal | no jerk limit | bound, um | segments | fit, plan: s |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    rows = []
+    for one in results(options.only, options.folder):
+        rows.append(one)
+        ratio = "–" if one["ratio"] is None else f"{one['ratio']:.3f}"
+        print(
+            f"| {one['file']} {one['feed_mm_s']:.0f} | {one['duration_s']:.3f} | {ratio} | {one['goal']:g} "
+            f"| {one['ratio_without_jerk']:.3f} | {one['deviation_bound_um']:.3f} | {one['segments']} "
+            f"| {one['fit_s']:.2f}, {one['plan_s']:.2f} |",
+            flush=True,
+        )
+    ratios = [float(str(one["ratio"])) for one in rows if one["ratio"] is not None]
+    if ratios:
+        mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
+        print(f"\nGeometric mean of the ratios to the S-curve planner: {mean:.3f} (goal 0.40)")
+    if options.json is not None:
+        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
