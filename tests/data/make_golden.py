@@ -13,6 +13,7 @@ format changes.
 from __future__ import annotations
 
 import struct
+import sys
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -28,6 +29,10 @@ from hodograph.program.codes import ProgramError
 from hodograph.program.image import HEADER_SIZE, PIECE_SIZE, SEGMENT_SIZE, STOP_SIZE, with_crc
 from hodograph.program.stops import FAULT, HOLD, no_stops
 from hodograph.spline import PHSpline, from_control_polygon, line
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
+
+import spatial_image as space
 
 HERE = Path(__file__).parent
 PROGRAMS = HERE / "programs"
@@ -53,7 +58,7 @@ def program(
     name: str,
     *,
     period_us: int = 1000,
-    offset_mm: complex = 0j,
+    offset_mm: tuple[float, ...] = (),
     controller: ControllerLimits = CONTROLLER,
 ) -> Program:
     """A program of `request` along `spline`, checked against the format but no controller."""
@@ -76,7 +81,7 @@ def good() -> dict[str, Program]:
         "line": program(line(-30 + 10j, 90 - 20j), FeedRequest("quintic", 200.0, 0.2), "line"),
         "line_slow": program(line(0, 0.5 + 0.25j), FeedRequest("quintic", 0.05, 0.5), "line slow"),
         "line_tiny": program(line(5, 5.002), FeedRequest("minimax", 10.0, 0.05), "line tiny"),
-        "alpha_offset": program(alpha, exponential, "alpha, shifted", offset_mm=100.0 - 57.25j),
+        "alpha_offset": program(alpha, exponential, "alpha, shifted", offset_mm=(100.0, -57.25)),
     }
 
 
@@ -208,14 +213,12 @@ def uneven() -> Program:
     p = compile_program(spline, plan, ProgramOptions(name="broken"))
     u = np.array([[2, 3, 4]], dtype=np.int64) << 44
     first = put(slice(None), 0)
-    one = segments(p, start_q40=first, x_q40=first, y_q40=first)
+    one = segments(p, start_q40=first, point_q40=first)
     return replace(
         one,
         start_q40=one.start_q40[:1],
-        x_q40=one.x_q40[:1],
-        y_q40=one.y_q40[:1],
-        u_q44=u,
-        v_q44=np.zeros_like(u),
+        point_q40=one.point_q40[:, :1],
+        a_q44=np.stack((u, np.zeros_like(u))),
     )
 
 
@@ -248,22 +251,30 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
         "period_used": (encode(_other_period(2000)), "PERIOD_USED", 0),
         "flags": (patch(image, 28, b"\x02\x00"), "FLAGS", 0),
         "reserved_76": (patch(image, 76, b"\x01"), "FLAGS", 0),
-        "axes": (patch(image, 30, b"\x03\x00"), "AXES", 0),
+        "axes": (patch(image, 30, b"\x07\x00"), "AXES", 0),
         "duration": (encode(replace(p, duration_q32_s=p.duration_q32_s + 1)), "DURATION", 0),
         "length_zero": (encode(replace(p, length_q40=0)), "LENGTH", 0),
         "length_negative": (encode(replace(p, length_q40=-p.length_q40)), "LENGTH", 0),
         "name": (patch(image, 111, b"x"), "NAME", 0),
-        "w_range": (encode(segments(p, u_q44=put((2, 1), 64 << 44))), "W_RANGE", 2),
-        "w_range_minimum": (encode(segments(p, v_q44=put((1, 0), -(2**63)))), "W_RANGE", 1),
-        "point_range": (encode(segments(p, y_q40=put(3, 4096 * MM))), "POINT_RANGE", 3),
-        "point_range_minimum": (encode(segments(p, x_q40=put(0, -(2**63)))), "POINT_RANGE", 0),
+        "w_range": (encode(segments(p, a_q44=put((0, 2, 1), 64 << 44))), "W_RANGE", 2),
+        "w_range_minimum": (encode(segments(p, a_q44=put((1, 1, 0), -(2**63)))), "W_RANGE", 1),
+        "point_range": (encode(segments(p, point_q40=put((1, 3), 4096 * MM))), "POINT_RANGE", 3),
+        "point_range_minimum": (
+            encode(segments(p, point_q40=put((0, 0), -(2**63)))),
+            "POINT_RANGE",
+            0,
+        ),
         "arc_range": (encode(segments(p, start_q40=put(4, -1))), "ARC_RANGE", 4),
-        "sigma": (encode(segments(p, u_q44=put(0, 0), v_q44=put(0, 0))), "SIGMA", 0),
+        "sigma": (encode(segments(p, a_q44=put((slice(None), 0), 0))), "SIGMA", 0),
         "sigma_ratio": (encode(uneven()), "SIGMA_RATIO", 0),
-        "segment_long": (encode(segments(p, u_q44=put(0, 6 << 44))), "SEGMENT_LONG", 0),
+        "segment_long": (encode(segments(p, a_q44=put((0, 0), 6 << 44))), "SEGMENT_LONG", 0),
         "segment_first": (encode(segments(p, start_q40=put(0, over))), "SEGMENT_FIRST", 0),
-        "join_point": (encode(segments(p, x_q40=add(5, over))), "JOIN_POINT", 5),
-        "join_point_y": (encode(segments(p, y_q40=add(n - 1, -over))), "JOIN_POINT", n - 1),
+        "join_point": (encode(segments(p, point_q40=add((0, 5), over))), "JOIN_POINT", 5),
+        "join_point_y": (
+            encode(segments(p, point_q40=add((1, n - 1), -over))),
+            "JOIN_POINT",
+            n - 1,
+        ),
         "join_arc": (encode(segments(p, start_q40=add(2, over))), "JOIN_ARC", 2),
         "join_direction": (encode(_turned(p)), "JOIN_DIRECTION", 1),
         "segment_end": (encode(replace(p, length_q40=p.length_q40 + over)), "SEGMENT_END", n - 1),
@@ -356,12 +367,14 @@ def _turned(p: Program) -> Program:
     u = np.rint(spline.w.real * 2.0**44).astype(np.int64)
     v = np.rint(spline.w.imag * 2.0**44).astype(np.int64)
     two = np.array([0, 9 * MM])
-    return replace(straight, start_q40=two, x_q40=two, y_q40=0 * two, u_q44=u, v_q44=v)
+    return replace(
+        straight, start_q40=two, point_q40=np.stack((two, 0 * two)), a_q44=np.stack((u, v))
+    )
 
 
 def _moved(p: Program, by: int) -> Program:
     """Shifted in x so that only the farthest stretch leaves the travel."""
-    return replace(p, x_q40=p.x_q40 + by)
+    return segments(p, point_q40=add(0, by))
 
 
 def _merged(p: Program, index: int) -> Program:
@@ -409,6 +422,14 @@ def _backwards(p: Program, index: int) -> Program:
     return pieces(p, c_q40=lambda a: a.__setitem__(index, a[index] + c))
 
 
+def spatial(extras: int) -> bytes:
+    """A spatial program: a curve that turns in all directions, with so many extra axes."""
+    own = space.chain(space.wandering(12, 8.0), [30 * MM, -20 * MM, 5 * MM])
+    for k in range(extras):
+        space.add_extra(own, 40.0 + 10 * k, 25.0 - 5 * k, 0.3 + k)
+    return space.image(own, space.feed_along(own, 80.0, 0.1, CONTROLLER))
+
+
 def main() -> None:
     """Writes everything, and insists that the Python check agrees."""
     PROGRAMS.mkdir(exist_ok=True)
@@ -436,6 +457,8 @@ def main() -> None:
             raise SystemExit(f"broken_{name}: expected {expected}, the check says {fault}")
         (PROGRAMS / f"broken_{name}.hdgp").write_bytes(image)
         rows.append(f"broken_{name}.hdgp {code} {int(expected.code)} {expected.index}")
+    for extras in (0, 3):
+        (PROGRAMS / f"space{3 + extras}.hdgp").write_bytes(spatial(extras))
     (HERE / "manifest.txt").write_text("\n".join(rows) + "\n")
 
 

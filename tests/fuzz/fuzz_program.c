@@ -256,16 +256,16 @@ struct trail {
 static void trail_push(struct trail *trail, const struct interpolator_point *point)
 {
     memmove(trail->mm[1], trail->mm[0], 3 * sizeof trail->mm[0]);
-    trail->mm[0][0] = (double)point->x_q40_mm / Q40;
-    trail->mm[0][1] = (double)point->y_q40_mm / Q40;
+    trail->mm[0][0] = (double)point->position_q40[0] / Q40;
+    trail->mm[0][1] = (double)point->position_q40[1] / Q40;
 }
 
 static void trail_begin(struct trail *trail, const struct program *p)
 {
     struct program_segment first;
     program_segment_get(p, 0, &first);
-    const struct interpolator_point point = {.x_q40_mm = first.x_q40_mm,
-                                             .y_q40_mm = first.y_q40_mm};
+    const struct interpolator_point point = {
+        .position_q40 = {first.point_q40_mm[0], first.point_q40_mm[1]}};
     memset(trail, 0, sizeof *trail);
     trail->period_s = 1e-6 * p->header.period_us;
     for (int i = 0; i < 4; i++) {

@@ -16,7 +16,14 @@ def copied_tree(folder: Path, board: str) -> Path:
     """
     for name in ("Makefile", "requirements.lock"):
         shutil.copy2(ROOT / name, folder / name)
-    for name in ("firmware", "tools", "tests/target", "tests/proofs", "build/generated"):
+    for name in (
+        "firmware",
+        "tools",
+        "tests/target",
+        "tests/proofs",
+        "packaging",
+        "build/generated",
+    ):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(ROOT / "build/stamps", folder / "build/stamps", symlinks=True)
     shutil.copytree(ROOT / "build/firmware/an386", folder / "build/firmware" / board)

@@ -76,7 +76,10 @@ def run_rs274(program: Path, limit_s: float = _LIMIT_S) -> Said:
         Path(home, "tools.tbl").write_text(table)
         Path(home, "parameters.var").touch()
         command = [f"{root}/usr/bin/rs274", "-t", "tools.tbl", "-v", "parameters.var", "-g"]
-        with Path(home, "out").open("w+") as out, Path(home, "err").open("w+") as err:
+        with (
+            Path(home, "out").open("w+", errors="surrogateescape") as out,
+            Path(home, "err").open("w+", errors="surrogateescape") as err,
+        ):
             try:
                 subprocess.run(
                     [*command, str(program)],
@@ -105,7 +108,7 @@ def run_rs274(program: Path, limit_s: float = _LIMIT_S) -> Said:
     return Said(canon.items, late or ("" if ended else " ".join(errors) or "no end"))
 
 
-_COMMAND = re.compile(r"\s*\d+ N\S*\s+(\w+)\((.*)\)\s*$")
+_COMMAND = re.compile(r"\s*\d+ N[.\d-]*\s*([A-Z]\w*)\((.*)\)\s*$")
 
 
 @dataclass
@@ -315,7 +318,7 @@ def _add(items: list[Item], start: moves.Position, command: moves.Command) -> No
     match command:
         case moves.StraightMove(_, end, None):
             items.append(("rapid", end))
-        case moves.StraightMove(_, end, feed):
+        case moves.StraightMove(_, end, moves.Feed() as feed):
             items.append(("straight", (*end, _speed(feed, start, end))))
         case moves.ArcMove(_, end, plane, centre, turns, feed):
             speed = math.nan if feed.duration_s else feed.feed_mm_s
@@ -376,7 +379,7 @@ def difference(
     while at["ours"] < len(ours) or (at["theirs"] < len(theirs) and not is_part):
         pair = [lists[side][at[side]] if at[side] < len(lists[side]) else None for side in at]
         if pair[0] is not None and pair[1] is not None and _same(pair[0], pair[1], tolerance):
-            steps = ("ours", "theirs")
+            steps: tuple[str, ...] = ("ours", "theirs")
         else:
             steps = tuple(
                 side

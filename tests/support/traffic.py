@@ -23,10 +23,12 @@ def alpha() -> tuple[bytes, Frames]:
     motion = simulate(
         pipeline.image, [axis.drive for axis in pipeline.machine.axes if axis.drive is not None]
     )
-    still = np.repeat(motion.rows["set_counts"][:1], 300, axis=0)
-    targets = np.concatenate([still, motion.rows["set_counts"]])
-    actual = np.concatenate([still, motion.rows["set_counts"][:1], motion.rows["set_counts"][:1]])
-    actual = np.concatenate([actual, motion.rows["act_counts"]])[: len(targets)]
+    still = np.repeat(motion.rows["set_counts"][:, :2][:1], 300, axis=0)
+    targets = np.concatenate([still, motion.rows["set_counts"][:, :2]])
+    actual = np.concatenate(
+        [still, motion.rows["set_counts"][:, :2][:1], motion.rows["set_counts"][:, :2][:1]]
+    )
+    actual = np.concatenate([actual, motion.rows["act_counts"][:, :2]])[: len(targets)]
     return pipeline.image, machine_frames(targets, actual)
 
 

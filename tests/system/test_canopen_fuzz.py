@@ -96,7 +96,7 @@ class Noise:
 def alpha(root: Path) -> tuple[Pipeline, Motion]:
     """The program, and what it does undisturbed."""
     pipeline = load_pipeline(root / "examples/alpha.toml")
-    drives = [axis.drive for axis in pipeline.machine.plane if axis.drive is not None]
+    drives = [axis.drive for axis in pipeline.machine.path_axes if axis.drive is not None]
     return pipeline, simulate(pipeline.image, drives, counts_per_mm=pipeline.machine.counts_per_mm)
 
 

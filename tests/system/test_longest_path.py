@@ -16,6 +16,7 @@ from longest_path import (  # noqa: E402
     DOCUMENT,
     ENTRY,
     NOT_PLAIN,
+    SPATIAL_GOALS,
     counted_at_most,
     document,
     motion_part,
@@ -50,6 +51,14 @@ def test_nothing_counted_is_longer(target: str, kernel: str, kind: str, ratio: f
 )
 def test_goals_are_kept_by_construction(target: str, kernel: str, kind: str, goal: int) -> None:
     assert motion_part(ROOT / "build", target, kernel, kind).of(ENTRY) <= goal
+
+
+@pytest.mark.parametrize(("target", "kernel", "axes"), SPATIAL_GOALS)
+def test_goals_of_spatial_ticks_are_kept_by_construction(
+    target: str, kernel: str, axes: str
+) -> None:
+    longest = motion_part(ROOT / "build", target, kernel, "plain", axes).of(ENTRY)
+    assert longest <= SPATIAL_GOALS[target, kernel, axes]
 
 
 @pytest.mark.parametrize("name", ["alpha", "heart_optimal"])

@@ -48,16 +48,18 @@ def other(hub: LocalHub, clock: VirtualClock) -> Iterator[Neighbour]:
         yield made
 
 
-Moving = Callable[[float], tuple[Bench, str]]
+Moving = Callable[..., tuple[Bench, str]]
 
 
 @pytest.fixture
 def moving(make_bench: MakeBench, alpha_at: MakeAlpha) -> Iterator[Moving]:
-    """A machine so many seconds into a program of ten; in the end no setpoint may have jumped."""
+    """A machine so many seconds into a program of 2.6, or of 100 mm at another feed; in the end no setpoint may have
+    jumped.
+    """
     recorders: list[tuple[Bench, Recorder]] = []
 
-    def begin(seconds: float) -> tuple[Bench, str]:
-        bench, path = make_bench(), str(alpha_at(10))
+    def begin(seconds: float, feed_mm_s: float = 40.0) -> tuple[Bench, str]:
+        bench, path = make_bench(), str(alpha_at(feed_mm_s))
         recorders.append((bench, Recorder(bench.bus)))
         assert main(["goto", path]) == 0
         assert main(["start"]) == 0
@@ -72,7 +74,7 @@ def moving(make_bench: MakeBench, alpha_at: MakeAlpha) -> Iterator[Moving]:
         assert find_jumps(frames, bench.machine.nodes, step_limits(bench.machine)) == []
 
 
-@pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(9.9)])
+@pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(2.4)])
 def test_setpoints_switched_off_at_a_drive(
     moving: Moving, other: Neighbour, seconds: float
 ) -> None:
@@ -97,7 +99,7 @@ def test_setpoints_switched_off_at_a_drive_that_stands(
     assert main(["start", "--follow"]) == 0
 
 
-@pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(9.9)])
+@pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(2.4)])
 def test_a_drive_stopped_by_nmt(moving: Moving, other: Neighbour, seconds: float) -> None:
     """STOPPED, it answers no SDO: it is made pre-operational before it is asked anything."""
     bench, path = moving(seconds)
@@ -174,7 +176,7 @@ def test_the_controllers_heartbeat_cannot_be_switched_off(
     moving: Moving, other: Neighbour, period_ms: int
 ) -> None:
     """The drives watch it: they stop by themselves when it stays away for two seconds."""
-    bench, _ = moving(1.0)
+    bench, _ = moving(1.0, 20.0)  # for four seconds more
     other.write(1, 0x1017, 0, period_ms, 2)
     bench.clock.sleep(0.1)
     assert bench.controller.read(0x1017) == 100
@@ -183,7 +185,7 @@ def test_the_controllers_heartbeat_cannot_be_switched_off(
 
 def test_another_heartbeat_with_the_number_of_a_drive(moving: Moving, other: Neighbour) -> None:
     """Two that say they are node 2: a boot-up message of one is a restart."""
-    bench, path = moving(1.0)
+    bench, path = moving(1.0, 25.0)
     for _ in range(20):
         other.send(0x700 + DRIVE, b"\x05")
         bench.clock.sleep(0.05)
@@ -281,7 +283,7 @@ def test_the_commands_to_stop_while_another_computer_goes_on_reading(
     moving: Moving, hub: LocalHub, command: str
 ) -> None:
     """For seven seconds. Whether the axes stand cannot be asked meanwhile, but they do."""
-    bench, _ = moving(1.0)
+    bench, _ = moving(1.0, 10.0)  # for nine seconds more
     with hand(hub, 1) as stranger, running(bench.clock, command) as process:
         assert stranger.ask(b"\x40" + object_bytes(0x2000, 1))[0] == 0x41
         for k in range(900):  # of 943 segments
@@ -346,7 +348,7 @@ def test_a_bus_that_is_full_for_longer_than_simulated_drives_are_waited_for(
     """After 100 ms a tick comes, and sends no SYNC before the setpoints that still wait. After 200 ms the drives stop
     by themselves.
     """
-    bench, path = make_bench(), str(alpha_at(10))
+    bench, path = make_bench(), str(alpha_at(40))
     recorder = Recorder(bench.bus)
     assert main(["goto", path]) == 0
     assert main(["start"]) == 0

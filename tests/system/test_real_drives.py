@@ -72,8 +72,8 @@ def test_simulated_drives_bear_it(
     assert settled(bench) == (READY, 0, 0)
 
 
-FEED_COUNTS = 10_000
-"""Way of a period of 1 ms at 10 mm/s: what an axis may be told to go from one SYNC to the next."""
+FEED_COUNTS = 40_000
+"""Way of a period of 1 ms at 40 mm/s: what an axis may be told to go from one SYNC to the next."""
 
 
 def full_bus(bench: Bench, hub: LocalHub, path: str, seconds: float) -> tuple[int, int]:
@@ -108,7 +108,7 @@ def test_a_bus_full_of_frames_of_higher_priority(
     real: Bench, hub: LocalHub, alpha_at: MakeAlpha, seconds: float, outcome: tuple[int, int]
 ) -> None:
     """SYNC waits for the setpoints that wait with it, and program time for both, as far as a gap of SYNC may last."""
-    path = str(alpha_at(10))
+    path = str(alpha_at(40))
     assert full_bus(real, hub, path, seconds) == outcome
     runs_again(path)
 
@@ -119,7 +119,7 @@ def test_a_bus_that_is_full_from_any_instant_on(
 ) -> None:
     """For one and a half periods: it begins before SYNC, between SYNC and setpoints, between these, and behind them."""
     clock.sleep(phase_us * 1e-6)
-    state, _ = full_bus(real, hub, str(alpha_at(10)), 0.0015)
+    state, _ = full_bus(real, hub, str(alpha_at(40)), 0.0015)
     assert state in (READY, FAULT_STATE)
 
 
@@ -133,7 +133,7 @@ def test_a_board_waits_too(
 ) -> None:
     monkeypatch.setenv("HODOGRAPH_CONTROLLER", f"{EMULATE} an386")
     with real_drives(hub, load_machine(PAPER_ALPHA)) as bench:
-        assert full_bus(bench, hub, str(alpha_at(10)), seconds)[0] == state
+        assert full_bus(bench, hub, str(alpha_at(40)), seconds)[0] == state
 
 
 def test_virtual_time_keeps_ticks(real: Bench) -> None:

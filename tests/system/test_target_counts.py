@@ -117,4 +117,4 @@ def test_the_images_that_are_counted_are_those_of_the_examples(name: str) -> Non
     assert counted.ticks == compiled.ticks
     assert counted.segment_count == compiled.segment_count
     assert counted.piece_count == compiled.piece_count
-    assert np.abs(counted.x_q40 - compiled.x_q40).max() < 2**10
+    assert np.abs(counted.point_q40 - compiled.point_q40).max() < 2**10

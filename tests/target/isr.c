@@ -211,7 +211,7 @@ static bool switch_on(const struct config *config)
 
 static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel)
 {
-    const int32_t anywhere[PLANE_AXES] = {0, 0};
+    const int32_t anywhere[AXES_MAX] = {0};
     struct config config;
     if (program_open(&program, image, size) != 0) {
         return STATUS_PROGRAM;

@@ -2,7 +2,7 @@
 /*
  * An image that runs programs without a bus: KERNEL FILE [COMMANDS [TIMES]], KERNEL 0 fixed or 1 float. The store (which the
  * emulator fills) holds one program image, or several one behind the other; the setpoints of all ticks of all of them,
- * i32 x and y, go to FILE on the host. So every target can be asked for its bits, however little memory it has. What
+ * i32 of all path axes, go to FILE on the host. So every target can be asked for its bits, however little memory it has. What
  * is run is what the controller's tick runs.
  *
  * COMMANDS is a file (commands.h) that each of the programs is run with. A hold that nothing ends lasts until the last
@@ -33,12 +33,12 @@ extern const uint8_t startup_store_base[];
 static struct motion motion;
 static struct program program;
 static struct commands commands;
-static int32_t counts[BATCH][PLANE_AXES];
+static int32_t counts[BATCH * AXES_MAX]; /* of each tick as many as the program has path axes */
 static uint32_t times[BATCH];
 static int times_file = -1;
 
-/* The counted part: time in, two setpoints out. */
-__attribute__((noinline)) static int tick(int32_t target_counts[PLANE_AXES])
+/* The counted part: time in, the setpoints of all axes out. */
+__attribute__((noinline)) static int tick(int32_t *target_counts)
 {
     return motion_step(&motion, target_counts);
 }
@@ -47,7 +47,7 @@ __attribute__((noinline)) static int tick(int32_t target_counts[PLANE_AXES])
 static int timed_tick(size_t slot)
 {
     const uint32_t before = clock_now();
-    const int result = tick(counts[slot]);
+    const int result = tick(&counts[slot * motion_axis_count(&motion)]);
     times[slot] = (clock_now() - before) & CLOCK_MASK;
     return result;
 }
@@ -57,7 +57,7 @@ static int write_batch(int file, size_t filled)
     if (times_file >= 0 && semihost_write(times_file, times, filled * sizeof times[0]) != 0) {
         return -1;
     }
-    return semihost_write(file, counts, filled * sizeof counts[0]);
+    return semihost_write(file, counts, filled * motion_axis_count(&motion) * sizeof counts[0]);
 }
 
 static int run(int file)

@@ -5,7 +5,7 @@
 #   build/target/setpoints-COMPILER-LEVEL STORE KERNEL FILE ...
 
 TARGET_HOSTS := gcc-O0 gcc-O2 clang-O0 clang-O2
-TARGET_HOST_SRC := tests/target/setpoints.c tests/target/commands.c tests/target/table.c tests/target/host.c firmware/app/machine/motion.c $(core_SRC)
+TARGET_HOST_SRC := tests/target/setpoints.c tests/target/commands.c tests/target/table.c tests/target/host.c firmware/app/machine/motion.c firmware/app/machine/path_counts.c $(core_SRC)
 TARGET_HOST_BINS := $(TARGET_HOSTS:%=$(BUILD)/target/setpoints-%)
 
 define TARGET_HOST_RULE # compiler, level

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "tools/README.md"])
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 
 
@@ -24,12 +24,28 @@ def test_links_and_merges(page: Path) -> None:
     assert marks == []
 
 
-@pytest.mark.parametrize("tool", ["draw_figures.py", "list_options.py"])
+@pytest.mark.parametrize("tool", ["draw_figures.py", "list_api.py", "list_options.py"])
 def test_generated_pages_are_current(tool: str) -> None:
     """`make figures` and `make options` would write the same again."""
     command = [sys.executable, str(ROOT / "tools" / tool), "--check"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_each_tool_has_a_row() -> None:
+    """In tools/README.md: scripts by their names, folders with a slash."""
+    text = (ROOT / "tools/README.md").read_text(encoding="utf-8")
+    listed = subprocess.run(
+        ["git", "ls-files", "tools"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    parts = [Path(name).relative_to("tools").parts for name in listed]
+    names = {own[0] + ("/" if len(own) > 1 else "") for own in parts} - {"README.md"}
+    assert sorted(name for name in names if f"`{name}`" not in text) == []
+    rows = [
+        cell for line in text.splitlines() if (cell := line.partition("|")[2].partition("|")[0])
+    ]
+    named = {name for row in rows for name in re.findall(r"`([^`]+)`", row)}
+    assert sorted(named - names) == []
 
 
 def test_there_are_pages_with_links() -> None:

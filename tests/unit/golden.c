@@ -37,7 +37,11 @@ void golden_seal(uint8_t *image, uint32_t size)
 struct program_limits golden_no_limits(void)
 {
     const int64_t far = (int64_t)1 << 52;
-    struct program_limits limits = {.min_q40_mm = {-far, -far}, .max_q40_mm = {far, far}};
+    struct program_limits limits = {.axis_count = 0};
+    for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
+        limits.min_q40_mm[axis] = -far;
+        limits.max_q40_mm[axis] = far;
+    }
     return limits;
 }
 

@@ -255,7 +255,7 @@ void override_program_random(struct override_program *p, uint32_t period_us, uin
     struct program_header *header = &p->program.header;
     header->version = PROGRAM_VERSION;
     header->header_size = PROGRAM_HEADER_SIZE;
-    header->axis_count = 2;
+    header->axis_count = PROGRAM_PLANE;
     header->piece_count = b.count;
     header->length_q40_mm = b.arc_q40;
     header->segment_count = (uint32_t)((double)b.arc_q40 / Q40 / SEGMENT_MM) + 1u;

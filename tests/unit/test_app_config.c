@@ -74,6 +74,9 @@ static void test_values_that_make_no_sense(void)
     TEST_ASSERT_FALSE(config_value_allowed(0x2004, 7, 0));
     TEST_ASSERT_TRUE(config_value_allowed(0x2004, 7, CONFIG_COUNTS_PER_MM_MAX));
     TEST_ASSERT_FALSE(config_value_allowed(0x2004, 7, CONFIG_COUNTS_PER_MM_MAX + 1u));
+    TEST_ASSERT_TRUE(config_value_allowed(0x2033, 4, 0));
+    TEST_ASSERT_TRUE(config_value_allowed(0x2033, 4, CONFIG_COUNTS_PER_MM_MAX));
+    TEST_ASSERT_FALSE(config_value_allowed(0x2033, 4, CONFIG_COUNTS_PER_MM_MAX + 1u));
 }
 
 static void test_which_objects_concern_the_drives(void)
@@ -89,6 +92,8 @@ static void test_which_objects_concern_the_drives(void)
     TEST_ASSERT_TRUE(config_concerns_drives(0x2012, 1));
     TEST_ASSERT_FALSE(config_concerns_drives(0x2018, 1));
     TEST_ASSERT_FALSE(config_concerns_drives(0x2032, 1));
+    TEST_ASSERT_TRUE(config_concerns_drives(0x2033, 6));
+    TEST_ASSERT_TRUE(config_contains(0x2033));
     TEST_ASSERT_FALSE(config_concerns_drives(0x201A, 6));
     TEST_ASSERT_TRUE(config_concerns_drives(0x201F, 1));
     TEST_ASSERT_TRUE(config_contains(0x2023));
@@ -130,6 +135,42 @@ static void test_every_axis_object_is_read(void)
     TEST_ASSERT_EQUAL_UINT32(2000000000u, config.axis[0].quick_stop_counts_s2);
 }
 
+/* An axis that turns has its own counts of a degree; what is configured for mm holds for degrees. */
+static void test_an_axis_that_turns(void)
+{
+    struct od_controller values = od_controller_defaults;
+    struct od od;
+    struct config config;
+    struct program_limits limits;
+    od_init(&od, &od_controller_table, &values, NULL, NULL);
+    values.configuration.axis_count = 5;
+    values.configuration.counts_per_mm = 1000000;
+    values.configuration.start_tolerance_counts = 5000;
+    values.configuration.feed_limit_um_s = 400000;
+    values.counts_per_unit[4] = 100000;
+    values.axis_velocity_limit[4] = 360000;
+    values.travel_minimum[4] = -1200000;
+    values.travel_maximum[4] = 36000000;
+    values.travel_maximum[3] = 36000000;
+    config_read(&config, &od);
+    TEST_ASSERT_EQUAL_UINT32(1000000, config_counts_per_unit(&config, 3));
+    TEST_ASSERT_EQUAL_UINT32(100000, config_counts_per_unit(&config, 4));
+    TEST_ASSERT_EQUAL_UINT32(5000, config_tolerance_counts(&config, 3));
+    TEST_ASSERT_EQUAL_UINT32(500, config_tolerance_counts(&config, 4));
+    TEST_ASSERT_EQUAL_UINT32(8000000, config.apart_counts[3]); /* 20 ms at 400 mm/s */
+    TEST_ASSERT_EQUAL_UINT32(720000, config.apart_counts[4]);  /* and at 360 deg/s */
+    config_limits(&config, &limits);
+    TEST_ASSERT_EQUAL_INT64(36 * Q40, limits.max_q40_mm[3]);
+    TEST_ASSERT_EQUAL_INT64(-12 * Q40, limits.min_q40_mm[4]);
+    TEST_ASSERT_EQUAL_INT64(360 * Q40, limits.max_q40_mm[4]);
+    TEST_ASSERT_EQUAL_UINT32(360000, limits.axis_velocity_um_s[4]);
+    struct config other = config;
+    TEST_ASSERT_TRUE(config_same_zero(&config, &other, 4));
+    other.axis[4].counts_per_unit = 100001;
+    TEST_ASSERT_FALSE(config_same_zero(&config, &other, 4));
+    TEST_ASSERT_TRUE(config_same_zero(&config, &other, 3));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -139,5 +180,6 @@ int main(void)
     RUN_TEST(test_values_that_make_no_sense);
     RUN_TEST(test_which_objects_concern_the_drives);
     RUN_TEST(test_every_axis_object_is_read);
+    RUN_TEST(test_an_axis_that_turns);
     return UNITY_END();
 }

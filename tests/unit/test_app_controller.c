@@ -214,8 +214,10 @@ static void test_setpoints_are_those_of_the_interpolator(void)
     for (uint32_t k = 0; k < APP_IMAGE_TICKS; ++k) {
         const uint64_t time_q42_s = ((uint64_t)k * 4398046511104u + 500u) / 1000u;
         TEST_ASSERT_TRUE(interpolator_at_q42(&interp, time_q42_s, &point) >= 0);
-        TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.x_q40_mm, 1000000), bench.targets[0][k]);
-        TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.y_q40_mm, 1000000), bench.targets[1][k]);
+        TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.position_q40[0], 1000000),
+                                bench.targets[0][k]);
+        TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.position_q40[1], 1000000),
+                                bench.targets[1][k]);
     }
     golden_discard(&prepared);
     TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, bench.drives[0].position_counts);

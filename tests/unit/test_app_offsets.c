@@ -10,7 +10,7 @@
 static struct config config;
 static struct offsets offsets;
 static struct motion motion;
-static struct feedforward_offset offset[PLANE_AXES];
+static struct feedforward_offset offset[AXES_MAX];
 
 void setUp(void)
 {
@@ -19,11 +19,12 @@ void setUp(void)
     config.period_us = 1000;
     config.counts_per_mm = 1000000;
     config.feedforward = CONFIG_TORQUE_FEEDFORWARD | CONFIG_VELOCITY_FEEDFORWARD;
-    for (unsigned i = 0; i < PLANE_AXES; ++i) {
+    for (unsigned i = 0; i < PROGRAM_PLANE; ++i) {
         config.axis[i].velocity_permille = 1000;
         config.axis[i].torque_per_velocity_q16 = 65536 * 100;
         config.axis[i].torque_per_acceleration_q16 = 65536 * 10;
     }
+    motion.scale.axis_count = PROGRAM_PLANE;
     offsets_init(&offsets);
 }
 
@@ -33,8 +34,8 @@ void tearDown(void)
 
 static void point(int64_t x_q40_mm, int64_t y_q40_mm)
 {
-    motion.point.x_q40_mm = x_q40_mm;
-    motion.point.y_q40_mm = y_q40_mm;
+    motion.point.position_q40[0] = x_q40_mm;
+    motion.point.position_q40[1] = y_q40_mm;
     motion.setpoints++;
     offsets_step(&offsets, &config, &motion, offset);
 }
@@ -60,7 +61,7 @@ static void test_constant_velocity(void)
 
 static void expect_zero(void)
 {
-    for (unsigned i = 0; i < PLANE_AXES; ++i) {
+    for (unsigned i = 0; i < PROGRAM_PLANE; ++i) {
         TEST_ASSERT_EQUAL_INT32(0, offset[i].velocity_counts_s);
         TEST_ASSERT_EQUAL_INT16(0, offset[i].torque_permille);
     }

@@ -15,6 +15,7 @@ static const struct config config = {
     .acceleration_limit_um_s2 = 200000,
     .jerk_limit_mm_s3 = 8000,
     .counts_per_mm = 1000000,
+    .axis_count = 2,
     .travel_min_counts = {-100000000, -100000000},
     .travel_max_counts = {100000000, 100000000},
     .crc32 = 1,

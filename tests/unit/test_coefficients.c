@@ -11,9 +11,9 @@
 #include "golden.h"
 #include "unity.h"
 
-static const char *const names[] = {"alpha_exponential.hdgp", "heart_minimax.hdgp",
-                                    "star_minimax.hdgp",      "line_tiny.hdgp",
-                                    "line_slow.hdgp",         "alpha_offset.hdgp"};
+static const char *const names[] = {
+    "alpha_exponential.hdgp", "heart_minimax.hdgp", "star_minimax.hdgp", "line_tiny.hdgp",
+    "line_slow.hdgp",         "alpha_offset.hdgp",  "space3.hdgp",       "space6.hdgp"};
 #define NAMES (sizeof names / sizeof names[0])
 
 struct buffer {
@@ -73,7 +73,6 @@ static void expand(struct interpolator_point *out, const struct kernel *kernel, 
     struct program_segment g;
     struct ph_segment ph;
     struct feed_point f;
-    int64_t point[2];
     uint64_t start_q42_s = 0;
     uint32_t i = 0;
     for (program_piece_get(&plain, 0, &from); time_q42_s - start_q42_s >= from.duration_q32_s << 10;
@@ -89,14 +88,15 @@ static void expand(struct interpolator_point *out, const struct kernel *kernel, 
     }
     program_segment_get(&plain, i, &g);
     ph_segment_expand(&ph, &g);
-    kernel->segment_set(&segment.path, &ph);
-    kernel->segment_at(&segment.path, point, arc);
-    *out = (struct interpolator_point){arc, point[0], point[1], f.feed_q32_mm_s};
+    kernel_path(kernel, g.axis_count)->segment_set(&segment.path, &ph);
+    kernel_path(kernel, g.axis_count)->segment_at(&segment.path, out->position_q40, arc);
+    out->arc_length_q40_mm = arc;
+    out->feed_q32_mm_s = f.feed_q32_mm_s;
 }
 
 static void is_as_expanded(struct interpolator *it, uint64_t time_q42_s)
 {
-    struct interpolator_point p, q;
+    struct interpolator_point p = {0}, q = {0};
     TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at_q42(it, time_q42_s, &p));
     expand(&q, it->kernel, time_q42_s);
     TEST_ASSERT_EQUAL_MEMORY(&p, &q, sizeof p);

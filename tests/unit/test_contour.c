@@ -84,6 +84,8 @@ static void begin(int count, bool closed)
     memset(&program, 0, sizeof program);
     program.image = image;
     program.size = sizeof image;
+    program.header.axis_count = PROGRAM_PLANE;
+    program.header.header_size = PROGRAM_HEADER_SIZE;
     program.header.segment_count = (uint32_t)count;
     program.header.flags = closed ? PROGRAM_FLAG_CLOSED : 0;
     program.header.length_q40_mm = llrint(arc[count] * 1099511627776.0);
@@ -139,7 +141,7 @@ void tearDown(void)
 
 static double distance(double arc_length_mm, double x_mm, double y_mm)
 {
-    const double point[2] = {x_mm, y_mm};
+    const double point[3] = {x_mm, y_mm};
     return contour_distance_mm(&contour, arc_length_mm, point);
 }
 
@@ -216,7 +218,7 @@ static void test_far_points_get_the_nearest_place_in_the_window(void)
         const int i = (int)random_within(2, SEGMENTS - 2);
         double at[2], s;
         integrate(i, 0.5, at, &s);
-        const double point[2] = {at[0] + random_within(-2, 2), at[1] + random_within(-2, 2)};
+        const double point[3] = {at[0] + random_within(-2, 2), at[1] + random_within(-2, 2)};
         const double gap = hypot(point[0] - at[0], point[1] - at[1]);
         const double found = distance(s, point[0], point[1]);
         TEST_ASSERT_TRUE(found <= gap + 1e-12);
@@ -280,7 +282,7 @@ static void test_many_points_in_counts(void)
     const int64_t s[2] = {0, INT64_C(2) << 40};
     const int32_t act[4] = {10000000, -1000250, 12000000, -999999};
     double errors[2];
-    contour_errors_um(&contour, 2, s, act, 1000000, errors);
+    contour_errors_um(&contour, 2, s, act, 2, 1000000, errors);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.25, errors[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.001, errors[1]);
 }

@@ -399,13 +399,42 @@ static void test_bad_figures_are_refused(void)
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_RATE, init_error());
     config.plant.time_constant_s = 5e-5;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_STEP, init_error());
-    config.interpolation = 2;
+    config.interpolation = 3;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_INTERPOLATION, init_error());
+    config.integral = 2;
+    TEST_ASSERT_EQUAL_INT(DRIVE_ERR_INTEGRAL, init_error());
     config.speed = 2;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_SENSING, init_error());
     config.delay_samples = 2;
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_SENSING, init_error());
     TEST_ASSERT_EQUAL_INT(0, init_error());
+}
+
+/* The law of a loop of 1 ms without interpolation, whose integral counts a sample from the next one on: written out. */
+static void test_no_interpolation_and_forward_integral(void)
+{
+    config.loop_rate_hz = 1000;
+    config.interpolation = DRIVE_NO_INTERPOLATION;
+    config.integral = DRIVE_INTEGRAL_FORWARD;
+    const struct drive_pdff *g = &config.pdff;
+    struct drive d = made();
+    double integral_rad = 0.0, before_mm = 0.0;
+    for (int k = 1; k < TICKS; k++) {
+        const double command_mm = target_at(k) * 1e-6;
+        const double position_mm = encoder_read_mm(&d.encoder, d.state.motor.position_mm);
+        const double speed_rad_s = d.state.motor.speed_rad_s;
+        const double ref = g->k_pp_rad_s_mm * (command_mm - position_mm) +
+                           g->k_pf_rad_mm * (command_mm - before_mm) / 1e-3;
+        const double torque =
+            g->k_pv_nm_s_rad * (g->k_vf * ref + g->k_iv_per_s * integral_rad - speed_rad_s);
+        const double volts = config.plant.torque_to_volts * torque;
+        const double most = config.plant.volts_limit;
+        const bool saturated = volts > most || volts < -most;
+        drive_period(&d, target_at(k));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, fmin(fmax(volts, -most), most), d.state.volts);
+        integral_rad += saturated ? 0.0 : (ref - speed_rad_s) * 1e-3;
+        before_mm = command_mm;
+    }
 }
 
 int main(void)
@@ -424,6 +453,7 @@ int main(void)
     RUN_TEST(test_cubic_interpolation_follows_more_closely);
     RUN_TEST(test_speed_by_differences_and_delay);
     RUN_TEST(test_sensing_changes_little);
+    RUN_TEST(test_no_interpolation_and_forward_integral);
     RUN_TEST(test_bad_figures_are_refused);
     return UNITY_END();
 }

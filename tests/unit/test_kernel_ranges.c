@@ -87,9 +87,10 @@ static void scale_and_turn(const double u[3], const double v[3], double scale, d
     double c = angle == 0 ? 1.0 : cos(angle);
     double s = angle == 0 ? 0.0 : sin(angle);
     memset(g, 0, sizeof *g);
+    g->axis_count = PROGRAM_PLANE;
     for (int k = 0; k < 3; k++) {
-        g->u_q44[k] = (int64_t)floor(scale * (u[k] * c - v[k] * s) * Q44);
-        g->v_q44[k] = (int64_t)floor(scale * (u[k] * s + v[k] * c) * Q44);
+        g->a_q44[PROGRAM_U][k] = (int64_t)floor(scale * (u[k] * c - v[k] * s) * Q44);
+        g->a_q44[PROGRAM_Q][k] = (int64_t)floor(scale * (u[k] * s + v[k] * c) * Q44);
     }
 }
 
@@ -101,9 +102,9 @@ static int64_t size_of(int64_t a)
 /* s(z) from the middle, as newton_step adds it up. */
 static int32_t arc_from_middle(const struct kernel_fixed_segment *k, int32_t z)
 {
-    int32_t value = k->s_q30[5];
+    int32_t value = k->arc.s_q30[5];
     for (int i = 4; i >= 1; i--) {
-        value = qmath_mul_hi(value, z) + k->s_q30[i];
+        value = qmath_mul_hi(value, z) + k->arc.s_q30[i];
     }
     return qmath_mul_hi(value, z);
 }
@@ -111,7 +112,7 @@ static int32_t arc_from_middle(const struct kernel_fixed_segment *k, int32_t z)
 /* At z, also where no arc length is: s(z), w, and sigma through its reciprocal, which the tangent refines. */
 static void hold_at(const struct kernel_fixed_segment *k, int32_t z, int is_straight)
 {
-    int32_t reciprocal = slope_reciprocal_q15(k, z);
+    int32_t reciprocal = slope_reciprocal_q15(&k->arc, z);
     int32_t half = arc_from_middle(k, z);
     TEST_ASSERT_TRUE(reciprocal >= RECIPROCAL_LEAST_Q15 && reciprocal <= RECIPROCAL_MOST_Q15);
     TEST_ASSERT_TRUE(z >= 0 ? half >= 0 : half <= 0);
@@ -120,7 +121,7 @@ static void hold_at(const struct kernel_fixed_segment *k, int32_t z, int is_stra
     int32_t v = quadratic(k->v_q28, z);
     TEST_ASSERT_TRUE(size_of(u) < W_BELOW_Q28 && size_of(v) < W_BELOW_Q28);
     int32_t sigma = qmath_mul_hi(u * 8, u * 8) + qmath_mul_hi(v * 8, v * 8);
-    int32_t before = slope_reciprocal_q15(k, z < 0 ? z + LAST_STEP : z - LAST_STEP);
+    int32_t before = slope_reciprocal_q15(&k->arc, z < 0 ? z + LAST_STEP : z - LAST_STEP);
     int32_t error = (1 << 25) - qmath_mul_hi(sigma, before * (1 << 11));
     TEST_ASSERT_TRUE(is_straight || size_of(error) < ERROR_BELOW_Q25);
 }
@@ -128,11 +129,11 @@ static void hold_at(const struct kernel_fixed_segment *k, int32_t z, int is_stra
 static void hold_to_contracts(const struct kernel_fixed_segment *k, int is_straight)
 {
     for (int side = 0; side < 2; side++) {
-        int32_t first = k->inverse[side].g_q26[0] / 2;
-        int32_t last = 3 * (1 << 26) - 2 * first - k->inverse[side].g_q26[1] / 4;
+        int32_t first = k->arc.inverse[side].g_q26[0] / 2;
+        int32_t last = 3 * (1 << 26) - 2 * first - k->arc.inverse[side].g_q26[1] / 4;
         TEST_ASSERT_TRUE(first >= START_LEAST_Q26 && first <= START_MOST_Q26);
         TEST_ASSERT_TRUE(last >= START_LEAST_Q26 && last <= START_MOST_Q26);
-        TEST_ASSERT_TRUE(k->inverse[side].scale_q26 >= (1 << 27) - (1 << 18));
+        TEST_ASSERT_TRUE(k->arc.inverse[side].scale_q26 >= (1 << 27) - (1 << 18));
     }
     for (int i = -PLACES; i <= PLACES; i++) {
         hold_at(k, i * (INT32_MAX / PLACES), is_straight);
@@ -146,13 +147,13 @@ static int64_t evaluate(const struct program_segment *g)
     struct ph_segment ph;
     struct kernel_fixed_segment fixed;
     struct kernel_double_segment doubles;
-    int64_t end_q48[3];
+    int64_t end_q48[PH_AXES];
     int64_t worst = 0;
     ph_segment_expand(&ph, g);
     ph_segment_end(&ph, end_q48);
     kernel_fixed_segment_set(&fixed, &ph);
     kernel_double_segment_set(&doubles, &ph);
-    hold_to_contracts(&fixed, ph.u_q44[0] == 0 && ph.v_q44[0] == 0);
+    hold_to_contracts(&fixed, ph.a_q44[PROGRAM_U][0] == 0 && ph.a_q44[PROGRAM_Q][0] == 0);
     int64_t length = end_q48[PH_S] >> 8;
     for (int i = -1; i <= 9; i++) {
         int64_t at = i < 0 ? -OUTSIDE : i > 8 ? length + OUTSIDE : length / 8 * i;
@@ -199,12 +200,13 @@ static void test_w_just_below_a_power_of_two(void)
 {
     struct program_segment g;
     memset(&g, 0, sizeof g);
-    g.u_q44[0] = 17592186042818;
-    g.u_q44[1] = 17592186042763;
-    g.u_q44[2] = 17592184512282;
+    g.axis_count = PROGRAM_PLANE;
+    g.a_q44[PROGRAM_U][0] = 17592186042818;
+    g.a_q44[PROGRAM_U][1] = 17592186042763;
+    g.a_q44[PROGRAM_U][2] = 17592184512282;
     for (int sign = -1; sign <= 1; sign += 2) {
         for (int k = 0; k < 3; k++) {
-            g.u_q44[k] *= sign;
+            g.a_q44[PROGRAM_U][k] *= sign;
         }
         TEST_ASSERT_LESS_OR_EQUAL_INT64(TOLERANCE, evaluate(&g));
     }

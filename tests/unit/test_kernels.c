@@ -3,6 +3,8 @@
  * The kernels on random segments that reach the limit of the speed ratio, from 32 mm to 1e-10 mm long: the bounds of
  * docs/theory/numerics.md sections 9 to 12. (Against 50-digit arithmetic: benchmarks/kernels.py.)
  */
+#include <string.h>
+
 #include "core/crc32.h"
 #include "core/kernel_double.h"
 #include "core/kernel_fixed.h"
@@ -69,6 +71,8 @@ static void random_segment(struct program_segment *g, int binary_exponent)
     double s = uniform(-1, 1);
     double scale = 17592186044416.0;
     draw(u, v);
+    memset(g, 0, sizeof *g);
+    g->axis_count = PROGRAM_PLANE;
     for (int i = binary_exponent; i < 0; i++) {
         scale *= 0.5;
     }
@@ -76,12 +80,12 @@ static void random_segment(struct program_segment *g, int binary_exponent)
         scale *= 2;
     }
     for (int k = 0; k < 3; k++) {
-        g->u_q44[k] = (int64_t)(scale * (c * u[k] - s * v[k]));
-        g->v_q44[k] = (int64_t)(scale * (c * v[k] + s * u[k]));
+        g->a_q44[PROGRAM_U][k] = (int64_t)(scale * (c * u[k] - s * v[k]));
+        g->a_q44[PROGRAM_Q][k] = (int64_t)(scale * (c * v[k] + s * u[k]));
     }
     g->start_q40_mm = (int64_t)(golden_random(&seed) >> 3);
-    g->x_q40_mm = (int64_t)golden_random(&seed) >> 12;
-    g->y_q40_mm = (int64_t)golden_random(&seed) >> 12;
+    g->point_q40_mm[0] = (int64_t)golden_random(&seed) >> 12;
+    g->point_q40_mm[1] = (int64_t)golden_random(&seed) >> 12;
 }
 
 static int64_t worst_of(const int64_t a[2], const int64_t b[2])
@@ -107,7 +111,7 @@ static void test_kernels_agree_at_the_limit_of_the_ratio(void)
 {
     for (int i = 0; i < SEGMENTS; i++) {
         struct program_segment g;
-        int64_t end_q48[3];
+        int64_t end_q48[PH_AXES];
         random_segment(&g, (int)(golden_random(&seed) % 19u) - 17);
         ph_segment_expand(&ph, &g);
         ph_segment_end(&ph, end_q48);
@@ -184,7 +188,7 @@ static void test_ends_are_met(void)
 {
     for (int i = 0; i < SEGMENTS; i++) {
         struct program_segment g;
-        int64_t end_q48[3];
+        int64_t end_q48[PH_AXES];
         int64_t a[2];
         random_segment(&g, 1);
         ph_segment_expand(&ph, &g);
@@ -194,11 +198,11 @@ static void test_ends_are_met(void)
         }
         kernel_fixed_segment_set(&fixed, &ph);
         kernel_fixed_segment_at(&fixed, a, g.start_q40_mm);
-        TEST_ASSERT_INT64_WITHIN(4, g.x_q40_mm, a[0]);
-        TEST_ASSERT_INT64_WITHIN(4, g.y_q40_mm, a[1]);
+        TEST_ASSERT_INT64_WITHIN(4, g.point_q40_mm[0], a[0]);
+        TEST_ASSERT_INT64_WITHIN(4, g.point_q40_mm[1], a[1]);
         kernel_fixed_segment_at(&fixed, a, g.start_q40_mm + qmath_round(end_q48[PH_S], 8));
-        TEST_ASSERT_INT64_WITHIN(4, g.x_q40_mm + qmath_round(end_q48[PH_X], 8), a[0]);
-        TEST_ASSERT_INT64_WITHIN(4, g.y_q40_mm + qmath_round(end_q48[PH_Y], 8), a[1]);
+        TEST_ASSERT_INT64_WITHIN(4, g.point_q40_mm[0] + qmath_round(end_q48[PH_X], 8), a[0]);
+        TEST_ASSERT_INT64_WITHIN(4, g.point_q40_mm[1] + qmath_round(end_q48[PH_Y], 8), a[1]);
     }
 }
 
@@ -206,7 +210,7 @@ static void test_ends_are_met(void)
 static void test_expansion_of_a_line(void)
 {
     const int64_t two = (int64_t)2 << 44;
-    struct program_segment g = {0, 0, 0, {two, two, two}, {0, 0, 0}};
+    struct program_segment g = {.axis_count = PROGRAM_PLANE, .a_q44 = {{two, two, two}}};
     ph_segment_expand(&ph, &g);
     TEST_ASSERT_INT64_WITHIN(4, (int64_t)2 << 48, ph.c_q48_mm[PH_X][0]);
     TEST_ASSERT_INT64_WITHIN(4, (int64_t)2 << 48, ph.c_q48_mm[PH_X][1]);

@@ -227,9 +227,9 @@ static void check_point(void)
     const double arc = (double)now.point.arc_length_q40_mm / 1099511627776.0;
     check_arc(arc);
     if (now.line) {
-        at_most("on the line", fabs((double)(now.point.x_q40_mm - now.point.arc_length_q40_mm)),
-                400);
-        at_most("on the line", fabs((double)now.point.y_q40_mm), 0);
+        at_most("on the line",
+                fabs((double)(now.point.position_q40[0] - now.point.arc_length_q40_mm)), 400);
+        at_most("on the line", fabs((double)now.point.position_q40[1]), 0);
     } else if (now.ticks % 16u == 0 || now.feed.state == FEED_ENDED) {
         struct interpolator_point exact;
         interpolator_seek(&now.exact, now.time_q42 >> 10);
@@ -238,8 +238,8 @@ static void check_point(void)
             (void)interpolator_at_arc_length(&now.exact, now.exact.segment->to_q40_mm, &exact);
         }
         at_most("on the curve",
-                hypot((double)(exact.x_q40_mm - now.point.x_q40_mm),
-                      (double)(exact.y_q40_mm - now.point.y_q40_mm)),
+                hypot((double)(exact.position_q40[0] - now.point.position_q40[0]),
+                      (double)(exact.position_q40[1] - now.point.position_q40[1])),
                 1.1e6);
     }
     check_differences(arc);
@@ -437,8 +437,8 @@ static void check_over(void)
     TEST_ASSERT_TRUE(feed_override_feed_q32(&now.feed) == 0);
     if (ended) {
         TEST_ASSERT_TRUE(now.point.arc_length_q40_mm == now.p->program.header.length_q40_mm);
-        TEST_ASSERT_TRUE(now.point.x_q40_mm == now.interp.end.x_q40_mm &&
-                         now.point.y_q40_mm == now.interp.end.y_q40_mm);
+        TEST_ASSERT_TRUE(now.point.position_q40[0] == now.interp.end.position_q40[0] &&
+                         now.point.position_q40[1] == now.interp.end.position_q40[1]);
     }
 }
 

@@ -42,8 +42,8 @@ static void test_segment_is_read(void)
     struct program_segment g;
     program_segment_get(&p, 0, &g);
     TEST_ASSERT_EQUAL_INT64(0, g.start_q40_mm);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -20.0 / 6.0, (double)g.x_q40_mm / 1099511627776.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -35.0 / 6.0, (double)g.y_q40_mm / 1099511627776.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -20.0 / 6.0, (double)g.point_q40_mm[0] / 1099511627776.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -35.0 / 6.0, (double)g.point_q40_mm[1] / 1099511627776.0);
     program_segment_get(&p, 1, &g);
     TEST_ASSERT_EQUAL_INT64(program_segment_start(&p, 1), g.start_q40_mm);
 }

@@ -106,9 +106,9 @@ static void test_travel_is_tight(void)
     struct program_segment first;
     golden_open(&p, "alpha_quintic.hdgp");
     program_segment_get(&p, 0, &first);
-    limits.min_q40_mm[0] = first.x_q40_mm;
+    limits.min_q40_mm[0] = first.point_q40_mm[0];
     TEST_ASSERT_EQUAL_INT(0, program_check(&p, &limits, &fault));
-    limits.min_q40_mm[0] = first.x_q40_mm + ((int64_t)1 << 20);
+    limits.min_q40_mm[0] = first.point_q40_mm[0] + ((int64_t)1 << 20);
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_TRAVEL, program_check(&p, &limits, &fault));
     TEST_ASSERT_EQUAL_UINT32(0, fault.index);
     golden_close(&p);

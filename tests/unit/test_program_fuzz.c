@@ -14,8 +14,9 @@
 #include "golden.h"
 #include "unity.h"
 
-static const char *const seeds[] = {"line.hdgp", "line_tiny.hdgp", "line_slow.hdgp",
-                                    "alpha_minimax.hdgp", "star_minimax.hdgp"};
+static const char *const seeds[] = {"line.hdgp",          "line_tiny.hdgp",    "line_slow.hdgp",
+                                    "alpha_minimax.hdgp", "star_minimax.hdgp", "space3.hdgp",
+                                    "space6.hdgp"};
 
 void setUp(void)
 {
@@ -70,20 +71,21 @@ static void run_accepted(const struct program *p, const struct program_limits *l
     for (uint64_t t = from; t <= duration + step; t += step) {
         int result = interpolator_at_q42(&it, t, &point);
         TEST_ASSERT_EQUAL_INT(t >= duration ? INTERPOLATOR_END : INTERPOLATOR_OK, result);
-        TEST_ASSERT_TRUE(point.x_q40_mm >= limits->min_q40_mm[0] - (1 << 22));
-        TEST_ASSERT_TRUE(point.x_q40_mm <= limits->max_q40_mm[0] + (1 << 22));
-        TEST_ASSERT_TRUE(point.y_q40_mm >= limits->min_q40_mm[1] - (1 << 22));
-        TEST_ASSERT_TRUE(point.y_q40_mm <= limits->max_q40_mm[1] + (1 << 22));
+        for (uint32_t axis = 0; axis < p->header.axis_count; axis++) {
+            const int64_t at = point.position_q40[axis];
+            TEST_ASSERT_TRUE(at >= limits->min_q40_mm[axis] - (1 << 22));
+            TEST_ASSERT_TRUE(at <= limits->max_q40_mm[axis] + (1 << 22));
+        }
     }
 }
 
 /* What a drive sees between setpoints: differences over period, its square and its cube are means of velocity, acceleration
  * and jerk. Of four points, the last one first. */
 static void keeps_axis_limits(const struct program_limits *limits, double period_s,
-                              const double mm[4][2])
+                              uint32_t axis_count, const double mm[4][PROGRAM_AXES])
 {
     const double noise_mm = 1e-9; /* of the kernel, docs/theory/numerics.md section 10 */
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < axis_count; axis++) {
         const double one = mm[0][axis] - mm[1][axis];
         const double two = one - (mm[1][axis] - mm[2][axis]);
         const double three = two - (mm[1][axis] - 2.0 * mm[2][axis] + mm[3][axis]);
@@ -103,15 +105,17 @@ static void run_within_axis_limits(const struct program *p, const struct program
     const uint64_t period = ((uint64_t)p->header.period_us << 42) / 1000000u;
     const uint64_t duration = p->header.duration_q32_s << 10;
     struct interpolator_point point;
-    double mm[4][2];
+    double mm[4][PROGRAM_AXES];
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, p));
     for (uint32_t k = 0; k < 1000u && k * period <= duration + 3u * period; k++) {
         (void)interpolator_at_q42(&it, k * period, &point);
         memmove(mm[1], mm[0], 3 * sizeof mm[0]);
-        mm[0][0] = (double)point.x_q40_mm / unit;
-        mm[0][1] = (double)point.y_q40_mm / unit;
+        for (uint32_t axis = 0; axis < p->header.axis_count; axis++) {
+            mm[0][axis] = (double)point.position_q40[axis] / unit;
+        }
         if (k >= 3u) {
-            keeps_axis_limits(limits, 1e-6 * p->header.period_us, (const double (*)[2])mm);
+            keeps_axis_limits(limits, 1e-6 * p->header.period_us, p->header.axis_count,
+                              (const double (*)[PROGRAM_AXES])mm);
         }
     }
 }
@@ -119,7 +123,7 @@ static void run_within_axis_limits(const struct program *p, const struct program
 /* Every third image is one for a machine whose axes have limits: none, or nearly what the seeds need. */
 static void set_axis_limits(struct program_limits *limits, uint64_t random)
 {
-    for (int axis = 0; axis < 2 && random % 3u != 0u; axis++) {
+    for (uint32_t axis = 0; axis < PROGRAM_AXES && random % 3u != 0u; axis++) {
         limits->axis_velocity_um_s[axis] = 100000u + (uint32_t)(random >> 8) % 100000u;
         limits->axis_acceleration_um_s2[axis] = 2000000u + (uint32_t)(random >> 16) % 3000000u;
         limits->axis_jerk_mm_s3[axis] = 50000u + (uint32_t)(random >> 24) % 200000u;
@@ -131,7 +135,7 @@ static int try_image(uint8_t *image, uint32_t size, uint64_t random)
     struct program p;
     struct program_fault fault;
     struct program_limits limits = golden_no_limits();
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
         limits.min_q40_mm[axis] = -((int64_t)300 << 40);
         limits.max_q40_mm[axis] = (int64_t)300 << 40;
     }

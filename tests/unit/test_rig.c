@@ -49,6 +49,8 @@ static void make_program(void)
     program.image = image;
     program.size = sizeof image;
     program.header.period_us = 1000;
+    program.header.axis_count = PROGRAM_PLANE;
+    program.header.header_size = PROGRAM_HEADER_SIZE;
     program.header.segment_count = 1;
     program.header.piece_count = 1;
     program.header.duration_q32_s = UINT64_C(1) << 32;
@@ -149,7 +151,7 @@ static void test_times_and_points(void)
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &program));
     TEST_ASSERT_EQUAL_INT(0, offline_points(&interp, TICKS, times, 1000000, points, counts));
     for (int k = 0; k < TICKS; k++) {
-        TEST_ASSERT_EQUAL_INT64(rows[TICKS - 1 - k].cmd_q40_mm[0], points[k].x_q40_mm);
+        TEST_ASSERT_EQUAL_INT64(rows[TICKS - 1 - k].cmd_q40_mm[0], points[k].position_q40[0]);
         TEST_ASSERT_EQUAL_INT32(rows[TICKS - 1 - k].set_counts[0], counts[2 * k]);
         TEST_ASSERT_EQUAL_INT32(rows[TICKS - 1 - k].set_counts[1], counts[2 * k + 1]);
     }

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import canopen
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from hodograph.bus.address import BusAddress
 from hodograph.bus.goto import SHORTEST_MOVE_MM, goto, legs, line_image
 from hodograph.bus.sdo.controller import connect
-from hodograph.config import load_machine
+from hodograph.config import Machine, load_machine
 from hodograph.data import CONTROLLER_EDS
 from hodograph.errors import PlanError, RefusedError
 from hodograph.native import NativeLimits, NativeProgram
@@ -40,24 +41,43 @@ def test_short_moves(x: int, y: int, dx: int, dy: int) -> None:
     )
 
 
-def check_moves(start: tuple[int, int], end: tuple[int, int]) -> None:
-    a, b = (complex(x / 1e6, y / 1e6) for x, y in (start, end))
-    moves = legs(a, b, MACHINE)
+def check_moves(start: tuple[int, ...], end: tuple[int, ...], machine: Machine = MACHINE) -> None:
+    a, b = (tuple(n / 1e6 for n in place) for place in (start, end))
+    moves = legs(a, b, machine)
     at = start
-    limits = NativeLimits(**vars(program_limits(MACHINE)))
+    limits = NativeLimits(**vars(program_limits(machine)))
     for leg_start, leg_end in moves:
-        program = NativeProgram(line_image(leg_start, leg_end, MACHINE))
+        program = NativeProgram(line_image(leg_start, leg_end, machine))
         assert program.check(limits) is None
-        _, setpoints = program.setpoints("fixed", MACHINE.counts_per_mm)
+        _, setpoints = program.setpoints("fixed", machine.counts_per_mm)
         assert tuple(setpoints[0].tolist()) == at
         at = tuple(setpoints[-1].tolist())
     assert at == end
-    assert len(moves) == (0 if start == end else 1 if abs(b - a) >= SHORTEST_MOVE_MM else 2)
+    assert len(moves) == (0 if start == end else 1 if math.dist(a, b) >= SHORTEST_MOVE_MM else 2)
+
+
+SPACE = load_machine(MACHINE.file.with_name("mill.toml"))
+FAR = 2_000_000_000
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.tuples(*[st.integers(-FAR, FAR)] * 3), st.tuples(*[st.integers(-FAR, FAR)] * 3))
+def test_any_move_in_space(start: tuple[int, ...], end: tuple[int, ...]) -> None:
+    check_moves(start, end, SPACE)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.tuples(*[st.integers(-1_900_000_000, 1_900_000_000)] * 3),
+    st.tuples(*[st.sampled_from([0, 1, -1, 1999, -2500, 60_000_000])] * 3),
+)
+def test_short_moves_and_moves_along_an_axis(start: tuple[int, ...], way: tuple[int, ...]) -> None:
+    check_moves(start, tuple(a + b for a, b in zip(start, way, strict=True)), SPACE)
 
 
 def test_outside_the_travel() -> None:
     with pytest.raises(PlanError, match="travel"):
-        line_image(0j, 300 + 0j, MACHINE)
+        line_image((0.0, 0.0), (300.0, 0.0), MACHINE)
 
 
 def test_an_override_of_0_is_said() -> None:

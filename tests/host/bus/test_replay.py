@@ -48,9 +48,9 @@ def motion(pipeline: Pipeline) -> Motion:
 def run_of(motion: Motion) -> tuple[Counts, Counts, Counts]:
     """Targets, positions, volts of standing, the run, standing; positions two SYNCs behind their setpoints."""
     rows = motion.rows
-    targets = padded(rows["set_counts"], STANDING, STANDING)
-    actual = padded(rows["act_counts"], STANDING + 2, STANDING - 2)
-    volts = padded(rows["volts_mv"], STANDING + 2, STANDING - 2)
+    targets = padded(rows["set_counts"][:, :2], STANDING, STANDING)
+    actual = padded(rows["act_counts"][:, :2], STANDING + 2, STANDING - 2)
+    volts = padded(rows["volts_mv"][:, :2], STANDING + 2, STANDING - 2)
     return targets, actual, volts
 
 
@@ -117,7 +117,7 @@ def test_the_figures_of_the_simulation(
 def test_a_run_among_other_things(frames: Frames, pipeline: Pipeline, motion: Motion) -> None:
     """Booting (SYNCs alone), a move to the start, the run; then a second run that was stopped half-way."""
     booting = np.concatenate([frame(0x080, bytes([j % 240 + 1])) for j in range(500)])
-    start = motion.rows["set_counts"][0].astype(np.int64)
+    start = motion.rows["set_counts"][:, :2][0].astype(np.int64)
     way = start + np.arange(400, -1, -1)[:, None] * [30, 20]
     there = recorded(way, way, np.zeros_like(way), 500)
     run = recorded(*run_of(motion), 500 + len(way))

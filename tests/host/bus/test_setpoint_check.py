@@ -325,3 +325,52 @@ def test_circles_at_any_speed_are_no_jump(steps: int, radius: float, phase: floa
         angle = phase + place / (10 * radius)
         stream.tick(10 * radius * math.cos(angle), 10 * radius * math.sin(angle))
     assert jumps(stream, StepLimits(200.0, 100.0)) == []
+
+
+IN_SPACE = StepLimits(speed=200.0, acceleration=100.0, path=3)
+
+
+def helix(radius: float, steps: int) -> Stream:
+    """At 200 counts a tick, a third of it upwards; x and y alone change their speed by more than the limit."""
+    stream, place, speed = Stream(), 0.0, 0.0
+    for k in range(steps + 10):
+        speed = min(speed + 90.0, 200.0) if k < steps else max(speed - 90.0, 0.0)
+        place += speed
+        angle = 0.94 * place / radius
+        stream.tick(radius * math.cos(angle), 0.34 * place, radius * math.sin(angle))
+    return stream
+
+
+@pytest.mark.parametrize("radius", [150.0, 400.0, 5000.0])
+def test_a_path_in_space_is_drawn_by_three_axes(radius: float) -> None:
+    stream = helix(radius, 80)
+    assert jumps(stream, IN_SPACE, (2, 3, 4)) == []
+    if radius < 200:
+        two = StepLimits(speed=200.0, acceleration=20.0, path=2)
+        assert any(found.startswith("acceleration") for found in jumps(stream, two, (2, 3, 4)))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_jump_of_each_axis_in_space(axis: int) -> None:
+    stream = Stream()
+    for k in range(20):
+        place = [100.0 * min(k, 1), 0.0, 50.0]
+        place[axis] += 320.0 if k > 10 else 0.0
+        stream.tick(*place)
+    found = find_jumps(stream.packed(), (2, 3, 4), IN_SPACE)
+    assert found[0].sync == 11
+    assert "axis 1, 2 and 3: speed" in str(found[0])
+
+
+def test_an_extra_axis_keeps_its_own_limits_only() -> None:
+    """Its counts are not those of mm: speed along the path says nothing about it."""
+    free = (math.inf, math.inf, math.inf)
+    own = StepLimits(200.0, 100.0, axes=(free, free, free, (500.0, 500.0, math.inf)), path=4)
+    stream = Stream()
+    for k in range(10):
+        stream.tick(0, 0, 0, 400 * k)
+    nodes = (2, 3, 4, 5)
+    assert jumps(stream, own, nodes) == []
+    assert "axis speed@10" in jumps(stream.tick(0, 0, 0, 400 * 9 + 600), own, nodes)
+    holds = StepLimits(200.0, 100.0, axes=(free,) * 4, path=3)
+    assert "speed@1" in jumps(stream, holds, nodes)

@@ -53,7 +53,7 @@ def test_rows_are_what_simulate_gives(write: Write, tmp_path: Path) -> None:
     assert [row["path"] for row in rows] == ["alpha", "alpha", "path", "path"]
     assert rows[0]["encoders_sha256"].startswith("81c8a7cb")
     pipeline = load_pipeline(EXAMPLES / "alpha.toml")
-    drives = pipeline.machine.models(pipeline.machine.plane)
+    drives = pipeline.machine.models(pipeline.machine.path_axes)
     for row, faults in (
         (rows[0], ()),
         (rows[1], (OfflineFault("encoder-jump", 1, 50, 2**32 - 1, 9000),)),
@@ -188,7 +188,7 @@ def test_machine_of_the_campaign(write: Write, tmp_path: Path) -> None:
     text += f'[[gains]]\nname = "heart"\n[[gains]]\nname = "alpha"\nmachine = "{MACHINE}"\n'
     assert run(write(text), tmp_path / "out") == 0
     pipeline = load_pipeline(tmp_path / "path.toml", EXAMPLES / "machines" / "paper_heart.toml")
-    own = simulate(pipeline.image, pipeline.machine.models(pipeline.machine.plane))
+    own = simulate(pipeline.image, pipeline.machine.models(pipeline.machine.path_axes))
     rows = table(tmp_path / "out")
     assert rows[0]["encoders_sha256"] == own.encoders_sha256
     assert rows[1]["encoders_sha256"] != own.encoders_sha256

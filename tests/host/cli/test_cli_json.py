@@ -82,11 +82,11 @@ def test_spline_in_space(capsys: pytest.CaptureFixture[str]) -> None:
     assert re.search(r"s mm +x mm +y mm +z mm +curvature /mm +torsion /mm\n", out)
 
 
-@pytest.mark.parametrize("command", ["feed", "compile", "inspect", "verify", "simulate", "report"])
-def test_a_path_in_space_has_no_program_yet(
-    capsys: pytest.CaptureFixture[str], command: str
+def test_a_command_for_paths_in_the_plane_refuses_one_in_space(
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main([command, str(EXAMPLES / "helix.toml")]) == 3
+    machine = str(EXAMPLES / "machines/paper_alpha.toml")
+    assert main(["tune", machine, "--path", str(EXAMPLES / "helix.toml")]) == 3
     caught = capsys.readouterr()
     assert caught.out == ""
     assert re.fullmatch(r".*helix\.toml: \[path\] has points \[x, y, z\]: .*\n", caught.err)
@@ -221,6 +221,13 @@ def test_paper(capsys: pytest.CaptureFixture[str]) -> None:
         assert curve["peak_jerk_plain_mm_s3"]["ours"] == pytest.approx(1e5 / 3**0.5, rel=1e-6)
         assert curve["peak_jerk_modified_mm_s3"]["ours"] < 48200
     assert found["heart"]["vector_jerk_mm_s3_over_limit"]["ours"] > 1.3
+    for name, plain, delayed in (("alpha", 10.51, 10.58), ("heart", 10.57, 10.87)):
+        rows = found[name]
+        assert rows["contour_error_um"]["ours_1ms"] == pytest.approx(plain, abs=0.02)
+        assert rows["contour_error_delayed_um"]["ours_1ms"] == pytest.approx(delayed, abs=0.02)
+        assert rows["max_volts_delayed"]["ours_1ms"] < 3.9
+        assert rows["contour_error_um"]["ours"] > 20.0
+        assert rows["n_c"]["ours_1ms"] is None
     assert found["alpha"]["vector_jerk_mm_s3_over_limit"]["ours"] < 0.5
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from hodograph.config import Feedforward, Homing, Scaling, Supervision, load_drive, load_machine
+from hodograph.config.rewrite import drive_text
 from hodograph.errors import InputError
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -42,7 +44,7 @@ def test_machines_of_the_paper(name: str) -> None:
     assert machine.period_us == 1000
     assert machine.counts_per_mm == 1_000_000
     assert machine.start_tolerance_counts == 5000
-    assert machine.offset_mm == 0
+    assert machine.offset_mm == (0.0, 0.0)
     assert machine.supervision == Supervision(100, 1, 200)
     for axis in machine.axes:
         assert axis.homing == Homing(0, 0.0, 10.0, 1.0, 100.0)
@@ -66,7 +68,7 @@ def test_every_key_of_real_drives() -> None:
     assert x.scaling == Scaling(131072, 10_000_000, 1, 1)
     assert y.homing.method == 37
     assert (z.drive, z.feedforward.has_torque) == (None, False)
-    assert machine.plane == (x, y)
+    assert machine.path_axes == (x, y)
     with pytest.raises(InputError, match="axis x cannot be simulated without a model"):
         machine.models(machine.axes)
 
@@ -111,6 +113,10 @@ MISTAKES = [
     ("node = 3", "node = 3\nfeedforward = {velocity = 2.5}", r"\[axis 2.feedforward\] velocity must be from 0 to 2"),
     ("node = 3", "node = 3\nfeedforward = {torque_permille_s_mm = 1}", r'did you mean "torque_permille_s_m"\?'),
     ("node = 3", "node = 3\nscaling = {gear_motor_revolutions = 0}", r"both or none"),
+    ("node = 3", 'node = 3\nunit = "inch"', r'unit cannot be "inch"; use one of: mm, deg'),
+    ("node = 3", "node = 3\ntravel_deg = [0, 1]", r"travel_deg does not fit: the axis does not turn, use travel_mm"),
+    ("node = 3", 'node = 3\nunit = "deg"', r"travel_mm does not fit: the axis turns, use travel_deg"),
+    ("node = 3", "node = 3\nhoming = {method = 17, speed_deg_s = 1}", r"speed_deg_s does not fit: .* use speed_mm_s"),
     ("node = 3", "node = 3\nscaling = {feed_counts_per_rev = 1e6}", r"feed_counts_per_rev must be a whole number"),
 ]  # fmt: skip
 
@@ -139,10 +145,102 @@ def test_one_to_six_axes(tmp_path: Path, count: int) -> None:
     machine = load_machine(file)
     assert machine.nodes == tuple(range(2, 2 + count))
     if count > 1:
-        assert [axis.name for axis in machine.plane] == ["a2", "a3"]
+        assert [axis.name for axis in machine.path_axes] == ["a2", "a3"]
         return
     with pytest.raises(InputError, match=r"has one axis \(a2\), a path needs two: add a second"):
-        _ = machine.plane
+        _ = machine.path_axes
+
+
+PATHS = [
+    ("path = 3", r"\[path\] must be a list of texts, but is 3"),
+    ("path = []", r"must be a list of texts"),
+    ('path = ["x", 2]', r"must be a text, but is 2"),
+    ('path = ["x"]', r"names one axis: it takes two, or three to 6"),
+    ('path = ["x", "q"]', r'names "q", but the axes are x, y, z, a, c'),
+    ('path = ["x", "y", "x"]', r'names "x" twice'),
+    ('path = ["x", "y", "a"]', r"axis a turns, but a path is drawn by the first three of its axes"),
+    ('path = ["c", "y"]', r"axis c turns, but a path is drawn by the first two of its axes"),
+    ('path = ["x", "y", "z", "a", "c", "b", "d"]', r'names "b", but the axes are'),
+    ('path = ["x", "y", "z"]', r"offset_mm must be three numbers \[a, b, c\], but is \[0, 0, 0, 0, 0\]"),
+    ('pth = ["x", "y", "z"]', r'did you mean "path"\?'),
+]  # fmt: skip
+
+
+def five_axes(folder: Path, path: str) -> Path:
+    shutil.copytree(EXAMPLES, folder / "examples")
+    file = folder / "examples" / "machines" / "mill_five_axes.toml"
+    lines = file.read_text().splitlines(keepends=True)
+    at = next(i for i, line in enumerate(lines) if line.startswith("path = "))
+    file.write_text("".join([*lines[:at], path + "\n", *lines[at + 1 :]]))
+    return file
+
+
+@pytest.mark.parametrize(("path", "message"), PATHS, ids=[m[0] for m in PATHS])
+def test_mistakes_in_the_path(tmp_path: Path, path: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        load_machine(five_axes(tmp_path, path))
+    assert "mill_five_axes.toml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_path_needs_names_that_differ(tmp_path: Path) -> None:
+    file = five_axes(tmp_path, 'path = ["x", "y", "z", "a", "c"]')
+    file.write_text(
+        file.read_text().replace('name = "c"', 'name = "a"').replace('"a", "c"]', '"a"]')
+    )
+    with pytest.raises(InputError, match='names "a", which two axes are called'):
+        load_machine(file)
+
+
+def test_axes_are_in_the_order_of_the_path(tmp_path: Path) -> None:
+    machine = load_machine(five_axes(tmp_path, 'path = ["z", "x", "y", "c", "a"]'))
+    assert [axis.name for axis in machine.axes] == ["z", "x", "y", "c", "a"]
+    assert machine.nodes == (4, 2, 3, 6, 5)
+    text = machine.file.read_text().replace("offset_mm = [0, 0, 0, 0, 0]", "offset_mm = [1, -2]")
+    machine.file.write_text(text.replace('["z", "x", "y", "c", "a"]', '["z", "y"]'))
+    machine = load_machine(machine.file)
+    assert [axis.name for axis in machine.path_axes] == ["z", "y"]
+    assert [axis.name for axis in machine.axes] == ["z", "y", "x", "a", "c"]
+    assert machine.offset_mm == (1.0, -2.0)
+
+
+def test_machines_in_space() -> None:
+    mill = load_machine(EXAMPLES / "machines" / "mill.toml")
+    assert [(a.name, a.unit, a.counts_per_unit) for a in mill.path_axes] == [
+        (name, "mm", 1_000_000) for name in "xyz"
+    ]
+    assert mill.offset_mm == (0.0, 0.0, 0.0)
+    five = load_machine(EXAMPLES / "machines" / "mill_five_axes.toml")
+    a, c = five.path_axes[3:]
+    assert (a.unit, a.counts_per_unit, a.turns) == ("deg", 100_000, True)
+    assert (a.travel_min_mm, a.travel_max_mm) == (-120, 120)
+    assert (c.velocity_mm_s, c.acceleration_mm_s2, c.jerk_mm_s3) == (360, 3600, 90_000)
+    assert c.quick_stop_mm_s2 == 3600  # of the axis itself
+    assert five.counts_per_mm == 1_000_000
+
+
+def test_every_key_of_an_axis_that_turns(tmp_path: Path) -> None:
+    file = five_axes(tmp_path, 'path = ["x", "y", "z", "a", "c"]')
+    file.write_text(
+        file.read_text()
+        + "following_window_deg = 2\nquick_stop_deg_s2 = 1000\n"
+        + "[axis.homing]\nmethod = 17\noffset_deg = 3\nspeed_deg_s = 4\nslow_deg_s = 0.5\nacceleration_deg_s2 = 7\n"
+        + "[axis.feedforward]\nvelocity = 1\ntorque_permille_s2_kdeg = 8\ntorque_permille_s_kdeg = 9\n"
+    )
+    c = load_machine(file).axes[4]
+    assert (c.following_window_mm, c.quick_stop_mm_s2) == (2, 1000)
+    assert c.homing == Homing(17, 3, 4, 0.5, 7)
+    assert c.feedforward == Feedforward(1, 8, 9)
+
+
+def test_a_path_that_is_not_named_may_not_turn(tmp_path: Path) -> None:
+    file = five_axes(tmp_path, "")
+    text = file.read_text().replace("offset_mm = [0, 0, 0, 0, 0]", "")
+    head, *axes = text.split("[[axis]]")
+    file.write_text("[[axis]]".join([head, axes[3], *axes[:3], axes[4]]))
+    machine = load_machine(file)
+    with pytest.raises(InputError, match="axis a turns, but a path is drawn by the first two"):
+        _ = machine.path_axes
 
 
 def test_scaling_from_the_screw(tmp_path: Path) -> None:
@@ -171,6 +269,27 @@ def test_servo_of_a_simulated_drive(tmp_path: Path) -> None:
     )
     drive = load_drive(file)
     assert (drive.interpolation, drive.speed, drive.delay_samples) == ("cubic", "differences", 1)
+
+
+def test_gains_in_radians_of_the_motor(tmp_path: Path) -> None:
+    by_way = load_drive(EXAMPLES / "drives" / "alpha_x.toml")
+    by_motor = load_drive(EXAMPLES / "drives" / "alpha_x_1ms.toml")
+    assert (by_motor.integral, by_motor.interpolation) == ("forward", "none")
+    for gain in ("k_pp_rad_s_mm", "k_pf_rad_mm"):
+        larger = getattr(by_motor, gain) * by_motor.screw_mm_rad
+        assert larger == pytest.approx(getattr(by_way, gain), rel=1e-15)
+    file = tmp_path / "drive.toml"
+    text = (EXAMPLES / "drives" / "alpha_x_1ms.toml").read_text()
+    file.write_text(text.replace("k_pp_per_s =", "k_pp_rad_s_mm = 1\nk_pp_per_s ="))
+    with pytest.raises(InputError, match=r"k_pp_per_s and k_pp_rad_s_mm are one gain in two units"):
+        load_drive(file)
+    file.write_text(text)
+    changed = drive_text(file, by_motor, replace(by_motor, k_pp_rad_s_mm=50.0, k_vf=0.9))
+    assert "k_pp_per_s = 79.5" in changed
+    assert "k_pp_rad_s_mm" not in changed
+    file.write_text(changed)
+    assert load_drive(file).k_pp_rad_s_mm == pytest.approx(50.0, rel=1e-15)
+    assert load_drive(file).k_pf_rad_mm == by_motor.k_pf_rad_mm
 
 
 @pytest.mark.parametrize(

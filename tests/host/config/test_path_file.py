@@ -270,7 +270,9 @@ def test_a_path_in_space(tmp_path: Path) -> None:
     np.testing.assert_array_equal(path.start_tangent, [0, 0, -1])
     assert path.end_tangent is None
     assert path.knots == "centripetal"
-    with pytest.raises(PlanError, match=r"points \[x, y, z\]: only the command spline"):
+    with pytest.raises(
+        PlanError, match=r"points \[x, y, z\]: this command takes a path in the plane"
+    ):
         found.require_planar()
 
 

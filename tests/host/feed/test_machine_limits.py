@@ -52,7 +52,9 @@ def test_two_points_nearly_equal(tmp_path: Path, profile: str, policy: str) -> N
     on = machine()
     made = pipeline(tmp_path, NEAR, profile, policy, on)
     found = verify_program(
-        made.program, Limits(machine=made.limits.machine), [a.drive for a in on.plane if a.drive]
+        made.program,
+        Limits(machine=made.limits.machine),
+        [a.drive for a in on.path_axes if a.drive],
     )
     peaks = {peak.quantity: peak for peak in found.peaks}
     for name in QUANTITIES:

@@ -36,18 +36,18 @@ def recording(
 ) -> Frames:
     """The run of a pipeline's program by these drives; normal noise on what they report."""
     machine = pipeline.machine
-    motion = simulate(pipeline.image, drives, feedforward=machine.plane_feedforward)
+    motion = simulate(pipeline.image, drives, feedforward=machine.path_feedforward)
     rows, noise = motion.rows, np.random.default_rng(seed)
     rest, volts_at_rest = (
-        np.repeat(rows["set_counts"][:1], REST + 2, axis=0),
+        np.repeat(rows["set_counts"][:, :2][:1], REST + 2, axis=0),
         np.zeros((REST + 2, 2)),
     )
-    targets = np.concatenate([rest[:REST], rows["set_counts"]])
-    actual = np.concatenate([rest, rows["act_counts"]])
-    volts = np.concatenate([volts_at_rest, rows["volts_mv"]])
+    targets = np.concatenate([rest[:REST], rows["set_counts"][:, :2]])
+    actual = np.concatenate([rest, rows["act_counts"][:, :2]])
+    volts = np.concatenate([volts_at_rest, rows["volts_mv"][:, :2]])
     actual = actual + np.rint(noise.normal(0, noise_counts, actual.shape)).astype(np.int64)
     volts = volts + np.rint(noise.normal(0, noise_mv, volts.shape))
-    offsets = _torques(pipeline, rows["cmd_q40_mm"], motion.ticks)
+    offsets = _torques(pipeline, rows["cmd_q40_mm"][:, :2], motion.ticks)
     frames: list[tuple[int, bytes]] = []
     for j in range(len(targets)):
         frames.append((0x80, bytes([j % 240 + 1])))
@@ -67,7 +67,7 @@ def _torques(
 ) -> NDArray[np.int64] | None:
     """Torque offsets by docs/reference/protocol.md section 3.2, in floating point: rounding may differ by
     one per mille."""
-    forward = pipeline.machine.plane_feedforward
+    forward = pipeline.machine.path_feedforward
     if forward is None:
         return None
     points = np.concatenate([cmd_q40[:1], cmd_q40[:1], cmd_q40]) * 2.0**-40
@@ -89,5 +89,5 @@ def packed(frames: list[tuple[int, bytes]]) -> Frames:
 
 def drives_of(name: str) -> tuple[Drive, Drive]:
     machine = load_machine(EXAMPLES / "machines" / f"{name}.toml")
-    x, y = machine.models(machine.plane)
+    x, y = machine.models(machine.path_axes)
     return x, y

@@ -139,7 +139,7 @@ def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None
         found = tomllib.loads(section[section.index("[plant]") :])["plant"]
         assert found["gain_rad_s_v"] == pytest.approx(drive.gain_rad_s_v, rel=0.005)
     written = load_machine(output)
-    for drive, axis in zip(drives, written.plane, strict=True):
+    for drive, axis in zip(drives, written.path_axes, strict=True):
         assert axis.drive is not None
         assert axis.drive.k_pp_rad_s_mm == drive.k_pp_rad_s_mm
         assert axis.drive.gain_rad_s_v != drive.gain_rad_s_v

@@ -19,7 +19,7 @@ COUNTS_PER_MM = 1_000_000
 
 def rows_of(chunk: int, path: ProgramPath | None) -> Rows:
     _, frames = alpha()
-    decoder, derivation = Decoder((2, 3)), Derivation(2, COUNTS_PER_MM, 1000)
+    decoder, derivation = Decoder((2, 3)), Derivation((COUNTS_PER_MM,) * 2, 2, 1000)
     parts = [
         derivation.feed(decoder.feed(part), path)
         for part in np.split(frames, range(chunk, frames.size, chunk))
@@ -98,7 +98,7 @@ def test_the_fit_is_exact_for_polynomials(derivative: int) -> None:
 def test_missing_values_do_not_spread_for_ever() -> None:
     _, frames = alpha()
     frames = np.delete(frames, slice(2500, 2525))  # five SYNCs
-    decoder, derivation = Decoder((2, 3)), Derivation(2, COUNTS_PER_MM, 1000)
+    decoder, derivation = Decoder((2, 3)), Derivation((COUNTS_PER_MM,) * 2, 2, 1000)
     rows = derivation.feed(decoder.feed(frames), None)
     assert np.count_nonzero(np.isnan(rows.feed_mm_s)) < 40
     assert np.all(np.diff(rows.t_s) > 0)

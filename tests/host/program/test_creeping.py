@@ -66,10 +66,8 @@ def creeping_program(back: float) -> Program:
         duration_q32_s=2 * DURATION_S << 32,
         length_q40=length_by_segments,
         start_q40=start,
-        x_q40=start,
-        y_q40=zeros,
-        u_q44=u,
-        v_q44=np.zeros_like(u),
+        point_q40=np.stack((start, zeros)),
+        a_q44=np.stack((u, np.zeros_like(u))),
         pieces=pieces,
         stops=no_stops(2),
     )

@@ -33,7 +33,7 @@ def make_case(name: str) -> Case:
     )
     plan = plan_feed(spline.length_mm, path.feed, path.limits, limits)
     image = encode(compile_program(spline, plan, ProgramOptions(name=name)))
-    x, y = machine.models(machine.plane)
+    x, y = machine.models(machine.path_axes)
     drives = (x, y)
     return Case(image, drives, spline, simulate(image, drives))
 

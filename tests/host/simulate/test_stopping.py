@@ -42,7 +42,9 @@ def test_a_stop_rests_within_its_bound_and_limits(file, kind) -> None:
     program = NativeProgram(pipeline.image)
     axis, path = (2000.0, 50000.0), (2000.0, 50000.0)
     for at_s in np.linspace(0.0, pipeline.program.duration_s, 14)[:-1].tolist():
-        found = simulate_stop(program, pipeline.machine.models(pipeline.machine.plane), kind, at_s)
+        found = simulate_stop(
+            program, pipeline.machine.models(pipeline.machine.path_axes), kind, at_s
+        )
         assert found.rest_after_s <= found.bound_s
         assert found.distance_mm >= 0.0
         if kind == "fault":
@@ -57,7 +59,7 @@ def test_a_stop_rests_within_its_bound_and_limits(file, kind) -> None:
 
 def test_until_the_stop_the_run_is_the_undisturbed_one() -> None:
     pipeline = load_pipeline(ALPHA)
-    drives = pipeline.machine.models(pipeline.machine.plane)
+    drives = pipeline.machine.models(pipeline.machine.path_axes)
     whole = simulate(pipeline.image, drives)
     found = simulate_stop(NativeProgram(pipeline.image), drives, "fault", 0.3)
     assert np.array_equal(found.motion.rows["set_counts"][:300], whole.rows["set_counts"][:300])

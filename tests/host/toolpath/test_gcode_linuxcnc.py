@@ -13,6 +13,7 @@ from hodograph.errors import ToolpathError
 from hodograph.toolpath.gcode import Options, read_gcode
 from hodograph.toolpath.moves import Command
 from linuxcnc import TOOLS, Item, canonical, difference, programs, run_rs274, unpacked
+from mutated_files import mutated
 
 pytestmark = pytest.mark.long
 
@@ -275,6 +276,34 @@ class _Writer:
             self._flow() if self._random.random() < 0.08 else self._block() for _ in range(count)
         ]
         return ["G21 G90 F600", "#31=1.5 #32=2 #33=-3", *pieces]
+
+
+SOUND = Path(__file__).resolve().parents[2] / "data" / "toolpaths" / "sound.ngc"
+
+
+def _disagreement_of_mutated(program: Path, data: bytes) -> str:
+    """What speaks against the reader where it reads a mutated program; empty if nothing does, or if it refuses."""
+    program.write_bytes(data)
+    found, refusal = ours(program)
+    if refusal:
+        return "" if re.match(rf"{program.name}:\d+:\d+: .", refusal) else f"no place: {refusal}"
+    if b"G20" in data or b"M6" in data:
+        return ""  # rs274 reads tool offsets in the new unit, and takes up the position that it printed last
+    said = run_rs274(program)
+    mine = canonical(found)
+    if said.error and _NO_END not in said.error:
+        return difference(_only_moves(said.items), _only_moves(mine), _TOLERANCE_MM, is_part=True)
+    return difference(_only_moves(mine), _only_moves(said.items), _TOLERANCE_MM)
+
+
+@pytest.mark.parametrize("part", range(100))
+def test_mutated_programs_that_are_read_have_the_same_moves(part: int, tmp_path: Path) -> None:
+    sound = SOUND.read_bytes()
+    wrong = []
+    for seed in range(part * 1000, part * 1000 + 1000):
+        text = _disagreement_of_mutated(tmp_path / "mutated.ngc", mutated(sound, seed))
+        wrong += [f"{seed}: {text}"] if text else []
+    assert not wrong, "\n".join(wrong)
 
 
 _STRICTER = (

@@ -17,5 +17,5 @@ def machine() -> Machine:
 
 @pytest.fixture(scope="session")
 def drives(machine: Machine) -> tuple[Drive, Drive]:
-    x, y = machine.models(machine.plane)
+    x, y = machine.models(machine.path_axes)
     return x, y

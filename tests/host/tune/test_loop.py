@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hodograph.config import Drive
+from hodograph.names import INTEGRALS
 from hodograph.native import DriveModel
 from hodograph.tune.design import Poles, feedforward_of, stiffness_n_um, with_poles
 from hodograph.tune.loop import loop_of, margins
@@ -19,8 +20,9 @@ Drives = tuple[Drive, Drive]
 
 @pytest.mark.parametrize("sensed", [False, True])
 @pytest.mark.parametrize("hz", [2.0, 20.0, 60.0])
+@pytest.mark.parametrize("integral", INTEGRALS)
 def test_closed_loop_is_that_of_the_simulated_drive(
-    drives: Drives, hz: float, sensed: bool
+    drives: Drives, hz: float, sensed: bool, integral: str
 ) -> None:
     drive = replace(
         with_poles(drives[0], Poles(1000.0, 0.7, 200.0)) if sensed else drives[0],
@@ -28,6 +30,7 @@ def test_closed_loop_is_that_of_the_simulated_drive(
         volts_limit=30.0,
         speed="differences" if sensed else "exact",
         delay_samples=int(sensed),
+        integral=integral,
     )
     rad_s, amplitude_mm, periods = 2 * math.pi * hz, 0.4 / hz, 2000
     t_s = np.arange(1, periods + 1) * 1e-3

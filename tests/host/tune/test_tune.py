@@ -51,8 +51,8 @@ def test_the_example_machine_has_a_contour_error_of_its_encoder(
     errors = []
     for pipeline in (plain, tuned):
         machine = pipeline.machine
-        drives = machine.models(machine.plane)
-        motion = simulate(pipeline.image, drives, feedforward=machine.plane_feedforward)
+        drives = machine.models(machine.path_axes)
+        motion = simulate(pipeline.image, drives, feedforward=machine.path_feedforward)
         assert motion.max_volts < 5.0
         errors.append(motion.max_contour_error_um)
     assert errors[0] == pytest.approx(paper_um, abs=within)
@@ -69,8 +69,8 @@ def test_the_example_machine_is_what_tune_finds(
     pipeline = load_pipeline(EXAMPLES / "alpha.toml", machine.file)
     found = tune(machine, [pipeline], Asked(interpolation="cubic"))
     example = load_machine(MACHINES / "tuned.toml")
-    assert found.drives == example.models(example.plane)
-    assert found.feedforward == example.plane_feedforward
+    assert found.drives == example.models(example.path_axes)
+    assert found.feedforward == example.path_feedforward
     assert found.tried == 1
     nominal = found.paths[0].cases[0]
     assert nominal.given.contour_error_um == pytest.approx(21.353, abs=0.001)
@@ -84,9 +84,9 @@ def test_straight_lines_and_late_sensing_keep_the_goals_too(
     pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
     late = [
         replace(drive, speed="differences", delay_samples=1, interpolation="cubic")
-        for drive in machine.models(machine.plane)
+        for drive in machine.models(machine.path_axes)
     ]
-    axes = tuple(replace(a, drive=d) for a, d in zip(machine.plane, late, strict=True))
+    axes = tuple(replace(a, drive=d) for a, d in zip(machine.path_axes, late, strict=True))
     asked = Asked(bandwidth_hz=214.5, damping=0.85)
     errors = []
     for given in (machine, replace(machine, axes=axes)):
@@ -117,8 +117,8 @@ def test_volts_that_a_plan_leaves_are_for_weaker_plants(
     file.write_text(text)
     pipeline = load_pipeline(file, MACHINES / "tuned.toml")
     drives, forward = (
-        pipeline.machine.models(pipeline.machine.plane),
-        pipeline.machine.plane_feedforward,
+        pipeline.machine.models(pipeline.machine.path_axes),
+        pipeline.machine.path_feedforward,
     )
     weak = next(case for case in CASES if case.name == "gain -20 %")
     found = outcome(pipeline.image, 1_000_000, (drives[0], drives[1]), forward, weak)

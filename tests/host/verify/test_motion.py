@@ -25,7 +25,7 @@ def exact_point(
     tau = t / mp.mpf(2) ** one.exponent
     arc = one.start_q40 + sum(c * tau ** (k + 1) for k, c in enumerate(one.c_q40))
     arc = (arc - int(program.start_q40[segment])) / mp.mpf(2) ** 40
-    u, v = ([mp.mpf(int(c)) / 2**44 for c in w[segment]] for w in (program.u_q44, program.v_q44))
+    u, v = ([mp.mpf(int(c)) / 2**44 for c in w[segment]] for w in program.a_q44)
     w = [mp.mpc(a, b) for a, b in zip(u, v, strict=True)]
     power = [w[0], 2 * (w[1] - w[0]), w[0] - 2 * w[1] + w[2]]
 

@@ -19,8 +19,8 @@ def test_differences_are_those_of_the_kernels_and_near_the_derivatives(name: str
     found = {one.kernel: one for one in sampled(pipeline.accepted)}
     program = pipeline.accepted
     points = program.points("fixed", program.tick_times_q42_s())
-    for axis, key in enumerate(("x_q40_mm", "y_q40_mm")):
-        x = points[key].astype(np.float64) * 2.0**-40
+    for axis in range(2):
+        x = points["position_q40"][:, axis].astype(np.float64) * 2.0**-40
         x = np.concatenate((np.full(3, x[0]), x, np.full(3, x[-1])))
         acceleration = np.abs(np.diff(x, 2)).max() / 1e-6
         jerk = np.abs(np.diff(x, 3)).max() / 1e-9

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: MIT
+"""What commands write beside their results: notes, progress, numbers for people."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import re
+import subprocess
+import sys
+import threading
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+
+from hodograph.cli import waiting as waiting_module
+from hodograph.cli.main import main
+from hodograph.cli.output import WANTED, duration_text, note, progress, size_text
+from hodograph.cli.waiting import held, waiting
+
+ALPHA = str(Path(__file__).resolve().parents[3] / "examples" / "alpha.toml")
+
+
+class Terminal(io.StringIO):
+    """A terminal that remembers all it was sent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.written = threading.Event()
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        self.written.set()
+        return super().write(text)
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """A terminal on which the line comes at once; tests redirect stderr to it."""
+    stream = Terminal()
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(waiting_module, "AFTER_S", 0.0)
+    monkeypatch.setattr(waiting_module, "EVERY_S", 0.005)
+    monkeypatch.setattr(WANTED, "notes", True)
+    monkeypatch.setattr(WANTED, "progress", True)
+    return stream
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"),
+        (0.0123, "12.3 ms"),
+        (0.771675, "0.771675 s"),
+        (59.9, "59.9 s"),
+        (60.0, "1 min 0.0 s"),
+        (119.96, "2 min 0.0 s"),
+        (125.3, "2 min 5.3 s"),
+        (3599.96, "1 h 0 min 0 s"),
+        (3725.0, "1 h 2 min 5 s"),
+        (90_061.0, "25 h 1 min 1 s"),
+    ],
+)
+def test_times_for_people(seconds: float, text: str) -> None:
+    assert duration_text(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [
+        (0, "0 bytes"),
+        (7672, "7672 bytes"),
+        (129_008, "129008 bytes (126 KiB)"),
+        (12 * 2**20, "12582912 bytes (12 MiB)"),
+        (11 * 2**30, "11811160064 bytes (11 GiB)"),
+    ],
+)
+def test_sizes_for_people(size: int, text: str) -> None:
+    assert size_text(size) == text
+
+
+# -- the line of a command that computes ---------------------------------------------------------------
+
+
+def test_the_line_shows_and_goes(terminal: Terminal) -> None:
+    with redirect_stderr(terminal), waiting("spline"):
+        assert terminal.written.wait(20)
+    text = terminal.getvalue()
+    assert re.match(r"\rspline: \d+ s\x1b\[K", text)
+    assert text.endswith("\r\x1b[K")
+
+
+def test_the_line_goes_before_results_and_notes(
+    terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = Terminal()
+    with redirect_stderr(terminal), redirect_stdout(out), waiting("spline"):
+        assert terminal.written.wait(20)
+        monkeypatch.setattr(waiting_module, "AFTER_S", 1e9)  # it does not come again
+        note("something")
+        before = terminal.getvalue()
+        print("a result")
+    assert before.endswith("\r\x1b[Khodograph: something\n")
+    assert terminal.getvalue() == before
+    assert out.getvalue() == "a result\n"
+
+
+def test_a_bar_has_the_terminal_for_itself(terminal: Terminal) -> None:
+    with redirect_stderr(terminal), waiting("simulate"):
+        assert terminal.written.wait(20)
+        with held():
+            terminal.written.clear()
+            assert not terminal.written.wait(0.1)
+        assert terminal.written.wait(20)
+
+
+def test_files_see_no_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(waiting_module, "EVERY_S", 0.001)
+    monkeypatch.setattr(waiting_module, "AFTER_S", 0.0)
+    with waiting("spline"):
+        threading.Event().wait(0.05)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_dumb_terminal_sees_no_line(terminal: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "dumb")
+    with redirect_stderr(terminal), waiting("spline"):
+        assert not terminal.written.wait(0.05)
+
+
+def test_the_line_goes_with_an_error(terminal: Terminal) -> None:
+    def fail() -> None:
+        with redirect_stderr(terminal), waiting("spline"):
+            assert terminal.written.wait(20)
+            raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        fail()
+    end = len(terminal.getvalue())
+    assert terminal.getvalue().endswith("\r\x1b[K")
+    terminal.written.clear()
+    assert not terminal.written.wait(0.05)
+    assert len(terminal.getvalue()) == end
+
+
+# -- quiet -----------------------------------------------------------------------------------------------
+
+
+def on_terminal(*words: str) -> tuple[int, str, str]:
+    """Exit status, stdout, and what a terminal gets as stderr."""
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hodograph", *words],
+        stdout=subprocess.PIPE,
+        stderr=follower,
+        env={**os.environ, "TERM": "xterm", "FORCE_COLOR": "1"},
+    )
+    os.close(follower)
+    told = b""
+    try:
+        while part := os.read(leader, 4096):
+            told += part
+    except OSError:  # how Linux tells the end of a terminal
+        pass
+    finally:
+        os.close(leader)
+    out, _ = process.communicate()
+    return process.returncode, out.decode(), told.decode()
+
+
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def test_a_terminal_gets_no_colours() -> None:
+    status, out, err = on_terminal("simulate", ALPHA)
+    assert status == 0
+    assert not COLOUR.search(out + err)
+    status, _, err = on_terminal("nothing")
+    assert (status, bool(COLOUR.search(err))) == (2, False)
+
+
+@pytest.mark.parametrize("words", [["--quiet", "simulate", ALPHA], ["simulate", ALPHA, "-q"]])
+def test_quiet_on_a_terminal(words: list[str]) -> None:
+    status, out, err = on_terminal(*words)
+    assert (status, err) == (0, "")
+    assert "greatest contour error" in out
+
+
+def test_quiet_leaves_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--quiet", "feed", "nothing.toml"]) == 2
+    assert capsys.readouterr().err == "hodograph: nothing.toml: no such file\n"
+
+
+def test_quiet_leaves_out_notes_and_lasts_for_one_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "closed.toml"
+    file.write_text(
+        "[path]\nclosed = true\ncontrol_points = [[0, 0], [9, 0], [9, 9], [0, 9], [0, 0], [9, 0], [9, 9]]\n"
+    )
+    assert main(["spline", str(file), "-q"]) == 0
+    assert capsys.readouterr().err == ""
+    assert main(["spline", str(file)]) == 0
+    assert "closed.toml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--quiet", "--no-progress"])
+def test_no_progress(option: str, terminal: Terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    with redirect_stderr(terminal):
+        assert main(["simulate", ALPHA, option]) == 0
+        with progress("anything", "tick", 10) as bar:
+            bar(5)
+    assert terminal.getvalue() == ""
+
+
+def test_progress_without_these(terminal: Terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    with redirect_stderr(terminal):
+        assert main(["simulate", ALPHA]) == 0
+    assert "\r" in terminal.getvalue()

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Toolpath files of every kind on the command line: the right reader, options that fit it, and clear messages."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hodograph.cli.main import main
+from hodograph.toolpath.files import ReadOptions, read_toolpath
+from hodograph.toolpath.moves import ProgramEnd, StraightMove
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+MILL = str(EXAMPLES / "machines" / "mill.toml")
+POINTS = "0 0\n10 0\n10 5\n0 5\n"
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="30mm" viewBox="0 0 40 30">
+<g id="cut"><circle id="c" cx="20" cy="15" r="5"/><text>a</text></g>
+<path id="l" d="M0 30 L8 30 L8 24"/>
+</svg>
+"""
+DXF = """0\nSECTION\n2\nENTITIES\n0\nLINE\n5\nA1\n8\ncut\n10\n0\n20\n0\n11\n8\n21\n6\n0\nENDSEC\n0\nEOF\n"""
+TEXTS = {
+    "p.csv": "x,y\n" + POINTS.replace(" ", ","),
+    "p.txt": POINTS,
+    "d.svg": SVG,
+    "d.dxf": DXF,
+    "G.NGC": "F600\nG1 X8 Y6\nM2\n",
+}
+
+
+@pytest.fixture(autouse=True)
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """All of TEXTS, in the present directory."""
+    monkeypatch.chdir(tmp_path)
+    for name, text in TEXTS.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def imported(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:
+    """What import prints of a file."""
+    capsys.readouterr()
+    status = main(["import", *words, "--machine", MILL, "--json"])
+    out, err = capsys.readouterr()
+    assert status == 0, err
+    found: dict[str, object] = json.loads(out)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("words", "length_mm"),
+    [
+        (("p.csv", "--feed", "20"), 25.0),
+        (("p.txt", "--feed", "20", "--closed"), 30.0),
+        (("p.txt", "--feed", "20", "--unit", "cm", "--scale", "0.5"), 125.0),
+        (("d.svg", "--feed", "20", "--id", "l"), 14.0),
+        (("d.svg", "--feed", "20", "--id", "l", "--scale", "2"), 28.0),
+        (("d.dxf", "--feed", "20", "--unit", "mm", "--layer", "cut"), 10.0),
+        (("d.dxf", "--feed", "20", "--unit", "in"), 254.0),
+        (("G.NGC",), 10.0),
+    ],
+)
+def test_every_kind_is_read_with_its_options(
+    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], length_mm: float
+) -> None:
+    assert imported(capsys, *words)["length_mm"] == pytest.approx(length_mm, abs=0.05)
+
+
+def test_what_was_left_out_is_a_note(capsys: pytest.CaptureFixture[str]) -> None:
+    notes = imported(capsys, "d.svg", "--feed", "20", "--layer", "cut")["notes"]
+    assert isinstance(notes, list)
+    assert notes[0].startswith('d.svg:2: left out: element "text"')
+    assert len([note for note in notes if "left out" in note]) == 1
+
+
+def test_rapid_moves_of_a_drawing_are_lifted() -> None:
+    read = read_toolpath(Path("d.svg"), ReadOptions(feed_mm_s=20.0, lift_mm=3.0))
+    commands = list(read)
+    assert isinstance(commands[-1], ProgramEnd)
+    rapids = [one for one in commands if isinstance(one, StraightMove) and one.feed is None]
+    assert max(one.end[2] for one in rapids) == 3.0
+
+
+def test_standard_input_is_gcode() -> None:
+    words = [sys.executable, "-m", "hodograph", "import", "-", "--machine", MILL, "--json"]
+    told = subprocess.run(words, input=TEXTS["G.NGC"], capture_output=True, text=True, check=True)
+    assert json.loads(told.stdout)["length_mm"] == pytest.approx(10.0)
+    told = subprocess.run(words, input="G1 X1 Q\n", capture_output=True, text=True, check=False)
+    assert told.returncode == 2
+    assert "hodograph: -:1:" in told.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("simulate p.csv", "p.csv:3:1: no feed: give one (--feed MM/S)"),
+        ("simulate d.svg", "d.svg: a drawing has no feed: add --feed MM/S"),
+        ("simulate d.dxf --feed 20", "give it, as by --unit mm"),
+        ("simulate d.dxf --feed 20 --unit ell", '"ell" is no unit'),
+        ("simulate d.svg --feed 20 --layer x", 'no layer "x"'),
+        ("simulate d.svg --feed 20 --closed", "--closed is for .csv, .txt"),
+        ("simulate G.NGC --gap 1", "--gap is for .dxf, .svg"),
+        ("simulate none.svg --feed 20", "none.svg: cannot be read: No such file"),
+        ("simulate none.csv --feed 20", "none.csv: no such file"),
+        ("import part.toml", "part.toml: no toolpath by the end of its name"),
+        ("feed G.NGC", "G.NGC: is a toolpath, which only"),
+        ("goto G.NGC", "G.NGC: is a toolpath, which only"),
+        ("rig d.svg", "d.svg: is a toolpath, which only"),
+        ("report p.csv", "p.csv: is a toolpath, which only"),
+    ],
+)
+def test_messages(capsys: pytest.CaptureFixture[str], words: str, message: str) -> None:
+    machine = [] if words.split()[0] in ("goto", "rig") else ["--machine", MILL]
+    words_of = words.split() if words.startswith("feed") else [*words.split(), *machine]
+    assert main(words_of) == 2
+    err = capsys.readouterr().err
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_options_of_toolpaths_are_not_for_path_files(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", str(EXAMPLES / "alpha.toml"), "--scale", "2"]) == 2
+    assert "--scale is for toolpaths" in capsys.readouterr().err

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""Jobs: sections of a toolpath, what happens between them, their run, and messages."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.cli.main import main
+from hodograph.config import Machine, load_machine
+from hodograph.errors import InputError, PlanError
+from hodograph.job import load_job
+from hodograph.toolpath.files import ReadOptions
+from hodograph.toolpath.fit.reference import distance_to_chord
+from hodograph.toolpath.fit.sections import divided
+from hodograph.toolpath.gcode import read_gcode
+from hodograph.toolpath.moves import Dwell, Spindle
+
+ROOT = Path(__file__).resolve().parent.parent.parent.parent
+MILL = ROOT / "examples" / "machines" / "mill.toml"
+
+
+@pytest.fixture(scope="module")
+def mill() -> Machine:
+    return load_machine(MILL)
+
+
+def sections(text: str, tolerance_mm: float = 0.01) -> list[tuple[int, int]]:
+    path = divided(read_gcode(text.splitlines()), tolerance_mm, "part.ngc")
+    return [(int(s.reference.line[0]), int(s.reference.line[-1])) for s in path.sections]
+
+
+def program(folder: Path, text: str) -> Path:
+    file = folder / "part.ngc"
+    file.write_text(text)
+    return file
+
+
+def test_moves_are_one_section_until_something_stops_them() -> None:
+    text = "F600\nG1 X1\nG1 Y1\nG4 P1\nG1 X2\nM3 S100\nG0 Y2\nG1 X3\nM6 T1\nG1 X4\nM64 P1\nG1 X5\nM62 P1\nG1 X6\nM2"
+    assert sections(text) == [(2, 3), (5, 5), (7, 8), (10, 10), (12, 14)]
+
+
+def test_exact_stops() -> None:
+    moves = "F600\n{}G1 X1\nG1 Y1\nG1 X2\nM2"
+    each = [(3, 3), (4, 4), (5, 5)]
+    assert sections(moves.format("G61\n")) == each
+    assert sections(moves.format("G61.1\n")) == each
+    assert sections(moves.format("G64\n")) == [(3, 5)]
+    assert sections(moves.format("G64\n"), 0.0) == each
+
+
+def test_a_reversal_is_a_stop() -> None:
+    assert sections("F600\nG1 X5\nG1 X1\nG1 X2 Y0.01\nM2") == [(2, 2), (3, 3), (4, 4)]
+
+
+def test_the_tolerance_of_the_file_counts_where_it_is_less() -> None:
+    path = divided(
+        read_gcode("F600\nG64 P0.002\nG1 X1\nG1 Y1\nG64 P0.5\nG1 X2\nM2".splitlines()), 0.01, "-"
+    )
+    assert [s.tolerance_mm for s in path.sections] == [0.002, 0.01]
+
+
+def test_commands_are_kept_at_their_sections() -> None:
+    path = divided(
+        read_gcode("F600\nM3 S100\nG1 X1\nG4 P2\nG1 Y1\nM62 P1\nG1 X2\nM2".splitlines()), 0.01, "-"
+    )
+    first, second = path.sections
+    assert [type(c) for c in first.before] == [Spindle]
+    assert [c.duration_s for c in second.before if isinstance(c, Dwell)] == [2.0]
+    (event,) = second.events
+    assert event.place_mm == pytest.approx(1.0)
+
+
+def test_a_job_keeps_feeds_and_lines(tmp_path: Path, mill: Machine) -> None:
+    job = load_job(
+        program(tmp_path, "G21\nF6000\nG1 X20\nF1200\nG1 X40 Y3\nG0 X0 Y0 Z5\nM2\n"), mill
+    )
+    one, two = job.sections
+    assert job.lines == 3
+    assert one.pipeline.feed.nominal_mm_s == pytest.approx(100.0)
+    (zone,) = one.pipeline.limits.zones
+    assert zone.feed_mm_s == pytest.approx(20.0)
+    assert zone.from_mm == pytest.approx(20.0, abs=0.05)
+    assert one.line_at(np.array([1.0, 25.0])).tolist() == [3, 5]
+    assert (two.first_line, two.last_line) == (6, 6)
+    assert job.deviation_um < 10.0
+    assert (
+        load_job(job.file, mill, reading=ReadOptions(feed_mm_s=50.0))
+        .sections[0]
+        .pipeline.limits.zones
+        == ()
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("M2\n", "moves nothing"),
+        ("F60\nG1 A5\nM2\n", ":2: the move turns A"),
+        ("F60\nG1 X1\nG1 X3000\nM2\n", ":3: x goes to"),
+        ("F60\nG1 X1 Q\nM2\n", ":2:"),
+    ],
+)
+def test_messages_name_the_line(tmp_path: Path, mill: Machine, text: str, words: str) -> None:
+    with pytest.raises((InputError, PlanError), match=words):
+        load_job(program(tmp_path, text), mill)
+
+
+def test_simulate_joins_the_sections(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = program(tmp_path, "G21\nF12000\nG1 X4\nG1 Y3\nG4 P0.25\nG0 X0 Y0\nM2\n")
+    trace = tmp_path / "out.csv"
+    command = ["simulate", str(file), "--machine", str(MILL), "--trace", str(trace), "--json"]
+    assert main([*command, "--tolerance", "0.01"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["lines"] == 3
+    assert found["sections"] == 2
+    assert found["dwell_s"] == 0.25
+    assert 5.0 < found["deviation_bound_um"] <= 10.0
+    with trace.open() as rows:
+        table = list(csv.DictReader(rows))
+    assert len(table) == found["ticks"]
+    assert float(table[-1]["t_s"]) == pytest.approx(found["duration_s"])
+    assert [int(row["tick"]) for row in table] == list(range(len(table)))
+    path = np.array([[float(row[f"{axis}_cmd_mm"]) for axis in "xyz"] for row in table])
+    legs = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0], [0.0, 0.0, 0.0]])
+    off = distance_to_chord(path[:, None], legs[None, :-1], legs[None, 1:]).min(axis=1)
+    assert 1000.0 * off.max() <= found["deviation_bound_um"]
+    assert np.abs(path[-1]).max() < 1e-9
+    assert np.abs(np.diff(path, axis=0)).max() <= 0.2 * (1.0 + 1e-6)
+    jerk = np.abs(np.diff(path, 3, axis=0)).max() * 1e9
+    assert jerk <= 50000.0 * 1.001
+    assert {int(row["line"]) for row in table} == {3, 4, 6}
+
+
+def test_import_shows_what_became_of_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = program(tmp_path, "G21\nF3000\nM3 S500\nG1 X9\nG3 X9 Y4 J2\nM5\nG0 X0 Y0\nM2\n")
+    output = tmp_path / "part.toml"
+    command = ["import", str(file), "--machine", str(MILL), "--json", "-o", str(output)]
+    assert main(command) == 0
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert [s["last_line"] for s in found["section"]] == [5, 7]
+    assert "part.ngc:3: spindle (M3, M4, M5) and 1 more" in captured.err
+    written = tomllib.loads(output.read_text())
+    assert written["section"] == found["section"]
+    assert main(["simulate", str(file)]) == 2
+    assert "names no machine" in capsys.readouterr().err
