@@ -3,14 +3,13 @@
 
 Runs as a process in a session of its own, so that a Ctrl-C at the terminal does not reach it. The client
 that opened the bus is connected from the start; when that connection ends, for whatever reason, the kernel
-inside is ended and everything removed. If the broker itself is killed, the kernel gets SIGTERM; besides,
-its line is cut, and then the agent stops it.
+inside is ended and everything removed. If the broker itself is killed, the process that opened the bus ends
+the kernel; if both are killed, the kernel gets SIGTERM, and its agent stops it when the line is cut.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import selectors
 import signal
 import socket
@@ -22,8 +21,6 @@ from vcan.errors import BusUnavailable
 from vcan.registry import Bus
 
 BOOT_LIMIT_S = 60.0
-_PR_SET_CHILD_SUBREAPER = 36
-_LIBC = ctypes.CDLL(None)
 
 
 class Client:
@@ -190,8 +187,7 @@ def main(bus: Bus, owner: socket.socket, memory: str) -> None:
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGPIPE):
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    # Stubs whose kernel has died become children of this process, which can then wait for them.
-    _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    user_mode.adopt_orphans()  # stubs whose kernel has died: `user_mode.end` waits for them
     try:
         registry.create(bus)  # the lock is held to the end of this process
         try:

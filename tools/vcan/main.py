@@ -18,7 +18,7 @@ from json import dumps, loads
 from typing import NoReturn
 
 import packages
-from vcan import broker, forward, kernel, registry
+from vcan import broker, forward, kernel, registry, user_mode
 from vcan.client import Client
 from vcan.errors import BusUnavailable
 from vcan.forward import Forward
@@ -186,6 +186,7 @@ def _open_user_mode(options: argparse.Namespace) -> int:
     cpu = options.cpu if options.cpu is not None else _quietest_cpu()
     bus = Bus(options.name or f"bus-{os.getpid()}", "user-mode", os.getpid(), cpu, options.command)
     here, there = socket.socketpair()
+    user_mode.adopt_orphans()
     process = subprocess.Popen(
         [
             sys.executable,
@@ -212,6 +213,7 @@ def _open_user_mode(options: argparse.Namespace) -> int:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, signal.SIG_IGN)
         process.wait()
+        user_mode.end_children()  # there are some only where the broker itself was killed
 
 
 def _quietest_cpu() -> int:

@@ -20,6 +20,7 @@ from vcan.registry import Bus
 
 _NICE = -10
 _PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
 _LIBC = ctypes.CDLL(None)
 _MODULES = Path("/usr/lib/uml/modules")
 _HERE = Path(__file__).resolve().parent
@@ -101,6 +102,22 @@ def _memory_folder(memory: str) -> str:
         f"neither /dev/shm, /tmp nor /var/tmp is writable, allows code and has {memory} free; "
         "make room or use --memory 512M"
     )
+
+
+def adopt_orphans() -> None:
+    """Makes processes whose parent dies children of this process, if they descend from it."""
+    _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
+
+
+def end_children() -> None:
+    """Ends every child of this process and what it leaves behind; needs `adopt_orphans` before."""
+    children = Path(f"/proc/self/task/{os.getpid()}/children")
+    with contextlib.suppress(ChildProcessError):
+        while True:
+            for child in children.read_text().split():
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(int(child), signal.SIGKILL)
+            os.waitpid(-1, 0)
 
 
 def end(kernel: subprocess.Popen[bytes]) -> None:
