@@ -34,6 +34,8 @@ from hodograph.native.feed_override import FeedOverride, State
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program import encode
 from hodograph.report.style import BLUE, GREEN, GREY, INK, ORANGE, RED, SOFT, styled
+from hodograph.toolpath.files import ReadOptions, read_toolpath
+from hodograph.toolpath.fit.sections import divided
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"
@@ -309,11 +311,46 @@ def bus_figure() -> Figure:
     return figure
 
 
+# --- Toolpaths ---
+
+TOOLPATHS = ("pocket", "engraving", "dispensing", "surface")
+
+
+def toolpath_figure() -> Figure:
+    """The example toolpaths as their files program them: isometric, rapid moves dashed."""
+    figure, grid = pyplot.subplots(2, 2, figsize=(9.6, 6.8))
+    for axes, name in zip(grid.flat, TOOLPATHS, strict=True):
+        _toolpath(axes, name)
+    return figure
+
+
+def _toolpath(axes: Axes, name: str) -> None:
+    file = ROOT / "examples" / "toolpaths" / f"{name}.ngc"
+    path = divided(read_toolpath(file, ReadOptions()), 0.01, file.name)
+    for section in path.sections:
+        x, y, z = section.reference.point.T
+        across, up = (x + y) * np.sqrt(0.5), (y - x) * np.sqrt(1 / 6) + z * np.sqrt(2 / 3)
+        rapid = np.isinf(section.reference.feed_mm_s)
+        edges = np.flatnonzero(np.append(True, rapid[1:] != rapid[:-1]))
+        for first, last in zip(edges, [*edges[1:], rapid.size], strict=True):
+            part = slice(first, last + 1)
+            style = (
+                {"color": SOFT, "linewidth": 0.8, "linestyle": (0, (4, 3))}
+                if rapid[first]
+                else {"color": BLUE, "linewidth": 0.9 if rapid.size > 1000 else 1.6}
+            )
+            axes.plot(across[part], up[part], **style)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    axes.set_title(f"{name}.ngc")
+
+
 FIGURES: dict[str, Any] = {
     "path": path_figure,
     "stops": stop_figure,
     "states": state_figure,
     "bus": bus_figure,
+    "toolpaths": toolpath_figure,
 }
 
 

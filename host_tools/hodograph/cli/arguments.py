@@ -82,7 +82,8 @@ def _inspect(command: Command) -> None:
 
 def _verify(command: Command) -> None:
     verify = command("verify", "look whether a program keeps the limits of its path file")
-    options.file(verify)
+    options.file(verify, what=f"path file (TOML), or {options.TOOLPATH}")
+    options.toolpath(verify)
     options.machine(verify)
     options.json(verify)
     verify.add_argument(
@@ -130,7 +131,8 @@ def _simulate(command: Command) -> None:
 
 def _report(command: Command) -> None:
     report = command("report", "simulate paths and write a report with figures")
-    options.file(report, many=True)
+    options.file(report, many=True, what="path files (TOML), or one toolpath")
+    options.toolpath(report)
     options.machine(report)
     options.kernel(report)
     report.add_argument(

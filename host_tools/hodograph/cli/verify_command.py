@@ -11,6 +11,7 @@ from pathlib import Path
 from ..config import PLANE_AXES, Drive, Machine
 from ..errors import InputError, LimitError
 from ..feed import Peak
+from ..names import is_toolpath
 from ..native.program import NativeFault, NativeProgram
 from ..pipeline import Pipeline, controller_verdict, load_pipeline, proved_limits
 from ..program import compile_program, encode
@@ -26,6 +27,7 @@ from ..verify import (
 )
 from .output import number, print_json
 from .path_commands import decode_file, print_notes, read_image
+from .toolpath_commands import refuse_toolpath_options, toolpath_job
 
 COUNTS_PER_MM = 1_000_000
 """Where no machine says anything else."""
@@ -35,6 +37,10 @@ _MOST_LINES = 20
 
 def verify(options: Namespace) -> None:
     """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
+    if is_toolpath(options.file):
+        _verify_toolpath(options)
+        return
+    refuse_toolpath_options(options, options.file)
     pipeline = load_pipeline(options.file, options.machine, allow_space=True)
     machine = pipeline.machine_or_none
     native = _planned(pipeline) if options.program is None else _given(options.program)
@@ -54,11 +60,43 @@ def verify(options: Namespace) -> None:
         print(_text(found, drives_see, noise))
     if fault is not None:
         raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
-    if not found.kept:
-        beyond = [peak.quantity for peak in found.exceeded]
+    _require_kept(str(options.file), [found])
+
+
+def _require_kept(place: str, found: list[Verification]) -> None:
+    """Raises LimitError: a limit is passed by more than TOLERANCE."""
+    beyond = {peak.quantity: None for one in found if not one.kept for peak in one.exceeded}
+    if beyond:
         raise LimitError(
-            f"{options.file}: beyond its limits by more than {100 * TOLERANCE:g} %: {', '.join(beyond)}"
+            f"{place}: beyond its limits by more than {100 * TOLERANCE:g} %: {', '.join(beyond)}"
         )
+
+
+def _verify_toolpath(options: Namespace) -> None:
+    """The programs of all sections, one after the other."""
+    if options.program is not None:
+        raise InputError(
+            f"{options.file}: --program is for path files; a toolpath is verified as it is planned now: leave it out"
+        )
+    job = toolpath_job(options, options.file)
+    noise = bus_noise(job.machine.counts_per_mm, job.machine.period_us)
+    found, documents = [], []
+    for index, section in enumerate(job.sections, 1):
+        pipeline = section.pipeline
+        native = pipeline.accepted
+        program = decode_file(options.file, native.image)
+        result = verify_program(program, pipeline.limits, _drives(job.machine))
+        drives_see = sampled(native)
+        found.append(result)
+        if options.json:
+            documents.append(section.lines_summary() | _document(result, drives_see, noise))
+        else:
+            print(f"section {index}, lines {section.first_line} … {section.last_line}")
+            print(_verdict(job.machine, None))
+            print(_text(result, drives_see, noise) + "\n")
+    if options.json:
+        print_json({"kept": all(one.kept for one in found), "section": documents})
+    _require_kept(str(options.file), found)
 
 
 def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""The report of a toolpath: what became of a file. Its view of the path names the source line under the cursor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from ..job import Job, JobMotion
+from ..pipeline import proved_limits
+from ..toolpath.files import is_gcode
+from .page import Figure, render, write_page
+from .style import styled
+from .toolpath_figures import (
+    corner_figure,
+    feed_figure,
+    path_figure,
+    rapid_at,
+    widest_corners,
+)
+
+MOST_POINTS = 20_000
+"""Points of the view; of a longer job every n-th tick is drawn."""
+
+_LONGEST_LINE = 100
+"""Characters of a source line that the view shows."""
+
+
+def write_toolpath_report(run: JobMotion, directory: Path) -> Path:
+    """Writes report.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
+    with styled():
+        figures = _figures(run)
+    text = render(
+        "toolpath.html.j2",
+        name=run.job.file.name,
+        file=str(run.job.file),
+        summary=_summary(run),
+        sections=_section_rows(run),
+        notes=run.job.notes,
+        proof=proved_limits(run.job.machine),
+        figures=figures,
+        view=json.dumps(view_data(run), separators=(",", ":")).replace("</", "<\\/"),
+    )
+    return write_page(directory / "report.html", text, ((one.name, one) for one in figures))
+
+
+def _figures(run: JobMotion) -> list[Figure]:
+    figures = [
+        Figure("path", "The path from above, with the feed as colour.", path_figure(run)),
+        Figure("feed", "Feed along the path over time.", feed_figure(run)),
+    ]
+    corners = widest_corners(run.job)
+    if corners:
+        caption = (
+            "Corners that the curve passes farthest from the programmed vertex, in the plane of their legs. "
+            "The band is the tolerance."
+        )
+        figures.append(Figure("corners", caption, corner_figure(corners)))
+    return figures
+
+
+def _summary(run: JobMotion) -> list[tuple[str, str]]:
+    job = run.job
+    return [
+        ("machine", job.machine.file.stem),
+        ("lines that move", str(job.lines)),
+        ("sections from rest to rest", str(len(job.sections))),
+        ("PH segments", str(job.segments)),
+        ("length, mm", f"{job.length_mm:.3f}"),
+        ("duration without dwells, s", f"{run.duration_s:.3f}"),
+        ("dwells, s", f"{job.dwell_s:g}"),
+        ("certified deviation, µm", f"{job.deviation_um:.3f}"),
+        ("greatest contour error, µm", _most(m.max_contour_error_um for m in run.motions)),
+        ("greatest following error, µm", _most(m.max_following_error_um for m in run.motions)),
+    ]
+
+
+def _most(values: Iterable[float]) -> str:
+    return f"{max(values):.3f}"
+
+
+def _section_rows(run: JobMotion) -> list[tuple[str, ...]]:
+    return [
+        (
+            str(number),
+            f"{section.first_line} … {section.last_line}",
+            f"{section.fitted.curve.length_mm:.3f}",
+            str(section.fitted.curve.segment_count),
+            f"{1000.0 * section.fitted.deviation_mm:.3f}",
+            f"{(motion.ticks - 1) * run.period_s:.3f}",
+        )
+        for number, (section, motion) in enumerate(
+            zip(run.job.sections, run.motions, strict=True), 1
+        )
+    ]
+
+
+def view_data(run: JobMotion) -> dict[str, object]:
+    """What the view draws: columns of ticks in the program's own coordinates, and the source lines that they name."""
+    step = max(1, -(-run.ticks // MOST_POINTS))
+    offset = np.array(run.job.machine.offset_mm)
+    columns: dict[str, list[object]] = {name: [] for name in ("x", "y", "z", "f", "l", "r")}
+    for section, motion in zip(run.job.sections, run.motions, strict=True):
+        rows = np.unique(np.append(np.arange(0, motion.ticks, step), motion.ticks - 1))
+        s_mm = motion.arc_length_mm[rows]
+        at = motion.cmd_mm[rows, : offset.size] - offset[: motion.cmd_mm.shape[1]]
+        z = at[:, 2] if at.shape[1] > 2 else np.zeros(rows.size)
+        for name, values in zip(
+            columns,
+            (at[:, 0], at[:, 1], z, motion.feed_mm_s[rows], section.line_at(s_mm)),
+            strict=False,
+        ):
+            columns[name] += np.round(values, 4).tolist()
+        columns["r"] += rapid_at(section, s_mm).astype(int).tolist()
+    return {**columns, "text": _source(run.job, {int(str(line)) for line in columns["l"]})}
+
+
+def _source(job: Job, wanted: set[int]) -> dict[str, str]:
+    """Source lines by number; none where the file is no text of lines, or came from standard input."""
+    if not is_gcode(job.file) or not job.file.is_file():
+        return {}
+    found = {}
+    with job.file.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if number in wanted:
+                found[str(number)] = line.strip()[:_LONGEST_LINE]
+    return found
