@@ -334,7 +334,7 @@ def _toolpath(axes: Axes, name: str) -> None:
         edges = np.flatnonzero(np.append(True, rapid[1:] != rapid[:-1]))
         for first, last in zip(edges, [*edges[1:], rapid.size], strict=True):
             part = slice(first, last + 1)
-            style = (
+            style: dict[str, Any] = (
                 {"color": SOFT, "linewidth": 0.8, "linestyle": (0, (4, 3))}
                 if rapid[first]
                 else {"color": BLUE, "linewidth": 0.9 if rapid.size > 1000 else 1.6}
