@@ -26,6 +26,7 @@ from .errors import (
 TYPE_CHECKING = False  # for type checkers; the module typing alone takes longer than all of this
 if TYPE_CHECKING:
     from .api.bus import Controller, connect, local_bus
+    from .api.job import Job, JobRun, Section, load_job
     from .api.machine import Machine, example_file
     from .api.path import (
         FeedZone,
@@ -47,6 +48,8 @@ __all__ = [
     "FeedZone",
     "HodographError",
     "InputError",
+    "Job",
+    "JobRun",
     "LimitError",
     "LimitUsage",
     "Limits",
@@ -59,9 +62,11 @@ __all__ = [
     "RefusedError",
     "Run",
     "RunError",
+    "Section",
     "__version__",
     "connect",
     "example_file",
+    "load_job",
     "load_path",
     "load_plan",
     "load_program",
@@ -71,6 +76,7 @@ __all__ = [
 
 _MODULES = {
     **dict.fromkeys(("Controller", "connect", "local_bus"), "bus"),
+    **dict.fromkeys(("Job", "JobRun", "Section", "load_job"), "job"),
     **dict.fromkeys(("Machine", "example_file"), "machine"),
     **dict.fromkeys(("FeedZone", "LimitUsage", "Limits", "Path", "PathMotion", "Plan"), "path"),
     **dict.fromkeys(("load_path", "load_plan"), "path"),

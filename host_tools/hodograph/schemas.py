@@ -75,6 +75,10 @@ def _text(text: str) -> Schema:
     return {"type": "string", "pattern": r"\S", "description": text}
 
 
+def _either(text: str, *schemas: Schema) -> Schema:
+    return {"anyOf": list(schemas), "description": text}
+
+
 def _list(
     text: str, item: Schema, least: int = 1, most: int | None = None, *, distinct: bool = False
 ) -> Schema:
@@ -343,7 +347,11 @@ def _axis() -> Schema:
                 COUNTS_PER_UNIT_MAX,
                 1_000_000,
             ),
-            "drive": _text("Drive file, for simulation; relative to this file"),
+            "drive": _either(
+                "Drive file, for simulation, relative to this file; or a table with its contents",
+                {"type": "string", "pattern": r"\S"},
+                _drive_file(),
+            ),
             "following_window_mm": _number("Following error window (0x6065), mm", *counted),
             "following_timeout_ms": _integer("Its time (0x6066)", 0, 65535, 10),
             "quick_stop_mm_s2": _number("Deceleration of a quick stop (0x6085), mm/s^2", *counted),

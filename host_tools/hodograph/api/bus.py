@@ -11,11 +11,14 @@ from typing import Any, Literal
 from ..bus.goto import goto
 from ..bus.hub import LocalHub
 from ..bus.own_bus import bus_address
-from ..bus.run import RunSession, run_program, run_session
+from ..bus.run import BusRun, RunSession, run_program, run_session
 from ..bus.sdo import actions
 from ..bus.sdo.controller import BOOT, DISABLE, HOLD, OFF, READY, RESUME
 from ..bus.sdo.status import read_status
+from ..errors import InputError
+from ..job_run import operator_stops, prepared, run_job
 from ..native import NativeProgram
+from .job import Job, JobRun
 from .machine import Machine
 from .program import Program, Run
 
@@ -141,7 +144,38 @@ class Controller:
         machine = program.machine._file
         kernel = machine.kernel
         found = run_program(self._session, machine, program.image, kernel, unhomed=unhomed)
-        return Run(found.motion, found.bus, found.deadline_misses)
+        return _run_of(found)
+
+    def run_job(
+        self, job: Job, *, operator: Callable[[str], None] | None = None, unhomed: bool = False
+    ) -> JobRun:
+        """Runs all sections of a job: each as `run` does, with the dwells between them.
+
+        operator   is called where the job waits for the operator (M0, M1, tool change), with the place and the code,
+                   and returns when the job may go on. None: such a job is refused, before anything moves
+
+        Every section is planned before the first one moves. A fault, a stop or a hold ends the job. Raises InputError
+        and PlanError, beside the errors of `run`.
+        """
+        made = prepared(job._job, job.machine._file.kernel)
+        stops = list(operator_stops(job._job))
+        if stops and operator is None:
+            line, code = stops[0]
+            raise InputError(
+                f"{job._job.file}:{line}: {code} waits for the operator: give operator= to run_job"
+            )
+
+        def ask(text: str, look: Callable[[], None]) -> None:
+            del look
+            if operator is not None:
+                operator(text)
+
+        found = run_job(self._session, made, ask, unhomed=unhomed)
+        return JobRun(tuple(map(_run_of, found.runs)), found.runs[0].bus)
+
+
+def _run_of(found: BusRun) -> Run:
+    return Run(found.motion, found.bus, found.deadline_misses)
 
 
 @contextmanager

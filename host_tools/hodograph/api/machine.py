@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine as MachineFile
-from ..config import is_there, load_machine
+from ..config import is_there, load_machine, machine_of
 from ..data import EXAMPLES
 from ..errors import InputError
 
@@ -33,7 +35,7 @@ def _example(folder: FilePath, name: str) -> FilePath:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A machine as its file describes it (docs/reference/files.md section 2); made by `load` or `example`.
+    """A machine as its file describes it (docs/reference/files.md section 2); made by `load`, `of` or `example`.
 
     >>> machine = Machine.example("paper_alpha")
     >>> machine.axis_names, machine.period_us
@@ -46,6 +48,37 @@ class Machine:
     def load(cls, file: str | PathLike[str]) -> Machine:
         """The machine of a file (TOML). Raises InputError."""
         return cls(load_machine(FilePath(file)))
+
+    @classmethod
+    def of(
+        cls,
+        contents: Mapping[str, Any],
+        *,
+        name: str = "machine",
+        folder: str | PathLike[str] = ".",
+    ) -> Machine:
+        """The machine of a mapping with the keys of a machine file; nothing is read but drive files that it names.
+
+        contents  as `tomllib.load` gives it: tables are mappings, [[axis]] is a sequence of them. Numbers and arrays
+                  may be NumPy's. `drive` of an axis is the name of a drive file, or a mapping with its contents
+        name      for messages
+        folder    that drive files are relative to
+
+        Raises InputError.
+
+        >>> axis = {"travel_mm": (-100, 100), "velocity_mm_s": 200, "acceleration_mm_s2": 2000, "jerk_mm_s3": 5e4}
+        >>> machine = Machine.of({
+        ...     "bus": {"period_us": 2000},
+        ...     "controller": {"feed_mm_s": 200, "acceleration_mm_s2": 2000, "jerk_mm_s3": 5e4},
+        ...     "axis": [axis | {"name": "x", "node": 2}, axis | {"name": "y", "node": 3}],
+        ... })
+        >>> machine.axis_names, machine.period_us
+        (('x', 'y'), 2000)
+        """
+        plain = _plain(contents, name)
+        if not isinstance(plain, dict):
+            raise InputError(f"{name}: must be a mapping with the keys of a machine file")
+        return cls(machine_of(FilePath(folder, name), plain))
 
     @classmethod
     def example(cls, name: str = "paper_alpha") -> Machine:
@@ -94,3 +127,23 @@ class Machine:
 
     def __repr__(self) -> str:
         return f"Machine({str(self._file.file)!r})"
+
+
+def _plain(value: Any, name: str) -> Any:
+    """A value as TOML would give it. Raises InputError for one that TOML cannot express."""
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise InputError(f"{name}: key {key!r} must be a text")
+        return {key: _plain(one, f"{name}: {key}") for key, one in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist(), name)
+    if isinstance(value, str | bool | int | float):
+        return value
+    if isinstance(value, PathLike):
+        return str(value)
+    if isinstance(value, Sequence):
+        return [_plain(one, name) for one in value]
+    raise InputError(
+        f"{name}: {value!r} is neither text, number, sequence nor mapping: leave it out"
+    )

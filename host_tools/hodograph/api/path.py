@@ -20,11 +20,13 @@ from ..feed import Limits as FileLimits
 from ..feed.kinematics import axis_motion
 from ..feed.limits import LEAST_RESERVE
 from ..feed.request import OPTIMAL, PROFILES
+from ..job import JobSection, SectionPipeline
 from ..names import AXES
 from ..pipeline import Pipeline
 from ..spline import PHSpline
 from ..spline.frames import frames
 from ..spline.spatial import SpatialPHSpline
+from ..toolpath.fit.fitting import FittedPath
 from .machine import Machine
 from .program import Program
 
@@ -121,6 +123,8 @@ class Path:
     _curve: PHSpline | SpatialPHSpline = field(repr=False)
     notes: tuple[str, ...] = ()
     """What the user should know about how the spline was made, one line each."""
+    _fitted: FittedPath | None = field(default=None, repr=False)
+    """Of a toolpath."""
 
     @classmethod
     def through(
@@ -245,7 +249,12 @@ class Path:
             feed = FeedRequest(profile, nominal_mm_s or 0.0, ramp_time_s or 0.0, n_c, degree)
         given = FileLimits() if limits is None else _file_limits(limits, self.axes)
         file = replace(self._file, feed=feed, limits=given, machine_file=None)
-        return Plan(self, machine, Pipeline(file, None if machine is None else machine._file))
+        on = None if machine is None else machine._file
+        if self._fitted is None:
+            return Plan(self, machine, Pipeline(file, on))
+        if on is None:
+            raise InputError(f"{self.name}: a path of a toolpath needs machine= to be planned")
+        return Plan(self, machine, SectionPipeline(file, on, self._fitted))
 
     def __repr__(self) -> str:
         return f"Path({self.name!r}, {self.length_mm:.6g} mm)"
@@ -343,6 +352,12 @@ def path_of(file: PathFile) -> Path:
     pipeline = Pipeline(file)
     found = pipeline.found_spline
     return Path(file, found.spline, found.notes)
+
+
+def path_of_section(section: JobSection) -> Path:
+    """The path of a section of a job."""
+    pipeline = section.pipeline
+    return Path(pipeline.file, pipeline.curve, _fitted=section.fitted)
 
 
 def _path(

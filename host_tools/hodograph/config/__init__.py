@@ -3,7 +3,7 @@
 
 from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive
-from .machine_file import PLANE_AXES, SPACE_AXES, Machine, Supervision, load_machine
+from .machine_file import PLANE_AXES, SPACE_AXES, Machine, Supervision, load_machine, machine_of
 from .path_file import PathFile, PathSpec, SpacePathSpec, load_path_file
 from .table import is_there, read_toml
 
@@ -24,5 +24,6 @@ __all__ = [
     "load_drive",
     "load_machine",
     "load_path_file",
+    "machine_of",
     "read_toml",
 ]

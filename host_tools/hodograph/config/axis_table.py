@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..errors import InputError
-from .drive_file import Drive, load_drive
+from .drive_file import Drive, drive_of, load_drive
 from .table import Table
 
 MAX_AXES = 6
@@ -237,7 +238,7 @@ def _axis(keyed: _AxisTable, counts_per_unit: int, acceleration_mm_s2: float) ->
     reach = I32_MAX / counts_per_unit
     if max(abs(low), abs(high)) > reach:
         raise table.error(travel, f"leaves the ±{reach:.1f} {unit} that i32 counts can express")
-    drive = load_drive(table.present("drive")) if table.has("drive") else None
+    drive = _drive(table)
     acceleration = _motion_limit(keyed, "acceleration_mm_s2", 0.1, 4e6)
     steepest = math.floor(1000 * U32_MAX / counts_per_unit) / 1000
     window = None
@@ -267,6 +268,16 @@ def _axis(keyed: _AxisTable, counts_per_unit: int, acceleration_mm_s2: float) ->
         scaling=_scaling(table, drive, counts_per_unit),
         identity=_identity(table),
     )
+
+
+def _drive(table: Table) -> Drive | None:
+    """Of the drive file that `drive` names, or of the table that it is."""
+    if not table.has("drive"):
+        return None
+    if table.is_table("drive"):
+        place = Path(f"{table.file}: drive of axis {table.text('name')}")
+        return drive_of(place, table.contents("drive"))
+    return load_drive(table.present("drive"))
 
 
 def _motion_limit(table: _AxisTable, name: str, low: float, high: float) -> float:

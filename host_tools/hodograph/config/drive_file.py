@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from ..names import INTEGRALS, INTERPOLATIONS, SPEEDS
 from .table import Table, read_toml
@@ -77,7 +79,12 @@ MOTOR_GAINS = {"k_pp_rad_s_mm": "k_pp_per_s", "k_pf_rad_mm": "k_pf"}
 
 def load_drive(file: Path) -> Drive:
     """The drive that a TOML file describes; raises InputError."""
-    root = Table(file, "", read_toml(file), _SECTIONS)
+    return drive_of(file, read_toml(file))
+
+
+def drive_of(file: Path, contents: Mapping[str, Any]) -> Drive:
+    """The drive that the contents of a drive file describe; `file` is what messages name. Raises InputError."""
+    root = Table(file, "", contents, _SECTIONS)
     plant = root.table("plant", _PLANT)
     pdff = root.table("pdff", (*_PDFF, *MOTOR_GAINS.values()))
     screw_mm_rad = plant.number("screw_mm_rad", low=1e-4, high=1e3)

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
 from ..names import KERNELS
@@ -142,7 +143,15 @@ _SUPERVISION = ("answer_wait_ms", "missed_max", "setpoint_timeout_ms")
 
 def load_machine(file: Path) -> Machine:
     """The machine that a TOML file describes, with the drive files it names; raises InputError."""
-    root = Table(file, "", read_toml(file), _SECTIONS)
+    return machine_of(file, read_toml(file))
+
+
+def machine_of(file: Path, contents: Mapping[str, Any]) -> Machine:
+    """The machine that the contents of a machine file describe. Raises InputError.
+
+    file  what messages name; drive files are relative to its folder
+    """
+    root = Table(file, "", contents, _SECTIONS)
     bus = root.table("bus", ("bitrate", "period_us"), required=False)
     controller = root.table("controller", _CONTROLLER)
     work = root.table("work", ("offset_mm",), required=False)

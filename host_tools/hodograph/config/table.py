@@ -93,6 +93,15 @@ class Table:
         """Whether the file gives this key, and as a list."""
         return isinstance(self._data.get(key), list)
 
+    def is_table(self, key: str) -> bool:
+        """Whether the file gives this key, and as a table."""
+        return isinstance(self._data.get(key), Mapping)
+
+    def contents(self, key: str) -> Mapping[str, Any]:
+        """The table of a key for which `is_table` holds, unchecked."""
+        found: Mapping[str, Any] = self._data[key]
+        return found
+
     def _get(self, key: str, default: Any, what: str) -> Any:
         if key in self._data:
             return self._data[key]

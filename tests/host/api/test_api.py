@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import json
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +31,7 @@ def machine() -> hg.Machine:
     return hg.Machine.example()
 
 
-@pytest.mark.parametrize("module", ["machine", "path", "program", "bus"])
+@pytest.mark.parametrize("module", ["machine", "path", "job", "program", "bus"])
 def test_examples_of_docstrings(module: str) -> None:
     result = doctest.testmod(import_module(f"hodograph.api.{module}"))
     assert result.attempted > 0
@@ -274,6 +277,139 @@ def test_a_program_of_another_machine_is_refused(machine: hg.Machine, tmp_path: 
     image = hg.Path.through(POINTS).plan(LIMITS, machine=machine).program().image
     with pytest.raises(hg.InputError, match=r"travel .* for this machine"):
         hg.Program(image, hg.Machine.load(small))
+
+
+# -- machines of mappings ----------------------------------------------------------------------------
+
+
+def contents(name: str) -> dict[str, Any]:
+    file = hg.example_file("alpha").parent / "machines" / f"{name}.toml"
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", ["paper_alpha", "mill", "real_drives"])
+def test_a_machine_of_a_mapping_is_that_of_the_file(name: str) -> None:
+    folder = hg.example_file("alpha").parent / "machines"
+    made = hg.Machine.of(contents(name), name=f"{name}.toml", folder=folder)
+    assert made._file == hg.Machine.example(name)._file
+
+
+def test_a_machine_of_a_mapping_may_hold_numpy_and_its_drives() -> None:
+    folder = hg.example_file("alpha").parent / "machines"
+    given = contents("paper_alpha")
+    for axis in given["axis"]:
+        file = folder / axis["drive"]
+        axis["drive"] = tomllib.loads(file.read_text(encoding="utf-8"))
+        axis["travel_mm"] = np.array(axis["travel_mm"])
+        axis["node"] = np.int64(axis["node"])
+    made, loaded = hg.Machine.of(given), hg.Machine.example("paper_alpha")
+    assert made._file.axes == loaded._file.axes
+    plan = hg.Path.through(POINTS).plan(LIMITS, machine=made)
+    there = hg.Path.through(POINTS).plan(LIMITS, machine=loaded)
+    assert plan.program().simulate().encoders_sha256 == there.program().simulate().encoders_sha256
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda given: given.update(buss={}), r'unknown key; did you mean "?bus"?'),
+        (lambda given: given["axis"][1].update(node=None), "None is neither text, number"),
+        (lambda given: given.update({3: {}}), "key 3 must be a text"),
+        (lambda given: given["axis"][0].update(drive={"plant": {}}), r"drive of axis x: .*missing"),
+        (lambda given: given["axis"][0].update(drive="nowhere.toml"), "nowhere.toml"),
+        (lambda given: given["bus"].update(period_us=True), "period_us"),
+        (lambda given: given.pop("axis"), r"one section \[\[axis\]\] or more"),
+    ],
+)
+def test_a_wrong_mapping_is_refused_by_name(
+    change: Callable[[dict[Any, Any]], object], text: str
+) -> None:
+    given: dict[Any, Any] = contents("paper_alpha")
+    folder = hg.example_file("alpha").parent / "machines"
+    change(given)
+    with pytest.raises(hg.InputError, match=text) as caught:
+        hg.Machine.of(given, name="mine", folder=folder)
+    assert "mine" in str(caught.value)
+
+
+def test_what_is_no_mapping_is_no_machine() -> None:
+    with pytest.raises(hg.InputError, match="must be a mapping"):
+        hg.Machine.of(["axis"])  # type: ignore[arg-type]
+
+
+# -- toolpaths ---------------------------------------------------------------------------------------
+
+PART = "G21 G64 P0.01\nG1 X20 F6000\nX35 Y10\nG4 P0.25\nX35 Y30\nM30\n"
+
+
+@pytest.fixture(scope="module")
+def mill() -> hg.Machine:
+    return hg.Machine.example("mill")
+
+
+def job_of(text: str, folder: Path, mill: hg.Machine, **options: Any) -> hg.Job:
+    file = folder / "part.ngc"
+    file.write_text(text, encoding="utf-8")
+    return hg.load_job(file, mill, **options)
+
+
+def test_a_job_is_that_of_the_command(tmp_path: Path, mill: hg.Machine) -> None:
+    job = job_of(PART, tmp_path, mill)
+    command = [*(sys.executable, "-m", "hodograph", "simulate", str(tmp_path / "part.ngc"))]
+    machine = str(hg.example_file("alpha").parent / "machines/mill.toml")
+    done = subprocess.run(
+        [*command, "--machine", machine, "--json"], capture_output=True, text=True, check=True
+    )
+    said = json.loads(done.stdout)
+    run = job.simulate()
+    assert [one.setpoints_sha256 for one in run.runs] == [
+        one["setpoints_sha256"] for one in said["section"]
+    ]
+    assert run.duration_s == pytest.approx(said["duration_s"], abs=0.001 * len(job.sections))
+    assert (job.length_mm, job.deviation_um) == (said["length_mm"], said["deviation_bound_um"])
+    assert (job.dwell_s, run.deadline_misses) == (0.25, None)
+    assert job.duration_s == pytest.approx(run.duration_s, abs=0.002 * len(job.sections))
+
+
+def test_a_section_is_a_path_that_can_be_planned_anew(tmp_path: Path, mill: hg.Machine) -> None:
+    section = job_of(PART, tmp_path, mill).sections[0]
+    assert (section.first_line, section.last_line) == (2, 3)
+    assert section.deviation_um <= 10.0
+    path = section.path
+    assert path.point_mm(path.length_mm) == pytest.approx([35, 10, 0], abs=1e-5)
+    slow = path.plan(hg.Limits(feed_mm_s=10), machine=mill)
+    assert slow.duration_s > 2.0 * section.plan.duration_s
+    assert slow.path is path
+    image = section.plan.program().image
+    assert section.program().image == image
+    with pytest.raises(hg.InputError, match="needs machine="):
+        path.plan(LIMITS)
+
+
+def test_options_of_the_reader_are_passed_on(tmp_path: Path, mill: hg.Machine) -> None:
+    slow = job_of(PART, tmp_path, mill, feed_mm_s=5.0, tolerance_mm=0.0)
+    assert slow.duration_s > 11.0
+    assert len(slow.sections) == 3
+    with pytest.raises(hg.InputError, match=r"part\.ngc"):
+        job_of(PART, tmp_path, mill, layers=["a"])
+    with pytest.raises(hg.InputError, match="moves nothing"):
+        job_of("M30\n", tmp_path, mill)
+
+
+def test_a_job_runs_on_a_bus_with_its_operator(tmp_path: Path, mill: hg.Machine) -> None:
+    job = job_of(PART.replace("M30", "M0\nX0\nM30"), tmp_path, mill)
+    asked: list[str] = []
+    with hg.local_bus() as bus, hg.connect(mill, bus) as controller:
+        with pytest.raises(hg.InputError, match=r"part\.ngc:6: M0 waits for the operator"):
+            controller.run_job(job)
+        run = controller.run_job(job, operator=asked.append)
+        assert run.bus == bus
+    assert asked == [f"{tmp_path / 'part.ngc'}:6: M0"]
+    offline = job.simulate()
+    assert [one.encoders_sha256 for one in run.runs] == [
+        one.encoders_sha256 for one in offline.runs
+    ]
+    assert repr(run) == f"JobRun(3 sections, on {bus})"
 
 
 # -- on a bus --------------------------------------------------------------------------------------
