@@ -218,7 +218,7 @@ share: build ## man page and shell completion in build/share, from the help
 	@$(PY) tools/make_share.py $(BUILD)/share
 
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
-	@$(PY) tools/bench.py --build $(BUILD)
+	@$(PY) tools/run_benchmarks.py --build $(BUILD)
 
 compare: build ## the same toolpaths planned by Hodograph, LinuxCNC, TOPP-RA and Ruckig; figures also in build/compare.json
 	@$(PYTHON) tools/packages.py compare
@@ -433,6 +433,7 @@ lint-js: $(READY)/packages-lint
 lint-directions:
 	$(call say,who,may use whom)
 	$(Q)$(PYTHON) tools/check_directions.py
+	$(Q)$(PYTHON) tools/check_test_names.py
 lint-symbols: $(HOST_LIBS)
 	$(call say,names,of the libraries)
 	$(Q)$(PYTHON) tools/check_symbols.py $(HOST_LIBS)

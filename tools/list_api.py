@@ -7,16 +7,15 @@ With --check nothing is written; the exit status is 1 when the page is not the o
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import inspect
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import hodograph
+from generated_page import REFERENCE, cell, write_or_check
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "python-api.md"
+PAGE = REFERENCE / "python-api.md"
 HEAD = """# Python API
 
 Generated from the docstrings by `make options`; do not edit. The [tutorial](../start/tutorial.md) shows how the names
@@ -37,11 +36,6 @@ otherwise. Points have one row each: (n, A) for A path axes. Objects are immutab
 milliseconds; a module is loaded when one of its names is first used. Objects on a bus belong to the thread that made
 them; the rest may be shared.
 """
-
-
-def cell(text: str) -> str:
-    """Text that stays in its cell of a table."""
-    return " ".join(text.split()).replace("|", "\\|")
 
 
 def body(subject: object) -> str:
@@ -142,16 +136,7 @@ def page() -> str:
 
 def main() -> int:
     """Writes or compares the page."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--check", action="store_true", help="compare, write nothing")
-    text = page()
-    if not options.parse_args().check:
-        PAGE.write_text(text, encoding="utf-8")
-        return 0
-    if PAGE.exists() and PAGE.read_text(encoding="utf-8") == text:
-        return 0
-    print(f"{PAGE.name} is not current: run make options", file=sys.stderr)
-    return 1
+    return write_or_check(PAGE, page(), __doc__)
 
 
 if __name__ == "__main__":

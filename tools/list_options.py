@@ -10,11 +10,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
+from generated_page import REFERENCE, cell, write_or_check
 from hodograph.cli.parser import EVERYWHERE, make_parser
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "options.md"
+PAGE = REFERENCE / "options.md"
 HEAD = """# Options of every command
 
 Generated from the command line by `make options`; do not edit. [cli.md](cli.md) explains the commands.
@@ -23,11 +23,6 @@ Every command also takes `-h`, and, before its name or behind it:
 | option | meaning |
 | --- | --- |
 """
-
-
-def cell(text: str) -> str:
-    """Text that stays in its cell of a table."""
-    return " ".join(text.split()).replace("|", "\\|")
 
 
 def name_of(action: argparse.Action) -> str:
@@ -77,16 +72,7 @@ def page() -> str:
 
 def main() -> int:
     """Writes or compares the page."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--check", action="store_true", help="compare, write nothing")
-    text = page()
-    if not options.parse_args().check:
-        PAGE.write_text(text, encoding="utf-8")
-        return 0
-    if PAGE.exists() and PAGE.read_text(encoding="utf-8") == text:
-        return 0
-    print(f"{PAGE.name} is not current: run make options", file=sys.stderr)
-    return 1
+    return write_or_check(PAGE, page(), __doc__)
 
 
 if __name__ == "__main__":

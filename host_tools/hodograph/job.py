@@ -23,7 +23,7 @@ from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .pipeline import Pipeline
 from .program.geometry import quantise
-from .simulate import Motion, simulate
+from .simulate import Motion, simulate_on
 from .spline.build import FoundSpline
 from .spline.curve import PHSpline
 from .spline.spatial import SpatialPHSpline
@@ -283,7 +283,7 @@ class _Maker:
             )
         places = np.union1d(reference.place_mm[chord], reference.place_mm[chord + 1])
         for part in cut_at(section, places):
-            yield from self.made(replace(part))
+            yield from self.made(part)
 
     @property
     def _limits(self) -> MotionLimits:
@@ -420,22 +420,12 @@ def simulate_job(
     progress: Callable[[int, int], None] | None = None,
 ) -> JobMotion:
     """Plans, compiles and runs every section. Errors name file and line."""
-    machine = job.machine
     begin = perf_counter()
     images = [section.pipeline.accepted for section in job.sections]
     planning_s = perf_counter() - begin
     motions = []
     for done, image in enumerate(images):
-        motions.append(
-            simulate(
-                image,
-                machine.models(machine.path_axes),
-                kernel=kernel or machine.kernel,
-                counts_per_mm=machine.counts_per_mm,
-                feedforward=machine.path_feedforward,
-                keep_rows=keep_rows,
-            )
-        )
+        motions.append(simulate_on(job.machine, image, kernel, keep_rows=keep_rows))
         if progress is not None:
             progress(done + 1, len(images))
     return JobMotion(job, tuple(motions), planning_s)

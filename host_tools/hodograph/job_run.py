@@ -16,7 +16,7 @@ import numpy as np
 
 from .bus.capture.setpoint_check import SetpointJumpError
 from .bus.goto import goto
-from .bus.run import BusRun, Progress, Recorded, RunSession, analysed, bring_up, record_program
+from .bus.run import BusRun, Progress, RunSession, analysed, bring_up, record_program
 from .bus.sdo.controller import READY
 from .errors import PlanError, RunError
 from .job import Job, JobMotion
@@ -130,11 +130,11 @@ def run_job(
     runs: list[BusRun] = []
     failure: RunError | None = None
     passed = 0
+    _to_start(at, made, made.programs[0], unhomed)
     for number, (section, program) in enumerate(zip(job.sections, made.programs, strict=True), 1):
-        if number == 1:
-            _to_start(at, made, program, unhomed)
         _rest(at, job, section.before, operator)
         place = f"{job.file}:{section.first_line}: section {number} of {len(job.sections)}"
+        # No move, unless an operator moved the axes during the stop.
         _to_start(at, made, program, unhomed)
         done = passed
         recorded = record_program(
@@ -148,7 +148,8 @@ def run_job(
         passed += program.ticks
         _say(at, job, [command for _, command in section.events])
         try:
-            runs.append(_analysed(at, made, program, recorded, _record_of(record, number, job)))
+            file = _record_of(record, number, job)
+            runs.append(analysed(at, job.machine, program.image, made.kernel, recorded, file))
         except SetpointJumpError as error:
             raise RunError(f"{place}: {error}") from None
         except RunError as error:
@@ -168,16 +169,6 @@ def _record_of(record: Path | None, number: int, job: Job) -> Path | None:
     if record is None or len(job.sections) == 1:
         return record
     return record.with_name(f"{record.stem}.{number}{record.suffix}")
-
-
-def _analysed(
-    at: RunSession,
-    made: PreparedJob,
-    program: NativeProgram,
-    recorded: Recorded,
-    record: Path | None,
-) -> BusRun:
-    return analysed(at, made.job.machine, program.image, made.kernel, recorded, record)
 
 
 def _setpoint(made: PreparedJob, program: NativeProgram, tick: int) -> list[int]:

@@ -12,7 +12,6 @@ from time import perf_counter
 from typing import TypeVar
 
 from .config import (
-    PLANE_AXES,
     SPACE_AXES,
     Drive,
     Machine,
@@ -39,7 +38,6 @@ from .feed import (
     replan,
 )
 from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
-from .names import AXES
 from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
@@ -81,12 +79,6 @@ def axis_limits(machine: Machine) -> AxisLimits:
         acceleration_mm_s2=tuple(axis.acceleration_mm_s2 for axis in axes),
         jerk_mm_s3=tuple(axis.jerk_mm_s3 for axis in axes),
     )
-
-
-def axis_names(machine: Machine) -> tuple[str, ...]:
-    """What the axes that follow a path are called: x, y in the plane, the machine's own names in space."""
-    axes = machine.path_axes
-    return AXES[:PLANE_AXES] if len(axes) == PLANE_AXES else tuple(axis.name for axis in axes)
 
 
 def plants(machine: Machine | None, limits: Limits) -> Plants | None:
@@ -315,7 +307,7 @@ class Pipeline:
         machine = self.machine_or_none
         if machine is None:
             return self.file.limits
-        return self.file.limits.on_machine(axis_names(machine), axis_limits(machine))
+        return self.file.limits.on_machine(machine.path_names, axis_limits(machine))
 
     @cached_property
     def peaks(self) -> dict[str, Peak]:

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from subprocesses import run
+
 ROOT = Path(__file__).resolve().parents[2]
 ALPHA = ROOT / "examples/alpha.toml"
 HANGS_S = 1700.0
@@ -35,17 +37,7 @@ apt-get purge --yes --quiet hodograph libhodograph-dev
 
 
 def output(*command: object, cwd: Path = ROOT) -> str:
-    done = subprocess.run(
-        list(map(str, command)),
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=HANGS_S,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
-    assert done.returncode == 0, (done.stdout + done.stderr)[-4000:]
-    return done.stdout
+    return run(*command, cwd=cwd, limit_s=HANGS_S).stdout
 
 
 def codename() -> str:

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
+
+from subprocesses import run
 
 ROOT = Path(__file__).resolve().parents[2]
 ALPHA = ROOT / "examples/alpha.toml"
@@ -27,17 +28,7 @@ def own_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def output(*command: object) -> str:
-    done = subprocess.run(
-        list(map(str, command)),
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=HANGS_S,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
+    return run(*command, limit_s=HANGS_S).stdout
 
 
 def unpacked(wheel: Path, folder: Path) -> Path:
@@ -70,8 +61,8 @@ def test_wheels_of_both_platforms(tmp_path: Path) -> None:
         package = unpacked(wheel, tmp_path / machine)
         controller = f"{emulator}{package / 'bin/hodograph-controller'}"
         words = ["run", ALPHA, "--json", "--pace", "fast", "--controller", controller]
-        run = json.loads(output(sys.executable, "-m", "hodograph", *words))
-        assert run["setpoints_sha256"] == expected["setpoints_sha256"], machine
+        ran = json.loads(output(sys.executable, "-m", "hodograph", *words))
+        assert ran["setpoints_sha256"] == expected["setpoints_sha256"], machine
         if machine == "x86_64":
             for file in (*(package / "bin").iterdir(), package / "native/_native.abi3.so"):
                 assert newest_glibc(file) <= (2, 17), file

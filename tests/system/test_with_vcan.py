@@ -2,7 +2,7 @@
 """tools/with-vcan: a command on a user-mode bus behaves as one run here, and nothing is left behind.
 
 A bus is a kernel that boots: most tests share one, and those that end one in their own way use it for all there is to
-see. What is waited for comes, or the test hangs and is ended (pyproject.toml).
+see. Each wait has a limit below that of pytest (pyproject.toml), and says what did not come.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import struct
 import subprocess
 import sys
 import termios
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,6 +25,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 WITH_VCAN = str(ROOT / "tools/with-vcan")
 HANGS_S = 600.0
+WAIT_S = 300.0
 LOOK_S = 0.02
 
 SEND = """
@@ -52,8 +54,7 @@ class OpenBus:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
         )
-        assert self.process.stdout is not None
-        assert self.process.stdout.readline() == b"up\n"
+        assert line_of(self.process) == b"up\n"
 
     def command(self, *words: str) -> list[str]:
         return [WITH_VCAN, "--join", "--bus", self.name, *words]
@@ -82,8 +83,16 @@ def started(command: list[str]) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def line_of(process: subprocess.Popen[bytes]) -> bytes:
+    """The next line of its output; a process that says nothing for too long is killed."""
     assert process.stdout is not None
-    return process.stdout.readline()
+    late = threading.Timer(WAIT_S, process.kill)
+    late.start()
+    try:
+        line = process.stdout.readline()
+    finally:
+        late.cancel()
+    assert line, f"no line in {WAIT_S:g} s, or the end: {process.args}"
+    return line
 
 
 @contextlib.contextmanager
@@ -115,8 +124,10 @@ def folder_of(name: str) -> Path:
     return Path(f"/tmp/hodograph-bus-{os.getuid()}") / name
 
 
-def wait_until(happened: Callable[[], bool]) -> None:
+def wait_until(what: str, happened: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + WAIT_S
     while not happened():
+        assert time.monotonic() < end_s, f"not in {WAIT_S:g} s: {what}"
         time.sleep(LOOK_S)
 
 
@@ -151,7 +162,8 @@ def test_a_slow_reader_holds_up_only_itself(bus: OpenBus) -> None:
     with started(bus.command("yes")) as flood:
         assert flood.stdout is not None
         pipe = flood.stdout.fileno()
-        wait_until(lambda: waiting_in(pipe) == fcntl.fcntl(pipe, fcntl.F_GETPIPE_SZ))
+        full = fcntl.fcntl(pipe, fcntl.F_GETPIPE_SZ)
+        wait_until("the pipe is full", lambda: waiting_in(pipe) == full)
         assert bus.run("echo", "through").stdout == b"through\n"
         flood.stdout.close()
         assert flood.wait(HANGS_S) == 128 + signal.SIGPIPE
@@ -210,7 +222,7 @@ def test_a_killed_client_takes_its_command_along(bus: OpenBus) -> None:
         assert line_of(process) == b"ready\n"
         process.kill()
     listing = ["sh", "-c", "cat /proc/[0-9]*/cmdline | tr '\\0' ' '"]
-    wait_until(lambda: mark not in bus.run(*listing).stdout.decode())
+    wait_until("the command is gone", lambda: mark not in bus.run(*listing).stdout.decode())
 
 
 def test_list_names_the_bus_and_unknown_names_are_refused(bus: OpenBus) -> None:
@@ -274,8 +286,8 @@ def test_real_time_scheduling_is_allowed_inside(bus: OpenBus) -> None:
 def test_nothing_is_left_after_sigkill() -> None:
     bus = OpenBus(f"kill-{os.getpid()}")
     bus.end(signal.SIGKILL)
-    wait_until(lambda: not processes_of(bus.name))
-    wait_until(lambda: not folder_of(bus.name).exists())
+    wait_until("no process is left", lambda: not processes_of(bus.name))
+    wait_until("the folder is gone", lambda: not folder_of(bus.name).exists())
 
 
 def test_nothing_runs_on_after_the_broker_is_killed() -> None:
@@ -296,7 +308,7 @@ def test_ctrl_c_while_booting_ends_at_once() -> None:
     process = subprocess.Popen(
         [WITH_VCAN, "--user-mode", "--name", name, "sleep", "600"], stdin=subprocess.DEVNULL
     )
-    wait_until((folder_of(name) / "info.json").exists)
+    wait_until("the bus has its folder", (folder_of(name) / "info.json").exists)
     process.send_signal(signal.SIGINT)
     assert process.wait(HANGS_S) == 130
     assert processes_of(name) == []

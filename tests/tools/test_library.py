@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,26 +13,13 @@ import pytest
 from dist.abi import differences, exported
 from dist.library import PREFIX, Abi, make_library, version
 from hodograph.native import NativeProgram
+from subprocesses import run
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "build/library"
 ALPHA = ROOT / "examples/alpha.toml"
 DAMAGED = "broken_backwards.hdgp"
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Werror")
-HANGS_S = 300.0
-
-
-def run(*command: object, cwd: Path = ROOT, status: int = 0) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        list(map(str, command)),
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=HANGS_S,
-        check=False,
-    )
-    assert done.returncode == status, done.stdout + done.stderr
-    return done
 
 
 def place(action: str, prefix: Path, *options: object) -> None:

@@ -39,8 +39,9 @@ static const struct config config = {
     .travel_min_counts = {-1000000000, -1000000000},
     .travel_max_counts = {1000000000, 1000000000},
 };
-static const char *const names[IMAGES] = {"star_minimax.hdgp", "alpha_exponential.hdgp",
-                                          "heart_exponential.hdgp"};
+/* The elder one is the longest, so that a part of it would be left where a page is not erased. */
+static const char *const names[IMAGES] = {"star_minimax.hdgp", "alpha_minimax.hdgp",
+                                          "heart_minimax.hdgp"};
 static struct image {
     uint8_t *bytes;
     uint32_t size;

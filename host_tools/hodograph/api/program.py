@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..native import NativeProgram
 from ..pipeline import controller_verdict
-from ..simulate import Motion, simulate
+from ..simulate import Motion, simulate_on
 from .machine import Machine
 
 Real = NDArray[np.float64]
@@ -159,16 +159,7 @@ class Program:
 
         Raises InputError when an axis of the machine has no drive file.
         """
-        machine = self.machine._file
-        return Run(
-            simulate(
-                self._native,
-                machine.models(machine.path_axes),
-                kernel=kernel or machine.kernel,
-                counts_per_mm=machine.counts_per_mm,
-                feedforward=machine.path_feedforward,
-            )
-        )
+        return Run(simulate_on(self.machine._file, self._native, kernel))
 
     def save(self, file: str | PathLike[str]) -> None:
         """Writes the image. Raises OSError."""

@@ -14,7 +14,6 @@ from ..errors import InputError, RefusedError
 from ..feed import FeedRequest, Limits, plan_path
 from ..pipeline import (
     axis_limits,
-    axis_names,
     controller_limits,
     plants,
     program_limits,
@@ -47,7 +46,7 @@ def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
         ramp_time_s=GOTO_RAMP_S,
         degree=5,
     )
-    limits = Limits(machine=axis_limits(machine), names=axis_names(machine))
+    limits = Limits(machine=axis_limits(machine), names=machine.path_names)
     plan = plan_path(
         spline,
         request,

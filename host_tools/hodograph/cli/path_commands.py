@@ -15,12 +15,12 @@ from ..errors import HodographError, InputError
 from ..feed import FeedPlan
 from ..names import is_toolpath
 from ..native import NativeProgram
-from ..pipeline import Pipeline, axis_names, load_pipeline
+from ..pipeline import Pipeline, load_pipeline
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.check import check, coefficients_in_range
 from ..program.image import LARGEST_BANK, MAGIC, RECORD_BYTES, memory_bytes
 from ..program.stops import stops_dict, stops_text
-from ..simulate import Motion, StoppedRun, last_tick_s, simulate, simulate_stop, write_trace
+from ..simulate import Motion, StoppedRun, last_tick_s, simulate_on, simulate_stop, write_trace
 from ..spline import PHSpline
 from ..spline.spatial import SpatialPHSpline
 from .output import (
@@ -271,18 +271,14 @@ def _unsound(program: Program) -> str:
 
 def simulate_chain(pipeline: Pipeline, kernel: str | None, *, keep_rows: bool = True) -> Motion:
     """A run of a path without a bus. Without its rows (one a tick) its memory does not grow with time."""
-    machine = pipeline.machine
     image = pipeline.image
     with progress("simulate", "tick", pipeline.program.ticks) as bar:
-        return simulate(
+        return simulate_on(
+            pipeline.machine,
             image,
-            machine.models(machine.path_axes),
-            kernel=kernel or machine.kernel,
-            counts_per_mm=machine.counts_per_mm,
-            feedforward=machine.path_feedforward,
+            kernel,
             keep_rows=keep_rows,
             progress=lambda done, total: bar(done),
-            names=axis_names(machine),
         )
 
 
@@ -332,7 +328,7 @@ def _stopped(pipeline: Pipeline, kernel: str | None, kind: str, at_s: float) -> 
         kernel=kernel or machine.kernel,
         counts_per_mm=machine.counts_per_mm,
         feedforward=machine.path_feedforward,
-        names=axis_names(machine),
+        names=machine.path_names,
     )
 
 

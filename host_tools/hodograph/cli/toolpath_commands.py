@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-import json
 from argparse import Namespace
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
+
+import tomlkit
 
 from ..config import load_machine
 from ..errors import InputError
@@ -98,7 +99,7 @@ def import_(options: Namespace) -> None:
     job = toolpath_job(options, options.file)
     found = imported(job)
     if options.output is not None:
-        write_file(options.output, _toml(found).encode())
+        write_file(options.output, tomlkit.dumps(found).encode())
     if options.json:
         print_json(found)
     elif options.output is None:
@@ -169,23 +170,6 @@ def _event(command: Command) -> dict[str, object]:
         for name, value in asdict(command).items()
     }
     return {"command": type(command).__name__, **own}
-
-
-def _toml(found: dict[str, object]) -> str:
-    """TOML of a dict of scalars, lists of texts, and lists of tables."""
-    lines = [
-        f"{key} = {json.dumps(value)}" for key, value in found.items() if not _is_tables(value)
-    ]
-    for key, value in found.items():
-        if _is_tables(value):
-            assert isinstance(value, list)
-            for table in value:
-                lines += ["", f"[[{key}]]", *(f"{k} = {json.dumps(v)}" for k, v in table.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _is_tables(value: object) -> bool:
-    return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
 
 
 COMMANDS = {"import": import_}

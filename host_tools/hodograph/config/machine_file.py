@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..names import KERNELS
+from ..names import AXES, KERNELS
 from .axis_table import MAX_AXES, Axis, Feedforward, read_axes
 from .drive_file import Drive
 from .table import Table, read_toml
@@ -92,6 +92,12 @@ class Machine:
                 f"{self.file}: has one axis ({self.axes[0].name}), a path needs two: add a second [[axis]]"
             )
         return _drawn(self.file, self.axes[: self.path_count])
+
+    @property
+    def path_names(self) -> tuple[str, ...]:
+        """Names of the axes that follow a path: x, y in the plane, the machine's own in space."""
+        axes = self.path_axes
+        return AXES[:PLANE_AXES] if len(axes) == PLANE_AXES else tuple(axis.name for axis in axes)
 
     def require_plane(self, what: str) -> tuple[Axis, Axis]:
         """The two axes of a path, for a command that knows no more. Raises InputError: there are more, or one."""

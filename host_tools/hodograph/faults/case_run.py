@@ -14,7 +14,7 @@ from ..bus.capture.frames import Frames
 from ..config import Machine
 from ..native import NativeProgram
 from ..pipeline import load_pipeline
-from ..simulate import Motion, simulate
+from ..simulate import Motion, simulate_on
 from .case_record import CaseRecord
 from .scenario import Case
 
@@ -26,14 +26,14 @@ LOOK_S = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Job:
+class CleanRun:
     """A program with its machine and what a clean run of it gives."""
 
     machine: Machine
     image: bytes
     other: Path
     """Another path for the same machine."""
-    clean: Motion
+    motion: Motion
     setpoints: NDArray[np.int32]
     fault_stop_s: float
     """Bound of the longest fault stop."""
@@ -44,7 +44,7 @@ class CaseRun:
     """What happened in a case, for the judge."""
 
     case: Case
-    job: Job
+    clean_run: CleanRun
     injections: list[dict[str, object]] = field(default_factory=list)
     evidence: CaseRecord | None = None
     """Of the disturbed run."""
@@ -68,17 +68,13 @@ class CaseRun:
 
 
 @lru_cache(maxsize=8)
-def load_job(path: Path) -> Job:
+def load_clean_run(path: Path) -> CleanRun:
     """The program of a path file; raises InputError, PlanError."""
     pipeline = load_pipeline(path, allow_space=True)
     machine, image = pipeline.machine, pipeline.image
     _, setpoints = NativeProgram(image).setpoints("fixed", machine.counts_per_mm)
-    clean = simulate(
-        image,
-        machine.models(machine.path_axes),
-        counts_per_mm=machine.counts_per_mm,
-        feedforward=machine.path_feedforward,
-        keep_rows=False,
-    )
+    motion = simulate_on(machine, image, "fixed", keep_rows=False)
     longest_us = max(pipeline.program.stops.worst_us[1:])
-    return Job(machine, image, path.with_name("other.toml"), clean, setpoints, longest_us * 1e-6)
+    return CleanRun(
+        machine, image, path.with_name("other.toml"), motion, setpoints, longest_us * 1e-6
+    )

@@ -27,12 +27,12 @@ _START_S = 120.0
 
 def disturb(record: CaseRun, bench: FaultBench, controller: Controller, control: Recorder) -> None:
     """Runs the case's program, or its upload, with what its scenario does to it. Raises what the bus tools raise."""
-    job, case = record.job, record.case
+    clean_run, case = record.clean_run, record.case
     controller.require(5.0)
-    controller.configure(job.machine, "fixed")
+    controller.configure(clean_run.machine, "fixed")
     controller.override(100)
     controller.enable()
-    controller.upload(job.image)
+    controller.upload(clean_run.image)
     if case.scenario.action in ("cut-upload", "kill-upload"):
         disturb_upload(record, bench, controller, control)
         return
@@ -49,11 +49,13 @@ def disturb(record: CaseRun, bench: FaultBench, controller: Controller, control:
             process.end()
     if state is None:  # a fresh controller: nothing to ask it
         return
-    record.finished = state == READY and controller.read(STATISTICS, _TICK) == job.clean.ticks - 1
+    record.finished = (
+        state == READY and controller.read(STATISTICS, _TICK) == clean_run.motion.ticks - 1
+    )
     _await_end_of_rules(record, controller)
     if controller.state() == FAULT_STATE:
         record.fault_codes.append(controller.read(FAULT, 1))
-    if controller.program_crc() != zlib.crc32(job.image[16:]):
+    if controller.program_crc() != zlib.crc32(clean_run.image[16:]):
         record.troubles.append("the program is not the one that was uploaded")
 
 
@@ -91,7 +93,7 @@ def _act(record: CaseRun, bench: FaultBench, clock: Clock, process: Process | No
         for drive in bench.drives:
             drive.kill()
     elif action == "kill-one-drive":
-        bench.drives[record.job.machine.nodes.index(int(record.case.drawn["node"]))].kill()
+        bench.drives[record.clean_run.machine.nodes.index(int(record.case.drawn["node"]))].kill()
     elif process is not None:
         process.kill()
     elif action == "kill-controller":
@@ -102,7 +104,7 @@ def _act(record: CaseRun, bench: FaultBench, clock: Clock, process: Process | No
 
 
 def _watch_drives(record: CaseRun, bench: FaultBench, clock: Clock) -> None:
-    machine = record.job.machine
+    machine = record.clean_run.machine
     with drives_at(bench.drives_bus, machine.nodes, machine.bitrate) as clients:
         rest_s = await_rest(clients, clock, REST_TOLERANCE_COUNTS, LIMIT_S)
     record.rest_us = round((rest_s - clock.now_s()) * 1e6) + clock.stamp_ns() // 1000
@@ -118,7 +120,7 @@ def _await_end_of_rules(record: CaseRun, controller: Controller) -> None:
             raise BusError("SYNCs have stopped")
         controller.clock.sleep(LOOK_S)
     controller.clock.sleep(case.longest_ms / 1000)
-    _await_rest(controller, len(record.job.machine.axes))
+    _await_rest(controller, len(record.clean_run.machine.axes))
     controller.clock.sleep(QUIET_S)
 
 

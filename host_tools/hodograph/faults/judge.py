@@ -135,7 +135,7 @@ def _told(record: CaseRun, evidence: CaseRecord) -> list[Emergency]:
     if record.case.scenario.action == CONTROLLER_KILLED:
         found = evidence.emergencies(evidence.drives, evidence.nodes)
     else:
-        found = evidence.emergencies(evidence.control, (record.job.machine.node,))
+        found = evidence.emergencies(evidence.control, (record.clean_run.machine.node,))
     return [emergency for emergency in found if emergency.time_us >= record.began_us]
 
 
@@ -146,14 +146,14 @@ def _between(evidence: CaseRecord, from_us: int, to_us: int) -> tuple[int, float
 
 def _bad_setpoints(record: CaseRun, evidence: CaseRecord) -> list[str]:
     """Jumps, and setpoints away from the curve."""
-    machine = record.job.machine
-    limits = step_limits(machine, record.job.setpoints)
+    machine = record.clean_run.machine
+    limits = step_limits(machine, record.clean_run.setpoints)
     frames = evidence.control if record.control is None else record.control
     bad = [str(jump) for jump in find_jumps(frames, machine.nodes, limits)[:3]]
     bad += find_rough_starts(frames, machine.nodes, REST_TOLERANCE_COUNTS)[:3]
     if not evidence.moved:
         return bad
-    drawn = evidence.setpoints()[: min(record.job.setpoints.shape[1], SPACE_AXES)]
+    drawn = evidence.setpoints()[: min(record.clean_run.setpoints.shape[1], SPACE_AXES)]
     sent = np.logical_and.reduce([axis_sent for _, axis_sent in drawn])
     points = np.unique(np.stack([axis[sent] for axis, _ in drawn], axis=1), axis=0)
     worst_mm = _distance_mm(record, points)
@@ -163,11 +163,11 @@ def _bad_setpoints(record: CaseRun, evidence: CaseRecord) -> list[str]:
 
 
 def _distance_mm(record: CaseRun, points: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> float:
-    program = NativeProgram(record.job.image)
-    rows, nominal = program.setpoints("fixed", record.job.machine.counts_per_mm)
+    program = NativeProgram(record.clean_run.image)
+    rows, nominal = program.setpoints("fixed", record.clean_run.machine.counts_per_mm)
     contour, worst = Contour(program), 0.0
     places = nominal[:, : points.shape[1]].astype(np.float64)
-    scale = record.job.machine.counts_per_mm
+    scale = record.clean_run.machine.counts_per_mm
     for point in points:
         near = int(np.argmin(np.sum((places - point) ** 2, axis=1)))
         arc_mm = float(rows["arc_length_q40_mm"][near]) * 2.0**-40
@@ -192,7 +192,7 @@ def _not_on_path(record: CaseRun, evidence: CaseRecord) -> list[str]:
     found = _told(record, evidence)
     if not record.case.scenario.expect.on_path or not found or not evidence.moved:
         return []
-    most_ticks = ceil(record.job.fault_stop_s / (record.job.machine.period_us * 1e-6))
+    most_ticks = ceil(record.clean_run.fault_stop_s / (record.clean_run.machine.period_us * 1e-6))
     fault_tick, bad = evidence.tick_at(found[0].time_us), []
     for node, (target, sent) in zip(evidence.nodes, evidence.setpoints(), strict=True):
         steps = np.flatnonzero((np.diff(target) != 0) & sent[1:] & sent[:-1])
@@ -232,7 +232,7 @@ def _unexpected(record: CaseRun, codes: list[int], latency: Times, rest: Times) 
 
 
 def _not_recovered(record: CaseRun) -> list[str]:
-    clean, again = record.job.clean, record.again
+    clean, again = record.clean_run.motion, record.again
     if again is None:
         return ["no clean run afterwards"] if not record.troubles else []
     bad = []

@@ -15,7 +15,7 @@ from .case_run import LIMIT_S, CaseRun
 
 def recover(record: CaseRun, bench: FaultBench, controller: Controller) -> None:
     """Resets the fault, and runs the program again from its start."""
-    job = record.job
+    clean_run = record.clean_run
     if bench.controller.ended():
         bench.start_controller()
         controller.require(5.0)
@@ -26,7 +26,9 @@ def recover(record: CaseRun, bench: FaultBench, controller: Controller) -> None:
     began_s = controller.clock.now_s()
     _reset(controller)
     record.recovery_ms = 1000 * (controller.clock.now_s() - began_s)
-    run = run_program(RunSession(controller, "fast", None), job.machine, job.image, "fixed")
+    run = run_program(
+        RunSession(controller, "fast", None), clean_run.machine, clean_run.image, "fixed"
+    )
     record.again = run.motion
 
 

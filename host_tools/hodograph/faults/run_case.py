@@ -13,7 +13,7 @@ from ..bus.sdo.controller import connect
 from ..errors import HodographError
 from .bench import FaultBench
 from .case_record import CaseRecord
-from .case_run import CaseRun, load_job
+from .case_run import CaseRun, load_clean_run
 from .disturb import disturb
 from .recover import recover
 from .scenario import Case
@@ -38,8 +38,8 @@ def run_case(case: Case, buses: Buses | None) -> CaseRun:
 
 def _run(case: Case, bus: BusAddress, drives_bus: BusAddress) -> CaseRun:
     began_s = time.monotonic()
-    record = CaseRun(case, load_job(case.scenario.path))
-    machine = record.job.machine
+    record = CaseRun(case, load_clean_run(case.scenario.path))
+    machine = record.clean_run.machine
     apart = case.scenario.action == "kill-one-drive"
     with (
         FaultBench(machine, bus, drives_bus, case.rules, apart=apart) as bench,
@@ -66,7 +66,7 @@ def _gather(
     record: CaseRun, bench: FaultBench, clock: Clock, control: Recorder, drives: Recorder
 ) -> None:
     record.injections = bench.injections()
-    record.evidence = CaseRecord(control.so_far(), drives.so_far(), record.job.machine.nodes)
+    record.evidence = CaseRecord(control.so_far(), drives.so_far(), record.clean_run.machine.nodes)
     if control.dropped or drives.dropped:
         record.troubles.append("the kernel dropped frames of a recording")
     if record.injections and not record.began_us:

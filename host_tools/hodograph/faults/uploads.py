@@ -13,7 +13,7 @@ from ..bus.processes import Process
 from ..bus.sdo.controller import FAULT_STATE, READY, Controller
 from ..errors import BusError, RefusedError, RunError
 from .bench import FaultBench
-from .case_run import LIMIT_S, LOOK_S, CaseRun, load_job
+from .case_run import LIMIT_S, LOOK_S, CaseRun, load_clean_run
 from .fault_actions import cut_upload, spawn_command
 
 _SDO_ASK = 0x600
@@ -23,11 +23,11 @@ def disturb_upload(
     record: CaseRun, bench: FaultBench, controller: Controller, control: Recorder
 ) -> None:
     """Breaks an upload of another program off; what was there must stay."""
-    other = load_job(record.job.other).image
+    other = load_clean_run(record.clean_run.other).image
     record.began_us = controller.clock.stamp_ns() // 1000
     if record.case.scenario.action == "kill-upload":
         process = spawn_command(
-            bench.clock, "upload", str(record.job.other), "--bus", str(bench.bus)
+            bench.clock, "upload", str(record.clean_run.other), "--bus", str(bench.bus)
         )
         _await_frames(
             controller.clock,
@@ -41,7 +41,7 @@ def disturb_upload(
     else:
         at = int(record.case.drawn["permille"]) * len(other) // 1000
         cut_upload(controller, other, at, polite=record.case.drawn["manner"] == "abort")
-    crc, wanted = _crc_after_cut(controller), zlib.crc32(record.job.image[16:])
+    crc, wanted = _crc_after_cut(controller), zlib.crc32(record.clean_run.image[16:])
     whole = record.case.scenario.action == "kill-upload" and crc == zlib.crc32(other[16:])
     if crc != wanted and not whole:
         record.troubles.append(f"after a broken upload the program has CRC {crc}, not {wanted}")

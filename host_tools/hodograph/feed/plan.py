@@ -159,8 +159,17 @@ class FeedPlan:
         own = length_q40 == self._length_q40
         if own and (joints_q40 is None or not self.curve.follows_joints):
             return self.pieces
-        raw = self.curve.raw_pieces(length_q40, self.period_us, joints_q40)
-        return with_override(raw, self.controller, self.limits, self.paths)
+        key = (length_q40, None if joints_q40 is None else joints_q40.tobytes())
+        if key not in self._fitted:
+            raw = self.curve.raw_pieces(length_q40, self.period_us, joints_q40)
+            self._fitted.clear()
+            self._fitted[key] = with_override(raw, self.controller, self.limits, self.paths)
+        return self._fitted[key]
+
+    @cached_property
+    def _fitted(self) -> dict[tuple[int, bytes | None], FeedPieces]:
+        """The last result of `pieces_over`: fitting and compiling a plan ask for the same pieces."""
+        return {}
 
     @property
     def _length_q40(self) -> int:

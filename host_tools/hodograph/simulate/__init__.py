@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Runs without a bus, and the analysis that they share with recorded ones.
 
-`simulate` runs a program through the controller's own kernels and two simulated drives in one process; `analyse`
-makes the same result from what a recorder saw on the bus. Both give a `Motion`: rows, hashes, maxima.
+`simulate` runs a program through the controller's own kernels and the simulated drives of its axes in one process;
+`simulate_on` takes them from a machine. `analyse` makes the same result from a recording of the bus. All give a
+`Motion`: rows, hashes, maxima.
 """
 
 from .motion import SETTLING_S, Motion, Tally, settling_ticks
 from .run_recording import analyse
-from .simulation import simulate
+from .simulation import simulate, simulate_on
 from .stopping import STOP_ORDERS, StoppedRun, last_tick_s, simulate_stop
 from .trace import TRACE_HEADER, write_trace
 
@@ -22,6 +23,7 @@ __all__ = [
     "last_tick_s",
     "settling_ticks",
     "simulate",
+    "simulate_on",
     "simulate_stop",
     "write_trace",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
+from ..config.machine_file import Machine
 from ..errors import InputError
 from ..names import AXES
 from ..native import ROW, NativeProgram, OfflineFault, OfflineSimulation
@@ -18,10 +19,10 @@ CHUNK_TICKS = 16384
 """Ticks a call of the C side: small enough to stay in cache, and between two checks for Ctrl-C."""
 
 
-def axis_names(
+def names_of_driven(
     program: NativeProgram, drives: Sequence[Drive], names: Sequence[str] | None
 ) -> tuple[str, ...]:
-    """The names of the axes of a program. Raises InputError: it has other axes than there are drives."""
+    """The names of the axes of a program. Raises InputError: the number of drives is not that of its axes."""
     count = program.axis_count
     if len(drives) != count:
         raise InputError(f"simulate: needs the drives of {count} axes, not {len(drives)}")
@@ -48,7 +49,7 @@ def simulate(
     `names` are those of the axes (default x, y, …). Raises InputError: image, kernel or drive figures not acceptable.
     """
     program = image if isinstance(image, NativeProgram) else NativeProgram(image)
-    names = axis_names(program, drives, names)
+    names = names_of_driven(program, drives, names)
     rig = OfflineSimulation(program, kernel, drives, counts_per_mm, feedforward, faults)
     total = program.ticks + settling_ticks(program.period_us)
     tally = Tally(program.ticks, counts_per_mm, names)
@@ -66,4 +67,28 @@ def simulate(
         counts_per_mm=counts_per_mm,
         ticks=program.ticks,
         rows=rows if keep_rows else rows[:0],
+    )
+
+
+def simulate_on(
+    machine: Machine,
+    image: bytes | NativeProgram,
+    kernel: str | None = None,
+    *,
+    keep_rows: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Motion:
+    """`simulate` with the drives, counts, feedforward and axis names of a machine; `kernel` None: the machine's.
+
+    Raises InputError as `simulate` does, and for an axis without a drive file.
+    """
+    return simulate(
+        image,
+        machine.models(machine.path_axes),
+        kernel=kernel or machine.kernel,
+        counts_per_mm=machine.counts_per_mm,
+        feedforward=machine.path_feedforward,
+        keep_rows=keep_rows,
+        progress=progress,
+        names=machine.path_names,
     )

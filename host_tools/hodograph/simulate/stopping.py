@@ -18,7 +18,7 @@ from ..native import ROW, NativeProgram, OfflineSimulation
 from ..native.offline import OfflineOrder
 from ..program import Program
 from .motion import Motion, Tally, settling_ticks
-from .simulation import axis_names
+from .simulation import names_of_driven
 
 STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
 """Kinds of a stop, and of the OfflineOrder that asks for it."""
@@ -80,7 +80,7 @@ def simulate_stop(
     first that follows. Raises InputError: a time outside the program, and as `simulate`.
     """
     period_s = program.period_us * 1e-6
-    names = axis_names(program, drives, names)
+    names = names_of_driven(program, drives, names)
     end_s = last_tick_s(program)
     if not 0.0 <= at_s <= end_s * (1.0 + 1e-12):
         raise InputError(f"{kind} at {at_s:g} s: must be from 0 to {end_s:.9g} s")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
 from hodograph.faults.case_record import CaseRecord
-from hodograph.faults.case_run import CaseRun, Job, load_job
+from hodograph.faults.case_run import CaseRun, CleanRun, load_clean_run
 from hodograph.faults.case_table import text
 from hodograph.faults.judge import Verdict, judge
 from hodograph.faults.scenario import Case, Expectation, Scenario
@@ -27,8 +27,8 @@ INJECTED = [{"t_ns": 0, "tick": 50, "line": 1, "kind": "drop"}]
 
 
 @cache
-def job() -> Job:
-    return load_job(FOLDER / "path.toml")
+def clean_run() -> CleanRun:
+    return load_clean_run(FOLDER / "path.toml")
 
 
 def frames(rows: list[tuple[int, int, bytes]]) -> Frames:
@@ -67,21 +67,21 @@ def record(recorded: Frames, expect: Expectation = EXPECT, *, at: int = 50) -> C
     scenario = Scenario(
         "made-up", "x", FOLDER / "path.toml", ("drop at=50 id=1",), {}, "none", expect
     )
-    made = CaseRun(Case(scenario, 0, {"seed": 1}), job())
+    made = CaseRun(Case(scenario, 0, {"seed": 1}), clean_run())
     made.injections = list(INJECTED)
     made.evidence = CaseRecord(recorded, recorded, (2, 3))
     made.began_us = BEGAN_US + 1000 * (5 + at)
-    made.again = job().clean
+    made.again = clean_run().motion
     made.recovery_ms = 900.0
     return made
 
 
 def stopped(at: int) -> NDArray[np.int32]:
     """The setpoints of a program that comes to rest on the path from tick `at` on."""
-    time = np.arange(2 * len(job().setpoints), dtype=np.float64)
+    time = np.arange(2 * len(clean_run().setpoints), dtype=np.float64)
     ahead = np.clip(time - at, 0, 60)
     tick = np.where(time < at, time, at + ahead - ahead**2 / 120)
-    nominal = job().setpoints.astype(np.float64)
+    nominal = clean_run().setpoints.astype(np.float64)
     return np.stack(
         [np.interp(tick, np.arange(len(nominal)), nominal[:, i]) for i in range(2)], axis=1
     ).astype(np.int32)
@@ -92,7 +92,7 @@ def violations(made: CaseRun) -> list[str]:
 
 
 def test_a_tolerated_fault_has_no_violation() -> None:
-    made = record(recording(job().setpoints, None, FOREVER), replace(EXPECT, codes=()))
+    made = record(recording(clean_run().setpoints, None, FOREVER), replace(EXPECT, codes=()))
     made.finished = True
     assert violations(made) == []
 
@@ -127,7 +127,7 @@ def test_a_stop_has_to_be_on_the_path_and_within_its_bound() -> None:
 
 
 def test_no_fault_late_fault_and_a_wrong_one() -> None:
-    made = record(recording(job().setpoints, None, FOREVER))
+    made = record(recording(clean_run().setpoints, None, FOREVER))
     made.finished = True
     assert violations(made) == ["no fault was raised"]
     late = violations(record(recording(stopped(100), 100, 200)))
@@ -150,23 +150,23 @@ def test_a_fault_beside_the_expected_one() -> None:
 
 
 def test_axes_that_move_on() -> None:
-    found = violations(record(recording(job().setpoints, 60, 60)))
+    found = violations(record(recording(clean_run().setpoints, 60, 60)))
     assert any(words.startswith("axes at rest after") for words in found)
 
 
 def test_axes_that_move_on_to_the_end_of_the_recording() -> None:
     """However short the recording: the time to rest is measured to its end, which may be within the limit."""
-    made = record(recording(job().setpoints[:120], 60, 60, stands=0))
+    made = record(recording(clean_run().setpoints[:120], 60, 60, stands=0))
     found = violations(made)
     assert "node 2 still moves at the end of the recording" in found
     assert not any(words.startswith("axes at rest after") for words in found)
-    silent = recording(job().setpoints, 60, 60)
+    silent = recording(clean_run().setpoints, 60, 60)
     gone = silent[(silent["id"] < 0x182) | (silent["time_us"] < BEGAN_US + 100_000)]
     assert not any("still moves" in words for words in violations(record(gone)))
 
 
 def test_a_jump_and_a_way_beside_the_path() -> None:
-    moved = job().setpoints.copy()
+    moved = clean_run().setpoints.copy()
     moved[300:] += 20_000
     made = record(recording(moved, None, FOREVER), replace(EXPECT, codes=()))
     made.finished = True
@@ -176,7 +176,7 @@ def test_a_jump_and_a_way_beside_the_path() -> None:
 
 
 def test_what_did_not_happen_or_not_recover() -> None:
-    made = record(recording(job().setpoints, None, FOREVER), replace(EXPECT, codes=()))
+    made = record(recording(clean_run().setpoints, None, FOREVER), replace(EXPECT, codes=()))
     made.injections = []
     made.again = None
     assert violations(made) == [
@@ -185,7 +185,7 @@ def test_what_did_not_happen_or_not_recover() -> None:
         "no clean run afterwards",
     ]
     made.injections, made.finished = list(INJECTED), True
-    made.again = replace(job().clean, encoders_sha256="0", setpoints_sha256="1")
+    made.again = replace(clean_run().motion, encoders_sha256="0", setpoints_sha256="1")
     assert violations(made) == [
         "the run afterwards has other setpoints",
         "the run afterwards has other encoder positions",
@@ -213,7 +213,7 @@ def test_a_rest_that_nobody_saw_is_no_rest() -> None:
 
 
 def test_an_axis_that_never_moved_is_at_rest() -> None:
-    still = np.repeat(job().setpoints[:1], 300, axis=0)
+    still = np.repeat(clean_run().setpoints[:1], 300, axis=0)
     verdict = judge(record(recording(still, 62, 200)))
     assert (verdict.rest_ticks, verdict.rest_ms) == (0, 0.0)
 

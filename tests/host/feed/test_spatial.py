@@ -9,8 +9,9 @@ from hodograph.feed import AxisLimits, FeedRequest, FeedZone, Limits, Plant, pla
 from hodograph.feed.optimal import plan_optimal, plan_peaks
 from hodograph.spline import PHSpline, through_points
 from hodograph.spline.frames import LEFT, RIGHT, frames
-from hodograph.spline.spatial import SpatialPHSpline, spatial_through_points
+from hodograph.spline.spatial import spatial_through_points
 from hodograph.spline.spatial.curve import embedded
+from spatial_curve import walk
 
 XYZ = ("x", "y", "z")
 SPACE = Limits(
@@ -23,14 +24,6 @@ def planar(seed: int) -> PHSpline:
     rng = np.random.default_rng(seed)
     turn = np.cumsum(rng.uniform(-0.8, 0.8, 12))
     return through_points(np.cumsum(rng.uniform(2, 9, 12) * np.exp(1j * turn)), False).spline
-
-
-def walk(seed: int, count: int = 14) -> SpatialPHSpline:
-    rng = np.random.default_rng(seed)
-    heading = np.cumsum(rng.normal(0.0, 0.5, (count, 3)), axis=0) + np.array([2.0, 0.0, 0.0])
-    heading /= np.linalg.norm(heading, axis=1, keepdims=True)
-    points = np.cumsum(rng.uniform(3.0, 9.0, (count, 1)) * heading, axis=0)
-    return spatial_through_points(points, False).spline
 
 
 @pytest.mark.parametrize("seed", range(3))

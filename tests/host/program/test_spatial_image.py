@@ -26,7 +26,8 @@ from hodograph.program.codes import ProgramError
 from hodograph.program.exact import ExactProgram
 from hodograph.program.geometry import quantise, segment_ways
 from hodograph.program.wide import product
-from hodograph.spline.spatial import SpatialPHSpline, spatial_through_points
+from hodograph.spline.spatial import spatial_through_points
+from spatial_curve import walk
 
 MM = 1 << 40
 FIELDS = (1000, 500_000, 5_000_000, 200_000, (-200 * MM,) * 3, (200 * MM,) * 3, 2000)
@@ -37,14 +38,6 @@ SPACE = Limits(
     names=("x", "y", "z"),
     reserve=0.2,
 )
-
-
-def walk(seed: int, count: int = 12) -> SpatialPHSpline:
-    rng = np.random.default_rng(seed)
-    heading = np.cumsum(rng.normal(0.0, 0.4, (count, 3)), axis=0) + np.array([1.5, 0.0, 0.0])
-    heading /= np.linalg.norm(heading, axis=1, keepdims=True)
-    points = np.cumsum(rng.uniform(3.0, 9.0, (count, 1)) * heading, axis=0)
-    return spatial_through_points(points, False).spline
 
 
 @cache

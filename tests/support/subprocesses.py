@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT
+"""Programs that a test runs from start to end, with a limit of time and the expected exit status."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(
+    *command: object, cwd: Path = ROOT, status: int = 0, limit_s: float = 300.0
+) -> subprocess.CompletedProcess[str]:
+    """Runs a program in a folder. AssertionError with the end of its output: it ended with another status."""
+    done = subprocess.run(
+        list(map(str, command)),
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=limit_s,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+    assert done.returncode == status, (done.stdout + done.stderr)[-4000:]
+    return done
