@@ -56,7 +56,7 @@ static enum machine_refusal program_refusal(struct controller *controller)
 static enum machine_refusal job_refusal(const struct controller *controller, enum command command)
 {
     return command == COMMAND_START_FROM || controller->stream.started ? MACHINE_JOB_STARTED
-                                                                        : MACHINE_ACCEPTED;
+                                                                       : MACHINE_ACCEPTED;
 }
 
 /* Reading all pieces takes long, so it happens before the lock. */

@@ -10,15 +10,16 @@
 
 /* At the start of a block of the ring; the bytes of the chunk follow, and behind them its coefficient records. */
 struct stream_chunk {
-    struct stream_chunk *next;  /* accepted after it; NULL: the newest */
-    uint64_t job_time_q32_s;    /* time of the job at its program time 0, */
-    uint64_t joint_time_q32_s;  /* and at its joint */
+    struct stream_chunk *next; /* accepted after it; NULL: the newest */
+    uint64_t job_time_q32_s;   /* time of the job at its program time 0, */
+    uint64_t joint_time_q32_s; /* and at its joint */
     struct chunk chunk;
 };
 
 #define HEAD_SIZE ((uint32_t)sizeof(struct stream_chunk))
 
-typedef char stream_assert_aligned[sizeof(struct stream_chunk) % CHUNK_RING_ALIGNMENT == 0u ? 1 : -1];
+typedef char
+    stream_assert_aligned[sizeof(struct stream_chunk) % CHUNK_RING_ALIGNMENT == 0u ? 1 : -1];
 
 static uint32_t aligned(uint32_t size)
 {
@@ -123,8 +124,8 @@ static int make_records(struct stream *stream, struct chunk *chunk, const struct
                              stream->receiving_bytes - used) != 0) {
         return PROGRAM_ERR_ROOM;
     }
-    chunk_ring_trim(&stream->ring, HEAD_SIZE + used +
-                                       (uint32_t)coefficients_size(&chunk->program, kernel));
+    chunk_ring_trim(&stream->ring,
+                    HEAD_SIZE + used + (uint32_t)coefficients_size(&chunk->program, kernel));
     return 0;
 }
 

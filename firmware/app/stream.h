@@ -49,7 +49,8 @@ struct stream {
     struct program_fault refused; /* last refusal; code 0: none */
     uint32_t underruns;           /* since the job was opened */
     struct stream_place place;
-    void (*attend)(void *self); /* called with `self` now and then while a chunk is checked; may be NULL */
+    void (*attend)(
+        void *self); /* called with `self` now and then while a chunk is checked; may be NULL */
     void *self;
 
     struct chunk_ring ring;

@@ -20,9 +20,9 @@ struct app_bench {
     struct fake_drive drives[BENCH_DRIVES];
     struct sdo_client host;
     uint32_t ticks;
-    uint32_t frames;          /* seen on the bus */
-    uint16_t emergency;       /* code of the controller's last EMCY */
-    uint32_t starts;          /* NMT start commands seen */
+    uint32_t frames;                   /* seen on the bus */
+    uint16_t emergency;                /* code of the controller's last EMCY */
+    uint32_t starts;                   /* NMT start commands seen */
     int32_t targets[2][BENCH_TARGETS]; /* setpoints sent while a program ran, by axis */
     uint32_t recorded;
     bool

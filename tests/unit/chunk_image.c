@@ -132,10 +132,10 @@ static uint32_t remaining_ms(const struct chunk_plan *plan)
     return plan->whole_to == 0u ? CHUNK_TIME_UNKNOWN : (uint32_t)(left_q32_s * 1000u >> 32);
 }
 
-uint32_t chunk_image_make(uint8_t *bytes, const struct chunk_plan *plan, int32_t x_mm,
-                          int32_t y_mm)
+uint32_t chunk_image_make(uint8_t *bytes, const struct chunk_plan *plan, int32_t x_mm, int32_t y_mm)
 {
-    const uint32_t size = CHUNK_HEADER_SIZE + put_program(bytes + CHUNK_HEADER_SIZE, plan, x_mm, y_mm);
+    const uint32_t size =
+        CHUNK_HEADER_SIZE + put_program(bytes + CHUNK_HEADER_SIZE, plan, x_mm, y_mm);
     memset(bytes, 0, CHUNK_HEADER_SIZE);
     memcpy(bytes, "HDGC", 4);
     cob_put(bytes + 4, CHUNK_VERSION, 2);

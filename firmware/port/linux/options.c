@@ -110,22 +110,22 @@ static enum options_result complain(const struct long_options *line)
 
 enum options_result options_parse(struct options *options, int argc, char **argv)
 {
-    static const struct option known[] = {
-        {"help", no_argument, NULL, 'h'},        {"bus", required_argument, NULL, 'b'},
-        {"node", required_argument, NULL, 'n'},  {"pace", required_argument, NULL, 'p'},
-        {"store", required_argument, NULL, 's'}, {"no-realtime", no_argument, NULL, 'r'},
-        {"verbose", no_argument, NULL, 'v'},     {"ring", required_argument, NULL, 'g'},
-        {NULL, 0, NULL, 0}};
+    static const struct option known[] = {{"help", no_argument, NULL, 'h'},
+                                          {"bus", required_argument, NULL, 'b'},
+                                          {"node", required_argument, NULL, 'n'},
+                                          {"pace", required_argument, NULL, 'p'},
+                                          {"store", required_argument, NULL, 's'},
+                                          {"no-realtime", no_argument, NULL, 'r'},
+                                          {"verbose", no_argument, NULL, 'v'},
+                                          {"ring", required_argument, NULL, 'g'},
+                                          {NULL, 0, NULL, 0}};
     char reason[REASON_SIZE];
     struct long_options line = long_options_begin(argc, argv, known, reason, sizeof reason);
     line.quoted = true;
     line.no_value = "a value is missing after";
     line.unknown = "unknown argument";
-    *options = (struct options){.bus = NULL,
-                                .store = NULL,
-                                .ring_kib = RING_KIB_MAX,
-                                .node = 1,
-                                .pace = OPTIONS_REAL_TIME};
+    *options = (struct options){
+        .bus = NULL, .store = NULL, .ring_kib = RING_KIB_MAX, .node = 1, .pace = OPTIONS_REAL_TIME};
     int option = long_options_next(&line);
     while (option > 0 && option != 'h' && set_option(options, option, &line) == LONG_OPTIONS_END) {
         option = long_options_next(&line);
