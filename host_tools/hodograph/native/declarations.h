@@ -21,7 +21,7 @@ struct program_limits {
     uint32_t axis_count, period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
     int64_t min_q40_mm[6], max_q40_mm[6];
     uint32_t axis_velocity_um_s[6], axis_acceleration_um_s2[6], axis_jerk_mm_s3[6];
-    uint32_t stop_time_ms;
+    uint32_t stop_time_ms, chunk;
     ...;
 };
 struct program_fault {
@@ -232,11 +232,12 @@ struct stop_found {
     double worst_s, mean_s;
 };
 #define STOP_ROWS ...
-void stop_rows(const struct program *p, const struct stop_limits *limits, const struct stop_path *path);
-void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
-               struct stop_limits *used);
-void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
-                 struct stop_found *found);
+void stop_rows(const struct program *p, const struct stop_limits *limits,
+               const struct stop_path *path);
+void stop_used(const struct program *p, const struct stop_limits *limits,
+               const struct stop_path *path, struct stop_limits *used);
+void stop_search(const struct program *p, const struct stop_limits *limits,
+                 const struct stop_path *path, struct stop_found *found);
 
 /* offline/stop_trial.h */
 struct stop_use {

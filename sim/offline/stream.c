@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT */
+#include "offline/stream.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "core/coefficients.h"
+
+void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
+                          const struct program_limits *limits)
+{
+    memset(s, 0, sizeof *s);
+    s->kernel = kernel;
+    s->limits = *limits;
+}
+
+int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
+                         const uint8_t *bytes, uint32_t size, struct program_fault *fault)
+{
+    const struct chunk *before = s->newest != NULL ? &s->newest->chunk : NULL;
+    memset(part, 0, sizeof *part);
+    fault->index = 0;
+    fault->code = chunk_open(&part->chunk, bytes, size);
+    return fault->code != 0 ? fault->code : chunk_check(&part->chunk, before, &s->limits, fault);
+}
+
+int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
+                       uint64_t size)
+{
+    struct program *p = &part->chunk.program;
+    const int code = coefficients_make_in(p, s->kernel, records, size);
+    if (code != 0) {
+        return code;
+    }
+    if (s->active == NULL) {
+        s->active = part;
+        (void)interpolator_begin(&s->interp, p);
+        feed_override_begin_job(&s->feed, &part->chunk, p->header.period_us);
+    } else {
+        s->newest->next = part;
+    }
+    s->newest = part;
+    return 0;
+}
+
+static void take_over(struct offline_stream *s)
+{
+    struct offline_part *next = s->active->next;
+    const int rests = feed_override_feed_q32(&s->feed) == 0;
+    if (next == NULL || !feed_override_take_over(&s->feed, &s->interp, &next->chunk)) {
+        return;
+    }
+    s->active = next;
+    s->resting += rests ? 1u : 0u;
+    s->moving += rests ? 0u : 1u;
+}
+
+static int tick(struct offline_stream *s, struct interpolator_point *point)
+{
+    take_over(s);
+    const int result = feed_override_next(&s->feed, &s->interp, point);
+    const uint32_t waits = feed_override_waits(&s->feed) ? 1u : 0u;
+    point->arc_length_q40_mm += s->active->chunk.job_start_q40_mm;
+    s->underruns += waits & ~s->rested;
+    s->rested = waits;
+    s->ticks++;
+    return result;
+}
+
+static int is_over(const struct offline_stream *s, uint32_t until_rest)
+{
+    const enum feed_state state = feed_override_state(&s->feed);
+    return state == FEED_ENDED || state == FEED_STOPPED ||
+           (until_rest != 0u && s->rested != 0u && s->active->next == NULL);
+}
+
+int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
+                           struct interpolator_point *points)
+{
+    uint32_t done = 0;
+    while (done < count && s->active != NULL && !is_over(s, until_rest)) {
+        const int result = tick(s, &points[done]);
+        if (result < 0) {
+            return result;
+        }
+        done++;
+    }
+    return (int64_t)done;
+}
