@@ -38,6 +38,8 @@
     0.03 /* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
 #define WAIT_AS_GOOD 1.001 /* or such a one that could also take much longer */
+#define GROUP_BITS   3u   /* 8 rows, or groups of the level below, make a group */
+#define MOST_LEVELS  11
 #define NEAR         1.05  /* so near to the least time without limits no other start is tried */
 
 /* What is looked at: one over the limits, less the margin; 0: none. */
@@ -83,7 +85,8 @@ struct search {
     uint32_t axis_count;
     const struct stop_row *rows;
     const struct stop_bend *bends; /* of a spatial program */
-    const struct stop_stretch *segments;
+    const struct stop_stretch *group[MOST_LEVELS]; /* of 8, 64, ... rows, at each level */
+    int levels;
     uint32_t row_count;
     struct inverse inverse;     /* at the rate 1, */
     struct inverse at_any_rate; /* and at others */
@@ -253,16 +256,38 @@ static double way_to(const struct preimage *w, double xi)
 
 static double feed_here(const struct stop_limits *limits, const struct stop_row *row)
 {
-    double feed = limits->feed;
-    for (uint32_t i = 0; i < limits->cap_count; i++) {
-        const struct stop_cap *cap = &limits->caps[i];
-        if (row->s_mm >= cap->from_mm && row->s_mm <= cap->to_mm && cap->feed_mm_s < feed) {
-            feed = cap->feed_mm_s;
-        }
-    }
     double bend = fabs(row->curvature);
     double most = bend > 0.0 ? sqrt(limits->centripetal / bend) : HUGE_VAL;
-    return most < feed ? most : feed;
+    return most < limits->feed ? most : limits->feed;
+}
+
+/* The first of `count` rows at or behind an arc length. */
+static uint32_t first_row_from(const struct stop_row *rows, uint32_t count, double s_mm)
+{
+    uint32_t low = 0;
+    uint32_t high = count;
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2u;
+        if (rows[middle].s_mm < s_mm) {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+static void cap_rows(const struct stop_limits *limits, struct stop_row *rows, uint32_t count)
+{
+    for (uint32_t i = 0; i < limits->cap_count; i++) {
+        const struct stop_cap *cap = &limits->caps[i];
+        uint32_t k = first_row_from(rows, count, cap->from_mm);
+        for (; k < count && rows[k].s_mm <= cap->to_mm; k++) {
+            if (cap->feed_mm_s < rows[k].feed_mm_s) {
+                rows[k].feed_mm_s = cap->feed_mm_s;
+            }
+        }
+    }
 }
 
 /* --- Bounds of a stretch --- */
@@ -323,6 +348,38 @@ static void stretch_add(struct stop_stretch *stretch, const struct stop_stretch 
     }
 }
 
+uint32_t stop_groups(uint32_t segment_count)
+{
+    uint32_t sum = 0;
+    for (uint32_t count = segment_count * STOP_ROWS >> GROUP_BITS; count > 0; count >>= GROUP_BITS) {
+        sum += count;
+    }
+    return sum;
+}
+
+/* The greatest values of the rows of each group; a group that is not full is none. */
+static void group_rows(const struct program *p, const struct stop_path *path)
+{
+    const uint32_t axes = p->header.axis_count;
+    struct stop_stretch *below = NULL;
+    struct stop_stretch *own = path->groups;
+    uint32_t count = p->header.segment_count * STOP_ROWS >> GROUP_BITS;
+    for (; count > 0; count >>= GROUP_BITS) {
+        for (uint32_t i = 0; i < count; i++) {
+            stretch_begin(&own[i]);
+            for (uint32_t k = i << GROUP_BITS; k < (i + 1u) << GROUP_BITS; k++) {
+                if (below == NULL) {
+                    stretch_add_row(&own[i], path->rows, path->bends, k, axes);
+                } else {
+                    stretch_add(&own[i], &below[k], axes);
+                }
+            }
+        }
+        below = own;
+        own += count;
+    }
+}
+
 void stop_rows(const struct program *p, const struct stop_limits *limits,
                const struct stop_path *path)
 {
@@ -343,12 +400,9 @@ void stop_rows(const struct program *p, const struct stop_limits *limits,
             row->s_mm = ldexp((double)segment.start_q40_mm, -40) + way_to(&w, xi);
             row->feed_mm_s = feed_here(limits, row);
         }
-        stretch_begin(&path->segments[i]);
-        for (uint32_t k = 0; k < STOP_ROWS; k++) {
-            stretch_add_row(&path->segments[i], path->rows, path->bends, i * STOP_ROWS + k,
-                            segment.axis_count);
-        }
     }
+    cap_rows(limits, path->rows, p->header.segment_count * STOP_ROWS);
+    group_rows(p, path);
 }
 
 /* The last row at or before an arc length. */
@@ -526,23 +580,47 @@ struct extent {
     struct stop_stretch path;
 };
 
+/* The first row behind both a row and an arc length; the last one if there is none. */
+static uint32_t row_behind(const struct search *search, uint32_t row, double to_mm)
+{
+    const uint32_t last = search->row_count - 1u;
+    uint32_t low = row;
+    uint32_t high = row < last ? row + 1u : last;
+    for (uint32_t step = 1u; high < last && search->rows[high].s_mm <= to_mm; step *= 2u) {
+        low = high;
+        high = last - high > step ? high + step : last;
+    }
+    while (high - low > 1u) {
+        const uint32_t middle = low + (high - low) / 2u;
+        if (search->rows[middle].s_mm <= to_mm) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return high;
+}
+
 /* Fills the bounds of the path, from a row up to an arc length. */
 static void extend(const struct search *search, uint32_t row, double to_mm, struct extent *extent)
 {
-    struct stop_stretch *path = &extent->path;
-    const uint32_t last = search->row_count - 1u;
-    const uint32_t axes = search->axis_count;
-    stretch_begin(path);
-    stretch_add_row(path, search->rows, search->bends, row, axes);
-    do {
-        row++;
-        while (row % STOP_ROWS == 0u && row + STOP_ROWS <= last &&
-               search->rows[row + STOP_ROWS - 1u].s_mm <= to_mm) {
-            stretch_add(path, &search->segments[row / STOP_ROWS], axes);
-            row += STOP_ROWS;
+    const uint32_t last = row_behind(search, row, to_mm);
+    stretch_begin(&extent->path);
+    while (row <= last) {
+        int level = 0;
+        uint32_t size = 1u;
+        while (level < search->levels && row % (size << GROUP_BITS) == 0u &&
+               last - row >= (size << GROUP_BITS) - 1u) {
+            size <<= GROUP_BITS;
+            level++;
         }
-        stretch_add_row(path, search->rows, search->bends, row, axes);
-    } while (row < last && search->rows[row].s_mm <= to_mm);
+        if (level == 0) {
+            stretch_add_row(&extent->path, search->rows, search->bends, row, search->axis_count);
+        } else {
+            stretch_add(&extent->path, &search->group[level - 1][row / size], search->axis_count);
+        }
+        row += size;
+    }
 }
 
 /* Share of the limits that axes use at most with these bounds. */
@@ -606,10 +684,25 @@ static int extent_keeps(const struct search *search, const struct inverse *inver
                             : spatial_share(search, inverse, extent);
     return greater(along, axes) * (1.0 + SPARE_SHARE) <= 1.0;
 }
-/* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`, that begin on the path
- * between a row and an arc length. */
-static void extent_of(const struct search *search, const struct path_brake_numbers *numbers,
-                      const struct state *most, double fall, uint32_t row, struct extent *extent)
+
+/* 1: no limit is passed on the path between a row and an arc length; `extent` has what the brake does there. */
+static int keeps_up_to(const struct search *search, const struct inverse *inverse,
+                       struct extent *extent, uint32_t row, double to_mm)
+{
+    /* Where limits bind, the first row alone shows it as a rule. */
+    stretch_begin(&extent->path);
+    stretch_add_row(&extent->path, search->rows, search->bends, row, search->axis_count);
+    if (!extent_keeps(search, inverse, extent)) {
+        return 0;
+    }
+    extend(search, row, to_mm, extent);
+    return extent_keeps(search, inverse, extent);
+}
+
+/* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`. Returns the arc
+ * length that they do not pass. */
+static double brake_extent(const struct search *search, const struct path_brake_numbers *numbers,
+                           const struct state *most, double fall, struct extent *extent)
 {
     const double period_s = search->period_s;
     const double tick2 = ldexp(1.0, -56) / (period_s * period_s);
@@ -621,7 +714,7 @@ static void extent_of(const struct search *search, const struct path_brake_numbe
     extent->acceleration =
         greater(greater(most->a, fall), (double)numbers->deceleration_q56 * tick2);
     extent->jerk = greater(down, up);
-    extend(search, row, most->s + extent->speed * most_s, extent);
+    return most->s + extent->speed * most_s;
 }
 
 /* 1: the rest of the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
@@ -633,8 +726,8 @@ static int surely_keeps(const struct search *search, const struct inverse *inver
     const double fall = greater(-most.a, 0.0);
     struct extent extent;
     most.a = greater(most.a, 0.0);
-    extent_of(search, &brake->numbers, &most, fall, row, &extent);
-    return extent_keeps(search, inverse, &extent);
+    const double to_mm = brake_extent(search, &brake->numbers, &most, fall, &extent);
+    return keeps_up_to(search, inverse, &extent, row, to_mm);
 }
 
 /* 1: some ticks of a brake, at[0 ... count], surely keep the limits, by bounds of all of them; 0: that is open. */
@@ -649,8 +742,7 @@ static int ticks_surely_keep(const struct search *search, const struct inverse *
         extent.acceleration = greater(extent.acceleration, fabs(at[k + 1].a));
         extent.jerk = greater(extent.jerk, fabs(at[k + 1].a - at[k].a) / period_s);
     }
-    extend(search, row, at[count].s, &extent);
-    return extent_keeps(search, inverse, &extent);
+    return keeps_up_to(search, inverse, &extent, row, at[count].s);
 }
 
 /* 1 while the brake keeps the limits all the way. */
@@ -949,7 +1041,8 @@ static void piece_extent(const struct search *search, const struct piece *piece,
     const double change = greatest_slope(piece) * v;
     const double little = search->rise_is_cut ? 0.25 * search->deceleration : HUGE_VAL;
     const struct state most = {piece->at[piece->count - 1u].s, v * rate, a + fmin(change, little)};
-    extent_of(search, numbers, &most, a + change, piece->row[0], extent);
+    const double to_mm = brake_extent(search, numbers, &most, a + change, extent);
+    extend(search, piece->row[0], to_mm, extent);
 }
 
 /* Whether these brakes keep the limits; the instant that broke one last is looked at first. */
@@ -1289,8 +1382,13 @@ static void begin(struct search *search, const struct program *p, const struct s
     search->axis_count = p->header.axis_count;
     search->rows = path->rows;
     search->bends = path->bends;
-    search->segments = path->segments;
     search->row_count = p->header.segment_count * STOP_ROWS;
+    const struct stop_stretch *group = path->groups;
+    search->levels = 0;
+    for (uint32_t count = search->row_count >> GROUP_BITS; count > 0; count >>= GROUP_BITS) {
+        search->group[search->levels++] = group;
+        group += count;
+    }
     search->period_us = p->header.period_us;
     search->period_s = 1e-6 * p->header.period_us;
     search->length_mm = ldexp((double)p->header.length_q40_mm, -40);

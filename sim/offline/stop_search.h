@@ -43,8 +43,8 @@ struct stop_stretch {
 /* The path of a program: segment_count * STOP_ROWS rows and bends. */
 struct stop_path {
     struct stop_row *rows;
-    struct stop_bend *bends;       /* of a spatial program; not looked at of a planar one */
-    struct stop_stretch *segments; /* one for each, so that bounds of a long stretch are quick */
+    struct stop_bend *bends;     /* of a spatial program; not looked at of a planar one */
+    struct stop_stretch *groups; /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
 };
 
 /* A greatest feed on a stretch of the path. */
@@ -82,6 +82,9 @@ struct stop_found {
     double worst_s;    /* longest brake of the instants looked at at the rate 1, */
     double mean_s;     /* and their mean */
 };
+
+/* How many groups of rows the path of a program has: `groups` of its stop_path. */
+uint32_t stop_groups(uint32_t segment_count);
 
 /* Fills the path; the program has passed program_open. */
 void stop_rows(const struct program *p, const struct stop_limits *limits,

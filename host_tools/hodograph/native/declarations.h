@@ -215,7 +215,7 @@ struct stop_stretch {
 struct stop_path {
     struct stop_row *rows;
     struct stop_bend *bends;
-    struct stop_stretch *segments;
+    struct stop_stretch *groups;
 };
 struct stop_cap {
     double from_mm, to_mm, feed_mm_s;
@@ -233,6 +233,7 @@ struct stop_found {
     double worst_s, mean_s;
 };
 #define STOP_ROWS ...
+uint32_t stop_groups(uint32_t segment_count);
 void stop_rows(const struct program *p, const struct stop_limits *limits,
                const struct stop_path *path);
 void stop_used(const struct program *p, const struct stop_limits *limits,

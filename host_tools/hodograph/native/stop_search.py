@@ -111,10 +111,10 @@ class StopSearch:
         count = self._program.segment_count * lib.STOP_ROWS
         rows = ffi.new("struct stop_row[]", count)
         bends = ffi.new("struct stop_bend[]", count if self._program.axis_count > 2 else 0)
-        segments = ffi.new("struct stop_stretch[]", self._program.segment_count)
-        path = ffi.new("struct stop_path *", (rows, bends, segments))
+        groups = ffi.new("struct stop_stretch[]", lib.stop_groups(self._program.segment_count))
+        path = ffi.new("struct stop_path *", (rows, bends, groups))
         lib.stop_rows(self._program.pointer, given[0], path)
-        return path, (rows, bends, segments)
+        return path, (rows, bends, groups)
 
 
 def limits_struct(limits: StopLimits) -> tuple[Any, Any]:
