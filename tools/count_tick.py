@@ -6,7 +6,7 @@
     .venv/bin/python tools/count_tick.py microbit fixed ladder --commands restless --worst 5
     .venv/bin/python tools/count_tick.py an386 float ladder --isr --functions  # the whole interrupt, by functions
 
-Needs `make counter`. The program is a path file, an image (.hdgp) or the name of one of the programs made to be dear
+Needs `make counter`. The program is a path file, an image (.hdgp) or the name of one of the worst-case programs
 (target/adversary.py), which also has the commands: overrides, holds and resumes.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All that `make count` counts: each kernel on each core, over the example programs and those made to be dear."""
+"""All that `make count` counts: each kernel on each core, over the example programs and those made to be expensive."""
 
 from __future__ import annotations
 

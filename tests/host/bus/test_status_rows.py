@@ -104,10 +104,10 @@ def test_troubles() -> None:
         axes=(replace(AXIS, error_code=0x3220, error="low", remedy="feed it"),),
     )
     text = shown(faulty)
-    assert "fault: expected PDOs stayed away (code 0x8250, node 2, 2 positions missed" in text
+    assert "fault: expected PDOs were not received (code 0x8250, node 2, 2 positions missed" in text
     assert f"remedy: {WORDS.remedy}; then hodograph reset" in text
     assert "error: low (0x3220)" in text
-    assert "fault 0x8250: expected PDOs stayed away" in status_line(faulty)
+    assert "fault 0x8250: expected PDOs were not received" in status_line(faulty)
     waiting = replace(RUNNING, state="boot", boot_trouble=boot_trouble(3, 0x100000, 0x05040000, 0))
     assert "boot waits: the drive at node 3 does not answer" in shown(waiting)
     assert "node 3 does not answer" in status_line(waiting)
