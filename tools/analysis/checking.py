@@ -6,9 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from analysis.counting import Counter
+from analysis.emulator import TARGETS
 from hodograph.pipeline import load_pipeline
-from target.counting import Counter
-from target.emulator import TARGETS
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("alpha", "heart", "star", "alpha_optimal", "heart_optimal")
