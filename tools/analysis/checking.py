@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What the proof of the axis limits costs the controller (core/limit_check.h): instructions, by segment and piece."""
+"""Instructions of the controller's proof of the axis limits (core/limit_check.h), by segment and piece.
+
+For benchmarks/counts.py, which prints them: runs the image `checker` of two cores over the example programs.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The thread that stands for both interrupts of a board, and what the main loop shares with it (interrupts.h). */
 #define _GNU_SOURCE
 #include "port/linux/interrupts.h"
 
