@@ -7,7 +7,7 @@ from argparse import Namespace
 
 from ..pipeline import load_pipeline
 from .output import print_json
-from .path_commands import print_notes, simulate_chain
+from .path_commands import print_notes, simulate_pipeline
 
 
 def report(options: Namespace) -> None:
@@ -18,7 +18,7 @@ def report(options: Namespace) -> None:
     cases = []
     for pipeline in pipelines:
         print_notes(pipeline, pipeline.plan)
-        cases.append((pipeline, simulate_chain(pipeline, options.kernel), None))
+        cases.append((pipeline, simulate_pipeline(pipeline, options.kernel), None))
     print(write_report(cases, options.output))
 
 

@@ -79,7 +79,9 @@ _PDO_RANGES = (
     (0x1800, "position PDO"),
     (0x1A00, "mapping of the position PDO"),
 )
-_PDO_REMEDY = "the drive cannot map the requested objects: switch feedforward off, or see its manual"
+_PDO_REMEDY = (
+    "the drive cannot map the requested objects: switch feedforward off, or see its manual"
+)
 
 
 @dataclass(frozen=True)
