@@ -380,13 +380,13 @@ $(foreach b,$(BINS),$(eval $(call BIN_RULE,asan,$(b),$(BUILD)/asan/bin/hodograph
 include tools/misra/misra.mk
 include tests/proofs/proofs.mk
 include firmware/targets/targets.mk
-include tools/target/count.mk
+include tools/analysis/count.mk
 include tests/target/target.mk
 include packaging/packaging.mk
 
 ## ---- lint ------------------------------------------------------------------------------------------
 
-C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/target/*.c packaging/library/*.c examples/embed/*.c)
+C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/analysis/*.c packaging/library/*.c examples/embed/*.c)
 PY_TREES   := $(wildcard host_tools tools tests benchmarks setup.py)
 JS_FILES   := $(wildcard host_tools/hodograph/monitor/page/*.js)
 SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)

@@ -20,8 +20,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 
-from target import checking, tables, taylor  # noqa: E402
-from target.campaign import FLOOR, Campaign  # noqa: E402
+from analysis import checking, tables, taylor  # noqa: E402
+from analysis.campaign import FLOOR, Campaign  # noqa: E402
 
 
 def main_figures(counted: dict[str, Any]) -> dict[str, Any]:

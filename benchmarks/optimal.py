@@ -101,7 +101,7 @@ def chain_of(case: Case, feed: str, reserve: float, folder: Path) -> Pipeline:
 
 
 def task_of(pipeline: Pipeline) -> Task:
-    """What the planner has to obey, its reserve aside: path file and controller."""
+    """The limits of the planner without its reserve: path file and controller."""
     limits, own = pipeline.file.limits, controller_limits(pipeline.machine)
     kept = 1.0 - own.kept_free
 

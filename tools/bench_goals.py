@@ -69,7 +69,7 @@ def _shown(value: Any) -> str:
 def goal_lines(found: Sequence[Judged]) -> list[str]:
     """As a table."""
     rows = [
-        ("goal", "asked for", "measured", ""),
+        ("goal", "required", "measured", ""),
         *((j.text, j.wanted, j.found, j.verdict) for j in found),
     ]
     widths = [max(len(row[i]) for row in rows) for i in range(4)]

@@ -14,10 +14,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from target.effects import StackError
-from target.forbidden import CLASSES, FLOAT, WHY_FLOAT, floats, forbidden
-from target.image import Image
-from target.stack import Rules, Stack
+from analysis.effects import StackError
+from analysis.forbidden import CLASSES, FLOAT, WHY_FLOAT, floats, forbidden
+from analysis.image import Image
+from analysis.stack import Rules, Stack
 
 RULES = Path(__file__).resolve().parent.parent / "firmware" / "targets" / "stack.toml"
 

@@ -19,8 +19,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from target import campaign, tables, taylor
-from target.emulator import TARGETS
+from analysis import campaign, tables, taylor
+from analysis.emulator import TARGETS
 from testing.cache import Stamps
 
 ROOT = Path(__file__).resolve().parents[1]

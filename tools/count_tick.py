@@ -6,8 +6,8 @@
     .venv/bin/python tools/count_tick.py microbit fixed ladder --commands restless --worst 5
     .venv/bin/python tools/count_tick.py an386 float ladder --isr --functions  # the whole interrupt, by functions
 
-Needs `make counter`. The program is a path file, an image (.hdgp) or the name of one of the programs made to be dear
-(target/adversary.py), which also has the commands: overrides, holds and resumes.
+Needs `make counter`. The program is a path file, an image (.hdgp) or the name of one of the worst-case programs
+(analysis/worst_case.py), which also has the commands: overrides, holds and resumes.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis import counting, emulator, worst_case
 from hodograph.pipeline import load_pipeline
-from target import adversary, counting, emulator
 
 
 def image_of(program: str) -> bytes:
     """The program's image, made if need be."""
-    for row in adversary.ADVERSARIES:
+    for row in worst_case.ADVERSARIES:
         if row.name == program:
-            return adversary.image(row)
+            return worst_case.image(row)
     path = Path(program)
     return load_pipeline(path).image if path.suffix == ".toml" else path.read_bytes()
 
@@ -48,14 +48,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("target", choices=emulator.TARGETS)
     parser.add_argument("kernel", choices=emulator.KERNELS)
-    parser.add_argument("program", help="path file, image, or a name of target/adversary.py")
-    parser.add_argument("--commands", choices=adversary.COMMANDS)
+    parser.add_argument("program", help="path file, image, or a name of analysis/worst_case.py")
+    parser.add_argument("--commands", choices=worst_case.COMMANDS)
     parser.add_argument("--isr", action="store_true", help="the whole interrupt, not only motion")
     parser.add_argument("--functions", action="store_true", help="by functions, not by parts")
     parser.add_argument("--build", type=Path, default=Path("build"))
     parser.add_argument("--worst", type=int, default=3, help="show so many of the worst ticks")
     options = parser.parse_args()
-    commands = adversary.COMMANDS[options.commands]() if options.commands else []
+    commands = worst_case.COMMANDS[options.commands]() if options.commands else []
     image, entry = ("isr", "isr") if options.isr else ("setpoints", "tick")
     target = emulator.TARGETS[options.target]
     counter = counting.Counter(options.build, target, image, entry, functions=options.functions)

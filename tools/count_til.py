@@ -17,12 +17,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import til
+from analysis import emulator
+from analysis.counting import Counter, read
+from analysis.parts import PARTS
 from count_tick import show
 from emulate import TARGETS
 from hodograph.pipeline import load_pipeline
-from target import emulator
-from target.counting import Counter, read
-from target.parts import PARTS
 
 ROOT = Path(__file__).resolve().parent.parent
 _FEED = PARTS.index("feed")

@@ -18,7 +18,7 @@ PAGE = REFERENCE / "options.md"
 HEAD = """# Options of every command
 
 Generated from the command line by `make options`; do not edit. [cli.md](cli.md) explains the commands.
-Every command also takes `-h`, and, before its name or behind it:
+Every command also takes `-h`, and, before or after its name:
 
 | option | meaning |
 | --- | --- |

@@ -18,9 +18,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from target import emulator, tables
-from target.image import Image
-from target.longest import Bounds, Longest, LongestError
+from analysis import emulator, tables
+from analysis.image import Image
+from analysis.longest import Bounds, Longest, LongestError
 
 ROOT = Path(__file__).resolve().parents[1]
 COUNTS = ROOT / "tests/data/counts.json"

@@ -4,7 +4,7 @@
 
 Prints what differs from firmware/targets/sizes.json; --update writes it there instead. Bytes: `code` is all that lies
 in flash, `data` the part of it that is copied to RAM, `ram` variables without the stack, `stack` the worst case of
-mainline and interrupts one upon the other (tools/target/stack.py), of the `room` that the linker script gives.
+mainline and interrupts one upon the other (tools/analysis/stack.py), of the `room` that the linker script gives.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from target.image import Image
-from target.stack import Rules, Stack
+from analysis.image import Image
+from analysis.stack import Rules, Stack
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "firmware" / "targets" / "sizes.json"

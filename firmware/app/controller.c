@@ -231,7 +231,7 @@ int controller_start(struct controller *controller)
 
 /* ---- Main loop: one round of all protocol objects ---- */
 
-/* The node is its own NMT master: it enters OPERATIONAL by itself, and obeys resets from outside
+/* The node is its own NMT master: it enters OPERATIONAL by itself, and executes resets from outside
  * while its drives are off. */
 static bool nmt_obeyed(struct controller *controller, const struct can_msg *in)
 {
@@ -395,7 +395,7 @@ static void poll_homing(struct controller *controller, uint32_t elapsed_us)
     }
 }
 
-/* On the way out nothing is asked any more: an answer that comes behind the end would be taken for one to the next client. */
+/* During shutdown nothing is requested any more: an answer after the end would be taken for one to the next client. */
 static void poll_drives(struct controller *controller, uint32_t elapsed_us)
 {
     port_lock();
@@ -444,7 +444,7 @@ void controller_poll(struct controller *controller)
     report_changes(controller);
 }
 
-/* ---- The way out: stop along the path, switch off, leave the drives pre-operational ---- */
+/* ---- Shutdown: stop along the path, switch off, leave the drives pre-operational ---- */
 
 static bool at_rest(const struct machine *machine)
 {

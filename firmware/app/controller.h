@@ -73,7 +73,7 @@ struct controller {
     enum cia402_state noted_drive[AXES_MAX];
     struct drive_trouble noted_trouble;
     enum machine_refusal refusal; /* of the last command */
-    bool ending; /* the way out has begun: nothing is switched on or started any more */
+    bool ending; /* the shutdown has begun: nothing is switched on or started any more */
     uint8_t node;
     bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
 };

@@ -31,7 +31,7 @@ enum cia402_mode { CIA402_MODE_NONE = 0, CIA402_MODE_HOMING = 6, CIA402_MODE_CSP
 /* Statusword bits beside those of the state. */
 #define CIA402_STATUS_VOLTAGE         0x0010u /* power stage is fed */
 #define CIA402_STATUS_WARNING         0x0080u
-#define CIA402_STATUS_REMOTE          0x0200u /* controlword is obeyed */
+#define CIA402_STATUS_REMOTE          0x0200u /* controlword is followed */
 #define CIA402_STATUS_TARGET_REACHED  0x0400u
 #define CIA402_STATUS_LIMIT           0x0800u /* internal limit active */
 #define CIA402_STATUS_FOLLOWS         0x1000u /* CSP: drive follows the command value */

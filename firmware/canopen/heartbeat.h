@@ -42,7 +42,7 @@ struct heartbeat_consumer {
     uint32_t time_us; /* of 0x1016; 0: not monitored, though states are still followed */
     uint32_t silence_us;
     enum heartbeat_presence presence;
-    enum nmt_state state; /* last one heard */
+    enum nmt_state state; /* last one received */
     uint8_t node;
 };
 

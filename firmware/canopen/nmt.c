@@ -13,12 +13,12 @@ void nmt_slave_init(struct nmt_slave *slave, uint8_t node, const struct nmt_hook
     slave->hooks = hooks == NULL ? &no_hooks : hooks;
     slave->context = context;
     slave->state = NMT_INITIALISING;
-    slave->told = NMT_INITIALISING;
+    slave->reported = NMT_INITIALISING;
     slave->reset_due = 0;
     slave->node = node;
 }
 
-static bool obey(struct nmt_slave *slave, uint8_t command)
+static bool execute(struct nmt_slave *slave, uint8_t command)
 {
     switch (command) {
     case NMT_START:
@@ -50,7 +50,7 @@ bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in)
         /* Not booted yet: only a node reset, which does more than a pending communication reset. */
         return false;
     }
-    return obey(slave, in->data[0]);
+    return execute(slave, in->data[0]);
 }
 
 static void carry_out_reset(struct nmt_slave *slave)
@@ -70,8 +70,8 @@ static void tell(struct nmt_slave *slave)
 {
     enum nmt_state state = slave->state;
 
-    if (state != slave->told) {
-        slave->told = state;
+    if (state != slave->reported) {
+        slave->reported = state;
         if (slave->hooks->changed != NULL) {
             slave->hooks->changed(slave->context, state);
         }

@@ -45,7 +45,7 @@ struct nmt_slave {
     void *context;
     volatile enum nmt_state state; /* INITIALISING until the boot-up frame is out */
     volatile uint8_t reset_due;    /* 0, NMT_RESET_NODE or NMT_RESET_COMMUNICATION */
-    enum nmt_state told;           /* last state given to hooks->changed */
+    enum nmt_state reported;       /* last state given to hooks->changed */
     uint8_t node;
 };
 

@@ -234,7 +234,7 @@ static bool block_download_initiate(struct sdo_server *s, const uint8_t *data, s
     s->use_crc = (data[0] & CRC_SUPPORTED) != 0;
     s->crc = 0;
     s->held = 0;
-    s->heard = 0;
+    s->received = 0;
     s->sequence = 0;
     s->block_limit = s->block_size;
     s->acknowledged_early = false;
@@ -275,7 +275,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
         /* Doubled on the bus, or one of the two is somebody else's. */
         return memcmp(s->last, data + 1, SEGMENT_BYTES) != 0 && fail(s, SDO_ABORT_SEQUENCE, out);
     }
-    s->heard = block_ends ? 0 : sequence;
+    s->received = block_ends ? 0 : sequence;
     if (sequence == 0 || sequence > s->block_limit) {
         return fail(s, SDO_ABORT_SEQUENCE, out);
     }
@@ -305,11 +305,11 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
 static bool block_download_straggler(struct sdo_server *s, const uint8_t *data)
 {
     uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
-    bool straggler = s->heard != 0 && sequence == s->heard + 1;
-    bool more = straggler && sequence == data[0];
+    bool late_segment = s->received != 0 && sequence == s->received + 1;
+    bool more = late_segment && sequence == data[0];
 
-    s->heard = more ? sequence : 0;
-    return straggler;
+    s->received = more ? sequence : 0;
+    return late_segment;
 }
 
 static bool block_download_end(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
@@ -553,7 +553,8 @@ static bool is_strange(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
     const bool doubled = sequence == s->sequence && sequence != 0u;
-    const bool next = sequence == s->heard + 1u || sequence == s->heard + 2u; /* one may be lost */
+    const bool next =
+        sequence == s->received + 1u || sequence == s->received + 2u; /* one may be lost */
     return !next && !doubled && is_sound_initiate(s, data);
 }
 
@@ -622,7 +623,7 @@ static void take_abort(struct sdo_server *s, const uint8_t *data)
     const bool named = cob_get(data + 1, 2) != 0u;
     if (s->state == SDO_SERVER_IDLE || !named || same_object(s, data)) {
         drop(s);
-        s->heard = 0;
+        s->received = 0;
     }
 }
 
@@ -661,7 +662,7 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
  * segment of it has come: a client that only paused would then send the whole block twice. */
 static bool acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
-    const bool begun = s->sequence != 0 || (s->heard != 0 && !s->acknowledged_early);
+    const bool begun = s->sequence != 0 || (s->received != 0 && !s->acknowledged_early);
 
     if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || !begun || s->silence_us < s->timeout_us / 2) {
         return false;

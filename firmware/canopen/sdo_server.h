@@ -66,7 +66,7 @@ struct sdo_server {
     uint8_t block_limit; /* segments of the present block */
     uint8_t sequence;    /* last segment received in order, or sent */
     uint8_t held;        /* block download: bytes in `last` */
-    uint8_t heard;       /* newest segment of a block that goes on or was broken off; else 0 */
+    uint8_t received;    /* newest segment of a block that goes on or was broken off; else 0 */
     bool use_crc;
     bool acknowledged_early; /* the answer after half of the timeout is the last thing said */
     uint8_t last[7]; /* block download: the newest segment: its padding is known only at the end */

@@ -51,7 +51,7 @@ GREATEST_TOLERANCE_MM = 10.0
 _MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
 """Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
 
-_UNHEEDED: dict[tuple[type[Command], ...], str] = {
+_IGNORED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
     (Coolant,): "coolant (M7, M8, M9)",
     (ToolChange,): "tool change (M6)",
@@ -222,7 +222,7 @@ def load_job(
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
     maker = _Maker(file, machine, reading.feed_mm_s, notes)
     sections = tuple(made for section in path.sections for made in maker.made(section))
-    notes += _unheeded(path, file)
+    notes += _ignored_commands(path, file)
     return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
 
 
@@ -236,13 +236,13 @@ def _commands(file: Path, reading: ReadOptions, notes: list[str]) -> Iterator[Co
             yield command
 
 
-def _unheeded(path: Toolpath, file: Path) -> Iterator[str]:
-    """Notes on commands that the machine does not obey, one for each kind."""
+def _ignored_commands(path: Toolpath, file: Path) -> Iterator[str]:
+    """Notes on commands that the machine does not execute, one for each kind."""
     at_rest = [command for section in path.sections for command in section.before]
     on_the_way = [event.command for section in path.sections for event in section.events]
     lines: dict[str, list[int]] = {}
     for command in [*at_rest, *path.after, *on_the_way]:
-        for kinds, text in _UNHEEDED.items():
+        for kinds, text in _IGNORED.items():
             if isinstance(command, kinds):
                 lines.setdefault(text, []).append(command.line)
     for text, where in lines.items():

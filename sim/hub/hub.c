@@ -440,7 +440,7 @@ static void greet(struct hub *hub, struct hub_connection *from,
     }
     if (hub->options.is_virtual) {
         from->number =
-            virtual_time_join(&hub->time, hello->name, (hello->flags & LOCAL_BUS_WATCHES) != 0u);
+            virtual_time_join(&hub->time, hello->name, (hello->flags & LOCAL_BUS_NOTICES) != 0u);
         from->role = from->number != 0u ? HUB_PARTICIPANT : HUB_UNKNOWN;
         if (from->number == 0u) {
             drop_connection(hub, from);
@@ -570,7 +570,7 @@ static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *
     return count;
 }
 
-bool hub_turn(struct hub *hub, int end)
+bool hub_step(struct hub *hub, int end)
 {
     struct pollfd wait[1u + HUB_BUSES + HUB_CONNECTIONS];
     size_t who[1u + HUB_BUSES + HUB_CONNECTIONS];

@@ -83,7 +83,7 @@ int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub
              size_t *failed);
 
 /* Waits for something to happen and does it. False: `end` has become readable, or nothing can happen any more. */
-bool hub_turn(struct hub *hub, int end);
+bool hub_step(struct hub *hub, int end);
 
 /* Ends the buses for all their members. */
 void hub_close(struct hub *hub);

@@ -68,7 +68,7 @@ static int serve(char **paths, size_t count, struct hub_options options)
     if (!options.is_virtual) {
         ask_for_priority();
     }
-    while (hub_turn(&hub, end)) {
+    while (hub_step(&hub, end)) {
     }
     hub_close(&hub);
     remove_paths(paths, count);

@@ -7,23 +7,23 @@
 
 typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 136 ? 1 : -1];
 
-static int offline_start_point(struct offline *rig, int32_t start[PROGRAM_AXES])
+static int offline_start_point(struct offline *sim, int32_t start[PROGRAM_AXES])
 {
     struct interpolator_point point;
-    if (interpolator_at(&rig->interp, 0, &point) < 0) {
+    if (interpolator_at(&sim->interp, 0, &point) < 0) {
         return OFFLINE_ERR_INTERP;
     }
-    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        start[axis] = counts_from_q40_mm(point.position_q40[axis], rig->counts_per_mm);
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        start[axis] = counts_from_q40_mm(point.position_q40[axis], sim->counts_per_mm);
     }
     return 0;
 }
 
-static int offline_drives(struct offline *rig, const struct program *program,
+static int offline_drives(struct offline *sim, const struct program *program,
                           const struct drive_config *drives)
 {
-    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        const int error = drive_init(&rig->drives[axis], &drives[axis]);
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        const int error = drive_init(&sim->drives[axis], &drives[axis]);
         if (error != 0) {
             return OFFLINE_ERR_DRIVE - 10 * (int)axis + error;
         }
@@ -31,7 +31,7 @@ static int offline_drives(struct offline *rig, const struct program *program,
             return OFFLINE_ERR_PERIOD;
         }
     }
-    for (uint32_t axis = 1; axis < rig->axis_count; axis++) {
+    for (uint32_t axis = 1; axis < sim->axis_count; axis++) {
         if (drives[axis].counts_per_mm != drives[0].counts_per_mm) {
             return OFFLINE_ERR_COUNTS;
         }
@@ -39,79 +39,79 @@ static int offline_drives(struct offline *rig, const struct program *program,
     return 0;
 }
 
-int offline_begin(struct offline *rig, const struct program *program,
+int offline_begin(struct offline *sim, const struct program *program,
                   const struct drive_config *drives, struct contour_segment *segments)
 {
     const struct feedforward_gains without = {.period_us = drives[0].period_us};
     int32_t start[PROGRAM_AXES] = {0};
-    rig->axis_count = program->header.axis_count;
-    int error = offline_drives(rig, program, drives);
+    sim->axis_count = program->header.axis_count;
+    int error = offline_drives(sim, program, drives);
     if (error != 0) {
         return error;
     }
-    rig->counts_per_mm = drives[0].counts_per_mm;
-    rig->tick = 0;
-    rig->influenced = false;
-    rig->faults = NULL;
-    rig->fault_count = 0;
-    rig->fault_tick = -1;
-    rig->program_ticks = program_ticks(program);
-    if (interpolator_begin(&rig->interp, program) != 0) {
+    sim->counts_per_mm = drives[0].counts_per_mm;
+    sim->tick = 0;
+    sim->influenced = false;
+    sim->faults = NULL;
+    sim->fault_count = 0;
+    sim->fault_tick = -1;
+    sim->program_ticks = program_ticks(program);
+    if (interpolator_begin(&sim->interp, program) != 0) {
         return OFFLINE_ERR_COEFFICIENTS;
     }
-    error = offline_start_point(rig, start);
+    error = offline_start_point(sim, start);
     if (error != 0) {
         return error;
     }
-    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        drive_place(&rig->drives[axis], start[axis]);
-        rig->latched_counts[axis] = start[axis];
-        rig->configs[axis] = drives[axis];
-        rig->gains[axis] = without;
-        rig->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
-        influence_none(&rig->influences[axis], &drives[axis]);
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        drive_place(&sim->drives[axis], start[axis]);
+        sim->latched_counts[axis] = start[axis];
+        sim->configs[axis] = drives[axis];
+        sim->gains[axis] = without;
+        sim->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
+        influence_none(&sim->influences[axis], &drives[axis]);
     }
-    feed_override_begin(&rig->feed, program, program->header.period_us, 0);
-    rig->orders = NULL;
-    rig->order_count = 0;
-    rig->next_order = 0;
-    rig->last_q40_mm = 0;
-    rig->stop = (struct offline_stop){UINT32_MAX, UINT32_MAX, 0, 0, 0};
-    contour_begin(&rig->contour, program, segments);
+    feed_override_begin(&sim->feed, program, program->header.period_us, 0);
+    sim->orders = NULL;
+    sim->order_count = 0;
+    sim->next_order = 0;
+    sim->last_q40_mm = 0;
+    sim->stop = (struct offline_stop){UINT32_MAX, UINT32_MAX, 0, 0, 0};
+    contour_begin(&sim->contour, program, segments);
     return 0;
 }
 
-void offline_feedforward(struct offline *rig, const struct feedforward_gains *gains)
+void offline_feedforward(struct offline *sim, const struct feedforward_gains *gains)
 {
-    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        rig->gains[axis] = gains[axis];
-        rig->gains[axis].period_us = rig->configs[axis].period_us;
-        rig->gains[axis].counts_per_mm = rig->counts_per_mm;
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        sim->gains[axis] = gains[axis];
+        sim->gains[axis].period_us = sim->configs[axis].period_us;
+        sim->gains[axis].counts_per_mm = sim->counts_per_mm;
     }
-    rig->influenced = true;
+    sim->influenced = true;
 }
 
-void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts)
+void offline_equip(struct offline *sim, int axis, double rated_torque_nm, double friction_volts)
 {
-    rig->rated_torque_nm[axis] = rated_torque_nm;
-    rig->influences[axis].friction_volts = friction_volts;
-    rig->influenced = rig->influenced || friction_volts > 0.0;
+    sim->rated_torque_nm[axis] = rated_torque_nm;
+    sim->influences[axis].friction_volts = friction_volts;
+    sim->influenced = sim->influenced || friction_volts > 0.0;
 }
 
-int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count)
+int offline_faults(struct offline *sim, const struct offline_fault *faults, uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
-        if (!offline_fault_ok(&faults[i]) || faults[i].axis >= rig->axis_count) {
+        if (!offline_fault_ok(&faults[i]) || faults[i].axis >= sim->axis_count) {
             return OFFLINE_ERR_FAULT;
         }
     }
-    rig->faults = faults;
-    rig->fault_count = count;
-    rig->influenced = rig->influenced || count > 0;
+    sim->faults = faults;
+    sim->fault_count = count;
+    sim->influenced = sim->influenced || count > 0;
     return 0;
 }
 
-int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count)
+int offline_orders(struct offline *sim, const struct offline_order *orders, uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
         const bool late = i > 0 && orders[i].tick < orders[i - 1].tick;
@@ -119,106 +119,106 @@ int offline_orders(struct offline *rig, const struct offline_order *orders, uint
             return OFFLINE_ERR_FAULT;
         }
     }
-    rig->orders = orders;
-    rig->order_count = count;
+    sim->orders = orders;
+    sim->order_count = count;
     return 0;
 }
 
-void offline_stop_get(const struct offline *rig, struct offline_stop *stop)
+void offline_stop_get(const struct offline *sim, struct offline_stop *stop)
 {
-    *stop = rig->stop;
+    *stop = sim->stop;
 }
 
-static bool offline_at_rest(const struct offline *rig)
+static bool offline_at_rest(const struct offline *sim)
 {
-    const enum feed_state state = feed_override_state(&rig->feed);
+    const enum feed_state state = feed_override_state(&sim->feed);
     return state == FEED_HELD || state == FEED_STOPPED || state == FEED_ENDED;
 }
 
-static void offline_order_stop(struct offline *rig, enum program_stop_kind kind)
+static void offline_order_stop(struct offline *sim, enum program_stop_kind kind)
 {
-    rig->stop.tick = rig->tick;
-    rig->stop.rest_tick = UINT32_MAX;
-    rig->stop.bound_us = feed_override_bound_us(&rig->feed, kind);
-    rig->stop.from_q40_mm = rig->last_q40_mm;
+    sim->stop.tick = sim->tick;
+    sim->stop.rest_tick = UINT32_MAX;
+    sim->stop.bound_us = feed_override_bound_us(&sim->feed, kind);
+    sim->stop.from_q40_mm = sim->last_q40_mm;
 }
 
-static void offline_order(struct offline *rig, const struct offline_order *order)
+static void offline_order(struct offline *sim, const struct offline_order *order)
 {
     switch (order->kind) {
     case OFFLINE_ORDER_HOLD:
-        offline_order_stop(rig, PROGRAM_STOP_HOLD);
-        feed_override_hold(&rig->feed);
+        offline_order_stop(sim, PROGRAM_STOP_HOLD);
+        feed_override_hold(&sim->feed);
         break;
     case OFFLINE_ORDER_STOP:
-        offline_order_stop(rig, PROGRAM_STOP_HOLD);
-        feed_override_stop(&rig->feed);
+        offline_order_stop(sim, PROGRAM_STOP_HOLD);
+        feed_override_stop(&sim->feed);
         break;
     case OFFLINE_ORDER_FAULT_STOP:
-        offline_order_stop(rig, PROGRAM_STOP_FAULT);
-        feed_override_fault_stop(&rig->feed);
+        offline_order_stop(sim, PROGRAM_STOP_FAULT);
+        feed_override_fault_stop(&sim->feed);
         break;
     case OFFLINE_ORDER_RESUME:
-        feed_override_resume(&rig->feed);
+        feed_override_resume(&sim->feed);
         break;
     default:
-        feed_override_set(&rig->feed, order->percent);
+        feed_override_set(&sim->feed, order->percent);
         break;
     }
 }
 
-static int offline_point_next(struct offline *rig, struct interpolator_point *point)
+static int offline_point_next(struct offline *sim, struct interpolator_point *point)
 {
-    while (rig->next_order < rig->order_count && rig->orders[rig->next_order].tick <= rig->tick) {
-        offline_order(rig, &rig->orders[rig->next_order++]);
+    while (sim->next_order < sim->order_count && sim->orders[sim->next_order].tick <= sim->tick) {
+        offline_order(sim, &sim->orders[sim->next_order++]);
     }
-    if (feed_override_next(&rig->feed, &rig->interp, point) != 0) {
+    if (feed_override_next(&sim->feed, &sim->interp, point) != 0) {
         return OFFLINE_ERR_INTERP;
     }
-    rig->last_q40_mm = point->arc_length_q40_mm;
-    if (rig->stop.tick != UINT32_MAX && rig->stop.rest_tick == UINT32_MAX && offline_at_rest(rig)) {
-        rig->stop.rest_tick = rig->tick;
-        rig->stop.rest_q40_mm = point->arc_length_q40_mm;
+    sim->last_q40_mm = point->arc_length_q40_mm;
+    if (sim->stop.tick != UINT32_MAX && sim->stop.rest_tick == UINT32_MAX && offline_at_rest(sim)) {
+        sim->stop.rest_tick = sim->tick;
+        sim->stop.rest_q40_mm = point->arc_length_q40_mm;
     }
     return 0;
 }
 
-static int offline_command(struct offline *rig, struct offline_row *row)
+static int offline_command(struct offline *sim, struct offline_row *row)
 {
     struct interpolator_point point;
-    if (offline_point_next(rig, &point) != 0) {
+    if (offline_point_next(sim, &point) != 0) {
         return OFFLINE_ERR_INTERP;
     }
     row->arc_length_q40_mm = point.arc_length_q40_mm;
-    row->feed_q32_mm_s = feed_override_feed_q32(&rig->feed);
+    row->feed_q32_mm_s = feed_override_feed_q32(&sim->feed);
     for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
-        const bool follows = axis < rig->axis_count;
+        const bool follows = axis < sim->axis_count;
         row->cmd_q40_mm[axis] = follows ? point.position_q40[axis] : 0;
         row->set_counts[axis] =
-            follows ? counts_from_q40_mm(point.position_q40[axis], rig->counts_per_mm) : 0;
+            follows ? counts_from_q40_mm(point.position_q40[axis], sim->counts_per_mm) : 0;
     }
-    row->tick = rig->tick++;
+    row->tick = sim->tick++;
     return 0;
 }
 
 /* As the controller sends it: from the program's first setpoint to its last, the first at rest. */
-static struct feedforward_offset offline_offset(struct offline *rig, const struct offline_row *row,
+static struct feedforward_offset offline_offset(struct offline *sim, const struct offline_row *row,
                                                 uint32_t axis)
 {
     const struct feedforward_offset none = {0, 0};
     if (row->tick == 0) {
-        feedforward_begin(&rig->feedforwards[axis], row->cmd_q40_mm[axis]);
+        feedforward_begin(&sim->feedforwards[axis], row->cmd_q40_mm[axis]);
     }
-    return row->tick < rig->program_ticks
-               ? feedforward_next(&rig->feedforwards[axis], &rig->gains[axis],
+    return row->tick < sim->program_ticks
+               ? feedforward_next(&sim->feedforwards[axis], &sim->gains[axis],
                                   row->cmd_q40_mm[axis])
                : none;
 }
 
-static bool offline_arrives(const struct offline *rig, uint32_t axis)
+static bool offline_arrives(const struct offline *sim, uint32_t axis)
 {
-    for (uint32_t i = 0; i < rig->fault_count; i++) {
-        if (rig->faults[i].axis == axis && offline_fault_loses(&rig->faults[i], rig->fault_tick)) {
+    for (uint32_t i = 0; i < sim->fault_count; i++) {
+        if (sim->faults[i].axis == axis && offline_fault_loses(&sim->faults[i], sim->fault_tick)) {
             return false;
         }
     }
@@ -226,71 +226,71 @@ static bool offline_arrives(const struct offline *rig, uint32_t axis)
 }
 
 /* Begins and ends faults, and latches what arrives. */
-static void offline_latch(struct offline *rig, const struct offline_row *row)
+static void offline_latch(struct offline *sim, const struct offline_row *row)
 {
     bool moves = false;
-    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        moves = moves || row->set_counts[axis] != rig->latched_counts[axis];
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        moves = moves || row->set_counts[axis] != sim->latched_counts[axis];
     }
-    if (rig->fault_tick >= 0 || moves) {
-        rig->fault_tick++;
+    if (sim->fault_tick >= 0 || moves) {
+        sim->fault_tick++;
     }
-    for (uint32_t i = 0; i < rig->fault_count; i++) {
-        const uint32_t axis = rig->faults[i].axis;
-        offline_fault_tick(&rig->faults[i], rig->fault_tick, &rig->influences[axis],
-                           &rig->drives[axis]);
+    for (uint32_t i = 0; i < sim->fault_count; i++) {
+        const uint32_t axis = sim->faults[i].axis;
+        offline_fault_tick(&sim->faults[i], sim->fault_tick, &sim->influences[axis],
+                           &sim->drives[axis]);
     }
-    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        if (offline_arrives(rig, axis)) {
-            rig->latched_counts[axis] = row->set_counts[axis];
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        if (offline_arrives(sim, axis)) {
+            sim->latched_counts[axis] = row->set_counts[axis];
         }
     }
 }
 
-static void offline_move_forward(struct offline *rig, const struct offline_row *row)
+static void offline_move_forward(struct offline *sim, const struct offline_row *row)
 {
-    offline_latch(rig, row);
-    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        struct influence *influence = &rig->influences[axis];
-        const struct feedforward_offset offset = offline_offset(rig, row, axis);
-        influence_offsets(influence, &rig->drives[axis], &rig->configs[axis],
+    offline_latch(sim, row);
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        struct influence *influence = &sim->influences[axis];
+        const struct feedforward_offset offset = offline_offset(sim, row, axis);
+        influence_offsets(influence, &sim->drives[axis], &sim->configs[axis],
                           offset.velocity_counts_s, offset.torque_permille,
-                          rig->rated_torque_nm[axis]);
-        if (influence_acts(influence, &rig->drives[axis])) {
-            influence_period(influence, &rig->drives[axis], rig->latched_counts[axis]);
+                          sim->rated_torque_nm[axis]);
+        if (influence_acts(influence, &sim->drives[axis])) {
+            influence_period(influence, &sim->drives[axis], sim->latched_counts[axis]);
         } else {
-            drive_period(&rig->drives[axis], rig->latched_counts[axis]);
+            drive_period(&sim->drives[axis], sim->latched_counts[axis]);
         }
     }
 }
 
-static void offline_move(struct offline *rig, struct offline_row *row)
+static void offline_move(struct offline *sim, struct offline_row *row)
 {
-    if (rig->influenced) {
-        offline_move_forward(rig, row);
+    if (sim->influenced) {
+        offline_move_forward(sim, row);
     } else {
-        drive_period_pair(&rig->drives[0], &rig->drives[1], row->set_counts);
-        for (uint32_t axis = PROGRAM_PLANE; axis < rig->axis_count; axis++) {
-            drive_period(&rig->drives[axis], row->set_counts[axis]);
+        drive_period_pair(&sim->drives[0], &sim->drives[1], row->set_counts);
+        for (uint32_t axis = PROGRAM_PLANE; axis < sim->axis_count; axis++) {
+            drive_period(&sim->drives[axis], row->set_counts[axis]);
         }
     }
     for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
-        const bool follows = axis < rig->axis_count;
-        row->act_counts[axis] = follows ? drive_position_counts(&rig->drives[axis]) : 0;
-        row->volts_mv[axis] = follows ? drive_volts_mv(&rig->drives[axis]) : 0;
+        const bool follows = axis < sim->axis_count;
+        row->act_counts[axis] = follows ? drive_position_counts(&sim->drives[axis]) : 0;
+        row->volts_mv[axis] = follows ? drive_volts_mv(&sim->drives[axis]) : 0;
     }
 }
 
-int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n)
+int offline_run(struct offline *sim, struct offline_row *rows, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
-        const int error = offline_command(rig, &rows[i]);
+        const int error = offline_command(sim, &rows[i]);
         if (error != 0) {
             return error;
         }
-        offline_move(rig, &rows[i]);
-        contour_errors_um(&rig->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
-                          rig->axis_count, rig->counts_per_mm, &rows[i].contour_error_um);
+        offline_move(sim, &rows[i]);
+        contour_errors_um(&sim->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
+                          sim->axis_count, sim->counts_per_mm, &rows[i].contour_error_um);
     }
     return 0;
 }

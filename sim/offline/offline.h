@@ -8,8 +8,8 @@
  * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
  * repeat its end point (settling), those behind a stop its place of rest.
  *
- * Use: offline_begin, then rig_run as often as wanted. No heap: the caller lends the segment array, and
- * the program, its image, its coefficient records and the segments must outlive the rig. Main loop only.
+ * Use: offline_begin, then offline_run as often as wanted. No heap: the caller lends the segment array, and
+ * the program, its image, its coefficient records and the segments must outlive the simulation. Main loop only.
  */
 #ifndef HODOGRAPH_OFFLINE_OFFLINE_H
 #define HODOGRAPH_OFFLINE_OFFLINE_H
@@ -101,30 +101,30 @@ struct offline {
 
 /* Sets up for a program that passed program_check and has coefficient records; segments has room for its
  * segment_count, `drives` one for each axis of the program. Returns 0 or an error. */
-int offline_begin(struct offline *rig, const struct program *program,
+int offline_begin(struct offline *sim, const struct program *program,
                   const struct drive_config *drives, struct contour_segment *segments);
 
 /* The controller's feedforward of each axis (0x2018 ... 0x201A), right after offline_begin; period and
- * counts per mm in the gains are the rig's. */
-void offline_feedforward(struct offline *rig, const struct feedforward_gains *gains);
+ * counts per mm in the gains are those of the simulation. */
+void offline_feedforward(struct offline *sim, const struct feedforward_gains *gains);
 
 /* Rated torque of an axis (from 0; more than 0; drive_config_rated_torque_nm if this is not called), and
  * Coulomb friction as volts (0 or more; none); right after offline_begin. */
-void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts);
+void offline_equip(struct offline *sim, int axis, double rated_torque_nm, double friction_volts);
 
-/* Faults of this run, right after offline_begin; they must outlive the rig. Positions and contour error stay
+/* Faults of this run, right after offline_begin; they must outlive the simulation. Positions and contour error stay
  * those of the axis itself, whatever its encoder says. Of faults of one kind and axis one acts at a time.
  * Returns 0 or OFFLINE_ERR_FAULT. */
-int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count);
+int offline_faults(struct offline *sim, const struct offline_fault *faults, uint32_t count);
 
-/* Commands of this run, by ascending tick, right after offline_begin; they must outlive the rig. Returns 0 or OFFLINE_ERR_FAULT. */
-int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count);
+/* Commands of this run, by ascending tick, right after offline_begin; they must outlive the simulation. Returns 0 or OFFLINE_ERR_FAULT. */
+int offline_orders(struct offline *sim, const struct offline_order *orders, uint32_t count);
 
 /* What became of the last order to stop. */
-void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
+void offline_stop_get(const struct offline *sim, struct offline_stop *stop);
 
 /* The next n ticks. Returns 0 or OFFLINE_ERR_INTERP. */
-int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
+int offline_run(struct offline *sim, struct offline_row *rows, uint32_t n);
 
 /* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
  * counts: those of all axes of a point, one point after the other, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */

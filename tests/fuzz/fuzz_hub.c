@@ -48,7 +48,7 @@ static void drain(int fd)
 
 static void turn(void)
 {
-    (void)hub_turn(&hub, readable);
+    (void)hub_step(&hub, readable);
     for (unsigned i = 0; i < CLIENTS; ++i) {
         drain(clients[i]);
     }

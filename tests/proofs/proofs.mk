@@ -5,9 +5,9 @@ PROVERS := $(BUILD)/provers/.ready
 .PHONY: proofs
 PROOFS ?=
 proofs: $(PROVERS) ## no overflow, no bad shift, index or division: shown by Frama-C and CBMC (PROOFS=...); ends with "N passed, N failed"
-	@nice $(PYTHON) tools/proofs/prove.py --build $(BUILD) --jobs $(shell nproc) $(stamps_option) $(PROOFS)
+	@nice $(PYTHON) tools/analysis/prove.py --build $(BUILD) --jobs $(shell nproc) $(stamps_option) $(PROOFS)
 
-$(PROVERS): tools/proofs/provers.lock tools/proofs/fetch_provers.sh | $(READY)/packages
+$(PROVERS): tools/analysis/provers.lock tools/analysis/fetch_provers.sh | $(READY)/packages
 	$(call say,fetch,Frama-C and CBMC)
-	@bash tools/proofs/fetch_provers.sh tools/proofs/provers.lock $(@D)
+	@bash tools/analysis/fetch_provers.sh tools/analysis/provers.lock $(@D)
 	@touch $@

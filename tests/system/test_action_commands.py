@@ -134,7 +134,7 @@ def test_reset(fail_after: FailAfter, capsys: pytest.CaptureFixture[str], after_
     controller = fail_after(after_s)
     assert main(["start"]) == 5
     refused = capsys.readouterr().err
-    assert "refused: expected PDOs stayed away (code 0x8250, node 2," in refused
+    assert "refused: expected PDOs were not received (code 0x8250, node 2," in refused
     assert refused.endswith("; then hodograph reset\n")
     assert main(["reset"]) == 0
     assert capsys.readouterr().out == "ready to be started\n"

@@ -12,6 +12,11 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
+from analysis.campaign import EXAMPLES  # noqa: E402
+from analysis.counting import Counter  # noqa: E402
+from analysis.emulator import TARGETS  # noqa: E402
+from analysis.image import Function, Image, Instruction  # noqa: E402
+from analysis.longest import Bounds, Longest, LongestError  # noqa: E402
 from longest_path import (  # noqa: E402
     DOCUMENT,
     ENTRY,
@@ -21,11 +26,6 @@ from longest_path import (  # noqa: E402
     document,
     motion_part,
 )
-from target.campaign import EXAMPLES  # noqa: E402
-from target.counting import Counter  # noqa: E402
-from target.emulator import TARGETS  # noqa: E402
-from target.image import Function, Image, Instruction  # noqa: E402
-from target.longest import Bounds, Longest, LongestError  # noqa: E402
 
 PAIRS = [(t.name, k) for t in TARGETS.values() for k in t.kernels]
 COUNTS = json.loads((ROOT / "tests/data/counts.json").read_text(encoding="utf-8"))["motion"]

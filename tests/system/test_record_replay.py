@@ -175,7 +175,7 @@ def test_for_some_seconds(
     assert capsys.readouterr().out == f"{file}: 0 frames in 0.7 s\n"
     assert file.read_bytes() == b""
     status, line = failed(capsys, "record", str(tmp_path / "bus.txt"))
-    assert (status, "told by its name" in line) == (2, True), line
+    assert (status, "the end of its name gives the format" in line) == (2, True), line
     status, line = failed(capsys, "record", str(file), "--bus", f"local:{tmp_path / 'none'}")
     assert (status, "nobody serves it" in line) == (4, True), line
 

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build"
 sys.path.insert(0, str(ROOT / "tools"))
 
-from target import emulator  # noqa: E402
+from analysis import emulator  # noqa: E402
 
 STORES = target_bits.stores()
 CASES = [(store, run) for store in STORES for run in store.runs]

@@ -17,10 +17,10 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
 import count  # noqa: E402
-from target import adversary  # noqa: E402
-from target.campaign import EXAMPLES, KINDS, SECTIONS, Campaign, compilers  # noqa: E402
-from target.counting import Counter  # noqa: E402
-from target.emulator import TARGETS, Target  # noqa: E402
+from analysis import worst_case  # noqa: E402
+from analysis.campaign import EXAMPLES, KINDS, SECTIONS, Campaign, compilers  # noqa: E402
+from analysis.counting import Counter  # noqa: E402
+from analysis.emulator import TARGETS, Target  # noqa: E402
 
 BUILD = ROOT / "build"
 INSTRUCTION_NS = 128  # -icount shift=7
@@ -38,8 +38,8 @@ def test_the_clock_of_the_core_counts_the_same(
     target: Target, kernel: str, image: str, tmp_path: Path
 ) -> None:
     """The motion part (setpoints) and the whole interrupt, with both kernels."""
-    programs = b"".join(adversary.image(a) for a in adversary.ADVERSARIES[:3])
-    given = (kernel, programs, adversary.restless(), ICOUNT)
+    programs = b"".join(worst_case.image(a) for a in worst_case.ADVERSARIES[:3])
+    given = (kernel, programs, worst_case.restless(), ICOUNT)
     file = tmp_path / "times"
     if image == "setpoints":
         counts = Counter(BUILD, target).count(*given, times=file)
@@ -55,16 +55,16 @@ def test_the_clock_of_the_core_counts_the_same(
 
 def test_the_counts_of_a_run_are_those_of_the_next() -> None:
     counter = Counter(BUILD, TARGETS["an386"])
-    program = adversary.image(adversary.ADVERSARIES[2])
-    first, second = (counter.count("float", program, adversary.jitter()) for _ in range(2))
+    program = worst_case.image(worst_case.ADVERSARIES[2])
+    first, second = (counter.count("float", program, worst_case.jitter()) for _ in range(2))
     assert np.array_equal(first, second)
 
 
 def test_a_tick_does_one_thing_with_the_override() -> None:
     """docs/validation/wcet.md: none that begins a ramp goes on with one, or does a step of a search."""
     counter = Counter(BUILD, TARGETS["an386"], functions=True)
-    programs = b"".join(adversary.image(a) for a in adversary.ADVERSARIES)
-    counts = counter.count("float", programs, adversary.restless())
+    programs = b"".join(worst_case.image(a) for a in worst_case.ADVERSARIES)
+    counts = counter.count("float", programs, worst_case.restless())
     columns = [counter.names.index(KINDS[kind]) for kind in ("moves", "looks", "begins")]
     moves, looks, begins = (counts[:, columns] > 0).T
     assert all(kind.any() for kind in (moves, looks, begins))

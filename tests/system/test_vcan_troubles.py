@@ -69,7 +69,7 @@ def taken_down() -> Iterator[None]:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may take the interface down")
-@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("moving", [pytest.param(False, marks=pytest.mark.long), True])
 def test_an_interface_that_is_taken_down_and_up(
     alpha_at: MakeAlpha, capsys: pytest.CaptureFixture[str], moving: bool
 ) -> None:

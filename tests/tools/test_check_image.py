@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 import check_image
+from analysis.forbidden import floats, forbidden
+from analysis.image import Image
+from analysis.stack import Rules, Stack, StackError, frame
 from copied_tree import copied_tree
-from target.forbidden import floats, forbidden
-from target.image import Image
-from target.stack import Rules, Stack, StackError, frame
 
 ROOT = Path(__file__).resolve().parents[2]
 M0 = ("arm-none-eabi-gcc", "-mcpu=cortex-m0", "-mthumb")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from target import campaign
-from target.campaign import Campaign
-from target.emulator import TARGETS, Target
+from analysis import campaign
+from analysis.campaign import Campaign
+from analysis.emulator import TARGETS, Target
 from testing.cache import Stamps
 
 FIGURES = {"motion": {"plain": {"whole": [1, 2, 3]}}}
@@ -23,7 +23,7 @@ def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         for image in ("setpoints", "isr"):
             write(tmp_path / f"firmware/{target}/{image}.elf")
     write(tmp_path / "target/count_plugin.so")
-    write(tmp_path / "tools/target/parts.py")
+    write(tmp_path / "tools/analysis/parts.py")
     monkeypatch.setattr(campaign, "ROOT", tmp_path)
     monkeypatch.setattr(Campaign, "checksums", lambda _: {"alpha": "1"})
     monkeypatch.setattr(campaign, "_first_line", lambda command: f"{command[0]} 1.0")
@@ -60,7 +60,7 @@ def test_the_second_time_nothing_is_counted(build: Path) -> None:
         ("firmware/an386/isr.elf", True),
         ("firmware/an385/isr.elf", False),
         ("target/count_plugin.so", True),
-        ("tools/target/parts.py", True),
+        ("tools/analysis/parts.py", True),
     ],
 )
 def test_what_is_counted_with_counts(build: Path, file: str, again: bool) -> None:

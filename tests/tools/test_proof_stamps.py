@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from proofs import prove
-from proofs.prove import Proof, Prover, Run, Verdict
+from analysis import prove
+from analysis.prove import Proof, Prover, Run, Verdict
 from testing.cache import Stamps
 
 FILES = {

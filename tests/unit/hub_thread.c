@@ -18,7 +18,7 @@ static bool running;
 static void *run(void *unused)
 {
     (void)unused;
-    while (hub_turn(&hub_thread_hub, pipe_fds[0])) {
+    while (hub_step(&hub_thread_hub, pipe_fds[0])) {
     }
     return NULL;
 }

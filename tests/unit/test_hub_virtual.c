@@ -37,7 +37,7 @@ static int open_connection(uint16_t kind, uint32_t number, const char *name,
     struct local_bus_control hello = {.mark = LOCAL_BUS_MARK,
                                       .version = LOCAL_BUS_VERSION,
                                       .kind = kind,
-                                      .flags = LOCAL_BUS_WATCHES,
+                                      .flags = LOCAL_BUS_NOTICES,
                                       .number = number};
     memcpy(hello.name, name, strlen(name));
     const int fd = local_connection_open(hub_thread_paths[0], &hello, welcome);

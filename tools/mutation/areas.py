@@ -40,7 +40,7 @@ AREAS = (
     Area("canopen", ("firmware/canopen/*.c",)),
     Area("app", ("firmware/app/**/*.c",)),
     Area("plant", ("sim/plant/*.c",)),
-    Area("rig", ("sim/offline/*.c",)),
+    Area("offline", ("sim/offline/*.c",)),
     Area("node", ("sim/node/*.c",)),
     Area("injector", ("sim/injector/*.c", "sim/faults/*.c")),
     Area("hub", ("sim/hub/*.c",)),

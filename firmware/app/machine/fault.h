@@ -13,7 +13,7 @@
 #define FAULT_NOT_ENABLED   (EMCY_MANUFACTURER | 0x01u) /* did not switch on in time */
 #define FAULT_DROPPED_OUT   (EMCY_MANUFACTURER | 0x02u) /* left Operation enabled */
 #define FAULT_REBOOTED      (EMCY_MANUFACTURER | 0x03u) /* a drive restarted by itself; 0 */
-#define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 gone: controlword not obeyed */
+#define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 gone: controlword not followed */
 #define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
 #define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
 #define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */

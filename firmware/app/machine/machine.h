@@ -41,7 +41,7 @@ enum machine_state {
 
 /* What goes on inside FAULT. */
 enum machine_fault_phase {
-    MACHINE_FAULT_BRAKING,   /* all drives obey: stop along the path, settle */
+    MACHINE_FAULT_BRAKING,   /* every drive follows: stop along the path, settle */
     MACHINE_FAULT_QUICK,     /* else: quick stop of all that still hear; targets stay */
     MACHINE_FAULT_OFF,       /* drives are switched off; waits for the reset */
     MACHINE_FAULT_RESETTING, /* drives are being reset; then BOOT, or OFF when the cause persists */
@@ -185,7 +185,7 @@ void machine_enter_boot(struct machine *machine);
  * each has answered a SYNC; when one does not, they are configured and started anew. */
 void machine_drives_configured(struct machine *machine, bool simulated);
 
-/* Something is wrong: FAULT. With a program running and every drive obeying it stops along the path, else by quick stop.
+/* Something is wrong: FAULT. With a program running and every drive following it stops along the path, else by quick stop.
  * Only the first fault counts, but a further one turns the stop along the path into a quick stop when a drive no longer
  * obeys. Any context, under the lock. */
 void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail);

@@ -8,7 +8,7 @@ void machine_command(struct machine *machine, enum cia402_goal goal)
     }
 }
 
-bool machine_obeyed(const struct machine *machine)
+bool machine_followed(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         if (!axis_obeys(&machine->axes[i])) {

@@ -9,7 +9,7 @@
 void machine_command(struct machine *machine, enum cia402_goal goal);
 
 /* Whether every drive answers, is enabled and follows its target, and frames reach them. */
-bool machine_obeyed(const struct machine *machine);
+bool machine_followed(const struct machine *machine);
 
 /* Whether a drive that answers has power on and moves yet. */
 bool machine_any_moves(const struct machine *machine);

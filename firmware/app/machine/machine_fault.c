@@ -42,8 +42,8 @@ static void brake_on_path(struct machine *machine)
 
 void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail)
 {
-    const bool obeyed = machine_on_path(machine) && machine_obeyed(machine);
-    if (!obeyed) {
+    const bool followed = machine_on_path(machine) && machine_followed(machine);
+    if (!followed) {
         machine_raise_quick(machine, code, node, detail);
     } else if (machine->state != MACHINE_FAULT) {
         set_fault(machine, code, node, detail);

@@ -104,7 +104,7 @@ static void step_motion(struct machine *machine)
 
 static void step_braking(struct machine *machine)
 {
-    if (!machine_obeyed(machine) || motion_late(&machine->motion)) {
+    if (!machine_followed(machine) || motion_late(&machine->motion)) {
         machine_fault_quick(machine);
     } else if (machine->withheld) {
         return;

@@ -11,7 +11,7 @@
  *
  * Stack: only the main one, for mainline and interrupts. It is the lowest thing in RAM, so that where nothing lies
  * below, an overflow is a fault and not a changed variable; a Cortex-M33 has the limit in MSPLIM besides. That it
- * does not come to that is proven for each image when it is linked (tools/target/stack.py).
+ * does not come to that is proven for each image when it is linked (tools/analysis/stack.py).
  *
  * FPU: on for all modes, and lazy stacking as after reset (FPCCR: ASPEN and LSPEN are 1). So interrupts may compute with
  * floats while the mainline does: entry leaves room for s0 to s15 and FPSCR on the stack (72 bytes more), which are

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * clock: the time of a process: the monotonic clock of the system, or, when it takes part in a local bus whose hub has
- * virtual time (local_bus.h), that.
+ * clock: the time of a process of this computer, for the Linux port and the simulated drives. It is the monotonic clock
+ * of the system. Where the process takes part in a local bus with virtual time (local_bus.h), it is that virtual time.
  *
- * One thread of a process takes part. It sleeps in clock_poll() only: whatever it does between two calls takes no virtual
- * time. Its SIGINT and SIGTERM come while it sleeps there; who lets them come at other times notes each of them with
- * clock_note_signal(). Users define _GNU_SOURCE first.
+ * One thread of a process takes part. It sleeps in clock_poll() only: what it does between two calls takes no virtual
+ * time. SIGINT and SIGTERM arrive while it sleeps there. A process that lets them arrive at other times reports each
+ * with clock_note_signal(). Users define _GNU_SOURCE first.
  */
 #ifndef PORT_LINUX_CLOCK_H
 #define PORT_LINUX_CLOCK_H

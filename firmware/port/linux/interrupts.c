@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* The thread that stands for both interrupts of a board, and what the main loop shares with it (interrupts.h). */
 #define _GNU_SOURCE
 #include "port/linux/interrupts.h"
 
@@ -154,7 +155,7 @@ static void step(uint64_t longest_ns)
         receive_waiting();
     } else if (ready < 0 && ready != -EINTR) {
         __atomic_store_n(&self.error, ready, __ATOMIC_RELEASE);
-        clock_leave(); /* the way out needs a clock that goes on */
+        clock_leave(); /* the shutdown needs a clock that goes on */
     }
     schedule_wait(&self.schedule, self.now_ns);
     if (self.now_ns >= self.schedule.due_ns && !gives_way()) {

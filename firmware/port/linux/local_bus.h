@@ -61,7 +61,7 @@ enum local_bus_kind {
 };
 
 enum local_bus_flag {
-    LOCAL_BUS_WATCHES = 1, /* hello: wants to be told of others */
+    LOCAL_BUS_NOTICES = 1, /* hello: wants notices of processes that join, leave or send signals */
     LOCAL_BUS_VIRTUAL = 2, /* welcome: time is virtual */
     LOCAL_BUS_SENT = 4,    /* wait: its members have sent something since the last one */
     LOCAL_BUS_FRAMES = 8,  /* grant: frames have come */

@@ -90,7 +90,7 @@ int port_begin(int argc, char **argv)
     return 0;
 }
 
-/* The handler writes to wake_fd, so it goes first: the process is on its way out in any case. */
+/* The handler writes to wake_fd, so it goes first: the process ends in any case. */
 int port_end(void)
 {
     (void)set_signals(SIG_IGN);

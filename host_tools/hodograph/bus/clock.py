@@ -184,8 +184,8 @@ class VirtualClock:
 
     def _await_message(self) -> None:
         """Until there is one, or the handler of a signal raises something."""
-        told = self._signals
-        watched: list[socket.socket | int] = [self._connection] + ([told] if told else [])
+        signals = self._signals
+        watched: list[socket.socket | int] = [self._connection] + ([signals] if signals else [])
         while self._connection not in select.select(watched, [], [])[0]:
             _signal_pipe().drain()
 
@@ -291,8 +291,8 @@ class VirtualClock:
 
     def _has_left(self, name: str) -> bool:
         """Whether that is the last report of it."""
-        heard = [kind for kind, of in self._notices if of == name and kind in (_JOINED, _LEFT)]
-        return bool(heard) and heard[-1] == _LEFT
+        reported = [kind for kind, of in self._notices if of == name and kind in (_JOINED, _LEFT)]
+        return bool(reported) and reported[-1] == _LEFT
 
     def _forget(self, name: str) -> None:
         self._notices = [notice for notice in self._notices if notice[1] != name]
@@ -334,7 +334,7 @@ class _SignalPipe:
         os.set_blocking(self._write, False)
 
     def listen(self) -> int | None:
-        """What to wait for beside other things; None: not in this thread, or somebody else is told of signals."""
+        """What to wait for beside other things; None: not in this thread, or another thread receives the signals."""
         if threading.current_thread() is not threading.main_thread():
             return None
         before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)

@@ -122,7 +122,7 @@ def _position_words(status: Status) -> str:
 
 def _override_words(override: Override) -> str:
     saturated = ", as much as the program allows here" if override.saturated else ""
-    return f"{override.wanted_percent} % asked for, {override.actual_percent:.1f} % now{saturated}"
+    return f"{override.wanted_percent} % commanded, {override.actual_percent:.1f} % now{saturated}"
 
 
 def _axis_words(axis: AxisStatus) -> str:

@@ -173,17 +173,17 @@ def load_campaign(file: Path) -> Campaign:
             f"{file}: makes {design.total} runs, more than {GREATEST_RUNS}: split it, or take fewer samples"
         )
     _check_samples(root, design)
-    told = _fingerprint(design, sources)
-    return Campaign(file, root.text("text", file.stem), sources, design, told)
+    fingerprint = _fingerprint(design, sources)
+    return Campaign(file, root.text("text", file.stem), sources, design, fingerprint)
 
 
 def _fingerprint(design: Design, sources: Sequence[Source]) -> str:
-    told = hashlib.sha256(f"{__version__} {design!r}".encode())
-    told.update(native_file().read_bytes())
+    digest = hashlib.sha256(f"{__version__} {design!r}".encode())
+    digest.update(native_file().read_bytes())
     for source in sources:
-        told.update(source.path.file.read_bytes())
-        told.update(repr(replace(source.machine, file=Path())).encode())
-    return told.hexdigest()
+        digest.update(source.path.file.read_bytes())
+        digest.update(repr(replace(source.machine, file=Path())).encode())
+    return digest.hexdigest()
 
 
 def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:

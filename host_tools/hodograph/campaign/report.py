@@ -129,8 +129,8 @@ def _errors(results: Results) -> list[tuple[str, int, int]]:
     first: dict[str, int] = {}
     for number, error in sorted(results.errors.items()):
         first.setdefault(error, number)
-    told = Counter(results.errors.values()).most_common(ERRORS_SHOWN)
-    return [(error, count, first[error]) for error, count in told]
+    shown = Counter(results.errors.values()).most_common(ERRORS_SHOWN)
+    return [(error, count, first[error]) for error, count in shown]
 
 
 def _figures(campaign: Campaign, results: Results, found: list[Group]) -> list[Figure]:

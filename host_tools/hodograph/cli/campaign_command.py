@@ -66,10 +66,10 @@ def _tell(asked: Campaign, results: Results, folder: Path, *, json: bool) -> Non
         )
     if results.errors:
         number, error = min(results.errors.items())
-        told = f"{len(results.errors)} of {asked.design.total} runs failed, the first is run {number}: {error}"
+        message = f"{len(results.errors)} of {asked.design.total} runs failed, the first is run {number}: {error}"
         if len(results.errors) == asked.design.total:
-            raise RunError(told)
-        note(told)
+            raise RunError(message)
+        note(message)
 
 
 COMMANDS = {"campaign": campaign}

@@ -43,8 +43,8 @@ def scan(options: Namespace) -> None:
     if options.output is not None:
         _write(options, address, drives)
     if options.json:
-        told = None if options.output is None else str(options.output)
-        print_json({"bus": str(address), "nodes": [f.json() for f in found], "file": told})
+        written = None if options.output is None else str(options.output)
+        print_json({"bus": str(address), "nodes": [f.json() for f in found], "file": written})
         return
     for facts in found:
         for line in _lines(facts):
@@ -69,12 +69,12 @@ def _lines(facts: DriveFacts) -> Iterator[str]:
     kind = "drive" if facts.is_drive else f"no drive (device type 0x{facts.device_type:08X})"
     yield f"node {facts.node}: {kind}{', ' if names else ''}{', '.join(names)}"
     numbers = (facts.vendor, facts.product, facts.revision, facts.serial)
-    told = ["-" if number is None else f"0x{number:08X}" for number in numbers]
-    yield "  vendor {}, product {}, revision {}, serial {}".format(*told)
+    identity = ["-" if number is None else f"0x{number:08X}" for number in numbers]
+    yield "  vendor {}, product {}, revision {}, serial {}".format(*identity)
     if not facts.is_drive:
         return
     modes = [MODES.get(mode, str(mode)) for mode in facts.modes]
-    yield f"  modes: {', '.join(modes) or 'not told'}"
+    yield f"  modes: {', '.join(modes) or 'not reported'}"
     for text, value in (
         ("encoder increments a turn", facts.encoder_increments),
         ("gear", facts.gear_ratio),

@@ -53,8 +53,8 @@ def upload(options: Namespace) -> None:
             controller.upload(image, bar)
         program = loaded_program(controller)
     if options.json:
-        told = {"bus": str(address), "node": node, "bytes": len(image)}
-        print_json(told | {"program": asdict(program)})
+        result = {"bus": str(address), "node": node, "bytes": len(image)}
+        print_json(result | {"program": asdict(program)})
     else:
         print(
             f"{size_text(len(image))} on node {node}: {program.segments} segments, {program.pieces} feed "

@@ -269,7 +269,7 @@ def _unsound(program: Program) -> str:
     return f"no program: {fault.code.text} ({fault.code.name}, code {fault.code}, {fault.place})"
 
 
-def simulate_chain(pipeline: Pipeline, kernel: str | None, *, keep_rows: bool = True) -> Motion:
+def simulate_pipeline(pipeline: Pipeline, kernel: str | None, *, keep_rows: bool = True) -> Motion:
     """A run of a path without a bus. Without its rows (one a tick) its memory does not grow with time."""
     image = pipeline.image
     with progress("simulate", "tick", pipeline.program.ticks) as bar:
@@ -292,7 +292,7 @@ def simulate_(options: Namespace) -> None:
     times = {"hold": options.hold_at, "stop": options.stop_at, "fault": options.fault_at}
     for kind, values in times.items():
         _within(f"--{kind}-at", values, last_tick_s(pipeline.program), "s")
-    motion = simulate_chain(pipeline, options.kernel, keep_rows=options.trace is not None)
+    motion = simulate_pipeline(pipeline, options.kernel, keep_rows=options.trace is not None)
     print_notes(pipeline, pipeline.compilation.plan)
     stops = [
         _stopped(pipeline, options.kernel, kind, at_s)

@@ -185,13 +185,13 @@ def _jumps(
 def _print(options: Namespace, recording: _Recording, found: list[Jump] | None) -> None:
     frames, seconds = recording.frame_count, recording.seconds
     if options.json:
-        told = None if found is None else [str(jump) for jump in found]
+        jumps = None if found is None else [str(jump) for jump in found]
         print_json(
             {
                 "file": str(options.file),
                 "frames": frames,
                 "seconds": seconds,
-                "jumps": told,
+                "jumps": jumps,
                 "unhomed_starts": recording.unhomed_starts,
             }
         )

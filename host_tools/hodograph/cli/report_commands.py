@@ -10,7 +10,7 @@ from ..job import simulate_job
 from ..names import is_toolpath
 from ..pipeline import load_pipeline
 from .output import print_json, progress
-from .path_commands import print_notes, simulate_chain
+from .path_commands import print_notes, simulate_pipeline
 from .toolpath_commands import refuse_toolpath_options, toolpath_job
 
 
@@ -32,7 +32,7 @@ def report(options: Namespace) -> None:
     cases = []
     for pipeline in pipelines:
         print_notes(pipeline, pipeline.plan)
-        cases.append((pipeline, simulate_chain(pipeline, options.kernel), None))
+        cases.append((pipeline, simulate_pipeline(pipeline, options.kernel), None))
     print(write_report(cases, options.output))
 
 

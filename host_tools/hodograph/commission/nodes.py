@@ -25,7 +25,7 @@ _NOT_THERE = (0x06020000, 0x06090011)
 
 @contextmanager
 def opened_bus(address: BusAddress, bitrate: int) -> Iterator[Network]:
-    """A network that hears all nodes. Raises BusError."""
+    """A network that receives the frames of all nodes. Raises BusError."""
     with open_network(address, None, bitrate) as network:
         yield network
 

@@ -53,7 +53,7 @@ _LEAST_FACTOR = 1.05
 """Along a path a factor below is 1: it would take half of the headroom of a changing override, and gain less than 5
 %."""
 
-_HAIR = 1.0 - 1e-9
+_MARGIN = 1.0 - 1e-9
 _TINY = 1e-12
 
 FACTOR_SHARE = 0.5
@@ -117,8 +117,8 @@ class _Piece:
         return second
 
     def codes(self, at: Real, share: float) -> tuple[Codes, Codes]:
-        rate = rate_codes(self.rate(at, share) * _HAIR)
-        return rate, second_codes(self.second(at, rates_per_s(rate)) * _HAIR)
+        rate = rate_codes(self.rate(at, share) * _MARGIN)
+        return rate, second_codes(self.second(at, rates_per_s(rate)) * _MARGIN)
 
 
 def override_bounds(
@@ -151,7 +151,7 @@ def override_bounds(
     if binding:
         factor = np.where(factor < _LEAST_FACTOR, 1.0, factor)
     # Rounded first: the rates then use the headroom that the stored factor really leaves.
-    factor_q14 = np.floor(np.clip(factor * _HAIR, 1.0, GREATEST_FACTOR) * FACTOR_ONE_Q14)
+    factor_q14 = np.floor(np.clip(factor * _MARGIN, 1.0, GREATEST_FACTOR) * FACTOR_ONE_Q14)
     factor = factor_q14 / FACTOR_ONE_Q14
     piece = _Piece(v, a, j, controller, binding)
     rates = np.zeros((v.size, LEVELS), dtype=np.uint8)

@@ -28,7 +28,7 @@ from .timeline import timeline
 from .usage import limit_peaks
 
 _CLOSE = 1e-4
-_HAIR = 1e-6
+_MARGIN = 1e-6
 _MOST_TRIALS = 30
 _MOST_ROUNDS = 20
 _REMEDY = "raise the limit, or smooth the path there (points too close together make such places)"
@@ -85,7 +85,7 @@ def plan_path(
     exceeded = (
         peak
         for peak in limit_peaks(bounds, plan.raw)
-        if peak.value > peak.limit.given * (1.0 + _HAIR)
+        if peak.value > peak.limit.given * (1.0 + _MARGIN)
     )
     return replace(
         plan,
@@ -206,14 +206,14 @@ def _reduced(plan: FeedPlan, bounds: PathBounds) -> FeedPlan:
             worst = found
         return tried, log(found.usage)
 
-    best = highest(plan.feed_mm_s, log(worst.usage), attempt, _CLOSE, _HAIR, _MOST_TRIALS)
+    best = highest(plan.feed_mm_s, log(worst.usage), attempt, _CLOSE, _MARGIN, _MOST_TRIALS)
     if best is None:
         raise PlanError(_infeasible(worst))
     return best
 
 
 def _infeasible(peak: Peak) -> str:
-    return f"feed: no feed of use obeys {peak.limit.reason}, {peak.place}: {_REMEDY}"
+    return f"feed: no useful feed keeps {peak.limit.reason}, {peak.place}: {_REMEDY}"
 
 
 def _worst(plan: FeedPlan, bounds: PathBounds) -> Peak:

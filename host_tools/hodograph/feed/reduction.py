@@ -18,7 +18,7 @@ from .request import FeedRequest
 
 T = TypeVar("T")
 
-_HAIR = 1e-9
+_MARGIN = 1e-9
 _CLOSE = 1e-6
 _MOST_TRIALS = 40
 
@@ -119,9 +119,9 @@ def _reduced(
         found, exceeded = _excess(tried, limits)
         return (tried, exceeded), found
 
-    best = highest(feed_mm_s, excess, attempt, _CLOSE, _HAIR, _MOST_TRIALS)
+    best = highest(feed_mm_s, excess, attempt, _CLOSE, _MARGIN, _MOST_TRIALS)
     if best is None:
-        raise PlanError(f"feed: no feed obeys {worst.reason}: raise it")
+        raise PlanError(f"feed: no feed keeps {worst.reason}: raise it")
     return best
 
 
@@ -140,7 +140,7 @@ def highest(
     excess: float,
     attempt: Callable[[float], tuple[T, float]],
     close: float,
-    hair: float,
+    margin: float,
     most_trials: int,
 ) -> T | None:
     """What `attempt` makes of the highest feed with an excess of at most 0, by a secant within a bracket; None where
@@ -149,7 +149,7 @@ def highest(
     attempt  of a feed: what it gives and the logarithm of its greatest limit usage (above 0: exceeded)
     excess   of `feed_mm_s`, above 0
     close    how near to 0 the excess may stay, and how narrow the bracket, when the search ends
-    hair     what first steps go below proportion
+    margin     what first steps go below proportion
 
     Peaks go about with the feed: first steps in proportion until one keeps all limits, longer where the last one has
     brought less; then the secant between the logarithms of feed and excess.
@@ -160,7 +160,7 @@ def highest(
     best: T | None = None
     for _ in range(most_trials):
         if best is None:
-            trial = high - high_excess / gain - hair
+            trial = high - high_excess / gain - margin
         else:
             share = -low_excess / (high_excess - low_excess)
             trial = low + (high - low) * max(0.05, min(0.95, share))

@@ -24,7 +24,7 @@ Socket = TypeVar("Socket")
 
 
 class ClientSlots(Generic[Socket]):
-    """The sockets of the server by what they are; `enter` and `seat` give the one that has to go, if any."""
+    """The sockets of the server by what they are; `enter` and `take_slot` give the one that has to go, if any."""
 
     def __init__(self) -> None:
         self._waiting: list[Socket] = []
@@ -36,7 +36,7 @@ class ClientSlots(Generic[Socket]):
         self._waiting.append(socket)
         return self._waiting.pop(0) if len(self._waiting) > MOST_WAITING else None
 
-    def seat(self, socket: Socket, *, may_command: bool) -> Socket | None:
+    def take_slot(self, socket: Socket, *, may_command: bool) -> Socket | None:
         """It has said hello: a browser that only watches is returned itself when there is no slot."""
         if socket in self._waiting:
             self._waiting.remove(socket)

@@ -140,7 +140,7 @@ class Link:
             remote = network.add_node(self._node, str(CONTROLLER_EDS))
             controller = _Prompt(self._address, self._node, remote, network.clock)
             controller.sdo.RESPONSE_TIMEOUT = _ANSWER_S
-            controller.before_read = lambda: self._obey(controller)
+            controller.before_read = lambda: self._execute(controller)
             if isinstance(network.clock, VirtualClock):
                 self._clock = network.clock
             try:
@@ -177,7 +177,7 @@ class Link:
                 continue
             failures = 0
             self._publish({"type": "status", "connected": True, "note": "", "status": status})
-            self._obey(controller)
+            self._execute(controller)
             # However slow the bus or this computer is, others find the controller's channel free most of the time.
             self._pause(clock, max(PAUSE_S, 2 * (clock.now_s() - begun_s)))
 
@@ -200,7 +200,7 @@ class Link:
             while True:
                 self._commands.get_nowait()[1].set_exception(error)
 
-    def _obey(self, controller: Controller) -> None:
+    def _execute(self, controller: Controller) -> None:
         """Carries out the commands that wait."""
         if self._in_command:
             return

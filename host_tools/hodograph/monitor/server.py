@@ -33,15 +33,15 @@ _TYPES = {
     ".svg": "image/svg+xml",
 }
 
-Obey = Callable[[dict[str, Any]], Awaitable[str]]
+Execute = Callable[[dict[str, Any]], Awaitable[str]]
 """Carries out the request of a browser that may command; returns words. Raises HodographError."""
 
 
 class Server:
     """The web application; `greeting` is the first message to a page."""
 
-    def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], obey: Obey) -> None:
-        self._guard, self._hub, self._greeting, self._obey = guard, hub, greeting, obey
+    def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], execute: Execute) -> None:
+        self._guard, self._hub, self._greeting, self._execute = guard, hub, greeting, execute
         self._pages = _load_pages()
         self._slots: ClientSlots[web.WebSocketResponse] = ClientSlots()
         self._closing: set[asyncio.Task[None]] = set()
@@ -95,7 +95,7 @@ class Server:
         may_command = await self._welcome(socket)
         if may_command is None:
             return
-        too_many = self._slots.seat(socket, may_command=may_command)
+        too_many = self._slots.take_slot(socket, may_command=may_command)
         if too_many is socket:
             await _close_full(socket)
             return
@@ -156,7 +156,7 @@ class Server:
         if not may_command:
             return answer | {"text": "this page was opened without the token: it may only look on"}
         try:
-            return answer | {"ok": True, "text": await self._obey(request)}
+            return answer | {"ok": True, "text": await self._execute(request)}
         except HodographError as error:
             return answer | {"text": str(error)}
 

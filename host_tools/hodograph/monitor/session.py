@@ -102,7 +102,7 @@ class LivePage:
         pump = Pump(self._opener(), self._layout, hub.publish)
         link = self._link(hub, pump)
         server = Server(
-            Guard(self._place.host, self._place.token), hub, self._greeting(), _obey(link, pump)
+            Guard(self._place.host, self._place.token), hub, self._greeting(), _execute(link, pump)
         )
         runner = web.AppRunner(
             server.app, access_log=None, shutdown_timeout=2.0, keepalive_timeout=REQUEST_S
@@ -174,8 +174,8 @@ class LivePage:
         }
 
 
-def _obey(link: Link | None, pump: Pump) -> Callable[[dict[str, Any]], Any]:
-    async def obey(request: dict[str, Any]) -> str:
+def _execute(link: Link | None, pump: Pump) -> Callable[[dict[str, Any]], Any]:
+    async def execute(request: dict[str, Any]) -> str:
         name = str(request.get("name"))
         if link is None:
             if name != "replay":
@@ -185,7 +185,7 @@ def _obey(link: Link | None, pump: Pump) -> Callable[[dict[str, Any]], Any]:
         await asyncio.wrap_future(link.submit(read_command(request)))
         return f"{name}: done"
 
-    return obey
+    return execute
 
 
 def _require_alive(pump: Pump, link: Link | None) -> None:

@@ -159,15 +159,15 @@ struct offline_row {
 struct offline {
     ...;
 };
-int offline_begin(struct offline *rig, const struct program *program,
+int offline_begin(struct offline *sim, const struct program *program,
                   const struct drive_config *drives, struct contour_segment *segments);
 struct feedforward_gains {
     uint32_t period_us, counts_per_mm, velocity_permille;
     int32_t torque_per_acceleration_q16, torque_per_velocity_q16;
 };
-void offline_feedforward(struct offline *rig, const struct feedforward_gains *gains);
-void offline_equip(struct offline *rig, int axis, double rated_torque_nm, double friction_volts);
-int offline_faults(struct offline *rig, const struct offline_fault *faults, uint32_t count);
+void offline_feedforward(struct offline *sim, const struct feedforward_gains *gains);
+void offline_equip(struct offline *sim, int axis, double rated_torque_nm, double friction_volts);
+int offline_faults(struct offline *sim, const struct offline_fault *faults, uint32_t count);
 enum offline_order_kind {
     OFFLINE_ORDER_HOLD,
     OFFLINE_ORDER_RESUME,
@@ -184,9 +184,9 @@ struct offline_stop {
     uint32_t tick, rest_tick, bound_us;
     int64_t from_q40_mm, rest_q40_mm;
 };
-int offline_orders(struct offline *rig, const struct offline_order *orders, uint32_t count);
-void offline_stop_get(const struct offline *rig, struct offline_stop *stop);
-int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n);
+int offline_orders(struct offline *sim, const struct offline_order *orders, uint32_t count);
+void offline_stop_get(const struct offline *sim, struct offline_stop *stop);
+int offline_run(struct offline *sim, struct offline_row *rows, uint32_t n);
 int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
                    uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 void offline_times(const struct program *program, uint32_t tick0, uint32_t n, uint64_t *time_q42_s);

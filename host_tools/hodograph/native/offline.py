@@ -158,7 +158,7 @@ class OfflineSimulation:
         ffi, lib = library()
         if rows.dtype != ROW or not rows.flags.c_contiguous:
             raise ValueError("rows must be a contiguous array of ROW")
-        error = lib.rig_run(
+        error = lib.offline_run(
             self._rig, ffi.cast("struct offline_row *", ffi.from_buffer(rows)), rows.size
         )
         if error != 0:
@@ -168,7 +168,7 @@ class OfflineSimulation:
 
 
 def _gains(feedforward: Feedforward) -> dict[str, int]:
-    """Struct feedforward_gains with the figures that the controller is given; the rig adds the rest."""
+    """Struct feedforward_gains with the figures that the controller is given; the simulation adds the rest."""
     return {
         "velocity_permille": feedforward.velocity_permille,
         "torque_per_acceleration_q16": feedforward.torque_per_acceleration_q16,

@@ -50,14 +50,14 @@ def simulate(
     """
     program = image if isinstance(image, NativeProgram) else NativeProgram(image)
     names = names_of_driven(program, drives, names)
-    rig = OfflineSimulation(program, kernel, drives, counts_per_mm, feedforward, faults)
+    simulation = OfflineSimulation(program, kernel, drives, counts_per_mm, feedforward, faults)
     total = program.ticks + settling_ticks(program.period_us)
     tally = Tally(program.ticks, counts_per_mm, names)
     rows = np.empty(total if keep_rows else min(total, CHUNK_TICKS), dtype=ROW)
     for first in range(0, total, CHUNK_TICKS):
         count = min(CHUNK_TICKS, total - first)
         chunk = rows[first : first + count] if keep_rows else rows[:count]
-        rig.run(chunk)
+        simulation.run(chunk)
         tally.add(chunk)
         if progress is not None:
             progress(first + count, total)

@@ -85,7 +85,7 @@ def simulate_stop(
     if not 0.0 <= at_s <= end_s * (1.0 + 1e-12):
         raise InputError(f"{kind} at {at_s:g} s: must be from 0 to {end_s:.9g} s")
     tick = ceil(at_s / period_s - 1e-9)
-    rig = OfflineSimulation(
+    simulation = OfflineSimulation(
         program,
         kernel,
         tuple(drives),
@@ -95,8 +95,8 @@ def simulate_stop(
     )
     settling = settling_ticks(program.period_us)
     rows = np.empty(program.ticks + settling, dtype=ROW)
-    rig.run(rows)
-    stop = rig.stop
+    simulation.run(rows)
+    stop = simulation.stop
     if stop is None or stop.rest_tick is None:
         raise HodographError(f"simulation: {kind} at {at_s:g} s never came to rest: report a bug")
     rows = rows[: stop.rest_tick + 1 + settling]

@@ -137,7 +137,7 @@ class PHSpline(ArcLengthChain):
         """The same curve in shorter segments, as a program wants them (docs/reference/protocol.md 1.2).
 
         Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm`
-        long and the largest Bernstein coefficient of its speed is (a hair less than) at most
+        long and the largest Bernstein coefficient of its speed is (1e-9 less than) at most
         `max_speed_ratio` times the smallest, which is positive. Raises PlanError naming the
         segment where the curve all but stops.
         """

@@ -219,7 +219,10 @@ def test_a_broken_blf_is_told(tmp_path: Path) -> None:
 
 
 def test_a_name_without_format_and_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"told by its name: \.log \(candump\), \.asc .*, \.blf"):
+    with pytest.raises(
+        InputError,
+        match=r"the end of its name gives the format of a recording: \.log \(candump\), \.asc .*, \.blf",
+    ):
         read_recording(tmp_path / "bus.csv")
     with pytest.raises(InputError, match="no such file"):
         read_recording(tmp_path / "bus.log")

@@ -81,7 +81,7 @@ def test_a_run() -> None:
         "fault stop: at most 0.07 s and 4.25 mm to rest, longest from arc length 30.5 mm (piece 11)",
         "position: 45.000000 of 99.900000 mm, 0.500 of 1.100 s, tick 500",
         "feed: 100.000 mm/s",
-        "override: 150 % asked for, 120.0 % now, as much as the program allows here",
+        "override: 150 % commanded, 120.0 % now, as much as the program allows here",
         "bus load: 61.2 % of 500 kbit/s, 4000 frames/s, over 0.25 s",
         "ticks: worst tick 12.3 us, worst lateness 130 us, deadline misses 2",
         "frames: SYNCs 5000, missed TPDOs 3, not sent 0",
@@ -104,10 +104,10 @@ def test_troubles() -> None:
         axes=(replace(AXIS, error_code=0x3220, error="low", remedy="feed it"),),
     )
     text = shown(faulty)
-    assert "fault: expected PDOs stayed away (code 0x8250, node 2, 2 positions missed" in text
+    assert "fault: expected PDOs were not received (code 0x8250, node 2, 2 positions missed" in text
     assert f"remedy: {WORDS.remedy}; then hodograph reset" in text
     assert "error: low (0x3220)" in text
-    assert "fault 0x8250: expected PDOs stayed away" in status_line(faulty)
+    assert "fault 0x8250: expected PDOs were not received" in status_line(faulty)
     waiting = replace(RUNNING, state="boot", boot_trouble=boot_trouble(3, 0x100000, 0x05040000, 0))
     assert "boot waits: the drive at node 3 does not answer" in shown(waiting)
     assert "node 3 does not answer" in status_line(waiting)

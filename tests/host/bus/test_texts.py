@@ -149,7 +149,7 @@ def test_boot_trouble_in_words() -> None:
     assert boot_trouble(0, 0, 0, 0) is None
     silent = boot_trouble(3, 0x100000, 0x05040000, 0)
     assert silent is not None
-    assert silent.text.startswith("the drive at node 3 does not answer (asked for object 0x1000")
+    assert silent.text.startswith("the drive at node 3 does not answer (requested: object 0x1000")
     assert "is it powered and connected, is its node number 3" in silent.remedy
     refused = boot_trouble(2, 0x60C201, 0x06090031, 0)
     assert refused is not None

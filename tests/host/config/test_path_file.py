@@ -94,7 +94,7 @@ def test_optimal_needs_no_nominal_feed(tmp_path: Path) -> None:
     cap = "[[limits.cap]]\nfrom_mm = 0\nto_mm = 1\nfeed_mm_s = 9\n"
     for text in (OPTIMAL, OPTIMAL + cap):
         with pytest.raises(
-            InputError, match=r'profile "optimal" has no limit to obey: name a machine'
+            InputError, match=r'profile "optimal" has no limit to keep: name a machine'
         ):
             _ = load_pipeline(write(tmp_path, text)).plan
 

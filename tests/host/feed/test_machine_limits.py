@@ -128,7 +128,7 @@ def test_a_curve_that_no_feed_can_follow_is_named_with_place_and_curvature(tmp_p
     on = machine(jerk_mm_s3=1.0, acceleration_mm_s2=0.1, velocity_mm_s=0.01)
     with pytest.raises(
         PlanError,
-        match=r"obeys .* at [\d.]+ mm, where the curvature is .* 1/mm \(radius .* mm\): raise",
+        match=r"keeps .* at [\d.]+ mm, where the curvature is .* 1/mm \(radius .* mm\): raise",
     ):
         _ = pipeline(tmp_path, NEAR, "quintic", "respect", on).plan
 

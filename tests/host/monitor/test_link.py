@@ -68,12 +68,12 @@ class Bench:
 
 
 def test_a_command_does_not_wait_for_a_program_that_is_being_fetched() -> None:
-    bench, obeyed = Bench(), []
-    bench.controller.happens[70] = lambda: bench.link.submit(lambda _: obeyed.append("hold"))
+    bench, executed = Bench(), []
+    bench.controller.happens[70] = lambda: bench.link.submit(lambda _: executed.append("hold"))
     bench.look()
     assert (bench.shown, bench.controller.aborted, bench.controller.given) == ([], 1, 11)
-    bench.link._obey(bench.controller)  # type: ignore[arg-type]
-    assert obeyed == ["hold"]
+    bench.link._execute(bench.controller)  # type: ignore[arg-type]
+    assert executed == ["hold"]
     bench.look()
     bench.look()
     assert (bench.shown, bench.controller.aborted) == ([IMAGE], 1)

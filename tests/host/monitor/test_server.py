@@ -27,23 +27,23 @@ Browser = TestClient[Any, Any]
 
 
 class Case:
-    """A server, and what it was told to obey."""
+    """A server, and what it was requested to do."""
 
     def __init__(self, host: str = "127.0.0.1") -> None:
-        self.obeyed: list[dict[str, Any]] = []
+        self.executed: list[dict[str, Any]] = []
         self.guard = Guard(host, TOKEN)
         self.hub: Hub
 
-    async def obey(self, request: dict[str, Any]) -> str:
+    async def execute(self, request: dict[str, Any]) -> str:
         if request.get("name") == "refuse":
             raise RefusedError("not now")
-        self.obeyed.append(request)
+        self.executed.append(request)
         return "done"
 
     def run(self, scenario: Callable[[Browser], Awaitable[None]]) -> None:
         async def whole() -> None:
             self.hub = Hub(asyncio.get_running_loop())
-            server = Server(self.guard, self.hub, {"mode": "live"}, self.obey)
+            server = Server(self.guard, self.hub, {"mode": "live"}, self.execute)
             async with TestClient(TestServer(server.app)) as browser:
                 await scenario(browser)
 
@@ -97,7 +97,7 @@ def test_foreign_hosts_and_origins_get_nothing() -> None:
     Case().run(scenario)
 
 
-def test_with_the_token_commands_are_obeyed() -> None:
+def test_with_the_token_commands_are_executed() -> None:
     case = Case()
 
     async def scenario(browser: Browser) -> None:
@@ -110,7 +110,7 @@ def test_with_the_token_commands_are_obeyed() -> None:
         assert (await answer(socket, "answer"))["text"] == "not now"
 
     case.run(scenario)
-    assert [request["name"] for request in case.obeyed] == ["hold"]
+    assert [request["name"] for request in case.executed] == ["hold"]
 
 
 def test_without_the_token_loopback_may_look_on_only() -> None:
@@ -128,7 +128,7 @@ def test_without_the_token_loopback_may_look_on_only() -> None:
         assert (await answer(socket, "rows"))["i"] == 1
 
     case.run(scenario)
-    assert case.obeyed == []
+    assert case.executed == []
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])

@@ -151,7 +151,8 @@ def test_copies_are_drawn_where_they_are_used(tmp_path: Path) -> None:
     assert [length_of(contour) for contour in found] == pytest.approx([2.0, 1.0, 1.0, 20.0])
 
 
-def test_copies_of_copies_are_bounded(tmp_path: Path) -> None:
+def test_copies_of_copies_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hodograph.toolpath.drawing.MOST_COPIES", 20_000)  # else it takes seconds
     rows = ['<g id="g0"><path d="M0 0h1"/></g>']
     rows += [f'<g id="g{k}">' + f'<use href="#g{k - 1}"/>' * 10 + "</g>" for k in range(1, 12)]
     assert "copies add more than" in str(refusal_of(tmp_path, svg_page("\n".join(rows))))

@@ -74,9 +74,9 @@ class SetpointWatch:
         self._kept, self._frame_count, self._sync_count = [], 0, 0
 
     def _look(self, frames: Frames, syncs: range) -> list[Step]:
-        told = np.unique(frames["id"][_is_of(frames, RPDO1)] - RPDO1).tolist()
-        self._seen |= set(told)
-        nodes = told if self._nodes is None else self._nodes
+        found = np.unique(frames["id"][_is_of(frames, RPDO1)] - RPDO1).tolist()
+        self._seen |= set(found)
+        nodes = found if self._nodes is None else self._nodes
         steps = worst_steps(frames, nodes, syncs)
         return [replace(step, sync=step.sync + self._before) for step in steps]
 

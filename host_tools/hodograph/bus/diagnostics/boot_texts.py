@@ -79,7 +79,9 @@ _PDO_RANGES = (
     (0x1800, "position PDO"),
     (0x1A00, "mapping of the position PDO"),
 )
-_PDO_REMEDY = "the drive can't map what is asked for: switch feedforward off, or see its manual"
+_PDO_REMEDY = (
+    "the drive cannot map the requested objects: switch feedforward off, or see its manual"
+)
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ def boot_trouble(
     name, remedy = _object(index, node)
     where = f"object 0x{index:04X} sub {sub} ({name})"
     if abort_code == _NO_ANSWER:
-        at = f" (asked for {where})" if index else ""
+        at = f" (requested: {where})" if index else ""
         text = f"the drive at node {node} does not answer{at}"
         remedy = f"is it powered and connected, is its node number {node}, is its bit rate that of the bus? {_RETRY}"
     elif index == 0x2005:

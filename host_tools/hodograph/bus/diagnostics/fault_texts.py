@@ -74,7 +74,7 @@ _SINGLE = {
         "check CAN cable, termination (120 ohms at both ends) and bit rate",
     ),
     0x8130: (
-        "no life sign: heartbeats stayed away",
+        "no heartbeat within the monitoring time",
         "is the drive powered and connected, is the controller running? check the CAN cable",
     ),
     0x8140: (
@@ -87,7 +87,7 @@ _SINGLE = {
     ),
     0x8240: ("SYNC has an unexpected length", "another SYNC producer is on the bus: switch it off"),
     0x8250: (
-        "expected PDOs stayed away",
+        "expected PDOs were not received",
         "is the drive powered and connected? check the CAN cable and the bus load; "
         "on a slow host raise answer_wait_ms in the machine file",
     ),
@@ -102,12 +102,12 @@ _SINGLE = {
         "move the axis off the limit, check travel and work offset in the machine file",
     ),
     0x8700: (
-        "SYNC lost: the controller's clock stayed away",
+        "SYNC lost: the drive received none within its time",
         "is the controller running? check the CAN cable",
     ),
     0xFF00: (
         "manufacturer specific error",
-        "read what the drive itself says (its manual, its history 0x1003)",
+        "read the error history of the drive (0x1003) and its manual",
     ),
     0xFF01: (
         "the drive did not switch on in time",
@@ -119,7 +119,7 @@ _SINGLE = {
     ),
     0xFF03: ("the drive restarted by itself", "check its supply; home the axis anew"),
     0xFF04: (
-        "the drive no longer obeys the bus (remote bit off)",
+        "the drive no longer follows its controlword (remote bit off)",
         "switch its local operation or its commissioning tool off",
     ),
     0xFF05: (
@@ -140,7 +140,7 @@ _SINGLE = {
         "a drive that lags behind by design needs following_window_mm in the machine file",
     ),
     0xFF09: (
-        "SYNC stayed away for longer than real drives can bridge: the axes left the path",
+        "no SYNC for longer than real drives can interpolate: the axes left the path",
         "give the controller real-time priority (docs/reference/cli.md, status) and an idle processor; home "
         "if in doubt",
     ),
@@ -149,7 +149,7 @@ _SINGLE = {
         "compile the program again; if it comes again, report a bug",
     ),
     0xFF0B: (
-        "the main loop of the controller stood still while axes moved",
+        "the main loop of the controller did not run for 1 s while axes moved",
         "give the controller's computer some processor time; if it comes again, report a bug",
     ),
     0xFF10: (
@@ -157,7 +157,7 @@ _SINGLE = {
         "has the drive a homing mode (0x6502)? switch its local operation off",
     ),
     0xFF11: (
-        "homing failed, says the drive",
+        "the drive reports that homing failed",
         "check home and limit switches and the homing method, read the drive's error code",
     ),
     0xFF12: (
@@ -172,7 +172,7 @@ _CLASSES = (
         0xF000,
         0x1000,
         "generic error",
-        "read what the drive itself says (its manual, its history 0x1003)",
+        "read the error history of the drive (0x1003) and its manual",
     ),
     (
         0xFF00,
@@ -236,7 +236,7 @@ _CLASSES = (
         0xF000,
         0x8000,
         "monitoring",
-        "read what the drive itself says (its manual, its history 0x1003)",
+        "read the error history of the drive (0x1003) and its manual",
     ),
     (
         0xF000,
@@ -248,7 +248,7 @@ _CLASSES = (
         0xFF00,
         0xF000,
         "additional functions",
-        "read what the drive itself says (its manual, its history 0x1003)",
+        "read the error history of the drive (0x1003) and its manual",
     ),
     (0xFF00, 0xFF00, "device specific error", "look the code up in the drive's manual"),
 )

@@ -24,7 +24,7 @@ from .plan_limits import PlanLimits
 Real = NDArray[np.float64]
 
 _SAMPLES = 32
-_HAIR = 1e-6
+_MARGIN = 1e-6
 _BEYOND = 2.0
 
 
@@ -113,7 +113,7 @@ def too_long(one: LimitedFeed, s_mm: float, time_s: float, longest_s: float, k: 
 def rounded_up(value: float) -> str:
     """Three digits, not below the value."""
     text = f"{value:.3g}"
-    return text if float(text) >= value * (1.0 + _HAIR) else f"{value * 1.0051:.3g}"
+    return text if float(text) >= value * (1.0 + _MARGIN) else f"{value * 1.0051:.3g}"
 
 
 def binding_most(spline: Curve, limits: PlanLimits) -> tuple[LimitedFeed, float]:

@@ -54,7 +54,7 @@ def plan_optimal(
     limits = limits.of_axes(spline.axes)
     if not limits.bind:
         raise InputError(
-            'feed: profile "optimal" has no limit to obey: name a machine, or add one to [limits]'
+            'feed: profile "optimal" has no limit to keep: name a machine, or add one to [limits]'
         )
     found = gather(request, limits, controller, plants, period_us)
     check_feasible(spline, found, LONGEST_S)

@@ -156,8 +156,8 @@ def _blend(known: Solution, known_to: float, guess: FirstEstimate) -> Feed:
 
 def _even(guess: FirstEstimate, known_to: float, period_s: float, found: Solution) -> bool:
     """Whether intervals last about as long as was wanted, after knots that are given: else knots have to move."""
-    wish, s = _refined(guess, found), found.grid.s
-    wanted = np.interp(0.5 * (s[1:] + s[:-1]), wish.s, wish.step_s)
+    steps, s = _refined(guess, found), found.grid.s
+    wanted = np.interp(0.5 * (s[1:] + s[:-1]), steps.s, steps.step_s)
     wanted[s[1:] <= known_to] = np.inf
     inner = found.times[1:-1]
     brief = inner.size > 1 and bool((inner[1:] + inner[:-1]).min() < 2.05 * period_s)
@@ -165,7 +165,7 @@ def _even(guess: FirstEstimate, known_to: float, period_s: float, found: Solutio
 
 
 def _refined(guess: FirstEstimate, found: Solution) -> FirstEstimate:
-    """The wish for steps, now that it is known where the acceleration changes."""
+    """The target steps, now that it is known where the acceleration changes."""
     acceleration = 0.5 * found.slope
     acceleration[-1] = 0.0
     if found.grid.grade[0] > 0:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // One plot over time: for each pixel the least and greatest value, so that no peak is lost.
+// No chart library: uPlot 1.6 is 51 KB minified, more than all scripts of this page together (39 KB).
 
 import { digitsOf, prepare, roundUp, text } from "./scale.js";
 

@@ -19,7 +19,7 @@ def check_suffix(file: Path) -> str:
     suffix = file.suffix.lower()
     if suffix not in FORMATS:
         known = ", ".join(f"{name} ({text})" for name, text in FORMATS.items())
-        raise InputError(f"{file}: the format of a recording is told by its name: {known}")
+        raise InputError(f"{file}: the end of its name gives the format of a recording: {known}")
     return suffix
 
 

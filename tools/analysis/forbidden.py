@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 
-from target.image import Image
+from analysis.image import Image
 
 _OPERATIONS = "add|sub|rsub|mul|div|neg|pow|sqrt|eq|ne|lt|le|gt|ge|unord|cmp"
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from target.image import Function, Image, Instruction
+from analysis.image import Function, Image, Instruction
 
 _CONDITIONS = "eq|ne|cs|hs|cc|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le"
 _ADDRESS = re.compile(r"(?:^|[\s,])([0-9a-f]+) <")

@@ -3,7 +3,7 @@
 
 COUNT_PLUGIN := $(BUILD)/target/count_plugin.so
 
-$(COUNT_PLUGIN): tools/target/count_plugin.c
+$(COUNT_PLUGIN): tools/analysis/count_plugin.c
 	@mkdir -p $(@D)
 	$(call say,plugin,$@)
 	$(Q)$(CC) -std=c99 $(WARN) -O2 -shared -fPIC -fvisibility=hidden -o $@ $<

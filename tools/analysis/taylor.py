@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from analysis.campaign import EXAMPLES, figures
+from analysis.counting import Counter
+from analysis.emulator import TARGETS
 from hodograph.config import load_path_file
-from target.campaign import EXAMPLES, figures
-from target.counting import Counter
-from target.emulator import TARGETS
 
 ROOT = Path(__file__).resolve().parents[2]
 ALPHA = ROOT / "examples/alpha.toml"

@@ -19,7 +19,7 @@ static uint64_t records[(sizeof(struct coefficients_piece) + sizeof(struct coeff
                         sizeof(uint64_t)];
 static struct contour_segment segments[1];
 static struct drive_config configs[2];
-static struct offline rig;
+static struct offline sim;
 static struct offline_row rows[ROWS];
 
 static void put(uint8_t *at, int64_t value)
@@ -71,13 +71,13 @@ void tearDown(void)
 
 static int begin(void)
 {
-    return offline_begin(&rig, &program, configs, segments);
+    return offline_begin(&sim, &program, configs, segments);
 }
 
 static void test_rows_of_a_line(void)
 {
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, rows, ROWS));
     for (int k = 0; k < ROWS; k++) {
         const double t = k < 1000 ? k * 1e-3 : 1.0;
         const double s = 4 * t * t * t * (10 - 15 * t + 6 * t * t);
@@ -104,8 +104,8 @@ static void test_positions_are_those_of_the_drive_alone(void)
     struct drive alone;
     TEST_ASSERT_EQUAL_INT(0, drive_init(&alone, &configs[0]));
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, 7));
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows + 7, ROWS - 7));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, rows, 7));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, rows + 7, ROWS - 7));
     drive_place(&alone, 10000000);
     for (int k = 0; k < ROWS; k++) {
         drive_period(&alone, rows[k].set_counts[0]);
@@ -138,7 +138,7 @@ static void test_times_and_points(void)
     static int32_t counts[2 * (TICKS + 2)];
     struct interpolator interp;
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, rows, ROWS));
     offline_times(&program, 0, TICKS + 2, times);
     TEST_ASSERT_EQUAL_UINT64(UINT64_C(4398046511), times[1]);
     TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 42, times[TICKS - 1]);
@@ -173,21 +173,21 @@ static void test_feedforward(void)
     const struct feedforward_gains none[2] = {{0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}};
     struct feedforward_gains gains[2] = {{0, 0, 500, 0, 0}, {0, 0, 500, 0, 0}};
     static struct offline_row forward[ROWS];
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
-    offline_feedforward(&rig, none);
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&sim, &program, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&sim, &program, configs, segments));
+    offline_feedforward(&sim, none);
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, forward, ROWS));
     for (int k = 0; k < ROWS; k++) {
         TEST_ASSERT_EQUAL_INT32_ARRAY(rows[k].act_counts, forward[k].act_counts, 2);
         TEST_ASSERT_EQUAL_INT16_ARRAY(rows[k].volts_mv, forward[k].volts_mv, 2);
     }
     configs[0].pdff.k_pf_rad_mm = 0.3; /* 0.3 + 0.5 * 1/1.59 is near the 1/1.59 of the screw */
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
-    TEST_ASSERT_EQUAL_INT(0, offline_begin(&rig, &program, configs, segments));
-    offline_feedforward(&rig, gains);
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, forward, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&sim, &program, configs, segments));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_begin(&sim, &program, configs, segments));
+    offline_feedforward(&sim, gains);
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, forward, ROWS));
     const int32_t plain = rows[500].set_counts[0] - rows[500].act_counts[0];
     const int32_t better = forward[500].set_counts[0] - forward[500].act_counts[0];
     TEST_ASSERT_TRUE(plain > 10000 && better < plain / 4 && better > -plain / 4);
@@ -199,10 +199,10 @@ static struct offline_row faulty[ROWS];
 static void run_with(const struct offline_fault *faults, uint32_t count)
 {
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, rows, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, rows, ROWS));
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, offline_faults(&rig, faults, count));
-    TEST_ASSERT_EQUAL_INT(0, rig_run(&rig, faulty, ROWS));
+    TEST_ASSERT_EQUAL_INT(0, offline_faults(&sim, faults, count));
+    TEST_ASSERT_EQUAL_INT(0, offline_run(&sim, faulty, ROWS));
 }
 
 /* The first row that differs in position or volts, ROWS if none does. */
@@ -284,9 +284,9 @@ static void test_faults_that_cannot_be(void)
     bad[3].value = (double)NAN;
     bad[4].kind = OFFLINE_FAULT_KINDS;
     TEST_ASSERT_EQUAL_INT(0, begin());
-    TEST_ASSERT_EQUAL_INT(0, offline_faults(&rig, &good, 1));
+    TEST_ASSERT_EQUAL_INT(0, offline_faults(&sim, &good, 1));
     for (int i = 0; i < 5; i++) {
-        TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_FAULT, offline_faults(&rig, &bad[i], 1));
+        TEST_ASSERT_EQUAL_INT(OFFLINE_ERR_FAULT, offline_faults(&sim, &bad[i], 1));
     }
 }
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from target import emulator, parts
+from analysis import emulator, parts
 
 Counts = npt.NDArray[np.uint32]
 Command = tuple[

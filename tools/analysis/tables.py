@@ -10,9 +10,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from target.campaign import FLOOR, GOALS, INTERRUPT_GOAL, OVERRIDE_GOAL, SCENARIOS, SPREAD_GOAL
-from target.emulator import TARGETS
-from target.parts import PARTS
+from analysis.campaign import FLOOR, GOALS, INTERRUPT_GOAL, OVERRIDE_GOAL, SCENARIOS, SPREAD_GOAL
+from analysis.emulator import TARGETS
+from analysis.parts import PARTS
 
 Figures = dict[str, Any]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Programs made to be as dear as the controller accepts them, and the commands to run them with.
+"""Programs made to be as expensive as the controller accepts them, and the commands to run them with.
 
 At 200 % a tick of these crosses two ends of segments and two of pieces again and again: neighbours are a very short and
 a long one, together just longer than docs/reference/protocol.md 1.2 and 1.3 ask for. Segments have the

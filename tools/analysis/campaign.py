@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All that `make count` counts: each kernel on each core, over the example programs and those made to be dear."""
+"""All that `make count` counts: each kernel on each core, over the example programs and those made to be expensive."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from target import adversary
-from target.counting import Command, Counter, Counts
-from target.emulator import TARGETS, Target
-from target.parts import PARTS
+from analysis import worst_case
+from analysis.counting import Command, Counter, Counts
+from analysis.emulator import TARGETS, Target
+from analysis.parts import PARTS
 from testing.cache import Stamps, content, digest, tree
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -107,7 +107,7 @@ class Campaign:
         """Name of a group, name of a program, image."""
         return {
             "examples": {name: file.read_bytes() for name, file in EXAMPLES.items()},
-            "adversary": {a.name: adversary.image(a) for a in adversary.ADVERSARIES},
+            "adversary": {a.name: worst_case.image(a) for a in worst_case.ADVERSARIES},
         }
 
     def checksums(self) -> dict[str, str]:
@@ -209,7 +209,7 @@ class Campaign:
         programs += [f"{t.cross}{tool}" for t in TARGETS.values() for tool in ("gcc", "objdump")]
         versions = [_first_line([program, "--version"]) for program in programs]
         plugin = content(self.build / "target/count_plugin.so")
-        return digest([plugin, tree(ROOT / "tools/target"), *versions])
+        return digest([plugin, tree(ROOT / "tools/analysis"), *versions])
 
     def run(self) -> dict[str, Any]:
         """Everything."""
@@ -225,7 +225,7 @@ class Campaign:
 
 
 def _commands(name: str | None) -> Sequence[Command]:
-    return adversary.COMMANDS[name]() if name else ()
+    return worst_case.COMMANDS[name]() if name else ()
 
 
 def compilers() -> dict[str, str]:

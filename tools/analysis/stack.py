@@ -15,8 +15,8 @@ from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 
-from target.effects import StackError, effect
-from target.image import Function, Image
+from analysis.effects import StackError, effect
+from analysis.image import Function, Image
 
 _MOST_BYTES = 1 << 16
 _FRAME_BYTES, _FPU_FRAME_BYTES = 32 + 4, 104 + 4  # each with the word that aligns it to 8

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""What the proof of the axis limits costs the controller (core/limit_check.h): instructions, by segment and piece."""
+"""Instructions of the controller's proof of the axis limits (core/limit_check.h), by segment and piece.
+
+For benchmarks/counts.py, which prints them: runs the image `checker` of two cores over the example programs.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+from analysis.counting import Counter
+from analysis.emulator import TARGETS
 from hodograph.pipeline import load_pipeline
-from target.counting import Counter
-from target.emulator import TARGETS
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("alpha", "heart", "star", "alpha_optimal", "heart_optimal")

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from target.effects import effect
-from target.image import Function, Image
+from analysis.effects import effect
+from analysis.image import Function, Image
 
 _NEVER = -(10**9)  # what cannot be on the way
 
