@@ -23,6 +23,7 @@ HEADERS = (
     "core/stop_check.h",
     "core/coefficients.h",
     "core/interpolator.h",
+    "core/chunk.h",
     "core/feed_override.h",
     "plant/drive.h",
     "offline/contour.h",
@@ -30,6 +31,7 @@ HEADERS = (
     "offline/stop_search.h",
     "offline/stop_trial.h",
     "offline/axis_run.h",
+    "offline/stream.h",
 )
 LIBRARIES = ("sim", "core")
 SOURCES = ("firmware/core", "sim/plant", "sim/offline")

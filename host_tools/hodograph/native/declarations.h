@@ -88,6 +88,7 @@ int feed_override_late(const struct feed_override *f);
 uint64_t feed_override_time_q42(const struct feed_override *f);
 int64_t feed_override_feed_q32(const struct feed_override *f);
 uint32_t feed_override_actual_q30(const struct feed_override *f);
+int feed_override_waits(const struct feed_override *f);
 uint32_t feed_override_bound_us(const struct feed_override *f, int kind);
 
 /* plant/drive.h */
@@ -269,3 +270,28 @@ struct axis_run {
 };
 int axis_run(const struct drive_config *config, const struct axis_run *run, double *position_mm,
              double *volts);
+
+/* offline/stream.h */
+struct chunk {
+    uint32_t job, sequence;
+    struct program program;
+    ...;
+};
+struct offline_part {
+    struct chunk chunk;
+    ...;
+};
+struct offline_stream {
+    struct feed_override feed;
+    struct offline_part *active;
+    uint32_t moving, resting, underruns;
+    ...;
+};
+void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
+                          const struct program_limits *limits);
+int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
+                         const uint8_t *bytes, uint32_t size, struct program_fault *fault);
+int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
+                       uint64_t size);
+int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
+                           struct interpolator_point *points);

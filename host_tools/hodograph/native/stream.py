@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""A job in chunks as the controller runs it, without a bus (sim/offline/stream.h)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import HodographError
+from .feed_override import State
+from .library import library, text
+from .program import POINT, NativeFault, NativeLimits, kernel_code, limits_fields
+
+
+class OfflineStream:
+    """Chunks of docs/reference/protocol.md 1.7 in, setpoints out. Chunks and commands take effect from the next tick.
+
+    Memory of a chunk is given back when a later one has been taken over.
+    """
+
+    def __init__(self, kernel: str = "fixed", limits: NativeLimits | None = None) -> None:
+        """Raises InputError for an unknown kernel. Without limits those of the format hold."""
+        self._ffi, self._lib = library()
+        self._kernel = self._lib.kernel_find(kernel_code(kernel))
+        self._stream = self._ffi.new("struct offline_stream *")
+        self._parts: list[tuple[Any, ...]] = []
+        given = self._ffi.new("struct program_limits *", limits_fields(limits or NativeLimits()))
+        self._lib.offline_stream_begin(self._stream, self._kernel, given)
+
+    def give(self, chunk: bytes) -> NativeFault | None:
+        """A chunk behind the newest accepted one; None: accepted. A refused one has changed nothing."""
+        ffi, lib = self._ffi, self._lib
+        part = ffi.new("struct offline_part *")
+        buffer = ffi.from_buffer("uint8_t[]", chunk)
+        fault = ffi.new("struct program_fault *")
+        code = lib.offline_stream_check(self._stream, part, buffer, len(chunk), fault)
+        if code != 0:
+            return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
+        size = lib.coefficients_size(ffi.addressof(part.chunk, "program"), self._kernel)
+        records = ffi.new("uint64_t[]", (size + 7) // 8)
+        if lib.offline_stream_add(self._stream, part, records, size) != 0:
+            raise HodographError("coefficients: their size is not what it was: report a bug")
+        self._parts.append((part, buffer, records))
+        return None
+
+    def run(self, ticks: int, *, until_rest: bool = False) -> NDArray[np.void]:
+        """Up to `ticks` setpoints as an array of POINT, (n,), with arc lengths of the job.
+
+        Fewer when the job has ended or was stopped and, with `until_rest`, at the end of a tail behind which no chunk
+        is known. Raises HodographError where the interpolator fails.
+        """
+        points = np.zeros(ticks, dtype=POINT)
+        made = self._lib.offline_stream_run(
+            self._stream,
+            ticks,
+            until_rest,
+            self._ffi.cast("struct interpolator_point *", self._ffi.from_buffer(points)),
+        )
+        if made < 0:
+            raise HodographError(f"stream: the interpolator fails (code {made}): report a bug")
+        while self._parts and self._parts[0][0] != self._stream.active:
+            self._parts.pop(0)
+        return points[: int(made)]
+
+    @property
+    def state(self) -> State:
+        """After the last tick."""
+        return State(self._lib.feed_override_state(self._feed))
+
+    @property
+    def waits(self) -> bool:
+        """Whether it is at rest at the end of a tail, until the next chunk is taken over."""
+        return bool(self._lib.feed_override_waits(self._feed))
+
+    @property
+    def sequence(self) -> int | None:
+        """Of the chunk under way; None before the first."""
+        active = self._stream.active
+        return None if active == self._ffi.NULL else int(active.chunk.sequence)
+
+    @property
+    def time_s(self) -> float:
+        """Program time in the chunk under way."""
+        return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
+
+    @property
+    def takeovers(self) -> tuple[int, int]:
+        """In motion, at rest."""
+        return int(self._stream.moving), int(self._stream.resting)
+
+    @property
+    def underruns(self) -> int:
+        """How often it has come to rest at the end of a tail."""
+        return int(self._stream.underruns)
+
+    def hold(self) -> None:
+        """To rest, until resumed."""
+        self._lib.feed_override_hold(self._feed)
+
+    def resume(self) -> None:
+        """Back to the override."""
+        self._lib.feed_override_resume(self._feed)
+
+    def override(self, percent: int) -> None:
+        """The rate wanted, 0 to 200; above 100 it counts as 100 until the last chunk."""
+        self._lib.feed_override_set(self._feed, percent)
+
+    def stop(self) -> None:
+        """To rest inside the program's limits, for good."""
+        self._lib.feed_override_stop(self._feed)
+
+    def fault_stop(self) -> None:
+        """To rest inside the machine's limits, for good."""
+        self._lib.feed_override_fault_stop(self._feed)
+
+    @property
+    def _feed(self) -> Any:
+        return self._ffi.addressof(self._stream, "feed")
