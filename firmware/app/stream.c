@@ -6,6 +6,7 @@
 #include "app/machine/path_counts.h"
 #include "core/coefficients.h"
 #include "core/kernel.h"
+#include "core/qmath.h"
 #include "port/port.h"
 
 /* At the start of a block of the ring; the bytes of the chunk follow, and behind them its coefficient records. */
@@ -313,7 +314,7 @@ uint32_t stream_hold_worst_us(const struct stream *stream)
 /* Of bytes in the ring, those that are left for a chunk beside its records, whatever it consists of. */
 static uint32_t share_of(uint64_t room, uint32_t image_size, uint32_t record_size)
 {
-    return (uint32_t)(room * image_size / (image_size + record_size));
+    return (uint32_t)qmath_div_u64(room * image_size, (uint64_t)image_size + record_size);
 }
 
 uint32_t stream_free_bytes(const struct stream *stream, const struct config *config)
