@@ -120,7 +120,7 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak bench compare share figures options mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak bench compare butterfly share figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -220,9 +220,18 @@ share: build ## man page and shell completion in build/share, from the help
 bench: build ## every benchmark of benchmarks/; figures also in build/bench.json
 	@$(PY) tools/run_benchmarks.py --build $(BUILD)
 
-compare: build ## the same toolpaths planned by Hodograph, LinuxCNC, TOPP-RA and Ruckig; figures also in build/compare.json
+# KLIPPER: folder of a clone of Klipper, which no registry has; without it its rows are left out
+KLIPPER ?=
+PEER_KLIPPER := benchmarks/peers/batch_klipper/requirements.lock
+$(READY)/klipper/.ready: $(PEER_KLIPPER) tools/make_venv.sh | $(READY)/packages
+	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(READY)/klipper $(PEER_KLIPPER)
+compare: build $(if $(KLIPPER),$(READY)/klipper/.ready) ## the same toolpaths planned by Hodograph, LinuxCNC, TOPP-RA, Ruckig and Klipper (KLIPPER=CLONE); figures also in build/compare.json
 	@$(PYTHON) tools/packages.py compare
-	@$(PY) benchmarks/peers/compare.py --json $(BUILD)/compare.json $(if $(ONLY),--only $(ONLY))
+	@$(PY) benchmarks/peers/compare.py --json $(BUILD)/compare.json $(if $(ONLY),--only $(ONLY)) \
+	    $(if $(KLIPPER),--klipper $(KLIPPER) --klipper-python $(READY)/klipper/bin/python)
+
+butterfly: build ## the butterfly NURBS of the literature, beside three published cycle times; figures also in build/butterfly.json
+	@$(PY) benchmarks/published/butterfly.py --json $(BUILD)/butterfly.json
 
 # AREA: some of those that tools/mutants.py --list names; COUNT mistakes for each
 AREA  ?= core

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`make compare`: the same toolpaths planned by Hodograph and by its peers, side by side in one run.
 
-    compare.py [--json OUT] [--only NAME ...]
+    compare.py [--json OUT] [--only NAME ...] [--klipper CLONE --klipper-python PYTHON]
 
 Each motion is sampled at 1 kHz. Printed of each: cycle time, greatest distance from the programmed path (both ways),
 greatest velocity, acceleration and jerk of an axis, ticks beyond the limits of the axes, and the wall time of planning
@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -31,7 +32,7 @@ from hodograph.toolpath.moves import ORIGIN, ArcMove, SplineMove, StraightMove
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from peers import linuxcnc, ruckig_stops, toppra_spline
+from peers import klipper, linuxcnc, ruckig_stops, toppra_spline
 from peers.motion import AxisLimits, Motion, deviation_um
 from peers.toolpaths import Toolpath, toolpaths
 
@@ -70,23 +71,50 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--only", nargs="*", default=[], help="these toolpaths")
-    options = parser.parse_args()
-    print(
-        f"axes: {LIMITS.velocity_mm_s:g} mm/s, {LIMITS.acceleration_mm_s2:g} mm/s^2, {LIMITS.jerk_mm_s3:g} mm/s^3 "
-        f"(those that limit it); tolerance {1000 * TOLERANCE_MM:g} um; LinuxCNC {linuxcnc.version()}, TOPP-RA "
-        f"{toppra_spline.version()}, Ruckig {ruckig_stops.version()}"
+    parser.add_argument(
+        "--klipper", type=Path, metavar="CLONE", help="folder of a clone of Klipper"
     )
-    print(_HEAD)
-    rows = []
-    for row in _rows(options.only):
-        rows.append(row)
-        print(_line(row), flush=True)
+    parser.add_argument("--klipper-python", type=Path, default=Path(sys.executable))
+    options = parser.parse_args()
+    try:
+        with _optional_klipper(options) as peer:
+            rows = _printed(options.only, peer)
+    except klipper.NoKlipperError as error:
+        print(f"compare.py: {error}", file=sys.stderr)
+        return 1
     if options.json is not None:
         options.json.write_text(json.dumps([vars(row) for row in rows], indent=1) + "\n")
     return 0
 
 
-def _rows(only: list[str]) -> Iterator[Row]:
+def _optional_klipper(
+    options: argparse.Namespace,
+) -> AbstractContextManager[klipper.Klipper | None]:
+    if options.klipper is None:
+        print(
+            "Klipper: left out, as no registry has it: give the folder of a clone, make compare KLIPPER=~/klipper"
+        )
+        return nullcontext()
+    return klipper.copied(options.klipper.expanduser(), options.klipper_python.absolute())
+
+
+def _printed(only: list[str], peer: klipper.Klipper | None) -> list[Row]:
+    """Measures and prints row by row."""
+    told = "" if peer is None else f", Klipper {peer.version}"
+    print(
+        f"axes: {LIMITS.velocity_mm_s:g} mm/s, {LIMITS.acceleration_mm_s2:g} mm/s^2, {LIMITS.jerk_mm_s3:g} mm/s^3 "
+        f"(those that limit it); tolerance {1000 * TOLERANCE_MM:g} um; LinuxCNC {linuxcnc.version()}, TOPP-RA "
+        f"{toppra_spline.version()}, Ruckig {ruckig_stops.version()}{told}"
+    )
+    print(_HEAD)
+    rows = []
+    for row in _rows(only, peer):
+        rows.append(row)
+        print(_line(row), flush=True)
+    return rows
+
+
+def _rows(only: list[str], peer: klipper.Klipper | None) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder:
         for feed in FEEDS_MM_MIN:
             for toolpath in toolpaths(feed):
@@ -95,13 +123,15 @@ def _rows(only: list[str]) -> Iterator[Row]:
                 file = Path(folder, f"{toolpath.name.replace(' ', '_')}_{feed:g}.ngc")
                 file.write_text(toolpath.text, encoding="utf-8")
                 path_mm = programmed_path(file)
-                for name, run in _peers(toolpath):
+                for name, run in _peers(toolpath, peer):
                     yield _measured(toolpath, name, *run(toolpath, file), path_mm)
 
 
-def _peers(toolpath: Toolpath) -> Iterator[tuple[str, Runner]]:
+def _peers(toolpath: Toolpath, peer: klipper.Klipper | None) -> Iterator[tuple[str, Runner]]:
     yield "Hodograph", _hodograph
     yield "LinuxCNC", _linuxcnc
+    if peer is not None and toolpath.plain:
+        yield "Klipper", lambda _, file: (peer.run(file, LIMITS), None)
     if toolpath.smooth:
         yield "TOPP-RA", _toppra
     if toolpath.name == "zigzag":

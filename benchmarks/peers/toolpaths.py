@@ -19,12 +19,17 @@ _HEAD = "G21 G90 G17 G94\nF{feed:g}\n"
 
 @dataclass(frozen=True)
 class Toolpath:
-    """A program with one feed word, mm/min. `smooth`: its points sample a smooth curve."""
+    """A program with one feed word, mm/min.
+
+    smooth  its points sample a smooth curve
+    plain   G1, G2 and G3 from X0 Y0 with numbers, without parameters and inches
+    """
 
     name: str
     feed_mm_min: float
     text: str
     smooth: bool
+    plain: bool
 
     @property
     def feed_mm_s(self) -> float:
@@ -35,15 +40,15 @@ class Toolpath:
 def toolpaths(feed_mm_min: float) -> list[Toolpath]:
     """All programs with this feed."""
     found = [
-        Toolpath("heart", feed_mm_min, _heart(feed_mm_min), True),
-        Toolpath("rounded rectangle", feed_mm_min, _rectangle(feed_mm_min), False),
-        Toolpath("zigzag", feed_mm_min, _zigzag(feed_mm_min), False),
+        Toolpath("heart", feed_mm_min, _heart(feed_mm_min), True, True),
+        Toolpath("rounded rectangle", feed_mm_min, _rectangle(feed_mm_min), False, True),
+        Toolpath("zigzag", feed_mm_min, _zigzag(feed_mm_min), False, True),
     ]
     for name, lines in (("spiral", None), ("3D_Chips", 2000)):
         file = LINUXCNC_FILES / f"{name}.ngc"
         with file.open(encoding="utf-8", errors="replace") as text:
             kept = "".join(islice(text, lines))
-        found.append(Toolpath(name, feed_mm_min, _with_feed(kept, feed_mm_min), False))
+        found.append(Toolpath(name, feed_mm_min, _with_feed(kept, feed_mm_min), False, False))
     return found
 
 

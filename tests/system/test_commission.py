@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import canopen
+import durand
+import durand.network
 import pytest
 from canopen_bench import let_pass
 
@@ -220,8 +222,13 @@ def test_nothing_is_written(hub: LocalHub, capsys: pytest.CaptureFixture[str]) -
     requests = [one for one in frames if 0x600 < one.arbitration_id <= 0x67F]
     assert len(requests) > 150
     assert {one.data[0] >> 5 for one in requests} <= {2, 3}  # upload: initiate, segment
-    others = {one.arbitration_id & 0x780 for one in frames} - {0x600, 0x580, 0x700}
-    assert others == set()
+    others = {
+        one.arbitration_id
+        for one in frames
+        if one.arbitration_id & 0x780 not in (0x600, 0x580, 0x700)
+    }
+    assert others == {0x7E5}
+    assert {one.data[0] for one in frames if one.arbitration_id == 0x7E5} == {0x04, 0x51}
 
 
 def test_a_running_controller_is_left_alone(
@@ -312,6 +319,174 @@ def test_a_servo_by_its_own_limits(
     limited = [o for o in checked["axes"][0]["objects"] if o["index"] == 0x607F]
     assert limited[0]["verdict"] == "fault"
     assert "limits velocity to 600 mm" in limited[0]["text"]
+
+
+# -- nodes without number: LSS, with devices of durand ---------------------------------------------------
+
+SERVO_ID = (0x29C, 0x402, 0x10003, 0x80000001)
+OTHER_ID = (0x29C, 0x402, 0x10003, 0x80000002)
+THIRD_ID = (0x29C, 0x403, 0, 0xFFFFFFFF)
+NO_NUMBER = 0xFF
+
+
+class DurandNetwork(durand.network.NetworkABC):
+    """What a node of durand sends and hears by, on a local bus.
+
+    conforming  a node that Fastscan has found takes part no more, as CiA 305 says; durand's go on
+    """
+
+    def __init__(self, network: Network, conforming: bool) -> None:
+        self._network, self._conforming = network, conforming
+        self._is_found, self._sent = False, 0
+        self._heard: dict[int, Callable[[int, bytearray, float], None]] = {}
+
+    def add_subscription(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
+        def heard(cob: int, data: bytearray, time_s: float) -> None:
+            is_fastscan = cob == 0x7E5 and data[0] == 0x51
+            if is_fastscan and self._is_found and self._conforming:
+                return
+            sent = self._sent
+            callback(cob, bytes(data))
+            if cob == 0x7E5:
+                answered_last = is_fastscan and self._sent > sent and data[7] < data[6]
+                self._is_found = answered_last or (is_fastscan and self._is_found)
+
+        self._heard[cob_id] = heard
+        self._network.subscribe(cob_id, heard)
+
+    def remove_subscription(self, cob_id: int) -> None:
+        self._network.unsubscribe(cob_id, self._heard.pop(cob_id))
+
+    def send(self, cob_id: int, msg: bytes) -> None:
+        self._sent += 1
+        self._network.send_message(cob_id, msg)
+
+
+class DurandDevices(Devices):
+    """Drives of durand, each with its node number and its identity."""
+
+    def __init__(
+        self,
+        hub: LocalHub,
+        nodes: Sequence[tuple[int, tuple[int, ...]]],
+        *,
+        conforming: bool = True,
+        stores: bool = False,
+    ) -> None:
+        super().__init__(hub, Path(), {})
+        self._nodes, self._conforming, self._stores = nodes, conforming, stores
+        self.stored: list[int] = []
+
+    def _serve(self) -> None:
+        network = Network(LocalBus(self._channel))
+        try:
+            for number, identity in self._nodes:
+                self._add(network, number, identity)
+            self._ready.set()
+            while not self._ended.is_set():
+                let_pass(network, 0.05)
+        finally:
+            network.disconnect()
+
+    def _add(self, network: Network, number: int, identity: tuple[int, ...]) -> None:
+        node = durand.MinimalNode(DurandNetwork(network, self._conforming), number)
+        node.object_dictionary.write(0x1000, 0, 0x20192)
+        for sub, value in enumerate(identity, 1):
+            node.object_dictionary.write(0x1018, sub, value)
+        if self._stores:
+            node.lss.set_store_configuration_callback(lambda rate, node: self.stored.append(node))
+
+
+def as_json(identity: tuple[int, ...], assigned: int | None = None) -> dict[str, int | None]:
+    names = ("vendor", "product", "revision", "serial")
+    return dict(zip(names, identity, strict=True)) | {"assigned": assigned}
+
+
+def test_nodes_without_number_are_found_and_left_alone(
+    hub: LocalHub, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nodes = [(NO_NUMBER, OTHER_ID), (5, THIRD_ID), (NO_NUMBER, SERVO_ID)]
+    with DurandDevices(hub, nodes):
+        for _ in range(2):
+            found = result(capsys, "scan", "--json")
+            assert [one["node"] for one in found["nodes"]] == [5]
+            assert found["unconfigured"] == [as_json(SERVO_ID), as_json(OTHER_ID)]
+        assert result(capsys, "scan", "--no-lss", "--json")["unconfigured"] == []
+        assert main(["scan"]) == 0
+        assert "serial 0x80000002: no node number" in capsys.readouterr().out
+
+
+def test_a_node_that_hides_others_is_told(
+    hub: LocalHub, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nodes = [(NO_NUMBER, OTHER_ID), (NO_NUMBER, SERVO_ID)]
+    with DurandDevices(hub, nodes, conforming=False):
+        assert main(["scan", "--json"]) == 0
+        out, err = capsys.readouterr()
+        assert json.loads(out)["unconfigured"] == [as_json(SERVO_ID)]
+        assert "answers twice, and may hide nodes" in err
+        first = result(capsys, "scan", "--json", "--assign", "0x80000001=7")
+        assert first["unconfigured"] == [as_json(SERVO_ID, 7)]
+        second = result(capsys, "scan", "--json", "--assign", "8")
+        assert second["unconfigured"] == [as_json(OTHER_ID, 8)]
+        assert [one["node"] for one in second["nodes"]] == [7, 8]
+
+
+def test_numbers_are_given_and_stored_only_when_asked(
+    hub: LocalHub, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with DurandDevices(hub, [(NO_NUMBER, OTHER_ID), (NO_NUMBER, SERVO_ID)], stores=True) as devices:
+        words = ["--assign", "2147483650=9", "--assign", "0x80000001=10", "--store"]
+        found = result(capsys, "scan", "--json", *words)
+        assert found["unconfigured"] == [as_json(SERVO_ID, 10), as_json(OTHER_ID, 9)]
+        by_node = {one["node"]: one["serial"] for one in found["nodes"]}
+        assert by_node == {9: OTHER_ID[3], 10: SERVO_ID[3]}
+        assert devices.stored == [9, 10]
+        assert result(capsys, "scan", "--json")["unconfigured"] == []
+
+
+def exit_status(*words: str) -> int | str | None:
+    try:
+        return main(list(words))
+    except SystemExit as ended:  # of argparse
+        return ended.code
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "text"),
+    [
+        (["--assign", "7"], 2, "2 unconfigured nodes: give SERIAL=NODE"),
+        (["--assign", "3=7"], 2, "no unconfigured node with serial number 0x00000003"),
+        (["--assign", "0x80000001=5"], 2, "node number 5 is taken"),
+        (["--assign", "0x80000001=7", "--assign", "0x80000001=8"], 2, "two numbers for"),
+        (["--assign", "0x80000001=7", "--store"], 4, "is node 7 now, but cannot store that"),
+        (["--assign", "7", "--no-lss"], 2, "leave --no-lss out"),
+        (["--store"], 2, "add --assign"),
+        (["--assign", "128"], 2, "no node number from 1 to 127"),
+    ],
+)
+def test_what_cannot_be_assigned(
+    words: list[str], status: int, text: str, hub: LocalHub, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nodes = [(NO_NUMBER, OTHER_ID), (5, THIRD_ID), (NO_NUMBER, SERVO_ID)]
+    with DurandDevices(hub, nodes):
+        assert exit_status("scan", *words) == status
+        assert text in capsys.readouterr().err
+
+
+def test_a_number_is_not_given_where_it_would_reach_two(
+    hub: LocalHub, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """LSS selects a node by its identity, whether it has a number or not."""
+    with DurandDevices(hub, [(5, SERVO_ID), (NO_NUMBER, SERVO_ID)]):
+        assert main(["scan", "--assign", "7"]) == 2
+        assert "node 5 has the same identity" in capsys.readouterr().err
+
+
+def test_two_nodes_of_one_identity(hub: LocalHub, capsys: pytest.CaptureFixture[str]) -> None:
+    """They cannot be told apart: both answer every bit alike."""
+    with DurandDevices(hub, [(NO_NUMBER, SERVO_ID), (NO_NUMBER, SERVO_ID)]):
+        assert result(capsys, "scan", "--json")["unconfigured"] == [as_json(SERVO_ID)]
 
 
 def _check(capsys: pytest.CaptureFixture[str], file: Path) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from ..names import INTERPOLATIONS, PACES, SHELLS
 from . import options
 from .options import (
     Command,
+    assignment,
     at_least_one,
     bit_rate,
     count,
@@ -388,6 +389,20 @@ def _scan(command: Command) -> None:
         "-o", "--output", type=Path, metavar="FILE", help="write a commented machine file"
     )
     scan.add_argument("--force", action="store_true", help="replace a file that is there")
+    scan.add_argument(
+        "--no-lss", action="store_true", help="do not ask for nodes without number (LSS Fastscan)"
+    )
+    scan.add_argument(
+        "--assign",
+        type=assignment,
+        action="append",
+        default=[],
+        metavar="[SERIAL=]NODE",
+        help="give the node without number, or that with this serial number, a node number (LSS)",
+    )
+    scan.add_argument(
+        "--store", action="store_true", help="--assign: the nodes keep their number without power"
+    )
     options.json(scan)
 
 

@@ -5,17 +5,24 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator
+from dataclasses import asdict
 
 from ..bus.address import BusAddress
 from ..bus.own_bus import bus_address
 from ..bustime import require_fit
 from ..commission import (
+    Assignment,
     DriveFacts,
     Finding,
+    Identity,
     NodeReader,
+    Unconfigured,
+    assign,
     check_axis,
+    find_unconfigured,
     found_nodes,
     machine_text,
+    matched,
     opened_bus,
     read_facts,
     require_no_controller,
@@ -24,18 +31,36 @@ from ..commission.check import FAULT, OK
 from ..commission.drive_facts import MODES
 from ..config import load_machine
 from ..config.axis_table import MAX_AXES
-from ..errors import BusError
+from ..errors import BusError, InputError
 from .output import note, print_json, write_files
 
 
 def scan(options: Namespace) -> None:
     """hodograph scan."""
+    if options.assign and options.no_lss:
+        raise InputError("--assign: needs LSS: leave --no-lss out")
+    if options.store and not options.assign:
+        raise InputError("--store: stores what --assign gives: add --assign")
     address = bus_address(options.bus)
+    wanted = [Assignment(*one) for one in options.assign]
+    unconfigured, assigned = Unconfigured(()), dict[Identity, int]()
     with opened_bus(address, options.bitrate) as network:
         require_no_controller(network, address)
         nodes = found_nodes(network, options.wait)
+        if not options.no_lss:
+            unconfigured = find_unconfigured(network)
         found = [read_facts(NodeReader(network, node)) for node in nodes]
-    if not found:
+        taken = {facts.node: _identity(facts) for facts in found}
+        for identity, node in matched(wanted, unconfigured.identities, taken):
+            assign(network, identity, node, store=options.store)
+            assigned[identity] = node
+        if assigned:
+            new = found_nodes(network, options.wait, assigned.values())
+            found += [read_facts(NodeReader(network, node)) for node in new]
+            found.sort(key=lambda facts: facts.node)
+    if unconfigured.hidden is not None:
+        note(unconfigured.hidden)
+    if not found and not unconfigured.identities:
         raise BusError(
             f"{address}: no node answers in {options.wait:g} s: is the power on, and the bit rate right?"
         )
@@ -44,13 +69,33 @@ def scan(options: Namespace) -> None:
         _write(options, address, drives)
     if options.json:
         written = None if options.output is None else str(options.output)
-        print_json({"bus": str(address), "nodes": [f.json() for f in found], "file": written})
+        without = [
+            asdict(identity) | {"assigned": assigned.get(identity)}
+            for identity in unconfigured.identities
+        ]
+        print_json(
+            {
+                "bus": str(address),
+                "nodes": [f.json() for f in found],
+                "unconfigured": without,
+                "file": written,
+            }
+        )
         return
+    for identity in unconfigured.identities:
+        became = f"is node {assigned[identity]} now" if identity in assigned else "no node number"
+        print(f"LSS: {identity}: {became}")
     for facts in found:
         for line in _lines(facts):
             print(line)
     if options.output is not None:
         print(options.output)
+
+
+def _identity(facts: DriveFacts) -> Identity:
+    """As LSS compares it: what a node does not tell is 0."""
+    numbers = (facts.vendor, facts.product, facts.revision, facts.serial)
+    return Identity(*(number or 0 for number in numbers))
 
 
 def _write(options: Namespace, address: BusAddress, drives: list[DriveFacts]) -> None:

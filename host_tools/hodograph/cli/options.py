@@ -89,6 +89,21 @@ def bit_rate(text: str) -> int:
     return int(text)
 
 
+def assignment(text: str) -> tuple[int | None, int]:
+    """Serial number, or None, and node number that is to be given."""
+    match = re.fullmatch(r"(?:(0[xX][0-9a-fA-F]{1,8}|\d{1,10})=)?(\d{1,3})", text)
+    serial = (
+        None
+        if match is None or match[1] is None
+        else int(match[1], 0 if "x" in match[1].lower() else 10)
+    )
+    if match is None or not 1 <= int(match[2]) <= 127 or (serial or 0) >= 2**32:
+        raise argparse.ArgumentTypeError(
+            f'"{text}" is no node number from 1 to 127, with or without SERIAL= before it'
+        )
+    return serial, int(match[2])
+
+
 def part(text: str) -> tuple[int, int]:
     """One of several equal parts."""
     match = re.fullmatch(r"(\d{1,3})/(\d{1,3})", text)

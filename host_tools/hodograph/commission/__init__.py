@@ -1,21 +1,28 @@
 # SPDX-License-Identifier: MIT
 """Commissioning: which drives are on a bus, what they are, and whether they can do what a machine needs.
 
-Nothing here writes to a drive.
+Nothing here writes to a drive, but `assign`, which gives a drive its node number.
 """
 
 from .check import Finding, check_axis
 from .drive_facts import DriveFacts, read_facts
+from .lss import Assignment, Identity, Unconfigured, assign, find_unconfigured, matched
 from .machine_text import machine_text
 from .nodes import NodeReader, found_nodes, opened_bus, require_no_controller
 
 __all__ = [
+    "Assignment",
     "DriveFacts",
     "Finding",
+    "Identity",
     "NodeReader",
+    "Unconfigured",
+    "assign",
     "check_axis",
+    "find_unconfigured",
     "found_nodes",
     "machine_text",
+    "matched",
     "opened_bus",
     "read_facts",
     "require_no_controller",

@@ -34,7 +34,7 @@ def require_no_controller(network: Network, address: BusAddress) -> None:
     """Raises BusError where somebody sends SYNC: a controller asks its drives by the same SDO channel as we would."""
     heard: list[int] = []
     network.subscribe(_SYNC, lambda cob, data, time_s: heard.append(cob))
-    _pass(network, LISTEN_S)
+    pass_time(network, LISTEN_S)
     if heard:
         raise BusError(
             f"{address}: a controller sends SYNC, and asks the drives by the same SDO channel: end it first"
@@ -47,11 +47,12 @@ def found_nodes(network: Network, wait_s: float, nodes: Collection[int] = NODES)
     for node in nodes:
         request = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
         network.send_message(0x600 + node, request)
-    _pass(network, wait_s)
+    pass_time(network, wait_s)
     return sorted(set(network.scanner.nodes) & set(nodes))
 
 
-def _pass(network: Network, seconds: float) -> None:
+def pass_time(network: Network, seconds: float) -> None:
+    """Hears the bus for a time."""
     if network.clock.is_virtual:
         network.wait_until(lambda: False, seconds)
     else:

@@ -32,7 +32,7 @@ for _name in ("canopen", "can"):
 
 
 class _Answers:
-    """What an SDO client takes for its queue of answers; in virtual time nobody fills one in the background."""
+    """What an SDO client or an LSS master takes for its queue of answers; nobody fills one in virtual time."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -72,6 +72,9 @@ class Network(canopen.Network):
             listeners: list[Any] = self.listeners
             listeners.insert(0, _Ended())
             self.connect()
+        else:
+            answers: Any = _Answers(self)
+            self.lss.responses = answers
 
     def add_node(self, node: Any, *arguments: Any, **options: Any) -> Any:
         """See canopen.Network."""
@@ -139,7 +142,8 @@ _ALL = 0x780
 def _filters(node: int | None) -> list[dict[str, Any]]:
     if node is None:
         return [
-            {"can_id": base, "can_mask": _ALL, "extended": False} for base in (0x080, 0x580, 0x700)
+            {"can_id": base, "can_mask": _ALL, "extended": False}
+            for base in (0x080, 0x580, 0x700, 0x780)
         ]
     return [
         {"can_id": base + node, "can_mask": 0x7FF, "extended": False}
@@ -161,8 +165,9 @@ def _open(address: BusAddress, node: int | None, bitrate: int) -> can.BusABC:
 
 @contextmanager
 def open_network(address: BusAddress, node: int | None, bitrate: int) -> Iterator[Network]:
-    """A canopen network that receives the answers of `node`, None: of all nodes, and SYNC. Raises BusError when it
-    can't be opened.
+    """A canopen network that receives the answers of `node`, None: of all nodes and of LSS, and SYNC.
+
+    Raises BusError when it can't be opened.
     """
     if address.is_raw:
         check_raw(address)
