@@ -14,7 +14,8 @@ static int offline_start_point(struct offline *rig, int32_t start[PROGRAM_AXES])
         return OFFLINE_ERR_INTERP;
     }
     for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
-        start[axis] = counts_from_q40_mm(point.position_q40[axis], rig->counts_per_mm);
+        start[axis] =
+            counts_from_q40_mm(point.position_q40[axis], rig->configs[axis].counts_per_mm);
     }
     return 0;
 }
@@ -31,10 +32,13 @@ static int offline_drives(struct offline *rig, const struct program *program,
             return OFFLINE_ERR_PERIOD;
         }
     }
-    for (uint32_t axis = 1; axis < rig->axis_count; axis++) {
+    for (uint32_t axis = 1; axis < program_curve_axes(rig->axis_count); axis++) {
         if (drives[axis].counts_per_mm != drives[0].counts_per_mm) {
             return OFFLINE_ERR_COUNTS;
         }
+    }
+    for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
+        rig->configs[axis] = drives[axis];
     }
     return 0;
 }
@@ -49,7 +53,6 @@ int offline_begin(struct offline *rig, const struct program *program,
     if (error != 0) {
         return error;
     }
-    rig->counts_per_mm = drives[0].counts_per_mm;
     rig->tick = 0;
     rig->influenced = false;
     rig->faults = NULL;
@@ -66,7 +69,6 @@ int offline_begin(struct offline *rig, const struct program *program,
     for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
         drive_place(&rig->drives[axis], start[axis]);
         rig->latched_counts[axis] = start[axis];
-        rig->configs[axis] = drives[axis];
         rig->gains[axis] = without;
         rig->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
         influence_none(&rig->influences[axis], &drives[axis]);
@@ -86,7 +88,7 @@ void offline_feedforward(struct offline *rig, const struct feedforward_gains *ga
     for (uint32_t axis = 0; axis < rig->axis_count; axis++) {
         rig->gains[axis] = gains[axis];
         rig->gains[axis].period_us = rig->configs[axis].period_us;
-        rig->gains[axis].counts_per_mm = rig->counts_per_mm;
+        rig->gains[axis].counts_per_mm = rig->configs[axis].counts_per_mm;
     }
     rig->influenced = true;
 }
@@ -195,7 +197,8 @@ static int offline_command(struct offline *rig, struct offline_row *row)
         const bool follows = axis < rig->axis_count;
         row->cmd_q40_mm[axis] = follows ? point.position_q40[axis] : 0;
         row->set_counts[axis] =
-            follows ? counts_from_q40_mm(point.position_q40[axis], rig->counts_per_mm) : 0;
+            follows ? counts_from_q40_mm(point.position_q40[axis], rig->configs[axis].counts_per_mm)
+                    : 0;
     }
     row->tick = rig->tick++;
     return 0;
@@ -290,7 +293,8 @@ int rig_run(struct offline *rig, struct offline_row *rows, uint32_t n)
         }
         offline_move(rig, &rows[i]);
         contour_errors_um(&rig->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
-                          rig->axis_count, rig->counts_per_mm, &rows[i].contour_error_um);
+                          rig->axis_count, rig->configs[0].counts_per_mm,
+                          &rows[i].contour_error_um);
     }
     return 0;
 }

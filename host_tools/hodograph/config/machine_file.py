@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
-from ..names import KERNELS
+from ..names import AXES, KERNELS
 from .axis_table import MAX_AXES, Axis, Feedforward, read_axes
 from .drive_file import Drive
 from .table import Table, read_toml
@@ -91,6 +91,22 @@ class Machine:
                 f"{self.file}: has one axis ({self.axes[0].name}), a path needs two: add a second [[axis]]"
             )
         return _drawn(self.file, self.axes[: self.path_count])
+
+    @property
+    def path_names(self) -> tuple[str, ...]:
+        """What the axes that follow a path are called: x, y in the plane, their own names in space."""
+        axes = self.path_axes
+        return AXES[:PLANE_AXES] if len(axes) == PLANE_AXES else tuple(axis.name for axis in axes)
+
+    @property
+    def path_counts(self) -> tuple[int, ...]:
+        """Counts of a mm, or of a degree, of the axes that follow a path."""
+        return tuple(axis.counts_per_unit for axis in self.path_axes)
+
+    @property
+    def path_units(self) -> tuple[str, ...]:
+        """Their units, "mm" or "deg"."""
+        return tuple(axis.unit for axis in self.path_axes)
 
     def require_plane(self, what: str) -> tuple[Axis, Axis]:
         """The two axes of a path, for a command that knows no more. Raises InputError: there are more, or one."""

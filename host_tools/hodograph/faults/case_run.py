@@ -72,11 +72,11 @@ def load_job(path: Path) -> Job:
     """The program of a path file; raises InputError, PlanError."""
     pipeline = load_pipeline(path, allow_space=True)
     machine, image = pipeline.machine, pipeline.image
-    _, setpoints = NativeProgram(image).setpoints("fixed", machine.counts_per_mm)
+    _, setpoints = NativeProgram(image).setpoints("fixed", machine.path_counts)
     clean = simulate(
         image,
         machine.models(machine.path_axes),
-        counts_per_mm=machine.counts_per_mm,
+        counts_per_mm=machine.path_counts,
         feedforward=machine.path_feedforward,
         keep_rows=False,
     )
