@@ -104,12 +104,14 @@ def space_cases(machines: Path) -> Iterator[Case]:
         yield Case(name.replace("_", " "), path, limits, machines / f"{machine}.toml")
     t = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     ring = 30.0 + 10.0 * np.cos(3.0 * t)
-    knot = np.stack((ring * np.cos(2.0 * t), ring * np.sin(2.0 * t), 10.0 * np.sin(3.0 * t)), axis=1)
+    knot = np.stack(
+        (ring * np.cos(2.0 * t), ring * np.sin(2.0 * t), 10.0 * np.sin(3.0 * t)), axis=1
+    )
     yield Case("trefoil", _through(knot, closed=True), SPACE, machines / "mill.toml")
     for seed in SPACE_SEEDS:
         rng = np.random.default_rng([seed, 6])
         legs = rng.uniform(8.0, 20.0, (int(rng.integers(5, 9)), 1))
-        way = np.cumsum(rng.uniform(-0.7, 0.7, (len(legs), 3)), axis=0) + [1.0, 0.0, 0.0]
+        way = np.cumsum(rng.uniform(-0.7, 0.7, (len(legs), 3)), axis=0) + np.array([1.0, 0.0, 0.0])
         walk = np.cumsum(legs * way / np.linalg.norm(way, axis=1)[:, None], axis=0)
         yield Case(f"space {seed}", _through(walk, closed=False), SPACE, machines / "mill.toml")
 

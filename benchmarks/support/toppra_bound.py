@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Time-optimal feed without a limit of the jerk, by TOPP-RA: a bound from below for every planner that has one.
 
-Besides its axes the path has a coordinate more, arc length itself, so that feed and tangential acceleration are limits like those of
-axes. Volts are left out (they mix speed and acceleration), which only lowers the bound.
+Besides its axes the path has a coordinate more, arc length itself, so that feed and tangential acceleration are limits
+like those of axes. Volts are left out (they mix speed and acceleration), which only lowers the bound.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def space_contour_figure(pipeline: Pipeline, motion: Motion) -> bytes:
 
 
 def extra_axes_figure(pipeline: Pipeline, motion: Motion) -> bytes:
-    """The axes behind x, y, z over arc length, with their given points, and their distance from the curve in the run."""
+    """The axes behind x, y, z over arc length, with their given points, and their distance from it in the run."""
     spline, given = pipeline.curve, pipeline.file.given_path
     assert isinstance(spline, SpatialPHSpline)
     s_mm = np.linspace(0.0, spline.length_mm, _SAMPLES)
