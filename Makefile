@@ -176,8 +176,8 @@ soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a
 # TARGET: one of an385 an386 an500 an505 microbit; TIL=--local: a bus of its own instead of vcan0; TIL="--local --link slcan": real time
 TARGET ?= an386
 TIL    ?=
-til: build firmware ## target in the loop: the controller on an emulated board runs alpha and heart, the same bits as here
-	@$(if $(findstring --local,$(TIL)),,tools/with-vcan) $(PY) tools/til.py --target $(TARGET) $(TIL) examples/alpha.toml examples/heart.toml
+til: build firmware ## target in the loop: the controller on an emulated board runs paths in the plane, in space and with five axes, the same bits as here
+	@$(if $(findstring --local,$(TIL)),,tools/with-vcan) $(PY) tools/til.py --target $(TARGET) $(TIL) examples/alpha.toml examples/heart.toml examples/helix.toml examples/five_axes.toml
 
 SEEDS ?= 5
 SCENARIO ?=

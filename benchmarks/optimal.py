@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Profile `optimal` beside the best known optimum (collocation), a bound from below (TOPP-RA) and the best program of
-the paper's kind, all under the same limits, on the paper's curves and on random ones.
+the paper's kind, all under the same limits, on the paper's curves, in space, with five axes, and on random ones.
 
     python benchmarks/optimal.py [--json OUT] [--only NAME…] [--intervals N]
 """
@@ -48,6 +48,23 @@ velocity_mm_s = [180, 160]
 acceleration_mm_s2 = [2500, 1800]
 jerk_mm_s3 = [70000, 50000]
 """
+SPACE = """feed_mm_s = 150
+acceleration_mm_s2 = 1500
+jerk_mm_s3 = 40000
+[limits.axis]
+velocity_mm_s = [120, 130, 60]
+acceleration_mm_s2 = [1400, 1500, 800]
+jerk_mm_s3 = [35000, 40000, 20000]
+"""
+FIVE = """feed_mm_s = 150
+acceleration_mm_s2 = 1500
+jerk_mm_s3 = 40000
+[limits.axis]
+velocity_mm_s = [120, 130, 60, 90, 140]
+acceleration_mm_s2 = [1400, 1500, 800, 900, 1800]
+jerk_mm_s3 = [35000, 40000, 20000, 30000, 60000]
+"""
+SPACE_SEEDS = range(201, 204)
 SEEDS = range(101, 106)
 """Of paths that nothing was ever tuned on."""
 
@@ -76,6 +93,32 @@ def cases() -> Iterator[Case]:
             yield Case(f"{curve}, {label}", path, limits, machines / f"paper_{curve}.toml")
     for seed in SEEDS:
         yield Case(f"random {seed}", random_path(seed), ALL, machines / "paper_alpha.toml")
+    yield from space_cases(machines)
+
+
+def space_cases(machines: Path) -> Iterator[Case]:
+    """Helix, trefoil knot and random walks in space, and the example with five axes."""
+    for name, limits, machine in (("helix", SPACE, "mill"), ("five_axes", FIVE, "mill_five_axes")):
+        text = (ROOT / f"examples/{name}.toml").read_text(encoding="utf-8")
+        path = text[text.index("[path]") : text.index("[feed]")]
+        yield Case(name.replace("_", " "), path, limits, machines / f"{machine}.toml")
+    t = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    ring = 30.0 + 10.0 * np.cos(3.0 * t)
+    knot = np.stack(
+        (ring * np.cos(2.0 * t), ring * np.sin(2.0 * t), 10.0 * np.sin(3.0 * t)), axis=1
+    )
+    yield Case("trefoil", _through(knot, closed=True), SPACE, machines / "mill.toml")
+    for seed in SPACE_SEEDS:
+        rng = np.random.default_rng([seed, 6])
+        legs = rng.uniform(8.0, 20.0, (int(rng.integers(5, 9)), 1))
+        way = np.cumsum(rng.uniform(-0.7, 0.7, (len(legs), 3)), axis=0) + np.array([1.0, 0.0, 0.0])
+        walk = np.cumsum(legs * way / np.linalg.norm(way, axis=1)[:, None], axis=0)
+        yield Case(f"space {seed}", _through(walk, closed=False), SPACE, machines / "mill.toml")
+
+
+def _through(points: np.ndarray, *, closed: bool) -> str:
+    listed = np.round(points, 6).tolist()
+    return f"[path]\nclosed = {str(closed).lower()}\nthrough = {listed}\n"
 
 
 def random_path(seed: int) -> str:
@@ -97,7 +140,7 @@ def chain_of(case: Case, feed: str, reserve: float, folder: Path) -> Pipeline:
     text = f"{case.path}[feed]\n{feed}[limits]\nreserve = {reserve}\n{case.limits}"
     file = folder / "case.toml"
     file.write_text(text + f'[machine]\nfile = "{case.machine}"\n', encoding="utf-8")
-    return load_pipeline(file)
+    return load_pipeline(file, allow_space=True)
 
 
 def task_of(pipeline: Pipeline) -> Task:
@@ -114,7 +157,7 @@ def task_of(pipeline: Pipeline) -> Task:
         acceleration_mm_s2=least(limits.acceleration_mm_s2, own.acceleration_mm_s2),
         jerk_mm_s3=least(limits.jerk_mm_s3, own.jerk_mm_s3),
     )
-    return Task(pipeline.spline_result.spline, bound_by, plants(pipeline.machine, limits))
+    return Task(pipeline.curve, bound_by, plants(pipeline.machine, limits))
 
 
 def optimum(task: Task, intervals: int) -> dict[str, Any]:
@@ -148,7 +191,7 @@ def optimum(task: Task, intervals: int) -> dict[str, Any]:
 def planned(case: Case, reserve: float, folder: Path) -> dict[str, Any] | None:
     """The planner's own time, peaks and wall time; None where it cannot."""
     pipeline = chain_of(case, 'profile = "optimal"\n', reserve, folder)
-    spline = pipeline.spline_result.spline  # not to be timed
+    spline = pipeline.curve  # not to be timed
     begin = time.perf_counter()
     try:
         duration_s = pipeline.plan.duration_s

@@ -45,7 +45,7 @@ def run(pipeline: Pipeline, bus: str, pace: str, controller: str | None) -> BusR
 
 def compare(file: Path, options: argparse.Namespace, bus: str) -> bool:
     """Whether both give the same bits."""
-    pipeline = load_pipeline(file)
+    pipeline = load_pipeline(file, allow_space=True)
     pace = "fast" if options.link == "fifo" else "real-time"
     image = f" --image {options.image}" if options.image else ""
     boards = {name: f"{EMULATE} {name} --link {options.link}{image}" for name in options.target}

@@ -10,6 +10,7 @@ in between is told. Nothing here is used by the planner or the verifier.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import comb
 from typing import Any
 
 import casadi as ca
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from hodograph.feed import Limits, Plant
 from hodograph.spline import PHSpline
+from hodograph.spline.spatial import SpatialPHSpline
 
 Real = NDArray[np.float64]
 Start = tuple[Real, Real]
@@ -34,7 +36,7 @@ _INNER = (0.25, 0.5, 0.75)
 class Task:
     """A path, its limits (controller's included; reserve not), and the plants when volts are limited."""
 
-    spline: PHSpline
+    spline: PHSpline | SpatialPHSpline
     limits: Limits
     plants: tuple[Plant, ...] | None
 
@@ -130,7 +132,7 @@ class _Program:
         )
         self._equal(s[0])
         self._equal(s[-1] - length)
-        curve = _Curve(task.spline, k)
+        curve = _curve(task.spline, k)
         self._equal(curve.arc(xi) - s)
         ends = (
             (xi[:-1], feed_now[:-1], acc[:-1], left),
@@ -147,7 +149,7 @@ class _Program:
             self._equal(curve.arc(inner) - s[:-1] - way)
             self._limits(curve, inner, feed_u, acc_u, left + slope * u)
 
-    def _limits(self, curve: _Curve, xi: Any, feed: Any, acc: Any, jerk: Any) -> None:
+    def _limits(self, curve: _Curve | _SpaceCurve, xi: Any, feed: Any, acc: Any, jerk: Any) -> None:
         """All limits at points given by parameter and derivatives of arc length."""
         limits = self.task.limits
         if limits.feed_mm_s is not None:
@@ -160,7 +162,7 @@ class _Program:
         if limits.centripetal_mm_s2 is not None:
             self._within(point.kappa * feed**2, limits.centripetal_mm_s2)
         axis = limits.axis
-        for k in range(2):
+        for k in range(self.task.spline.axes):
             velocity = feed * point.r1[k]
             acceleration = acc * point.r1[k] + feed**2 * point.r2[k]
             if axis.velocity_mm_s is not None:
@@ -258,7 +260,7 @@ class _Program:
         spline, limits = self.task.spline, self.task.limits
         base, length = spline.segment_starts_mm[k], spline.segment_lengths_mm[k]
         _, xi = spline.locate(base + np.clip(s, 1e-9 * length, (1 - 1e-9) * length))
-        point = _Curve(spline, k).frame(xi)
+        point = _curve(spline, k).frame(xi)
         pairs: list[tuple[Real, float | None]] = [
             (v, limits.feed_mm_s),
             (a, limits.acceleration_mm_s2),
@@ -266,7 +268,7 @@ class _Program:
             (point.kappa * v**2, limits.centripetal_mm_s2),
         ]
         axis = limits.axis
-        for i in range(2):
+        for i in range(spline.axes):
             acceleration = a * point.r1[i] + v**2 * point.r2[i]
             jerk = j * point.r1[i] + 3 * v * a * point.r2[i] + v**3 * point.r3[i]
             pairs += [
@@ -283,12 +285,17 @@ class _Program:
 
 @dataclass(frozen=True)
 class _Frame:
-    """r_s, r_ss, r_sss as (x, y), and the curvature, at parameters."""
+    """r_s, r_ss, r_sss by axis, and the curvature, at parameters."""
 
-    r1: tuple[Any, Any]
-    r2: tuple[Any, Any]
-    r3: tuple[Any, Any]
+    r1: tuple[Any, ...]
+    r2: tuple[Any, ...]
+    r3: tuple[Any, ...]
     kappa: Any
+
+
+def _curve(spline: PHSpline | SpatialPHSpline, k: int) -> _Curve | _SpaceCurve:
+    """Span k."""
+    return _Curve(spline, k) if isinstance(spline, PHSpline) else _SpaceCurve(spline, k)
 
 
 class _Curve:
@@ -320,6 +327,50 @@ class _Curve:
             (-slope * ty - kappa**2 * tx, slope * tx - kappa**2 * ty),
             kappa,
         )
+
+
+class _SpaceCurve:
+    """The same of a span in space, extra axes included."""
+
+    def __init__(self, spline: SpatialPHSpline, k: int) -> None:
+        self.sigma = _powers(spline.speed_coefficients[k])
+        drawn = [_powers(row) for row in spline.hodograph_coefficients[k]]
+        extra = spline.extra[k] if spline.extra_axes else np.zeros((0, 6))
+        self.slopes = [*drawn, *(_powers(5.0 * np.diff(row)) for row in extra)]
+
+    def arc(self, xi: Any) -> Any:
+        """Arc length from the start of the span."""
+        return _horner([0.0, *(c / (i + 1) for i, c in enumerate(self.sigma))], xi)
+
+    def frame(self, xi: Any) -> _Frame:
+        """Derivatives of the axes by arc length."""
+        s0, s1, s2 = (_horner(_derived(self.sigma, n), xi) for n in range(3))
+        first, second, third = [], [], []
+        for own in self.slopes:
+            p0, p1, p2 = (_horner(_derived(own, n), xi) for n in range(3))
+            r1 = p0 / s0
+            r2 = (p1 - s1 * r1) / s0**2
+            first.append(r1)
+            second.append(r2)
+            third.append((p2 - s2 * r1) / s0**3 - 3 * s1 * r2 / s0**2)
+        bend = sum(r2**2 for r2 in second[:3])
+        return _Frame(tuple(first), tuple(second), tuple(third), (bend + 1e-18) ** 0.5)
+
+
+def _powers(bernstein: Real) -> list[float]:
+    """A polynomial in powers, from its Bernstein coefficients."""
+    n = len(bernstein) - 1
+    return [
+        comb(n, k) * sum((-1) ** (k - i) * comb(k, i) * float(bernstein[i]) for i in range(k + 1))
+        for k in range(n + 1)
+    ]
+
+
+def _derived(coefficients: list[float], order: int) -> list[float]:
+    """The derivative of a polynomial in powers."""
+    for _ in range(order):
+        coefficients = [k * c for k, c in enumerate(coefficients)][1:]
+    return coefficients
 
 
 def _horner(coefficients: Any, x: Any) -> Any:

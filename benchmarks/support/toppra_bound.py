@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Time-optimal feed without a limit of the jerk, by TOPP-RA: a bound from below for every planner that has one.
 
-The path has a third coordinate, arc length itself, so that feed and tangential acceleration are limits like those of
-axes. Volts are left out (they mix speed and acceleration), which only lowers the bound.
+Besides its axes the path has a coordinate more, arc length itself, so that feed and tangential acceleration are limits
+like those of axes. Volts are left out (they mix speed and acceleration), which only lowers the bound.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from toppra.interpolator import AbstractGeometricPath
 
 from hodograph.feed import Limits
 from hodograph.spline import PHSpline
+from hodograph.spline.frames import Curve, frames
+from hodograph.spline.spatial import SpatialPHSpline
 
 Real = NDArray[np.float64]
 
@@ -36,12 +38,12 @@ class Bound:
 
 
 class _Path(AbstractGeometricPath):  # type: ignore[misc]
-    def __init__(self, spline: PHSpline) -> None:
+    def __init__(self, spline: Curve) -> None:
         self._spline = spline
 
     @property
     def dof(self) -> int:
-        return 3
+        return self._spline.axes + 1
 
     @property
     def path_interval(self) -> Real:
@@ -55,34 +57,44 @@ class _Path(AbstractGeometricPath):  # type: ignore[misc]
         s = np.asarray(path_positions, dtype=np.float64)
         at = np.clip(np.atleast_1d(s), 0.0, self._spline.length_mm)
         if order == 0:
-            z, along = self._spline.point(at), at
+            rows, along = _places(self._spline, at), at
         elif order == 1:
-            z, along = self._spline.tangent(at), np.ones(at.size)
+            rows, along = frames(self._spline, at).r1, np.ones(at.size)
         else:
-            z = 1j * self._spline.curvature(at) * self._spline.tangent(at)
-            along = np.zeros(at.size)
-        out = np.stack((z.real, z.imag, along), axis=1)
+            rows, along = frames(self._spline, at).r2, np.zeros(at.size)
+        out = np.vstack((rows, along)).T
         return out[0] if s.ndim == 0 else out
 
 
-def bound(spline: PHSpline, limits: Limits) -> Bound:
+def _places(spline: Curve, s: Real) -> Real:
+    """Points (A, n)."""
+    if isinstance(spline, SpatialPHSpline):
+        return spline.axes_point(s).T
+    assert isinstance(spline, PHSpline)
+    z = spline.point(s)
+    return np.stack((z.real, z.imag))
+
+
+def bound(spline: Curve, limits: Limits) -> Bound:
     """From rest to rest along the whole path. Raises RuntimeError: TOPP-RA finds none."""
     toppra.setup_logging("ERROR")
     path = _Path(spline)
     axis = limits.axis
-    vx, vy = axis.velocity_mm_s or (_FREE, _FREE)
-    ax, ay = axis.acceleration_mm_s2 or (_FREE, _FREE)
+    free = (_FREE,) * spline.axes
+    axis_velocity = axis.velocity_mm_s or free
+    axis_acceleration = axis.acceleration_mm_s2 or free
     feed, acceleration = limits.feed_mm_s or _FREE, limits.acceleration_mm_s2 or _FREE
 
     def velocities(s: float) -> Real:
-        kappa = abs(float(spline.curvature(min(max(s, 0.0), spline.length_mm))))
+        at = np.array([min(max(s, 0.0), spline.length_mm)])
+        kappa = abs(float(frames(spline, at).curvature[0]))
         curve = inf if limits.centripetal_mm_s2 is None else limits.centripetal_mm_s2
         most = min(feed, (curve / max(kappa, 1e-12)) ** 0.5)
         most = min([most, *(c.feed_mm_s for c in limits.zones if c.from_mm <= s <= c.to_mm)])
-        high = np.array([vx, vy, most])
+        high = np.array([*axis_velocity, most])
         return np.stack((-high, high), axis=1)
 
-    high = np.array([ax, ay, acceleration])
+    high = np.array([*axis_acceleration, acceleration])
     constraints = [
         constraint.JointVelocityConstraintVarying(velocities),
         constraint.JointAccelerationConstraint(np.stack((-high, high), axis=1)),
@@ -97,13 +109,12 @@ def bound(spline: PHSpline, limits: Limits) -> Bound:
     return Bound(float(t[-1]), _sampled_jerk(spline, grid, speed, t))
 
 
-def _sampled_jerk(spline: PHSpline, grid: Real, speed: Real, t: Real) -> float:
+def _sampled_jerk(spline: Curve, grid: Real, speed: Real, t: Real) -> float:
     """Constant tangential acceleration within each interval, looked at every millisecond."""
     at = np.arange(0.0, t[-1], _PERIOD_S)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     u = at - t[k]
     pull = (speed[k + 1] - speed[k]) / (t[k + 1] - t[k])
     s = np.clip(grid[k] + speed[k] * u + 0.5 * pull * u * u, 0.0, spline.length_mm)
-    z = np.pad(spline.point(np.append(s, spline.length_mm)), 3, mode="edge")
-    third = np.diff(z, 3) / _PERIOD_S**3
-    return float(max(np.abs(third.real).max(), np.abs(third.imag).max()))
+    rows = np.pad(_places(spline, np.append(s, spline.length_mm)), ((0, 0), (3, 3)), mode="edge")
+    return float(np.abs(np.diff(rows, 3, axis=1)).max()) / _PERIOD_S**3

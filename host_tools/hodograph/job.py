@@ -437,11 +437,11 @@ def write_job_trace(run: JobMotion, file: Path) -> None:
     Positions are in the program's own coordinates: without the work offset. Raises InputError.
     """
     machine = run.job.machine
-    names = [axis.name for axis in machine.path_axes]
+    named = [(axis.name, axis.unit) for axis in machine.path_axes]
     header = [
         *("tick", "t_s", "line", "arc_length_mm", "feed_mm_s"),
-        *(f"{name}_cmd_mm" for name in names),
-        *(f"{name}_act_mm" for name in names),
+        *(f"{name}_cmd_{unit}" for name, unit in named),
+        *(f"{name}_act_{unit}" for name, unit in named),
     ]
     try:
         with file.open("w", encoding="ascii", newline="\n") as out:

@@ -172,7 +172,7 @@ def _record_of(record: Path | None, number: int, job: Job) -> Path | None:
 
 
 def _setpoint(made: PreparedJob, program: NativeProgram, tick: int) -> list[int]:
-    counts_per_mm = made.job.machine.counts_per_mm
+    counts_per_mm = made.job.machine.path_counts
     _, setpoints = program.setpoints(made.kernel, counts_per_mm, tick, 1)
     found: list[int] = setpoints[0].tolist()
     return found

@@ -11,6 +11,15 @@ KERNELS = ("fixed", "float", "double")
 AXES = ("x", "y", "z", "a", "b", "c")
 """What the axes of a path are called where no machine names them."""
 
+UNITS = ("mm", "deg")
+"""What an axis is measured in: an axis in degrees turns."""
+
+
+def in_unit(name: str, unit: str) -> str:
+    """The name in this unit of a key or a quantity that is called `name` in mm."""
+    return "_".join(unit if word == "mm" else word for word in name.split("_"))
+
+
 INTERPOLATIONS = ("linear", "cubic", "none")
 """How a simulated drive goes from setpoint to setpoint, in the order of enum drive_interpolation."""
 

@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import TypeVar
 
 from .config import (
-    SPACE_AXES,
+    PLANE_AXES,
     Drive,
     Machine,
     PathFile,
@@ -57,6 +57,7 @@ from .spline.spatial import (
     spatial_through_points,
 )
 from .spline.spatial.curve import SpatialPHSpline, embedded
+from .spline.spatial.extra import with_standing_axes
 
 _Found = TypeVar("_Found", SplineResult, SpatialSplineResult)
 
@@ -161,7 +162,8 @@ def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault 
 def proved_limits(machine: Machine) -> str:
     """The limits that the controller of this machine has proved of each program that it accepts."""
     return ", ".join(
-        f"{axis.name} {axis.velocity_mm_s:g} mm/s {axis.acceleration_mm_s2:g} mm/s^2 {axis.jerk_mm_s3:g} mm/s^3"
+        f"{axis.name} {axis.velocity_mm_s:g} {axis.unit}/s {axis.acceleration_mm_s2:g} {axis.unit}/s^2 "
+        f"{axis.jerk_mm_s3:g} {axis.unit}/s^3"
         for axis in machine.path_axes
     )
 
@@ -245,9 +247,10 @@ class Pipeline:
         through: Callable[..., _Found],
     ) -> _Found:
         """The spline of a path by one of these two; their errors name the file."""
+        extra = {"extra": path.extra} if isinstance(path, SpacePathSpec) else {}
         with _named_by(f"{self.file.file}: [path]"):
             if not path.through:
-                return from_polygon(path.points, path.closed)
+                return from_polygon(path.points, path.closed, **extra)
             return through(
                 path.points,
                 path.closed,
@@ -255,6 +258,7 @@ class Pipeline:
                 start_tangent=path.start_tangent,
                 end_tangent=path.end_tangent,
                 knots=path.knots,
+                **extra,
             )
 
     @property
@@ -264,23 +268,24 @@ class Pipeline:
 
     @cached_property
     def curve(self) -> PHSpline | SpatialPHSpline:
-        """What the axes follow: the spline; at z = 0 where a path in the plane runs on a machine with an axis z.
+        """What the axes follow: the spline, and 0 for axes of the machine that the path does not move.
 
-        Raises InputError: the machine has too few axes for the path, or axes that nothing moves.
+        Raises InputError: the machine has too few axes for the path.
         """
         spline, machine = self.found_spline.spline, self.machine_or_none
         axes = spline.axes if machine is None else len(machine.path_axes)
         if axes < spline.axes:
+            one, every = ("only two", "three") if axes == 2 else (f"{axes}", f"{spline.axes}")
             raise InputError(
-                f"{self.file.file}: [path] has points [x, y, z], but only two axes of the machine follow a path: "
-                'name three of them, path = ["x", "y", "z"], at the top of its file, or give points [x, y]'
+                f"{self.file.file}: [path] has points [{', '.join(AXES[: spline.axes])}], but {one} axes of the "
+                f"machine follow a path: name {every} of them, path = [...], at the top of its file, or give "
+                f"points [{', '.join(AXES[:axes])}]"
             )
-        if axes > SPACE_AXES:
-            raise InputError(
-                f"{self.file.file}: {axes} axes of the machine follow a path, and [path] moves {spline.axes}: "
-                "name two or three axes in path = [...] at the top of the machine's file"
-            )
-        return embedded(spline, 0.0) if isinstance(spline, PHSpline) and axes > 2 else spline
+        if isinstance(spline, PHSpline):
+            if axes == PLANE_AXES:
+                return spline
+            spline = embedded(spline, 0.0)
+        return with_standing_axes(spline, axes - spline.axes)
 
     @property
     def feed(self) -> FeedRequest:
@@ -307,7 +312,7 @@ class Pipeline:
         machine = self.machine_or_none
         if machine is None:
             return self.file.limits
-        return self.file.limits.on_machine(machine.path_names, axis_limits(machine))
+        return self.file.limits.on_machine(machine.path_names, axis_limits(machine), machine.path_units)
 
     @cached_property
     def peaks(self) -> dict[str, Peak]:

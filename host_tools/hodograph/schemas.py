@@ -149,7 +149,8 @@ def _path_file() -> Schema:
 def _points(text: str) -> Schema:
     at_most = {"type": "number", "minimum": -COORDINATE_LIMIT_MM, "maximum": COORDINATE_LIMIT_MM}
     alike = [
-        {"items": {"type": "array", "items": at_most, "minItems": n, "maxItems": n}} for n in (2, 3)
+        {"items": {"type": "array", "items": at_most, "minItems": n, "maxItems": n}}
+        for n in range(2, 7)
     ]
     return {"type": "array", "minItems": 1, "anyOf": alike, "description": text}
 
@@ -160,8 +161,10 @@ def _curve() -> Schema:
         "The curve",
         {
             "closed": _flag("Whether the end of the path is its start"),
-            "control_points": _points("Control polygon, [[x, y], …] or [[x, y, z], …], mm"),
-            "through": _points("Points that the path passes, mm"),
+            "control_points": _points(
+                "Control polygon, [[x, y], …], [[x, y, z], …], or up to three extra axes more; mm, degrees"
+            ),
+            "through": _points("Points that the path passes, likewise"),
             "knots": _choice(
                 "How the spline's parameter follows the distances of the points",
                 KNOT_NAMES,
@@ -217,7 +220,7 @@ def _limits() -> Schema:
         },
         ("from_mm", "to_mm", "feed_mm_s"),
     )
-    per_axis = "of the axes, a number for all, or one for each: [x, y] or [x, y, z]"
+    per_axis = "of the axes, a number for all, or one for each axis of the points"
     return _table(
         "What the plan keeps",
         {
@@ -236,11 +239,11 @@ def _limits() -> Schema:
             "axis": _table(
                 "Of the motion of the axes",
                 {
-                    "velocity_mm_s": _number_or_vector(f"Velocity {per_axis}", 2, 3, *FEED),
+                    "velocity_mm_s": _number_or_vector(f"Velocity {per_axis}", 2, 6, *FEED),
                     "acceleration_mm_s2": _number_or_vector(
-                        f"Acceleration {per_axis}", 2, 3, *ACCELERATION
+                        f"Acceleration {per_axis}", 2, 6, *ACCELERATION
                     ),
-                    "jerk_mm_s3": _number_or_vector(f"Jerk {per_axis}", 2, 3, *JERK),
+                    "jerk_mm_s3": _number_or_vector(f"Jerk {per_axis}", 2, 6, *JERK),
                 },
             ),
             "cap": _list("Feed zones", cap),

@@ -67,9 +67,10 @@ static double contour_gap_at(const struct contour *c, double arc_length_mm, cons
     return contour_gap(c, contour_place(c, c->cursor, contour_wrap(c, arc_length_mm)), point);
 }
 
-/* Slow and sure: samples the window, then closes in on the best sample by golden sections. */
+/* Slow and sure: samples the window, then closes in on the best sample by golden sections. *foot_mm is the arc length
+ * found. */
 static double contour_search(const struct contour *c, double arc_length_mm, double window_mm,
-                             const double point[3])
+                             const double point[3], double *foot_mm)
 {
     const double golden = 0.61803398874989484820;
     const double half =
@@ -96,10 +97,13 @@ static double contour_search(const struct contour *c, double arc_length_mm, doub
         }
     }
     const double gap = contour_gap_at(c, 0.5 * (low + high), point);
+    *foot_mm = gap < least ? 0.5 * (low + high) : best;
     return gap < least ? gap : least;
 }
 
-double contour_distance_mm(struct contour *c, double arc_length_mm, const double point[3])
+/* The distance, and the place on the curve from which it is measured. */
+static double contour_foot(struct contour *c, double arc_length_mm, const double point[3],
+                           struct place *place)
 {
     const double arc =
         arc_length_mm > c->length_mm ? c->length_mm : (arc_length_mm >= 0.0 ? arc_length_mm : 0.0);
@@ -109,21 +113,76 @@ double contour_distance_mm(struct contour *c, double arc_length_mm, const double
     const struct foot foot = contour_newton(c, start, point);
     const double window = CONTOUR_WINDOW * gap + 0.001;
     if (foot.found && foot.distance_mm <= gap + CONTOUR_STEP_MM && fabs(foot.moved_mm) <= window) {
+        *place = foot.place;
         return foot.distance_mm;
     }
-    return contour_search(c, arc, window, point);
+    double foot_mm;
+    const double distance_mm = contour_search(c, arc, window, point, &foot_mm);
+    *place = contour_place(c, c->cursor, contour_wrap(c, foot_mm));
+    return distance_mm;
+}
+
+double contour_distance_mm(struct contour *c, double arc_length_mm, const double point[3])
+{
+    struct place place;
+    return contour_foot(c, arc_length_mm, point, &place);
+}
+
+/* x, y, z of a row of counts. */
+static void contour_point(const struct contour *c, const int32_t *act_counts,
+                          uint32_t counts_per_mm, double point[3])
+{
+    const double mm_per_count = 1.0 / (double)counts_per_mm;
+    for (uint32_t j = 0; j < 3; j++) {
+        point[j] = j < c->axes ? (double)act_counts[j] * mm_per_count : 0.0;
+    }
 }
 
 void contour_errors_um(struct contour *c, uint32_t n, const int64_t *arc_length_q40_mm,
                        const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,
                        double *errors_um)
 {
-    const double mm_per_count = 1.0 / (double)counts_per_mm;
     for (uint32_t i = 0; i < n; i++) {
-        double point[3] = {0.0, 0.0, 0.0};
-        for (uint32_t j = 0; j < c->axes; j++) {
-            point[j] = (double)act_counts[(size_t)stride * i + j] * mm_per_count;
-        }
+        double point[3];
+        contour_point(c, &act_counts[(size_t)stride * i], counts_per_mm, point);
         errors_um[i] = 1000.0 * contour_distance_mm(c, contour_q40(arc_length_q40_mm[i]), point);
+    }
+}
+
+/* Position of an extra axis at xi, mm or degrees. */
+static double contour_extra(const struct program_extra *extra, double xi)
+{
+    double b[6] = {0.0};
+    for (int k = 1; k < 6; k++) {
+        b[k] = contour_q40(extra->b_q40[k - 1]);
+    }
+    for (int degree = 5; degree > 0; degree--) {
+        for (int k = 0; k < degree; k++) {
+            b[k] += (b[k + 1] - b[k]) * xi;
+        }
+    }
+    return contour_q40(extra->start_q40) + b[0];
+}
+
+void contour_extra_errors(struct contour *c, const struct program *program, uint32_t n,
+                          const int64_t *arc_length_q40_mm, const int32_t *act_counts,
+                          const uint32_t *counts_per_unit, double *errors)
+{
+    const uint32_t axes = program->header.axis_count;
+    const uint32_t extras = program_extra_axes(axes);
+    for (uint32_t i = 0; i < n; i++) {
+        const int32_t *act = &act_counts[(size_t)axes * i];
+        struct place place;
+        struct program_segment segment;
+        double point[3];
+        contour_point(c, act, counts_per_unit[0], point);
+        (void)contour_foot(c, contour_q40(arc_length_q40_mm[i]), point, &place);
+        program_segment_get(program, place.segment, &segment);
+        const double xi = place.xi < 0.0 ? 0.0 : (place.xi > 1.0 ? 1.0 : place.xi);
+        for (uint32_t k = 0; k < extras; k++) {
+            const uint32_t axis = program_curve_axes(axes) + k;
+            errors[(size_t)extras * i + k] = (double)act[axis] / (double)counts_per_unit[axis] -
+                                             contour_extra(&segment.extra[k], xi);
+        }
     }
 }

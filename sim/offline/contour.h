@@ -58,4 +58,11 @@ void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_l
                        const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,
                        double *errors_um);
 
+/* How far the extra axes of a program are from where the curve has them at the foot of the perpendicular: n rows of
+ * axis_count - 3 differences, actual less exact, in mm or degrees. act_counts holds all path axes of each point,
+ * counts_per_unit those of a mm or degree by axis; *program is that of *contour. */
+void contour_extra_errors(struct contour *contour, const struct program *program, uint32_t n,
+                          const int64_t *arc_length_q40_mm, const int32_t *act_counts,
+                          const uint32_t *counts_per_unit, double *errors);
+
 #endif

@@ -14,7 +14,8 @@ static int offline_start_point(struct offline *sim, int32_t start[PROGRAM_AXES])
         return OFFLINE_ERR_INTERP;
     }
     for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
-        start[axis] = counts_from_q40_mm(point.position_q40[axis], sim->counts_per_mm);
+        start[axis] =
+            counts_from_q40_mm(point.position_q40[axis], sim->configs[axis].counts_per_mm);
     }
     return 0;
 }
@@ -31,10 +32,13 @@ static int offline_drives(struct offline *sim, const struct program *program,
             return OFFLINE_ERR_PERIOD;
         }
     }
-    for (uint32_t axis = 1; axis < sim->axis_count; axis++) {
+    for (uint32_t axis = 1; axis < program_curve_axes(sim->axis_count); axis++) {
         if (drives[axis].counts_per_mm != drives[0].counts_per_mm) {
             return OFFLINE_ERR_COUNTS;
         }
+    }
+    for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
+        sim->configs[axis] = drives[axis];
     }
     return 0;
 }
@@ -49,7 +53,6 @@ int offline_begin(struct offline *sim, const struct program *program,
     if (error != 0) {
         return error;
     }
-    sim->counts_per_mm = drives[0].counts_per_mm;
     sim->tick = 0;
     sim->influenced = false;
     sim->faults = NULL;
@@ -66,7 +69,6 @@ int offline_begin(struct offline *sim, const struct program *program,
     for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
         drive_place(&sim->drives[axis], start[axis]);
         sim->latched_counts[axis] = start[axis];
-        sim->configs[axis] = drives[axis];
         sim->gains[axis] = without;
         sim->rated_torque_nm[axis] = drive_config_rated_torque_nm(&drives[axis]);
         influence_none(&sim->influences[axis], &drives[axis]);
@@ -86,7 +88,7 @@ void offline_feedforward(struct offline *sim, const struct feedforward_gains *ga
     for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
         sim->gains[axis] = gains[axis];
         sim->gains[axis].period_us = sim->configs[axis].period_us;
-        sim->gains[axis].counts_per_mm = sim->counts_per_mm;
+        sim->gains[axis].counts_per_mm = sim->configs[axis].counts_per_mm;
     }
     sim->influenced = true;
 }
@@ -195,7 +197,8 @@ static int offline_command(struct offline *sim, struct offline_row *row)
         const bool follows = axis < sim->axis_count;
         row->cmd_q40_mm[axis] = follows ? point.position_q40[axis] : 0;
         row->set_counts[axis] =
-            follows ? counts_from_q40_mm(point.position_q40[axis], sim->counts_per_mm) : 0;
+            follows ? counts_from_q40_mm(point.position_q40[axis], sim->configs[axis].counts_per_mm)
+                    : 0;
     }
     row->tick = sim->tick++;
     return 0;
@@ -290,7 +293,8 @@ int offline_run(struct offline *sim, struct offline_row *rows, uint32_t n)
         }
         offline_move(sim, &rows[i]);
         contour_errors_um(&sim->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
-                          sim->axis_count, sim->counts_per_mm, &rows[i].contour_error_um);
+                          sim->axis_count, sim->configs[0].counts_per_mm,
+                          &rows[i].contour_error_um);
     }
     return 0;
 }

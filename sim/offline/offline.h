@@ -66,7 +66,7 @@ struct offline_stop {
 enum offline_error {
     OFFLINE_ERR_COEFFICIENTS = -100, /* the program has no coefficient records */
     OFFLINE_ERR_PERIOD = -101,       /* a drive's period is not the program's */
-    OFFLINE_ERR_COUNTS = -102,       /* the drives' counts per mm differ */
+    OFFLINE_ERR_COUNTS = -102,       /* counts per mm of the axes that draw the path differ */
     OFFLINE_ERR_FAULT = -103,        /* a fault or an order that cannot be carried out */
     OFFLINE_ERR_DRIVE = -200,        /* minus 10 * axis, plus the enum drive_error of that axis */
     OFFLINE_ERR_INTERP = -300,       /* the interpolator failed: the program was not checked */
@@ -95,7 +95,6 @@ struct offline {
     int64_t fault_tick;                   /* of the faults; negative before the first motion */
     int32_t latched_counts[PROGRAM_AXES]; /* the last setpoint that arrived */
     uint32_t program_ticks;
-    uint32_t counts_per_mm;
     uint32_t tick;
 };
 

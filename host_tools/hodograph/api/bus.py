@@ -90,7 +90,7 @@ class Controller:
         """
         machine = self._machine._file
         native = NativeProgram(program.image)
-        _, first = native.setpoints(machine.kernel, machine.counts_per_mm, 0, 1)
+        _, first = native.setpoints(machine.kernel, machine.path_counts, 0, 1)
         start = tuple(int(counts) for counts in first[0])
         way_mm = goto(self._node, machine, start, unhomed=unhomed)
         self.upload(program)

@@ -138,11 +138,12 @@ class Path:
         knots: Literal["chord", "centripetal", "uniform"] = "chord",
         name: str = "path",
     ) -> Path:
-        """The path through points (n, A).
+        """The path through points (n, A): x, y, or x, y, z, or these and up to three extra axes, in degrees where they
+        turn.
 
         closed         the end is the start; each point is given once, 3 or more
         ends           of an open path: "cubic", or "natural" (no curvature)
-        start_tangent, end_tangent   direction (A,) there, instead of `ends`
+        start_tangent, end_tangent   direction (2,), in space (3,), there, instead of `ends`
         knots          how the spline's parameter follows the distances of the points
         name           for messages and for the program
 
@@ -175,7 +176,7 @@ class Path:
 
     @property
     def axes(self) -> int:
-        """A: 2 in the plane, 3 in space."""
+        """A: 2 in the plane, 3 in space, 4 to 6 with extra axes."""
         return int(self.node_points_mm.shape[1])
 
     @property
@@ -186,7 +187,8 @@ class Path:
     @property
     def node_points_mm(self) -> Real:
         """Joints of the N segments, (N + 1, A), from start to end."""
-        return _rows(self._curve.nodal_points)
+        curve = self._curve
+        return curve.axes_nodes if isinstance(curve, SpatialPHSpline) else _rows(curve.nodal_points)
 
     @property
     def node_arc_lengths_mm(self) -> Real:
@@ -200,10 +202,10 @@ class Path:
 
     def point_mm(self, arc_length_mm: ArrayLike) -> Real:
         """Points (…, A)."""
-        return _rows(self._curve.point(arc_length_mm))
+        return _places(self._curve, np.asarray(arc_length_mm, dtype=np.float64))
 
     def tangent(self, arc_length_mm: ArrayLike) -> Real:
-        """Unit tangents (…, A)."""
+        """Unit tangents (…, 2), in space (…, 3)."""
         return _rows(self._curve.tangent(arc_length_mm))
 
     def curvature_per_mm(self, arc_length_mm: ArrayLike) -> Real:
@@ -327,7 +329,7 @@ class Plan:
         s = np.clip(feed.arc_length(t), 0.0, curve.length_mm)
         along = feed.feed(t), feed.acceleration(t), feed.jerk(t)
         axes = (np.moveaxis(each, 0, -1) for each in axis_motion(frames(curve, s), *along))
-        return PathMotion(t, s, *along, _rows(curve.point(s)), *axes)
+        return PathMotion(t, s, *along, _places(curve, s), *axes)
 
     def program(self) -> Program:
         """The program for the plan's machine, as its controller accepts it.
@@ -372,13 +374,14 @@ def _path(
 ) -> Path:
     """As `PathSpec` and `SpacePathSpec`."""
     tangents = [
-        _direction(name, key, value, points.shape[1])
+        _direction(name, key, value, min(points.shape[1], 3))
         for key, value in (("start_tangent", start_tangent), ("end_tangent", end_tangent))
     ]
     start, end = tangents
     given: PathSpec | SpacePathSpec
-    if points.shape[1] == 3:
-        given = SpacePathSpec(closed, points, through, ends, start, end, knots)
+    if points.shape[1] > 2:
+        drawn, extra = points[:, :3], points[:, 3:]
+        given = SpacePathSpec(closed, drawn, through, ends, start, end, knots, extra)
     else:
         plane = points[:, 0] + 1j * points[:, 1]
         given = PathSpec(closed, plane, through, ends, _plane(start), _plane(end), knots)
@@ -390,8 +393,10 @@ def _points(points_mm: ArrayLike) -> Real:
         points = np.array(points_mm, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("points: must be numbers, of shape (n, 2) or (n, 3)") from None
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise InputError(f"points: must have shape (n, 2) or (n, 3), not {points.shape}")
+    if points.ndim != 2 or not 2 <= points.shape[1] <= len(AXES):
+        raise InputError(
+            f"points: must have shape (n, 2), (n, 3), or (n, 4) to (n, 6) with extra axes, not {points.shape}"
+        )
     return points
 
 
@@ -413,6 +418,11 @@ def _rows(values: NDArray[np.complex128] | Real) -> Real:
     if np.iscomplexobj(values):
         return np.stack((values.real, values.imag), axis=-1)
     return np.asarray(values, dtype=np.float64)
+
+
+def _places(curve: PHSpline | SpatialPHSpline, s: Real) -> Real:
+    """All axes (…, A) at arc lengths."""
+    return curve.axes_point(s) if isinstance(curve, SpatialPHSpline) else _rows(curve.point(s))
 
 
 def load_plan(file: str | PathLike[str], machine: Machine | None = None) -> Plan:

@@ -67,7 +67,7 @@ class Run:
 
     @property
     def following_error_um(self) -> Real:
-        """Setpoint less position (n, A)."""
+        """Setpoint less position (n, A); thousandths of a degree of axes that turn."""
         return self._motion.following_error_um[: self._motion.ticks]
 
     @property
@@ -76,13 +76,19 @@ class Run:
         return self._motion.contour_error_um[: self._motion.ticks]
 
     @property
+    def orientation_error(self) -> Real:
+        """Of the axes behind x, y, z (n, A - 3): how far they are from where the exact path has them beside the point
+        nearest to the tool; degrees, or mm of axes that do not turn."""
+        return self._motion.orientation_error[: self._motion.ticks]
+
+    @property
     def greatest_contour_error_um(self) -> float:
         """Of the whole run, settling included."""
         return self._motion.max_contour_error_um
 
     @property
     def greatest_following_error_um(self) -> float:
-        """Of one axis, settling included."""
+        """Of one axis in mm, settling included."""
         return self._motion.max_following_error_um
 
     @property
@@ -151,7 +157,7 @@ class Program:
     def setpoints_counts(self, kernel: Kernel | None = None) -> NDArray[np.int32]:
         """All setpoints in counts (ticks, A), as the controller computes them. `kernel` None: the machine's."""
         machine = self.machine._file
-        _, counts = self._native.setpoints(kernel or machine.kernel, machine.counts_per_mm)
+        _, counts = self._native.setpoints(kernel or machine.kernel, machine.path_counts)
         return counts
 
     def simulate(self, kernel: Kernel | None = None) -> Run:

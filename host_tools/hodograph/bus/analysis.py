@@ -62,7 +62,7 @@ def analyse_recording(
     kernel gives here.
     """
     program = NativeProgram(image)
-    _, setpoints = program.setpoints(kernel, machine.counts_per_mm)
+    _, setpoints = program.setpoints(kernel, machine.path_counts)
     require_no_jump(frames, machine.nodes, step_limits(machine, setpoints))
     ticks = decode_ticks(frames, machine.nodes)
     motion = _motion(image, program, ticks, setpoints, machine, kernel)
@@ -97,7 +97,7 @@ def replay(frames: Frames, name: str, image: bytes, machine: Machine, kernel: st
 def _stretch(frames: Frames, image: bytes, machine: Machine, kernel: str) -> Frames | None:
     """The frames about the program's run, None when its setpoints are not there one after the other."""
     program = NativeProgram(image)
-    _, setpoints = program.setpoints(kernel, machine.counts_per_mm)
+    _, setpoints = program.setpoints(kernel, machine.path_counts)
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
     whole = [complete_ticks(frames, sync_at, RPDO1 + node) for node in machine.nodes]
     for begin, end in runs_of(np.logical_and.reduce(whole)):
@@ -169,7 +169,9 @@ def _motion(
         ticks.actual[path][reached],
         volts_mv[path][reached],
         kernel=kernel,
-        counts_per_mm=machine.counts_per_mm,
+        counts_per_mm=machine.path_counts,
+        names=machine.path_names,
+        units=machine.path_units,
     )
     return motion if ticks.volts_mv is not None else replace(motion, max_volts=None)
 

@@ -124,7 +124,7 @@ def run_program(
     not those that the same kernel gives here.
     """
     program = NativeProgram(image)
-    _, start = program.setpoints(kernel, machine.counts_per_mm, 0, 1)
+    _, start = program.setpoints(kernel, machine.path_counts, 0, 1)
     bring_up(at, machine, kernel)
     goto(at.controller, machine, start[0].tolist(), unhomed=unhomed)
     recorded = record_program(at, machine, image, progress, unhomed=unhomed)

@@ -81,6 +81,7 @@ def machine_layout(machine: Machine) -> Layout:
         counts_per_unit=tuple(axis.counts_per_unit for axis in machine.axes),
         units=tuple(axis.unit for axis in machine.axes),
         drawn=min(machine.path_count, SPACE_AXES),
+        path_axes=machine.path_count,
         period_us=machine.period_us,
         bitrate=machine.bitrate,
         limits=step_limits(machine),

@@ -102,7 +102,7 @@ def _end_counts(options: Namespace, machine: Machine, image: bytes | None) -> li
         raise InputError("--z: goes with --to")
     require_axes(NativeProgram(image), machine)
     _, setpoints = NativeProgram(image).setpoints(
-        options.kernel or machine.kernel, machine.counts_per_mm, 0, 1
+        options.kernel or machine.kernel, machine.path_counts, 0, 1
     )
     return [int(counts) for counts in setpoints[0]]
 

@@ -47,7 +47,9 @@ def spline(options: Namespace) -> None:
     result: dict[str, object] = {
         "closed": curve.closed,
         "segments": curve.segment_count,
-        "nodal_points": _lists(curve.nodal_points),
+        "nodal_points": _lists(
+            curve.axes_nodes if isinstance(curve, SpatialPHSpline) else curve.nodal_points
+        ),
         "length_mm": curve.length_mm,
         "segment_lengths_mm": curve.segment_lengths_mm.tolist(),
         "newton_iterations": found.newton_iterations,
@@ -59,7 +61,7 @@ def spline(options: Namespace) -> None:
     }
     if options.at is not None:
         s = np.atleast_1d(_within("--at", options.at, curve.length_mm, "mm"))
-        result["points"] = _lists(curve.point(s))
+        result["points"] = _places(curve, s)
         result["tangents"] = _lists(curve.tangent(s))
         result["curvatures"] = curve.curvature(s).tolist()
         if isinstance(curve, SpatialPHSpline):
@@ -83,11 +85,19 @@ def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> 
     columns = [("curvature /mm", curve.curvature(s))]
     if isinstance(curve, SpatialPHSpline):
         columns.append(("torsion /mm", curve.torsion(s)))
-    points = np.array(_lists(curve.point(s)))
-    names = ["x mm", "y mm", "z mm"][: points.shape[1]] + [name for name, _ in columns]
+    points = np.array(_places(curve, s))
+    own = [*(f"{axis} mm" for axis in "xyz"), "axis 4", "axis 5", "axis 6"][: points.shape[1]]
+    names = own + [name for name, _ in columns]
     print(f"{'s mm':>12} " + " ".join(f"{name:>16}" for name in names))
     for at, row in zip(s, np.column_stack((points, *(v for _, v in columns))), strict=True):
         print(f"{at:12.6g} " + " ".join(f"{value:16.9f}" for value in row))
+
+
+def _places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> list[list[float]]:
+    """Points at arc lengths, with the extra axes behind x, y, z."""
+    if isinstance(curve, SpatialPHSpline):
+        return _lists(curve.axes_point(s))
+    return _lists(curve.point(s))
 
 
 def _lists(values: NDArray[np.complex128] | NDArray[np.float64]) -> list[list[float]]:
@@ -326,9 +336,10 @@ def _stopped(pipeline: Pipeline, kernel: str | None, kind: str, at_s: float) -> 
         kind,
         at_s,
         kernel=kernel or machine.kernel,
-        counts_per_mm=machine.counts_per_mm,
+        counts_per_mm=machine.path_counts,
         feedforward=machine.path_feedforward,
         names=machine.path_names,
+        units=machine.path_units,
     )
 
 
@@ -356,14 +367,26 @@ def volts_words(motion: Motion) -> str:
 
 def motion_rows(motion: Motion) -> list[tuple[str, str]]:
     """A run's results for people."""
+    mdeg = motion.max_following_error_mdeg
+    turning = "" if mdeg is None else f", {mdeg:.1f} mdeg"
     return [
         ("ticks", f"{motion.ticks} of {motion.period_us} us, kernel {motion.kernel}"),
         ("greatest contour error", f"{motion.max_contour_error_um:.3f} um"),
-        ("greatest following error", f"{motion.max_following_error_um:.1f} um"),
+        *_orientation_rows(motion),
+        ("greatest following error", f"{motion.max_following_error_um:.1f} um{turning}"),
         ("greatest voltage", volts_words(motion)),
         ("setpoints SHA-256", motion.setpoints_sha256),
         ("encoders SHA-256", motion.encoders_sha256),
     ]
+
+
+def _orientation_rows(motion: Motion) -> list[tuple[str, str]]:
+    """The greatest errors of the axes behind x, y, z."""
+    if not motion.extra_names:
+        return []
+    every = zip(motion.extra_names, motion.units[3:], motion.max_orientation_error, strict=True)
+    text = ", ".join(f"{name} {1000.0 * most:.3f} m{unit}" for name, unit, most in every)
+    return [("greatest orientation error", text.replace("mmm", "um"))]
 
 
 COMMANDS = {

@@ -57,7 +57,9 @@ def verify(options: Namespace) -> None:
         print_json(_verdict_document(machine, fault) | _document(found, drives_see, noise))
     else:
         print(_verdict(machine, fault))
-        print(_text(found, drives_see, noise))
+        names = pipeline.limits.of_axes(program.axis_count).names
+        axes = [(name, pipeline.limits.unit(k)) for k, name in enumerate(names)]
+        print(_text(found, drives_see, noise, axes))
     if fault is not None:
         raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
     _require_kept(str(options.file), [found])
@@ -171,7 +173,12 @@ def _entry(peak: Peak) -> dict[str, object]:
     }
 
 
-def _text(found: Verification, drives_see: tuple[Sampled, ...], noise: BusNoise) -> str:
+def _text(
+    found: Verification,
+    drives_see: tuple[Sampled, ...],
+    noise: BusNoise,
+    axes: list[tuple[str, str]],
+) -> str:
     lines = [
         f"{'quantity':<24} {'peak':>12} {'at most':>12} {'limit':>10} {'ratio':>8} {'s mm':>10} {'t s':>9}",
         *(_row(peak) for peak in found.peaks),
@@ -187,21 +194,27 @@ def _text(found: Verification, drives_see: tuple[Sampled, ...], noise: BusNoise)
             lines.append(f"  ... {len(found.excesses) - _MOST_LINES} more (--json lists them)")
     else:
         lines.append("nothing beyond a limit")
-    lines += [
-        "",
-        f"{'setpoints of kernel':<24} {'x mm/s^2':>12} {'y mm/s^2':>12} {'x mm/s^3':>12} {'y mm/s^3':>12} "
-        f"{'noise':>10}",
-    ]
-    lines += [
-        f"{one.kernel:<24} {number(one.acceleration_mm_s2[0]):>12} {number(one.acceleration_mm_s2[1]):>12} "
-        f"{number(one.jerk_mm_s3[0]):>12} {number(one.jerk_mm_s3[1]):>12} {number(one.noise_mm_s3):>10}"
-        for one in drives_see
-    ]
+    lines += ["", *_sampled_rows(drives_see, axes)]
     lines.append(
         f"rounding to counts adds up to {number(noise.acceleration_mm_s2)} mm/s^2 and "
         f"{number(noise.jerk_mm_s3)} mm/s^3 on the bus"
     )
     return "\n".join(lines)
+
+
+def _sampled_rows(drives_see: tuple[Sampled, ...], axes: list[tuple[str, str]]) -> list[str]:
+    """The table of setpoints by kernel; `axes` are names and units."""
+    heads = [f"{name} {unit}/s^{order}" for order in (2, 3) for name, unit in axes]
+    rows = [
+        f"{'setpoints of kernel':<24} "
+        + " ".join(f"{one:>12}" for one in heads)
+        + f" {'noise':>10}"
+    ]
+    for one in drives_see:
+        values = (number(value) for value in (*one.acceleration_mm_s2, *one.jerk_mm_s3))
+        cells = " ".join(f"{value:>12}" for value in values)
+        rows.append(f"{one.kernel:<24} {cells} {number(one.noise_mm_s3):>10}")
+    return rows
 
 
 def _row(peak: Peak) -> str:

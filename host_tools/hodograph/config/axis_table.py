@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from ..names import UNITS as UNITS
+from ..names import in_unit as quantity_in_unit
 from .drive_file import Drive, drive_of, load_drive
 from .table import Table
 
 MAX_AXES = 6
-UNITS = ("mm", "deg")
-"""What an axis is measured in: an axis in degrees turns."""
 COUNTS_PER_UNIT_MAX = 2**23
 """The controller's own bound (firmware/app/machine/config.h)."""
 I32_MAX, U32_MAX = 2**31 - 1, 2**32 - 1
@@ -194,7 +194,7 @@ def in_unit(name: str, unit: str) -> str:
     """The key of an axis in this unit that is called `name` in mm."""
     if name.startswith("torque_permille"):
         return name if unit == "mm" else name.removesuffix("m") + "kdeg"
-    return "_".join(unit if word == "mm" else word for word in name.split("_"))
+    return quantity_in_unit(name, unit)
 
 
 def _in_units(names: tuple[str, ...]) -> tuple[str, ...]:

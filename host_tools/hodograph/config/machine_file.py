@@ -95,9 +95,19 @@ class Machine:
 
     @property
     def path_names(self) -> tuple[str, ...]:
-        """Names of the axes that follow a path: x, y in the plane, the machine's own in space."""
+        """What the axes that follow a path are called: x, y in the plane, their own names in space."""
         axes = self.path_axes
         return AXES[:PLANE_AXES] if len(axes) == PLANE_AXES else tuple(axis.name for axis in axes)
+
+    @property
+    def path_counts(self) -> tuple[int, ...]:
+        """Counts of a mm, or of a degree, of the axes that follow a path."""
+        return tuple(axis.counts_per_unit for axis in self.path_axes)
+
+    @property
+    def path_units(self) -> tuple[str, ...]:
+        """Their units, "mm" or "deg"."""
+        return tuple(axis.unit for axis in self.path_axes)
 
     def require_plane(self, what: str) -> tuple[Axis, Axis]:
         """The two axes of a path, for a command that knows no more. Raises InputError: there are more, or one."""

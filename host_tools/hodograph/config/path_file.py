@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Literal
@@ -50,7 +50,10 @@ class PathSpec:
 
 @dataclass(frozen=True, eq=False)
 class SpacePathSpec:
-    """The same in space: points (n, 3) in mm, and directions (3,)."""
+    """The same in space: points (n, 3) in mm, and directions (3,).
+
+    extra  (n, E): the extra axes at the points, in mm, or in degrees where they turn
+    """
 
     closed: bool
     points: NDArray[np.float64]
@@ -59,6 +62,12 @@ class SpacePathSpec:
     start_tangent: NDArray[np.float64] | None
     end_tangent: NDArray[np.float64] | None
     knots: str
+    extra: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def axes(self) -> int:
+        """3, and the extra axes."""
+        return 3 + int(self.extra.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +129,7 @@ def load_path_file(file: Path) -> PathFile:
     machine = root.table("machine", ("file",), required=False)
     path = _path(root.table("path", _PATH))
     feed = _feed(root.table("feed", _FEED)) if root.has("feed") else None
-    axes = 3 if isinstance(path, SpacePathSpec) else 2
+    axes = path.axes if isinstance(path, SpacePathSpec) else 2
     limits = _limits(root.table("limits", _LIMITS, required=False), axes)
     return PathFile(
         file=file,
@@ -147,12 +156,13 @@ def _path(table: Table) -> PathSpec | SpacePathSpec:
     key = "through" if through else "control_points"
     points = table.points(key, limit=COORDINATE_LIMIT_MM)
     if closed:
-        _check_closing(table, key, points)
+        _check_closing(table, key, points[:, :3])
     ends = table.choice("ends", END_NAMES, END_NAMES[0])
     knots = table.choice("knots", KNOT_NAMES, KNOT_NAMES[0])
-    if points.shape[1] == 3:
+    if points.shape[1] > 2:
         start, end = _direction(table, "start_tangent"), _direction(table, "end_tangent")
-        return SpacePathSpec(closed, points, through, ends, start, end, knots)
+        drawn, extra = points[:, :3], points[:, 3:]
+        return SpacePathSpec(closed, drawn, through, ends, start, end, knots, extra)
     return PathSpec(
         closed=closed,
         points=np.asarray(points[:, 0] + 1j * points[:, 1]),

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, one_line
+from ..names import AXES
 
 MAX_FILE_BYTES = 64 * 2**20
 """A configuration file above this size is refused unread (10^5 points take about 4 MB)."""
@@ -212,21 +213,25 @@ class Table:
         return x, y, z
 
     def points(self, key: str, *, limit: float) -> NDArray[np.float64]:
-        """A list of [x, y], or of [x, y, z], as an array (n, 2) or (n, 3), each component within ±`limit`."""
+        """A list of [x, y], of [x, y, z], or of these with one to three extra axes, as an array (n, 2 … 6).
+
+        Each component is within ±`limit`.
+        """
         value = self._get(key, _MISSING, "[[x, y], ...]")
         if not isinstance(value, list) or not value:
             raise self.error(key, f"must be a list [[x, y], ...], but is {_show(value)}")
-        size = 3 if isinstance(value[0], list) and len(value[0]) == 3 else 2
+        first = value[0]
+        size = len(first) if isinstance(first, list) and 2 <= len(first) <= len(AXES) else 2
+        form = f"[{', '.join(AXES[:size])}]" + (" like the first" if size > 2 else "")
         for i, point in enumerate(value):
             if not isinstance(point, list) or len(point) != size:
-                form = "[x, y, z] like the first" if size == 3 else "[x, y]"
                 raise self.error(key, f"point {i} must be {form}, but is {_show(point)}")
-            for coordinate in point:
-                self._check_coordinate(key, i, coordinate, limit, "three" if size == 3 else "two")
+            for axis, coordinate in zip(AXES, point, strict=False):
+                self._check_coordinate(key, i, coordinate, limit, _COUNTS[size], axis in "xyz")
         return np.asarray(value, dtype=np.float64)
 
     def _check_coordinate(
-        self, key: str, i: int, coordinate: Any, limit: float, count: str
+        self, key: str, i: int, coordinate: Any, limit: float, count: str, drawn: bool
     ) -> None:
         if isinstance(coordinate, bool) or not isinstance(coordinate, (int, float)):
             raise self.error(key, f"point {i} holds {_show(coordinate)}: give {count} numbers")
@@ -235,7 +240,8 @@ class Table:
                 key, f"point {i} holds {_show(coordinate)}: give {count} finite numbers"
             )
         if abs(coordinate) > limit:
-            raise self.error(key, f"point {i} holds {coordinate:g}: at most {limit:g} mm from 0")
+            unit = " mm" if drawn else ""
+            raise self.error(key, f"point {i} holds {coordinate:g}: at most {limit:g}{unit} from 0")
 
     def table(self, key: str, known: Collection[str], *, required: bool = True) -> Table:
         """The sub-table `key`; empty when it is absent and not required. Its messages begin with [outer.key]."""

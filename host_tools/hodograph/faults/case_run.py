@@ -72,7 +72,7 @@ def load_clean_run(path: Path) -> CleanRun:
     """The program of a path file; raises InputError, PlanError."""
     pipeline = load_pipeline(path, allow_space=True)
     machine, image = pipeline.machine, pipeline.image
-    _, setpoints = NativeProgram(image).setpoints("fixed", machine.counts_per_mm)
+    _, setpoints = NativeProgram(image).setpoints("fixed", machine.path_counts)
     motion = simulate_on(machine, image, "fixed", keep_rows=False)
     longest_us = max(pipeline.program.stops.worst_us[1:])
     return CleanRun(

@@ -164,7 +164,7 @@ def _bad_setpoints(record: CaseRun, evidence: CaseRecord) -> list[str]:
 
 def _distance_mm(record: CaseRun, points: np.ndarray[tuple[int, int], np.dtype[np.int64]]) -> float:
     program = NativeProgram(record.clean_run.image)
-    rows, nominal = program.setpoints("fixed", record.clean_run.machine.counts_per_mm)
+    rows, nominal = program.setpoints("fixed", record.clean_run.machine.path_counts)
     contour, worst = Contour(program), 0.0
     places = nominal[:, : points.shape[1]].astype(np.float64)
     scale = record.clean_run.machine.counts_per_mm

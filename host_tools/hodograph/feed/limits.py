@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from math import inf, isfinite
 
 from ..errors import InputError
-from ..names import AXES
+from ..names import AXES, in_unit
 from .request import FeedRequest
 
 POLICIES = ("respect", "report")
@@ -53,6 +53,7 @@ class Limit:
     zone    where on the path it applies; None: everywhere
     share   `value` over the value given in the file; below 1 where a reserve is kept
     words   the reason for a limit that no file gives
+    unit    of the axis: "deg" where it turns
     """
 
     key: str
@@ -62,6 +63,7 @@ class Limit:
     zone: FeedZone | None = None
     share: float = 1.0
     words: str = ""
+    unit: str = "mm"
 
     @property
     def given(self) -> float:
@@ -73,24 +75,29 @@ class Limit:
         """The limited quantity: "feed_mm_s", "x_velocity_mm_s", "cap_mm_s" (the feed in a zone)."""
         if self.zone is not None:
             return "cap_mm_s"
-        return self.key if self.axis is None else f"{self.axis}_{self.key}"
+        return self.key if self.axis is None else f"{self.axis}_{self.in_unit}"
+
+    @property
+    def in_unit(self) -> str:
+        """The key in the unit of the axis."""
+        return in_unit(self.key, self.unit)
 
     @property
     def dotted(self) -> str:
         """The same as a plan's JSON has it: "feed_mm_s", "axis.velocity_mm_s.x", "volts.x"."""
-        return self.quantity if self.axis is None else f"{self._table}{self.key}.{self.axis}"
+        return self.quantity if self.axis is None else f"{self._table}{self.in_unit}.{self.axis}"
 
     @property
     def entry(self) -> str:
         """The key in its file: "axis.velocity_mm_s of x"."""
         if self.axis is not None:
-            return f"{self._table}{self.key} of {self.axis}"
+            return f"{self._table}{self.in_unit} of {self.axis}"
         return self._zone + self.key
 
     @property
     def name(self) -> str:
         """The same in notes: "axis x velocity_mm_s"."""
-        return self._zone + self.key if self.axis is None else f"axis {self.axis} {self.key}"
+        return self._zone + self.key if self.axis is None else f"axis {self.axis} {self.in_unit}"
 
     @property
     def reason(self) -> str:
@@ -252,7 +259,7 @@ class Limits:
                         and override keep these limits too (docs/theory/numerics.md section 7)
 
     machine             of the motion of the axes by the machine file: they always bind
-    names               of the axes that follow the path, in its order
+    names, units        of the axes that follow the path, in its order; a unit is "mm" or "deg", () stands for mm
 
     policy "respect": the feed is lowered until the profile keeps all limits; "report": it runs as requested and what
     exceeds is listed, but the machine's limits are kept. Profile "optimal" always keeps them. Raises InputError.
@@ -269,6 +276,7 @@ class Limits:
     reserve: float = LEAST_RESERVE
     machine: AxisLimits = field(default_factory=AxisLimits)
     names: tuple[str, ...] = AXES[:2]
+    units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for table in (self.axis, self.machine):
@@ -303,9 +311,15 @@ class Limits:
             )
         return replace(self, names=AXES[:count])
 
-    def on_machine(self, names: tuple[str, ...], machine: AxisLimits) -> Limits:
-        """The same on a machine with path axes of these names; those that the path file does not know are not limited
-        by it.
+    def unit(self, axis: int) -> str:
+        """Of axis number `axis`."""
+        return self.units[axis] if self.units else "mm"
+
+    def on_machine(
+        self, names: tuple[str, ...], machine: AxisLimits, units: tuple[str, ...] = ()
+    ) -> Limits:
+        """The same on a machine with path axes of these names and units; those that the path file does not know are not
+        limited by it.
         """
         each = (getattr(self.axis, one.name) for one in fields(self.axis))
         own = AxisLimits(
@@ -314,7 +328,7 @@ class Limits:
                 for given in each
             )
         )
-        return replace(self, axis=own, machine=machine, names=names)
+        return replace(self, axis=own, machine=machine, names=names, units=units)
 
     @property
     def bind(self) -> bool:
@@ -334,7 +348,9 @@ class Limits:
     @property
     def of_machine(self) -> Limits:
         """The machine's only."""
-        return Limits(reserve=self.reserve, machine=self.machine, names=self.names)
+        return Limits(
+            reserve=self.reserve, machine=self.machine, names=self.names, units=self.units
+        )
 
     def source(self, name: str, axis: int) -> str:
         """Source of the limit of axis number `axis` that binds: "limits" (path file), "machine", or "drive" (volts)."""
@@ -348,7 +364,15 @@ class Limits:
         each = getattr(self.axes, key) or (inf,) * len(self.names)
         share = 1.0 if key == "velocity_mm_s" else 1.0 - self.reserve
         return tuple(
-            Limit(key, share * value, self.source(key, k) if value < inf else "", name, None, share)
+            Limit(
+                key,
+                share * value,
+                self.source(key, k) if value < inf else "",
+                name,
+                None,
+                share,
+                unit=self.unit(k),
+            )
             for k, (name, value) in enumerate(zip(self.names, each, strict=True))
         )
 

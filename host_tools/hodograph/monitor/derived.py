@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..config import SPACE_AXES
 from ..native import Contour, NativeProgram
 from .decoder import Floats, Samples
 
@@ -44,7 +45,8 @@ class ProgramPath:
         self.name = image[80:112].rstrip(b"\0").decode("utf-8", "replace")
         self.length_mm = int(program.pointer.header.length_q40_mm) / 2**40
         self.duration_s = program.duration_q32_s / 2**32
-        self._arc_mm, self._points_mm = _table(program)
+        self._arc_mm, places = _table(program)
+        self._points_mm, self._extra = places[:, :SPACE_AXES], places[:, SPACE_AXES:]
         self._tangents = _tangents(self._arc_mm, self._points_mm)
         self.axes = self._points_mm.shape[1]
         """That draw the curve: 2 in the plane, 3 in space."""
@@ -56,27 +58,33 @@ class ProgramPath:
         arcs = np.linspace(0.0, self.length_mm, min(DRAWN_POINTS, self._arc_mm.size))
         return self._at(arcs, self._points_mm)
 
-    def contour_errors_um(self, targets: Floats, actual: Floats) -> Floats:
+    def extra_drawing(self) -> tuple[Floats, Floats]:
+        """Arc lengths (n,) in mm and the axes behind x, y, z there (n, A - 3), in mm or degrees."""
+        arcs = np.linspace(0.0, self.length_mm, min(DRAWN_POINTS, self._arc_mm.size))
+        extra = self._at(arcs, self._extra) if self._extra.shape[1] else np.zeros((arcs.size, 0))
+        return arcs, extra
+
+    def contour_errors_um(self, targets: Floats, actual: Floats) -> tuple[Floats, Floats]:
         """Distance of the positions (n, A) from the curve, in um, beside the setpoints (n, A), all in counts; A is
-        `axes`, or more: what is behind them counts for nothing.
+        `axes`, or more: what is behind them counts for nothing. And the arc lengths of the setpoints, in mm.
 
         NaN where the setpoint is not on the curve, or something did not come.
         """
-        errors = np.full(targets.shape[0], np.nan)
+        errors, places = (np.full(targets.shape[0], np.nan) for _ in range(2))
         if targets.shape[1] < self.axes:
-            return errors
+            return errors, places
         targets, actual = targets[:, : self.axes], actual[:, : self.axes]
         there = np.flatnonzero(np.isfinite(targets).all(axis=1) & np.isfinite(actual).all(axis=1))
         if there.size == 0:
-            return errors
+            return errors, places
         set_counts, act_counts = targets[there], actual[there]
         arcs, on_path = self._follow(set_counts)
         self._last_counts = set_counts[-1]
         self._last_mm = float(arcs[-1]) if on_path[-1] else None
         found = self._errors(arcs, act_counts)
         found[~on_path] = np.nan
-        errors[there] = found
-        return errors
+        errors[there], places[there] = found, np.where(on_path, arcs, np.nan)
+        return errors, places
 
     @property
     def arc_length_mm(self) -> float | None:
@@ -127,15 +135,15 @@ class ProgramPath:
 
 
 def _table(program: NativeProgram) -> tuple[Floats, Floats]:
-    """Arc lengths, ascending, and points of a program, at even times."""
+    """Arc lengths, ascending, and all path axes of a program, at even times."""
     count = min(program.ticks, _TABLE_POINTS)
     end_q42 = program.duration_q32_s << 10
     times = np.array([end_q42 * i // (count - 1) for i in range(count)], dtype=np.uint64)
     points = program.points("double", times)
     arcs = points["arc_length_q40_mm"] / 2**40
     fresh = np.concatenate([[True], np.diff(arcs) > 0])
-    xy = points["position_q40"][:, :2] / 2**40
-    return np.asarray(arcs[fresh]), np.asarray(xy[fresh])
+    places = points["position_q40"][:, : program.axis_count] / 2**40
+    return np.asarray(arcs[fresh]), np.asarray(places[fresh])
 
 
 def _tangents(arcs: Floats, points: Floats) -> Floats:
@@ -166,6 +174,7 @@ class Rows:
     jerk_mm_s3: Floats
     contour_um: Floats  # NaN off the program's path
     following_um: Floats  # (n, axes)
+    arc_mm: Floats  # of the setpoint, NaN off the program's path
 
     @property
     def count(self) -> int:
@@ -230,9 +239,9 @@ class Derivation:
     def _rows(self, first: int, last: int, path: ProgramPath | None) -> Rows:
         targets = self._targets[first:last]
         actual = self._actual[first + REACHED_AFTER : last + REACHED_AFTER]
-        contour = np.full(last - first, np.nan)
+        contour, arc_mm = (np.full(last - first, np.nan) for _ in range(2))
         if path is not None and last > first:
-            contour = path.contour_errors_um(targets, actual)
+            contour, arc_mm = path.contour_errors_um(targets, actual)
         feed, acceleration, jerk = self._motion(first, last)
         return Rows(
             t_s=np.asarray(self._sync[first:last] * self._dt_s, dtype=np.float64),
@@ -243,6 +252,7 @@ class Derivation:
             jerk_mm_s3=jerk,
             contour_um=contour,
             following_um=(targets - actual) * (1000.0 / self._counts_per_unit),
+            arc_mm=arc_mm,
         )
 
     def _motion(self, first: int, last: int) -> tuple[Floats, Floats, Floats]:

@@ -54,7 +54,9 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
 
 
 def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
-    """The program's curve to draw, in space with z; `note` says why there is none, or what is odd about it."""
+    """The program's curve to draw, in space with z, and axes behind z over arc length; `note` says why there is none, or
+    what is odd about it.
+    """
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}
     if path is not None:
         points = path.drawing()
@@ -65,14 +67,20 @@ def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
             "duration_s": path.duration_s,
             "crc32": path.crc32,
         }
+        arcs, extra = path.extra_drawing()
+        if extra.shape[1]:
+            message |= {
+                "arc": numbers(arcs, 3),
+                "extra": [numbers(column, 4) for column in extra.T],
+            }
     return message
 
 
 def rows_message(
-    rows: Rows, period_s: float, age_ms: float | None, drawn: int = 2
+    rows: Rows, period_s: float, age_ms: float | None, drawn: int = 2, path_axes: int = 0
 ) -> dict[str, Any]:
     """The rows of one look, decimated. `age_ms`: how old the newest frame in it is. `drawn`: how many axes draw the
-    path, whose positions the points have.
+    path, whose positions the points have; further axes of the `path_axes` have theirs with the arc length.
     """
     starts = group_starts(rows.count, round(GROUP_S / period_s), MOST_GROUPS)
     message: dict[str, Any] = {
@@ -88,6 +96,12 @@ def rows_message(
     if rows.cmd_mm.shape[1] >= 2:
         message["cmd"] = [numbers(column, 5) for column in rows.cmd_mm[points, :drawn].T]
         message["act"] = [numbers(column, 5) for column in rows.act_mm[points, :drawn].T]
+    if path_axes > drawn:
+        message["arc"] = numbers(rows.arc_mm[points], 3)
+        message["extra"] = [
+            [numbers(column, 4) for column in values[points, drawn:path_axes].T]
+            for values in (rows.cmd_mm, rows.act_mm)
+        ]
     return message
 
 

@@ -48,6 +48,8 @@ class Layout:
     bitrate: int
     limits: StepLimits | None = None
     """Of setpoints; None: nobody says what they are."""
+    path_axes: int = 2
+    """How many of the axes follow a path."""
 
 
 @dataclass
@@ -163,7 +165,13 @@ class Pump:
         if rows.count:
             age_ms = None if taken.now_us is None else (taken.now_us - newest_us) / 1000
             self._publish(
-                rows_message(rows, self._layout.period_us / 1e6, age_ms, self._layout.drawn)
+                rows_message(
+                    rows,
+                    self._layout.period_us / 1e6,
+                    age_ms,
+                    self._layout.drawn,
+                    self._layout.path_axes,
+                )
             )
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S

@@ -169,6 +169,7 @@ class LivePage:
             "nodes": list(self._layout.nodes),
             "units": list(self._layout.units),
             "drawn": self._layout.drawn,
+            "path_axes": self._layout.path_axes,
             "period_us": self._layout.period_us,
             "loopback": is_loopback(self._place.host),
         }

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .library import library
-from .program import NativeProgram
+from .program import Counts, NativeProgram, counts_by_axis
 
 
 class Contour:
@@ -18,6 +18,7 @@ class Contour:
         ffi, lib = library()
         program.require()
         self._segments = ffi.new("struct contour_segment[]", program.segment_count)
+        self._program = program
         self.pointer = ffi.new("struct contour *")
         lib.contour_begin(self.pointer, program.pointer, self._segments)
 
@@ -36,7 +37,7 @@ class Contour:
     ) -> NDArray[np.float64]:
         """Contour errors in um, (n,), of encoder positions (n, A) beside commanded arc lengths (n,).
 
-        A is 2 in the plane and at least 3 in space; what is behind z counts for nothing.
+        A is 2 in the plane and at least 3 in space; what is behind z counts for nothing (`extra_errors`).
         """
         ffi, lib = library()
         arc = np.ascontiguousarray(arc_length_q40_mm, dtype=np.int64)
@@ -58,4 +59,33 @@ class Contour:
             counts_per_mm,
             ffi.from_buffer("double[]", errors),
         )
+        return errors
+
+    def extra_errors(
+        self,
+        arc_length_q40_mm: NDArray[np.int64],
+        act_counts: NDArray[np.int32],
+        counts_per_mm: Counts,
+    ) -> NDArray[np.float64]:
+        """How far the extra axes are from where the curve has them beside the point nearest to the tool.
+
+        (n, A - 3), actual less exact, in mm or degrees; arguments as above, with the counts of all axes.
+        """
+        ffi, lib = library()
+        axes = self._program.axis_count
+        arc = np.ascontiguousarray(arc_length_q40_mm, dtype=np.int64)
+        act = np.ascontiguousarray(act_counts, dtype=np.int32)
+        if act.shape != (arc.size, axes):
+            raise ValueError(f"act_counts has shape {act.shape}, not ({arc.size}, {axes})")
+        errors = np.zeros((arc.size, max(axes - 3, 0)))
+        if errors.size:
+            lib.contour_extra_errors(
+                self.pointer,
+                self._program.pointer,
+                arc.size,
+                ffi.from_buffer("int64_t[]", arc),
+                ffi.from_buffer("int32_t[]", act),
+                counts_by_axis(counts_per_mm, axes),
+                ffi.from_buffer("double[]", errors),
+            )
         return errors

@@ -129,6 +129,9 @@ double contour_distance_mm(struct contour *contour, double arc_length_mm, const 
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
                        const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,
                        double *errors_um);
+void contour_extra_errors(struct contour *contour, const struct program *program, uint32_t n,
+                          const int64_t *arc_length_q40_mm, const int32_t *act_counts,
+                          const uint32_t *counts_per_unit, double *errors);
 
 /* offline/offline_fault.h */
 enum offline_fault_kind {

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import HodographError, InputError
 from .drive import drive_config
 from .library import library, text
-from .program import AXES, NativeProgram
+from .program import AXES, Counts, NativeProgram, counts_by_axis
 
 if TYPE_CHECKING:
     from ..config.axis_table import Feedforward
@@ -93,12 +93,14 @@ class OfflineSimulation:
         program: NativeProgram,
         kernel: str,
         drives: Sequence[Drive],
-        counts_per_mm: int,
+        counts_per_mm: Counts,
         feedforward: Sequence[Feedforward] | None = None,
         faults: Sequence[OfflineFault] = (),
         orders: Sequence[OfflineOrder] = (),
     ) -> None:
         """Set up, with the controller's feedforward (None: none), faults, and orders by ascending tick.
+
+        counts_per_mm  of all axes, or of each (of a degree where it turns)
 
         Raises InputError: unknown kernel, figures out of range, program not acceptable.
         """
@@ -107,7 +109,11 @@ class OfflineSimulation:
         self._program = program  # keeps the image alive
         self._segments = ffi.new("struct contour_segment[]", program.segment_count)
         self._rig = ffi.new("struct offline *")
-        configs = [drive_config(drive, counts_per_mm, program.period_us) for drive in drives]
+        counts = counts_by_axis(counts_per_mm, len(drives))
+        configs = [
+            drive_config(drive, own, program.period_us)
+            for drive, own in zip(drives, counts, strict=True)
+        ]
         error = lib.offline_begin(
             self._rig,
             prepared,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,9 @@ from .library import library, text
 
 AXES = 6
 """Greatest number of path axes, PROGRAM_AXES of core/program.h."""
+
+Counts = int | Sequence[int]
+"""Counts of a mm, the same for all axes, or of each axis (for one that turns, of a degree)."""
 
 POINT = np.dtype(
     [
@@ -188,9 +192,12 @@ class NativeProgram:
         return points
 
     def setpoints(
-        self, kernel: str, counts_per_mm: int, tick0: int = 0, count: int | None = None
+        self, kernel: str, counts_per_mm: Counts, tick0: int = 0, count: int | None = None
     ) -> tuple[NDArray[np.void], NDArray[np.int32]]:
-        """Points (n,) of POINT and setpoints in counts (n, axis_count) of `count` ticks from `tick0` on."""
+        """Points (n,) of POINT and setpoints in counts (n, axis_count) of `count` ticks from `tick0` on.
+
+        `counts_per_mm`: of all axes, or of each; for an axis that turns those of a degree.
+        """
         points = self.points(kernel, self.tick_times_q42_s(tick0, count))
         return points, counts_from_q40_mm(
             points["position_q40"][:, : self.axis_count], counts_per_mm
@@ -205,9 +212,27 @@ def limits_fields(given: NativeLimits) -> dict[str, object]:
     return fields
 
 
-def counts_from_q40_mm(q40_mm: NDArray[np.int64], counts_per_mm: int) -> NDArray[np.int32]:
-    """Bus counts of positions in mm * 2^40, any shape: round half up, saturated (core/counts.h)."""
+def counts_by_axis(counts_per_mm: Counts, axes: int) -> tuple[int, ...]:
+    """Counts of a mm, or of a degree, of each of so many axes. Raises InputError: they are for other axes."""
+    if isinstance(counts_per_mm, int):
+        return (counts_per_mm,) * axes
+    if len(counts_per_mm) != axes:
+        raise InputError(f"counts of {len(counts_per_mm)} axes are given, the program has {axes}")
+    return tuple(counts_per_mm)
+
+
+def counts_from_q40_mm(q40_mm: NDArray[np.int64], counts_per_mm: Counts) -> NDArray[np.int32]:
+    """Bus counts of positions in mm * 2^40, any shape: round half up, saturated (core/counts.h).
+
+    With counts for each axis the axis is the last index.
+    """
     ffi, lib = library()
+    if not isinstance(counts_per_mm, int):
+        each = counts_by_axis(counts_per_mm, q40_mm.shape[-1])
+        if len(set(each)) == 1:
+            return counts_from_q40_mm(q40_mm, each[0])
+        columns = [counts_from_q40_mm(q40_mm[..., k], one) for k, one in enumerate(each)]
+        return np.stack(columns, axis=-1)
     source = np.ascontiguousarray(q40_mm, dtype=np.int64)
     counts = np.empty(source.shape, dtype=np.int32)
     lib.offline_counts(

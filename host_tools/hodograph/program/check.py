@@ -100,6 +100,8 @@ JOIN_WAY = wide(WAY_SCALE << (88 - 34))
 CLOSE_WAY = wide(WAY_SCALE << (88 - 24))
 LONGEST_WAY = wide(32 * WAY_SCALE << 88)
 DIRECTION_RAD = 2.0**-20
+SLOPE = 2.0**-20
+CLOSE_Q40 = 1 << 16
 TRAVEL_SLACK_Q40 = 2.0**16
 """A path may run along a travel limit: 2^-24 mm of rounding are allowed."""
 
@@ -138,7 +140,7 @@ def segment_faults(
     backwards = program.start_q40[1:] <= program.start_q40[:-1]
     out: list[Rule] = [
         (_bool(_beyond(program.a_q44, limit).any(axis=(0, 2))), 0, code.W_RANGE),
-        (_bool(_beyond(drawn, POINT_LIMIT_Q40).any(axis=0)), 0, code.POINT_RANGE),
+        (_bool(_beyond(program.point_q40, POINT_LIMIT_Q40).any(axis=0)), 0, code.POINT_RANGE),
         (outside, 0, code.ARC_RANGE),
         (_any(one <= wide(0) for one in sigma), 0, code.SIGMA),
         (_any(~(a <= b.doubled()) for a in sigma for b in sigma), 0, code.SIGMA_RATIO),
@@ -149,9 +151,9 @@ def segment_faults(
     return [
         *out,
         (_bool(program.start_q40[:1] != 0), 0, code.SEGMENT_FIRST),
-        (_any(apart), 1, code.JOIN_POINT),
+        (_any([*apart, _extras_apart(program)]), 1, code.JOIN_POINT),
         (_bool(_apart(program.start_q40, ways[-1]) | backwards), 1, code.JOIN_ARC),
-        (_turned(program.a_q44), 1, code.JOIN_DIRECTION),
+        (_bool(_turned(program.a_q44) | _other_slopes(program)), 1, code.JOIN_DIRECTION),
     ]
 
 
@@ -165,6 +167,8 @@ def end_faults(program: Program, ways: tuple[Wide, ...]) -> list[Rule]:
         _apart(np.array([0, way]), own[last:], CLOSE_WAY)[0]
         for way, own in zip(away, ways[:-1], strict=False)
     ]
+    extra_end = program.extra_q40[:, last, 4] if program.extra_q40.size else away[:0]
+    open_end += list(np.abs(extra_end - away[len(away) - len(extra_end) :]) > CLOSE_Q40)
     return [
         (np.array([off]), last, ProgramError.SEGMENT_END),
         (np.array([program.closed and any(open_end)]), last, ProgramError.NOT_CLOSED),
@@ -213,6 +217,29 @@ def _turned(a_q44: Int) -> Bool:
     before, after = (polar(one.T, one.T) for one in (end * 2.0**-44, start * 2.0**-44))
     across = np.linalg.norm(np.cross(before, after), axis=1)
     return np.asarray(np.arctan2(across, np.sum(before * after, axis=1)) > DIRECTION_RAD)
+
+
+def _extras_apart(program: Program) -> Bool:
+    """Extra axes do not go on at the joints where they were."""
+    if not program.extra_q40.size:
+        return np.zeros(program.segment_count - 1, dtype=np.bool_)
+    start = program.point_q40[-len(program.extra_q40) :]
+    gap = program.extra_q40[:, :-1, 4] - np.diff(start, axis=1)
+    return _bool((np.abs(gap) > JOIN_Q40).any(axis=0))
+
+
+def _other_slopes(program: Program) -> Bool:
+    """Extra axes go on at the joints with another slope by arc length."""
+    if not program.extra_q40.size:
+        return np.zeros(program.segment_count - 1, dtype=np.bool_)
+    a = np.ldexp(program.a_q44.astype(np.float64), -44)
+    per_end, per_start = (
+        5.0 / np.sum(a[:, part, k] ** 2, axis=0) for part, k in ((np.s_[:-1], 2), (np.s_[1:], 0))
+    )
+    b = np.ldexp(program.extra_q40.astype(np.float64), -40)
+    last = (b[:, :-1, 4] - b[:, :-1, 3]) * per_end
+    most = SLOPE * (1.0 + np.abs(last)) + 2.0**-38 * (per_end + per_start)
+    return _bool((np.abs(b[:, 1:, 0] * per_start - last) > most).any(axis=0))
 
 
 def boxes_q40(program: Program) -> tuple[Real, Real]:

@@ -111,6 +111,7 @@ def compile_path(
         a_q44=geometry.a_q44,
         pieces=pieces,
         stops=no_stops(len(pieces)),
+        extra_q40=geometry.extra_q40,
     )
     program = plan_stops(program, plan, options.stops)
     fault = check(program, options.limits)

@@ -66,6 +66,7 @@ class Geometry:
     start_q40: Int  # (N + 1,), the last is the length
     point_q40: Int  # (A, N)
     a_q44: Int  # (2, N, 3) or (4, N, 3)
+    extra_q40: Int  # (A - 3, N, 5), (0, 0, 5) in the plane
     drift_mm: float
 
 
@@ -76,9 +77,9 @@ def quantise(path: PHSpline | SpatialPHSpline, offset_mm: Sequence[float] = ()) 
     """
     spline = path.split(LONGEST_SEGMENT_MM, 2.0)
     origin, preimage = _real(spline)
-    offset = np.asarray(offset_mm if len(offset_mm) else np.zeros(len(origin)), dtype=np.float64)
-    far = np.linalg.norm(np.column_stack((origin, offset)), axis=0)
-    if not np.all(far < 8192.0):
+    offset = np.asarray(offset_mm if len(offset_mm) else np.zeros(spline.axes), dtype=np.float64)
+    far = np.linalg.norm(np.column_stack((origin, offset[: len(origin)])), axis=0)
+    if not (np.all(far < 8192.0) and np.all(np.abs(offset) < 8192.0)):
         raise InputError("path or work offset: a coordinate is beyond the 4096 mm of the format")
     if np.abs(preimage).max(initial=0.0) >= 2.0**6:
         raise InputError("path: a segment is too long for the format")
@@ -86,10 +87,15 @@ def quantise(path: PHSpline | SpatialPHSpline, offset_mm: Sequence[float] = ()) 
     *ways, along = (way_to_q40(way.sums()) for way in segment_ways(a_q44))
     columns = [
         _anchored(way[:-1], ideal, by)
-        for way, ideal, by in zip(ways, origin, offset.tolist(), strict=True)
+        for way, ideal, by in zip(ways, origin, offset[: len(ways)].tolist(), strict=True)
     ]
     drift = np.linalg.norm([apart for _, apart in columns], axis=0)
-    return Geometry(along, np.stack([point for point, _ in columns]), a_q44, float(drift.max()))
+    points = np.stack([point for point, _ in columns])
+    extra = np.zeros((0, 0, 5), dtype=np.int64)
+    if isinstance(spline, SpatialPHSpline):
+        start, extra = _extra(spline, offset[len(columns) :])
+        points = np.concatenate((points, start))
+    return Geometry(along, points, a_q44, extra, float(drift.max()))
 
 
 def _real(spline: PHSpline | SpatialPHSpline) -> tuple[Real, Real]:
@@ -98,6 +104,27 @@ def _real(spline: PHSpline | SpatialPHSpline) -> tuple[Real, Real]:
         origin, w = spline.origin, spline.w
         return np.stack((origin.real, origin.imag)), np.stack((w.real, w.imag))
     return spline.origin.T, np.moveaxis(spline.preimage, 1, 0)
+
+
+def _extra(spline: SpatialPHSpline, offset: Real) -> tuple[Int, Int]:
+    """Start points (E, N) of the extra axes, and their Bezier coefficients 1 … 5 (E, N, 5) from there.
+
+    A segment ends exactly where the next one starts. Raises InputError: an axis is beyond the format.
+    """
+    count = spline.extra_axes
+    if not count:
+        return np.zeros((0, spline.segment_count), dtype=np.int64), np.zeros(
+            (0, spline.segment_count, 5), dtype=np.int64
+        )
+    bezier = np.moveaxis(spline.extra, 1, 0)
+    if not np.all(np.abs(bezier) < 8192.0):
+        raise InputError("path: an extra axis is beyond the 4096 mm or degrees of the format")
+    b_q40 = np.rint(bezier * 2.0**40).astype(np.int64)
+    b_q40[:, :-1, 5] = b_q40[:, 1:, 0]
+    if spline.closed:
+        b_q40[:, -1, 5] = b_q40[:, 0, 0]
+    shift = np.rint(offset * 2.0**40).astype(np.int64)
+    return b_q40[:, :, 0] + shift[:, None], b_q40[:, :, 1:] - b_q40[:, :, :1]
 
 
 def _anchored(way_q40: Int, ideal_mm: Real, offset_mm: float) -> tuple[Int, Real]:

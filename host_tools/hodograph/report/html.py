@@ -17,7 +17,7 @@ from .feed_figures import feed_figure, search_figure
 from .page import Figure, file_name, render, write_page
 from .path_figures import joint_figure, polygon_figure
 from .run_figures import contour_figure, drive_figure
-from .space_figures import space_contour_figure, space_path_figure
+from .space_figures import extra_axes_figure, space_contour_figure, space_path_figure
 from .style import styled
 
 Case = tuple[Pipeline, Motion, BusRun | None]
@@ -121,7 +121,14 @@ def _space_run(pipeline: Pipeline, motion: Motion, source: str) -> list[Figure]:
         "Commanded and actual path in an isometric view and three projections, and the contour error along the run, "
         f"{source}."
     )
-    return [Figure("contour", caption, space_contour_figure(pipeline, motion))]
+    figures = [Figure("contour", caption, space_contour_figure(pipeline, motion))]
+    if motion.extra_names:
+        caption = (
+            "The axes behind x, y, z over arc length; and how far they are from where the curve has them beside the "
+            f"point nearest to the tool, {source}."
+        )
+        figures.append(Figure("axes", caption, extra_axes_figure(pipeline, motion)))
+    return figures
 
 
 def _misses(run: BusRun | None) -> str:
@@ -172,6 +179,7 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
             "ticks": str(motion.ticks),
             "kernel": motion.kernel,
             "greatest contour error, µm": f"{motion.max_contour_error_um:.3f}",
+            **_orientation(cases, motion),
             "greatest following error, µm": f"{motion.max_following_error_um:.1f}",
             "greatest voltage, V": "–" if motion.max_volts is None else f"{motion.max_volts:.3f}",
             "bus": run.bus if run is not None else "none (simulated)",
@@ -185,6 +193,17 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
         for name, value in values.items():
             rows.setdefault(name, []).append(value)
     return list(rows.items())
+
+
+def _orientation(cases: Sequence[Case], motion: Motion) -> dict[str, str]:
+    """A row for the axes behind x, y, z, where one of the cases has such."""
+    if not any(one.extra_names for _, one, _ in cases):
+        return {}
+    every = zip(motion.extra_names, motion.units[3:], motion.max_orientation_error, strict=True)
+    texts = [
+        f"{name} {1000 * most:.3f} {'µm' if unit == 'mm' else 'mdeg'}" for name, unit, most in every
+    ]
+    return {"greatest orientation error": ", ".join(texts) or "–"}
 
 
 _SIDES = ("paper", "ours", "ours_1ms")

@@ -111,7 +111,8 @@ def drive_figure(pipeline: Pipeline, motion: Motion) -> bytes:
     if limits and (motion.max_volts or 0.0) > 0.5 * (limit := min(limits)):
         for sign in (-1, 1):
             volts.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
-    following.set_ylabel("setpoint - position, µm")
+    turning = any(axis.turns for axis in path_axes)
+    following.set_ylabel(f"setpoint - position, µm{', mdeg' if turning else ''}")
     volts.set_ylabel("drive voltage, V")
     volts.set_xlabel("time, s")
     following.set_title(f"{pipeline.file.name}: following error and voltage of the axes")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures of a path in space: the curve with its given points, and a run from four sides."""
+"""Figures of a path in space: the curve with its given points, a run from four sides, and the axes behind x, y, z."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
+from ..config import SpacePathSpec
 from ..pipeline import Pipeline
 from ..simulate import Motion
 from ..spline.spatial import SpatialPHSpline
@@ -69,6 +70,35 @@ def space_contour_figure(pipeline: Pipeline, motion: Motion) -> bytes:
         axes.plot(*at[:, None], "o", color=RED, markersize=7, fillstyle="none", label="worst place")
     views[1][0].legend(loc="best")
     error_axes(figure.add_subplot(grid[2, :]), motion, worst)
+    return png(figure)
+
+
+def extra_axes_figure(pipeline: Pipeline, motion: Motion) -> bytes:
+    """The axes behind x, y, z over arc length, with their given points, and their distance from it in the run."""
+    spline, given = pipeline.curve, pipeline.file.given_path
+    assert isinstance(spline, SpatialPHSpline)
+    s_mm = np.linspace(0.0, spline.length_mm, _SAMPLES)
+    exact = spline.extra_point(s_mm)
+    count = spline.extra_axes
+    figure, grid = pyplot.subplots(count, 2, figsize=(9.6, 2.4 * count), squeeze=False)
+    names = zip(motion.extra_names, motion.units[3:], strict=True)
+    for k, (name, unit) in enumerate(names):
+        place, error = grid[k]
+        place.plot(s_mm, exact[:, k], color=BLUE, label="axis")
+        if isinstance(given, SpacePathSpec) and given.through and k < given.extra.shape[1]:
+            nodes = spline.segment_starts_mm[: len(given.extra)]
+            points = given.extra[: len(nodes), k]
+            place.plot(nodes, points, "o", color=ORANGE, markersize=4, label="given points")
+        place.set_ylabel(f"{name}, {unit}")
+        error.plot(motion.arc_length_mm, 1000.0 * motion.orientation_error[:, k], color=RED)
+        error.set_ylabel("actual - exact, " + ("µm" if unit == "mm" else f"m{unit}"))
+    grid[0, 0].legend(loc="best")
+    grid[0, 0].set_title("Axes that follow the path")
+    grid[0, 1].set_title("Orientation error beside the tool")
+    for axes in grid[-1]:
+        axes.set_xlabel("arc length, mm")
+    for axes in grid.ravel():
+        axes.margins(x=0)
     return png(figure)
 
 

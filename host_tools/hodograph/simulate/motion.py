@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..names import AXES
+from ..native.contour import Contour
+from ..native.program import Counts, counts_by_axis
 
 SETTLING_S = 0.2
 """Time after the last tick that maxima count, hashes and traces do not (docs/reference/protocol.md section 2)."""
@@ -34,11 +37,15 @@ class Motion:
     x, y (…) of the program's ticks. The following error
     is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
     the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not tell their volts.
+
+    `units`, `counts_per_unit` by axis. An axis that turns has degrees where names say mm, and thousandths of a degree
+    where they say um; the greatest following error is that of the axes in mm. Axes behind x, y, z have an orientation
+    error: how far they are from where the curve has them beside the point nearest to the tool.
     """
 
     kernel: str
     period_us: int
-    counts_per_mm: int
+    counts_per_unit: tuple[int, ...]
     ticks: int
     rows: NDArray[np.void]
     setpoints_sha256: str
@@ -48,12 +55,35 @@ class Motion:
     max_following_error_um: float
     max_volts: float | None
     names: tuple[str, ...] = AXES[:2]
+    units: tuple[str, ...] = ("mm", "mm")
+    orientation_error: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    """(n, A - 3), actual less exact, in mm or degrees."""
+    max_orientation_error: tuple[float, ...] = ()
+    """Of each axis behind x, y, z, in mm or degrees."""
+    max_following_error_mdeg: float | None = None
+    """Of the axes that turn; None: there is none."""
+
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """The axes behind x, y, z."""
+        return self.names[3:]
+
+    @property
+    def _counts(self) -> NDArray[np.int64]:
+        return np.asarray(self.counts_per_unit, dtype=np.int64)
 
     def _by_axis(self, field: str) -> NDArray[Any]:
         return self.rows[field][:, : len(self.names)]
 
     def summary(self) -> dict[str, object]:
         """The keys that tools may rely on in `--json` output."""
+        extra: dict[str, object] = {}
+        if self.max_following_error_mdeg is not None:
+            extra["max_following_error_mdeg"] = self.max_following_error_mdeg
+        for name, unit, error in zip(
+            self.extra_names, self.units[3:], self.max_orientation_error, strict=True
+        ):
+            extra[f"{name}_max_error_{unit}"] = error
         return {
             "ticks": self.ticks,
             "setpoints_sha256": self.setpoints_sha256,
@@ -62,6 +92,7 @@ class Motion:
             "max_following_error_um": self.max_following_error_um,
             "max_volts": self.max_volts,
             "kernel": self.kernel,
+            **extra,
         }
 
     @property
@@ -97,7 +128,7 @@ class Motion:
     @property
     def set_mm(self) -> NDArray[np.float64]:
         """Setpoint as it goes over the bus, mm, (n, A)."""
-        return self.set_counts / self.counts_per_mm
+        return self.set_counts / self._counts
 
     @property
     def set_counts(self) -> NDArray[np.int32]:
@@ -107,13 +138,13 @@ class Motion:
     @property
     def act_mm(self) -> NDArray[np.float64]:
         """Encoder position, mm, (n, A)."""
-        return self._by_axis("act_counts") / self.counts_per_mm
+        return np.asarray(self._by_axis("act_counts") / self._counts)
 
     @property
     def following_error_um(self) -> NDArray[np.float64]:
-        """Setpoint less position, by axis, um, (n, A)."""
+        """Setpoint less position, by axis, um, or thousandths of a degree, (n, A)."""
         difference = self.set_counts.astype(np.int64) - self._by_axis("act_counts")
-        return np.asarray(difference * (1000.0 / self.counts_per_mm))
+        return np.asarray(difference * (1000.0 / self._counts))
 
     @property
     def contour_error_um(self) -> NDArray[np.float64]:
@@ -129,17 +160,32 @@ class Motion:
 class Tally:
     """Gathers hashes and maxima, chunk by chunk, so that a run of any length needs bounded memory."""
 
-    def __init__(self, ticks: int, counts_per_mm: int, names: tuple[str, ...] = AXES[:2]) -> None:
-        """Of a program with `ticks` ticks and these axes; what is added beyond the ticks counts as settling."""
+    def __init__(
+        self,
+        ticks: int,
+        counts_per_mm: Counts,
+        names: tuple[str, ...] = AXES[:2],
+        units: Sequence[str] | None = None,
+        contour: Contour | None = None,
+    ) -> None:
+        """Of a program with `ticks` ticks and these axes; what is added beyond the ticks counts as settling.
+
+        units    of the axes (default mm)
+        contour  of a program with axes behind x, y, z; None: it has none
+        """
         self._left = ticks
         self._names = names
-        self._um_per_count = 1000.0 / counts_per_mm
+        self._units = ("mm",) * len(names) if units is None else tuple(units)
+        self._counts = counts_by_axis(counts_per_mm, len(names))
+        self._contour = contour
+        self._orientation: list[NDArray[np.float64]] = []
+        self._max_orientation = np.zeros(max(len(names) - 3, 0))
         self._setpoints = hashlib.sha256()
         self._encoders = hashlib.sha256()
         self._contour_um = 0.0
         self._contour_um2 = 0.0
         self._rows = 0
-        self._following_counts = 0
+        self._following_counts = np.zeros(len(names), dtype=np.int64)
         self._volts_mv = 0
 
     def add(self, rows: NDArray[np.void]) -> None:
@@ -152,7 +198,13 @@ class Tally:
         if rows.size == 0:
             return
         behind = np.abs(rows["set_counts"][path].astype(np.int64) - rows["act_counts"][path])
-        self._following_counts = max(self._following_counts, int(behind.max()))
+        self._following_counts = np.maximum(self._following_counts, behind.max(axis=0))
+        if self._contour is not None:
+            error = self._contour.extra_errors(
+                rows["arc_length_q40_mm"], rows["act_counts"][path], self._counts
+            )
+            self._max_orientation = np.maximum(self._max_orientation, np.abs(error).max(axis=0))
+            self._orientation.append(error)
         self._contour_um = max(self._contour_um, float(rows["contour_error_um"].max()))
         contour_um = counted["contour_error_um"]
         self._contour_um2 += math.fsum(
@@ -163,21 +215,30 @@ class Tally:
             self._volts_mv, int(np.abs(rows["volts_mv"][path].astype(np.int32)).max())
         )
 
-    def motion(
-        self, *, kernel: str, period_us: int, counts_per_mm: int, ticks: int, rows: NDArray[np.void]
-    ) -> Motion:
+    def _greatest_following(self, unit: str) -> float | None:
+        """In thousandths of the unit, of the axes that have it; None: there is none."""
+        every = zip(self._following_counts.tolist(), self._counts, self._units, strict=True)
+        return max((most * (1000.0 / own) for most, own, its in every if its == unit), default=None)
+
+    def motion(self, *, kernel: str, period_us: int, ticks: int, rows: NDArray[np.void]) -> Motion:
         """The result, with `rows` as they were kept."""
+        kept = self._orientation if rows.size else []
+        error = np.concatenate(kept) if kept else np.zeros((rows.size, self._max_orientation.size))
         return Motion(
             kernel=kernel,
             period_us=period_us,
-            counts_per_mm=counts_per_mm,
+            counts_per_unit=self._counts,
             ticks=ticks,
             rows=rows,
             setpoints_sha256=self._setpoints.hexdigest(),
             encoders_sha256=self._encoders.hexdigest(),
             max_contour_error_um=self._contour_um,
             rms_contour_error_um=math.sqrt(self._contour_um2 / max(self._rows, 1)),
-            max_following_error_um=self._following_counts * self._um_per_count,
+            max_following_error_um=self._greatest_following("mm") or 0.0,
             max_volts=self._volts_mv / 1000.0,
             names=self._names,
+            units=self._units,
+            orientation_error=error,
+            max_orientation_error=tuple(self._max_orientation.tolist()),
+            max_following_error_mdeg=self._greatest_following("deg"),
         )

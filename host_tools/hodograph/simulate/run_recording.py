@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from ..errors import RunError
 from ..names import AXES
 from ..native import ROW, Contour, NativeProgram
-from .motion import Motion, Tally, settling_ticks
+from ..native.program import Counts, counts_by_axis
+from .motion import Motion, settling_ticks
+from .simulation import make_tally
 
 
 def analyse(
@@ -21,14 +23,15 @@ def analyse(
     volts_mv: NDArray[np.int16],
     *,
     kernel: str,
-    counts_per_mm: int = 1_000_000,
+    counts_per_mm: Counts = 1_000_000,
     names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
 ) -> Motion:
     """The `Motion` of a recording, as `simulate` gives it.
 
-    All three arrays are (n, A), by axis (`names`, default x, y, …); row k holds setpoint k and what the drives
-    reported for SYNC k+2, n being the program's ticks and 0.2 s of settling (`settling_ticks`). The commanded points
-    are computed again by the kernel that the controller used, and compared with the setpoints.
+    All three arrays are (n, A), by axis (`names` and `units`, default x, y, … in mm); row k holds setpoint k and what
+    the drives reported for SYNC k+2, n being the program's ticks and 0.2 s of settling (`settling_ticks`). The
+    commanded points are computed again by the kernel that the controller used, and compared with the setpoints.
 
     Raises RunError when rows are missing or a setpoint is not the kernel's, InputError for a bad image.
     """
@@ -49,14 +52,13 @@ def analyse(
     rows["volts_mv"][:, :axes] = volts_mv[:wanted]
     rows["tick"] = np.arange(wanted)
     rows["contour_error_um"] = Contour(program).errors_um(
-        rows["arc_length_q40_mm"], act_counts[:wanted], counts_per_mm
+        rows["arc_length_q40_mm"], act_counts[:wanted], counts_by_axis(counts_per_mm, axes)[0]
     )
-    tally = Tally(program.ticks, counts_per_mm, tuple(names or AXES[:axes]))
+    tally = make_tally(program, counts_per_mm, tuple(names or AXES[:axes]), units)
     tally.add(rows)
     return tally.motion(
         kernel=kernel,
         period_us=program.period_us,
-        counts_per_mm=counts_per_mm,
         ticks=program.ticks,
         rows=rows,
     )

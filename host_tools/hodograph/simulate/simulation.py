@@ -12,7 +12,8 @@ from ..config.drive_file import Drive
 from ..config.machine_file import Machine
 from ..errors import InputError
 from ..names import AXES
-from ..native import ROW, NativeProgram, OfflineFault, OfflineSimulation
+from ..native import ROW, Contour, NativeProgram, OfflineFault, OfflineSimulation
+from ..native.program import Counts
 from .motion import Motion, Tally, settling_ticks
 
 CHUNK_TICKS = 16384
@@ -29,30 +30,45 @@ def names_of_driven(
     return AXES[:count] if names is None else tuple(names)
 
 
+def make_tally(
+    program: NativeProgram,
+    counts_per_mm: Counts,
+    names: tuple[str, ...],
+    units: Sequence[str] | None,
+    ticks: int | None = None,
+) -> Tally:
+    """The tally of a run of a program, or of its first ticks."""
+    contour = Contour(program) if program.axis_count > 3 else None
+    return Tally(program.ticks if ticks is None else ticks, counts_per_mm, names, units, contour)
+
+
 def simulate(
     image: bytes | NativeProgram,
     drives: Sequence[Drive],
     *,
     kernel: str = "fixed",
-    counts_per_mm: int = 1_000_000,
+    counts_per_mm: Counts = 1_000_000,
     feedforward: Sequence[Feedforward] | None = None,
     faults: Sequence[OfflineFault] = (),
     keep_rows: bool = True,
     progress: Callable[[int, int], None] | None = None,
     names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
 ) -> Motion:
     """Run a program image with the drives of its axes, which begin parked at its start point.
 
     Gives the same setpoints and encoder positions as a run on the bus, bit for bit. `keep_rows=False`
     bounds the memory of very long runs: hashes and maxima only. `progress(done, all)` is called
     after each chunk. An image that is run often may be given opened. `faults` act on the axes; nobody supervises them.
-    `names` are those of the axes (default x, y, …). Raises InputError: image, kernel or drive figures not acceptable.
+    `names` and `units` are those of the axes (default x, y, … in mm); `counts_per_mm` may be given for each.
+
+    Raises InputError: image, kernel or drive figures not acceptable.
     """
     program = image if isinstance(image, NativeProgram) else NativeProgram(image)
     names = names_of_driven(program, drives, names)
     simulation = OfflineSimulation(program, kernel, drives, counts_per_mm, feedforward, faults)
     total = program.ticks + settling_ticks(program.period_us)
-    tally = Tally(program.ticks, counts_per_mm, names)
+    tally = make_tally(program, counts_per_mm, names, units)
     rows = np.empty(total if keep_rows else min(total, CHUNK_TICKS), dtype=ROW)
     for first in range(0, total, CHUNK_TICKS):
         count = min(CHUNK_TICKS, total - first)
@@ -64,7 +80,6 @@ def simulate(
     return tally.motion(
         kernel=kernel,
         period_us=program.period_us,
-        counts_per_mm=counts_per_mm,
         ticks=program.ticks,
         rows=rows if keep_rows else rows[:0],
     )
@@ -86,9 +101,10 @@ def simulate_on(
         image,
         machine.models(machine.path_axes),
         kernel=kernel or machine.kernel,
-        counts_per_mm=machine.counts_per_mm,
+        counts_per_mm=machine.path_counts,
         feedforward=machine.path_feedforward,
         keep_rows=keep_rows,
         progress=progress,
         names=machine.path_names,
+        units=machine.path_units,
     )

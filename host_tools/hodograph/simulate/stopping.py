@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..errors import HodographError, InputError
+from ..names import in_unit
 from ..native import ROW, NativeProgram, OfflineSimulation
 from ..native.offline import OfflineOrder
+from ..native.program import Counts
 from ..program import Program
-from .motion import Motion, Tally, settling_ticks
-from .simulation import names_of_driven
+from .motion import Motion, settling_ticks
+from .simulation import make_tally, names_of_driven
 
 STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
 """Kinds of a stop, and of the OfflineOrder that asks for it."""
@@ -72,9 +74,10 @@ def simulate_stop(
     at_s: float,
     *,
     kernel: str = "fixed",
-    counts_per_mm: int = 1_000_000,
+    counts_per_mm: Counts = 1_000_000,
     feedforward: Sequence[Feedforward] | None = None,
     names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
 ) -> StoppedRun:
     """A run as `simulate` makes it, that is stopped `at_s` after its first setpoint: the setpoint of this time is the
     first that follows. Raises InputError: a time outside the program, and as `simulate`.
@@ -100,12 +103,11 @@ def simulate_stop(
     if stop is None or stop.rest_tick is None:
         raise HodographError(f"simulation: {kind} at {at_s:g} s never came to rest: report a bug")
     rows = rows[: stop.rest_tick + 1 + settling]
-    tally = Tally(stop.rest_tick + 1, counts_per_mm, names)
+    tally = make_tally(program, counts_per_mm, names, units, stop.rest_tick + 1)
     tally.add(rows)
     motion = tally.motion(
         kernel=kernel,
         period_us=program.period_us,
-        counts_per_mm=counts_per_mm,
         ticks=stop.rest_tick + 1,
         rows=rows,
     )
@@ -125,20 +127,23 @@ def _peaks(motion: Motion, tick: int, rest_tick: int) -> dict[str, float]:
     begin = max(tick - _HISTORY, 0)
     rows = slice(begin, rest_tick + 1 + _HISTORY)
     period_s = motion.period_us * 1e-6
-    columns = {"": motion.arc_length_mm[rows]}
-    columns |= {f"{axis}_": motion.cmd_mm[rows, k] for k, axis in enumerate(motion.names)}
+    columns = [("", "mm", motion.arc_length_mm[rows])]
+    for k, (axis, unit) in enumerate(zip(motion.names, motion.units, strict=True)):
+        columns.append((f"{axis}_", unit, motion.cmd_mm[rows, k]))
     peaks = {}
-    for name, values in columns.items():
+    for name, unit, values in columns:
         padded = np.concatenate((np.repeat(values[:1], _HISTORY if begin == 0 else 0), values))
         for order, quantity in enumerate(
             ("velocity_mm_s" if name else "feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3"), start=1
         ):
             found = np.diff(padded, order) / period_s**order
-            peaks[name + quantity] = _greatest(found)
+            peaks[name + in_unit(quantity, unit)] = _greatest(found)
     after = slice(tick, None)
     for k, axis in enumerate(motion.names):
         peaks[f"{axis}_volts"] = _greatest(motion.volts[after, k])
     peaks["contour_error_um"] = _greatest(motion.contour_error_um[after])
+    for k, (axis, unit) in enumerate(zip(motion.extra_names, motion.units[3:], strict=True)):
+        peaks[f"{axis}_error_{unit}"] = _greatest(motion.orientation_error[after, k])
     return peaks
 
 

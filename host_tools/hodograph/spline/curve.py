@@ -141,5 +141,5 @@ class PHSpline(ArcLengthChain):
         `max_speed_ratio` times the smallest, which is positive. Raises PlanError naming the
         segment where the curve all but stops.
         """
-        origin, w = split_segments(self.origin, self.w, max_length_mm, max_speed_ratio)
+        origin, w, _ = split_segments(self.origin, self.w, max_length_mm, max_speed_ratio)
         return PHSpline(origin, w, self.closed)

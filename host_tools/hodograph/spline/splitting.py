@@ -12,10 +12,13 @@ import numpy as np
 
 from ..errors import InputError, PlanError
 from .bernstein import Real, halves, square, square_modulus
+from .quintics import halved
 
 _HAIR = 1.0 - 2.0**-20
 _SHORTEST_MM = 2.0**-20
 _MOST_ROUNDS = 64
+_MOST_EXTRA = 127.0
+"""How far an extra axis may move in a segment; the format ends at 128 mm or degrees."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +39,12 @@ def split_segments(
     max_speed_ratio: float,
     image: Image = PLANAR,
     max_component: float = inf,
-) -> tuple[Any, Any]:
+    extra: Real | None = None,
+) -> tuple[Any, Any, Real | None]:
     """Origins (K,) and w (K, 3) of the halved segments, in order; see PHSpline.split.
 
     max_component  greatest magnitude of a component of the preimage, mm^(1/2)
+    extra          (N, E, 6), Bezier coefficients of extra axes, which are halved too and come back (K, E, 6)
 
     In space, origins (K, 3) and preimages (K, 4, 3) with their `image`. The pieces of one segment carry on from its
     own origin: each start is origin + integral of r', so nothing drifts along the path. Raises InputError for limits
@@ -61,8 +66,11 @@ def split_segments(
             )
         wide = np.abs(w).reshape(len(w), -1).max(axis=1) > max_component
         split = uneven | (length > max_length_mm) | wide
+        if extra is not None:
+            split |= np.abs(extra - extra[..., :1]).max(axis=(1, 2)) > _MOST_EXTRA
         if not split.any():
-            return origin, w
+            return origin, w, extra
+        extra = None if extra is None else _halved_extra(extra, split)
         origin, w, source = _halved(origin, w, source, split, image)
     raise PlanError("split: the segments cannot be made short enough: is the path absurdly long?")
 
@@ -84,3 +92,11 @@ def _halved(
     new_w[at], new_w[at + 1] = left * np.sqrt(0.5), right * np.sqrt(0.5)
     new_origin[at + 1] = origin[split] + image.hodograph(left).mean(axis=-1) / 2.0
     return new_origin, new_w, np.repeat(source, repeats)
+
+
+def _halved_extra(extra: Real, split: np.ndarray) -> Real:
+    repeats = 1 + split.astype(np.intp)
+    at = (np.cumsum(repeats) - repeats)[split]
+    out = np.repeat(extra, repeats, axis=0)
+    out[at], out[at + 1] = halved(extra[split])
+    return np.asarray(out)

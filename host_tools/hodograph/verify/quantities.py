@@ -44,7 +44,8 @@ def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Qu
         key: str, value: float | None, of: Callable[[Motion], Real], axis: int | None = None
     ) -> Quantity:
         name = None if axis is None else names[axis]
-        limit = Limit(key, inf if value is None else value, axis=name)
+        unit = "mm" if axis is None else limits.unit(axis)
+        limit = Limit(key, inf if value is None else value, axis=name, unit=unit)
         return Quantity(limit, of, None if value is None else np.full(len(cells), value))
 
     out = [

@@ -17,13 +17,13 @@ Int = NDArray[np.int64]
 
 _CHUNK = 1 << 17
 _ORDER = 3
-PerAxis = tuple[float, float]
+PerAxis = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """One kernel's setpoints at the period: greatest differences over dt^2 and dt^3 of x and y, and its own noise in
-    the latter: the greatest distance from the double kernel's.
+    """One kernel's setpoints at the period: greatest differences over dt^2 and dt^3 of each path axis, and its own
+    noise in the latter: the greatest distance from the double kernel's.
     """
 
     kernel: str
@@ -51,13 +51,13 @@ def bus_noise(counts_per_mm: int, period_us: int) -> BusNoise:
 def sampled(program: NativeProgram) -> tuple[Sampled, ...]:
     """All kernels, over the whole program with rest before and after. Raises InputError: a program that is refused."""
     dt = 1e-6 * program.period_us
-    second = {kernel: np.zeros(2) for kernel in KERNELS}
-    third = {kernel: np.zeros(2) for kernel in KERNELS}
+    second = {kernel: np.zeros(program.axis_count) for kernel in KERNELS}
+    third = {kernel: np.zeros(program.axis_count) for kernel in KERNELS}
     noise = dict.fromkeys(KERNELS, 0.0)
     for points in _stretches(program):
         reference = np.diff(points["double"], n=_ORDER, axis=0)
-        for kernel, xy in points.items():
-            differences = np.diff(xy, n=2, axis=0)
+        for kernel, places in points.items():
+            differences = np.diff(places, n=2, axis=0)
             jerk = np.diff(differences, axis=0)
             second[kernel] = np.maximum(second[kernel], np.abs(differences).max(axis=0))
             third[kernel] = np.maximum(third[kernel], np.abs(jerk).max(axis=0))
@@ -66,8 +66,8 @@ def sampled(program: NativeProgram) -> tuple[Sampled, ...]:
     return tuple(
         Sampled(
             kernel,
-            _pair(second[kernel] * unit / dt**2),
-            _pair(third[kernel] * unit / dt**3),
+            _each(second[kernel] * unit / dt**2),
+            _each(third[kernel] * unit / dt**3),
             noise[kernel] * unit / dt**3,
         )
         for kernel in KERNELS
@@ -75,7 +75,7 @@ def sampled(program: NativeProgram) -> tuple[Sampled, ...]:
 
 
 def _stretches(program: NativeProgram) -> Iterator[dict[str, Int]]:
-    """Setpoints (n, 2) of each kernel in 2^-40 mm, by stretches that overlap: no difference is missing."""
+    """Setpoints (n, A) of each kernel in 2^-40 mm, by stretches that overlap: no difference is missing."""
     ticks = program.ticks
     for first in range(0, ticks, _CHUNK):
         begin, end = max(first - _ORDER, 0), min(first + _CHUNK, ticks)
@@ -84,10 +84,10 @@ def _stretches(program: NativeProgram) -> Iterator[dict[str, Int]]:
         out = {}
         for kernel in KERNELS:
             points = program.points(kernel, times)
-            xy = points["position_q40"][:, :2]
-            out[kernel] = np.pad(xy, (pad, (0, 0)), mode="edge")
+            places = points["position_q40"][:, : program.axis_count]
+            out[kernel] = np.pad(places, (pad, (0, 0)), mode="edge")
         yield out
 
 
-def _pair(values: Real) -> PerAxis:
-    return float(values[0]), float(values[1])
+def _each(values: Real) -> PerAxis:
+    return tuple(values.tolist())

@@ -9,6 +9,7 @@ import pytest
 from hodograph.errors import InputError
 from hodograph.monitor.decoder import Decoder
 from hodograph.monitor.derived import Derivation, ProgramPath, Rows, derivative_weights
+from hodograph.monitor.messages import path_message, rows_message
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import Motion, simulate
 from traffic import EXAMPLES, alpha
@@ -65,9 +66,9 @@ def test_feed_acceleration_and_jerk_are_the_programs() -> None:
 def test_off_the_path_there_is_no_contour_error() -> None:
     path = ProgramPath(alpha()[0], COUNTS_PER_MM)
     away = np.array([[5e6, -2e6], [5.1e6, -2e6]])
-    assert np.isnan(path.contour_errors_um(away, away)).all()
+    assert np.isnan(path.contour_errors_um(away, away)[0]).all()
     start = np.array([[0.0, 0.0], [0.0, 0.0]])
-    assert path.contour_errors_um(start, start) == pytest.approx([0, 0], abs=1e-3)
+    assert path.contour_errors_um(start, start)[0] == pytest.approx([0, 0], abs=1e-3)
     assert path.arc_length_mm == pytest.approx(0, abs=1e-6)
 
 
@@ -102,3 +103,35 @@ def test_missing_values_do_not_spread_for_ever() -> None:
     rows = derivation.feed(decoder.feed(frames), None)
     assert np.count_nonzero(np.isnan(rows.feed_mm_s)) < 40
     assert np.all(np.diff(rows.t_s) > 0)
+
+
+def test_five_axes_are_drawn_in_space_and_over_arc_length() -> None:
+    pipeline = load_pipeline(EXAMPLES / "five_axes.toml", allow_space=True)
+    machine, program = pipeline.machine, pipeline.accepted
+    path = ProgramPath(program.image, machine.counts_per_mm)
+    assert path.axes == 3
+    assert path.drawing().shape[1] == 3
+    arcs, extra = path.extra_drawing()
+    assert extra[-1] == pytest.approx([12.0, 360.0])
+    assert np.all(np.diff(arcs) > 0)
+    points, counts = program.setpoints("fixed", machine.path_counts)
+    errors, places = path.contour_errors_um(counts.astype(float), counts.astype(float))
+    assert errors.max() < 0.01
+    assert places == pytest.approx(points["arc_length_q40_mm"] / 2**40, abs=1e-3)
+
+
+def test_messages_of_five_axes_have_their_curves() -> None:
+    pipeline = load_pipeline(EXAMPLES / "five_axes.toml", allow_space=True)
+    path = ProgramPath(pipeline.image, 1_000_000)
+    message = path_message(path)
+    assert len(message["x"]) == len(message["z"])
+    assert [len(column) for column in message["extra"]] == [len(message["arc"])] * 2
+    count = 40
+    still = np.zeros((count, 5))
+    line = np.linspace(0.0, 1.0, count)
+    rows = Rows(line, still, still + 1.0, line, line, line, line, still, 10.0 * line)
+    found = rows_message(rows, 0.002, None, drawn=3, path_axes=5)
+    assert len(found["cmd"]) == 3
+    assert [len(side) for side in found["extra"]] == [2, 2]
+    assert found["arc"][-1] <= 10.0
+    assert "extra" not in rows_message(rows, 0.002, None, drawn=3, path_axes=3)

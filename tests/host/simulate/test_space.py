@@ -86,10 +86,49 @@ def test_a_path_in_space_needs_three_axes() -> None:
         _ = pipeline.plan
 
 
-def test_axes_that_nothing_moves_are_refused() -> None:
+def test_axes_that_the_path_does_not_move_stand_at_0(tmp_path: Path) -> None:
     machine = EXAMPLES / "machines" / "mill_five_axes.toml"
-    pipeline = load_pipeline(EXAMPLES / "helix.toml", machine, allow_space=True)
-    with pytest.raises(
-        InputError, match=r"5 axes of the machine follow a path, and \[path\] moves 3"
-    ):
+    file = tmp_path / "flat.toml"
+    file.write_text(FLAT)
+    program = load_pipeline(file, machine).program
+    assert program.axis_count == 5
+    assert not program.point_q40[3:].any()
+    assert not program.extra_q40.any()
+    assert np.array_equal(program.point_q40[:3], load_pipeline(file, MILL).program.point_q40)
+
+
+def test_five_axes_have_their_own_units_and_counts(tmp_path: Path) -> None:
+    trace = tmp_path / "five.csv"
+    assert main(["simulate", str(EXAMPLES / "five_axes.toml"), "--trace", str(trace)]) == 0
+    head, *rows = trace.read_text().splitlines()
+    names = head.split(",")
+    assert {"z_cmd_mm", "a_cmd_deg", "c_set_counts", "c_act_deg", "c_error_deg"} <= set(names)
+    last = dict(zip(names, map(float, rows[-1].split(",")), strict=True))
+    assert [last[f"{axis}_set_counts"] for axis in "zac"] == [12_000_000, 1_200_000, 36_000_000]
+    assert last["c_act_deg"] == pytest.approx(360.0, abs=1e-3)
+    assert last["c_error_deg"] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_stops_of_five_axes_report_degrees() -> None:
+    pipeline = load_pipeline(EXAMPLES / "five_axes.toml", allow_space=True)
+    machine = pipeline.machine
+    run = simulate_stop(
+        pipeline.accepted,
+        machine.models(machine.path_axes),
+        "fault",
+        1.0,
+        counts_per_mm=machine.path_counts,
+        names=machine.path_names,
+        units=machine.path_units,
+    )
+    assert run.rest_after_s <= run.bound_s
+    for axis in machine.path_axes:
+        assert run.peak[f"{axis.name}_acceleration_{axis.unit}_s2"] <= axis.acceleration_mm_s2
+        assert run.peak[f"{axis.name}_jerk_{axis.unit}_s3"] <= axis.jerk_mm_s3
+    assert run.peak["c_error_deg"] < 1e-3
+
+
+def test_a_path_with_too_many_axes_is_refused() -> None:
+    pipeline = load_pipeline(EXAMPLES / "five_axes.toml", MILL, allow_space=True)
+    with pytest.raises(InputError, match=r"points \[x, y, z, a, b\], but 3 axes of the machine"):
         _ = pipeline.plan

@@ -162,7 +162,7 @@ def _held(limits: Limits, controller: ControllerLimits | None) -> Iterator[Limit
         share = limits.reserve * by
         for k, value in enumerate(getattr(limits.axes, key) or ()):
             held, source = value * limits.reserve * by, limits.source(key, k)
-            yield Limit(key, held, source, limits.names[k], None, share)
+            yield Limit(key, held, source, limits.names[k], None, share, unit=limits.unit(k))
         if controller is not None:
             free = controller.kept_free
             value = float(getattr(controller, key)) * free * by

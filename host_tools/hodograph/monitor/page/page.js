@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The page put together: messages go to store and panel, what changed is drawn at the next frame of the screen.
 
+import { AxisCurves } from "./axes.js";
 import { Chart, timeAt } from "./chart.js";
 import { Link } from "./link.js";
 import { Panel } from "./panel.js";
@@ -31,12 +32,14 @@ function redraw() {
 }
 
 const plane = new Plane($("plane-canvas"), redraw);
+const axisCurves = new AxisCurves($("axis-curves"));
 const theme = new Theme($("theme"), redraw);
 
 function draw() {
   wanted = false;
   const end = frozenAt ?? store.newest;
   plane.draw(store.points, theme.colours);
+  axisCurves.draw(theme.colours);
   for (const chart of charts) chart.draw(store.groups, end, seconds, theme.colours, hover);
   if (arrivedMs !== null && ageMs !== null) {
     const lag = ageMs + link.rttMs / 2 + (performance.now() - arrivedMs);
@@ -81,6 +84,7 @@ function makeCharts(axes, units) {
 
 function addRows(message, live) {
   store.add(message);
+  axisCurves.add(message);
   if (live) {
     arrivedMs = performance.now();
     ageMs = message.age_ms;
@@ -94,14 +98,16 @@ const handlers = {
     store.setAxes(message.axes.length);
     makeCharts(message.axes, message.units);
     offerViews(message.drawn > 2, message.axes);
+    axisCurves.setAxes(message.axes.slice(message.drawn, message.path_axes), message.units.slice(message.drawn, message.path_axes));
     panel.hello(message);
     $("event-rows").replaceChildren();
   },
   rows: (message) => addRows(message, true),
   history: ({ messages }) => messages.forEach((m) => (m.type === "rows" ? addRows(m, false) : handlers[m.type](m))),
-  restart: () => store.clear(),
+  restart: () => { store.clear(); axisCurves.clear(); },
   path(message) {
     plane.setPath(message.x, message.y, message.z);
+    axisCurves.setPath(message.arc, message.extra);
     panel.name = message.name;
     panel.lengthMm = message.length_mm;
     $("path-note").textContent = message.note;

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...errors import PlanError
@@ -13,6 +15,7 @@ from ..knots import KnotSpans, checked_knots, knot_spans
 from ..newton import solved
 from ..nodal import checked_space_points
 from .curve import SpatialPHSpline, embedded
+from .extra import nodal_values, with_extra_axes, without_tail
 from .frame import guide_frame, without_rests
 from .guide import SpaceEnd, SpaceGuide, points_guide, polygon_guide
 from .quality import judge
@@ -21,12 +24,19 @@ from .system import NATURAL_END, SpaceEndRule, SpaceSystem, cubic_end, tangent_e
 SpatialSplineResult = FoundSpline[SpatialPHSpline]
 
 
-def spatial_from_control_polygon(points: object, closed: bool) -> SpatialSplineResult:
+def spatial_from_control_polygon(
+    points: object, closed: bool, extra: Real | None = None
+) -> SpatialSplineResult:
     """C2 PH quintic spline in space of a cubic B-spline control polygon, on uniform knots as in the plane.
 
     `points`: real (n, 3), mm; otherwise as `from_control_polygon`. Points of one z give the planar spline, bit for bit.
+    `extra`: (n, E), values of extra axes at the points of the polygon; mm, or degrees.
     Raises InputError for bad points and PlanError, naming the span, where there is no decent spline.
     """
+    return _with_extra(_of_polygon(points, closed), extra, closed, polygon=True)
+
+
+def _of_polygon(points: object, closed: bool) -> SpatialSplineResult:
     p, notes = checked_space_points(points, closed, 3 if closed else 4, "control point")
     if _level(p):
         return _embedded(from_control_polygon(p[:, :2], closed), float(p[0, 2]), notes)
@@ -43,12 +53,26 @@ def spatial_through_points(
     start_tangent: object = None,
     end_tangent: object = None,
     knots: str = "chord",
+    extra: Real | None = None,
 ) -> SpatialSplineResult:
     """C2 PH quintic spline through given points in space, one span between neighbours.
 
     `points`: real (n, 3), mm; tangents are vectors (3,); otherwise as `through_points`. Points of one z, with tangents
-    that keep it, give the planar spline, bit for bit. Raises InputError and PlanError as above.
+    that keep it, give the planar spline, bit for bit. `extra`: (n, E), values of extra axes at the points; mm, or
+    degrees. Raises InputError and PlanError as above.
     """
+    found = _through(points, closed, ends, start_tangent, end_tangent, knots)
+    return _with_extra(found, extra, closed, polygon=False)
+
+
+def _through(
+    points: object,
+    closed: bool,
+    ends: str,
+    start_tangent: object,
+    end_tangent: object,
+    knots: str,
+) -> SpatialSplineResult:
     p, notes = checked_space_points(points, closed, 3 if closed else 2, "through point")
     start = SpaceEnd.chosen(ends, start_tangent, "start_tangent", closed)
     end = SpaceEnd.chosen(ends, end_tangent, "end_tangent", closed)
@@ -118,3 +142,16 @@ def _solved(
         bending_ratio=verdict.bending_ratio,
         notes=notes,
     )
+
+
+def _with_extra(
+    found: SpatialSplineResult, extra: Real | None, closed: bool, polygon: bool
+) -> SpatialSplineResult:
+    """The same with extra axes that have the values `extra` (n, E) at the points that were given; None: none."""
+    if extra is None or not extra.shape[1]:
+        return found
+    spans = found.spline.segment_count
+    count = spans if closed else spans + 3 if polygon else spans + 1
+    kept = without_tail(extra, count, "control point" if polygon else "through point")
+    nodes = nodal_values(kept, closed) if polygon else kept
+    return replace(found, spline=with_extra_axes(found.spline, nodes))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..bernstein import Real
 from ..curve import PHSpline
 from ..extremum import greatest_curvature
 from ..frames import Frames
+from ..quintics import extra_frames
 from ..splitting import Image, split_segments
 from .quaternion import polar
 
@@ -31,6 +32,7 @@ class SpatialPHSpline(ArcLengthChain):
     origin    (N, 3), start point of each segment
     preimage  (N, 4, 3), Bernstein coefficients of A = u + v i + p j + q k in mm^(1/2), the three of a component last
     closed    the end is the start
+    extra     (N, E, 6), Bezier coefficients of the axes that follow beside x, y, z; mm, degrees (`with_extra_axes`)
 
     Built by `spatial_from_control_polygon` or `spatial_through_points`, not by hand. All methods take arrays of any one
     shape (or scalars) and give arrays of that shape, of vectors with three components more. Arc lengths outside 0 …
@@ -40,11 +42,17 @@ class SpatialPHSpline(ArcLengthChain):
     origin: Real
     preimage: Real
     closed: bool
+    extra: Real = field(default_factory=lambda: np.zeros((0, 0, 6)))
 
     @property
     def axes(self) -> int:
-        """3: x, y and z follow it."""
-        return 3
+        """3: x, y and z follow it; one more for each extra axis."""
+        return 3 + self.extra_axes
+
+    @property
+    def extra_axes(self) -> int:
+        """E."""
+        return int(self.extra.shape[1])
 
     @property
     def segment_count(self) -> int:
@@ -73,11 +81,26 @@ class SpatialPHSpline(ArcLengthChain):
         end = self.origin[:1] if self.closed else self.position_coefficients[-1:, :, 5]
         return np.concatenate((self.origin, end))
 
+    @cached_property
+    def axes_nodes(self) -> Real:
+        """The joints of all axes (N + 1, 3 + E)."""
+        if not self.extra_axes:
+            return self.nodal_points
+        return np.column_stack(
+            (self.nodal_points, np.vstack((self.extra[:, :, 0], self.extra[-1:, :, 5])))
+        )
+
     # By segment and parameter
 
     def position(self, segment: ArrayLike, xi: ArrayLike) -> Real:
         """Points (…, 3) of segments `segment` at `xi` in [0, 1]; mm."""
         return np.asarray(evaluate(self.position_coefficients, segment, xi))
+
+    def extra_position(self, segment: ArrayLike, xi: ArrayLike) -> Real:
+        """The extra axes (…, E) of segments `segment` at `xi`; mm, degrees."""
+        if not self.extra_axes:
+            return np.zeros((*np.shape(xi), 0))
+        return np.asarray(evaluate(self.extra, segment, xi))
 
     def hodograph(self, segment: ArrayLike, xi: ArrayLike) -> Real:
         """r' = A i A* (…, 3)."""
@@ -120,7 +143,11 @@ class SpatialPHSpline(ArcLengthChain):
         r2 = (2.0 * _image(a, first) - growth * r1) / sigma**2
         r3 = 2.0 * (_image(first, first) + _image(a, second)) - bend * r1
         r3 = r3 / sigma**3 - (3.0 * growth / sigma**2) * r2
-        return Frames(r1, r2, r3, np.sqrt(_inner(r2, r2)))
+        curvature = np.sqrt(_inner(r2, r2))
+        if self.extra_axes:
+            own = extra_frames(self.extra[segment], xi, (sigma, growth, bend))
+            r1, r2, r3 = (np.concatenate(pair) for pair in zip((r1, r2, r3), own, strict=True))
+        return Frames(r1, r2, r3, curvature)
 
     def _is_straight(self, segment: ArrayLike, xi: ArrayLike) -> NDArray[np.bool_]:
         length = self.segment_lengths_mm[np.asarray(segment, dtype=np.intp)]
@@ -131,6 +158,15 @@ class SpatialPHSpline(ArcLengthChain):
     def point(self, s_mm: ArrayLike) -> Real:
         """Points (…, 3) at arc lengths `s_mm`; mm."""
         return self.position(*self.locate(s_mm))
+
+    def extra_point(self, s_mm: ArrayLike) -> Real:
+        """The extra axes (…, E) at arc lengths `s_mm`; mm, degrees."""
+        return self.extra_position(*self.locate(s_mm))
+
+    def axes_point(self, s_mm: ArrayLike) -> Real:
+        """All axes (…, 3 + E) at arc lengths `s_mm`: x, y, z and the extra axes."""
+        place = self.locate(s_mm)
+        return np.concatenate((self.position(*place), self.extra_position(*place)), axis=-1)
 
     def tangent(self, s_mm: ArrayLike) -> Real:
         """Unit tangents (…, 3) at arc lengths `s_mm`."""
@@ -152,16 +188,21 @@ class SpatialPHSpline(ArcLengthChain):
         return greatest_curvature(self.preimage, curvature_numerator, speed_of)
 
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> SpatialPHSpline:
-        """The same curve in shorter segments; as PHSpline.split, and with components of A below 8."""
-        origin, preimage = split_segments(
+        """The same curve in shorter segments; as PHSpline.split, with components of A below 8, and no segment in which
+        an extra axis moves by more than the format can express.
+        """
+        origin, preimage, extra = split_segments(
             self.origin,
             self.preimage,
             max_length_mm,
             max_speed_ratio,
             _IMAGE,
             _GREATEST_COMPONENT,
+            self.extra if self.extra_axes else None,
         )
-        return SpatialPHSpline(origin, preimage, self.closed)
+        return SpatialPHSpline(
+            origin, preimage, self.closed, self.extra if extra is None else extra
+        )
 
 
 def _inner(a: Real, b: Real) -> Real:

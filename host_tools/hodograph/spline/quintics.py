@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""Quintics in Bezier form: the extra axes of a path, in the parameter of its segments."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .bernstein import Real
+
+
+def halved(extra: Real) -> tuple[Real, Real]:
+    """Quintics (…, 6) on [0, 1/2] and [1/2, 1] in their own [0, 1], by de Casteljau."""
+    left, right, rest = [extra[..., 0]], [extra[..., -1]], extra
+    for _ in range(5):
+        rest = (rest[..., :-1] + rest[..., 1:]) / 2.0
+        left.append(rest[..., 0])
+        right.append(rest[..., -1])
+    return np.stack(left, axis=-1), np.stack(right[::-1], axis=-1)
+
+
+def extra_frames(extra: Real, xi: Real, speed: tuple[Real, Real, Real]) -> tuple[Real, Real, Real]:
+    """First three derivatives (E, …) by arc length of quintics (…, E, 6) at xi (…,).
+
+    speed  sigma, its first and its second derivative there
+    """
+    sigma, growth, bend = speed
+    rows, orders = np.moveaxis(extra, -1, 0), []
+    for degree in (5, 4, 3):
+        rows = degree * np.diff(rows, axis=0)
+        orders.append(np.moveaxis(_casteljau(rows, xi[..., None]), -1, 0))
+    e1 = orders[0] / sigma
+    e2 = (orders[1] - growth * e1) / sigma**2
+    e3 = (orders[2] - bend * e1) / sigma**3 - (3.0 * growth / sigma**2) * e2
+    return e1, e2, e3
+
+
+def _casteljau(rows: Real, xi: Real) -> Real:
+    """Bernstein coefficients (k, …) at xi."""
+    while len(rows) > 1:
+        rows = rows[:-1] * (1.0 - xi) + rows[1:] * xi
+    return np.asarray(rows[0])

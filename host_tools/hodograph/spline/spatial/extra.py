@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""Extra axes of a path in space: C2 quintics in the parameter of its segments; docs/theory/spatial-splines.md 8."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import InputError
+from ..bernstein import Real
+from ..nodal import control_polygon_guide
+from .curve import SpatialPHSpline
+
+_MOST_SLOPE, _MOST_BEND = 1.5, 4.0
+"""Slope at a node times the longer span beside it, and second derivative times its square, over the greater step."""
+
+_REPEATED = 1e-9
+
+
+def with_extra_axes(curve: SpatialPHSpline, values: Real) -> SpatialPHSpline:
+    """The curve with axes that have `values` (nodes, E) at its joints; mm, or degrees of an axis that turns.
+
+    curve  not yet split: one segment for each span
+    values of an open path at its N + 1 joints, of a closed one at the N joints without the repeated first
+
+    Slopes and second derivatives by arc length at the nodes are those of a C2 cubic spline over arc length, limited
+    where a short span beside a long one would make the axis overshoot. A quintic for each span meets both. An axis
+    that is linear in arc length is exactly that.
+    """
+    value = np.vstack((values, values[:1])) if curve.closed else np.asarray(values)
+    slope, bend = _by_arc_length(curve.segment_starts_mm, value, curve.closed)
+    c = curve.speed_coefficients
+    begin = _by_parameter(slope[:-1], bend[:-1], c[:, 0], 4.0 * (c[:, 1] - c[:, 0]))
+    end = _by_parameter(slope[1:], bend[1:], c[:, 4], 4.0 * (c[:, 4] - c[:, 3]))
+    return replace(curve, extra=_hermite(value[:-1], value[1:], begin, end))
+
+
+def with_standing_axes(curve: SpatialPHSpline, count: int) -> SpatialPHSpline:
+    """The curve with so many extra axes more, which stand at 0."""
+    if count == 0:
+        return curve
+    still = np.zeros((curve.segment_count, count, 6))
+    return replace(
+        curve, extra=np.concatenate((curve.extra, still), axis=1) if curve.extra_axes else still
+    )
+
+
+def nodal_values(values: Real, closed: bool) -> Real:
+    """Values (nodes, E) at the joints of a curve from those (n, E) at the points of its control polygon."""
+    columns = (np.asarray(one, dtype=np.complex128) for one in values.T)
+    nodes = [control_polygon_guide(one, closed).nodal_points.real for one in columns]
+    return np.stack(nodes, axis=1)[:-1] if closed else np.stack(nodes, axis=1)
+
+
+def without_tail(values: Real, count: int, what: str) -> Real:
+    """The first `count` rows of extra axes: those of points that a closed path keeps.
+
+    The points behind repeat the first ones in x, y and z. Raises InputError: an axis does not come back with them.
+    """
+    tail = len(values) - count
+    apart = np.abs(values[count:] - values[:tail])
+    if apart.size and apart.max() > _REPEATED:
+        point, axis = (int(k) for k in np.unravel_index(int(apart.argmax()), apart.shape))
+        raise InputError(
+            f"{what} {count + point} repeats {what} {point} in x, y and z, but number {axis + 4} is "
+            f"{values[count + point, axis]:g}, not {values[point, axis]:g}: on a closed path every axis comes back; "
+            "set closed = false to end there"
+        )
+    return values[:count]
+
+
+def _by_arc_length(s_mm: Real, value: Real, closed: bool) -> tuple[Real, Real]:
+    """First and second derivatives (nodes, E) by arc length."""
+    # Here, since scipy's import takes longer than most splines.
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(s_mm, value, bc_type="periodic" if closed else "not-a-knot")
+    span, step = np.diff(s_mm)[:, None], np.abs(np.diff(value, axis=0))
+    longer, greater = (_beside(one, closed) for one in (span, step))
+    most_slope, most_bend = _MOST_SLOPE * greater / longer, _MOST_BEND * greater / longer**2
+    return (
+        np.clip(spline(s_mm, 1), -most_slope, most_slope),
+        np.clip(spline(s_mm, 2), -most_bend, most_bend),
+    )
+
+
+def _beside(spans: Real, closed: bool) -> Real:
+    """The greater of the two values (N, …) beside each node (N + 1, …)."""
+    before = np.concatenate((spans[-1:] if closed else spans[:1], spans))
+    after = np.concatenate((spans, spans[:1] if closed else spans[-1:]))
+    return np.asarray(np.maximum(before, after))
+
+
+def _by_parameter(slope: Real, bend: Real, speed: Real, growth: Real) -> tuple[Real, Real]:
+    """First and second derivatives by xi from those by arc length, sigma and its derivative."""
+    speed, growth = speed[:, None], growth[:, None]
+    return slope * speed, bend * speed**2 + slope * growth
+
+
+def _hermite(first: Real, last: Real, begin: tuple[Real, Real], end: tuple[Real, Real]) -> Real:
+    """Bezier coefficients (N, E, 6) of quintics with values and two derivatives (N, E) at both ends."""
+    before, after = first + begin[0] / 5.0, last - end[0] / 5.0
+    inner = begin[1] / 20.0 + 2.0 * before - first, end[1] / 20.0 + 2.0 * after - last
+    return np.stack((first, before, *inner, after, last), axis=-1)
