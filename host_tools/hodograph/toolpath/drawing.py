@@ -211,7 +211,11 @@ class Drawing:
     def _sequence(self) -> tuple[list[Visit], str]:
         """The contours in their order, and what that gains."""
         contours, options = self.contours, self.options
-        chains = join(contours, options.gap_mm)
+        chains = [
+            chain for chain in join(contours, options.gap_mm) if _moves_at_all(contours, chain)
+        ]
+        if not chains:
+            raise self.error(max(1, self.last_line), "the drawing has no line or curve to follow")
         start = here = (options.start[0], options.start[1], options.start[2])
         as_given = rapid_length(contours, in_file_order(chains), start)
         visits: list[Visit] = []
@@ -275,6 +279,11 @@ class Drawing:
                 here = point
         if over:
             yield StraightMove(step.line, _position(step.start, others), feed)
+
+
+def _moves_at_all(contours: Contours, chain: Chain) -> bool:
+    """Whether a chain has a step: one that is closed within the gap by moving its ends may have none left."""
+    return next(steps_of(contours, Visit(chain)), None) is not None
 
 
 def _some(names: Iterable[str]) -> str:

@@ -141,3 +141,18 @@ def test_a_broken_file_gives_moves_or_one_message(tmp_path: Path, kind: str, par
             assert 1 <= error.line <= data.count(b"\n") + data.count(b"\r") + 2, seed
             assert error.column >= 1, seed
     assert read > PART / 20
+
+
+def test_a_chain_that_closing_leaves_without_a_step_is_no_contour(tmp_path: Path) -> None:
+    """A line shorter than the gap is closed by moving its end onto its start."""
+    path = tmp_path / "tiny.svg"
+    tiny = '<path d="M 5 5 L 5.00000000001 5"/>'
+    for around in ("", '<path d="M 0 0 L 9 0 L 9 9 Z"/>'):
+        path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{around}{tiny}</svg>')
+        options = DrawingOptions(10.0, unit_mm=1.0, order="inside-first", gap_mm=0.01)
+        if not around:
+            with pytest.raises(ToolpathError, match="no line or curve"):
+                list(read_svg(path, options))
+        else:
+            found = [one for one in read_svg(path, options) if isinstance(one, Move)]
+            assert [one.end[:2] for one in found if max(one.end[:2]) < 8.0] == [(0.0, 0.0)]
