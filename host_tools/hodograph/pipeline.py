@@ -38,6 +38,7 @@ from .feed import (
     replan,
 )
 from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
+from .names import AXES
 from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
@@ -312,7 +313,9 @@ class Pipeline:
         machine = self.machine_or_none
         if machine is None:
             return self.file.limits
-        return self.file.limits.on_machine(machine.path_names, axis_limits(machine), machine.path_units)
+        return self.file.limits.on_machine(
+            machine.path_names, axis_limits(machine), machine.path_units
+        )
 
     @cached_property
     def peaks(self) -> dict[str, Peak]:

@@ -57,12 +57,16 @@ def verify(options: Namespace) -> None:
         print_json(_verdict_document(machine, fault) | _document(found, drives_see, noise))
     else:
         print(_verdict(machine, fault))
-        names = pipeline.limits.of_axes(program.axis_count).names
-        axes = [(name, pipeline.limits.unit(k)) for k, name in enumerate(names)]
-        print(_text(found, drives_see, noise, axes))
+        print(_text(found, drives_see, noise, _axes(pipeline, program.axis_count)))
     if fault is not None:
         raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
     _require_kept(str(options.file), [found])
+
+
+def _axes(pipeline: Pipeline, count: int) -> list[tuple[str, str]]:
+    """Name and unit of each path axis."""
+    names = pipeline.limits.of_axes(count).names
+    return [(name, pipeline.limits.unit(k)) for k, name in enumerate(names)]
 
 
 def _require_kept(place: str, found: list[Verification]) -> None:
@@ -95,7 +99,7 @@ def _verify_toolpath(options: Namespace) -> None:
         else:
             print(f"section {index}, lines {section.first_line} … {section.last_line}")
             print(_verdict(job.machine, None))
-            print(_text(result, drives_see, noise) + "\n")
+            print(_text(result, drives_see, noise, _axes(pipeline, program.axis_count)) + "\n")
     if options.json:
         print_json({"kept": all(one.kept for one in found), "section": documents})
     _require_kept(str(options.file), found)
