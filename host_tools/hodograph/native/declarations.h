@@ -233,12 +233,11 @@ struct stop_found {
     double worst_s, mean_s;
 };
 #define STOP_ROWS ...
-void stop_rows(const struct program *p, const struct stop_limits *limits,
-               const struct stop_path *path);
-void stop_used(const struct program *p, const struct stop_limits *limits,
-               const struct stop_path *path, struct stop_limits *used);
-void stop_search(const struct program *p, const struct stop_limits *limits,
-                 const struct stop_path *path, struct stop_found *found);
+void stop_rows(const struct program *p, const struct stop_limits *limits, const struct stop_path *path);
+void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
+               struct stop_limits *used);
+void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
+                 struct stop_found *found);
 
 /* offline/stop_trial.h */
 struct stop_use {
