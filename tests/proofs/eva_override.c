@@ -91,7 +91,9 @@ static void place(struct feed_override *f)
     f->place.time_q42_s = (uint64_t)any_between(INT64_MIN, INT64_MAX);
     f->point.arc_length_q40_mm = any_between(LEAST_ARC, MOST_ARC);
     f->point.feed_q32_mm_s = any_between(-MOST_FEED_AT, MOST_FEED_AT);
-    f->state = (uint32_t)any_between(0, 5);
+    f->state = (uint32_t)any_between(0, 6);
+    f->at_end = (uint32_t)any_between(0, 6);
+    f->goes_on = (uint32_t)any_between(0, 1);
     f->phase = (uint32_t)any_between(0, 2);
     f->kind = (uint32_t)any_between(0, 1);
     f->replace = (uint32_t)any_between(0, 1);
@@ -101,7 +103,8 @@ static void place(struct feed_override *f)
 
 static void stays(const struct feed_override *f)
 {
-    prove(f->numbers_kind <= 2 && f->look <= 3 && f->state <= 5 && f->phase <= 2 && f->kind <= 1);
+    prove(f->numbers_kind <= 2 && f->look <= 3 && f->state <= 6 && f->phase <= 2 && f->kind <= 1);
+    prove(f->at_end <= 6 && f->goes_on <= 1);
     prove(f->replace <= 1 && f->found <= 1 && f->clock.piece < COUNT);
 }
 
@@ -135,6 +138,7 @@ static void ask_all(struct feed_override *f)
     feed_override_feed_q32(f);
     feed_override_actual_q30(f);
     feed_override_saturated(f);
+    feed_override_waits(f);
 }
 
 static void tick(struct feed_override *f, struct interpolator *it)

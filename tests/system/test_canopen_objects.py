@@ -32,8 +32,8 @@ from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 
 MEASURED = {
-    # state, what it waits for at boot, statistics, memory, CRC
-    "controller": {0x2002, 0x2003, 0x2008, 0x2025, 0x2041, 0x2050},
+    # state, what it waits for at boot, statistics, memory, CRC, stream
+    "controller": {0x2002, 0x2003, 0x2008, 0x2025, 0x2041, 0x2050, 0x2060},
     "drive": {0x6041, 0x6062, 0x6063, 0x6064, 0x607A, 0x60FD, 0x2101},
 }
 """Objects whose value depends on what happens."""

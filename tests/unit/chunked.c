@@ -143,8 +143,8 @@ static int keeps(const struct quintic *q, const struct override_limits *limit)
 static int find_duration(struct quintic *q, const struct override_program *w, double way_mm,
                          const double state[4])
 {
-    for (double duration_s = 0.02; duration_s < 20; duration_s *= 1.1) {
-        set_quintic(q, way_mm, state[1], state[2], duration_s);
+    for (int i = 0; i < 72; i++) { /* to 17 s */
+        set_quintic(q, way_mm, state[1], state[2], 0.02 * pow(1.1, i));
         if (keeps(q, &w->limit)) {
             return 1;
         }

@@ -611,6 +611,85 @@ static void test_override_in_a_job(void)
     TEST_ASSERT_EQUAL_INT32((X_MM + 56) * UNIT, bench.drives[0].position_counts);
 }
 
+/* ---- Anything ---- */
+
+static uint32_t random_state;
+
+static uint32_t random_below(uint32_t most)
+{
+    random_state = random_state * 1664525u + 1013904223u;
+    return (random_state >> 8) % most;
+}
+
+/* The next chunk, perhaps damaged. Gives how many have been accepted. */
+static uint32_t send_perhaps(uint32_t next)
+{
+    if (next == PARTS) {
+        return next;
+    }
+    const uint32_t size = make(&parts[next]);
+    if (random_below(3) == 0u) {
+        bytes[16u + random_below(size - 16u)] ^= (uint8_t)(1u << random_below(8));
+    }
+    return next + (app_bench_chunk(&bench, bytes, size) == SDO_OK ? 1u : 0u);
+}
+
+static uint32_t act_at_random(uint32_t next)
+{
+    switch (random_below(6)) {
+    case 0:
+        (void)app_bench_command(&bench, COMMAND_HOLD);
+        return next;
+    case 1:
+        (void)app_bench_write(&bench, 0x2010, 1, random_below(201), 2);
+        return next;
+    case 2:
+        return send_perhaps(next);
+    default:
+        (void)app_bench_command(&bench, COMMAND_RESUME);
+        return next;
+    }
+}
+
+/* Every setpoint is on the path, and no further from the one before than the feed allows; the path is not left backwards. */
+static void expect_path(void)
+{
+    for (uint32_t k = 1; k < bench.recorded; ++k) {
+        const int32_t step_counts = bench.targets[0][k] - bench.targets[0][k - 1u];
+        TEST_ASSERT_TRUE(step_counts >= -1 && step_counts <= 24001);
+        TEST_ASSERT_EQUAL_INT32(Y_MM * UNIT, bench.targets[1][k]);
+    }
+}
+
+static void test_any_sequence_of_commands_and_chunks(void)
+{
+    for (uint32_t seed = 1; seed <= 30u; ++seed) {
+        random_state = seed;
+        app_bench_init(&bench, X_MM * UNIT, Y_MM * UNIT);
+        power_on();
+        expect_sent(&parts[0]);
+        command(COMMAND_START);
+        uint32_t next = 1;
+        for (uint32_t k = 0; k < 25u; ++k) {
+            app_bench_periods(&bench, 1u + random_below(200));
+            if (bench.controller.machine.state != MACHINE_READY) {
+                next = act_at_random(next);
+            }
+        }
+        (void)app_bench_command(&bench, COMMAND_RESUME);
+        (void)app_bench_write(&bench, 0x2010, 1, 100, 2);
+        while (next < PARTS) {
+            next = send_perhaps(next);
+        }
+        (void)app_bench_until(&bench, MACHINE_READY, 20000);
+        app_bench_period(&bench);
+        expect_state(STREAM_ENDED);
+        expect_executed(3);
+        TEST_ASSERT_EQUAL_INT32((X_MM + 8 + 48) * UNIT, bench.drives[0].position_counts);
+        expect_path();
+    }
+}
+
 /* ---- Begin and end of a job ---- */
 
 static void test_a_job_starts_at_its_beginning_once(void)
@@ -756,6 +835,7 @@ int main(void)
     RUN_TEST(test_stop_in_an_underrun);
     RUN_TEST(test_a_fault_ends_the_job_on_its_path);
     RUN_TEST(test_override_in_a_job);
+    RUN_TEST(test_any_sequence_of_commands_and_chunks);
     RUN_TEST(test_a_job_starts_at_its_beginning_once);
     RUN_TEST(test_a_program_closes_the_job_when_it_is_accepted);
     RUN_TEST(test_no_program_while_the_job_moves);

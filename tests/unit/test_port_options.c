@@ -16,7 +16,7 @@ void tearDown(void)
 
 static enum options_result parse(int argc, const char *const *words)
 {
-    char *argv[8];
+    char *argv[10];
     for (int i = 0; i < argc; ++i) {
         argv[i] = (char *)(uintptr_t)words[i];
     }
@@ -25,9 +25,10 @@ static enum options_result parse(int argc, const char *const *words)
 
 static void test_all_of_them(void)
 {
-    const char *const words[] = {"x",  "--bus",  "can1", "--node",
-                                 "17", "--pace", "fast", "--verbose"};
-    TEST_ASSERT_EQUAL_INT(OPTIONS_OK, parse(8, words));
+    const char *const words[] = {"x",      "--bus", "can1",      "--node", "17",
+                                 "--pace", "fast",  "--verbose", "--ring", "48"};
+    TEST_ASSERT_EQUAL_INT(OPTIONS_OK, parse(10, words));
+    TEST_ASSERT_EQUAL_UINT32(48, options.ring_kib);
     TEST_ASSERT_EQUAL_STRING("can1", options.bus);
     TEST_ASSERT_EQUAL_UINT8(17, options.node);
     TEST_ASSERT_EQUAL_INT(OPTIONS_FAST, options.pace);
@@ -39,6 +40,7 @@ static void test_defaults(void)
     const char *const words[] = {"x", "--bus", "vcan0"};
     TEST_ASSERT_EQUAL_INT(OPTIONS_OK, parse(3, words));
     TEST_ASSERT_EQUAL_UINT8(1, options.node);
+    TEST_ASSERT_EQUAL_UINT32(16384, options.ring_kib);
     TEST_ASSERT_EQUAL_INT(OPTIONS_REAL_TIME, options.pace);
     TEST_ASSERT_FALSE(options.verbose);
 }
@@ -49,7 +51,8 @@ static void test_mistakes(void)
         {"x", "--bus", "vcan0", "--node"}, {"x", "--node", "0", NULL},
         {"x", "--node", "128", NULL},      {"x", "--node", "2x", NULL},
         {"x", "--pace", "slow", NULL},     {"x", "--speed", "1", NULL},
-        {"x", "--verbose", NULL, NULL},
+        {"x", "--verbose", NULL, NULL},    {"x", "--ring", "0", NULL},
+        {"x", "--ring", "16385", NULL},    {"x", "--ring", "48k", NULL},
     };
     for (unsigned i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
         int argc = 0;

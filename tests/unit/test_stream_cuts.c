@@ -43,11 +43,11 @@ struct chain {
 };
 
 static struct {
+    struct golden_prepared exact;
     struct override_program program;
+    struct chain chains[CHAINS];
     struct interpolator_point right[MOST_TICKS]; /* its setpoints at 100 % */
     uint32_t ticks;
-    struct golden_prepared exact;
-    struct chain chains[CHAINS];
     uint32_t chain_count;
 } wholes[WHOLES];
 

@@ -66,8 +66,7 @@ enum machine_refusal {
     MACHINE_NOT_HOMED = 13,       /* an axis with a homing method has no zero */
     MACHINE_ENDING = 17,          /* the controller is being shut down */
     MACHINE_NOT_IN_TIME = 16,     /* drives are real, and the port cannot keep ticks in time */
-    MACHINE_JOB_STARTED =
-        19, /* the streamed job has been started before; or not at its beginning */
+    MACHINE_JOB_STARTED = 19,     /* a job starts once, at its beginning */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
