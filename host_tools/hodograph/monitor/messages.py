@@ -54,8 +54,8 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
 
 
 def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
-    """The program's curve to draw, in space with z, and axes behind z over arc length; `note` says why there is none, or
-    what is odd about it.
+    """The program's curve to draw, in space with z, and axes behind z over arc length; `note` says why there is none,
+    or what is odd about it.
     """
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}
     if path is not None:
