@@ -146,9 +146,9 @@ def goto(
     count = len(end_counts)
     if list(here[SPACE_AXES:count]) == list(end_counts[SPACE_AXES:]):
         count = min(count, SPACE_AXES)
-    counts = machine.path_counts[:count]
+    scales = machine.path_counts[:count]
     start_mm, end_mm = (
-        tuple(place[k] / own for k, own in enumerate(counts)) for place in (here, end_counts)
+        tuple(place[k] / own for k, own in enumerate(scales)) for place in (here, end_counts)
     )
     way_mm = 0.0
     moves = legs(start_mm, end_mm, machine)
