@@ -234,7 +234,7 @@ def _found(motion: Motion, axis: int, truth: Drive, seed: int) -> tuple[list[flo
     volts = rows["volts_mv"][:, axis] + np.rint(noise.normal(0, NOISE_MV, len(rows)))
     stretch = Stretch(inputs, actual.astype(np.int32), volts.astype(np.int16))
     guess = replace(truth, gain_rad_s_v=1.4 * truth.gain_rad_s_v, time_constant_s=0.12)
-    found = identify_axis([stretch], guess, motion.counts_per_mm, motion.period_us)
+    found = identify_axis([stretch], guess, motion.counts_per_unit[0], motion.period_us)
     pairs = (
         (found.gain_rad_s_v, truth.gain_rad_s_v),
         (found.time_constant_s, truth.time_constant_s),
