@@ -18,6 +18,7 @@ from hodograph.bus.capture.decode import decode_ticks
 from hodograph.bus.capture.frames import Frames
 from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
+from hodograph.bus.goto import DETOUR_MM, LONGEST_DETOUR_MM, goto
 from hodograph.bus.sdo.controller import (
     FAULT_STATE,
     HELD,
@@ -179,6 +180,24 @@ def test_run_gives_the_bits_of_simulate(
     assert "at (1, 2, -3) mm" in capsys.readouterr().out
 
 
+def test_five_axes_run_and_go_back_to_their_start(
+    make_bench: MakeBench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The bits of simulate; then again: goto turns a and c back, though x, y, z are brought to the start as well."""
+    bench = make_bench(file=FIVE_AXES)
+    capsys.readouterr()
+    words = [str(EXAMPLES / "five_axes.toml"), "--json"]
+    assert main(["simulate", *words]) == 0
+    expected = json.loads(capsys.readouterr().out)
+    for _ in range(2):
+        assert main(["run", *words]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["setpoints_sha256"] == expected["setpoints_sha256"]
+        assert found["c_max_error_deg"] < 1e-3
+    status = snapshot(bench.controller)
+    assert status.axes[4].actual_mm == pytest.approx(360.0, abs=1e-3)
+
+
 RULES = [
     "fault node=4 code=0x5400",
     "restart node=4",
@@ -233,6 +252,18 @@ def test_axes_that_turn(make_bench: MakeBench) -> None:
     assert program_tick(targets, expected) is not None
     status = snapshot(bench.controller)
     assert status.axes[4].actual_mm == pytest.approx(expected[-1, 4] / 100_000, abs=1e-4)
+
+
+def test_goto_turns_axes_where_the_tool_stands(make_bench: MakeBench) -> None:
+    """Without a way of x, y, z: a little way of x, and back."""
+    bench = make_bench(file=FIVE_AXES)
+    bench.controller.enable()
+    counts = bench.machine.path_counts
+    for a, c in ((-90.0, 720.0), (0.0, 0.0)):
+        end = [0, 0, 0, round(a * counts[3]), round(c * counts[4])]
+        way_mm = goto(bench.controller, bench.machine, end, unhomed=True)
+        assert 2 * DETOUR_MM <= way_mm <= 2 * LONGEST_DETOUR_MM
+        assert list(bench.controller.targets(5)) == end
 
 
 def test_a_program_with_fewer_axes_leaves_the_others(make_bench: MakeBench) -> None:

@@ -25,13 +25,13 @@ from hodograph.bus.sdo.objects import BOOT
 from hodograph.pipeline import load_pipeline
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = [str(ROOT / "examples" / f"{name}.toml") for name in ("alpha", "heart")]
+FILES = [str(ROOT / "examples" / f"{name}.toml") for name in ("alpha", "heart", "five_axes")]
 HASHES = ("setpoints_sha256", "encoders_sha256")
 BITRATE = 1_000_000
 MIDWAY_TICKS = 500  # of 1101
 
 
-def test_the_m4f_runs_alpha_and_heart(
+def test_the_m4f_runs_in_the_plane_and_with_five_axes(
     hub: LocalHub, clock: VirtualClock, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """`simulate` gives the hashes of `run` with the Linux controller (test_bus_run)."""

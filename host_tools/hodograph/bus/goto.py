@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..config import PLANE_AXES, SPACE_AXES, Axis, Machine
+from ..config import PLANE_AXES, SPACE_AXES, Machine
 from ..errors import InputError, RefusedError
 from ..feed import FeedRequest, Limits, plan_path
 from ..pipeline import (
@@ -30,15 +30,19 @@ GOTO_RAMP_S = 0.25
 SHORTEST_MOVE_MM = 0.002
 """Shorter moves (the format ends near 1 um) go by way of a point DETOUR_MM away."""
 DETOUR_MM = 0.1
-
+DETOUR_SHARE, LONGEST_DETOUR_MM = 0.01, 5.0
+"""The same where axes behind x, y, z move and these do not: mm for each degree, or mm, of the longest of those ways."""
+FOLLOWING_SHARE = 0.5
+"""Of the axis limits, for moves of axes behind x, y, z: at their full speed they could not stop within stop_time_ms."""
 
 Place = tuple[float, ...]
-"""Of the axes that draw a path: two in the plane, three in space; mm."""
+"""Of path axes, mm or degrees: the two or three that draw a path, or these and the axes that follow them."""
 
 
 def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
     """The program of a straight move in machine coordinates. Raises PlanError when it leaves the travel."""
     machine = replace(machine, path_count=len(start_mm), offset_mm=(0.0,) * len(start_mm))
+    machine = _along(machine, start_mm, end_mm)
     spline = _line(start_mm, end_mm)
     request = FeedRequest(
         profile="minimax",
@@ -46,7 +50,12 @@ def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
         ramp_time_s=GOTO_RAMP_S,
         degree=5,
     )
-    limits = Limits(machine=axis_limits(machine), names=machine.path_names)
+    follow = start_mm[SPACE_AXES:] != end_mm[SPACE_AXES:]
+    limits = Limits(
+        machine=axis_limits(machine).scaled(FOLLOWING_SHARE if follow else 1.0),
+        names=machine.path_names,
+        units=machine.path_units,
+    )
     plan = plan_path(
         spline,
         request,
@@ -65,21 +74,47 @@ def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
     return encode(compile_path(spline, plan, options).program)
 
 
+def _along(machine: Machine, start_mm: Place, end_mm: Place) -> Machine:
+    """The machine with limits along the straight way at which the axes behind x, y, z keep theirs.
+
+    Stops are looked for down to a share of the limits along the way, which such axes may be far below.
+    """
+    way_mm = math.dist(start_mm[:SPACE_AXES], end_mm[:SPACE_AXES])
+    axes = zip(machine.path_axes, start_mm, end_mm, strict=True)
+    moving = [(axis, abs(b - a) / way_mm) for axis, a, b in axes if a != b]
+    acceleration = [axis.acceleration_mm_s2 / slope for axis, slope in moving if slope > 1.0]
+    jerk = [axis.jerk_mm_s3 / slope for axis, slope in moving if slope > 1.0]
+    return replace(
+        machine,
+        acceleration_mm_s2=min([machine.acceleration_mm_s2, *acceleration]),
+        jerk_mm_s3=min([machine.jerk_mm_s3, *jerk]),
+    )
+
+
 def _line(start_mm: Place, end_mm: Place) -> PHSpline | SpatialPHSpline:
     if len(start_mm) == PLANE_AXES:
         return line(complex(*start_mm), complex(*end_mm))
-    return spatial_through_points(np.array([start_mm, end_mm]), closed=False).spline
+    ends = np.array([start_mm, end_mm])
+    drawn, extra = ends[:, :SPACE_AXES], ends[:, SPACE_AXES:]
+    return spatial_through_points(drawn, closed=False, extra=extra).spline
 
 
 def legs(start_mm: Place, end_mm: Place, machine: Machine) -> list[tuple[Place, Place]]:
-    """The straight moves that lead from one point to another: none, one, or two for a tiny way."""
+    """The straight moves that lead from one point to another: none, one, or two for a tiny way of x, y, z.
+
+    Axes behind x, y, z move on the first of two.
+    """
     if start_mm == end_mm:
         return []
-    if math.dist(start_mm, end_mm) >= SHORTEST_MOVE_MM:
+    way_mm = math.dist(start_mm[:SPACE_AXES], end_mm[:SPACE_AXES])
+    turns = [abs(b - a) for a, b in zip(start_mm, end_mm, strict=True)][SPACE_AXES:]
+    detour_mm = min(max(DETOUR_MM, DETOUR_SHARE * max(turns, default=0.0)), LONGEST_DETOUR_MM)
+    if way_mm >= (detour_mm if any(turns) else SHORTEST_MOVE_MM):
         return [(start_mm, end_mm)]
     axis = machine.path_axes[0]
     middle = (axis.travel_min_mm + axis.travel_max_mm) / 2
-    detour = (start_mm[0] + math.copysign(DETOUR_MM, middle - start_mm[0]), *start_mm[1:])
+    beside = start_mm[0] + math.copysign(detour_mm, middle - start_mm[0])
+    detour = (beside, *start_mm[1:SPACE_AXES], *end_mm[SPACE_AXES:])
     return [(start_mm, detour), (detour, end_mm)]
 
 
@@ -92,7 +127,8 @@ def goto(
     unhomed: bool = False,
 ) -> float:
     """Moves from the present setpoint to a point in counts of the path's axes, in the order of the path; returns the
-    way in mm, at standstill. Axes that it does not name hold their position.
+    way in mm, at standstill. Axes that it does not name hold their position. Where axes behind x, y, z move and these
+    do not, x makes a small way and comes back: a program has no motion without a way.
 
     The drives have to be on (state ready). Each move replaces the program that is loaded. `unhomed`: also when axes
     with a homing method are not homed. Raises RefusedError when the feed override is 0, with which nothing would move.
@@ -106,10 +142,12 @@ def goto(
                 f"{axis.travel_min_mm:g} to {axis.travel_max_mm:g} {axis.unit}"
             )
     here = controller.targets(len(axes))
-    drawn = min(len(end_counts), SPACE_AXES)
-    _require_no_way(axes[drawn:], here[drawn:], end_counts[drawn:])
+    count = len(end_counts)
+    if list(here[SPACE_AXES:count]) == list(end_counts[SPACE_AXES:]):
+        count = min(count, SPACE_AXES)
+    scales = machine.path_counts[:count]
     start_mm, end_mm = (
-        tuple(n / machine.counts_per_mm for n in place[:drawn]) for place in (here, end_counts)
+        tuple(place[k] / own for k, own in enumerate(scales)) for place in (here, end_counts)
     )
     way_mm = 0.0
     moves = legs(start_mm, end_mm, machine)
@@ -121,16 +159,5 @@ def goto(
         controller.upload(line_image(a, b, machine))
         controller.start(unhomed=unhomed)
         controller.wait_for((READY,), math.inf, tick)
-        way_mm += math.dist(a, b)
+        way_mm += math.dist(a[:SPACE_AXES], b[:SPACE_AXES])
     return way_mm
-
-
-def _require_no_way(axes: Sequence[Axis], here: Sequence[int], end: Sequence[int]) -> None:
-    """Raises InputError where an axis that does not draw the path would have to move."""
-    for axis, at, wanted in zip(axes, here, end, strict=False):
-        if at != wanted:
-            scale = axis.counts_per_unit
-            raise InputError(
-                f"goto: moves the axes that draw the path only, and {axis.name} stands at {at / scale:g} {axis.unit}, "
-                f"not at {wanted / scale:g}: bring it there first"
-            )
