@@ -87,6 +87,10 @@ def stage_python(build: Path, stage: Path, work: Path) -> None:
     pip_install(site, "--no-index", wheel)
     shutil.rmtree(site / "bin")
     shutil.rmtree(site / "hodograph/bin")  # the same programs are in /usr/bin
+    share = site / "share"  # of the wheel's data files
+    (share / "zsh/site-functions").rename(share / "zsh/vendor-completions")
+    shutil.copytree(share, stage / "usr/share", dirs_exist_ok=True)
+    shutil.rmtree(share)
     for told in site.glob("hodograph-*.dist-info/direct_url.json"):
         told.unlink()  # where the wheel lay on this computer
     command = stage / "usr/bin/hodograph"
