@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """packages.py SET...: makes sure that what the machine must have is there.
 
-A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware`, `flash`, `aarch64`, `deb`, `lintian`,
+A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware`, `flash`, `aarch64`, `deb`,
 `clean-root` or `container`. Missing Debian packages are installed when this runs as root or with passwordless sudo;
 otherwise the command to type is printed and the exit status is 1. Standard library only: it runs before anything is
 installed.
@@ -128,7 +128,6 @@ AARCH64 = (
     _file(f"{AARCH64_ROOT}/lib/ld-linux-aarch64.so.1", "libc6-arm64-cross"),
 )
 DEB = (_program("dpkg-buildpackage"), _program("dh"))
-LINTIAN = (_program("lintian"),)
 # A clean root, to try packages in, and containers.
 CLEAN_ROOT = (_program("mmdebstrap"),)
 CONTAINER = (_program("buildah"), *CLEAN_ROOT)
@@ -143,7 +142,6 @@ SETS = {
     "flash": FLASH,
     "aarch64": AARCH64,
     "deb": DEB,
-    "lintian": LINTIAN,
     "clean-root": CLEAN_ROOT,
     "container": CONTAINER,
     "compare": COMPARE,
