@@ -82,6 +82,15 @@ class CompleteWheel(bdist_wheel):
             raise FileError(f"the wheel would lack {', '.join(missing)}")
 
 
+def shared_files() -> list[tuple[str, list[str]]]:
+    """Man page and shell completion, below PREFIX/share; tools/dist/make_release.py puts them into a release."""
+    share = ROOT / "packaging/share"
+    files = sorted(file for file in share.rglob("*") if file.is_file())
+    return [
+        (f"share/{file.parent.relative_to(share)}", [str(file.relative_to(ROOT))]) for file in files
+    ]
+
+
 def remove_stale_build() -> None:
     """setuptools packs what lies in build/lib, also from an older build: begin without."""
     shutil.rmtree(ROOT / "build/lib", ignore_errors=True)
@@ -90,6 +99,7 @@ def remove_stale_build() -> None:
 remove_stale_build()
 setup(
     ext_modules=[extension(ROOT)],
+    data_files=shared_files(),
     cmdclass={"bdist_wheel": CompleteWheel, "build_ext": NothingToBuild if BY_MAKE else BuildAll},
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

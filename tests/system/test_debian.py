@@ -28,6 +28,9 @@ su user -c 'cd && hodograph simulate /tmp/examples/alpha.toml --json > simulate.
 su user -c 'cd && cp -r /usr/share/hodograph/examples/embed . && cd embed && make'
 su user -c 'cd && embed/setpoints /tmp/alpha.hdgp > setpoints.txt'
 su user -c 'cd && cmake -S embed -B cmake && cmake --build cmake && cmake/setpoints /tmp/alpha.hdgp > cmake.txt'
+zcat /usr/share/man/man1/hodograph.1.gz | grep -q 'hodograph scan'
+grep -q -- --assign /usr/share/bash-completion/completions/hodograph
+ls /usr/share/zsh/vendor-completions/_hodograph /usr/share/fish/vendor_completions.d/hodograph.fish
 ldd /home/user/embed/setpoints | grep libhodograph > /home/user/linked.txt
 mkdir /tmp/results
 cp /home/user/*.json /home/user/*.txt /tmp/results
@@ -67,6 +70,15 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     make("deb", f"DIST={folder}")
     assert len(list(folder.glob("*.deb"))) == 3
     return folder
+
+
+@pytest.mark.timeout(3600)
+def test_the_same_bytes_again(packages: Path, tmp_path: Path) -> None:
+    make("deb", f"DIST={tmp_path}")
+    names = sorted(file.name for file in packages.glob("*.deb"))
+    assert names == sorted(file.name for file in tmp_path.glob("*.deb"))
+    for name in names:
+        assert (tmp_path / name).read_bytes() == (packages / name).read_bytes(), name
 
 
 @pytest.mark.timeout(3600)

@@ -48,6 +48,7 @@ def test_the_wheel_alone_runs_the_demo(tmp_path: Path) -> None:
     check_source(source)
     check_wheel(wheel)
     environment = unpacked(wheel, tmp_path)
+    check_share(Path(environment["PYTHONPATH"]))
     where = "import hodograph.bus.processes as p; print(p.find_program('hodograph-hub'))"
     found = python(environment, tmp_path, "-c", where)
     assert found.startswith(environment["PYTHONPATH"])
@@ -66,6 +67,17 @@ def check_wheel(wheel: Path) -> None:
             data = archive.read(name)
             assert str(ROOT).encode() not in data, name
             assert b"hodograph-dist-" not in data, name
+
+
+def check_share(site: Path) -> None:
+    """Man page and completion of all shells, as `make share` writes them."""
+    for name in (
+        "man/man1/hodograph.1",
+        "bash-completion/completions/hodograph",
+        "zsh/site-functions/_hodograph",
+        "fish/vendor_completions.d/hodograph.fish",
+    ):
+        assert (site / "share" / name).stat().st_size > 5000, name
 
 
 def check_source(source: Path) -> None:

@@ -37,7 +37,9 @@ def soname(shared: Path) -> str:
 def struct_sizes(include: Path, names: list[str]) -> dict[str, int]:
     """Bytes of structs of the public header, by the compiler of this computer."""
     prints = "".join(f'printf("{name} %zu\\n", sizeof(struct {name}));\n' for name in names)
-    source = f"#include <stdio.h>\n#include <hodograph.h>\nint main(void)\n{{\n{prints}return 0;\n}}\n"
+    source = (
+        f"#include <stdio.h>\n#include <hodograph.h>\nint main(void)\n{{\n{prints}return 0;\n}}\n"
+    )
     with tempfile.TemporaryDirectory(prefix="hodograph-abi-") as folder:
         program = Path(folder, "sizes")
         compile_it = ["cc", "-std=c99", f"-I{include}", "-x", "c", "-", "-o", str(program)]
@@ -89,7 +91,9 @@ def main() -> int:
     for line in found:
         print(f"packaging/library/abi.txt: {line}", file=sys.stderr)
     if found:
-        print("a change for callers: raise the number there (docs/guides/embed.md)", file=sys.stderr)
+        print(
+            "a change for callers: raise the number there (docs/guides/embed.md)", file=sys.stderr
+        )
     return 1 if found else 0
 
 

@@ -41,14 +41,26 @@ sys.exit(main())
 COPYRIGHT = """\
 Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
 Upstream-Name: hodograph
+"""
+BRINGS = """\
 Comment: The package hodograph also has the Python packages below, as their authors distribute them. The text of each
  licence lies beside the package, in the folder that "Files" names, with those of the libraries that it brings.
+"""
+OWN = """\
 
 Files: *
 Copyright: 2026 The Hodograph authors
 License: MIT
 
 """
+COMMON_LICENSES = {
+    "Apache": "Apache-2.0",
+    "LGPL": "LGPL-3",
+    "Lesser General Public": "LGPL-3",
+    "MPL": "MPL-2.0",
+    "Mozilla": "MPL-2.0",
+}
+"""Words in the name of a licence: its file in Debian's /usr/share/common-licenses."""
 
 
 class PackageError(Exception):
@@ -87,11 +99,21 @@ def stage_python(build: Path, stage: Path, work: Path) -> None:
     pip_install(site, "--no-index", wheel)
     shutil.rmtree(site / "bin")
     shutil.rmtree(site / "hodograph/bin")  # the same programs are in /usr/bin
+    share = site / "share"  # of the wheel's data files
+    (share / "zsh/site-functions").rename(share / "zsh/vendor-completions")
+    shutil.copytree(share, stage / "usr/share", dirs_exist_ok=True)
+    shutil.rmtree(share)
     for told in site.glob("hodograph-*.dist-info/direct_url.json"):
         told.unlink()  # where the wheel lay on this computer
     command = stage / "usr/bin/hodograph"
     command.write_text(LAUNCHER, encoding="utf-8")
     command.chmod(0o755)
+
+
+def set_times(folder: Path, time_s: int) -> None:
+    """One time for all files: dpkg-deb keeps those that are older than SOURCE_DATE_EPOCH."""
+    for path in [folder, *folder.rglob("*")]:
+        os.utime(path, (time_s, time_s), follow_symlinks=False)
 
 
 def licence_name(package: Distribution) -> str:
@@ -111,7 +133,7 @@ def licence_name(package: Distribution) -> str:
 
 def copyright_text(site: Path) -> str:
     """debian/copyright in Debian's machine-readable form: our own licence, then each Python package's."""
-    text = COPYRIGHT
+    text = COPYRIGHT + BRINGS + OWN
     used = {}
     for package in sorted(distributions(path=[str(site)]), key=lambda one: one.name.lower()):
         if package.name == "hodograph":
@@ -125,13 +147,20 @@ def copyright_text(site: Path) -> str:
         ]
         text += "Files: " + "\n ".join(names) + "\n"
         text += f"Copyright: the authors of {package.name} {package.version}\nLicense: {label}\n\n"
-    licence = (ROOT / "LICENSE").read_text(encoding="utf-8").strip()
-    body = "\n".join(f" {line}" if line else " ." for line in licence.splitlines())
-    text += f"License: MIT\n{body}\n"
+    text += own_licence()
     for label, name in sorted(used.items()):
         if label != "MIT":
             text += f"\nLicense: {label}\n {name}: see the files of the package.\n"
+            files = {file for word, file in COMMON_LICENSES.items() if word in name}
+            text += "".join(f" See also /usr/share/common-licenses/{file}.\n" for file in files)
     return text
+
+
+def own_licence() -> str:
+    """The text of ours, in Debian's form."""
+    licence = (ROOT / "LICENSE").read_text(encoding="utf-8").strip()
+    body = "\n".join(f" {line}" if line else " ." for line in licence.splitlines())
+    return f"License: MIT\n{body}\n"
 
 
 def make_sources(source: Path, stage: Path, time_s: int) -> None:
@@ -152,7 +181,8 @@ def make_sources(source: Path, stage: Path, time_s: int) -> None:
         encoding="utf-8",
     )
     site = stage / HOME / SITE
-    (debian / "copyright").write_text(copyright_text(site), encoding="utf-8")
+    (debian / "hodograph.copyright").write_text(copyright_text(site), encoding="utf-8")
+    (debian / "copyright").write_text(COPYRIGHT + OWN + own_licence(), encoding="utf-8")
 
 
 def make_packages(build: Path, out: Path) -> list[Path]:
@@ -169,6 +199,7 @@ def make_packages(build: Path, out: Path) -> list[Path]:
         words = ("--build", build, "--prefix", "/usr", "--libdir", libraries, "--destdir", stage)
         run(sys.executable, script, "install", *words)
         stage_python(build, stage, work)
+        set_times(stage, time_s)
         make_sources(source, stage, time_s)
         run("dpkg-buildpackage", "-b", "-us", "-uc", cwd=source)
         out.mkdir(parents=True, exist_ok=True)

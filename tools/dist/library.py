@@ -94,7 +94,9 @@ def declared(header: str) -> list[str]:
         text = re.sub(r"\{[^{}]*\}", ";", text)
     names = []
     for statement in text.split(";"):
-        found = re.search(r"(\w+)\s*\(", statement) or re.search(r"extern .*?(\w+)(\[|$)", statement)
+        found = re.search(r"(\w+)\s*\(", statement) or re.search(
+            r"extern .*?(\w+)(\[|$)", statement
+        )
         if found and not _NOT_DECLARED.match(statement):
             names.append(found[1])
     return names

@@ -63,6 +63,12 @@ def checked_out(folder: Path) -> Path:
     return tree
 
 
+def make_share(tree: Path) -> None:
+    """Man page and shell completion into a tree, from which setup.py installs them; a clone is without them."""
+    command = [sys.executable, str(ROOT / "tools/make_share.py"), str(tree / "packaging/share")]
+    subprocess.run(command, check=True)
+
+
 def normalised(archive: Path, target: Path, time_s: int) -> Path:
     """The same archive with its members in order, of nobody, at one time."""
     with (
@@ -95,7 +101,9 @@ def make_release(out: Path, platform: str | None) -> list[Path]:
     time_s = epoch_s()
     with tempfile.TemporaryDirectory(prefix="hodograph-dist-") as folder:
         work = Path(folder)
-        backend("build_sdist", checked_out(work), work, time_s)
+        checkout = checked_out(work)
+        make_share(checkout)
+        backend("build_sdist", checkout, work, time_s)
         made = next(work.glob("hodograph-*.tar.gz"))
         source = normalised(made, work / f"normalised-{made.name}", time_s).replace(made)
         with tarfile.open(source) as archive:

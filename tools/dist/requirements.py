@@ -49,7 +49,9 @@ def read_lock(text: str) -> list[Locked]:
 def package_dependencies() -> set[str]:
     """What pyproject.toml names."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    return {canonicalize_name(Requirement(word).name) for word in settings["project"]["dependencies"]}
+    return {
+        canonicalize_name(Requirement(word).name) for word in settings["project"]["dependencies"]
+    }
 
 
 def runtime_requirements() -> list[Locked]:

@@ -49,7 +49,13 @@ def make_sbom(build: Path, tool: Path) -> dict[str, Any]:
     """The document; raises CalledProcessError."""
     with tempfile.TemporaryDirectory(prefix="hodograph-sbom-") as folder:
         target = Path(folder, "sbom.json")
-        words = ["environment", "--pyproject", str(ROOT / "pyproject.toml"), "--mc-type", "application"]
+        words = [
+            "environment",
+            "--pyproject",
+            str(ROOT / "pyproject.toml"),
+            "--mc-type",
+            "application",
+        ]
         words += ["--spec-version", "1.6", "--output-reproducible", "--output-format", "JSON"]
         words += ["--output-file", str(target), str(build / "runtime/bin/python3")]
         subprocess.run([str(tool), *words], check=True)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import socket
 import struct
 from dataclasses import dataclass
@@ -75,6 +74,12 @@ def _check_local(address: BusAddress) -> None:
 
 
 def _check_socketcan(address: BusAddress) -> None:
+    if not hasattr(socket, "AF_CAN"):
+        raise BusError(
+            f"{address}: only Linux has SocketCAN: name your adapter, --bus INTERFACE:CHANNEL as python-can calls it"
+        )
+    import fcntl  # Windows has none; the rest of the package does without
+
     name = address.channel
     try:
         probe = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)

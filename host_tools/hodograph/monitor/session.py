@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import resource
 import signal
 import time
 from collections.abc import Callable
@@ -37,6 +36,8 @@ class Usage:
         passed_s = max(now[0] - self._last[0], 1e-3)
         percent = 100 * (now[1] - self._last[1]) / passed_s
         self._last = now
+        import resource  # not on Windows
+
         return {
             "type": "usage",
             "cpu_percent": round(percent, 1),
