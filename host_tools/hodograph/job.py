@@ -22,7 +22,10 @@ from .errors import InputError, PlanError
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .pipeline import Pipeline
+from .program.compiler import Compilation
 from .program.geometry import quantise
+from .program.stop_planning import LongStopError
+from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, late_mostly, reserve_zones
 from .simulate import Motion, simulate
 from .spline.build import FoundSpline
 from .spline.curve import PHSpline
@@ -85,6 +88,27 @@ class SectionPipeline(Pipeline):
                 break
             plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
         return plan
+
+    def _compiled(self, plan: FeedPlan) -> Compilation:
+        """The program; of a plan made again with more reserve where a stop would have to wait too long to begin."""
+        longest_s = self.machine.stop_time_ms * 1e-3
+        limits, zones = plan.limits, plan.limits.reserve_zones
+        steps: list[ReserveStep | float] = [*STEPS, *EVERYWHERE]
+        while True:
+            try:
+                return super()._compiled(plan)
+            except LongStopError as error:
+                if late_mostly(error.program, longest_s):
+                    steps = [step for step in steps if isinstance(step, float)]
+                if not steps:
+                    raise
+                step = steps.pop(0)
+                if isinstance(step, float):
+                    lower = replace(limits, machine=limits.machine.scaled(1.0 - step))
+                else:
+                    zones += tuple(reserve_zones(error.program, longest_s, step))
+                    lower = replace(limits, reserve_zones=zones)
+            plan = self._planned(lower)
 
 
 def _in_plane(curve: SpatialPHSpline) -> PHSpline:
