@@ -24,7 +24,7 @@ from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
-from .program.stop_planning import LongStopError
+from .program.stop_planning import LongStopError, StopTerms
 from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, late_mostly, reserve_zones
 from .simulate import Motion, simulate
 from .spline.build import FoundSpline
@@ -54,6 +54,9 @@ GREATEST_TOLERANCE_MM = 10.0
 _MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
 """Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
 
+_QUICK_CHORDS = 1000
+"""Sections with more chords are searched for stops with few trials."""
+
 _UNHEEDED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
     (Coolant,): "coolant (M7, M8, M9)",
@@ -77,6 +80,12 @@ class SectionPipeline(Pipeline):
         if len(self.machine.path_axes) > 2:
             return FoundSpline(curve, 0)
         return FoundSpline(_in_plane(curve), 0)
+
+    @property
+    def stop_terms(self) -> StopTerms:
+        """What the stops of the program keep."""
+        assert self.fitted is not None
+        return replace(super().stop_terms, quick=self.fitted.reference.count > _QUICK_CHORDS)
 
     def _planned(self, limits: Limits) -> FeedPlan:
         """The plan; with more reserve where a piece would have none left for the least override rate."""

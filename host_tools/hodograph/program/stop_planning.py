@@ -33,10 +33,6 @@ MOST_MISSES = 2
 """Halvings without numbers, after which a part is not halved again."""
 
 
-QUICK_PIECES = 5000
-"""Of programs with more pieces few numbers are tried."""
-
-
 class LongStopError(PlanError):
     """A fault stop of `program` may take longer than the machine file allows."""
 
@@ -53,12 +49,14 @@ class StopTerms:
     drives        the same with all the volts that their drives have; for fault stops. None: any
     axis          limits of the machine's axes, for both
     stop_time_ms  greatest bound of a fault stop; 0: any
+    quick         few numbers are tried: for long programs
     """
 
     plants: Plants | None = None
     drives: Plants | None = None
     axis: AxisLimits = field(default_factory=AxisLimits)
     stop_time_ms: int = 0
+    quick: bool = False
 
 
 def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
@@ -68,7 +66,7 @@ def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     """
     search = StopSearch(NativeProgram(encode(program)))
     limits = [
-        replace(own.raised(search.used(own)), quick=program.piece_count > QUICK_PIECES)
+        replace(own.raised(search.used(own)), quick=terms.quick)
         for own in (hold_limits(plan, terms), fault_limits(plan, terms))
     ]
     tree = _Halves(program)
