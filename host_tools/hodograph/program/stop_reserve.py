@@ -42,7 +42,7 @@ class ReserveStep:
 STEPS = (ReserveStep(0.03, 0.25), ReserveStep(0.06, 0.4), ReserveStep(inf, 0.2))
 """One round after the other, where stops are late in places."""
 
-EVERYWHERE = (0.12, 0.25, 0.4, 0.6)
+EVERYWHERE = (0.16, 0.25, 0.4, 0.6)
 """Shares of all limits that are left free, one after the other, where this does not help."""
 
 _MOST_LATE = 0.3
