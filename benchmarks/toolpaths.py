@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Cycle times of toolpaths beside those that were measured with LinuxCNC, and the certified deviation.
 
-    python benchmarks/toolpaths.py [--json OUT] [--only NAME…] [--folder DIR…]
+    python benchmarks/toolpaths.py [--json OUT] [--only NAME…] [--folder DIR…] [--lines N]
 
-The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the plans; a run takes them rounded
-up to ticks. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with its S-curve planner and 50000 mm/s^3.
-Files that are in none of the folders are left out, with a line that says so.
+The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the programs: with what a plan is
+slower so that stops may begin soon enough. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with its
+S-curve planner and 50000 mm/s^3. Files that are in none of the folders are left out, with a line that says so. Then
+generated programs of N lines, and the processor time that they take.
 """
 
 from __future__ import annotations
@@ -75,13 +76,83 @@ def first_lines(file: Path, lines: int | None, folder: Path) -> Path:
     return copy
 
 
+def smooth(lines: int) -> Iterator[str]:
+    """A wavy spiral in chords of 0.2 mm."""
+    for k in range(lines):
+        t = 0.02 * k
+        r = 100.0 + 20.0 * math.sin(0.155 * t) + 3.0 * math.sin(0.9 * t)
+        yield f"G1 X{r * math.cos(0.1 * t):.4f} Y{r * math.sin(0.1 * t):.4f}"
+
+
+def raster(lines: int) -> Iterator[str]:
+    """Rows of 60 mm over a surface, a point each 0.3 mm."""
+    for k in range(lines):
+        row, column = divmod(k, 200)
+        x, y = 0.3 * (column if row % 2 == 0 else 199 - column), 0.5 * row
+        z = 3.0 * math.sin(0.2 * x) * math.cos(0.15 * y) + 0.8 * math.sin(0.7 * x + 0.3 * y)
+        yield f"G1 X{x:.4f} Y{y:.4f} Z{z:.4f}"
+
+
+def stairs(lines: int) -> Iterator[str]:
+    """Right angles, legs of 0.5 mm."""
+    for k in range(1, lines + 1):
+        yield f"G1 X{0.5 * ((k + 1) // 2):g} Y{0.5 * (k // 2):g}"
+
+
+GENERATED = {"smooth": smooth, "raster": raster, "stairs": stairs}
+
+
+def seconds_by_stage(kind: str, lines: int, folder: Path) -> dict[str, object]:
+    """Processor time of each stage for a generated program, s, and the cycle time that comes out."""
+    file = folder / f"{kind}.ngc"
+    file.write_text(
+        "\n".join(["G21 G90 F6000", *GENERATED[kind](lines), "M2"]) + "\n", encoding="utf-8"
+    )
+    begin = time.process_time()
+    job = load_job(file, load_machine(MILL))
+    fitted = time.process_time()
+    planned_s = sum(section.pipeline.plan.duration_s for section in job.sections)
+    planned = time.process_time()
+    duration_s = sum(section.pipeline.compilation.plan.duration_s for section in job.sections)
+    return {
+        "kind": kind,
+        "lines": lines,
+        "fit_s": fitted - begin,
+        "plan_s": planned - fitted,
+        "compile_s": time.process_time() - planned,
+        "planned_duration_s": planned_s,
+        "duration_s": duration_s,
+    }
+
+
+def print_stages(lines: int) -> list[dict[str, object]]:
+    """The table of generated programs; its rows."""
+    print("\n| program, lines | fit, feed, program: s for 1000 lines | cycle: plan, program, s |")
+    print("| --- | --- | --- |")
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in GENERATED:
+            # Stairs take a hundred times as long to pass as to write.
+            one = seconds_by_stage(kind, lines if kind != "stairs" else lines // 10, Path(folder))
+            rows.append(one)
+            each = 1e-3 * float(str(one["lines"]))
+            stages = ", ".join(
+                f"{float(str(one[key])) / each:.2f}" for key in ("fit_s", "plan_s", "compile_s")
+            )
+            cycle = f"{one['planned_duration_s']:.3f}, {one['duration_s']:.3f}"
+            print(f"| {kind}, {one['lines']} | {stages} | {cycle} |", flush=True)
+    return rows
+
+
 def measured(row: Row, file: Path) -> dict[str, object]:
     """The figures of one row."""
     begin = time.process_time()
     job = load_job(file, load_machine(MILL), reading=ReadOptions(feed_mm_s=row.feed_mm_s))
     fit_s = time.process_time() - begin
     begin = time.process_time()
-    duration_s = sum(section.pipeline.plan.duration_s for section in job.sections)
+    planned_s = sum(section.pipeline.plan.duration_s for section in job.sections)
+    plan_s = time.process_time() - begin
+    duration_s = sum(section.pipeline.compilation.plan.duration_s for section in job.sections)
     return {
         "file": row.file,
         "feed_mm_s": row.feed_mm_s,
@@ -90,7 +161,9 @@ def measured(row: Row, file: Path) -> dict[str, object]:
         "goal": row.goal,
         "ratio_without_jerk": duration_s / row.without_jerk_s,
         "fit_s": fit_s,
-        "plan_s": time.process_time() - begin,
+        "plan_s": plan_s,
+        "compile_s": time.process_time() - begin - plan_s,
+        "planned_duration_s": planned_s,
     } | job.summary()
 
 
@@ -113,9 +186,11 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--only", nargs="+")
     parser.add_argument("--folder", type=Path, nargs="+", default=list(FOLDERS))
+    parser.add_argument("--lines", type=int, default=5000, help="of generated programs; 0: none")
     options = parser.parse_args()
     print(
-        "| file, mm/s | time, s | S-curve planner | goal | no jerk limit | bound, um | segments | fit, plan: s |"
+        "| file, mm/s | time, s | S-curve planner | goal | no jerk limit | bound, um | segments "
+        "| fit, feed, program: s |"
     )
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     rows = []
@@ -125,13 +200,15 @@ def main() -> None:
         print(
             f"| {one['file']} {one['feed_mm_s']:.0f} | {one['duration_s']:.3f} | {ratio} | {one['goal']:g} "
             f"| {one['ratio_without_jerk']:.3f} | {one['deviation_bound_um']:.3f} | {one['segments']} "
-            f"| {one['fit_s']:.2f}, {one['plan_s']:.2f} |",
+            f"| {one['fit_s']:.2f}, {one['plan_s']:.2f}, {one['compile_s']:.2f} |",
             flush=True,
         )
     ratios = [float(str(one["ratio"])) for one in rows if one["ratio"] is not None]
     if ratios:
         mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
         print(f"\nGeometric mean of the ratios to the S-curve planner: {mean:.3f} (goal 0.40)")
+    if options.lines:
+        rows += print_stages(options.lines)
     if options.json is not None:
         options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 

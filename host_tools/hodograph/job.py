@@ -22,7 +22,10 @@ from .errors import InputError, PlanError
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .pipeline import Pipeline
+from .program.compiler import Compilation
 from .program.geometry import quantise
+from .program.stop_planning import LongStopError, StopTerms
+from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, late_mostly, reserve_zones
 from .simulate import Motion, simulate_on
 from .spline.build import FoundSpline
 from .spline.curve import PHSpline
@@ -51,6 +54,9 @@ GREATEST_TOLERANCE_MM = 10.0
 _MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
 """Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
 
+_QUICK_CHORDS = 1000
+"""Sections with more chords are searched for stops with few trials."""
+
 _IGNORED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
     (Coolant,): "coolant (M7, M8, M9)",
@@ -75,6 +81,12 @@ class SectionPipeline(Pipeline):
             return FoundSpline(curve, 0)
         return FoundSpline(_in_plane(curve), 0)
 
+    @property
+    def stop_terms(self) -> StopTerms:
+        """What the stops of the program keep."""
+        assert self.fitted is not None
+        return replace(super().stop_terms, quick=self.fitted.reference.count > _QUICK_CHORDS)
+
     def _planned(self, limits: Limits) -> FeedPlan:
         """The plan; with more reserve where a piece would have none left for the least override rate."""
         plan = super()._planned(limits)
@@ -85,6 +97,27 @@ class SectionPipeline(Pipeline):
                 break
             plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
         return plan
+
+    def _compiled(self, plan: FeedPlan) -> Compilation:
+        """The program; of a plan made again with more reserve where a stop would have to wait too long to begin."""
+        longest_s = self.machine.stop_time_ms * 1e-3
+        limits, zones = plan.limits, plan.limits.reserve_zones
+        steps: list[ReserveStep | float] = [*STEPS, *EVERYWHERE]
+        while True:
+            try:
+                return super()._compiled(plan)
+            except LongStopError as error:
+                if late_mostly(error.program, longest_s):
+                    steps = [step for step in steps if isinstance(step, float)]
+                if not steps:
+                    raise
+                step = steps.pop(0)
+                if isinstance(step, float):
+                    lower = replace(limits, machine=limits.machine.scaled(1.0 - step))
+                else:
+                    zones += tuple(reserve_zones(error.program, longest_s, step))
+                    lower = replace(limits, reserve_zones=zones)
+            plan = self._planned(lower)
 
 
 def _in_plane(curve: SpatialPHSpline) -> PHSpline:

@@ -434,7 +434,8 @@ def _named_by(place: str) -> Iterator[None]:
     try:
         yield
     except (InputError, PlanError) as error:
-        raise type(error)(f"{place} {error}") from error
+        error.args = (f"{place} {error}",)
+        raise
 
 
 def load_pipeline(

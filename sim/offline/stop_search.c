@@ -38,9 +38,9 @@
     0.03 /* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
 #define WAIT_BETTER  0.8   /* of the mean time: rather none than such a brake; */
 #define WAIT_AS_GOOD 1.001 /* or such a one that could also take much longer */
-#define GROUP_BITS   3u   /* 8 rows, or groups of the level below, make a group */
+#define GROUP_BITS   3u    /* 8 rows, or groups of the level below, make a group */
 #define MOST_LEVELS  11
-#define NEAR         1.05  /* so near to the least time without limits no other start is tried */
+#define NEAR         1.05 /* so near to the least time without limits no other start is tried */
 
 /* What is looked at: one over the limits, less the margin; 0: none. */
 struct inverse {
@@ -84,13 +84,14 @@ struct piece {
 struct search {
     uint32_t axis_count;
     const struct stop_row *rows;
-    const struct stop_bend *bends; /* of a spatial program */
+    const struct stop_bend *bends;                 /* of a spatial program */
     const struct stop_stretch *group[MOST_LEVELS]; /* of 8, 64, ... rows, at each level */
     int levels;
     uint32_t row_count;
     struct inverse inverse;     /* at the rate 1, */
     struct inverse at_any_rate; /* and at others */
     uint32_t rise_is_cut;
+    uint32_t quick;
     uint32_t period_us;
     double period_s;
     double length_mm;
@@ -351,7 +352,8 @@ static void stretch_add(struct stop_stretch *stretch, const struct stop_stretch 
 uint32_t stop_groups(uint32_t segment_count)
 {
     uint32_t sum = 0;
-    for (uint32_t count = segment_count * STOP_ROWS >> GROUP_BITS; count > 0; count >>= GROUP_BITS) {
+    for (uint32_t count = segment_count * STOP_ROWS >> GROUP_BITS; count > 0;
+         count >>= GROUP_BITS) {
         sum += count;
     }
     return sum;
@@ -1362,6 +1364,46 @@ static void search_piece(const struct search *search, struct piece *piece, const
     }
 }
 
+/* Takes codes that keep the limits strictly, each less than the greatest by its share of `down` quarters; 0: they do not. */
+static int lower_by(const struct search *search, struct piece *piece, const int from[3],
+                    const int quarters[3], double after_s, struct choice *best)
+{
+    int codes[3];
+    for (int k = 0; k < 3; k++) {
+        codes[k] = from[k] - quarters[k] / 4;
+    }
+    return better(search, piece, codes, after_s, 1, best);
+}
+
+/* A search of few trials: the codes of the next piece, else lower ones of all, or of the onset first, down to the lowest; then
+ * raised together as far as that goes. */
+static void search_quickly(const struct search *search, struct piece *piece, const int warm[3],
+                           double after_s, struct choice *best)
+{
+    static const int8_t shapes[][3] = {{4, 4, 4}, {4, 2, 0}, {4, 0, 0}, {2, 4, 4}};
+    const struct choice none = {{0, 0, 0}, NEVER_S, NEVER_S, NEVER_S, NEVER_S, NEVER_S};
+    int near[3];
+    for (int k = 0; k < 3; k++) {
+        near[k] = warm[k] < piece->most[k] ? warm[k] : piece->most[k];
+    }
+    *best = none;
+    int found = better(search, piece, near, after_s, 1, best);
+    for (int down = 0; down <= FEWER && !found; down += 4) {
+        for (size_t i = 0; i < sizeof shapes / sizeof shapes[0] && !found; i++) {
+            const int quarters[3] = {down * shapes[i][0], down * shapes[i][1], down * shapes[i][2]};
+            found = lower_by(search, piece, piece->most, quarters, after_s, best);
+        }
+    }
+    for (int step = found ? 4 : 0; step >= 1; step /= 2) {
+        int raised = 1;
+        while (raised) {
+            const int quarters[3] = {-4 * step, -4 * step, -4 * step};
+            const int from[3] = {best->codes[0], best->codes[1], best->codes[2]};
+            raised = lower_by(search, piece, from, quarters, after_s, best);
+        }
+    }
+}
+
 /* --- All of it --- */
 
 static void invert(struct inverse *inverse, const struct stop_limits *limits, uint32_t axis_count)
@@ -1393,6 +1435,7 @@ static void begin(struct search *search, const struct program *p, const struct s
     search->period_s = 1e-6 * p->header.period_us;
     search->length_mm = ldexp((double)p->header.length_q40_mm, -40);
     search->rise_is_cut = limits->rise_is_cut;
+    search->quick = limits->quick;
     search->deceleration = limits->acceleration;
     invert(&search->inverse, limits, search->axis_count);
     search->at_any_rate = search->inverse;
@@ -1449,7 +1492,11 @@ static void choose(const struct search *search, struct piece *piece, const int w
                    double after_s, struct choice *best)
 {
     struct choice none;
-    search_piece(search, piece, warm, after_s, best);
+    if (search->quick != 0u) {
+        search_quickly(search, piece, warm, after_s, best);
+    } else {
+        search_piece(search, piece, warm, after_s, best);
+    }
     wait_for_next(piece, after_s, &none);
     if (none.mean_s < WAIT_BETTER * best->mean_s ||
         (none.mean_s < WAIT_AS_GOOD * best->mean_s && best->longest_s > 2.0 * none.worst_s)) {

@@ -43,8 +43,9 @@ struct stop_stretch {
 /* The path of a program: segment_count * STOP_ROWS rows and bends. */
 struct stop_path {
     struct stop_row *rows;
-    struct stop_bend *bends;     /* of a spatial program; not looked at of a planar one */
-    struct stop_stretch *groups; /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
+    struct stop_bend *bends; /* of a spatial program; not looked at of a planar one */
+    struct stop_stretch
+        *groups; /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
 };
 
 /* A greatest feed on a stretch of the path. */
@@ -72,6 +73,7 @@ struct stop_limits {
         reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
     uint32_t
         rise_is_cut; /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
+    uint32_t quick; /* 1: few codes are tried, about 0.1 ms a piece, for long programs */
 };
 
 /* What was found for a piece. Codes of 0: no numbers keep the limits from all of its instants. */

@@ -10,6 +10,7 @@ from .limits import (
     Peak,
     Plant,
     Plants,
+    ReserveZone,
     ineffective_limits,
 )
 from .pieces import FeedPiece, FeedPieces
@@ -32,6 +33,7 @@ __all__ = [
     "Plant",
     "Plants",
     "Replan",
+    "ReserveZone",
     "SearchStep",
     "ineffective_limits",
     "plan_feed",

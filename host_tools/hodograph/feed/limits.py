@@ -122,6 +122,15 @@ def least(limits: Iterable[Limit]) -> Limit:
 
 
 @dataclass(frozen=True)
+class ReserveZone:
+    """A stretch of the path on which a plan leaves `share` of the accelerations and jerks free for stops."""
+
+    from_mm: float
+    to_mm: float
+    share: float
+
+
+@dataclass(frozen=True)
 class Peak:
     """The largest value of a limited quantity, and its place.
 
@@ -260,6 +269,7 @@ class Limits:
 
     machine             of the motion of the axes by the machine file: they always bind
     names, units        of the axes that follow the path, in its order; a unit is "mm" or "deg", () stands for mm
+    reserve_zones       where profile "optimal" leaves more than `reserve` free
 
     policy "respect": the feed is lowered until the profile keeps all limits; "report": it runs as requested and what
     exceeds is listed, but the machine's limits are kept. Profile "optimal" always keeps them. Raises InputError.
@@ -277,6 +287,7 @@ class Limits:
     machine: AxisLimits = field(default_factory=AxisLimits)
     names: tuple[str, ...] = AXES[:2]
     units: tuple[str, ...] = ()
+    reserve_zones: tuple[ReserveZone, ...] = ()
 
     def __post_init__(self) -> None:
         for table in (self.axis, self.machine):

@@ -228,6 +228,7 @@ struct stop_limits {
     double axis_velocity[6], axis_acceleration[6], axis_jerk[6], reach[6], time_constant[6];
     const struct stop_cap *caps;
     uint32_t cap_count, reach_at_pace, rise_is_cut;
+    uint32_t quick;
 };
 struct stop_found {
     uint8_t known;

@@ -27,6 +27,7 @@ class StopLimits:
     caps                       (from_mm, to_mm, feed_mm_s) each
     reach_at_pace              `reach` counts at the rate 1 only
     rise_is_cut                a brake begins when a rising rate adds a quarter of its deceleration at most
+    quick                      few numbers are tried: for long programs
     """
 
     feed: float = inf
@@ -41,6 +42,7 @@ class StopLimits:
     caps: tuple[tuple[float, float, float], ...] = ()
     reach_at_pace: bool = False
     rise_is_cut: bool = False
+    quick: bool = False
 
     def raised(self, used: StopLimits) -> StopLimits:
         """The greater of each limit and of what is used of it with the margin of the search. Caps, constants and what

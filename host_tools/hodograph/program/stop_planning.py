@@ -33,6 +33,14 @@ MOST_MISSES = 2
 """Halvings without numbers, after which a part is not halved again."""
 
 
+class LongStopError(PlanError):
+    """A fault stop of `program` may take longer than the machine file allows."""
+
+    def __init__(self, program: Program, text: str) -> None:
+        super().__init__(text)
+        self.program = program
+
+
 @dataclass(frozen=True)
 class StopTerms:
     """What stops have to keep beside the limits of a plan.
@@ -41,22 +49,24 @@ class StopTerms:
     drives        the same with all the volts that their drives have; for fault stops. None: any
     axis          limits of the machine's axes, for both
     stop_time_ms  greatest bound of a fault stop; 0: any
+    quick         few numbers are tried: for long programs
     """
 
     plants: Plants | None = None
     drives: Plants | None = None
     axis: AxisLimits = field(default_factory=AxisLimits)
     stop_time_ms: int = 0
+    quick: bool = False
 
 
 def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     """The program with its stop table. Feed pieces in which no numbers are found are halved, as far as that helps: a
     place where no brake may begin, such as a narrow bend that is passed as fast as its limits allow, need not keep the
-    whole piece from braking. Raises PlanError: a fault stop may take longer than `stop_time_ms`.
+    whole piece from braking. Raises LongStopError: a fault stop may take longer than `stop_time_ms`.
     """
     search = StopSearch(NativeProgram(encode(program)))
     limits = [
-        own.raised(search.used(own))
+        replace(own.raised(search.used(own)), quick=terms.quick)
         for own in (hold_limits(plan, terms), fault_limits(plan, terms))
     ]
     tree = _Halves(program)
@@ -212,10 +222,11 @@ def _checked(program: Program, terms: StopTerms) -> Program:
     worst = program.stops.worst(FAULT)
     if terms.stop_time_ms and worst.time_s > terms.stop_time_ms * 1e-3:
         place = float(program.pieces.start_q40[worst.piece]) * 2.0**-40
-        raise PlanError(
+        raise LongStopError(
+            program,
             f"stops: a fault stop at arc length {place:.6g} mm (piece {worst.piece}) may take {worst.time_s:.3g} s, "
             f"longer than stop_time_ms = {terms.stop_time_ms} of the machine file: "
-            "lower the feed there, or raise stop_time_ms or the machine's acceleration and jerk"
+            "lower the feed there, or raise stop_time_ms or the machine's acceleration and jerk",
         )
     return program
 

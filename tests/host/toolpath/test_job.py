@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import tomllib
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from hodograph.cli.main import main
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError, PlanError
 from hodograph.job import load_job
+from hodograph.program.stops import FAULT
 from hodograph.toolpath.files import ReadOptions
 from hodograph.toolpath.fit.reference import distance_to_chord
 from hodograph.toolpath.fit.sections import divided
@@ -53,6 +55,37 @@ def test_exact_stops() -> None:
     assert sections(moves.format("G61.1\n")) == each
     assert sections(moves.format("G64\n")) == [(3, 5)]
     assert sections(moves.format("G64\n"), 0.0) == each
+
+
+def test_exact_path_does_not_stop_where_it_goes_straight_on() -> None:
+    moves = "F600\n{}\nG1 X1 Y1\nG1 X3 Y3\nG1 X4 Y3\nG1 X5\nG2 X6 Y2 J-1\nG1 Y1\nM2"
+    assert sections(moves.format("G61")) == [(3, 4), (5, 6), (7, 7), (8, 8)]
+    assert sections(moves.format("G61.1")) == [(k, k) for k in range(3, 9)]
+
+
+def test_a_path_mode_said_again_changes_nothing() -> None:
+    again = "F600\nG64 P0.01\nG1 X1\nG64 P0.01\nG1 Y1\nM2"
+    path = divided(read_gcode(again.splitlines()), 0.01, "-")
+    assert [s.reference.point.tolist() for s in path.sections] == [
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
+    ]
+
+
+@pytest.mark.parametrize("moves", ["flood", pytest.param("winding", marks=pytest.mark.long)])
+def test_where_a_stop_would_come_too_late_the_plan_leaves_more_free(
+    tmp_path: Path, mill: Machine, moves: str
+) -> None:
+    flood = ["F6000"] + [f"G1 X{0.5 * ((k + 1) // 2):g} Y{0.5 * (k // 2):g}" for k in range(1, 27)]
+    wave = [
+        f"G1 X{0.3 * k:g} Z{2 * math.sin(0.12 * k) + 0.4 * math.sin(0.8 * k):.4f}"
+        for k in range(150)
+    ]
+    text = "\n".join(flood if moves == "flood" else ["F6000", *wave])
+    pipeline = load_job(program(tmp_path, text), mill).only_section("test").pipeline
+    accepted = pipeline.compilation
+    assert accepted.program.stops.worst(FAULT).time_s <= 0.5
+    assert pipeline.plan.duration_s < accepted.plan.duration_s < 1.15 * pipeline.plan.duration_s
+    assert pipeline.accepted.image
 
 
 def test_a_reversal_is_a_stop() -> None:

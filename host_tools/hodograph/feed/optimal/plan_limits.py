@@ -7,7 +7,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf
 
-from ..limits import ControllerLimits, FeedZone, Limit, Limits, Plant, Plants, least
+from ..limits import (
+    ControllerLimits,
+    FeedZone,
+    Limit,
+    Limits,
+    Plant,
+    Plants,
+    ReserveZone,
+    least,
+)
 from ..pieces import LONGEST_PIECE_MM
 from ..request import FeedRequest
 
@@ -34,6 +43,7 @@ class PlanLimits:
     velocity, axis_acceleration, axis_jerk, volts  of the axes; volts None: not limited
     plants      of the axes, with the volts that may be used
     zones       feed zones
+    reserve_zones  where accelerations and jerks leave more free
     """
 
     feed: Limit
@@ -47,6 +57,7 @@ class PlanLimits:
     plants: Plants | None
     zones: tuple[FeedZone, ...]
     notes: tuple[str, ...] = ()
+    reserve_zones: tuple[ReserveZone, ...] = ()
 
     @property
     def least_acceleration(self) -> float:
@@ -108,6 +119,7 @@ def gather(
         None if weaker is None else _volts(limits, weaker),
         weaker,
         limits.zones,
+        reserve_zones=limits.reserve_zones,
     )
     return found if found.least_jerk < inf else _with_jerk(found, period_s)
 

@@ -19,6 +19,9 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+JERK_ROW = 1.5
+"""The right side of a row of a jerk: its greatest share, and half."""
+
 _NEAR = 0.7
 _LEAST_P = 0.05
 _FULL = 0.99
@@ -50,10 +53,12 @@ class Selection:
     With `everything` all points make rows: safe, and slow.
     A first estimate, of which nothing is known, has rows at all points of `estimated`.
     So most limits at most points never become rows.
+    tight  (m,) what limits are divided by at each point; None: 1
     """
 
     basic: Mask
     estimated: Mask
+    tight: Real | None = None
     kept: dict[str, Mask] = field(default_factory=dict)
     last: Real | None = None
     everything: bool = False
@@ -63,6 +68,8 @@ class Selection:
         """Points for the rows of a quantity, of which the last feed used these shares."""
         basic = self.estimated if used is None else self.basic
         wanted = basic if among is None else basic & among
+        if used is not None and self.tight is not None:
+            used = used * self.tight
         if self.everything:
             return np.flatnonzero(np.ones_like(wanted) if among is None else among)
         if used is None:
@@ -115,7 +122,7 @@ def _jerk_rows(
             + (0.5 * limited.c1[at] * by)[:, None] * dd
         )
         one = np.ones(at.size)
-        yield Rows(coefficients, points.interval[at], -np.inf * one, 1.5 * one)
+        yield Rows(coefficients, points.interval[at], -np.inf * one, JERK_ROW * one)
 
 
 def _acceleration_rows(

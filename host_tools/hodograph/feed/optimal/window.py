@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...spline.frames import Curve
+from ..limits import FeedZone, ReserveZone
 from .constraints import GridKinematics, make_points
 from .grid import GAUSS_W, GAUSS_X, Grid, corners, make_grid, squared_feed
 from .knots import FirstEstimate, choose_knots, first_estimate, refined
 from .plan_limits import PlanLimits
-from .rows import About, Rows, Selection, make_rows
+from .rows import JERK_ROW, About, Rows, Selection, make_rows
 from .solver import Problem, solve
 
 Real = NDArray[np.float64]
@@ -93,7 +94,8 @@ class _Setting:
     gauss: tuple[
         Index, Real, Real
     ]  # interval, arc length and basis of p at the points of quadrature
-    tight: Real | None = None  # (n,): what the limits of each interval are divided by
+    tight: Real | None = None  # (n,): what the limits of each interval are divided by,
+    reserved: Real | None = None  # (n,): and for reserve zones alone
 
 
 def plan_window(
@@ -134,6 +136,9 @@ def plan_window(
 
 def tightened(found: Solution, tight: Real) -> Solution | None:
     """The same window, on the same knots, with the limits of each interval divided by `tight` (n,)."""
+    reserved = found.setting.reserved
+    if reserved is not None:
+        tight = tight * reserved
     return _Rounds(replace(found.setting, tight=tight), found.squared_feed, found).run()
 
 
@@ -215,7 +220,20 @@ def _setting(spline: Curve, limits: PlanLimits, knots: Real, start: State | None
     limit = np.where(moving, points.most_p, np.inf) * np.where(moving, points.sigma[0], 1.0) ** 2
     np.minimum.at(most, at_start, limit[us == 0.0])
     np.minimum.at(most, at_end, limit[us == 1.0])
-    return _Setting(limits, grid, start, points, basic, estimated, us < 1.0, most, _gauss(grid))
+    reserved = _interval_reserve(limits, knots)
+    return _Setting(
+        limits,
+        grid,
+        start,
+        points,
+        basic,
+        estimated,
+        us < 1.0,
+        most,
+        _gauss(grid),
+        reserved,
+        reserved,
+    )
 
 
 def _gauss(grid: Grid) -> tuple[Index, Real, Real]:
@@ -244,12 +262,27 @@ def _interval_zones(limits: PlanLimits, knots: Real) -> Real:
     most = np.full(knots.size - 1, np.inf)
     slack = 1e-9 * (knots[-1] - knots[0])
     for zone in limits.zones:
-        first = int(np.searchsorted(knots, zone.from_mm + slack, side="right")) - 1
-        last = int(np.searchsorted(knots, zone.to_mm - slack, side="left"))
-        if last > 0 and first < most.size:
-            part = slice(max(first, 0), last)
-            most[part] = np.minimum(most[part], zone.feed_mm_s)
+        part = _touched(knots, zone, slack)
+        most[part] = np.minimum(most[part], zone.feed_mm_s)
     return most
+
+
+def _interval_reserve(limits: PlanLimits, knots: Real) -> Real | None:
+    """What limits are divided by (n,) on intervals that reserve zones touch; None: no zone is there."""
+    tight = np.ones(knots.size - 1)
+    slack = 1e-9 * (knots[-1] - knots[0])
+    for zone in limits.reserve_zones:
+        if zone.to_mm > knots[0] and zone.from_mm < knots[-1]:
+            part = _touched(knots, zone, slack)
+            tight[part] = np.maximum(tight[part], JERK_ROW / (JERK_ROW - zone.share))
+    return tight if (tight > 1.0).any() else None
+
+
+def _touched(knots: Real, zone: FeedZone | ReserveZone, slack: float) -> slice:
+    """Intervals that a zone touches."""
+    first = int(np.searchsorted(knots, zone.from_mm + slack, side="right")) - 1
+    last = int(np.searchsorted(knots, zone.to_mm - slack, side="left"))
+    return slice(max(first, 0), max(last, 0))
 
 
 class _Rounds:
@@ -261,7 +294,9 @@ class _Rounds:
     def __init__(self, setting: _Setting, estimate: Feed, known: Solution | None = None) -> None:
         """Begins about an estimated feed; known: a solution of nearly the same on the same knots."""
         self.setting = setting
-        self.select = Selection(setting.basic, setting.estimated)
+        reserved = setting.reserved
+        by_point = None if reserved is None else reserved[setting.points.interval]
+        self.select = Selection(setting.basic, setting.estimated, by_point)
         self.about = About(_p_of(estimate, setting.points.interval, setting.points.s, setting))
         self.inner_p = _p_of(estimate, setting.gauss[0], setting.gauss[1], setting)
         self.typical_q = estimate(setting.grid.s)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..moves import (
@@ -40,11 +41,16 @@ from .corners import SHARPEST_RAD
 from .reference import Reference, ReferenceBuilder
 from .stations import outline
 
+Real = NDArray[np.float64]
+
 SAG_SHARE = 0.01
 """Of the tolerance: how far the chords of an arc or a spline may be off."""
 
 EXACT_MM = 1e-3
 """Deviation of arcs and splines where moves are to be followed exactly."""
+
+_STRAIGHT_RAD = 1e-6
+"""Change of direction up to which moves of G61 go straight on."""
 
 _STOPS = (Dwell, Spindle, Coolant, ToolChange, ProgramStop)
 _SHORTEST_MM = 2.0**-9
@@ -95,6 +101,7 @@ class _Divider:
     blending: Blending = Blending.CONTINUOUS
     tolerance_mm: float = 0.0
     moved: bool = False
+    direction: Real | None = None
 
     def take(self, command: Command) -> None:
         if isinstance(command, StraightMove | ArcMove | SplineMove):
@@ -119,10 +126,31 @@ class _Divider:
                     f"{self.file}:{move.line}: the move turns {name.upper()}: "
                     "moves of A, B and C have no path yet: leave them out"
                 )
+        if self.blending is Blending.EXACT_PATH and not self._goes_straight_on(move):
+            self.stop()
+        self._add(move)
+        if self.blending is Blending.EXACT_STOP or self.tolerance_mm == 0.0:
+            self.stop()
+
+    def _add(self, move: Move) -> None:
+        before = self.builder.position
         self.builder.add(move)
         self.moved = True
-        if self.blending is not Blending.CONTINUOUS or self.tolerance_mm == 0.0:
-            self.stop()
+        if isinstance(move, StraightMove):
+            way = np.subtract(move.end[:3], before[:3])
+            length = float(np.linalg.norm(way))
+            self.direction = way / length if length > 0.0 else self.direction
+        else:
+            self.direction = None
+
+    def _goes_straight_on(self, move: Move) -> bool:
+        """Whether a straight move goes on in the direction of the straight move before it."""
+        if self.direction is None or not isinstance(move, StraightMove):
+            return False
+        way = np.subtract(move.end[:3], self.builder.position[:3])
+        along = float(way @ self.direction)
+        aside = float(np.linalg.norm(way - along * self.direction))
+        return along >= 0.0 and aside <= _STRAIGHT_RAD * along
 
     def _mode(self, mode: PathMode) -> None:
         own = [self.asked_mm]
@@ -132,8 +160,9 @@ class _Divider:
             if one is not None and one > 0.0
         ]
         tolerance = min(own)
-        if mode.blending is not self.blending or tolerance != self.tolerance_mm:
-            self.stop()
+        if mode.blending is self.blending and tolerance == self.tolerance_mm:
+            return
+        self.stop()
         self.blending = mode.blending
         self.tolerance_mm = tolerance
         self.builder = ReferenceBuilder(self.builder.position, SAG_SHARE * self.section_tolerance)
