@@ -6,7 +6,8 @@
 
 #include "core/qmath.h"
 
-enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
+/* At rest and at the end of a tail nothing moves: those are the last. */
+enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST, PHASE_WAIT };
 
 /* Whether a brake would rest before the end of the path: found out a tick before it begins. */
 enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
@@ -18,8 +19,9 @@ enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 #define NO_NUMBERS    2u
 #define MOST_FEED_Q32 ((int64_t)1 << 45)
 #define MOST_SLOPE_Q56                                                                             \
-    (((int64_t)1 << 57) - 1)  /* 2^57, the greatest, less a unit: it is made an int32_t */
-#define MS_Q40    1099511628u /* 2^40 / 1000 */
+    (((int64_t)1 << 57) - 1)         /* 2^57, the greatest, less a unit: it is made an int32_t */
+#define REACH_Q40 ((int64_t)1 << 26) /* 2^-14 mm: how far a piece may reach beyond its ends */
+#define MS_Q40    1099511628u        /* 2^40 / 1000 */
 #define UM_PER_MM 1000u
 #define US_PER_S  1000000u
 
@@ -33,7 +35,24 @@ void feed_override_begin(struct feed_override *f, const struct program *p, uint3
     f->state = f->clock.time_q42_s == f->clock.duration_q42_s ? FEED_ENDED : FEED_RUNNING;
 }
 
+static void goes_on(struct feed_override *f, const struct chunk *chunk)
+{
+    f->goes_on = chunk_goes_on(chunk) ? 1u : 0u;
+    override_plan_limit(&f->plan, f->goes_on != 0u ? OVERRIDE_ONE : OVERRIDE_MOST);
+}
+
+void feed_override_begin_job(struct feed_override *f, const struct chunk *first, uint32_t period_us)
+{
+    feed_override_begin(f, &first->program, period_us, 0);
+    goes_on(f, first);
+}
+
 /* --- Commands --- */
+
+static int rests(const struct feed_override *f)
+{
+    return f->phase >= PHASE_REST;
+}
 
 static int comes_to_rest(const struct feed_override *f)
 {
@@ -78,7 +97,7 @@ static void ask(struct feed_override *f, enum program_stop_kind kind)
 void feed_override_hold(struct feed_override *f)
 {
     if (f->state == FEED_RUNNING) {
-        f->state = f->phase == PHASE_REST ? FEED_HELD : FEED_HOLDING;
+        f->state = rests(f) ? FEED_HELD : FEED_HOLDING;
         ask(f, PROGRAM_STOP_HOLD);
     }
 }
@@ -106,7 +125,7 @@ void feed_override_stop(struct feed_override *f)
     if (is_over(f) || f->state == FEED_STOPPING) {
         return;
     }
-    if (f->phase == PHASE_REST) {
+    if (rests(f)) {
         f->state = FEED_STOPPED;
         return;
     }
@@ -121,7 +140,7 @@ void feed_override_fault_stop(struct feed_override *f)
     if (is_over(f) || (f->state == FEED_STOPPING && f->kind == PROGRAM_STOP_FAULT)) {
         return;
     }
-    if (f->phase == PHASE_REST) {
+    if (rests(f)) {
         f->state = FEED_STOPPED;
         return;
     }
@@ -170,23 +189,27 @@ int feed_override_motion(const struct feed_override *f, const struct interpolato
 
 /* --- A tick --- */
 
+static void come_to_rest(struct feed_override *f, enum phase where, uint32_t found)
+{
+    f->phase = (uint32_t)where;
+    f->found = found;
+    if (comes_to_rest(f)) {
+        f->state = f->state == FEED_STOPPING ? FEED_STOPPED : FEED_HELD;
+    }
+}
+
 static int plan_tick(struct feed_override *f, struct interpolator *it)
 {
     const uint64_t time_q42_s = override_plan_tick(&f->plan, &f->clock);
     const int result = interpolator_at_piece(it, f->clock.record, time_q42_s, &f->point);
     if (result == INTERPOLATOR_END) {
-        f->state = FEED_ENDED;
+        if (f->goes_on != 0) {
+            come_to_rest(f, PHASE_WAIT, 0);
+        } else {
+            f->state = FEED_ENDED;
+        }
     }
     return result;
-}
-
-static void come_to_rest(struct feed_override *f, uint32_t found)
-{
-    f->phase = PHASE_REST;
-    f->found = found;
-    if (comes_to_rest(f)) {
-        f->state = f->state == FEED_STOPPING ? FEED_STOPPED : FEED_HELD;
-    }
 }
 
 /* The point at the brake's arc length. */
@@ -213,7 +236,7 @@ static int brake_tick(struct feed_override *f, struct interpolator *it)
     if (result == INTERPOLATOR_OK && path_brake_rests(&f->brake)) {
         interpolator_search_begin(&f->place, f->clock.record, f->clock.piece,
                                   f->point.arc_length_q40_mm);
-        come_to_rest(f, 0);
+        come_to_rest(f, PHASE_REST, 0);
     }
     return result;
 }
@@ -291,7 +314,7 @@ static int leaves_or_rests(struct feed_override *f, const struct interpolator *i
     const int known = feed_override_motion(f, it, &state, &turned_q56);
     const int rests = (f->plan.now.override_q57 | f->plan.now.slope_q56) == 0;
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
-        come_to_rest(f, 1);
+        come_to_rest(f, PHASE_REST, 1);
         return 1;
     }
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
@@ -361,7 +384,9 @@ int feed_override_stop_tick(struct feed_override *f, struct interpolator *it)
         }
         return brake_tick(f, it);
     }
-    look_for_place(f, it);
+    if (f->phase == PHASE_REST) {
+        look_for_place(f, it);
+    }
     return f->phase == PHASE_PLAN ? plan_tick(f, it) : INTERPOLATOR_OK;
 }
 
@@ -375,6 +400,68 @@ int feed_override_next(struct feed_override *f, struct interpolator *it,
     }
     interpolator_point_copy(out, &f->point, it->axis_count);
     return 0;
+}
+
+/* --- The next chunk --- */
+
+/* In motion: the last setpoint and all up to the joint are the same in both programs. A piece that reaches beyond an end of
+ * one of them is not: it is held inside there (core/interpolator). */
+static int is_shared(const struct feed_override *f, const struct chunk *next)
+{
+    const struct program *p = f->clock.program;
+    const uint32_t joint = next->piece_shift + next->shared_pieces;
+    if (f->clock.piece < next->piece_shift || f->clock.piece >= joint) {
+        return 0;
+    }
+    const int64_t start_q40_mm = program_piece_start(p, f->clock.piece) - next->arc_shift_q40_mm;
+    return (next->segment_shift == 0u || start_q40_mm >= REACH_Q40) &&
+           p->header.length_q40_mm - program_piece_start(p, joint) >= REACH_Q40;
+}
+
+/* The plan goes on, and what is on its way was decided with pieces before the joint. */
+static int may_take_over_moving(const struct feed_override *f, const struct chunk *next)
+{
+    const uint64_t joint_q42_s =
+        coefficients_piece_at(f->clock.program, f->clock.program->coefficients_for,
+                              next->piece_shift + next->shared_pieces)
+            ->start_q42_s;
+    return f->state == FEED_RUNNING && is_shared(f, next) &&
+           override_plan_ends_by(&f->plan, qmath_q32_of_q42(joint_q42_s));
+}
+
+static int may_take_over_resting(const struct feed_override *f, const struct chunk *next)
+{
+    return !is_over(f) && f->point.arc_length_q40_mm - next->arc_shift_q40_mm >=
+                              program_piece_start(&next->program, 0);
+}
+
+int feed_override_take_over(struct feed_override *f, struct interpolator *it,
+                            const struct chunk *next)
+{
+    const struct program *p = &next->program;
+    const int resting = rests(f);
+    uint64_t shift_q42_s = qmath_q42_of_q32(next->time_shift_q32_s);
+    uint32_t piece = 0;
+    if (f->goes_on == 0u || f->phase == PHASE_BRAKE ||
+        !(resting ? may_take_over_resting(f, next) : may_take_over_moving(f, next))) {
+        return 0;
+    }
+    f->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
+    if (resting) {
+        shift_q42_s = f->clock.time_q42_s; /* at its start until the place is found */
+    } else {
+        piece = f->clock.piece - next->piece_shift;
+    }
+    program_clock_carry(&f->clock, p, shift_q42_s, piece);
+    interpolator_carry(it, p, &next->end, next->segment_shift, piece, f->point.arc_length_q40_mm);
+    override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
+    goes_on(f, next);
+    if (resting) {
+        interpolator_search_begin(&f->place, f->clock.record, 0, f->point.arc_length_q40_mm);
+        f->phase = PHASE_REST;
+        f->found = 0;
+    }
+    return 1;
 }
 
 /* --- What is so --- */
@@ -404,7 +491,7 @@ uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop
 
 int64_t feed_override_feed_q32(const struct feed_override *f)
 {
-    if (f->phase == PHASE_REST || is_over(f)) {
+    if (rests(f) || is_over(f)) {
         return 0;
     }
     if (f->phase == PHASE_BRAKE) {
@@ -422,7 +509,13 @@ uint32_t feed_override_actual_q30(const struct feed_override *f)
     return f->phase == PHASE_PLAN && !is_over(f) ? override_q30(f) : 0u;
 }
 
+int feed_override_waits(const struct feed_override *f)
+{
+    return f->phase == PHASE_WAIT;
+}
+
 int feed_override_saturated(const struct feed_override *f)
 {
-    return f->phase == PHASE_PLAN && f->plan.saturated != 0;
+    return f->phase == PHASE_PLAN &&
+           (f->plan.saturated != 0 || f->plan.asked_q57 > f->plan.most_q57);
 }

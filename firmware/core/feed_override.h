@@ -12,6 +12,9 @@
  * At rest of a hold the program time of the place is looked for, a step in each tick; a resume goes on from there. It is
  * found to 2^-42 s of program time.
  *
+ * Of a job in chunks (core/chunk.h) the program under way is taken for the next one by feed_override_take_over. At the end
+ * of a tail the motion rests and waits for that: it is still running, held or stopped.
+ *
  * Integers only, the same on every target. One owner: commands called from elsewhere than the tick need the tick held off.
  */
 #ifndef HODOGRAPH_CORE_FEED_OVERRIDE_H
@@ -19,6 +22,7 @@
 
 #include <stdint.h>
 
+#include "core/chunk.h"
 #include "core/interpolator.h"
 #include "core/override_plan.h"
 #include "core/path_brake.h"
@@ -50,6 +54,7 @@ struct feed_override {
     uint32_t kind;    /* enum program_stop_kind of the stop asked for */
     uint32_t replace; /* 1: a fault stop, whose numbers the brake has not got yet */
     uint32_t found;   /* 1: `place` is */
+    uint32_t goes_on; /* 1: the job goes on behind the end of the program */
     int64_t left_q30; /* ticks at override 1 until the deadline */
 };
 
@@ -57,6 +62,20 @@ struct feed_override {
  * period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must stay as it is. */
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
+
+/* The same for the first chunk of a job, from its start. The override stays at or below 100 % until the last chunk. */
+void feed_override_begin_job(struct feed_override *f, const struct chunk *first,
+                             uint32_t period_us);
+
+/* Takes the next chunk, which chunk_check has accepted behind the one under way and which has coefficient records for the
+ * same kernel, for the program from the next tick on. In motion: where all setpoints up to the joint are those of the
+ * program under way, bit for bit. So not in a brake, nor beyond the joint, nor while the override looks for a ramp or is on
+ * one that was decided with pieces behind the joint. At rest (held, or at the end of the tail): on from the same arc length;
+ * the motion goes on when it is running and the place is found, with the override from 0.
+ * Returns 1, or 0: not now, and nothing has changed; try again after the next tick. After 1 the program before is no longer
+ * in use. Main loop with the tick held off; constant time. */
+int feed_override_take_over(struct feed_override *f, struct interpolator *it,
+                            const struct chunk *next);
 
 /* --- Commands: take effect from the next tick. Any sequence is allowed. Constant time. --- */
 
@@ -111,6 +130,9 @@ int64_t feed_override_feed_q32(const struct feed_override *f);
 
 /* The override as it is, 2^30 = 1; 0 in a brake and at rest. */
 uint32_t feed_override_actual_q30(const struct feed_override *f);
+
+/* 1 at rest at the end of a tail, until the next chunk is taken over. */
+int feed_override_waits(const struct feed_override *f);
 
 /* 1 while the override wanted is more than the pieces allow here, so that the override stays below. */
 int feed_override_saturated(const struct feed_override *f);

@@ -88,7 +88,7 @@ static void set_start(struct interpolator_point *start, const struct program *p,
     start->feed_q32_mm_s = 0;
 }
 
-static void set_end(struct interpolator_point *end, const struct program *p)
+void interpolator_exact_end(const struct program *p, struct interpolator_point *end)
 {
     struct program_segment segment;
     struct ph_segment ph;
@@ -120,7 +120,7 @@ void interpolator_ends(const struct program *p, const struct kernel *kernel,
                        struct interpolator_point *first, struct interpolator_point *last)
 {
     set_start(first, p, kernel);
-    set_end(last, p);
+    interpolator_exact_end(p, last);
 }
 
 int interpolator_begin(struct interpolator *it, const struct program *p)
@@ -140,8 +140,24 @@ int interpolator_begin(struct interpolator *it, const struct program *p)
     it->length_q40_mm = p->header.length_q40_mm;
     it->piece = coefficients_piece_at(p, it->kernel, 0);
     it->segment = coefficients_segment_at(p, it->kernel, 0);
-    set_end(&it->end, p);
+    interpolator_exact_end(p, &it->end);
     return 0;
+}
+
+void interpolator_carry(struct interpolator *it, const struct program *p,
+                        const struct interpolator_point *end, uint32_t segment_shift,
+                        uint32_t piece, int64_t arc_length_q40_mm)
+{
+    const uint8_t *first = (const uint8_t *)coefficients_segment_at(it->program, it->kernel, 0);
+    const uint32_t present = (uint32_t)((const uint8_t *)it->segment - first) / it->segment_size;
+    const uint32_t index = present > segment_shift ? present - segment_shift : 0u;
+    it->program = p;
+    it->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
+    it->length_q40_mm = p->header.length_q40_mm;
+    it->piece = coefficients_piece_at(p, it->kernel, piece);
+    it->segment = coefficients_segment_at(p, it->kernel, index);
+    it->end = *end;
+    (void)find_segment(it, arc_length_q40_mm, INTERPOLATOR_MOST_SEGMENTS);
 }
 
 /* Beyond the end of the piece: the last one ends with the program. */

@@ -81,6 +81,15 @@ int interpolator_begin(struct interpolator *it, const struct program *p);
 void interpolator_ends(const struct program *p, const struct kernel *kernel,
                        struct interpolator_point *first, struct interpolator_point *last);
 
+/* Goes on in another program for the same kernel, which has the present segment of this one, `segment_shift` numbers lower, and
+ * this exact end point; at this arc length and in this piece of the other. Main loop; constant time. */
+void interpolator_carry(struct interpolator *it, const struct program *p,
+                        const struct interpolator_point *end, uint32_t segment_shift,
+                        uint32_t piece, int64_t arc_length_q40_mm);
+
+/* Only the last one. */
+void interpolator_exact_end(const struct program *p, struct interpolator_point *end);
+
 /* The point at a program time in 2^-42 s, below 2^22 s. Crosses at most two piece ends forwards and
  * two segment ends either way, which program_check guarantees to suffice for steps up to two
  * periods; otherwise INTERPOLATOR_ERR_JUMP: *out is unchanged, seek before going on. At or beyond the

@@ -60,7 +60,8 @@ struct check {
     uint32_t axis_count;
     struct real limit[PROGRAM_AXES][QUANTITIES]; /* m = 0: none */
     struct real per_period;                      /* 1/s */
-    struct motion last; /* at the end of the stretch before; at rest before the first */
+    struct motion last; /* at the end of the stretch before; at rest before the first, */
+    int unknown;        /* or not known: before a program that begins in motion */
 };
 
 static void set_at_rest(struct motion *out)
@@ -627,7 +628,8 @@ static int check_stretch(struct check *check, const struct way *way, const struc
     int32_t halvings = 0;
     set_cell(&cell, way, path, low, high);
     motion_at(&cell, real_make(-1, 0), &now);
-    int code = check_step(check, &now);
+    int code = check->unknown != 0 ? 0 : check_step(check, &now);
+    check->unknown = 0;
     motion_at(&cell, real_make(1, 0), &check->last);
     while (code == 0 && (at >> halvings) == 0u) {
         int certain = 0;
@@ -736,6 +738,7 @@ int limit_check_all(const struct program *p, const struct program_limits *limits
     set_limits(&check, limits);
     set_at_rest(&rest);
     check.last = rest;
+    check.unknown = (p->header.flags & PROGRAM_FLAG_MOVING) != 0;
     check.per_period = real_div(real_make(1000000, 0), real_make((int64_t)p->header.period_us, 0));
     *index = 0;
     if (any_limit(&check) == 0) {

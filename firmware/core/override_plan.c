@@ -35,8 +35,41 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
     memset(plan, 0, sizeof *plan);
     override_bounds_of(&plan->guaranteed, p, 0, p->header.piece_count);
     plan->guaranteed_q57 = override_of_factor(plan->guaranteed.factor_q14);
+    plan->asked_q57 = OVERRIDE_ONE;
+    plan->most_q57 = OVERRIDE_MOST;
     plan->commanded_q57 = OVERRIDE_ONE;
     come_to_rest(plan);
+}
+
+void override_plan_limit(struct override_plan *plan, int64_t most_q57)
+{
+    const int64_t counts_q57 = qmath_lesser(plan->asked_q57, most_q57);
+    plan->most_q57 = most_q57;
+    if (plan->commanded_q57 != counts_q57) {
+        plan->commanded_q57 = counts_q57;
+        plan->steady = 0;
+    }
+}
+
+int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s)
+{
+    if (plan->steady != 0u) {
+        return 1;
+    }
+    return override_ramp_moves(&plan->ramp) && plan->task == OVERRIDE_DECIDES &&
+           plan->now.override_q57 <= plan->guaranteed_q57 && plan->ahead.end_q32_s <= time_q32_s;
+}
+
+void override_plan_carry(struct override_plan *plan, const struct program_override *least,
+                         uint64_t shift_q32_s)
+{
+    plan->guaranteed = *least;
+    plan->guaranteed_q57 = override_of_factor(least->factor_q14);
+    plan->ahead.bounds =
+        &plan->guaranteed; /* of a window of the program before: not looked at again */
+    plan->ahead.end_q32_s -=
+        plan->ahead.end_q32_s < shift_q32_s ? plan->ahead.end_q32_s : shift_q32_s;
+    plan->searched = NOWHERE;
 }
 
 void override_plan_rest(struct override_plan *plan)
@@ -48,8 +81,8 @@ void override_plan_rest(struct override_plan *plan)
 void override_plan_set(struct override_plan *plan, uint32_t percent)
 {
     const uint32_t used = percent < OVERRIDE_MOST_PERCENT ? percent : OVERRIDE_MOST_PERCENT;
-    plan->commanded_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
-    plan->steady = 0;
+    plan->asked_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
+    override_plan_limit(plan, plan->most_q57);
 }
 
 void override_plan_hold(struct override_plan *plan)

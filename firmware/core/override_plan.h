@@ -52,6 +52,8 @@ struct override_plan {
     uint32_t started;   /* 0 until the first tick */
     uint32_t steady;    /* 1: at the commanded override, in which only a command changes anything */
     uint32_t held;      /* 1: the override goes to 0 */
+    int64_t asked_q57;  /* the override asked for, */
+    int64_t most_q57;   /* and the most that counts of it: */
     int64_t commanded_q57;
     int64_t guaranteed_q57;             /* greatest override that all pieces allow, */
     struct program_override guaranteed; /* and their least bounds */
@@ -74,6 +76,18 @@ struct override_plan {
 
 /* For a program at rest, commanded 100 %. Reads all pieces: main loop. */
 void override_plan_begin(struct override_plan *plan, const struct program *p);
+
+/* The most that counts of the override asked for. Not lowered while the override is above. */
+void override_plan_limit(struct override_plan *plan, int64_t most_q57);
+
+/* 1 when nothing on its way depends on pieces that begin at this program time or later: the override is steady, or on a ramp
+ * decided with pieces before, and nothing is looked for. */
+int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s);
+
+/* The program goes on as another, with these least bounds, whose time is less by `shift`. Where override_plan_ends_by its
+ * first new piece, or at rest. */
+void override_plan_carry(struct override_plan *plan, const struct program_override *least,
+                         uint64_t shift_q32_s);
 
 /* The path came to rest otherwise: the override goes on from 0. */
 void override_plan_rest(struct override_plan *plan);

@@ -111,9 +111,20 @@ static int at_rest(const struct feed_state *s)
            within(s->acceleration_q16_mm_s2, JOIN_ACCELERATION_Q16);
 }
 
-static int check_first(const struct program_piece *c)
+/* Of a chunk that begins in motion: inside the first segment. */
+static int check_first_moving(const struct program *p, const struct program_piece *c)
+{
+    const int64_t end_q40_mm =
+        p->header.segment_count > 1u ? program_segment_start(p, 1u) : p->header.length_q40_mm;
+    return c->start_q40_mm < end_q40_mm ? 0 : PROGRAM_ERR_PIECE_FIRST;
+}
+
+static int check_first(const struct program *p, const struct program_piece *c)
 {
     struct feed_state start;
+    if ((p->header.flags & PROGRAM_FLAG_MOVING) != 0) {
+        return check_first_moving(p, c);
+    }
     feed_bounds_start(c, &start);
     if (c->start_q40_mm != 0) {
         return PROGRAM_ERR_PIECE_FIRST;
@@ -145,7 +156,7 @@ static int check_neighbours(const struct program *p, uint32_t i, const struct pr
                             const struct program_piece *c)
 {
     if (i == 0) {
-        return check_first(c);
+        return check_first(p, c);
     }
     int code = check_join(before, c);
     if (code == 0 && i >= 2 && i + 1 < p->header.piece_count &&

@@ -5,35 +5,11 @@
 #include <string.h>
 
 #include "core/crc32.h"
+#include "core/little_endian.h"
 #include "core/program_check.h"
 #include "core/qmath.h"
 
 #define CRC_FROM 16u /* the CRC covers everything behind itself */
-
-static uint32_t read_u16(const uint8_t *b)
-{
-    return (uint32_t)b[0] | (uint32_t)b[1] << 8;
-}
-
-static uint32_t read_u32(const uint8_t *b)
-{
-    return read_u16(b) | read_u16(b + 2) << 16;
-}
-
-static uint64_t read_u64(const uint8_t *b)
-{
-    return (uint64_t)read_u32(b) | (uint64_t)read_u32(b + 4) << 32;
-}
-
-static int64_t read_i64(const uint8_t *b)
-{
-    return (int64_t)read_u64(b);
-}
-
-static int64_t read_i48(const uint8_t *b)
-{
-    return (int64_t)((uint64_t)read_u32(b) << 16 | (uint64_t)read_u16(b + 4) << 48) >> 16;
-}
 
 static void read_header(struct program_header *h, const uint8_t *b)
 {
@@ -173,6 +149,23 @@ uint64_t program_piece_duration(const struct program *p, uint32_t i)
 int64_t program_piece_start(const struct program *p, uint32_t i)
 {
     return read_i64(piece_bytes(p, i) + 8);
+}
+
+int program_segment_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k)
+{
+    const size_t behind_start = 8;
+    return memcmp(segment_bytes(a, i) + behind_start, segment_bytes(b, k) + behind_start,
+                  program_segment_size(a->header.axis_count) - behind_start) == 0;
+}
+
+int program_piece_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k)
+{
+    const size_t start = 8;
+    const size_t behind_start = 16;
+    const uint8_t *one = piece_bytes(a, i);
+    const uint8_t *other = piece_bytes(b, k);
+    return memcmp(one, other, start) == 0 &&
+           memcmp(one + behind_start, other + behind_start, PROGRAM_PIECE_SIZE - behind_start) == 0;
 }
 
 void program_piece_override(const struct program *p, uint32_t i, struct program_override *out)

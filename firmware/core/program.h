@@ -29,6 +29,7 @@ struct kernel; /* core/kernel.h */
 #define PROGRAM_STOP_SIZE    16u
 #define PROGRAM_VERSION      2u
 #define PROGRAM_FLAG_CLOSED  1u
+#define PROGRAM_FLAG_MOVING  2u /* begins in motion: only in a chunk (core/chunk.h) */
 
 /* Header of the image, protocol.md 1.1; field names carry the units. */
 struct program_header {
@@ -160,6 +161,11 @@ void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kin
 int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 int64_t program_piece_start(const struct program *p, uint32_t i);
+
+/* Whether segment or piece i of one program is number k of the other, bit for bit, but for the arc length of its start.
+ * Of programs with the same number of path axes. */
+int program_segment_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
+int program_piece_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
 
 /* Only its override bounds. */
 void program_piece_override(const struct program *p, uint32_t i, struct program_override *out);

@@ -44,7 +44,8 @@ static int check_header(const struct program *p, const struct program_limits *li
     if (code != 0) {
         return code;
     }
-    if ((h->flags & ~PROGRAM_FLAG_CLOSED) != 0 || !bytes_are_zero(p->image + 76, 4)) {
+    const uint32_t flags = PROGRAM_FLAG_CLOSED | (limits->chunk != 0 ? PROGRAM_FLAG_MOVING : 0u);
+    if ((h->flags & ~flags) != 0 || !bytes_are_zero(p->image + 76, 4)) {
         return PROGRAM_ERR_FLAGS;
     }
     if (limits->axis_count != 0 && limits->axis_count != h->axis_count) {
@@ -139,6 +140,16 @@ static const struct text texts[] = {
     {PROGRAM_ERR_STOP_BOUND, "a stop can take longer than its bound"},
     {PROGRAM_ERR_STOP_LONG, "a fault stop can take longer than the controller allows"},
     {PROGRAM_ERR_STOP_WORST, "the worst stops of the header are not those of the table"},
+    {PROGRAM_ERR_CHUNK_FORMAT,
+     "chunk: wrong magic, version, size or flag, or a reserved field is not 0"},
+    {PROGRAM_ERR_CHUNK_CRC, "chunk: CRC-32 is wrong"},
+    {PROGRAM_ERR_CHUNK_JOB, "chunk: of another job, or job 0"},
+    {PROGRAM_ERR_CHUNK_SEQUENCE, "chunk: sequence number is not the next one"},
+    {PROGRAM_ERR_CHUNK_FIRST, "chunk: its flag 'first' contradicts its predecessor or its start"},
+    {PROGRAM_ERR_CHUNK_PROGRAM, "chunk: period or axis count is not that of its predecessor"},
+    {PROGRAM_ERR_CHUNK_SHARED, "chunk: shifts or shared counts do not fit its predecessor"},
+    {PROGRAM_ERR_CHUNK_SEGMENT, "chunk: a shared segment is not that of its predecessor"},
+    {PROGRAM_ERR_CHUNK_PIECE, "chunk: a shared piece is not that of its predecessor"},
     {PROGRAM_ERR_AXIS_VELOCITY, "above the velocity limit of an axis"},
     {PROGRAM_ERR_AXIS_ACCELERATION, "above the acceleration limit of an axis"},
     {PROGRAM_ERR_AXIS_JERK, "above the jerk limit of an axis"},

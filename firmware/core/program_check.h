@@ -79,6 +79,20 @@ enum program_error {
     PROGRAM_ERR_STOP_BOUND = -62,   /* a stop can take longer than its bound */
     PROGRAM_ERR_STOP_LONG = -63,    /* a fault stop can take longer than the controller allows */
     PROGRAM_ERR_STOP_WORST = -64,   /* the worst stops of the header are not those of the table */
+    /* chunks of a stream (core/chunk.h): index = the segment or piece of the chunk where it says so, else 0 */
+    PROGRAM_ERR_CHUNK_FORMAT =
+        -80, /* no magic "HDGC", version unknown, size wrong, unknown flag, or a reserved field is not 0 */
+    PROGRAM_ERR_CHUNK_CRC = -81, /* CRC-32 of the chunk is wrong */
+    PROGRAM_ERR_CHUNK_JOB = -82, /* another job than the predecessor's, or job 0 */
+    PROGRAM_ERR_CHUNK_SEQUENCE =
+        -83, /* sequence is not the predecessor's and 1; of a first chunk not 0 */
+    PROGRAM_ERR_CHUNK_FIRST =
+        -84, /* flag FIRST, but a predecessor, shared parts or a start in motion; or none of them */
+    PROGRAM_ERR_CHUNK_PROGRAM = -85, /* period or axis count is not the predecessor's */
+    PROGRAM_ERR_CHUNK_SHARED = -86,  /* shifts or shared counts do not fit the predecessor */
+    PROGRAM_ERR_CHUNK_SEGMENT =
+        -87, /* a shared segment is not the predecessor's; index = the segment */
+    PROGRAM_ERR_CHUNK_PIECE = -88, /* a shared piece is not the predecessor's; index = the piece */
 };
 
 /* What this controller allows. */
@@ -96,6 +110,7 @@ struct program_limits {
     uint32_t axis_acceleration_um_s2[PROGRAM_AXES];
     uint32_t axis_jerk_mm_s3[PROGRAM_AXES];
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
+    uint32_t chunk;        /* 1: a chunk's program may begin in motion (core/chunk.h) */
     /* Called with `self` at every piece by the parts of the check that take long: so a main loop can give signs of life
      * meanwhile. NULL: nobody is. */
     void (*attend)(void *self);

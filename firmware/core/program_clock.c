@@ -55,3 +55,13 @@ void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_
     clock->piece = piece;
     clock->record = record;
 }
+
+void program_clock_carry(struct program_clock *clock, const struct program *p, uint64_t shift_q42_s,
+                         uint32_t piece)
+{
+    clock->program = p;
+    clock->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
+    clock->time_q42_s -= shift_q42_s;
+    clock->piece = piece;
+    clock->record = coefficients_piece_at(p, p->coefficients_for, piece);
+}

@@ -54,6 +54,11 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
                        const struct coefficients_piece *record);
 
+/* The same instant in a program that begins `shift` later, inside its piece of this number: what is left below 2^-42 s
+ * stays. Main loop. */
+void program_clock_carry(struct program_clock *clock, const struct program *p, uint64_t shift_q42_s,
+                         uint32_t piece);
+
 /* Program time of a tick in 2^-62 s, in which the override changes from `from` to the slope at its end (2^-56 a tick):
  * six times its mean is 3 override + 2 slope + next slope. */
 uint64_t program_clock_way_q62_s(const struct program_clock *clock,

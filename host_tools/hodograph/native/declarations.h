@@ -21,7 +21,7 @@ struct program_limits {
     uint32_t axis_count, period_us, feed_um_s, acceleration_um_s2, jerk_mm_s3;
     int64_t min_q40_mm[6], max_q40_mm[6];
     uint32_t axis_velocity_um_s[6], axis_acceleration_um_s2[6], axis_jerk_mm_s3[6];
-    uint32_t stop_time_ms;
+    uint32_t stop_time_ms, chunk;
     ...;
 };
 struct program_fault {

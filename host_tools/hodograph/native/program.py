@@ -35,7 +35,7 @@ class NativeLimits:
 
     Those of travel and axes have one number for each path axis, travel in mm * 2^40; period in us, feed and velocity in
     um/s, acceleration in um/s^2, jerk in mm/s^3. Axes that are not given have no limits. `axis_count` is the number of
-    path axes of the machine (0: any).
+    path axes of the machine (0: any). `chunk` 1: a program may begin in motion, as in a chunk of a stream.
     """
 
     period_us: int = 0
@@ -49,6 +49,7 @@ class NativeLimits:
     axis_acceleration_um_s2: tuple[int, ...] = ()
     axis_jerk_mm_s3: tuple[int, ...] = ()
     axis_count: int = 0
+    chunk: int = 0
 
 
 @dataclass(frozen=True)

@@ -289,13 +289,13 @@ def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) ->
     factor = pieces.override_factor_q14
     codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
     override = (factor < FACTOR_ONE_Q14) | (factor > 2 * FACTOR_ONE_Q14)
-    start_moving = np.array([_moving(feed_start[0], acceleration_start[0])])
+    begins = (_starts_elsewhere(program), _moving(feed_start[0], acceleration_start[0]))
     return [
         (np.asarray(np.abs(way) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
         *bounds,
         (np.asarray(override | (codes == 0).any(axis=1)), 0, code.OVERRIDE),
-        (np.asarray(start[:1] != 0, dtype=np.bool_), 0, code.PIECE_FIRST),
-        (start_moving, 0, code.START_MOVING),
+        (np.array([begins[0]]), 0, code.PIECE_FIRST),
+        (np.array([begins[1] and not program.moving]), 0, code.START_MOVING),
         (np.asarray(advance < 0, dtype=np.bool_), 1, code.BACKWARDS),
         (np.asarray(np.abs(gaps) > JOIN_Q40 << 4, dtype=np.bool_), 1, code.JOIN_LENGTH),
         (np.abs(feed_end[:-1] - feed_start[1:]) > JOIN_FEED_Q24, 1, code.JOIN_FEED),
@@ -306,6 +306,14 @@ def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) ->
         ),
         (_brief(pieces.duration_q32_s, program.period_us), 2, code.PIECE_SHORT),
     ]
+
+
+def _starts_elsewhere(program: Program) -> bool:
+    """The first piece does not begin at arc length 0; of a chunk in motion: not inside the first segment."""
+    start = int(program.pieces.start_q40[0])
+    if not program.moving:
+        return start != 0
+    return start >= int([*program.start_q40[1:2], program.length_q40][0])
 
 
 def _bound_faults(duration: Int, c: Int, limits: ProgramLimits | None) -> list[Rule]:
@@ -403,30 +411,34 @@ class Fault:
         return f"{'segment' if self.code > -40 else 'piece'} {self.index}"
 
 
-def check(program: Program, limits: ProgramLimits | None = None) -> Fault | None:
-    """The first rule that `program` breaks, None when it may run.
+def check(
+    program: Program, limits: ProgramLimits | None = None, *, chunk: bool = False
+) -> Fault | None:
+    """The first rule that `program` breaks, None when it may run. In a chunk it may begin in motion.
 
     The order is that of the controller: header, segments one by one, their end, pieces one by one, their
     end and sum, then what two segments have to do with the pieces over them, and last the stops.
     """
-    return _check(program, limits, _CLEAN)
+    return _check(program, limits, _CLEAN, chunk)
 
 
-def check_image(image: bytes, limits: ProgramLimits | None = None) -> Fault | None:
+def check_image(
+    image: bytes, limits: ProgramLimits | None = None, *, chunk: bool = False
+) -> Fault | None:
     """The same from the bytes, with what `decode` refuses and what `Program` does not hold."""
     broken = open_fault(image)
     if broken is not None:
         return Fault(broken, 0)
-    return _check(decode(image), limits, reserved_fields(image))
+    return _check(decode(image), limits, reserved_fields(image), chunk)
 
 
 _CLEAN = ReservedFields(flags=True, name=True, stops=None)
 
 
 def _check(
-    program: Program, limits: ProgramLimits | None, reserved: ReservedFields
+    program: Program, limits: ProgramLimits | None, reserved: ReservedFields, chunk: bool
 ) -> Fault | None:
-    header = _header_fault(program, limits, reserved)
+    header = _header_fault(program, limits, reserved, chunk)
     if header is not None:
         return Fault(header, 0)
     ways = segment_ways(program.a_q44)
@@ -462,13 +474,13 @@ def _first(rules: list[Rule]) -> Fault | None:
 
 
 def _header_fault(
-    program: Program, limits: ProgramLimits | None, reserved: ReservedFields
+    program: Program, limits: ProgramLimits | None, reserved: ReservedFields, chunk: bool
 ) -> ProgramError | None:
     if program.period_us not in PERIODS_US:
         return ProgramError.PERIOD
     if limits is not None and limits.period_us not in (0, program.period_us):
         return ProgramError.PERIOD_USED
-    if not reserved.flags:
+    if not reserved.flags or (program.moving and not chunk):
         return ProgramError.FLAGS
     if limits is not None and limits.axis_count not in (0, program.axis_count):
         return ProgramError.AXES

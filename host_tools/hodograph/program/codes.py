@@ -66,6 +66,15 @@ class ProgramError(IntEnum):
     STOP_BOUND = -62
     STOP_LONG = -63
     STOP_WORST = -64
+    CHUNK_FORMAT = -80
+    CHUNK_CRC = -81
+    CHUNK_JOB = -82
+    CHUNK_SEQUENCE = -83
+    CHUNK_FIRST = -84
+    CHUNK_PROGRAM = -85
+    CHUNK_SHARED = -86
+    CHUNK_SEGMENT = -87
+    CHUNK_PIECE = -88
 
     @property
     def text(self) -> str:
@@ -128,4 +137,13 @@ _TEXTS = {
     ProgramError.STOP_BOUND: "a stop can take longer than its bound",
     ProgramError.STOP_LONG: "a fault stop can take longer than the controller allows",
     ProgramError.STOP_WORST: "the worst stops of the header are not those of the table",
+    ProgramError.CHUNK_FORMAT: "chunk: wrong magic, version, size or flag, or a reserved field is not 0",
+    ProgramError.CHUNK_CRC: "chunk: CRC-32 is wrong",
+    ProgramError.CHUNK_JOB: "chunk: of another job, or job 0",
+    ProgramError.CHUNK_SEQUENCE: "chunk: sequence number is not the next one",
+    ProgramError.CHUNK_FIRST: 'chunk: its flag "first" contradicts its predecessor or its start',
+    ProgramError.CHUNK_PROGRAM: "chunk: period or axis count is not that of its predecessor",
+    ProgramError.CHUNK_SHARED: "chunk: shifts or shared counts do not fit its predecessor",
+    ProgramError.CHUNK_SEGMENT: "chunk: a shared segment is not that of its predecessor",
+    ProgramError.CHUNK_PIECE: "chunk: a shared piece is not that of its predecessor",
 }

@@ -24,7 +24,7 @@ VERSION = 2
 HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE, STOP_SIZE = 128, 72, 88, 16
 """Those of header and segment are a planar program's; `header_size` and `segment_size` know the others."""
 PLANE_AXES, SPACE_AXES, MOST_AXES = 2, 3, 6
-FLAG_CLOSED = 1
+FLAG_CLOSED, FLAG_MOVING = 1, 2
 NAME_SIZE = 32
 
 _HEADER = struct.Struct("<4sHHII III HH Q qqq III I 32s 4I".replace(" ", ""))
@@ -57,6 +57,7 @@ class Program:
     extra_q40  (A - 3, N, 5) Bezier coefficients 1 … 5 of the extra axes from the segment's start; mm, degrees
     offset_q40 work offset of each axis, already contained
     pieces     the M feed pieces, and `stops` for each of them
+    moving     it begins in motion: only in a chunk of a stream
     Limits of 0 mean none.
     """
 
@@ -75,6 +76,7 @@ class Program:
     pieces: FeedPieces
     stops: Stops
     extra_q40: Int = field(default_factory=lambda: np.zeros((0, 0, 5), dtype=np.int64))
+    moving: bool = False
 
     def __post_init__(self) -> None:
         if not len(self.extra_q40):
@@ -157,7 +159,7 @@ def encode(program: Program) -> bytes:
             program.period_us,
             program.segment_count,
             program.piece_count,
-            FLAG_CLOSED if program.closed else 0,
+            FLAG_CLOSED * program.closed | FLAG_MOVING * program.moving,
             program.axis_count,
             program.duration_q32_s,
             program.length_q40,
@@ -218,6 +220,7 @@ def decode(image: bytes) -> Program:
         name=head[18].rstrip(b"\0").decode(errors="replace"),
         period_us=head[5],
         closed=bool(head[8] & FLAG_CLOSED),
+        moving=bool(head[8] & FLAG_MOVING),
         duration_q32_s=head[10],
         length_q40=head[11],
         offset_q40=(
@@ -327,7 +330,7 @@ def reserved_fields(image: bytes) -> ReservedFields:
     after = header_size(head[9]) + segment_size(head[9]) * head[6]
     stops = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])["reserved"]
     return ReservedFields(
-        flags=not (head[8] & ~FLAG_CLOSED or head[17]),
+        flags=not (head[8] & ~(FLAG_CLOSED | FLAG_MOVING) or head[17]),
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
         stops=stops != 0,
     )

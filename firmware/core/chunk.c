@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/chunk.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "core/crc32.h"
+#include "core/little_endian.h"
+#include "core/override_ramp.h"
+
+#define CRC_FROM      16u /* the CRC covers everything behind itself */
+#define ARC_LIMIT_Q40 ((int64_t)1 << 62)
+
+static void read_header(struct chunk *c, const uint8_t *b)
+{
+    c->flags = read_u16(b + 6);
+    c->size = read_u32(b + 8);
+    c->job = read_u32(b + 16);
+    c->sequence = read_u32(b + 20);
+    c->piece_shift = read_u32(b + 24);
+    c->segment_shift = read_u32(b + 28);
+    c->shared_pieces = read_u32(b + 32);
+    c->shared_segments = read_u32(b + 36);
+    c->arc_shift_q40_mm = read_i64(b + 40);
+    c->time_shift_q32_s = read_u64(b + 48);
+    c->job_start_q40_mm = read_i64(b + 56);
+    c->line = read_u32(b + 64);
+    c->remaining_ms = read_u32(b + 68);
+}
+
+int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size)
+{
+    if (bytes == NULL || size < CHUNK_HEADER_SIZE || memcmp(bytes, "HDGC", 4) != 0 ||
+        read_u16(bytes + 4) != CHUNK_VERSION) {
+        return PROGRAM_ERR_CHUNK_FORMAT;
+    }
+    read_header(c, bytes);
+    if (c->size > size || c->size < CHUNK_HEADER_SIZE ||
+        (c->flags & ~(CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST)) != 0u || read_u64(bytes + 72) != 0u) {
+        return PROGRAM_ERR_CHUNK_FORMAT;
+    }
+    if (crc32_update(0, bytes + CRC_FROM, c->size - CRC_FROM) != read_u32(bytes + 12)) {
+        return PROGRAM_ERR_CHUNK_CRC;
+    }
+    const int code =
+        program_open(&c->program, bytes + CHUNK_HEADER_SIZE, c->size - CHUNK_HEADER_SIZE);
+    if (code != 0) {
+        return code;
+    }
+    return c->program.size == c->size - CHUNK_HEADER_SIZE ? 0 : PROGRAM_ERR_CHUNK_FORMAT;
+}
+
+/* --- The first chunk of a job --- */
+
+static int check_first(const struct chunk *c)
+{
+    const uint64_t shifts = (uint64_t)c->piece_shift | c->segment_shift | c->shared_pieces |
+                            c->shared_segments | (uint64_t)c->arc_shift_q40_mm |
+                            c->time_shift_q32_s;
+    if (c->sequence != 0u) {
+        return PROGRAM_ERR_CHUNK_SEQUENCE;
+    }
+    if ((c->flags & CHUNK_FLAG_FIRST) == 0u || shifts != 0u ||
+        (c->program.header.flags & PROGRAM_FLAG_MOVING) != 0u) {
+        return PROGRAM_ERR_CHUNK_FIRST;
+    }
+    return c->job_start_q40_mm >= 0 && c->job_start_q40_mm < ARC_LIMIT_Q40
+               ? 0
+               : PROGRAM_ERR_CHUNK_SHARED;
+}
+
+/* --- A later one beside its predecessor --- */
+
+/* What is known without a look at segments and pieces. */
+static int check_follows(const struct chunk *next, const struct chunk *previous)
+{
+    if (next->sequence != previous->sequence + 1u) {
+        return PROGRAM_ERR_CHUNK_SEQUENCE;
+    }
+    if ((next->flags & CHUNK_FLAG_FIRST) != 0u || !chunk_goes_on(previous)) {
+        return PROGRAM_ERR_CHUNK_FIRST;
+    }
+    return next->program.header.period_us == previous->program.header.period_us &&
+                   next->program.header.axis_count == previous->program.header.axis_count
+               ? 0
+               : PROGRAM_ERR_CHUNK_PROGRAM;
+}
+
+/* The tail has a piece at least; all segments of the predecessor behind the shift are shared. */
+static int counts_fit(const struct chunk *next, const struct chunk *previous)
+{
+    const struct program_header *h = &next->program.header;
+    const struct program_header *before = &previous->program.header;
+    return next->shared_pieces > 0u && next->shared_pieces <= h->piece_count &&
+           (uint64_t)next->piece_shift + next->shared_pieces < before->piece_count &&
+           next->shared_segments > 0u && next->shared_segments <= h->segment_count &&
+           (uint64_t)next->segment_shift + next->shared_segments == before->segment_count;
+}
+
+static uint64_t time_of_piece_q32_s(const struct program *p, uint32_t piece)
+{
+    uint64_t sum = 0;
+    for (uint32_t i = 0; i < piece; i++) {
+        sum += program_piece_duration(p, i);
+    }
+    return sum;
+}
+
+static int shifts_fit(const struct chunk *next, const struct chunk *previous)
+{
+    const struct program *before = &previous->program;
+    return next->arc_shift_q40_mm == program_segment_start(before, next->segment_shift) &&
+           next->time_shift_q32_s == time_of_piece_q32_s(before, next->piece_shift) &&
+           next->job_start_q40_mm >= 0 && next->job_start_q40_mm < ARC_LIMIT_Q40 &&
+           next->job_start_q40_mm == previous->job_start_q40_mm + next->arc_shift_q40_mm;
+}
+
+static int check_segments(const struct chunk *next, const struct chunk *previous, uint32_t *index)
+{
+    for (*index = 0; *index < next->shared_segments; (*index)++) {
+        const uint32_t k = next->segment_shift + *index;
+        const int64_t way_q40 =
+            program_segment_start(&previous->program, k) - next->arc_shift_q40_mm;
+        if (program_segment_start(&next->program, *index) != way_q40 ||
+            !program_segment_alike(&next->program, *index, &previous->program, k)) {
+            return PROGRAM_ERR_CHUNK_SEGMENT;
+        }
+    }
+    *index = 0;
+    return 0;
+}
+
+static int check_pieces(const struct chunk *next, const struct chunk *previous, uint32_t *index)
+{
+    for (*index = 0; *index < next->shared_pieces; (*index)++) {
+        const uint32_t k = next->piece_shift + *index;
+        const int64_t way_q40 = program_piece_start(&previous->program, k) - next->arc_shift_q40_mm;
+        if (program_piece_start(&next->program, *index) != way_q40 ||
+            !program_piece_alike(&next->program, *index, &previous->program, k)) {
+            return PROGRAM_ERR_CHUNK_PIECE;
+        }
+    }
+    *index = 0;
+    return 0;
+}
+
+static int check_shared(const struct chunk *next, const struct chunk *previous, uint32_t *index)
+{
+    int code = check_follows(next, previous);
+    if (code == 0 && (!counts_fit(next, previous) || !shifts_fit(next, previous))) {
+        code = PROGRAM_ERR_CHUNK_SHARED;
+    }
+    code = code != 0 ? code : check_segments(next, previous, index);
+    return code != 0 ? code : check_pieces(next, previous, index);
+}
+
+int chunk_check(struct chunk *next, const struct chunk *previous,
+                const struct program_limits *limits, struct program_fault *fault)
+{
+    struct program_limits own = *limits;
+    fault->index = 0;
+    if (next->job == 0u || (previous != NULL && next->job != previous->job)) {
+        fault->code = PROGRAM_ERR_CHUNK_JOB;
+    } else if (previous == NULL) {
+        fault->code = check_first(next);
+    } else {
+        fault->code = check_shared(next, previous, &fault->index);
+    }
+    own.chunk = 1;
+    if (fault->code == 0 && program_check(&next->program, &own, fault) == 0) {
+        override_bounds_of(&next->least, &next->program, 0, next->program.header.piece_count);
+        interpolator_exact_end(&next->program, &next->end);
+    }
+    return fault->code;
+}

@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * A chunk: a part of a job that is longer than the memory of the controller (docs/reference/protocol.md 1.7).
+ *
+ * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside the
+ * limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before the joint,
+ * where that tail begins, bit for bit, and goes on from there. The controller takes it over while the motion is in the
+ * shared part (feed_override_take_over). When that does not come to pass, the motion follows the tail and rests on the path.
+ *
+ * A chunk is never copied; its bytes must stay unchanged as long as a struct chunk refers to them. No heap, no globals.
+ */
+#ifndef HODOGRAPH_CORE_CHUNK_H
+#define HODOGRAPH_CORE_CHUNK_H
+
+#include <stdint.h>
+
+#include "core/interpolator.h"
+#include "core/program.h"
+#include "core/program_check.h"
+
+#define CHUNK_HEADER_SIZE  80u
+#define CHUNK_VERSION      1u
+#define CHUNK_FLAG_FIRST   1u /* the job begins with it, at rest */
+#define CHUNK_FLAG_LAST    2u /* the job ends with it: its end is no tail */
+#define CHUNK_TIME_UNKNOWN UINT32_MAX
+#define CHUNK_SHARED_PIECES                                                                        \
+    16u /* of a chunk whose takeover no look-ahead delays: the longest window */
+
+struct chunk {
+    /* The header, as in protocol.md 1.7. */
+    uint32_t flags; /* CHUNK_FLAG_... */
+    uint32_t size;  /* bytes of header and image */
+    uint32_t job;
+    uint32_t sequence;
+    uint32_t piece_shift;   /* number in the predecessor of piece 0, */
+    uint32_t segment_shift; /* and of segment 0 */
+    uint32_t
+        shared_pieces; /* so many from the first are the predecessor's; the joint is behind them */
+    uint32_t shared_segments;
+    int64_t arc_shift_q40_mm;  /* arc length in the predecessor of arc length 0, */
+    uint64_t time_shift_q32_s; /* and program time in it of time 0 */
+    int64_t job_start_q40_mm;  /* arc length of the job at arc length 0 */
+    uint32_t line;             /* of the source at its start; 0: none */
+    uint32_t remaining_ms;     /* of the job from the joint on; CHUNK_TIME_UNKNOWN */
+    struct program program;
+    /* What a takeover needs of the whole program, made by chunk_check: */
+    struct program_override least; /* the least override bounds of its pieces, */
+    struct interpolator_point end; /* and its exact end point */
+};
+
+/* Opens a chunk of `size` bytes: magic, version, size, flags, CRC, and the program in it (program_open). The buffer may be
+ * longer than the chunk says, never shorter. Cost: two CRCs, linear in the size. Returns 0 or a negative enum
+ * program_error; *c is then not usable. */
+int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size);
+
+/* Checks an opened chunk: its whole program (program_check), and that it goes on from its predecessor, which has passed this
+ * check; NULL for the first. Returns 0, or the code of the first rule broken; *fault gets the same code and its index. What
+ * costs little and refuses a wrong chunk comes first. Main loop; linear. */
+int chunk_check(struct chunk *next, const struct chunk *previous,
+                const struct program_limits *limits, struct program_fault *fault);
+
+/* 1: the job goes on behind the end of this chunk's program, which is the end of a tail. */
+static inline int chunk_goes_on(const struct chunk *c)
+{
+    return (c->flags & CHUNK_FLAG_LAST) == 0u;
+}
+
+#endif
