@@ -24,10 +24,12 @@ HEADERS = (
     "core/coefficients.h",
     "core/interpolator.h",
     "core/feed_override.h",
+    "core/chunk.h",
     "plant/drive.h",
     "offline/contour.h",
     "offline/offline.h",
     "offline/stop_search.h",
+    "offline/stream.h",
     "offline/stop_trial.h",
     "offline/axis_run.h",
 )

@@ -90,6 +90,26 @@ int64_t feed_override_feed_q32(const struct feed_override *f);
 uint32_t feed_override_actual_q30(const struct feed_override *f);
 uint32_t feed_override_bound_us(const struct feed_override *f, int kind);
 
+/* core/chunk.h */
+struct chunk {
+    uint32_t flags, sequence;
+    struct program program;
+    ...;
+};
+int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size);
+int chunk_check(struct chunk *next, const struct chunk *previous,
+                const struct program_limits *limits, struct program_fault *fault);
+int feed_override_waits(const struct feed_override *f);
+
+/* offline/stream.h */
+struct offline_stream {
+    struct feed_override feed;
+    ...;
+};
+int offline_stream_begin(struct offline_stream *stream, const struct chunk *first);
+int offline_stream_run(struct offline_stream *stream, const struct chunk *next, uint32_t n,
+                       uint32_t counts_per_mm, int32_t *counts, uint32_t *taken);
+
 /* plant/drive.h */
 struct drive_plant {
     double gain_rad_s_v, time_constant_s, screw_mm_rad, torque_to_volts, volts_limit;
