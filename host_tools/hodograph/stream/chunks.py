@@ -18,18 +18,28 @@ from ..pipeline import program_limits, stop_terms
 from ..program.codes import ProgramError
 from ..program.image import Program, encode
 from ..program.stop_planning import stop_codes, with_bounds
-from ..program.stops import no_stops
-from .chunk import LEAST_SHARED_PIECES, Chunk, ChunkHeader
+from ..program.stops import DECELERATION, no_stops
+from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader
 from .geometry import Block
-from .windows import SectionFeed, Stretch, Window, chained, taken
+from .windows import JOINTS, SectionFeed, Spacing, Stretch, Window, chained, taken
 
 Codes = NDArray[np.uint8]
+Real = NDArray[np.float64]
 
 CHUNK_S = 0.7
 """New motion of a chunk."""
 
+CHUNK_BYTES = 24 * 1024 - 64
+"""The largest chunk: half of the ring of a small controller, which holds two."""
+
+_NEW_SHARE = 0.5
+"""Of these bytes, for what is new: the rest is for the repeated part and the tail."""
+
 LATENESS_S = 0.1
 """A takeover may be so late without effect on the motion."""
+
+SEARCH_S, GAP_S = 0.02, 0.06
+"""Stops may begin about so often, and all pieces are searched where they may not for so long."""
 
 _LONGEST_NAME = 32
 _MOVING_FAULTS = frozenset(
@@ -65,13 +75,14 @@ class PlannedChunk:
 @dataclass(frozen=True, eq=False)
 class _Made:
     """What the next chunk has to know of the last one: its header, and arc lengths of the section where its first
-    segment begins and its program ends; numbers in the section of its first segment, and of the one behind its last.
+    segment begins and its program ends; numbers in the section of its first segment, and of the one behind its last; and its pieces.
     """
 
     header: ChunkHeader
     first_segment: int
     end_segment: int
     end_q40: int
+    pieces: int
 
 
 @dataclass
@@ -81,9 +92,10 @@ class _Kept:
     pieces: FeedPieces | None = None
     codes: Codes = field(default_factory=lambda: _no_codes(0))
 
-    def append(self, pieces: FeedPieces, codes: Codes) -> None:
-        self.pieces = pieces if self.pieces is None else chained([self.pieces, pieces])
-        self.codes = np.concatenate((self.codes, codes))
+    def with_new(self, pieces: FeedPieces, codes: Codes) -> _Kept:
+        """With pieces behind them."""
+        old = [] if self.pieces is None else [self.pieces]
+        return _Kept(chained([*old, pieces]), np.concatenate((self.codes, codes)))
 
     def reduce(self) -> tuple[int, int]:
         """Removes the pieces that the next chunk need not repeat. Returns how many, and their time in 2^-32 s."""
@@ -101,41 +113,62 @@ class _Kept:
 class SectionChunks:
     """Makes the chunks of one section."""
 
-    def __init__(self, machine: Machine, name: str, blocks: Iterator[Block], job: int) -> None:
-        """`job`: number that the chunks carry."""
+    def __init__(
+        self,
+        machine: Machine,
+        name: str,
+        blocks: Iterator[Block],
+        job: int,
+        most_bytes: int = CHUNK_BYTES,
+    ) -> None:
+        """`job`: number that the chunks carry; `most_bytes`: of a chunk, as the controller has room for."""
         self.machine = machine
         self._name, self._job = name[:_LONGEST_NAME], job
         self._limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
-        self._feed = SectionFeed(machine, blocks, CHUNK_S, self._exceeded)
+        self._feed = SectionFeed(
+            machine, blocks, Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)), self._exceeded
+        )
+        self._most = most_bytes
         self._kept = _Kept()
         self._last: _Made | None = None
 
     def chunks(self) -> Iterator[PlannedChunk]:
         """The chunks in order. Raises InputError and PlanError."""
         for window in self._feed.windows():
-            first = 0
-            for joint in window.joints:
-                yield self._next(window, first, joint)
-                first = joint
+            first, joints = 0, list(window.joints)
+            while joints:
+                planned, used = self._next(window, first, joints[:JOINTS])
+                yield planned
+                first, joints = joints[used - 1], joints[used:]
             assert self._last is not None
             self._feed.forget(self._last.first_segment)
 
-    def _next(self, window: Window, first: int, joint: int) -> PlannedChunk:
-        """The chunk whose new pieces are those from knot `first` to knot `joint` of a window."""
-        new = taken(window.stretch.pieces, slice(first, joint))
-        codes = self._stop_codes(window, first, joint)
+    def _next(self, window: Window, first: int, joints: list[int]) -> tuple[PlannedChunk, int]:
+        """The chunk whose new pieces are those from knot `first` to the last one of these joints that there is room
+        for, and which this is.
+        """
+        codes = self._stop_codes(window, first, joints[-1])
         piece_shift, time_shift = self._kept.reduce()
-        shared = len(self._kept.codes)
-        self._kept.append(new, codes)
-        program, fault = self._with_tail(window, joint)
+        kept = self._kept
+        for used in range(len(joints), 0, -1):
+            joint = joints[used - 1]
+            new = taken(window.stretch.pieces, slice(first, joint))
+            self._kept = kept.with_new(new, codes[: joint - first])
+            program, fault = self._with_tail(window, joint)
+            if fault is not None and fault.code == ProgramError.STOP_LONG:
+                codes = self._all_codes(window, first, joint)
+                self._kept = kept.with_new(new, codes)
+                program, fault = self._with_tail(window, joint, search_tail=True)
+            if fault is None and program.image_size + HEADER_SIZE <= self._most:
+                break
         header = self._header(window, joint, program)
         if self._last is not None:
+            # One piece of the predecessor at least is behind the joint (docs/reference/protocol.md 1.7).
+            shared = min(len(kept.codes), self._last.pieces - piece_shift - 1)
             header = replace(
-                header,
-                piece_shift=piece_shift,
-                time_shift_q32_s=time_shift,
-                shared_pieces=shared,
+                header, piece_shift=piece_shift, time_shift_q32_s=time_shift, shared_pieces=shared
             )
+        self._require_room(program, header.line)
         if fault is not None:
             raise PlanError(
                 f"line {header.line}: the controller would refuse this part: {fault.text} "
@@ -145,7 +178,15 @@ class SectionChunks:
         joint_q40 = window.joint_q40(joint)
         line = self._feed.path.line_at(joint_q40)
         new_s = float(new.duration_q32_s.sum()) * 2.0**-32
-        return PlannedChunk(Chunk(header, encode(program)), new_s, line, joint_q40)
+        return PlannedChunk(Chunk(header, encode(program)), new_s, line, joint_q40), used
+
+    def _require_room(self, program: Program, line: int) -> None:
+        size = program.image_size + HEADER_SIZE
+        if size > self._most:
+            raise PlanError(
+                f"line {line}: a part of the path that the controller needs at once takes {size} bytes, and it takes "
+                f"{self._most}: raise --tolerance, lower the feed there, or give the controller more memory"
+            )
 
     def _header(self, window: Window, joint: int, program: Program) -> ChunkHeader:
         """The header, without what it says of shared pieces."""
@@ -175,10 +216,16 @@ class SectionChunks:
         path = self._feed.path
         first = path.passed + path.segment_at(header.job_start_q40)
         end_q40 = header.job_start_q40 + program.length_q40
-        return _Made(header, first, first + program.segment_count, end_q40)
+        end = first + program.segment_count
+        return _Made(header, first, end, end_q40, program.piece_count)
 
-    def _with_tail(self, window: Window, joint: int) -> tuple[Program, NativeFault | None]:
-        """The program of the kept pieces with the first tail that the controller accepts, and what it finds in it."""
+    def _with_tail(
+        self, window: Window, joint: int, *, search_tail: bool = False
+    ) -> tuple[Program, NativeFault | None]:
+        """The program of the kept pieces with the first tail that the controller accepts, and what it finds in it.
+
+        `search_tail`: stops may begin in the tail too. It is at rest soon anyway.
+        """
         kept, codes = self._kept.pieces, self._kept.codes
         assert kept is not None
         if window.rests and joint == window.count:
@@ -187,13 +234,11 @@ class SectionChunks:
         least_q40 = 0 if self._last is None else self._last.end_q40
         for tail in self._feed.tails(window, joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
-            none = _no_codes(len(tail.pieces))
-            program = self._program(whole, np.concatenate((codes, none)))
+            own = self._tail_codes(window, tail) if search_tail else _no_codes(len(tail.pieces))
+            program = self._program(whole, np.concatenate((codes, own)))
             fault = self._fault(program)
-            if fault is not None and fault.code == ProgramError.STOP_LONG:
-                every = np.concatenate((codes, self._tail_codes(window, tail)))
-                program = self._program(whole, every)
-                fault = self._fault(program)
+            if program.image_size + HEADER_SIZE > self._most:
+                break
             if fault is None:
                 break
         return program, fault
@@ -238,7 +283,26 @@ class SectionChunks:
         return bad
 
     def _stop_codes(self, window: Window, first: int, joint: int) -> Codes:
-        """Codes of the pieces between two knots, good for all of the path that the window knows behind them."""
+        """Codes of the pieces between two knots, good for all of the path that the window knows behind them.
+
+        Of brief pieces only some are searched: a stop that is commanded in another one begins in the next that has
+        codes, a little later.
+        """
+        stretch = window.stretch
+        seconds = np.ldexp(stretch.pieces.duration_q32_s[first:joint].astype(np.float64), -32)
+        codes = _no_codes(len(stretch.pieces))
+        for spacing_s in (SEARCH_S, 0.0):
+            found = codes[first:joint, :, DECELERATION].all(axis=1)
+            wanted = np.zeros(len(stretch.pieces), dtype=np.bool_)
+            wanted[first:joint] = _spaced(seconds, spacing_s, found)
+            if wanted.any():
+                codes = np.where(
+                    wanted[:, None, None], self._codes(window, stretch, wanted), codes
+                )
+        return codes[first:joint]
+
+    def _all_codes(self, window: Window, first: int, joint: int) -> Codes:
+        """The same with every piece searched."""
         wanted = np.zeros(len(window.stretch.pieces), dtype=np.bool_)
         wanted[first:joint] = True
         return self._codes(window, window.stretch, wanted)[first:joint]
@@ -255,6 +319,16 @@ class SectionChunks:
         limits = window.plan.limits
         plan = replace(window.plan, limits=replace(limits, zones=_moved(limits.zones, base_mm)))
         return stop_codes(program, plan, stop_terms(self.machine, limits), wanted)
+
+
+def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The pieces (M,) that are searched next: one in `spacing_s`; once some are found, all in gaps of GAP_S between."""
+    t = np.concatenate((np.zeros(1), np.cumsum(seconds)))
+    if spacing_s > 0.0:
+        return np.asarray(np.diff(np.floor(t / spacing_s)) > 0.0)
+    before = np.maximum.accumulate(np.where(found, t[1:], 0.0))
+    after = np.minimum.accumulate(np.where(found, t[:-1], t[-1])[::-1])[::-1]
+    return np.asarray((after - before > GAP_S) & ~found)
 
 
 def _no_codes(count: int) -> Codes:

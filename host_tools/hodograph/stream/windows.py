@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import ceil
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +31,13 @@ from ..feed.optimal.window import Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
 from ..feed.request import LONGEST_S, OPTIMAL
+from ..program.image import PIECE_SIZE, STOP_SIZE, segment_size
 from ..pipeline import axis_limits, axis_names, controller_limits, plants
 from .geometry import Block, StreamPath
 
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
+_Made = TypeVar("_Made")
 
 FIRST_WINDOW_S, WINDOW_S = 1.0, 3.0
 """Motion that a window keeps: the first is shorter, so that a job starts soon."""
@@ -50,7 +54,7 @@ RESERVE = 0.004
 _EASED = (1e-3, 1e-2)
 """Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
 
-_TAIL_WAYS = (1.15, 1.5, 2.2)
+_TAIL_WAYS = (1.15, 1.5, 2.2, 3.3)
 """Ways of tails that are tried, in times the way that braking takes at least."""
 
 _MOST_LOWERED, _LOWERED = 8, 1.01
@@ -58,6 +62,22 @@ _MOST_LOWERED, _LOWERED = 8, 1.01
 
 _TAIL_EXCESS = 1.003
 _DRIFT_Q40 = 1024
+
+
+JOINTS = 4
+"""Places for a joint in what is new in a chunk: the last one is taken where there is room."""
+
+PIECE_BYTES = PIECE_SIZE + STOP_SIZE
+_SLIGHTLY_MORE = 0.25
+"""A chunk may have this share more of what is new than is wanted, rather than that there is one more."""
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """How far joints are apart at most: in time, and in bytes of pieces and segments."""
+
+    time_s: float
+    bytes: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +93,7 @@ class Window:
     """A planned window.
 
     count   intervals that are kept; all of them where `rests`: the motion is at rest there
-    joints  (j,) numbers of the knots at which tails may begin, the last one `count`
+    joints  (j,) numbers of the knots at which tails may begin, JOINTS for a chunk; the last one is `count`
     end_mm  where the kept part ends, in the arc length of the path in memory
     """
 
@@ -99,16 +119,16 @@ class SectionFeed:
         self,
         machine: Machine,
         blocks: Iterator[Block],
-        joint_s: float,
+        joint: Spacing,
         exceeded: Callable[[Stretch], NDArray[np.bool_]],
     ) -> None:
-        """`joint_s`: about how far apart joints are; `exceeded`: the pieces (M,) of a stretch that the controller would
+        """`joint`: how far apart joints are; `exceeded`: the pieces (M,) of a stretch that the controller would
         refuse for their motion.
         """
         self.machine = machine
         self.path = StreamPath(machine.offset_mm, machine.period_us)
         self._blocks = blocks
-        self._joint_s = joint_s
+        self._joint = joint
         self._exceeded = exceeded
         self._period_s = 1e-6 * machine.period_us
         self._held: Solution | None = None
@@ -163,20 +183,29 @@ class SectionFeed:
         found = self._solved(limits, high, stop_s)
         if found is None:
             return self._to_rest()
-        made = self._window(found, limits, given, high, stop_s)
-        tight = np.ones(found.grid.size)
+        return self._lowered(
+            found, lambda one: self._window(one, limits, given, high, stop_s), lambda w: w.stretch
+        )
+
+    def _lowered(
+        self,
+        found: Solution,
+        made: Callable[[Solution], _Made],
+        stretch_of: Callable[[_Made], Stretch],
+    ) -> _Made:
+        """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse."""
+        tight, out = np.ones(found.grid.size), made(found)
         for _ in range(_MOST_LOWERED):
-            bad = self._exceeded(made.stretch)
+            bad = self._exceeded(stretch_of(out))
             if not bad.any():
                 break
-            beside = bad | np.append(bad[1:], False) | np.append(False, bad[:-1])
-            tight[beside] *= _LOWERED
+            tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= _LOWERED
             lower = tightened(found, tight)
             if lower is None:
                 break
             found = lower
-            made = self._window(found, limits, given, high, stop_s)
-        return made
+            out = made(found)
+        return out
 
     def _window(
         self,
@@ -288,10 +317,14 @@ class SectionFeed:
         return None
 
     def _joints(self, found: Solution, count: int) -> tuple[int, ...]:
-        """Knots up to `count`, about evenly apart in time."""
-        t = np.concatenate((np.zeros(1), np.cumsum(found.times)))
-        parts = max(1, round(float(t[count]) / self._joint_s))
-        at = np.searchsorted(t[: count + 1], t[count] * np.arange(1, parts) / parts)
+        """Knots up to `count`, JOINTS of them for the time and the bytes of a chunk, evenly in the greater one."""
+        t = np.concatenate((np.zeros(1), np.cumsum(found.times)))[: count + 1]
+        knots = found.grid.s[: count + 1]
+        segments = np.searchsorted(self.path.curve.segment_starts_mm, knots)
+        own = np.arange(count + 1) * PIECE_BYTES + segments * segment_size(self.path.curve.axes)
+        share = np.maximum(t / self._joint.time_s, (own - own[0]) / self._joint.bytes)
+        parts = JOINTS * max(1, ceil(float(share[-1]) - _SLIGHTLY_MORE))
+        at = np.searchsorted(share, share[-1] * np.arange(1, parts) / parts)
         inner = [int(k) for k in np.unique(at) if 2 < k < count - 2]
         return (*inner, count)
 
@@ -332,8 +365,13 @@ class SectionFeed:
             one = None if one is None else measured(curve, one)
             if one is None or one.excess > _TAIL_EXCESS - 1.0:
                 continue
-            own = _begun(ends_of(one, one.grid.size), state)
-            yield self._stretch(make_track(own, 1.0, ends), window.plan, window.joint_q40(joint))
+            begin_q40 = window.joint_q40(joint)
+
+            def made(found: Solution) -> Stretch:
+                own = _begun(ends_of(found, found.grid.size), state)
+                return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
+
+            yield self._lowered(one, made, lambda tail: tail)
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
 

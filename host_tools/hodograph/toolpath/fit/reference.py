@@ -104,6 +104,23 @@ class ReferenceBuilder:
             self._rows.extend([(move.line, feed, sag)] * (points.shape[0] - 1))
         self._at = move.end
 
+    @property
+    def count(self) -> int:
+        """Chords of all moves so far."""
+        return len(self._rows)
+
+    def cut(self, chord: int) -> Reference:
+        """The chords of all moves so far up to the middle of this one; the other half and what follows stays."""
+        a, b = self._points[chord : chord + 2]
+        middle = tuple(0.5 * (p + q) for p, q in zip(a, b, strict=True))
+        points, rows = self._points, self._rows
+        self._points, self._rows = [*points[: chord + 1], middle], rows[: chord + 1]
+        part = self.reference()
+        self._points, self._rows = [middle, *points[chord + 1 :]], rows[chord:]
+        self.start = (*middle, *self._at[3:])
+        self.length_mm -= float(part.place_mm[-1])
+        return part
+
     def reference(self) -> Reference:
         """The chords of all moves so far, without those of length 0."""
         rows = np.array(self._rows, dtype=np.float64).reshape(-1, 3)
