@@ -121,7 +121,7 @@ def _fit(
     reference: Reference, how: Tolerance, cap_mm_s: float, tied: tuple[bool, bool]
 ) -> FittedPath | Unfit:
     """A curve for estimated speeds of at most `cap_mm_s`."""
-    path = outline(reference, how.tolerance_mm)
+    path = outline(reference, how.tolerance_mm, tied)
     plan = _Plan.of(path, how, cap_mm_s, tied)
     room = _ROOM_SHARE
     plan = plan.with_stretches(room)

@@ -109,6 +109,10 @@ class ReferenceBuilder:
         """Chords of all moves so far."""
         return len(self._rows)
 
+    def points(self, first: int, end: int) -> Real:
+        """Points (n, 3) first … end - 1, as far as there are so many."""
+        return np.array(self._points[max(first, 0) : end], dtype=np.float64)
+
     def cut(self, chord: int) -> Reference:
         """The chords of all moves so far up to the middle of this one; the other half and what follows stays."""
         a, b = self._points[chord : chord + 2]
