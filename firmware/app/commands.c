@@ -27,6 +27,16 @@ static int prepare(struct controller *controller, int64_t from_q40_mm, struct mo
     return result;
 }
 
+static enum machine_refusal prepare_any(struct controller *controller, int64_t from_q40_mm,
+                                        struct motion *prepared, int32_t start_counts[AXES_MAX])
+{
+    if (stream_is_open(&controller->stream)) {
+        return stream_prepare(&controller->stream, &controller->config, prepared, start_counts);
+    }
+    return prepare(controller, from_q40_mm, prepared, start_counts) == 0 ? MACHINE_ACCEPTED
+                                                                         : MACHINE_OUTSIDE_LIMITS;
+}
+
 /* What keeps the program from being started. Costs a check of it where it was not checked under this configuration: apart from
  * the start, so that the stack never holds the check and a prepared motion. */
 static enum machine_refusal program_refusal(struct controller *controller)
@@ -42,19 +52,29 @@ static enum machine_refusal program_refusal(struct controller *controller)
     return slot->acceptable ? MACHINE_ACCEPTED : MACHINE_OUTSIDE_LIMITS;
 }
 
+/* A job starts at its beginning, once. */
+static enum machine_refusal job_refusal(const struct controller *controller, enum command command)
+{
+    return command == COMMAND_START_FROM || controller->stream.started ? MACHINE_JOB_STARTED
+                                                                       : MACHINE_ACCEPTED;
+}
+
 /* Reading all pieces takes long, so it happens before the lock. */
 static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
 {
     struct motion prepared;
     int32_t start_counts[AXES_MAX];
-    if (prepare(controller, from_q40_mm, &prepared, start_counts) != 0) {
-        return MACHINE_OUTSIDE_LIMITS;
+    enum machine_refusal refusal = prepare_any(controller, from_q40_mm, &prepared, start_counts);
+    if (refusal != MACHINE_ACCEPTED) {
+        return refusal;
     }
     port_lock();
     controller->machine.unhomed_allowed = controller->values.start_without_homing.allowed != 0u;
-    const enum machine_refusal refusal =
-        machine_start(&controller->machine, &prepared, start_counts);
+    refusal = machine_start(&controller->machine, &prepared, start_counts);
     port_unlock();
+    if (refusal == MACHINE_ACCEPTED && stream_is_open(&controller->stream)) {
+        stream_started(&controller->stream);
+    }
     if (refusal == MACHINE_ACCEPTED && controller->machine.unhomed_axes != 0u) {
         port_log(PORT_WARNING, "started without homing, axes (bit 0: the first)",
                  controller->machine.unhomed_axes);
@@ -135,7 +155,9 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
 /* What allows a start without homing is for one attempt. */
 static enum machine_refusal attempt_start(struct controller *controller, enum command command)
 {
-    enum machine_refusal refusal = program_refusal(controller);
+    enum machine_refusal refusal = stream_is_open(&controller->stream)
+                                       ? job_refusal(controller, command)
+                                       : program_refusal(controller);
     if (refusal == MACHINE_ACCEPTED) {
         refusal = dispatch(controller, command);
     }

@@ -123,6 +123,17 @@ static void init_values(struct controller *controller, uint8_t port_node)
     }
 }
 
+/* A chunk is checked while the motion goes on: the main loop does not stand still, and the chunk before this one may be due. */
+static void beat_in_stream(void *self)
+{
+    struct controller *controller = self;
+    controller_beat(controller);
+    port_lock();
+    machine_attend(&controller->machine);
+    port_unlock();
+    stream_process(&controller->stream, &controller->machine);
+}
+
 void controller_init(struct controller *controller, uint8_t node)
 {
     memset(controller, 0, sizeof *controller);
@@ -135,6 +146,9 @@ void controller_init(struct controller *controller, uint8_t node)
     program_slot_recover(&controller->slot);
     controller->slot.attend = controller_beat;
     controller->slot.self = controller;
+    stream_init(&controller->stream);
+    controller->stream.attend = beat_in_stream;
+    controller->stream.self = controller;
     drive_boot_init(&controller->boot);
     drive_polling_init(&controller->polling);
     homing_init(&controller->homing);
@@ -426,6 +440,7 @@ void controller_poll(struct controller *controller)
     poll_homing(controller, elapsed_us);
     poll_drives(controller, elapsed_us);
     drive_monitor_process(&controller->monitor, &controller->machine, elapsed_us);
+    stream_process(&controller->stream, &controller->machine);
     report_changes(controller);
 }
 
@@ -494,7 +509,10 @@ static uint32_t quick_time_us(const struct controller *controller)
 static uint32_t path_time_us(const struct controller *controller)
 {
     const struct program_slot *slot = &controller->slot;
-    const uint32_t told_us = slot->present ? slot->program.header.hold_worst_us : 0u;
+    const uint32_t told_us = stream_is_open(&controller->stream)
+                                 ? stream_hold_worst_us(&controller->stream)
+                             : slot->present ? slot->program.header.hold_worst_us
+                                             : 0u;
     const uint32_t bound_us = told_us < STOP_BOUND_MOST_US ? told_us : STOP_BOUND_MOST_US;
     return 3u * bound_us + (MACHINE_SETTLE_TICKS + MACHINE_ARRIVE_TICKS + AXIS_STANDSTILL_SYNCS) *
                                controller->config.period_us;

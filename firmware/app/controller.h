@@ -23,6 +23,7 @@
 #include "app/machine/machine.h"
 #include "app/parameter_store.h"
 #include "app/program_slot.h"
+#include "app/stream.h"
 #include "app/tick.h"
 #include "canopen/emcy.h"
 #include "canopen/heartbeat.h"
@@ -55,6 +56,7 @@ struct controller {
     struct configured configured;
     struct parameter_store store;
     struct program_slot slot;
+    struct stream stream;
     struct drive_boot boot;
     struct drive_monitor monitor;
     struct drive_polling polling;

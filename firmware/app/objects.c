@@ -6,6 +6,7 @@
 #include "app/commands.h"
 #include "app/objects_axis.h"
 #include "app/objects_program.h"
+#include "app/objects_stream.h"
 #include "canopen/cob.h"
 #include "canopen/heartbeat.h"
 #include "canopen/sdo_abort.h"
@@ -378,6 +379,8 @@ static const struct object objects[] = {
     {0x2041, 0x2041, 1, 5, OWN, object_read_memory, NULL, NULL, NULL},
     {0x2050, 0x2050, 1, 6, OWN, object_read_configuration, object_write_confirmation, NULL, NULL},
     {0x2055, 0x2055, 2, 2, SHARED, object_read_unhomed, NULL, NULL, NULL},
+    {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
+    {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},
 };
 
 static bool contains(const struct object *object, const struct od_entry *entry)
@@ -442,15 +445,50 @@ static void objects_written(void *context, const struct od_entry *entry)
     }
 }
 
+/* ---- DOMAINs: the image of the program, and a chunk ---- */
+
+static bool is_chunk(const struct od_entry *entry)
+{
+    return entry->index == OBJECT_STREAM;
+}
+
+static uint32_t domain_begin(void *context, const struct od_entry *entry, uint32_t size)
+{
+    return is_chunk(entry) ? object_chunk_begin(context, size)
+                           : object_program_begin(context, entry, size);
+}
+
+static uint32_t domain_write(void *context, const struct od_entry *entry, uint32_t offset,
+                             const uint8_t *data, uint32_t size)
+{
+    return is_chunk(entry) ? object_chunk_write(context, offset, data, size)
+                           : object_program_write(context, entry, offset, data, size);
+}
+
+static uint32_t domain_end(void *context, const struct od_entry *entry, uint32_t size)
+{
+    return is_chunk(entry) ? object_chunk_end(context, size)
+                           : object_program_end(context, entry, size);
+}
+
+static void domain_abort(void *context, const struct od_entry *entry)
+{
+    if (is_chunk(entry)) {
+        object_chunk_abort(context);
+    } else {
+        object_program_abort(context, entry);
+    }
+}
+
 const struct od_hooks objects_hooks = {
     .read = objects_read,
     .write = objects_write,
     .urgent = objects_urgent,
     .written = objects_written,
-    .domain_begin = object_program_begin,
-    .domain_write = object_program_write,
-    .domain_end = object_program_end,
-    .domain_abort = object_program_abort,
+    .domain_begin = domain_begin,
+    .domain_write = domain_write,
+    .domain_end = domain_end,
+    .domain_abort = domain_abort,
     .domain_size = object_program_size,
     .domain_read = object_program_read,
 };

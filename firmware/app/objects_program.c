@@ -43,7 +43,11 @@ uint32_t object_program_end(void *context, const struct od_entry *entry, uint32_
     struct controller *controller = context;
     (void)entry;
     const int result = program_slot_finish(&controller->slot, size, &controller->config);
-    return result == 0 ? SDO_OK : SDO_ABORT_VALUE;
+    if (result != 0) {
+        return SDO_ABORT_VALUE;
+    }
+    stream_close(&controller->stream);
+    return SDO_OK;
 }
 
 void object_program_abort(void *context, const struct od_entry *entry)

@@ -7,7 +7,6 @@
 #include "app/machine/path_counts.h"
 #include "app/program_table.h"
 #include "core/coefficients.h"
-#include "core/interpolator.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)
@@ -81,20 +80,6 @@ static int check(const struct program_slot *slot, const struct program *program,
     return program_check(program, &limits, fault);
 }
 
-static void find_ends(struct program_slot *slot, const struct config *config)
-{
-    const struct kernel *kernel = kernel_find(config->kernel);
-    struct interpolator_point first;
-    struct interpolator_point last;
-    if (kernel != NULL) {
-        interpolator_ends(&slot->program, kernel, &first, &last);
-        struct path_counts scale;
-        path_counts_init(&scale, &slot->program, config);
-        path_counts_of(&scale, &first, slot->start_counts);
-        path_counts_of(&scale, &last, slot->end_counts);
-    }
-}
-
 static void adopt(struct program_slot *slot, const struct program *program, unsigned bank,
                   const struct bank_record *record)
 {
@@ -143,7 +128,7 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
     }
     slot->acceptable = true;
     slot->checked = true;
-    find_ends(slot, config);
+    path_counts_ends(&slot->program, config, slot->start_counts, slot->end_counts);
     return 0;
 }
 
@@ -211,7 +196,7 @@ void program_slot_refresh(struct program_slot *slot, const struct config *config
     if (!slot->acceptable) {
         slot->refused = fault;
     }
-    find_ends(slot, config);
+    path_counts_ends(&slot->program, config, slot->start_counts, slot->end_counts);
     slot->config_crc32 = config->crc32;
     slot->checked = true;
 }

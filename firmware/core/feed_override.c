@@ -6,8 +6,10 @@
 
 #include "core/qmath.h"
 
-/* At rest and at the end of a tail nothing moves: those are the last. */
-enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST, PHASE_WAIT };
+enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
+
+/* A state that others see as FEED_RUNNING: at rest at the end of a tail. */
+#define STATE_WAITING ((uint32_t)FEED_HELD + 1u)
 
 /* Whether a brake would rest before the end of the path: found out a tick before it begins. */
 enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
@@ -33,12 +35,30 @@ void feed_override_begin(struct feed_override *f, const struct program *p, uint3
     override_plan_begin(&f->plan, p);
     f->phase = PHASE_PLAN;
     f->state = f->clock.time_q42_s == f->clock.duration_q42_s ? FEED_ENDED : FEED_RUNNING;
+    f->at_end = FEED_ENDED;
+}
+
+/* What each state becomes at the end of a tail. */
+static uint32_t state_at_tail_end(uint32_t state)
+{
+    if (state == FEED_RUNNING || state == STATE_WAITING) {
+        return STATE_WAITING;
+    }
+    return state == FEED_HOLDING || state == FEED_HELD ? FEED_HELD : FEED_STOPPED;
+}
+
+/* The end of the program is known beforehand, so that the tick that comes to it takes no longer for it. */
+static void set_state(struct feed_override *f, uint32_t state)
+{
+    f->state = state;
+    f->at_end = f->goes_on != 0u ? state_at_tail_end(state) : FEED_ENDED;
 }
 
 static void goes_on(struct feed_override *f, const struct chunk *chunk)
 {
     f->goes_on = chunk_goes_on(chunk) ? 1u : 0u;
     override_plan_limit(&f->plan, f->goes_on != 0u ? OVERRIDE_ONE : OVERRIDE_MOST);
+    set_state(f, f->state);
 }
 
 void feed_override_begin_job(struct feed_override *f, const struct chunk *first, uint32_t period_us)
@@ -49,9 +69,15 @@ void feed_override_begin_job(struct feed_override *f, const struct chunk *first,
 
 /* --- Commands --- */
 
+/* At the end of a tail the plan is what goes on, and goes nowhere. */
+int feed_override_waits(const struct feed_override *f)
+{
+    return f->phase == PHASE_PLAN && (f->state == STATE_WAITING || f->state == FEED_HELD);
+}
+
 static int rests(const struct feed_override *f)
 {
-    return f->phase >= PHASE_REST;
+    return f->phase == PHASE_REST || feed_override_waits(f);
 }
 
 static int comes_to_rest(const struct feed_override *f)
@@ -96,8 +122,8 @@ static void ask(struct feed_override *f, enum program_stop_kind kind)
 
 void feed_override_hold(struct feed_override *f)
 {
-    if (f->state == FEED_RUNNING) {
-        f->state = rests(f) ? FEED_HELD : FEED_HOLDING;
+    if (f->state == FEED_RUNNING || f->state == STATE_WAITING) {
+        set_state(f, rests(f) ? FEED_HELD : FEED_HOLDING);
         ask(f, PROGRAM_STOP_HOLD);
     }
 }
@@ -106,7 +132,7 @@ void feed_override_resume(struct feed_override *f)
 {
     if (f->state == FEED_HOLDING || f->state == FEED_HELD) {
         override_plan_release(&f->plan);
-        f->state = FEED_RUNNING;
+        set_state(f, feed_override_waits(f) ? STATE_WAITING : FEED_RUNNING);
     }
 }
 
@@ -126,13 +152,13 @@ void feed_override_stop(struct feed_override *f)
         return;
     }
     if (rests(f)) {
-        f->state = FEED_STOPPED;
+        set_state(f, FEED_STOPPED);
         return;
     }
     if (f->state == FEED_RUNNING) {
         ask(f, PROGRAM_STOP_HOLD);
     }
-    f->state = FEED_STOPPING;
+    set_state(f, FEED_STOPPING);
 }
 
 void feed_override_fault_stop(struct feed_override *f)
@@ -141,12 +167,12 @@ void feed_override_fault_stop(struct feed_override *f)
         return;
     }
     if (rests(f)) {
-        f->state = FEED_STOPPED;
+        set_state(f, FEED_STOPPED);
         return;
     }
     ask(f, PROGRAM_STOP_FAULT);
     f->replace = f->phase == PHASE_BRAKE ? 1u : 0u;
-    f->state = FEED_STOPPING;
+    set_state(f, FEED_STOPPING);
 }
 
 /* --- Where the plan is --- */
@@ -189,27 +215,23 @@ int feed_override_motion(const struct feed_override *f, const struct interpolato
 
 /* --- A tick --- */
 
-static void come_to_rest(struct feed_override *f, enum phase where, uint32_t found)
-{
-    f->phase = (uint32_t)where;
-    f->found = found;
-    if (comes_to_rest(f)) {
-        f->state = f->state == FEED_STOPPING ? FEED_STOPPED : FEED_HELD;
-    }
-}
-
 static int plan_tick(struct feed_override *f, struct interpolator *it)
 {
     const uint64_t time_q42_s = override_plan_tick(&f->plan, &f->clock);
     const int result = interpolator_at_piece(it, f->clock.record, time_q42_s, &f->point);
     if (result == INTERPOLATOR_END) {
-        if (f->goes_on != 0) {
-            come_to_rest(f, PHASE_WAIT, 0);
-        } else {
-            f->state = FEED_ENDED;
-        }
+        f->state = f->at_end;
     }
     return result;
+}
+
+static void come_to_rest(struct feed_override *f, uint32_t found)
+{
+    f->phase = PHASE_REST;
+    f->found = found;
+    if (comes_to_rest(f)) {
+        f->state = f->state == FEED_STOPPING ? FEED_STOPPED : FEED_HELD;
+    }
 }
 
 /* The point at the brake's arc length. */
@@ -236,7 +258,7 @@ static int brake_tick(struct feed_override *f, struct interpolator *it)
     if (result == INTERPOLATOR_OK && path_brake_rests(&f->brake)) {
         interpolator_search_begin(&f->place, f->clock.record, f->clock.piece,
                                   f->point.arc_length_q40_mm);
-        come_to_rest(f, PHASE_REST, 0);
+        come_to_rest(f, 0);
     }
     return result;
 }
@@ -314,7 +336,7 @@ static int leaves_or_rests(struct feed_override *f, const struct interpolator *i
     const int known = feed_override_motion(f, it, &state, &turned_q56);
     const int rests = (f->plan.now.override_q57 | f->plan.now.slope_q56) == 0;
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
-        come_to_rest(f, PHASE_REST, 1);
+        come_to_rest(f, 1);
         return 1;
     }
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
@@ -384,9 +406,7 @@ int feed_override_stop_tick(struct feed_override *f, struct interpolator *it)
         }
         return brake_tick(f, it);
     }
-    if (f->phase == PHASE_REST) {
-        look_for_place(f, it);
-    }
+    look_for_place(f, it);
     return f->phase == PHASE_PLAN ? plan_tick(f, it) : INTERPOLATOR_OK;
 }
 
@@ -455,12 +475,13 @@ int feed_override_take_over(struct feed_override *f, struct interpolator *it,
     program_clock_carry(&f->clock, p, shift_q42_s, piece);
     interpolator_carry(it, p, &next->end, next->segment_shift, piece, f->point.arc_length_q40_mm);
     override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
-    goes_on(f, next);
     if (resting) {
         interpolator_search_begin(&f->place, f->clock.record, 0, f->point.arc_length_q40_mm);
         f->phase = PHASE_REST;
         f->found = 0;
+        f->state = f->state == STATE_WAITING ? FEED_RUNNING : f->state;
     }
+    goes_on(f, next);
     return 1;
 }
 
@@ -468,7 +489,7 @@ int feed_override_take_over(struct feed_override *f, struct interpolator *it,
 
 enum feed_state feed_override_state(const struct feed_override *f)
 {
-    return (enum feed_state)f->state;
+    return f->state == STATE_WAITING ? FEED_RUNNING : (enum feed_state)f->state;
 }
 
 int feed_override_late(const struct feed_override *f)
@@ -506,12 +527,7 @@ int64_t feed_override_feed_q32(const struct feed_override *f)
 
 uint32_t feed_override_actual_q30(const struct feed_override *f)
 {
-    return f->phase == PHASE_PLAN && !is_over(f) ? override_q30(f) : 0u;
-}
-
-int feed_override_waits(const struct feed_override *f)
-{
-    return f->phase == PHASE_WAIT;
+    return f->phase == PHASE_PLAN && !rests(f) && !is_over(f) ? override_q30(f) : 0u;
 }
 
 int feed_override_saturated(const struct feed_override *f)

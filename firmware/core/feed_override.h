@@ -49,7 +49,8 @@ struct feed_override {
     uint32_t look;                    /* and how far the look has come */
     struct interpolator_search place; /* of rest */
     struct interpolator_point point;  /* of the last setpoint */
-    uint32_t state;   /* enum feed_state: what is wanted, and whether it is reached */
+    uint32_t state;   /* enum feed_state: what is wanted, and whether it is reached, */
+    uint32_t at_end;  /* and what it becomes at the end of the program */
     uint32_t phase;   /* where setpoints come from */
     uint32_t kind;    /* enum program_stop_kind of the stop asked for */
     uint32_t replace; /* 1: a fault stop, whose numbers the brake has not got yet */
@@ -131,7 +132,7 @@ int64_t feed_override_feed_q32(const struct feed_override *f);
 /* The override as it is, 2^30 = 1; 0 in a brake and at rest. */
 uint32_t feed_override_actual_q30(const struct feed_override *f);
 
-/* 1 at rest at the end of a tail, until the next chunk is taken over. */
+/* 1 at rest at the end of a tail, running or held, until the next chunk is taken over. */
 int feed_override_waits(const struct feed_override *f);
 
 /* 1 while the override wanted is more than the pieces allow here, so that the override stays below. */

@@ -93,6 +93,8 @@ enum program_error {
     PROGRAM_ERR_CHUNK_SEGMENT =
         -87, /* a shared segment is not the predecessor's; index = the segment */
     PROGRAM_ERR_CHUNK_PIECE = -88, /* a shared piece is not the predecessor's; index = the piece */
+    PROGRAM_ERR_CHUNK_OVER =
+        -89, /* the job has ended or has been stopped, or the configuration has changed (app/stream) */
 };
 
 /* What this controller allows. */

@@ -143,6 +143,12 @@ int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32
 /* The bank as memory, aligned to 8, readable at any time and from any context. */
 const uint8_t *port_store_data(unsigned bank);
 
+/* --- RAM for chunks of streamed jobs --- */
+
+/* The memory of the ring (app/stream), aligned to 8, and its bytes; 0: this port streams nothing. Lost with the power. Always
+ * the same. Main loop. */
+uint8_t *port_stream_memory(uint32_t *size);
+
 /* --- Words for a human --- */
 
 enum port_level {

@@ -2,37 +2,88 @@
 #include "offline/stream.h"
 
 #include <stddef.h>
+#include <string.h>
 
-#include "core/counts.h"
+#include "core/coefficients.h"
 
-int offline_stream_begin(struct offline_stream *stream, const struct chunk *first)
+void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
+                          const struct program_limits *limits)
 {
-    stream->axis_count = first->program.header.axis_count;
-    feed_override_begin_job(&stream->feed, first, first->program.header.period_us);
-    return interpolator_begin(&stream->interp, &first->program);
+    memset(s, 0, sizeof *s);
+    s->kernel = kernel;
+    s->limits = *limits;
 }
 
-int offline_stream_run(struct offline_stream *stream, const struct chunk *next, uint32_t n,
-                       uint32_t counts_per_mm, int32_t *counts, uint32_t *taken)
+int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
+                         const uint8_t *bytes, uint32_t size, struct program_fault *fault)
 {
-    const uint32_t axes = stream->axis_count;
-    *taken = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        if (next != NULL && *taken == 0u) {
-            *taken = (uint32_t)feed_override_take_over(&stream->feed, &stream->interp, next);
-        }
-        struct interpolator_point point;
-        const int code = feed_override_next(&stream->feed, &stream->interp, &point);
-        if (code < 0) {
-            return code;
-        }
-        for (uint32_t axis = 0; axis < axes; axis++) {
-            counts[axes * (size_t)i + axis] =
-                counts_from_q40_mm(point.position_q40[axis], counts_per_mm);
-        }
-        if (*taken != 0u || feed_override_state(&stream->feed) == FEED_ENDED) {
-            return (int)(i + 1u);
-        }
+    const struct chunk *before = s->newest != NULL ? &s->newest->chunk : NULL;
+    memset(part, 0, sizeof *part);
+    fault->index = 0;
+    fault->code = chunk_open(&part->chunk, bytes, size);
+    return fault->code != 0 ? fault->code : chunk_check(&part->chunk, before, &s->limits, fault);
+}
+
+int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
+                       uint64_t size)
+{
+    struct program *p = &part->chunk.program;
+    const int code = coefficients_make_in(p, s->kernel, records, size);
+    if (code != 0) {
+        return code;
     }
-    return (int)n;
+    if (s->active == NULL) {
+        s->active = part;
+        (void)interpolator_begin(&s->interp, p);
+        feed_override_begin_job(&s->feed, &part->chunk, p->header.period_us);
+    } else {
+        s->newest->next = part;
+    }
+    s->newest = part;
+    return 0;
+}
+
+static void take_over(struct offline_stream *s)
+{
+    struct offline_part *next = s->active->next;
+    const int rests = feed_override_feed_q32(&s->feed) == 0;
+    if (next == NULL || !feed_override_take_over(&s->feed, &s->interp, &next->chunk)) {
+        return;
+    }
+    s->active = next;
+    s->resting += rests ? 1u : 0u;
+    s->moving += rests ? 0u : 1u;
+}
+
+static int tick(struct offline_stream *s, struct interpolator_point *point)
+{
+    take_over(s);
+    const int result = feed_override_next(&s->feed, &s->interp, point);
+    const uint32_t waits = feed_override_waits(&s->feed) ? 1u : 0u;
+    point->arc_length_q40_mm += s->active->chunk.job_start_q40_mm;
+    s->underruns += waits & ~s->rested;
+    s->rested = waits;
+    s->ticks++;
+    return result;
+}
+
+static int is_over(const struct offline_stream *s, uint32_t until_rest)
+{
+    const enum feed_state state = feed_override_state(&s->feed);
+    return state == FEED_ENDED || state == FEED_STOPPED ||
+           (until_rest != 0u && s->rested != 0u && s->active->next == NULL);
+}
+
+int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
+                           struct interpolator_point *points)
+{
+    uint32_t done = 0;
+    while (done < count && s->active != NULL && !is_over(s, until_rest)) {
+        const int result = tick(s, &points[done]);
+        if (result < 0) {
+            return result;
+        }
+        done++;
+    }
+    return (int64_t)done;
 }

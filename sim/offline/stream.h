@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A job in chunks without a bus and without drives: its setpoints, with the takeovers of the controller.
+ * A job in chunks without a bus: what the controller makes of chunks that come when they come (docs/reference/protocol.md
+ * 1.7). Chunks are opened, checked and taken over by the code of the controller, one try before each tick; commands are
+ * those of the feed override. Gives setpoints as the controller would, bit for bit.
  *
- * Use: offline_stream_begin, then offline_stream_run as often as wanted. No heap: chunks, their images and coefficient
- * records are the caller's; each must outlive the takeover of the next one. Main loop of a host.
+ * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
+ * offline_stream_run in between. No heap: the caller lends a struct offline_part, memory for records and the bytes of each chunk. They
+ * have to stay as long as the stream. Main loop only.
  */
 #ifndef HODOGRAPH_OFFLINE_STREAM_H
 #define HODOGRAPH_OFFLINE_STREAM_H
@@ -13,22 +16,44 @@
 #include "core/chunk.h"
 #include "core/feed_override.h"
 #include "core/interpolator.h"
+#include "core/kernel.h"
 
-/* Fields are private but `feed`, to which commands may be given between two calls. */
-struct offline_stream {
-    struct feed_override feed;
-    struct interpolator interp;
-    uint32_t axis_count;
+/* A chunk that was given. */
+struct offline_part {
+    struct chunk chunk;
+    struct offline_part *next; /* that was accepted behind it */
 };
 
-/* For the first chunk of a job, which chunk_check has accepted and which has coefficient records. Returns 0 or
- * INTERPOLATOR_ERR_.... */
-int offline_stream_begin(struct offline_stream *stream, const struct chunk *first);
+struct offline_stream {
+    const struct kernel *kernel;
+    struct program_limits limits;
+    struct feed_override feed; /* its commands may be called between ticks */
+    struct interpolator interp;
+    struct offline_part *active; /* NULL before the first chunk, */
+    struct offline_part *newest; /* and the last one accepted */
+    uint64_t ticks;
+    uint32_t moving;    /* takeovers in motion, */
+    uint32_t resting;   /* and at rest */
+    uint32_t underruns; /* rests at the end of a tail */
+    uint32_t rested;    /* 1: at the last tick it was at one */
+};
 
-/* The next ticks, n at most: up to and with the takeover of `next` (NULL: there is none yet), and to the end of the job.
- * Before each tick `next` is offered for takeover; *taken becomes 1 or 0. counts: those of all axes of a setpoint, one
- * setpoint after the other. Returns the number of ticks, or a negative INTERPOLATOR_ERR_.... */
-int offline_stream_run(struct offline_stream *stream, const struct chunk *next, uint32_t n,
-                       uint32_t counts_per_mm, int32_t *counts, uint32_t *taken);
+void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
+                          const struct program_limits *limits);
+
+/* Opens and checks a chunk behind the newest accepted one. 0, or enum program_error with *fault the same: the stream has
+ * not changed, and the chunk may be given again. */
+int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
+                         const uint8_t *bytes, uint32_t size, struct program_fault *fault);
+
+/* Accepts a chunk that has just passed offline_stream_check, and makes its records in this memory of coefficients_size
+ * bytes, aligned to COEFFICIENTS_ALIGNMENT. The first one begins the motion. 0 or COEFFICIENTS_ERR_SIZE. */
+int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
+                       uint64_t size);
+
+/* Up to `count` ticks; less when the job has ended or was stopped, and with `until_rest` at the end of a tail behind which
+ * no chunk is known. Points have arc lengths of the job. How many ticks it were, or a negative INTERPOLATOR_ERR_.... */
+int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
+                           struct interpolator_point *points);
 
 #endif

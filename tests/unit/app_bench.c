@@ -31,7 +31,7 @@ static void watch(struct app_bench *bench, const struct can_msg *frame)
     }
     const int node = pdo_decode_setpoint(frame, &setpoint);
     if ((node == 2 || node == 3) && machine_moving(&bench->controller.machine) &&
-        bench->recorded < 2048u) {
+        bench->recorded < BENCH_TARGETS) {
         bench->targets[node - 2][bench->recorded] = setpoint.target_counts;
         bench->recorded += node == 3 ? 1u : 0u;
     }
@@ -206,12 +206,23 @@ uint32_t app_bench_command(struct app_bench *bench, unsigned command)
     return app_bench_write(bench, 0x2001, 0, command, 1);
 }
 
-uint32_t app_bench_upload(struct app_bench *bench, const uint8_t *image, uint32_t size)
+static uint32_t download(struct app_bench *bench, uint16_t index, const uint8_t *bytes,
+                         uint32_t size)
 {
     struct can_msg out;
     const int begun =
-        sdo_client_write(&bench->host, bench->controller.node, 0x2000, 1, image, size, &out);
+        sdo_client_write(&bench->host, bench->controller.node, index, 1, bytes, size, &out);
     return finish_transfer(bench, begun, &out);
+}
+
+uint32_t app_bench_upload(struct app_bench *bench, const uint8_t *image, uint32_t size)
+{
+    return download(bench, 0x2000, image, size);
+}
+
+uint32_t app_bench_chunk(struct app_bench *bench, const uint8_t *bytes, uint32_t size)
+{
+    return download(bench, 0x2060, bytes, size);
 }
 
 int64_t app_bench_read(struct app_bench *bench, uint16_t index, uint8_t sub)

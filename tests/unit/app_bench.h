@@ -12,17 +12,18 @@
 #include "canopen/sdo_client.h"
 #include "fake_drive.h"
 
-#define BENCH_DRIVES 2u
+#define BENCH_DRIVES  2u
+#define BENCH_TARGETS 8192u /* of an axis that are recorded */
 
 struct app_bench {
     struct controller controller;
     struct fake_drive drives[BENCH_DRIVES];
     struct sdo_client host;
     uint32_t ticks;
-    uint32_t frames;          /* seen on the bus */
-    uint16_t emergency;       /* code of the controller's last EMCY */
-    uint32_t starts;          /* NMT start commands seen */
-    int32_t targets[2][2048]; /* setpoints sent while a program ran, by axis */
+    uint32_t frames;                   /* seen on the bus */
+    uint16_t emergency;                /* code of the controller's last EMCY */
+    uint32_t starts;                   /* NMT start commands seen */
+    int32_t targets[2][BENCH_TARGETS]; /* setpoints sent while a program ran, by axis */
     uint32_t recorded;
     bool
         unconfirmed; /* the host does not confirm the configuration; else it does before each command */
@@ -49,6 +50,8 @@ uint32_t app_bench_write(struct app_bench *bench, uint16_t index, uint8_t sub, u
                          uint8_t size);
 uint32_t app_bench_command(struct app_bench *bench, unsigned command);
 uint32_t app_bench_upload(struct app_bench *bench, const uint8_t *image, uint32_t size);
+/* The same to 0x2060 sub 1. */
+uint32_t app_bench_chunk(struct app_bench *bench, const uint8_t *bytes, uint32_t size);
 /* Fails the test when the object cannot be read. */
 int64_t app_bench_read(struct app_bench *bench, uint16_t index, uint8_t sub);
 

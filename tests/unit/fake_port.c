@@ -34,6 +34,8 @@ static struct {
     uint32_t sent_tail;
     struct can_msg sent[SENT_MAX];
     uint8_t banks[PORT_STORE_BANKS_ALL][FAKE_PORT_BANK_BYTES] __attribute__((aligned(8)));
+    uint8_t ring[FAKE_PORT_RING_BYTES] __attribute__((aligned(8)));
+    uint32_t ring_missing;
     const struct fake_port_store *store;
     void (*wait_hook)(void *context);
     void *wait_context;
@@ -222,6 +224,17 @@ int port_can_accept(const struct can_match *filters, size_t count)
     memcpy(self.filters, filters, count * sizeof filters[0]);
     self.filter_count = count;
     return 0;
+}
+
+void fake_port_shrink_ring(uint32_t bytes)
+{
+    self.ring_missing = FAKE_PORT_RING_BYTES - bytes;
+}
+
+uint8_t *port_stream_memory(uint32_t *size)
+{
+    *size = FAKE_PORT_RING_BYTES - self.ring_missing;
+    return self.ring;
 }
 
 int port_can_send(const struct can_msg *message)

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/little_endian.h"
 #include "golden.h"
 #include "stop_table.h"
 #include "unity.h"
@@ -52,6 +53,29 @@ static double greater(double a, double b)
     return a > b ? a : b;
 }
 
+/* Coefficients and peaks of a piece whose times are known. */
+static void read_piece(struct override_piece *piece, const struct program_piece *raw)
+{
+    static struct override_program one;
+    double d[4];
+    piece->c[0] = (double)raw->start_q40_mm / Q40;
+    for (int k = 1; k < 8; k++) {
+        piece->c[k] = ldexp((double)raw->c_q40_mm[k - 1],
+                            -40 - k * program_piece_exponent(raw->duration_q32_s));
+    }
+    one.pieces[0] = *piece;
+    for (int n = 0; n <= SAMPLES; n++) {
+        override_program_feed(&one, 0,
+                              piece->start_s + (piece->end_s - piece->start_s) * n / SAMPLES, d);
+        piece->feed = greater(piece->feed, fabs(d[1]));
+        piece->acceleration = greater(piece->acceleration, fabs(d[2]));
+        piece->jerk = greater(piece->jerk, fabs(d[3]));
+    }
+    piece->feed = piece->feed * 1.0001 + 1e-6;
+    piece->acceleration = piece->acceleration * 1.0001 + 1e-4;
+    piece->jerk = piece->jerk * 1.0001 + 1e-2;
+}
+
 /* Doubles and peaks from the image. */
 static void read_pieces(struct override_program *p)
 {
@@ -61,26 +85,11 @@ static void read_pieces(struct override_program *p)
     for (uint32_t i = 0; i < p->program.header.piece_count; i++) {
         struct override_piece *piece = &p->pieces[i];
         struct program_piece raw;
-        double d[4];
         memset(piece, 0, sizeof *piece);
         program_piece_get(&p->program, i, &raw);
         piece->start_s = start_s;
         piece->end_s = start_s += (double)raw.duration_q32_s / Q32;
-        piece->c[0] = (double)raw.start_q40_mm / Q40;
-        for (int k = 1; k < 8; k++) {
-            piece->c[k] = ldexp((double)raw.c_q40_mm[k - 1],
-                                -40 - k * program_piece_exponent(raw.duration_q32_s));
-        }
-        for (int n = 0; n <= SAMPLES; n++) {
-            override_program_feed(
-                p, i, piece->start_s + (piece->end_s - piece->start_s) * n / SAMPLES, d);
-            piece->feed = greater(piece->feed, fabs(d[1]));
-            piece->acceleration = greater(piece->acceleration, fabs(d[2]));
-            piece->jerk = greater(piece->jerk, fabs(d[3]));
-        }
-        piece->feed = piece->feed * 1.0001 + 1e-6;
-        piece->acceleration = piece->acceleration * 1.0001 + 1e-4;
-        piece->jerk = piece->jerk * 1.0001 + 1e-2;
+        read_piece(piece, &raw);
         p->peak.feed = greater(p->peak.feed, piece->feed);
         p->peak.acceleration = greater(p->peak.acceleration, piece->acceleration);
         p->peak.jerk = greater(p->peak.jerk, piece->jerk);
@@ -99,19 +108,17 @@ static uint8_t stored(double value, double scale)
 }
 
 /* docs/theory/numerics.md section 7; no program limits but those of the controller. */
-static void set_bounds(struct override_program *p, uint32_t i)
+static void set_bounds(const struct override_limits *limit, struct override_piece *piece,
+                       uint8_t *at)
 {
-    struct override_piece *piece = &p->pieces[i];
     double v = piece->feed;
     double a = piece->acceleration;
     double j = piece->jerk;
-    const struct override_limits *limit = &p->limit;
     double f = fmin(2.0, limit->feed / v);
     f = fmin(f, sqrt((a + limit->acceleration) / (2.0 * a)));
     f = greater(1.0, fmin(f, cbrt((j + limit->jerk) / (2.0 * j))));
     uint32_t factor = (uint32_t)greater(16384.0, floor(f * (1.0 - 1e-9) * 16384.0));
     piece->rates[PROGRAM_LEVEL_FULL] = factor / 16384.0;
-    uint8_t *at = piece_at(p, i);
     put(at + 72, factor, 2);
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
         piece->rates[k] = k == PROGRAM_LEVEL_FULL ? factor / 16384.0 : program_level_q9(k) / 512.0;
@@ -133,16 +140,21 @@ static uint8_t code_of(double value)
 }
 
 /* A hold brakes inside the limits, a fault stop inside twice of them. */
+void override_program_codes(const struct override_limits *limit, uint8_t codes[6])
+{
+    const uint8_t jerk = code_of(limit->jerk / 64);
+    const uint8_t acceleration = code_of(limit->acceleration);
+    for (int kind = 0; kind < 2; kind++) {
+        codes[3 * kind] = (uint8_t)(jerk + 8 * kind);
+        codes[3 * kind + 1] = (uint8_t)(acceleration + 8 * kind);
+        codes[3 * kind + 2] = (uint8_t)(jerk + 8 * kind);
+    }
+}
+
 static void set_stops(struct override_program *p)
 {
-    const uint8_t jerk = code_of(p->limit.jerk / 64);
-    const uint8_t acceleration = code_of(p->limit.acceleration);
-    const uint8_t codes[6] = {jerk,
-                              acceleration,
-                              jerk,
-                              (uint8_t)(jerk + 8u),
-                              (uint8_t)(acceleration + 8u),
-                              (uint8_t)(jerk + 8u)};
+    uint8_t codes[6];
+    override_program_codes(&p->limit, codes);
     stop_table_fill(&p->program, p->image, codes);
 }
 
@@ -152,9 +164,23 @@ void override_program_limits(struct override_program *p, uint64_t *random)
     p->limit.acceleration = p->peak.acceleration * override_random(random, 1.05, 3.0);
     p->limit.jerk = p->peak.jerk * override_random(random, 1.05, 3.0);
     for (uint32_t i = 0; i < p->program.header.piece_count; i++) {
-        set_bounds(p, i);
+        set_bounds(&p->limit, &p->pieces[i], piece_at(p, i));
     }
     set_stops(p);
+}
+
+void override_program_bound(const struct override_limits *limit, uint8_t *piece_bytes)
+{
+    struct override_piece piece = {0};
+    struct program_piece raw = {0};
+    raw.duration_q32_s = read_u64(piece_bytes);
+    raw.start_q40_mm = read_i64(piece_bytes + 8);
+    for (int k = 0; k < 7; k++) {
+        raw.c_q40_mm[k] = read_i64(piece_bytes + 16 + 8 * k);
+    }
+    piece.end_s = (double)raw.duration_q32_s / Q32;
+    read_piece(&piece, &raw);
+    set_bounds(limit, &piece, piece_bytes);
 }
 
 /* v0 + (v1 - v0) (10 x^3 - 15 x^4 + 6 x^5), x = t/T, as F' of a piece that begins at t = a. */
@@ -270,14 +296,20 @@ void override_program_random(struct override_program *p, uint32_t period_us, uin
     read_pieces(p);
 }
 
+void override_program_image(struct override_program *p, uint8_t *image, uint32_t size)
+{
+    memset(p, 0, sizeof *p);
+    p->image = image;
+    TEST_ASSERT_EQUAL_INT(0, program_open(&p->program, p->image, size));
+    read_pieces(p);
+}
+
 void override_program_golden(struct override_program *p, const char *name)
 {
     uint32_t size = 0;
-    memset(p, 0, sizeof *p);
-    p->image = golden_load(name, &size);
-    TEST_ASSERT_NOT_NULL_MESSAGE(p->image, name);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, program_open(&p->program, p->image, size), name);
-    read_pieces(p);
+    uint8_t *image = golden_load(name, &size);
+    TEST_ASSERT_NOT_NULL_MESSAGE(image, name);
+    override_program_image(p, image, size);
 }
 
 void override_program_close(struct override_program *p)

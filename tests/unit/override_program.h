@@ -35,10 +35,16 @@ struct override_program {
 /* Random feed over a line; period_us sets the shortest pieces. Free with override_program_close. */
 void override_program_random(struct override_program *p, uint32_t period_us, uint64_t *random);
 void override_program_golden(struct override_program *p, const char *name);
+/* An image on the heap that opens; the program takes it. */
+void override_program_image(struct override_program *p, uint8_t *image, uint32_t size);
 void override_program_close(struct override_program *p);
 
 /* Limits somewhat above the peaks of the program, and the pieces' bounds from them. */
 void override_program_limits(struct override_program *p, uint64_t *random);
+
+/* The override bounds that these limits leave one piece, written into its bytes; and the codes of its stops. */
+void override_program_bound(const struct override_limits *limit, uint8_t *piece_bytes);
+void override_program_codes(const struct override_limits *limit, uint8_t codes[6]);
 
 /* F', F'', F''' of piece i at a program time in s. */
 void override_program_feed(const struct override_program *p, uint32_t i, double time_s,

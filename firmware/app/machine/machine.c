@@ -85,9 +85,18 @@ bool machine_drives_answer(const struct machine *machine)
     return true;
 }
 
+bool machine_waits_for_chunk(const struct machine *machine)
+{
+    return (machine->state == MACHINE_RUNNING || machine->state == MACHINE_HOLDING ||
+            machine->state == MACHINE_HELD) &&
+           motion_waits(&machine->motion);
+}
+
 bool machine_busy(const struct machine *machine)
 {
-    if (machine->state != MACHINE_READY && machine->state != MACHINE_HELD) {
+    const bool rests = machine->state == MACHINE_READY || machine->state == MACHINE_HELD ||
+                       machine_waits_for_chunk(machine);
+    if (!rests) {
         return machine->state == MACHINE_ENABLING || machine_moving(machine);
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {

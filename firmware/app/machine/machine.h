@@ -66,6 +66,8 @@ enum machine_refusal {
     MACHINE_NOT_HOMED = 13,       /* an axis with a homing method has no zero */
     MACHINE_ENDING = 17,          /* the controller is being shut down */
     MACHINE_NOT_IN_TIME = 16,     /* drives are real, and the port cannot keep ticks in time */
+    MACHINE_JOB_STARTED =
+        19, /* the streamed job has been started before; or not at its beginning */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
@@ -151,6 +153,10 @@ uint8_t machine_unhomed(const struct machine *machine);
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
                                    const int32_t start_counts[AXES_MAX]);
 
+/* Goes on with the next chunk of a job (motion_take_over): true when it has been taken over, false when it cannot be now. A path
+ * that is held stays so. After a stop, and in a fault, nothing is taken over any more. */
+bool machine_take_over(struct machine *machine, const struct chunk *next);
+
 /* Homing, from OFF to OFF. In between the mainline sets each axis's `goal` and `control_extra`
  * (under the lock); the targets follow the positions. It has failed when the state has left HOMING
  * before machine_end_homing, which then changes nothing. */
@@ -167,6 +173,9 @@ bool machine_configurable(const struct machine *machine);
 bool machine_on_path(const struct machine *machine);
 /* The same, or the drives move by themselves: homing, quick stop. The program must stay as it is. */
 bool machine_moving(const struct machine *machine);
+
+/* At rest at the end of a tail: goes on when the next chunk of the job is taken over. */
+bool machine_waits_for_chunk(const struct machine *machine);
 
 /* New configuration, where machine_configurable. When it concerns the drives: to BOOT. */
 void machine_configure(struct machine *machine, const struct config *config, bool drives);

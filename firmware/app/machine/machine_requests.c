@@ -106,6 +106,13 @@ enum machine_refusal machine_resume(struct machine *machine)
     return MACHINE_ACCEPTED;
 }
 
+bool machine_take_over(struct machine *machine, const struct chunk *next)
+{
+    const bool goes_on = machine->state == MACHINE_RUNNING || machine->state == MACHINE_HOLDING ||
+                         machine->state == MACHINE_HELD;
+    return goes_on && motion_take_over(&machine->motion, next);
+}
+
 enum machine_refusal machine_begin_homing(struct machine *machine)
 {
     const enum machine_refusal refusal = not_available(machine);

@@ -18,6 +18,24 @@ int motion_begin(struct motion *motion, const struct program *program, const str
     return result;
 }
 
+int motion_begin_job(struct motion *motion, const struct chunk *first, const struct config *config)
+{
+    const int result = motion_begin(motion, &first->program, config);
+    if (result == 0) {
+        feed_override_begin_job(&motion->feed, first, config->period_us);
+    }
+    return result;
+}
+
+bool motion_take_over(struct motion *motion, const struct chunk *next)
+{
+    if (feed_override_take_over(&motion->feed, &motion->interp, next) == 0) {
+        return false;
+    }
+    motion->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
+    return true;
+}
+
 int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
                     int32_t start_counts[AXES_MAX])
@@ -73,6 +91,11 @@ void motion_override(struct motion *motion, uint32_t percent)
 bool motion_held(const struct motion *motion)
 {
     return feed_override_state(&motion->feed) == FEED_HELD;
+}
+
+bool motion_waits(const struct motion *motion)
+{
+    return feed_override_waits(&motion->feed) != 0 && !motion_over(motion);
 }
 
 bool motion_late(const struct motion *motion)

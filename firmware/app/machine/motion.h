@@ -13,6 +13,7 @@
 
 #include "app/machine/config.h"
 #include "app/machine/path_counts.h"
+#include "core/chunk.h"
 #include "core/feed_override.h"
 #include "core/interpolator.h"
 
@@ -33,6 +34,13 @@ int motion_begin(struct motion *motion, const struct program *program, const str
 int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
                     int32_t start_counts[AXES_MAX]);
+
+/* As motion_begin, for the first chunk of a job. */
+int motion_begin_job(struct motion *motion, const struct chunk *first, const struct config *config);
+
+/* Goes on with the next chunk of the job, where the motion is in the part that it shares with the program under way, or rests: then
+ * true, and that program is not needed any more. Under the lock. */
+bool motion_take_over(struct motion *motion, const struct chunk *next);
 
 /* The next setpoint: targets of the program's path axes. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.
  * Timer. */
@@ -55,6 +63,9 @@ void motion_override(struct motion *motion, uint32_t percent);
 
 /* True while a hold has the path at rest. */
 bool motion_held(const struct motion *motion);
+
+/* True at rest at the end of the tail of a chunk: only the next chunk leads on. */
+bool motion_waits(const struct motion *motion);
 
 /* True while it comes to rest and has taken longer than its bound and a fifth. */
 bool motion_late(const struct motion *motion);

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "app/machine/path_counts.h"
 
+#include <stddef.h>
+
+#include "core/kernel.h"
+
 void path_counts_init(struct path_counts *scale, const struct program *program,
                       const struct config *config)
 {
@@ -9,6 +13,22 @@ void path_counts_init(struct path_counts *scale, const struct program *program,
     for (uint32_t i = PROGRAM_SPACE; i < PROGRAM_AXES; ++i) {
         scale->per_unit[i - PROGRAM_SPACE] = config_counts_per_unit(config, i);
     }
+}
+
+void path_counts_ends(const struct program *program, const struct config *config,
+                      int32_t start_counts[AXES_MAX], int32_t end_counts[AXES_MAX])
+{
+    const struct kernel *kernel = kernel_find(config->kernel);
+    struct interpolator_point first;
+    struct interpolator_point last;
+    struct path_counts scale;
+    if (kernel == NULL) {
+        return;
+    }
+    interpolator_ends(program, kernel, &first, &last);
+    path_counts_init(&scale, program, config);
+    path_counts_of(&scale, &first, start_counts);
+    path_counts_of(&scale, &last, end_counts);
 }
 
 void path_counts_rest(const struct path_counts *scale, const struct interpolator_point *point,

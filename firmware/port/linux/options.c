@@ -7,12 +7,12 @@
 
 #include "port/linux/long_options.h"
 
-enum { REASON_SIZE = 4096 };
+enum { REASON_SIZE = 4096, RING_KIB_MAX = 16384 };
 
 static const char help[] =
     "usage: hodograph-controller --bus INTERFACE [--node N] [--pace real-time|fast] [--store "
     "FILE] [--no-realtime]\n"
-    "                            [--verbose]\n"
+    "                            [--ring KIB] [--verbose]\n"
     "\n"
     "The Hodograph motion controller as a CANopen node on a SocketCAN bus. All configuration comes "
     "over the bus\n"
@@ -30,6 +30,8 @@ static const char help[] =
     "                   made where it is missing, some kilobytes on disk; without it both end with "
     "the "
     "process\n"
+    "  --ring KIB       RAM for the chunks of a streamed job, 1 to 16384 KiB; default 16384, a "
+    "microcontroller has 48\n"
     "  --no-realtime    enables real drives although the machine does not permit SCHED_FIFO and "
     "locked memory:\n"
     "                   ticks may come late, and a late SYNC is a fault\n"
@@ -47,6 +49,18 @@ static int set_node(struct options *options, const struct long_options *line)
         return long_options_wrong(line, "--node takes a number from 1 to 127, not", line->value);
     }
     options->node = (uint8_t)node;
+    return LONG_OPTIONS_END;
+}
+
+static int set_ring(struct options *options, const struct long_options *line)
+{
+    char *end = NULL;
+    const long kib = strtol(line->value, &end, 10);
+    if (end == line->value || *end != '\0' || kib < 1 || kib > RING_KIB_MAX) {
+        return long_options_wrong(line, "--ring takes a number of KiB from 1 to 16384, not",
+                                  line->value);
+    }
+    options->ring_kib = (uint32_t)kib;
     return LONG_OPTIONS_END;
 }
 
@@ -76,6 +90,8 @@ static int set_option(struct options *options, int option, const struct long_opt
     case 's':
         options->store = line->value;
         break;
+    case 'g':
+        return set_ring(options, line);
     case 'r':
         options->no_realtime = true;
         break;
@@ -94,17 +110,22 @@ static enum options_result complain(const struct long_options *line)
 
 enum options_result options_parse(struct options *options, int argc, char **argv)
 {
-    static const struct option known[] = {
-        {"help", no_argument, NULL, 'h'},        {"bus", required_argument, NULL, 'b'},
-        {"node", required_argument, NULL, 'n'},  {"pace", required_argument, NULL, 'p'},
-        {"store", required_argument, NULL, 's'}, {"no-realtime", no_argument, NULL, 'r'},
-        {"verbose", no_argument, NULL, 'v'},     {NULL, 0, NULL, 0}};
+    static const struct option known[] = {{"help", no_argument, NULL, 'h'},
+                                          {"bus", required_argument, NULL, 'b'},
+                                          {"node", required_argument, NULL, 'n'},
+                                          {"pace", required_argument, NULL, 'p'},
+                                          {"store", required_argument, NULL, 's'},
+                                          {"no-realtime", no_argument, NULL, 'r'},
+                                          {"verbose", no_argument, NULL, 'v'},
+                                          {"ring", required_argument, NULL, 'g'},
+                                          {NULL, 0, NULL, 0}};
     char reason[REASON_SIZE];
     struct long_options line = long_options_begin(argc, argv, known, reason, sizeof reason);
     line.quoted = true;
     line.no_value = "a value is missing after";
     line.unknown = "unknown argument";
-    *options = (struct options){.bus = NULL, .store = NULL, .node = 1, .pace = OPTIONS_REAL_TIME};
+    *options = (struct options){
+        .bus = NULL, .store = NULL, .ring_kib = RING_KIB_MAX, .node = 1, .pace = OPTIONS_REAL_TIME};
     int option = long_options_next(&line);
     while (option > 0 && option != 'h' && set_option(options, option, &line) == LONG_OPTIONS_END) {
         option = long_options_next(&line);

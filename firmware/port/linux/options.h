@@ -14,6 +14,7 @@ enum options_pace {
 struct options {
     const char *bus;   /* CAN interface, points into argv */
     const char *store; /* file of the program store, points into argv; NULL: memory only */
+    uint32_t ring_kib; /* RAM for streamed jobs: 1 ... 16384 */
     uint8_t node;      /* 1 ... 127 */
     enum options_pace pace;
     bool verbose;

@@ -75,6 +75,7 @@ int port_begin(int argc, char **argv)
     if (store_open(self.options.store) != 0) {
         return EXIT_MACHINE;
     }
+    store_ring(self.options.ring_kib * 1024u);
     const int status = open_bus();
     if (status != 0) {
         return status;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The store is the board's PSRAM: 16 MiB. */
+/* The store is the board's PSRAM: 16 MiB. The ring of streamed jobs is RAM, as much as a microcontroller would have to spare. */
 #include "port/common/ram_store.h"
 #include "port/port.h"
 
@@ -9,3 +9,17 @@ static uint8_t banks[PORT_STORE_BANKS][BANK_BYTES] __attribute__((section(".stor
 static uint8_t parameters[RAM_STORE_PARAMETER_BYTES] __attribute__((section(".store"), aligned(8)));
 struct ram_store ram_store = {
     .memory = banks[0], .bank_bytes = sizeof banks[0], .parameters = parameters};
+
+#if defined(__ARM_ARCH_6M__)
+#define RING_BYTES (8u * 1024u)
+#else
+#define RING_BYTES (48u * 1024u)
+#endif
+
+static uint8_t ring[RING_BYTES] __attribute__((aligned(8)));
+
+uint8_t *port_stream_memory(uint32_t *size)
+{
+    *size = sizeof ring;
+    return ring;
+}

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The store of port.h: the banks of flash_store, with the watchdog fed between. */
+/* The store of port.h: the banks of flash_store, with the watchdog fed between; and the ring of streamed jobs in RAM. */
 #include "port/port.h"
 #include "port/stm32g4/flash_store.h"
+
+#define RING_BYTES (48u * 1024u)
 
 uint32_t port_store_size(unsigned bank)
 {
@@ -24,4 +26,11 @@ int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32
 const uint8_t *port_store_data(unsigned bank)
 {
     return flash_store_data(bank);
+}
+
+uint8_t *port_stream_memory(uint32_t *size)
+{
+    static uint8_t ring[RING_BYTES] __attribute__((aligned(8)));
+    *size = sizeof ring;
+    return ring;
 }

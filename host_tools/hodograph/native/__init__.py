@@ -19,6 +19,7 @@ from .program import (
     counts_from_q40_mm,
     kernel_code,
 )
+from .stream import OfflineStream
 
 __all__ = [
     "FAULT_KINDS",
@@ -34,6 +35,7 @@ __all__ = [
     "NativeProgram",
     "OfflineFault",
     "OfflineSimulation",
+    "OfflineStream",
     "counts_from_q40_mm",
     "kernel_code",
     "library",

@@ -88,27 +88,8 @@ int feed_override_late(const struct feed_override *f);
 uint64_t feed_override_time_q42(const struct feed_override *f);
 int64_t feed_override_feed_q32(const struct feed_override *f);
 uint32_t feed_override_actual_q30(const struct feed_override *f);
-uint32_t feed_override_bound_us(const struct feed_override *f, int kind);
-
-/* core/chunk.h */
-struct chunk {
-    uint32_t flags, sequence;
-    struct program program;
-    ...;
-};
-int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size);
-int chunk_check(struct chunk *next, const struct chunk *previous,
-                const struct program_limits *limits, struct program_fault *fault);
 int feed_override_waits(const struct feed_override *f);
-
-/* offline/stream.h */
-struct offline_stream {
-    struct feed_override feed;
-    ...;
-};
-int offline_stream_begin(struct offline_stream *stream, const struct chunk *first);
-int offline_stream_run(struct offline_stream *stream, const struct chunk *next, uint32_t n,
-                       uint32_t counts_per_mm, int32_t *counts, uint32_t *taken);
+uint32_t feed_override_bound_us(const struct feed_override *f, int kind);
 
 /* plant/drive.h */
 struct drive_plant {
@@ -252,11 +233,12 @@ struct stop_found {
     double worst_s, mean_s;
 };
 #define STOP_ROWS ...
-void stop_rows(const struct program *p, const struct stop_limits *limits, const struct stop_path *path);
-void stop_used(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
-               struct stop_limits *used);
-void stop_search(const struct program *p, const struct stop_limits *limits, const struct stop_path *path,
-                 struct stop_found *found);
+void stop_rows(const struct program *p, const struct stop_limits *limits,
+               const struct stop_path *path);
+void stop_used(const struct program *p, const struct stop_limits *limits,
+               const struct stop_path *path, struct stop_limits *used);
+void stop_search(const struct program *p, const struct stop_limits *limits,
+                 const struct stop_path *path, struct stop_found *found);
 
 /* offline/stop_trial.h */
 struct stop_use {
@@ -288,3 +270,28 @@ struct axis_run {
 };
 int axis_run(const struct drive_config *config, const struct axis_run *run, double *position_mm,
              double *volts);
+
+/* offline/stream.h */
+struct chunk {
+    uint32_t job, sequence;
+    struct program program;
+    ...;
+};
+struct offline_part {
+    struct chunk chunk;
+    ...;
+};
+struct offline_stream {
+    struct feed_override feed;
+    struct offline_part *active;
+    uint32_t moving, resting, underruns;
+    ...;
+};
+void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
+                          const struct program_limits *limits);
+int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
+                         const uint8_t *bytes, uint32_t size, struct program_fault *fault);
+int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
+                       uint64_t size);
+int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
+                           struct interpolator_point *points);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Chunks as the controller sees them: its check, and a job's setpoints with the takeovers (sim/offline/stream.h)."""
+"""A job in chunks as the controller runs it, without a bus (sim/offline/stream.h)."""
 
 from __future__ import annotations
 
@@ -8,68 +8,61 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import HodographError, InputError
+from ..errors import HodographError
 from .feed_override import State
 from .library import library, text
-from .program import NativeFault, NativeLimits, kernel_code, limits_fields
+from .program import POINT, NativeFault, NativeLimits, kernel_code, limits_fields
 
 
-class NativeChunk:
-    """A chunk that was opened: magic, version, size, flags and CRC are right."""
+class OfflineStream:
+    """Chunks of docs/reference/protocol.md 1.7 in, setpoints out. Chunks and commands take effect from the next tick.
 
-    def __init__(self, data: bytes) -> None:
-        """Raises InputError: it cannot be read."""
-        ffi, lib = library()
-        self.data = bytes(data)
-        self._buffer = ffi.from_buffer("uint8_t[]", self.data)
-        self.pointer = ffi.new("struct chunk *")
-        code = lib.chunk_open(self.pointer, self._buffer, len(self.data))
-        if code != 0:
-            raise InputError(f"chunk: {text(lib.program_error_text(code))} (code {code})")
-        self._records: Any = None
+    Memory of a chunk is given back when a later one has been taken over.
+    """
 
-    @property
-    def last(self) -> bool:
-        """The job ends with it."""
-        return bool(self.pointer.flags & 2)
+    def __init__(self, kernel: str = "fixed", limits: NativeLimits | None = None) -> None:
+        """Raises InputError for an unknown kernel. Without limits those of the format hold."""
+        self._ffi, self._lib = library()
+        self._kernel = self._lib.kernel_find(kernel_code(kernel))
+        self._stream = self._ffi.new("struct offline_stream *")
+        self._parts: list[tuple[Any, ...]] = []
+        given = self._ffi.new("struct program_limits *", limits_fields(limits or NativeLimits()))
+        self._lib.offline_stream_begin(self._stream, self._kernel, given)
 
-    def check(self, before: NativeChunk | None, limits: NativeLimits) -> NativeFault | None:
-        """The controller's check of the program and of how it follows `before`; None: accepted."""
-        ffi, lib = library()
-        given = ffi.new("struct program_limits *", limits_fields(limits))
+    def give(self, chunk: bytes) -> NativeFault | None:
+        """A chunk behind the newest accepted one; None: accepted. A refused one has changed nothing."""
+        ffi, lib = self._ffi, self._lib
+        part = ffi.new("struct offline_part *")
+        buffer = ffi.from_buffer("uint8_t[]", chunk)
         fault = ffi.new("struct program_fault *")
-        previous = ffi.NULL if before is None else before.pointer
-        code = lib.chunk_check(self.pointer, previous, given, fault)
-        if code == 0:
-            return None
-        return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
-
-    def prepare(self, kernel: str) -> None:
-        """Makes its coefficient records. Raises InputError: no such kernel."""
-        ffi, lib = library()
-        made_for = lib.kernel_find(kernel_code(kernel))
-        own = ffi.addressof(self.pointer, "program")
-        size = lib.coefficients_size(own, made_for)
-        self._records = ffi.new("uint64_t[]", (size + 7) // 8)
-        if lib.coefficients_make_in(own, made_for, self._records, size) != 0:
+        code = lib.offline_stream_check(self._stream, part, buffer, len(chunk), fault)
+        if code != 0:
+            return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
+        size = lib.coefficients_size(ffi.addressof(part.chunk, "program"), self._kernel)
+        records = ffi.new("uint64_t[]", (size + 7) // 8)
+        if lib.offline_stream_add(self._stream, part, records, size) != 0:
             raise HodographError("coefficients: their size is not what it was: report a bug")
+        self._parts.append((part, buffer, records))
+        return None
 
+    def run(self, ticks: int, *, until_rest: bool = False) -> NDArray[np.void]:
+        """Up to `ticks` setpoints as an array of POINT, (n,), with arc lengths of the job.
 
-class StreamRun:
-    """A job tick by tick, from its first chunk."""
-
-    def __init__(self, first: NativeChunk, kernel: str, counts_per_mm: int) -> None:
-        """`first` has passed its check."""
-        ffi, self._lib = library()
-        self._ffi = ffi
-        self._counts_per_mm, self._kernel = counts_per_mm, kernel
-        self._stream = ffi.new("struct offline_stream *")
-        self._feed = ffi.addressof(self._stream, "feed")
-        self._axes = int(first.pointer.program.header.axis_count)
-        first.prepare(kernel)
-        self._now = first
-        if self._lib.offline_stream_begin(self._stream, first.pointer) != 0:
-            raise HodographError("stream: the interpolator does not begin: report a bug")
+        Fewer when the job has ended or was stopped and, with `until_rest`, at the end of a tail behind which no chunk
+        is known. Raises HodographError where the interpolator fails.
+        """
+        points = np.zeros(ticks, dtype=POINT)
+        made = self._lib.offline_stream_run(
+            self._stream,
+            ticks,
+            until_rest,
+            self._ffi.cast("struct interpolator_point *", self._ffi.from_buffer(points)),
+        )
+        if made < 0:
+            raise HodographError(f"stream: the interpolator fails (code {made}): report a bug")
+        while self._parts and self._parts[0][0] != self._stream.active:
+            self._parts.pop(0)
+        return points[: int(made)]
 
     @property
     def state(self) -> State:
@@ -78,31 +71,29 @@ class StreamRun:
 
     @property
     def waits(self) -> bool:
-        """At rest at the end of a tail, until the next chunk comes."""
+        """Whether it is at rest at the end of a tail, until the next chunk is taken over."""
         return bool(self._lib.feed_override_waits(self._feed))
 
-    def run(self, next_chunk: NativeChunk | None, ticks: int) -> tuple[NDArray[np.int32], bool]:
-        """Setpoints (n, A) of the next ticks: up to the takeover of `next_chunk`, to the end of the job, or `ticks`; and
-        whether it was taken over.
-        """
-        if next_chunk is not None and next_chunk._records is None:
-            next_chunk.prepare(self._kernel)
-        counts = np.empty((ticks, self._axes), dtype=np.int32)
-        taken = self._ffi.new("uint32_t *")
-        count = self._lib.offline_stream_run(
-            self._stream,
-            self._ffi.NULL if next_chunk is None else next_chunk.pointer,
-            ticks,
-            self._counts_per_mm,
-            self._ffi.cast("int32_t *", self._ffi.from_buffer(counts)),
-            taken,
-        )
-        if count < 0:
-            raise HodographError(f"stream: the interpolator failed (code {count}): report a bug")
-        if taken[0]:
-            assert next_chunk is not None
-            self._now = next_chunk
-        return counts[:count], bool(taken[0])
+    @property
+    def sequence(self) -> int | None:
+        """Of the chunk under way; None before the first."""
+        active = self._stream.active
+        return None if active == self._ffi.NULL else int(active.chunk.sequence)
+
+    @property
+    def time_s(self) -> float:
+        """Program time in the chunk under way."""
+        return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
+
+    @property
+    def takeovers(self) -> tuple[int, int]:
+        """In motion, at rest."""
+        return int(self._stream.moving), int(self._stream.resting)
+
+    @property
+    def underruns(self) -> int:
+        """How often it has come to rest at the end of a tail."""
+        return int(self._stream.underruns)
 
     def hold(self) -> None:
         """To rest, until resumed."""
@@ -113,5 +104,17 @@ class StreamRun:
         self._lib.feed_override_resume(self._feed)
 
     def override(self, percent: int) -> None:
-        """The override wanted."""
+        """The rate wanted, 0 to 200; above 100 it counts as 100 until the last chunk."""
         self._lib.feed_override_set(self._feed, percent)
+
+    def stop(self) -> None:
+        """To rest inside the program's limits, for good."""
+        self._lib.feed_override_stop(self._feed)
+
+    def fault_stop(self) -> None:
+        """To rest inside the machine's limits, for good."""
+        self._lib.feed_override_fault_stop(self._feed)
+
+    @property
+    def _feed(self) -> Any:
+        return self._ffi.addressof(self._stream, "feed")

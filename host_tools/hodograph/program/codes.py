@@ -75,6 +75,7 @@ class ProgramError(IntEnum):
     CHUNK_SHARED = -86
     CHUNK_SEGMENT = -87
     CHUNK_PIECE = -88
+    CHUNK_OVER = -89
 
     @property
     def text(self) -> str:
@@ -146,4 +147,5 @@ _TEXTS = {
     ProgramError.CHUNK_SHARED: "chunk: shifts or shared counts do not fit its predecessor",
     ProgramError.CHUNK_SEGMENT: "chunk: a shared segment is not that of its predecessor",
     ProgramError.CHUNK_PIECE: "chunk: a shared piece is not that of its predecessor",
+    ProgramError.CHUNK_OVER: "chunk: of a job that is over, or checked under another configuration",
 }

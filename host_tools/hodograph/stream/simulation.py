@@ -8,19 +8,20 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import RunError
 from ..feed.pieces import FeedPieces
 from ..native.feed_override import State
-from ..native.program import NativeLimits
-from ..native.stream import NativeChunk, StreamRun
+from ..native.program import NativeLimits, counts_from_q40_mm
+from ..native.stream import OfflineStream
 from ..program.image import Program
 from ..program.stop_planning import with_bounds
 from ..program.stops import no_stops
 from .chunk import Chunk
 from .windows import chained, taken
 
-_SLICE_TICKS = 4096
+_SLICE_TICKS = 2048
 
 
 @dataclass(frozen=True)
@@ -29,56 +30,44 @@ class StreamedMotion:
 
     ticks              setpoints, from the first to the exact end
     setpoints_sha256   over them, as docs/reference/protocol.md section 2 has it
-    underruns          how often the motion rested at the end of a tail
+    takeovers          in motion, and at rest
     """
 
     ticks: int
     setpoints_sha256: str
-    underruns: int
+    takeovers: tuple[int, int]
 
 
 def simulate_chunks(
     chunks: Iterable[Chunk], limits: NativeLimits, kernel: str, counts_per_mm: int
 ) -> StreamedMotion:
-    """Runs the chunks of a section, each offered to the controller's core when its predecessor is under way.
+    """Runs the chunks of a section through the controller's core: each is given when its predecessor is under way.
 
     Raises RunError: a chunk is refused.
     """
-    digest, ticks = hashlib.sha256(), 0
-    run: StreamRun | None = None
-    before: NativeChunk | None = None
-    for chunk in chunks:
-        native = accepted(chunk, before, limits)
-        before = native
-        if run is None:
-            run = StreamRun(native, kernel, counts_per_mm)
-            continue
-        done = False
-        while not done:
-            counts, done = run.run(native, _SLICE_TICKS)
-            digest.update(counts.tobytes())
-            ticks += len(counts)
-            if not done and (run.state is State.ENDED or run.waits):
-                raise RunError(f"chunk {chunk.header.sequence} is not taken over: report a bug")
-    if run is None:
-        raise RunError("a section has one chunk at least: report a bug")
-    while run.state is not State.ENDED:
-        counts, _ = run.run(None, _SLICE_TICKS)
+    stream, digest, ticks = OfflineStream(kernel, limits), hashlib.sha256(), 0
+    axes = 0
+
+    def run(points: NDArray[np.void]) -> int:
+        counts = counts_from_q40_mm(points["position_q40"][:, :axes], counts_per_mm)
         digest.update(counts.tobytes())
-        ticks += len(counts)
-    return StreamedMotion(ticks, digest.hexdigest(), 0)
+        return len(points)
 
-
-def accepted(chunk: Chunk, before: NativeChunk | None, limits: NativeLimits) -> NativeChunk:
-    """The chunk, which the controller's check accepts after `before`. Raises RunError: it does not."""
-    native = NativeChunk(chunk.encode())
-    fault = native.check(before, limits)
-    if fault is not None:
-        raise RunError(
-            f"line {chunk.header.line}: the controller would refuse chunk {chunk.header.sequence}: {fault.text} "
-            f"(code {fault.code}, number {fault.index}): please report this file"
-        )
-    return native
+    for chunk in chunks:
+        fault = stream.give(chunk.encode())
+        if fault is not None:
+            raise RunError(
+                f"line {chunk.header.line}: the controller would refuse chunk {chunk.header.sequence}: {fault.text} "
+                f"(code {fault.code}, number {fault.index}): please report this file"
+            )
+        axes = axes or chunk.program.axis_count
+        while stream.sequence != chunk.header.sequence:
+            if stream.waits:
+                raise RunError(f"chunk {chunk.header.sequence} is not taken over: report a bug")
+            ticks += run(stream.run(_SLICE_TICKS, until_rest=True))
+    while stream.state is not State.ENDED:
+        ticks += run(stream.run(_SLICE_TICKS))
+    return StreamedMotion(ticks, digest.hexdigest(), stream.takeovers)
 
 
 class Concatenation:

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/chunk_ring.h"
+
+#include <stddef.h>
+
+static uint32_t rounded_down(uint32_t size)
+{
+    return size & ~(CHUNK_RING_ALIGNMENT - 1u);
+}
+
+static uint32_t rounded_up(uint32_t size)
+{
+    return rounded_down(size + CHUNK_RING_ALIGNMENT - 1u);
+}
+
+void chunk_ring_init(struct chunk_ring *ring, uint8_t *memory, uint32_t size)
+{
+    *ring = (struct chunk_ring){.memory = memory, .size = rounded_down(size)};
+}
+
+void chunk_ring_clear(struct chunk_ring *ring)
+{
+    chunk_ring_init(ring, ring->memory, ring->size);
+}
+
+/* The newest block lies before the oldest one. */
+static bool is_wrapped(const struct chunk_ring *ring)
+{
+    return ring->used && ring->end <= ring->first;
+}
+
+static uint32_t room_behind_newest(const struct chunk_ring *ring)
+{
+    return (is_wrapped(ring) ? ring->first : ring->size) - ring->end;
+}
+
+static uint32_t room_at_start(const struct chunk_ring *ring)
+{
+    return is_wrapped(ring) ? 0u : ring->first;
+}
+
+uint32_t chunk_ring_room(const struct chunk_ring *ring)
+{
+    const uint32_t behind = room_behind_newest(ring);
+    const uint32_t start = room_at_start(ring);
+    return behind > start ? behind : start;
+}
+
+uint8_t *chunk_ring_take(struct chunk_ring *ring, uint32_t least, uint32_t *size)
+{
+    const bool behind = room_behind_newest(ring) >= least;
+    const uint32_t at = behind ? ring->end : 0u;
+    *size = behind ? room_behind_newest(ring) : room_at_start(ring);
+    if (*size < least || *size == 0u) {
+        return NULL;
+    }
+    ring->back = ring->end;
+    ring->newest = at;
+    ring->end = at + *size;
+    ring->first = ring->used ? ring->first : at;
+    ring->used = true;
+    return ring->memory + at;
+}
+
+void chunk_ring_trim(struct chunk_ring *ring, uint32_t size)
+{
+    ring->end = ring->newest + rounded_up(size);
+}
+
+void chunk_ring_give_back(struct chunk_ring *ring)
+{
+    if (ring->first == ring->newest) {
+        chunk_ring_clear(ring);
+    } else {
+        ring->end = ring->back;
+    }
+}
+
+void chunk_ring_free_oldest(struct chunk_ring *ring, const uint8_t *next)
+{
+    ring->first = (uint32_t)(next - ring->memory);
+}

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * chunk_ring: memory for the chunks of a stream: blocks that lie in one piece each, taken and freed in the same order.
+ *
+ * A block that does not fit behind the newest one begins at the start of the memory again; what is left over at the end
+ * stays unused until then. The newest block may be made smaller, or given back, as long as no other has been taken.
+ * Offsets, not pointers: no block moves, and nothing is stored in the memory itself. Main loop.
+ */
+#ifndef APP_CHUNK_RING_H
+#define APP_CHUNK_RING_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define CHUNK_RING_ALIGNMENT 8u /* of every block */
+
+/* Contents private. */
+struct chunk_ring {
+    uint8_t *memory; /* aligned to CHUNK_RING_ALIGNMENT */
+    uint32_t size;
+    uint32_t first;  /* offset of the oldest block */
+    uint32_t newest; /* of the newest one, */
+    uint32_t end;    /* and behind it */
+    uint32_t back;   /* `end` before it was taken */
+    bool used;       /* there is a block */
+};
+
+/* Of all memory that is there; `size` may be 0. */
+void chunk_ring_init(struct chunk_ring *ring, uint8_t *memory, uint32_t size);
+
+/* Frees all blocks. */
+void chunk_ring_clear(struct chunk_ring *ring);
+
+/* Bytes of the largest block that can be taken now. Pure. */
+uint32_t chunk_ring_room(const struct chunk_ring *ring);
+
+/* Takes a block of `least` bytes or more, as large as there is room in its place: *size. NULL: there is no such place. */
+uint8_t *chunk_ring_take(struct chunk_ring *ring, uint32_t least, uint32_t *size);
+
+/* The newest block keeps its first `size` bytes, which must be some. */
+void chunk_ring_trim(struct chunk_ring *ring, uint32_t size);
+
+/* The newest block, the last one taken, is free again. */
+void chunk_ring_give_back(struct chunk_ring *ring);
+
+/* Frees the oldest block; `next` is the one taken after it. */
+void chunk_ring_free_oldest(struct chunk_ring *ring, const uint8_t *next);
+
+#endif

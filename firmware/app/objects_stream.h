@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/* objects_stream: handlers of object 0x2060, for the table and the hooks in objects.c: a chunk (sub 1, a DOMAIN), what has become
+ * of the job, its end. Mainline. */
+#ifndef APP_OBJECTS_STREAM_H
+#define APP_OBJECTS_STREAM_H
+
+#include "app/controller.h"
+
+#define OBJECT_STREAM 0x2060u
+
+/* A reader, of the sub-indices from 2 on: two's complement in 64 bits. Under the lock. */
+uint64_t object_read_stream(struct controller *controller, const struct od_entry *entry);
+
+/* Refused with SDO_ABORT_STATE while a program without a stream is on the path, or the drives move by themselves;
+ * SDO_ABORT_MEMORY when there is no room now. */
+uint32_t object_chunk_begin(struct controller *controller, uint32_t size);
+uint32_t object_chunk_write(struct controller *controller, uint32_t offset, const uint8_t *data,
+                            uint32_t size);
+/* Checks the chunk; SDO_ABORT_VALUE when it is refused (subs 5 and 6 say why). */
+uint32_t object_chunk_end(struct controller *controller, uint32_t size);
+void object_chunk_abort(struct controller *controller);
+
+/* Sub 15 closes the job; SDO_ABORT_STATE while it is on the path. */
+uint32_t object_write_stream_close(struct controller *controller, const struct od_entry *entry,
+                                   uint64_t number);
+
+#endif

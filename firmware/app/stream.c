@@ -1,0 +1,376 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/stream.h"
+
+#include <string.h>
+
+#include "app/machine/path_counts.h"
+#include "core/coefficients.h"
+#include "core/kernel.h"
+#include "core/qmath.h"
+#include "port/port.h"
+
+/* At the start of a block of the ring; the bytes of the chunk follow, and behind them its coefficient records. */
+struct stream_chunk {
+    struct stream_chunk *next; /* accepted after it; NULL: the newest */
+    uint64_t job_time_q32_s;   /* time of the job at its program time 0, */
+    uint64_t joint_time_q32_s; /* and at its joint */
+    struct chunk chunk;
+};
+
+#define HEAD_SIZE ((uint32_t)sizeof(struct stream_chunk))
+
+typedef char
+    stream_assert_aligned[sizeof(struct stream_chunk) % CHUNK_RING_ALIGNMENT == 0u ? 1 : -1];
+
+static uint32_t aligned(uint32_t size)
+{
+    return (size + COEFFICIENTS_ALIGNMENT - 1u) & ~(COEFFICIENTS_ALIGNMENT - 1u);
+}
+
+void stream_init(struct stream *stream)
+{
+    uint32_t size;
+    uint8_t *memory = port_stream_memory(&size);
+    memset(stream, 0, sizeof *stream);
+    chunk_ring_init(&stream->ring, memory, size);
+}
+
+/* ---- A download ---- */
+
+int stream_begin(struct stream *stream, uint32_t size)
+{
+    uint32_t room;
+    stream_abandon(stream);
+    if (size > stream->ring.size) {
+        return PROGRAM_ERR_ROOM;
+    }
+    stream->receiving = chunk_ring_take(&stream->ring, HEAD_SIZE + size, &room);
+    if (stream->receiving == NULL) {
+        return PROGRAM_ERR_ROOM;
+    }
+    stream->receiving_bytes = room - HEAD_SIZE;
+    return 0;
+}
+
+int stream_write(struct stream *stream, uint32_t offset, const uint8_t *data, uint32_t size)
+{
+    const uint32_t room = stream->receiving_bytes;
+    if (offset > room || size > room - offset) {
+        return PROGRAM_ERR_ROOM;
+    }
+    memcpy(stream->receiving + HEAD_SIZE + offset, data, size);
+    return 0;
+}
+
+void stream_abandon(struct stream *stream)
+{
+    if (stream->receiving != NULL) {
+        chunk_ring_give_back(&stream->ring);
+    }
+    stream->receiving = NULL;
+    stream->receiving_bytes = 0;
+}
+
+/* ---- What a chunk has to pass ---- */
+
+static bool is_over(const struct stream *stream)
+{
+    return stream->state == STREAM_ENDED || stream->state == STREAM_STOPPED;
+}
+
+static bool opens_a_job(const struct stream *stream, const struct chunk *chunk)
+{
+    return (chunk->flags & CHUNK_FLAG_FIRST) != 0u && chunk->job != stream->job;
+}
+
+/* Whether it is this chunk's turn. */
+static int check_turn(const struct stream *stream, const struct chunk *chunk,
+                      const struct config *config)
+{
+    if (opens_a_job(stream, chunk)) {
+        return stream->started && !is_over(stream) ? PROGRAM_ERR_CHUNK_JOB : 0;
+    }
+    if (stream->job == 0u || chunk->job != stream->job) {
+        return PROGRAM_ERR_CHUNK_JOB;
+    }
+    if (chunk->sequence != stream->wanted) {
+        return PROGRAM_ERR_CHUNK_SEQUENCE;
+    }
+    return is_over(stream) || stream->config_crc32 != config->crc32 ? PROGRAM_ERR_CHUNK_OVER : 0;
+}
+
+static int check_program(const struct stream *stream, struct chunk *chunk,
+                         const struct config *config, struct program_fault *fault)
+{
+    const struct chunk *previous = opens_a_job(stream, chunk) ? NULL : &stream->newest->chunk;
+    struct program_limits limits;
+    if (chunk->program.header.axis_count > config->axis_count) {
+        return PROGRAM_ERR_AXES;
+    }
+    config_limits(config, &limits);
+    limits.attend = stream->attend;
+    limits.self = stream->self;
+    return chunk_check(chunk, previous, &limits, fault);
+}
+
+static int make_records(struct stream *stream, struct chunk *chunk, const struct config *config)
+{
+    const struct kernel *kernel = kernel_find(config->kernel);
+    const uint32_t used = aligned(chunk->size);
+    if (kernel == NULL) {
+        return PROGRAM_ERR_KERNEL;
+    }
+    if (used > stream->receiving_bytes ||
+        coefficients_make_in(&chunk->program, kernel, stream->receiving + HEAD_SIZE + used,
+                             stream->receiving_bytes - used) != 0) {
+        return PROGRAM_ERR_ROOM;
+    }
+    chunk_ring_trim(&stream->ring,
+                    HEAD_SIZE + used + (uint32_t)coefficients_size(&chunk->program, kernel));
+    return 0;
+}
+
+/* The first thing that is wrong with the chunk that has come. */
+static struct program_fault check(struct stream *stream, struct chunk *chunk, uint32_t size,
+                                  const struct config *config)
+{
+    struct program_fault fault = {.code = 0, .index = 0};
+    fault.code = chunk_open(chunk, stream->receiving + HEAD_SIZE, size);
+    if (fault.code == 0 && chunk->size != size) {
+        fault.code = PROGRAM_ERR_CHUNK_FORMAT;
+    }
+    fault.code = fault.code != 0 ? fault.code : check_turn(stream, chunk, config);
+    fault.code = fault.code != 0 ? fault.code : check_program(stream, chunk, config, &fault);
+    fault.code = fault.code != 0 ? fault.code : make_records(stream, chunk, config);
+    return fault;
+}
+
+/* ---- A chunk that has passed ---- */
+
+static void enter(struct stream *stream, struct stream_chunk *at)
+{
+    stream->executed = at;
+    stream->place = (struct stream_place){.sequence = at->chunk.sequence,
+                                          .line = at->chunk.line,
+                                          .job_start_q40_mm = at->chunk.job_start_q40_mm,
+                                          .job_time_q32_s = at->job_time_q32_s};
+}
+
+static void open_job(struct stream *stream, struct stream_chunk *first, const struct config *config)
+{
+    int32_t end_counts[AXES_MAX];
+    first->job_time_q32_s = 0;
+    path_counts_ends(&first->chunk.program, config, stream->start_counts, end_counts);
+    chunk_ring_free_oldest(&stream->ring, (const uint8_t *)first);
+    stream->job = first->chunk.job;
+    stream->config_crc32 = config->crc32;
+    stream->underruns = 0;
+    stream->started = false;
+    stream->waits = false;
+    stream->state = STREAM_OPEN;
+    enter(stream, first);
+}
+
+static uint64_t shared_time_q32_s(const struct chunk *chunk)
+{
+    uint64_t sum = 0;
+    for (uint32_t i = 0; i < chunk->shared_pieces; ++i) {
+        sum += program_piece_duration(&chunk->program, i);
+    }
+    return sum;
+}
+
+static void accept(struct stream *stream, struct stream_chunk *chunk, const struct config *config)
+{
+    chunk->next = NULL;
+    if (opens_a_job(stream, &chunk->chunk)) {
+        open_job(stream, chunk, config);
+    } else {
+        chunk->job_time_q32_s = stream->newest->job_time_q32_s + chunk->chunk.time_shift_q32_s;
+        stream->newest->next = chunk;
+    }
+    chunk->joint_time_q32_s = chunk->job_time_q32_s + shared_time_q32_s(&chunk->chunk);
+    stream->newest = chunk;
+    stream->wanted = chunk->chunk.sequence + 1u;
+}
+
+int stream_finish(struct stream *stream, uint32_t size, const struct config *config)
+{
+    struct stream_chunk *candidate = (struct stream_chunk *)(void *)stream->receiving;
+    stream->refused = check(stream, &candidate->chunk, size, config);
+    if (stream->refused.code != 0) {
+        stream_abandon(stream);
+        return stream->refused.code;
+    }
+    stream->receiving = NULL;
+    stream->receiving_bytes = 0;
+    accept(stream, candidate, config);
+    return 0;
+}
+
+/* ---- The job ---- */
+
+static void drop_chunks(struct stream *stream)
+{
+    stream_abandon(stream);
+    chunk_ring_clear(&stream->ring);
+    stream->executed = NULL;
+    stream->newest = NULL;
+}
+
+void stream_close(struct stream *stream)
+{
+    drop_chunks(stream);
+    stream->job = 0;
+    stream->wanted = 0;
+    stream->underruns = 0;
+    stream->started = false;
+    stream->state = STREAM_NONE;
+    stream->place = (struct stream_place){.sequence = 0};
+}
+
+enum machine_refusal stream_prepare(const struct stream *stream, const struct config *config,
+                                    struct motion *prepared, int32_t start_counts[AXES_MAX])
+{
+    if (stream->started) {
+        return MACHINE_JOB_STARTED;
+    }
+    if (stream->config_crc32 != config->crc32 ||
+        motion_begin_job(prepared, &stream->executed->chunk, config) != 0) {
+        return MACHINE_OUTSIDE_LIMITS;
+    }
+    memcpy(start_counts, stream->start_counts, sizeof stream->start_counts);
+    return MACHINE_ACCEPTED;
+}
+
+void stream_started(struct stream *stream)
+{
+    stream->started = true;
+}
+
+/* ---- A round ---- */
+
+static enum stream_state state_of(const struct stream *stream, const struct machine *machine)
+{
+    const bool at_end = feed_override_state(&machine->motion.feed) == FEED_ENDED;
+    if (machine_on_path(machine)) {
+        return machine_waits_for_chunk(machine) ? STREAM_UNDERRUN : STREAM_OPEN;
+    }
+    return at_end && !chunk_goes_on(&stream->executed->chunk) && machine->state != MACHINE_FAULT
+               ? STREAM_ENDED
+               : STREAM_STOPPED;
+}
+
+/* What has become of the job since the last round. */
+static void note_state(struct stream *stream, const struct machine *machine)
+{
+    port_lock();
+    stream->state = state_of(stream, machine);
+    port_unlock();
+    if (stream->state == STREAM_UNDERRUN && !stream->waits) {
+        stream->waits = true;
+        stream->underruns++;
+        port_log(PORT_NOTE, "underrun: waits for chunk", (int32_t)stream->wanted);
+    }
+    if (is_over(stream) && stream->receiving == NULL) {
+        drop_chunks(stream);
+    }
+}
+
+static bool take_next_over(struct stream *stream, struct machine *machine)
+{
+    struct stream_chunk *next = stream->executed->next;
+    if (next == NULL) {
+        return false;
+    }
+    port_lock();
+    const bool taken = machine_take_over(machine, &next->chunk);
+    port_unlock();
+    if (taken) {
+        chunk_ring_free_oldest(&stream->ring, (const uint8_t *)next);
+        stream->waits = false;
+        enter(stream, next);
+    }
+    return taken;
+}
+
+void stream_process(struct stream *stream, struct machine *machine)
+{
+    if (!stream->started || stream->executed == NULL) {
+        return;
+    }
+    do {
+        note_state(stream, machine);
+    } while (!is_over(stream) && take_next_over(stream, machine));
+}
+
+/* ---- What is so ---- */
+
+uint32_t stream_hold_worst_us(const struct stream *stream)
+{
+    return stream->executed != NULL ? stream->executed->chunk.program.header.hold_worst_us : 0u;
+}
+
+/* Of bytes in the ring, those that are left for a chunk beside its records, whatever it consists of. */
+static uint32_t share_of(uint64_t room, uint32_t image_size, uint32_t record_size)
+{
+    return (uint32_t)qmath_div_u64(room * image_size, (uint64_t)image_size + record_size);
+}
+
+uint32_t stream_free_bytes(const struct stream *stream, const struct config *config)
+{
+    const struct kernel *kernel = kernel_find(config->kernel);
+    const uint32_t room = chunk_ring_room(&stream->ring);
+    if (kernel == NULL || room <= HEAD_SIZE) {
+        return 0;
+    }
+    const uint32_t axes = config->axis_count < PROGRAM_PLANE ? PROGRAM_PLANE : config->axis_count;
+    const uint32_t of_pieces = share_of(room - HEAD_SIZE, PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE,
+                                        coefficients_piece_size(kernel));
+    const uint32_t of_segments = share_of(room - HEAD_SIZE, program_segment_size(axes),
+                                          coefficients_segment_size(kernel, axes));
+    return of_pieces < of_segments ? of_pieces : of_segments;
+}
+
+static uint64_t time_now_q32_s(const struct stream *stream, const struct machine *machine)
+{
+    return stream->place.job_time_q32_s +
+           (stream->started ? motion_time_q32_s(&machine->motion) : 0u);
+}
+
+/* Below 2^22 s. */
+static uint32_t ms_of(int64_t time_q32_s)
+{
+    return time_q32_s <= 0 ? 0u : (uint32_t)(((uint64_t)time_q32_s >> 16) * 1000u >> 16);
+}
+
+uint32_t stream_committed_ms(const struct stream *stream, const struct machine *machine)
+{
+    const struct stream_chunk *newest = stream->newest;
+    if (newest == NULL) {
+        return 0;
+    }
+    const uint64_t end_q32_s = newest->job_time_q32_s + newest->chunk.program.header.duration_q32_s;
+    return ms_of((int64_t)(end_q32_s - time_now_q32_s(stream, machine)));
+}
+
+int64_t stream_arc_length_q40_mm(const struct stream *stream, const struct machine *machine)
+{
+    return stream->place.job_start_q40_mm +
+           (stream->started ? machine->motion.point.arc_length_q40_mm : 0);
+}
+
+uint32_t stream_remaining_ms(const struct stream *stream, const struct machine *machine)
+{
+    const struct stream_chunk *newest = stream->newest;
+    if (newest == NULL || newest->chunk.remaining_ms == CHUNK_TIME_UNKNOWN) {
+        return stream->state == STREAM_ENDED ? 0u : CHUNK_TIME_UNKNOWN;
+    }
+    const uint64_t now_q32_s = time_now_q32_s(stream, machine);
+    const uint64_t joint_q32_s = newest->joint_time_q32_s;
+    if (now_q32_s <= joint_q32_s) {
+        return newest->chunk.remaining_ms + ms_of((int64_t)(joint_q32_s - now_q32_s));
+    }
+    const uint32_t passed_ms = ms_of((int64_t)(now_q32_s - joint_q32_s));
+    return newest->chunk.remaining_ms > passed_ms ? newest->chunk.remaining_ms - passed_ms : 0u;
+}

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h, docs/reference/protocol.md 1.7).
+ *
+ * Chunks are downloaded in order to a ring in RAM, checked there as strictly as a program, and given coefficient records.
+ * In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part that the next
+ * chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free. So whatever
+ * happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an underrun), and
+ * goes on when the next chunk has come.
+ *
+ * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped or
+ * has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. The power takes it
+ * away. A job is bound to the configuration that it was checked under. Main loop; machine is locked here where it has to be.
+ */
+#ifndef APP_STREAM_H
+#define APP_STREAM_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/chunk_ring.h"
+#include "app/machine/config.h"
+#include "app/machine/machine.h"
+#include "core/chunk.h"
+
+/* Values of object 0x2060 sub 2. */
+enum stream_state {
+    STREAM_NONE = 0,
+    STREAM_OPEN = 1,     /* a job has its first chunk; it may be running */
+    STREAM_UNDERRUN = 2, /* at rest at the end of a tail: the next chunk is missing */
+    STREAM_ENDED = 3,    /* the last chunk has been executed to its end */
+    STREAM_STOPPED = 4,  /* over before its end: stopped, or a fault */
+};
+
+/* Where a job is; kept when its chunks are gone. */
+struct stream_place {
+    uint32_t sequence; /* of the chunk that is executed, or will be first */
+    uint32_t line;
+    int64_t job_start_q40_mm;
+    uint64_t job_time_q32_s; /* time of the job at program time 0 of this chunk */
+};
+
+struct stream_chunk; /* a chunk in the ring */
+
+/* Read the fields; private from `ring` on. */
+struct stream {
+    uint32_t job;                 /* 0: none */
+    uint32_t wanted;              /* sequence of the next chunk: all before it have been accepted */
+    struct program_fault refused; /* last refusal; code 0: none */
+    uint32_t underruns;           /* since the job was opened */
+    struct stream_place place;
+    void (*attend)(
+        void *self); /* called with `self` now and then while a chunk is checked; may be NULL */
+    void *self;
+
+    struct chunk_ring ring;
+    struct stream_chunk *executed; /* NULL: no chunks are kept */
+    struct stream_chunk *newest;   /* accepted last; executed ... newest are linked */
+    uint8_t *receiving;            /* the block of the download under way; NULL: none */
+    uint32_t receiving_bytes;
+    uint32_t config_crc32; /* of the configuration that the job was checked under */
+    int32_t start_counts[AXES_MAX];
+    bool started;
+    bool waits; /* this underrun has been counted */
+    enum stream_state state;
+};
+
+void stream_init(struct stream *stream);
+
+/* A download of a chunk: begin (`size` bytes, 0: not known), write in order, then finish or abandon. Begin and write: 0 or
+ * PROGRAM_ERR_ROOM, when the chunk does not fit the ring now. Finish checks: 0, or the code that is then in
+ * stream->refused; then nothing has changed. */
+int stream_begin(struct stream *stream, uint32_t size);
+int stream_write(struct stream *stream, uint32_t offset, const uint8_t *data, uint32_t size);
+int stream_finish(struct stream *stream, uint32_t size, const struct config *config);
+void stream_abandon(struct stream *stream);
+
+/* Forgets the job and frees the ring. Not while it is on the path. */
+void stream_close(struct stream *stream);
+
+/* Whether commands start the job instead of the program in the slot. */
+static inline bool stream_is_open(const struct stream *stream)
+{
+    return stream->job != 0u;
+}
+
+/* Prepares the start of the job. MACHINE_ACCEPTED, or why it cannot be. */
+enum machine_refusal stream_prepare(const struct stream *stream, const struct config *config,
+                                    struct motion *prepared, int32_t start_counts[AXES_MAX]);
+/* machine_start has accepted it. */
+void stream_started(struct stream *stream);
+
+/* A round: takes the next chunk over where it can be; notes underrun and end. Short; also to be called from `attend`. */
+void stream_process(struct stream *stream, struct machine *machine);
+
+/* The longest hold of the program that is executed, us; 0: none is. */
+uint32_t stream_hold_worst_us(const struct stream *stream);
+
+/* Object 0x2060 subs 7, 8, 11, 12. */
+uint32_t stream_free_bytes(const struct stream *stream, const struct config *config);
+uint32_t stream_committed_ms(const struct stream *stream, const struct machine *machine);
+int64_t stream_arc_length_q40_mm(const struct stream *stream, const struct machine *machine);
+uint32_t stream_remaining_ms(const struct stream *stream, const struct machine *machine);
+
+#endif

@@ -1,0 +1,574 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Chunks of a job: their check, and the takeover of the next one by the motion (core/chunk.h, core/feed_override.h). The
+ * chunks are cut from golden programs (chunked.h), so that the whole program says which setpoints are right.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "chunked.h"
+#include "core/feed_override.h"
+#include "golden.h"
+#include "unity.h"
+
+enum { MOST_TICKS = 4000, BEHIND = 60 };
+enum { SEQUENCE = 20, PIECE_SHIFT = 24, SHARED_PIECES = 32, SHARED_SEGMENTS = 36 };
+
+static struct override_program whole;
+static struct chunked chain;
+static struct chunk chunks[CHUNKED_MOST];
+static void *records[CHUNKED_MOST];
+
+void setUp(void)
+{
+    uint64_t random = 7;
+    override_program_golden(&whole, "alpha_minimax.hdgp");
+    chunked_refine(&whole, 0.01);
+    override_program_limits(&whole, &random);
+    golden_seal(whole.image, whole.program.size);
+    memset(records, 0, sizeof records);
+}
+
+void tearDown(void)
+{
+    for (uint32_t i = 0; i < CHUNKED_MOST; i++) {
+        free(records[i]);
+    }
+    chunked_close(&chain);
+    override_program_close(&whole);
+}
+
+static int check_chunk(uint32_t i, struct program_fault *fault)
+{
+    const struct program_limits limits = golden_no_limits();
+    fault->index = 0;
+    fault->code = chunk_open(&chunks[i], chain.bytes[i], chain.sizes[i]);
+    return fault->code != 0
+               ? fault->code
+               : chunk_check(&chunks[i], i > 0 ? &chunks[i - 1u] : NULL, &limits, fault);
+}
+
+/* All chunks of the chain opened, checked, and made ready for a kernel. */
+static void accept_all(enum kernel_number number)
+{
+    const struct kernel *kernel = kernel_find((uint32_t)number);
+    for (uint32_t i = 0; i < chain.count; i++) {
+        struct program_fault fault;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, check_chunk(i, &fault), program_error_text(fault.code));
+        const uint64_t size = coefficients_size(&chunks[i].program, kernel);
+        free(records[i]);
+        records[i] = malloc((size_t)size);
+        TEST_ASSERT_EQUAL_INT(0,
+                              coefficients_make_in(&chunks[i].program, kernel, records[i], size));
+    }
+}
+
+/* Two chunks: pieces before 40, with those from 12 on in both. */
+static void cut_in_two(void)
+{
+    const uint32_t firsts[2] = {0, 12};
+    const uint32_t joints[2] = {40, whole.program.header.piece_count};
+    TEST_ASSERT_TRUE(chunked_make(&chain, &whole, firsts, joints, 2));
+}
+
+/* --- The check --- */
+
+static int code_with(uint32_t at, uint32_t value, uint32_t bytes)
+{
+    struct program_fault fault;
+    uint8_t *chunk = chain.bytes[1];
+    uint8_t before[4];
+    memcpy(before, chunk + at, bytes);
+    for (uint32_t i = 0; i < bytes; i++) {
+        chunk[at + i] = (uint8_t)(value >> (8u * i));
+    }
+    golden_seal(chunk, chain.sizes[1]);
+    const int code = check_chunk(1, &fault);
+    memcpy(chunk + at, before, bytes);
+    golden_seal(chunk, chain.sizes[1]);
+    return code;
+}
+
+static void test_headers_are_refused_with_their_codes(void)
+{
+    struct program_fault fault;
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(0, 'h', 1));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(4, 2, 2));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(6, 4, 2));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(76, 1, 1));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_JOB, code_with(16, 0, 4));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_JOB, code_with(16, 99, 4));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SEQUENCE, code_with(SEQUENCE, 0, 4));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SEQUENCE, code_with(SEQUENCE, 2, 4));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FIRST,
+                          code_with(6, CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST, 2));
+    for (uint32_t at = PIECE_SHIFT; at < 64; at += 4) { /* every shift and shared count */
+        const uint32_t was = (uint32_t)chain.bytes[1][at];
+        if (at != SHARED_PIECES) { /* fewer pieces than could be are shared: allowed */
+            TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SHARED, code_with(at, was ^ 1u, 1));
+        }
+        TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SHARED, code_with(at, 0xFFFFFFFFu, 4));
+    }
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SHARED, code_with(SHARED_PIECES, 0, 4));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SHARED, code_with(SHARED_SEGMENTS, 0, 4));
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+}
+
+/* Truncated at any byte, and any flipped bit. */
+static void test_damage_is_refused(void)
+{
+    struct program_fault fault;
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+    for (uint32_t size = 0; size < chain.sizes[1]; size += 7) {
+        TEST_ASSERT_TRUE(chunk_open(&chunks[1], chain.bytes[1], size) < 0);
+    }
+    for (uint32_t bit = 0; bit < 8u * chain.sizes[1]; bit += 11) {
+        chain.bytes[1][bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+        TEST_ASSERT_TRUE(chunk_open(&chunks[1], chain.bytes[1], chain.sizes[1]) < 0);
+        chain.bytes[1][bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+    }
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+}
+
+/* The first byte of a segment or piece of the image of chunk 1. */
+static uint32_t segment_at(uint32_t i)
+{
+    return CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE + i * PROGRAM_SEGMENT_SIZE;
+}
+
+static uint32_t piece_at(uint32_t i)
+{
+    return segment_at(chunks[1].program.header.segment_count) + i * PROGRAM_PIECE_SIZE;
+}
+
+static struct program_fault fault_with_bit(uint32_t at)
+{
+    struct program_fault fault;
+    chain.bytes[1][at] ^= 1u;
+    chunked_seal(chain.bytes[1], chain.sizes[1]);
+    (void)check_chunk(1, &fault);
+    chain.bytes[1][at] ^= 1u;
+    chunked_seal(chain.bytes[1], chain.sizes[1]);
+    return fault;
+}
+
+/* Any byte of the shared part. */
+static void test_the_shared_part_is_compared_bit_for_bit(void)
+{
+    struct program_fault fault;
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+    const uint32_t segments = chunks[1].shared_segments;
+    const uint32_t pieces = chunks[1].shared_pieces;
+    TEST_ASSERT_TRUE(segments > 1 && pieces == 28);
+    for (uint32_t at = segment_at(0); at < segment_at(segments); at++) {
+        fault = fault_with_bit(at);
+        TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SEGMENT, fault.code);
+        TEST_ASSERT_EQUAL_UINT32((at - segment_at(0)) / PROGRAM_SEGMENT_SIZE, fault.index);
+    }
+    for (uint32_t at = piece_at(0); at < piece_at(pieces); at += 5) {
+        fault = fault_with_bit(at);
+        TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_PIECE, fault.code);
+        TEST_ASSERT_EQUAL_UINT32((at - piece_at(0)) / PROGRAM_PIECE_SIZE, fault.index);
+    }
+    fault = fault_with_bit(piece_at(pieces) + 17); /* behind the joint: the rules of a program */
+    TEST_ASSERT_TRUE(fault.code > PROGRAM_ERR_CHUNK_FORMAT && fault.code < 0);
+}
+
+static void test_a_program_in_motion_is_accepted_in_a_chunk_only(void)
+{
+    struct program_fault fault;
+    struct program_limits limits = golden_no_limits();
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_FLAGS, program_check(&chunks[1].program, &limits, &fault));
+    limits.chunk = 1;
+    TEST_ASSERT_EQUAL_INT(0, program_check(&chunks[1].program, &limits, &fault));
+    chain.bytes[1][CHUNK_HEADER_SIZE + 28] = 0; /* not said to move */
+    chunked_seal(chain.bytes[1], chain.sizes[1]);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_PIECE_FIRST, check_chunk(1, &fault));
+    chain.bytes[0][CHUNK_HEADER_SIZE + 28] = PROGRAM_FLAG_MOVING; /* the first one may not */
+    chunked_seal(chain.bytes[0], chain.sizes[0]);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FIRST, check_chunk(0, &fault));
+}
+
+/* --- The motion --- */
+
+struct motion {
+    struct feed_override feed;
+    struct interpolator it;
+    struct interpolator_point point; /* of the last setpoint, arc length of the job */
+    uint32_t chunk;
+};
+
+static struct interpolator_point right[MOST_TICKS]; /* setpoints of the whole program */
+static uint32_t right_count;
+static struct golden_prepared exact;
+
+static void run_whole(enum kernel_number kernel, uint32_t percent)
+{
+    struct feed_override feed;
+    struct interpolator it;
+    golden_prepare(&exact, &whole.program, kernel);
+    feed_override_begin(&feed, &exact.program, whole.program.header.period_us, 0);
+    feed_override_set(&feed, percent);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &exact.program));
+    right_count = 0;
+    while (feed_override_state(&feed) != FEED_ENDED) {
+        TEST_ASSERT_TRUE(right_count < MOST_TICKS);
+        memset(&right[right_count], 0, sizeof right[0]);
+        TEST_ASSERT_EQUAL_INT(0, feed_override_next(&feed, &it, &right[right_count++]));
+    }
+    golden_discard(&exact);
+}
+
+static void begin(struct motion *m)
+{
+    memset(m, 0, sizeof *m);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&m->it, &chunks[0].program));
+    feed_override_begin_job(&m->feed, &chunks[0], whole.program.header.period_us);
+}
+
+static void tick(struct motion *m)
+{
+    TEST_ASSERT_EQUAL_INT(0, feed_override_next(&m->feed, &m->it, &m->point));
+    m->point.arc_length_q40_mm += chunks[m->chunk].job_start_q40_mm;
+}
+
+static int take_over(struct motion *m)
+{
+    const struct motion before = *m;
+    if (feed_override_take_over(&m->feed, &m->it, &chunks[m->chunk + 1u])) {
+        m->chunk++;
+        return 1;
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, m, sizeof before); /* nothing has changed */
+    return 0;
+}
+
+static void same_setpoints(struct motion *m, uint32_t from, uint32_t to)
+{
+    for (uint32_t k = from; k < to && k < right_count; k++) {
+        tick(m);
+        TEST_ASSERT_EQUAL_MEMORY(&right[k], &m->point, sizeof m->point);
+    }
+}
+
+static int passed_joint(const struct motion *m, const struct chunk *next)
+{
+    return m->feed.clock.piece >= next->piece_shift + next->shared_pieces;
+}
+
+/* Takes chunk 1 over at every tick in which that is possible, and compares all setpoints with those of the whole. */
+static void take_over_at_every_tick(enum kernel_number kernel, uint32_t percent)
+{
+    struct motion m;
+    uint32_t taken = 0;
+    accept_all(kernel);
+    run_whole(kernel, percent);
+    begin(&m);
+    feed_override_set(&m.feed, percent);
+    for (uint32_t k = 0; k + 1u < right_count; k++) {
+        tick(&m);
+        if (passed_joint(&m, &chunks[1])) {
+            break;
+        }
+        TEST_ASSERT_EQUAL_MEMORY(&right[k], &m.point, sizeof m.point);
+        struct motion branch = m;
+        if (take_over(&branch)) {
+            taken++;
+            same_setpoints(&branch, k + 1u, taken % 16u == 0u ? right_count : k + BEHIND);
+        } else { /* before the shared part only */
+            TEST_ASSERT_EQUAL_UINT32(0, taken);
+        }
+    }
+    TEST_ASSERT_FALSE(take_over(&m));
+    TEST_ASSERT_TRUE(taken > 100u);
+}
+
+static void test_a_takeover_at_every_tick_changes_no_setpoint(void)
+{
+    cut_in_two();
+    for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
+        take_over_at_every_tick((enum kernel_number)kernel, 100);
+    }
+    take_over_at_every_tick(KERNEL_FIXED, 37);
+}
+
+/* Many chunks, each taken over at the first or the last tick that there is. */
+static void run_chain(uint32_t late)
+{
+    struct motion m;
+    run_whole(KERNEL_FIXED, 100);
+    begin(&m);
+    for (uint32_t k = 0; k < right_count; k++) {
+        same_setpoints(&m, k, k + 1u);
+        if (m.chunk + 1u < chain.count) {
+            const struct chunk *next = &chunks[m.chunk + 1u];
+            struct motion ahead = m;
+            tick(&ahead);
+            if (late == 0u || passed_joint(&ahead, next)) {
+                (void)take_over(&m);
+            }
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(chain.count - 1u, m.chunk);
+    TEST_ASSERT_EQUAL_INT(FEED_ENDED, feed_override_state(&m.feed));
+}
+
+static void test_chains_give_the_setpoints_of_the_whole(void)
+{
+    uint64_t random = 5;
+    uint32_t most = 0;
+    for (int i = 0; i < 40; i++) {
+        TEST_ASSERT_TRUE(chunked_random(&chain, &whole, &random));
+        most = chain.count > most ? chain.count : most;
+        accept_all(KERNEL_FIXED);
+        run_chain(0);
+        run_chain(1);
+        chunked_close(&chain);
+    }
+    TEST_ASSERT_TRUE(most > 8u);
+}
+
+static void run_to_piece(struct motion *m, uint32_t piece)
+{
+    while (m->feed.clock.piece < piece) {
+        tick(m);
+    }
+}
+
+/* In motion with a brake, a command that waits for one, or a search of the override: not now. */
+static void test_no_takeover_while_a_stop_or_a_search_is_under_way(void)
+{
+    struct motion m;
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    for (int kind = 0; kind < 3; kind++) {
+        begin(&m);
+        run_to_piece(&m, 20);
+        kind == 0   ? feed_override_hold(&m.feed)
+        : kind == 1 ? feed_override_stop(&m.feed)
+                    : feed_override_fault_stop(&m.feed);
+        while (feed_override_state(&m.feed) != FEED_HELD &&
+               feed_override_state(&m.feed) != FEED_STOPPED) {
+            TEST_ASSERT_FALSE(take_over(&m));
+            tick(&m);
+        }
+        TEST_ASSERT_EQUAL_INT(kind == 0, take_over(&m)); /* a stop is final */
+    }
+    begin(&m);
+    TEST_ASSERT_FALSE(take_over(&m)); /* nothing has moved yet */
+    run_to_piece(&m, 20);
+    feed_override_set(&m.feed, 50);
+    TEST_ASSERT_FALSE(take_over(&m));
+    tick(&m);
+    TEST_ASSERT_FALSE(take_over(&m)); /* a window is looked at */
+}
+
+/* A ramp that ends before the joint goes on in the next chunk as it would have in this one; one that was decided with pieces
+ * behind it keeps this chunk. */
+static void test_ramps(void)
+{
+    struct motion m;
+    uint32_t in_ramp = 0;
+    uint32_t refused = 0;
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    begin(&m);
+    run_to_piece(&m, 14);
+    feed_override_set(&m.feed, 95);
+    while (!passed_joint(&m, &chunks[1])) {
+        tick(&m);
+        struct motion branch = m;
+        struct motion same = m;
+        if (override_ramp_moves(&m.feed.plan.ramp)) {
+            if (!take_over(&branch)) {
+                refused++;
+                continue;
+            }
+            in_ramp++;
+            while (override_ramp_moves(&same.feed.plan.ramp)) {
+                tick(&same);
+                tick(&branch);
+                TEST_ASSERT_EQUAL_MEMORY(&same.point, &branch.point, sizeof m.point);
+            }
+        }
+    }
+    TEST_ASSERT_TRUE(in_ramp > 0u);
+    begin(&m);
+    run_to_piece(&m, 37); /* no window ends before the joint */
+    feed_override_set(&m.feed, 10);
+    for (int i = 0; i < 30; i++) {
+        tick(&m);
+        if (override_ramp_moves(&m.feed.plan.ramp) &&
+            m.feed.plan.ahead.end_q32_s > chunks[1].time_shift_q32_s) {
+            refused += take_over(&m) ? 0u : 1u;
+        }
+    }
+    TEST_ASSERT_TRUE(refused > 0u);
+}
+
+/* --- At rest --- */
+
+/* The setpoint is on the path of the whole program, at its arc length, and has not gone back. */
+static void on_the_path(const struct motion *m, int64_t *last_q40, struct interpolator *path)
+{
+    struct interpolator_point at;
+    const int64_t arc = m->point.arc_length_q40_mm;
+    TEST_ASSERT_TRUE(arc >= *last_q40 - 4);
+    *last_q40 = arc;
+    while (interpolator_at_arc_length(path, arc, &at) < 0) {
+        (void)interpolator_at_arc_length(path, path->segment->to_q40_mm, &at);
+    }
+    for (int axis = 0; axis < 2; axis++) {
+        TEST_ASSERT_TRUE(llabs(at.position_q40[axis] - m->point.position_q40[axis]) < 2200000);
+    }
+}
+
+static void run_on(struct motion *m, uint32_t ticks, int64_t *last_q40, struct interpolator *path)
+{
+    for (uint32_t k = 0; k < ticks && feed_override_state(&m->feed) != FEED_ENDED; k++) {
+        tick(m);
+        on_the_path(m, last_q40, path);
+    }
+}
+
+static void test_the_tail_ends_at_rest_and_the_motion_goes_on_from_there(void)
+{
+    struct motion m;
+    struct interpolator path;
+    int64_t last_q40 = 0;
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    golden_prepare(&exact, &whole.program, KERNEL_DOUBLE);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&path, &exact.program));
+    begin(&m);
+    while (!feed_override_waits(&m.feed)) {
+        run_on(&m, 1, &last_q40, &path);
+    }
+    TEST_ASSERT_EQUAL_INT(FEED_RUNNING, feed_override_state(&m.feed));
+    TEST_ASSERT_EQUAL_UINT32(0, feed_override_actual_q30(&m.feed));
+    TEST_ASSERT_TRUE(feed_override_feed_q32(&m.feed) == 0);
+    TEST_ASSERT_TRUE(m.point.arc_length_q40_mm == chunks[0].program.header.length_q40_mm);
+    run_on(&m, 100, &last_q40, &path);
+    TEST_ASSERT_TRUE(take_over(&m));
+    TEST_ASSERT_FALSE(feed_override_waits(&m.feed));
+    run_on(&m, MOST_TICKS, &last_q40, &path);
+    TEST_ASSERT_EQUAL_INT(FEED_ENDED, feed_override_state(&m.feed));
+    TEST_ASSERT_TRUE(m.point.arc_length_q40_mm == whole.program.header.length_q40_mm);
+    golden_discard(&exact);
+}
+
+/* Commands while it waits at the end of a tail, or on the way there. */
+static void test_commands_at_the_end_of_a_tail(void)
+{
+    struct motion m;
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    for (uint32_t before = 0; before < 40;
+         before++) { /* a hold so many ticks before the end, and at it */
+        begin(&m);
+        const uint64_t end = chunks[0].program.header.duration_q32_s << 10;
+        while (feed_override_time_q42(&m.feed) + before * m.feed.clock.period_q42_s < end &&
+               !feed_override_waits(&m.feed)) {
+            tick(&m);
+        }
+        feed_override_hold(&m.feed);
+        for (int k = 0; k < 2000 && feed_override_state(&m.feed) != FEED_HELD; k++) {
+            tick(&m);
+        }
+        TEST_ASSERT_EQUAL_INT(FEED_HELD, feed_override_state(&m.feed));
+        const struct interpolator_point rest = m.point;
+        TEST_ASSERT_TRUE(take_over(&m));
+        for (int k = 0; k < 200; k++) { /* still held */
+            tick(&m);
+            TEST_ASSERT_EQUAL_MEMORY(&rest, &m.point, sizeof rest);
+        }
+        feed_override_resume(&m.feed);
+        for (int k = 0; k < MOST_TICKS && feed_override_state(&m.feed) != FEED_ENDED; k++) {
+            tick(&m);
+        }
+        TEST_ASSERT_EQUAL_INT(FEED_ENDED, feed_override_state(&m.feed));
+    }
+    for (int kind = 0; kind < 2; kind++) {
+        begin(&m);
+        while (!feed_override_waits(&m.feed)) {
+            tick(&m);
+        }
+        kind == 0 ? feed_override_stop(&m.feed) : feed_override_fault_stop(&m.feed);
+        TEST_ASSERT_EQUAL_INT(FEED_STOPPED, feed_override_state(&m.feed));
+        TEST_ASSERT_FALSE(take_over(&m));
+    }
+}
+
+/* Held before the chunk begins: it has to wait until the motion is there. */
+static void test_no_takeover_at_rest_before_the_chunk(void)
+{
+    struct motion m;
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    begin(&m);
+    run_to_piece(&m, 6);
+    feed_override_hold(&m.feed);
+    while (feed_override_state(&m.feed) != FEED_HELD) {
+        tick(&m);
+    }
+    TEST_ASSERT_TRUE(m.point.arc_length_q40_mm <
+                     chunks[1].job_start_q40_mm + program_piece_start(&chunks[1].program, 0));
+    TEST_ASSERT_FALSE(take_over(&m));
+    feed_override_resume(&m.feed);
+    while (!take_over(&m)) {
+        TEST_ASSERT_FALSE(passed_joint(&m, &chunks[1]));
+        tick(&m);
+    }
+}
+
+/* Above 100 % the override counts as 100 % until the last chunk. */
+static void test_override_above_100_waits_for_the_last_chunk(void)
+{
+    struct motion m;
+    uint32_t most_q30 = 0;
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    run_whole(KERNEL_FIXED, 100);
+    begin(&m);
+    feed_override_set(&m.feed, 150);
+    uint32_t k = 0;
+    while (m.feed.clock.piece < 30) {
+        same_setpoints(&m, k, k + 1u);
+        TEST_ASSERT_TRUE(feed_override_saturated(&m.feed));
+        k++;
+    }
+    TEST_ASSERT_TRUE(take_over(&m));
+    while (feed_override_state(&m.feed) != FEED_ENDED) {
+        tick(&m);
+        const uint32_t now_q30 = feed_override_actual_q30(&m.feed);
+        most_q30 = now_q30 > most_q30 ? now_q30 : most_q30;
+    }
+    TEST_ASSERT_TRUE(most_q30 > 1u << 30);
+    TEST_ASSERT_TRUE(m.point.arc_length_q40_mm == whole.program.header.length_q40_mm);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_headers_are_refused_with_their_codes);
+    RUN_TEST(test_damage_is_refused);
+    RUN_TEST(test_the_shared_part_is_compared_bit_for_bit);
+    RUN_TEST(test_a_program_in_motion_is_accepted_in_a_chunk_only);
+    RUN_TEST(test_a_takeover_at_every_tick_changes_no_setpoint);
+    RUN_TEST(test_chains_give_the_setpoints_of_the_whole);
+    RUN_TEST(test_no_takeover_while_a_stop_or_a_search_is_under_way);
+    RUN_TEST(test_ramps);
+    RUN_TEST(test_the_tail_ends_at_rest_and_the_motion_goes_on_from_there);
+    RUN_TEST(test_commands_at_the_end_of_a_tail);
+    RUN_TEST(test_no_takeover_at_rest_before_the_chunk);
+    RUN_TEST(test_override_above_100_waits_for_the_last_chunk);
+    return UNITY_END();
+}

@@ -1,0 +1,440 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop and
+ * fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside its
+ * limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case ends with
+ * a host that sends no more: then the motion comes to rest.
+ *
+ * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "chunked.h"
+#include "core/feed_override.h"
+#include "golden.h"
+#include "unity.h"
+
+#define CASES      10000u
+#define WHOLES     12u
+#define LINES      4u /* of them: one for each period */
+#define CHAINS     6u /* of each whole program */
+#define MOST_TICKS 6000u
+#define LONGEST    20000u /* until rest */
+
+static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "heart_minimax.hdgp", "line.hdgp",
+                                     "alpha_exponential.hdgp"};
+
+/* The motion with the number of its chunk and of its next setpoint. */
+struct motion {
+    struct feed_override feed;
+    struct interpolator it;
+    uint32_t chunk;
+    uint32_t tick;
+};
+
+struct chain {
+    struct chunked cuts;
+    struct chunk chunks[CHUNKED_MOST];
+    void *records[CHUNKED_MOST];
+    struct motion begun[CHUNKED_MOST]; /* as it was when each chunk was the program */
+};
+
+static struct {
+    struct override_program program;
+    struct interpolator_point right[MOST_TICKS]; /* its setpoints at 100 % */
+    uint32_t ticks;
+    struct golden_prepared exact;
+    struct chain chains[CHAINS];
+    uint32_t chain_count;
+} wholes[WHOLES];
+
+static struct {
+    const struct override_program *p;
+    struct chain *chain;
+    struct motion m;
+    struct interpolator path;
+    struct interpolator_point point;
+    double h;
+    double arc[4];
+    uint32_t known; /* setpoints in `arc` */
+    uint32_t which;
+    uint32_t held;      /* 1: a hold was commanded */
+    uint32_t fault;     /* 1: a fault stop */
+    uint32_t commanded; /* commands so far, */
+    uint32_t rested;    /* and rests at the end of a tail */
+    unsigned number;
+} now;
+
+static struct {
+    uint64_t ticks;
+    unsigned moving, resting, underruns, refused, same, ended, stopped, held, waited;
+    double jerk;
+} seen;
+
+static char message[160];
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+static const char *where(const char *what, double a, double b)
+{
+    snprintf(message, sizeof message, "case %u tick %u chunk %u: %s: %.12g, %.12g", now.number,
+             now.m.tick, now.m.chunk, what, a, b);
+    return message;
+}
+
+static void at_most(const char *what, double a, double most)
+{
+    if (!(a <= most)) {
+        TEST_FAIL_MESSAGE(where(what, a, most));
+    }
+}
+
+/* --- Programs and chains --- */
+
+static void run_whole(uint32_t w)
+{
+    struct golden_prepared fixed;
+    struct feed_override feed;
+    struct interpolator it;
+    golden_prepare(&fixed, &wholes[w].program.program, KERNEL_FIXED);
+    golden_prepare(&wholes[w].exact, &wholes[w].program.program, KERNEL_DOUBLE);
+    feed_override_begin(&feed, &fixed.program, fixed.program.header.period_us, 0);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &fixed.program));
+    while (feed_override_state(&feed) != FEED_ENDED) {
+        TEST_ASSERT_TRUE(wholes[w].ticks < MOST_TICKS);
+        TEST_ASSERT_EQUAL_INT(0,
+                              feed_override_next(&feed, &it, &wholes[w].right[wholes[w].ticks++]));
+    }
+    golden_discard(&fixed);
+}
+
+static void accept(struct chain *c)
+{
+    const struct program_limits limits = golden_no_limits();
+    const struct kernel *kernel = kernel_find(KERNEL_FIXED);
+    for (uint32_t i = 0; i < c->cuts.count; i++) {
+        struct program_fault fault;
+        struct chunk *chunk = &c->chunks[i];
+        TEST_ASSERT_EQUAL_INT(0, chunk_open(chunk, c->cuts.bytes[i], c->cuts.sizes[i]));
+        const int code = chunk_check(chunk, i > 0 ? chunk - 1 : NULL, &limits, &fault);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, code, program_error_text(code));
+        const uint64_t size = coefficients_size(&chunk->program, kernel);
+        c->records[i] = malloc((size_t)size);
+        TEST_ASSERT_EQUAL_INT(0,
+                              coefficients_make_in(&chunk->program, kernel, c->records[i], size));
+    }
+}
+
+/* The motion of a chain whose chunks come in time, at the takeover of each. */
+static void note_begins(struct chain *c)
+{
+    struct motion m = {.chunk = 0};
+    struct interpolator_point point;
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&m.it, &c->chunks[0].program));
+    feed_override_begin_job(&m.feed, &c->chunks[0], c->cuts.whole->program.header.period_us);
+    c->begun[0] = m;
+    while (m.chunk + 1u < c->cuts.count) {
+        TEST_ASSERT_EQUAL_INT(0, feed_override_next(&m.feed, &m.it, &point));
+        m.tick++;
+        if (feed_override_take_over(&m.feed, &m.it, &c->chunks[m.chunk + 1u])) {
+            m.chunk++;
+            c->begun[m.chunk] = m;
+        }
+        TEST_ASSERT_FALSE(feed_override_waits(&m.feed));
+    }
+}
+
+static void make_whole(uint32_t w, uint64_t *random)
+{
+    struct override_program *p = &wholes[w].program;
+    if (w < LINES) {
+        override_program_random(p, 1000u << w, random);
+    } else {
+        override_program_golden(p, GOLDEN[w % (sizeof GOLDEN / sizeof *GOLDEN)]);
+        chunked_refine(p, override_random(random, 0.012, 0.03));
+    }
+    override_program_limits(p, random);
+    run_whole(w);
+    for (uint32_t i = 0; i < 4u * CHAINS && wholes[w].chain_count < CHAINS; i++) {
+        struct chain *c = &wholes[w].chains[wholes[w].chain_count];
+        if (chunked_random(&c->cuts, p, random)) {
+            accept(c);
+            note_begins(c);
+            wholes[w].chain_count++;
+        }
+    }
+    TEST_ASSERT_TRUE(wholes[w].chain_count > 0u);
+}
+
+/* --- A tick --- */
+
+static void check_differences(void)
+{
+    const double more = now.fault != 0u ? 2 : 1; /* its codes are twice those of a hold */
+    memmove(now.arc, now.arc + 1, 3 * sizeof *now.arc);
+    now.arc[3] = (double)now.point.arc_length_q40_mm / 1099511627776.0;
+    if (++now.known < 4) {
+        return;
+    }
+    const double jerk =
+        fabs(now.arc[3] - 3 * now.arc[2] + 3 * now.arc[1] - now.arc[0]) / (now.h * now.h * now.h);
+    const double a = fabs(now.arc[3] - 2 * now.arc[2] + now.arc[1]) / (now.h * now.h);
+    at_most("jerk", jerk, more * now.p->limit.jerk * (1 + 1e-6) + 1.0);
+    at_most("acceleration", a, more * now.p->limit.acceleration * (1 + 1e-6) + 1e-3);
+    at_most("never backwards", now.arc[2] - now.arc[3], 2e-10);
+    seen.jerk = fmax(seen.jerk, jerk / now.p->limit.jerk / more);
+}
+
+/* Setpoints lie on the path of the whole program: each eighth, and all at rest. */
+static void check_path(void)
+{
+    struct interpolator_point exact;
+    const int64_t arc = now.point.arc_length_q40_mm;
+    if (now.m.tick % 8u != 0 && feed_override_feed_q32(&now.m.feed) != 0) {
+        return;
+    }
+    while (interpolator_at_arc_length(&now.path, arc, &exact) < 0) {
+        TEST_ASSERT_TRUE(now.path.segment->to_q40_mm != INT64_MAX);
+        (void)interpolator_at_arc_length(&now.path, now.path.segment->to_q40_mm, &exact);
+    }
+    at_most("on the path",
+            hypot((double)(exact.position_q40[0] - now.point.position_q40[0]),
+                  (double)(exact.position_q40[1] - now.point.position_q40[1])),
+            1.2e6);
+}
+
+/* In time and without commands: what the whole program has. */
+static void check_same(void)
+{
+    if (now.commanded == 0 && now.rested == 0 &&
+        now.m.feed.clock.piece <
+            now.chain->cuts.cuts[now.m.chunk].joint - now.chain->cuts.cuts[now.m.chunk].first) {
+        const uint32_t last = wholes[now.which].ticks - 1u;
+        const struct interpolator_point *right =
+            &wholes[now.which].right[now.m.tick < last ? now.m.tick : last];
+        TEST_ASSERT_EQUAL_MEMORY_MESSAGE(right, &now.point,
+                                         offsetof(struct interpolator_point, position_q40[2]),
+                                         where("the same setpoint", 0, 0));
+        seen.same++;
+    }
+}
+
+static void tick(void)
+{
+    const int waited = feed_override_waits(&now.m.feed);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, feed_override_next(&now.m.feed, &now.m.it, &now.point),
+                                  where("no error", 0, 0));
+    now.point.arc_length_q40_mm += now.chain->chunks[now.m.chunk].job_start_q40_mm;
+    if (!waited && feed_override_waits(&now.m.feed)) {
+        now.rested++;
+        seen.underruns++;
+    }
+    check_differences();
+    check_path();
+    check_same();
+    TEST_ASSERT_FALSE_MESSAGE(feed_override_late(&now.m.feed), where("late", 0, 0));
+    now.m.tick++;
+    seen.ticks++;
+}
+
+static int over(void)
+{
+    const enum feed_state state = feed_override_state(&now.m.feed);
+    return state == FEED_ENDED || state == FEED_STOPPED;
+}
+
+static int rests(void)
+{
+    return over() || feed_override_state(&now.m.feed) == FEED_HELD ||
+           feed_override_waits(&now.m.feed) ||
+           (feed_override_state(&now.m.feed) == FEED_RUNNING && now.m.feed.plan.started != 0 &&
+            now.m.feed.plan.asked_q57 == 0 && now.m.feed.plan.now.override_q57 == 0);
+}
+
+/* --- A case --- */
+
+static void command(uint64_t *random)
+{
+    const uint64_t kind = golden_random(random) % 8u;
+    now.commanded++;
+    if (kind < 2) {
+        now.held = 1;
+        feed_override_hold(&now.m.feed);
+    } else if (kind < 4) {
+        now.held = 0;
+        feed_override_resume(&now.m.feed);
+    } else if (kind < 7 || golden_random(random) % 4u != 0) {
+        feed_override_set(&now.m.feed, (uint32_t)(golden_random(random) % 201u));
+    } else if (golden_random(random) % 2u == 0) {
+        feed_override_stop(&now.m.feed);
+    } else {
+        now.fault |= over() ? 0u : 1u;
+        feed_override_fault_stop(&now.m.feed);
+    }
+}
+
+/* A chunk comes damaged, or one that is not wanted: refused, and nothing changes. */
+static void refuse(uint64_t *random)
+{
+    const struct program_limits limits = golden_no_limits();
+    struct chunked *cuts = &now.chain->cuts;
+    const uint32_t i = (uint32_t)(golden_random(random) % cuts->count);
+    /* not of magic, version, flags and size, which the CRC does not cover */
+    const uint64_t bit = 8u * 12u + golden_random(random) % (8u * (cuts->sizes[i] - 12u));
+    struct program_fault fault;
+    struct chunk chunk;
+    if (i != now.m.chunk + 1u && golden_random(random) % 2u == 0) { /* again, or out of order */
+        TEST_ASSERT_EQUAL_INT(0, chunk_open(&chunk, cuts->bytes[i], cuts->sizes[i]));
+        TEST_ASSERT_EQUAL_INT(
+            PROGRAM_ERR_CHUNK_SEQUENCE,
+            chunk_check(&chunk, &now.chain->chunks[now.m.chunk], &limits, &fault));
+    } else {
+        cuts->bytes[i][bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+        TEST_ASSERT_TRUE(chunk_open(&chunk, cuts->bytes[i], cuts->sizes[i]) < 0);
+        cuts->bytes[i][bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+    }
+    seen.refused++;
+}
+
+/* The next chunk is there: it is taken over when that is possible. */
+static void try_to_take_over(void)
+{
+    const int moves = feed_override_feed_q32(&now.m.feed) != 0;
+    if (now.m.chunk + 1u < now.chain->cuts.count &&
+        feed_override_take_over(&now.m.feed, &now.m.it, &now.chain->chunks[now.m.chunk + 1u])) {
+        now.m.chunk++;
+        seen.moving += moves ? 1u : 0u;
+        seen.resting += moves ? 0u : 1u;
+    }
+}
+
+static void begin(uint64_t *random)
+{
+    const unsigned number = now.number;
+    memset(&now, 0, sizeof now);
+    now.number = number;
+    now.which = (uint32_t)(golden_random(random) % WHOLES);
+    now.p = &wholes[now.which].program;
+    now.chain = &wholes[now.which].chains[golden_random(random) % wholes[now.which].chain_count];
+    now.m = now.chain->begun[golden_random(random) % now.chain->cuts.count];
+    now.h = now.p->program.header.period_us * 1e-6;
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&now.path, &wholes[now.which].exact.program));
+}
+
+/* The host sends no more: to rest, unless the override is nothing or it has been held there. */
+static void end(uint64_t *random)
+{
+    if (now.m.feed.plan.asked_q57 < OVERRIDE_ONE / 2) {
+        feed_override_set(&now.m.feed, 60u + (uint32_t)(golden_random(random) % 100u));
+    }
+    for (uint32_t i = 0; i < LONGEST && !rests(); i++) {
+        tick();
+    }
+    TEST_ASSERT_TRUE_MESSAGE(rests(), where("no rest", 0, 0));
+    const struct interpolator_point place = now.point;
+    for (int i = 0; i < 3; i++) {
+        tick();
+        TEST_ASSERT_EQUAL_MEMORY(&place, &now.point, sizeof place);
+    }
+    seen.ended += feed_override_state(&now.m.feed) == FEED_ENDED;
+    seen.stopped += feed_override_state(&now.m.feed) == FEED_STOPPED;
+    seen.held += feed_override_state(&now.m.feed) == FEED_HELD;
+    seen.waited += feed_override_waits(&now.m.feed) ? 1u : 0u;
+    if (feed_override_state(&now.m.feed) == FEED_ENDED) {
+        TEST_ASSERT_TRUE(now.point.arc_length_q40_mm == now.p->program.header.length_q40_mm);
+    }
+}
+
+/* 0 to 256, the short ones often. */
+static uint32_t some_ticks(uint64_t *random)
+{
+    const uint32_t most = 4u << golden_random(random) % 7u;
+    return (uint32_t)(golden_random(random) % most);
+}
+
+static void run_case(uint64_t seed)
+{
+    uint64_t random = seed;
+    begin(&random);
+    const uint32_t arrivals = 1u + (uint32_t)(golden_random(&random) % 3u);
+    const int quiet = golden_random(&random) % 4u == 0;
+    for (uint32_t i = 0; i < arrivals && !over(); i++) {
+        const uint32_t wait = some_ticks(&random);
+        const uint32_t there = some_ticks(&random);
+        for (uint32_t k = 0; k < wait + there && !over(); k++) {
+            if (!quiet && golden_random(&random) % 32u == 0) {
+                command(&random);
+            }
+            if (golden_random(&random) % 512u == 0) {
+                refuse(&random);
+            }
+            if (k >= wait) {
+                try_to_take_over();
+            }
+            tick();
+        }
+    }
+    end(&random);
+}
+
+static unsigned setting(const char *name, unsigned otherwise)
+{
+    const char *text = getenv(name);
+    return text != NULL ? (unsigned)strtoul(text, NULL, 10) : otherwise;
+}
+
+static void free_all(void)
+{
+    for (uint32_t w = 0; w < WHOLES; w++) {
+        for (uint32_t i = 0; i < wholes[w].chain_count; i++) {
+            struct chain *c = &wholes[w].chains[i];
+            for (uint32_t k = 0; k < c->cuts.count; k++) {
+                free(c->records[k]);
+            }
+            chunked_close(&c->cuts);
+        }
+        golden_discard(&wholes[w].exact);
+        override_program_close(&wholes[w].program);
+    }
+}
+
+static void test_cuts_at_any_instant(void)
+{
+    const unsigned cases = setting("HODOGRAPH_CASES", CASES);
+    uint64_t seed = setting("HODOGRAPH_SEED", 1);
+    uint64_t random = seed;
+    for (uint32_t w = 0; w < WHOLES; w++) {
+        make_whole(w, &random);
+    }
+    for (unsigned i = setting("HODOGRAPH_FIRST", 0); i < cases; i++) {
+        now.number = i;
+        run_case(seed * 0x100000001u + i);
+    }
+    printf("%u cuts, %.3g ticks: %u takeovers in motion, %u at rest, %u chunks refused, %u rests "
+           "at the end of a tail; ended %u, stopped %u, held %u, waits %u; %u setpoints beside "
+           "the whole; jerk %.4f of the limit\n",
+           cases, (double)seen.ticks, seen.moving, seen.resting, seen.refused, seen.underruns,
+           seen.ended, seen.stopped, seen.held, seen.waited, seen.same, seen.jerk);
+    if (cases >= 1000u) {
+        TEST_ASSERT_TRUE(seen.moving > cases / 8u && seen.resting > cases / 64u);
+        TEST_ASSERT_TRUE(seen.refused > 0 && seen.underruns > cases / 8u && seen.same > cases);
+        TEST_ASSERT_TRUE(seen.ended > 0 && seen.stopped > 0 && seen.held > 0 && seen.waited > 0);
+    }
+    free_all();
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_cuts_at_any_instant);
+    return UNITY_END();
+}
