@@ -21,7 +21,8 @@ from ..program.stops import no_stops
 from .chunk import Chunk
 from .windows import chained, taken
 
-_SLICE_TICKS = 2048
+_SLICE_TICKS = 50
+"""Less than a takeover may be late (LATENESS_S), at the shortest period."""
 
 
 @dataclass(frozen=True)
