@@ -96,11 +96,12 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
 def operator_stops(job: Job) -> Iterator[tuple[int, str]]:
     """Where a job waits for the operator: source line, and the code of it."""
     for section in job.sections:
-        yield from _stops(section.before)
-    yield from _stops(job.after)
+        yield from stops(section.before)
+    yield from stops(job.after)
 
 
-def _stops(commands: Sequence[Command]) -> Iterator[tuple[int, str]]:
+def stops(commands: Sequence[Command]) -> Iterator[tuple[int, str]]:
+    """The same of some commands."""
     for command in commands:
         if isinstance(command, ProgramStop):
             yield command.line, "M1" if command.optional else "M0"
@@ -133,7 +134,7 @@ def run_job(
     for number, (section, program) in enumerate(zip(job.sections, made.programs, strict=True), 1):
         if number == 1:
             _to_start(at, made, program, unhomed)
-        _rest(at, job, section.before, operator)
+        at_rest(at, job.file, section.before, operator)
         place = f"{job.file}:{section.first_line}: section {number} of {len(job.sections)}"
         _to_start(at, made, program, unhomed)
         done = passed
@@ -146,14 +147,14 @@ def run_job(
         )
         _require_end(at, made, program, place)
         passed += program.ticks
-        _say(at, job, [command for _, command in section.events])
+        _say(at, job.file, [command for _, command in section.events])
         try:
             runs.append(_analysed(at, made, program, recorded, _record_of(record, number, job)))
         except SetpointJumpError as error:
             raise RunError(f"{place}: {error}") from None
         except RunError as error:
             failure = failure or RunError(f"{place}: {error}")
-    _rest(at, job, job.after, operator)
+    at_rest(at, job.file, job.after, operator)
     if failure is not None:
         raise failure
     motion = JobMotion(job, tuple(run.motion for run in runs), made.planning_s)
@@ -204,21 +205,21 @@ def _require_end(at: RunSession, made: PreparedJob, program: NativeProgram, plac
         raise RunError(f"{place}: stopped before its end: the job ends here")
 
 
-def _rest(at: RunSession, job: Job, commands: Sequence[Command], operator: Operator) -> None:
+def at_rest(at: RunSession, file: Path, commands: Sequence[Command], operator: Operator) -> None:
     """What happens at rest, in its order. Commands that the machine has nothing for are passed."""
     for command in commands:
-        _say(at, job, [command])
+        _say(at, file, [command])
         if isinstance(command, Dwell):
             _dwell(at, command.duration_s)
-        for line, code in _stops([command]):
-            operator(f"{job.file}:{line}: {code}", lambda: _look(at, _LOOK_S))
+        for line, code in stops([command]):
+            operator(f"{file}:{line}: {code}", lambda: _look(at, _LOOK_S))
 
 
-def _say(at: RunSession, job: Job, commands: Sequence[Command]) -> None:
+def _say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
     """Tells the messages among commands. Those on the way of a section are told at its end."""
     for command in commands:
         if isinstance(command, Message):
-            at.note(f"{job.file}:{command.line}: {command.text}")
+            at.note(f"{file}:{command.line}: {command.text}")
 
 
 def _dwell(at: RunSession, duration_s: float) -> None:

@@ -120,13 +120,16 @@ class SectionChunks:
         blocks: Iterator[Block],
         job: int,
         most_bytes: int = CHUNK_BYTES,
+        begin_q40: int = 0,
     ) -> None:
-        """`job`: number that the chunks carry; `most_bytes`: of a chunk, as the controller has room for."""
+        """`job`: number that the chunks carry; `most_bytes`: of a chunk, as the controller has room for; `begin_q40`:
+        arc length of the section where the path of the blocks begins.
+        """
         self.machine = machine
         self._name, self._job = name[:_LONGEST_NAME], job
         self._limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
         self._feed = SectionFeed(
-            machine, blocks, Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)), self._exceeded
+            machine, blocks, Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)), self._exceeded, begin_q40
         )
         self._most = most_bytes
         self._kept = _Kept()
@@ -264,7 +267,7 @@ class SectionChunks:
             a_q44=path.a_q44[:, first:end],
             pieces=replace(pieces, start_q40=pieces.start_q40 - base),
             stops=replace(no_stops(len(pieces)), codes=codes),
-            moving=int(pieces.start_q40[0]) != 0,
+            moving=int(pieces.start_q40[0]) != self._feed.begin_q40,
         )
         return with_bounds(program)
 

@@ -7,13 +7,13 @@ never changes once it is here: chunks that were sent have its bits.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PlanError
+from ..errors import InputError, PlanError
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
 from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_ways, way_to_q40
@@ -32,6 +32,7 @@ _SPEED_RATIO = 2.0
 _PAIR_SHARE = 0.997
 """Of the feed at which a tick at 200 % crosses more than two ends of segments."""
 
+_BESIDE_MM = 1e-6
 _FARTHEST_Q40 = 1 << 62
 
 
@@ -83,6 +84,36 @@ def joined(curves: Sequence[Curve]) -> Curve:
     return SpatialPHSpline(origin, np.concatenate([one.preimage for one in curves]), False)  # type: ignore[union-attr]
 
 
+def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
+    """The blocks of a section from an arc length on. Raises InputError: it is not that long."""
+    for block in blocks:
+        length = block.curve.length_mm
+        if begin_mm >= length:
+            begin_mm -= length
+            continue
+        if begin_mm > 0.0:
+            block, begin_mm = _behind(block, begin_mm), 0.0
+        yield block
+    if begin_mm > _BESIDE_MM:
+        raise InputError(f"the section ends {begin_mm:g} mm before the place where it shall go on")
+
+
+def _behind(block: Block, begin_mm: float) -> Block:
+    """A block without its first part."""
+    segment, xi = block.curve.locate(begin_mm)
+    first, x = int(segment), float(xi)
+    curve = sliced(block.curve, first)
+    point = block.curve.position(first, x)
+    w = curve.w if isinstance(curve, PHSpline) else curve.preimage
+    a, b, c = np.moveaxis(w[:1], -1, 0)
+    b1, c1 = b + x * (c - b), c
+    middle = (a + x * (b - a)) + x * (b1 - (a + x * (b - a)))
+    w = np.concatenate((np.stack((middle, b1, c1), axis=-1) * np.sqrt(1.0 - x), w[1:]))
+    origin = np.concatenate((np.asarray(point)[None], curve.origin[1:]))
+    made = PHSpline(origin, w, False) if isinstance(curve, PHSpline) else SpatialPHSpline(origin, w, False)
+    return Block(made, block.feed_mm_s[first:], block.line[first:])
+
+
 class StreamPath:
     """The segments in memory. Arc lengths of `curve` and of zones count from their first one, those in q40 from the
     start of the section.
@@ -92,13 +123,13 @@ class StreamPath:
     point_q40  (A, N), a_q44 (2 or 4, N, 3): as in a program
     """
 
-    def __init__(self, offset_mm: Sequence[float], period_us: int) -> None:
-        """`offset_mm`: work offset of each axis of the path."""
+    def __init__(self, offset_mm: Sequence[float], period_us: int, begin_q40: int = 0) -> None:
+        """`offset_mm`: work offset of each axis of the path; `begin_q40`: arc length of the section at its start."""
         self._offset_mm = tuple(offset_mm)
         self._period_s = 1e-6 * period_us
         self._curve: Curve | None = None
         self._end_point: Int | None = None
-        self.start_q40: Int = np.zeros(1, dtype=np.int64)
+        self.start_q40: Int = np.array([begin_q40], dtype=np.int64)
         self.feed_mm_s: Real = np.zeros(0)
         self.line: Int = np.zeros(0, dtype=np.int64)
         self.complete = False

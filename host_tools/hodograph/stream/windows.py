@@ -48,7 +48,7 @@ _STOPS = 4.0
 _END_SHARE = 0.5
 """A window takes what remains of a section when that is less than this share of it more."""
 
-RESERVE = 0.004
+RESERVE = 0.01
 """Share of the axis limits that windows leave free: what is kept is not planned again when a later piece needs more."""
 
 _EASED = (1e-3, 1e-2)
@@ -121,12 +121,14 @@ class SectionFeed:
         blocks: Iterator[Block],
         joint: Spacing,
         exceeded: Callable[[Stretch], NDArray[np.bool_]],
+        begin_q40: int = 0,
     ) -> None:
         """`joint`: how far apart joints are; `exceeded`: the pieces (M,) of a stretch that the controller would
-        refuse for their motion.
+        refuse for their motion; `begin_q40`: arc length of the section where the blocks begin.
         """
         self.machine = machine
-        self.path = StreamPath(machine.offset_mm, machine.period_us)
+        self.path = StreamPath(machine.offset_mm, machine.period_us, begin_q40)
+        self.begin_q40 = begin_q40
         self._blocks = blocks
         self._joint = joint
         self._exceeded = exceeded
@@ -135,7 +137,7 @@ class SectionFeed:
         self._last: Window | None = None
         self._moving: State | None = None
         self._carried = (0.0, 0.0)
-        self._low_q40 = 0
+        self._low_q40 = begin_q40
         self._low_mm = 0.0
         self._first = True
         self._needed = 0
@@ -183,29 +185,34 @@ class SectionFeed:
         found = self._solved(limits, high, stop_s)
         if found is None:
             return self._to_rest()
-        return self._lowered(
+        made, bad = self._lowered(
             found, lambda one: self._window(one, limits, given, high, stop_s), lambda w: w.stretch
         )
+        if self._moving is not None and bad[: made.count].any():
+            return self._to_rest()
+        return made
 
     def _lowered(
         self,
         found: Solution,
         made: Callable[[Solution], _Made],
         stretch_of: Callable[[_Made], Stretch],
-    ) -> _Made:
-        """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse."""
+    ) -> tuple[_Made, NDArray[np.bool_]]:
+        """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse; and the
+        pieces that it still would refuse.
+        """
         tight, out = np.ones(found.grid.size), made(found)
         for _ in range(_MOST_LOWERED):
             bad = self._exceeded(stretch_of(out))
             if not bad.any():
-                break
+                return out, bad
             tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= _LOWERED
             lower = tightened(found, tight)
             if lower is None:
                 break
             found = lower
             out = made(found)
-        return out
+        return out, self._exceeded(stretch_of(out))
 
     def _window(
         self,
@@ -371,7 +378,7 @@ class SectionFeed:
                 own = _begun(ends_of(found, found.grid.size), state)
                 return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
 
-            yield self._lowered(one, made, lambda tail: tail)
+            yield self._lowered(one, made, lambda tail: tail)[0]
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
 
