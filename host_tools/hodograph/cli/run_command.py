@@ -98,15 +98,15 @@ def _task(options: Namespace, file: Path) -> Task:
 def _run_one(task: Task, address: BusAddress, options: Namespace) -> BusRun | JobRun:
     if isinstance(task, PreparedJob):
         with (
-            _session(task.job.machine, address, options) as at,
+            session(task.job.machine, address, options) as at,
             progress(f"run {task.job.file.name}", "tick", task.ticks) as bar,
         ):
-            operator = _pass if options.no_stops else _await_enter
+            operator = pass_stop if options.no_stops else await_enter
             return run_job(at, task, operator, bar, options.record, unhomed=options.unhomed)
     machine = task.machine
     print_notes(task, task.compilation.plan)
     with (
-        _session(machine, address, options) as at,
+        session(machine, address, options) as at,
         progress(f"run {task.file.name}", "tick", task.program.ticks) as bar,
     ):
         kernel = options.kernel or machine.kernel
@@ -116,7 +116,8 @@ def _run_one(task: Task, address: BusAddress, options: Namespace) -> BusRun | Jo
 
 
 @contextmanager
-def _session(machine: Machine, address: BusAddress, options: Namespace) -> Iterator[RunSession]:
+def session(machine: Machine, address: BusAddress, options: Namespace) -> Iterator[RunSession]:
+    """The controller of a machine on a bus, as the options of run and stream say."""
     with run_session(
         machine, address, options.pace or "real-time", options.wait, note, options.controller
     ) as at:
@@ -127,12 +128,14 @@ def _session(machine: Machine, address: BusAddress, options: Namespace) -> Itera
         yield at
 
 
-def _pass(text: str, look: Look) -> None:
+def pass_stop(text: str, look: Look) -> None:
+    """Goes on at a program stop without waiting."""
     look()
     note(f"{text}: passed without waiting (--no-stops)")
 
 
-def _await_enter(text: str, look: Look) -> None:
+def await_enter(text: str, look: Look) -> None:
+    """Waits at a program stop until Enter is pressed."""
     note(f"{text}: waits for Enter; Ctrl-C ends the job")
     while True:
         look()

@@ -97,6 +97,36 @@ class JobPlan:
                 raise IndexError(index)
             return None
 
+    def by_section(self) -> Iterator[Iterator[Chunk]]:
+        """The chunks of each section, as they are planned; each section is to be read to its end first."""
+        at = [0]
+
+        def chunks() -> Iterator[Chunk]:
+            last = False
+            while not last:
+                item = self.item(at[0], _FOR_EVER_S)
+                assert item is not None
+                at[0] += 1
+                yield item[1]
+                last = item[1].header.last
+
+        while True:
+            try:
+                self.item(at[0], _FOR_EVER_S)
+            except IndexError:
+                return
+            yield chunks()
+
+    @property
+    def chunks(self) -> int:
+        """Planned so far."""
+        return self._planned
+
+    @property
+    def bytes(self) -> int:
+        """Of these chunks."""
+        return self._ends[-1]
+
     @property
     def _planned(self) -> int:
         return len(self._section_of)
@@ -181,7 +211,7 @@ class JobPlan:
             self.after = reader.after
 
 
-_RATE_S = 3.0
+_RATE_S, _FOR_EVER_S = 3.0, 1e6
 
 
 def dwell_s(commands: Sequence[Command]) -> float:
