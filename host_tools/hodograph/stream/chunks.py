@@ -35,8 +35,8 @@ CHUNK_BYTES = 24 * 1024 - 64
 _NEW_SHARE = 0.5
 """Of these bytes, for what is new: the rest is for the repeated part and the tail."""
 
-LATENESS_S = 0.1
-"""A takeover may be so late without effect on the motion."""
+LATENESS_S, LEAST_LATENESS_S = 0.1, 0.02
+"""A takeover may be so late without effect on the motion; the lesser where there is no room for more."""
 
 SEARCH_S, GAP_S = 0.02, 0.06
 """Stops may begin about so often, and all pieces are searched where they may not for so long."""
@@ -97,17 +97,17 @@ class _Kept:
         old = [] if self.pieces is None else [self.pieces]
         return _Kept(chained([*old, pieces]), np.concatenate((self.codes, codes)))
 
-    def reduce(self) -> tuple[int, int]:
-        """Removes the pieces that the next chunk need not repeat. Returns how many, and their time in 2^-32 s."""
+    def repeated(self, lateness_s: float) -> tuple[_Kept, int, int]:
+        """The pieces that the next chunk repeats, how many before them it does not, and their time in 2^-32 s."""
         if self.pieces is None:
-            return 0, 0
+            return self, 0, 0
         count = len(self.codes)
         times = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(self.pieces.duration_q32_s)))
         looked = max(count - LEAST_SHARED_PIECES, 0)
-        late = times[looked] - round(LATENESS_S * 2**32)
+        late = times[looked] - round(lateness_s * 2**32)
         shift = max(int(np.searchsorted(times, late, side="right")) - 1, 0)
-        self.pieces, self.codes = taken(self.pieces, slice(shift, None)), self.codes[shift:]
-        return shift, int(times[shift])
+        kept = _Kept(taken(self.pieces, slice(shift, None)), self.codes[shift:])
+        return kept, shift, int(times[shift])
 
 
 class SectionChunks:
@@ -151,16 +151,19 @@ class SectionChunks:
         for, and which this is.
         """
         codes = self._stop_codes(window, first, joints[-1])
-        piece_shift, time_shift = self._kept.reduce()
-        kept = self._kept
-        for used in range(len(joints), 0, -1):
+        before = self._kept
+        for lateness_s, used in [
+            *((LATENESS_S, count) for count in range(len(joints), 0, -1)),
+            (LEAST_LATENESS_S, 1),
+        ]:
+            kept, piece_shift, time_shift = before.repeated(lateness_s)
             joint = joints[used - 1]
             new = taken(window.stretch.pieces, slice(first, joint))
             self._kept = kept.with_new(new, codes[: joint - first])
             program, fault = self._with_tail(window, joint)
             if fault is not None and fault.code == ProgramError.STOP_LONG:
-                codes = self._all_codes(window, first, joint)
-                self._kept = kept.with_new(new, codes)
+                codes = self._all_codes(window, first, joints[-1])
+                self._kept = kept.with_new(new, codes[: joint - first])
                 program, fault = self._with_tail(window, joint, search_tail=True)
             if fault is None and program.image_size + HEADER_SIZE <= self._most:
                 break

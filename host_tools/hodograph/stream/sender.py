@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from ..bus.goto import goto
 from ..bus.run import RunSession
-from ..bus.sdo.controller import HELD, READY
+from ..bus.sdo.controller import READY
 from ..bus.sdo.follow import Follower
-from ..bus.sdo.objects import ON_PATH
+from ..bus.sdo.objects import MOVING
 from ..bus.sdo.stream_channel import (
     ENDED,
     STOPPED,
@@ -26,7 +26,6 @@ from ..config import Machine
 from ..errors import RunError
 from ..job_run import Operator, at_rest
 from ..native import NativeProgram
-from ..toolpath.moves import Command
 from .chunk import Chunk
 from .journal import Journal
 from .plan import JobPlan, PlannedSection
@@ -38,7 +37,8 @@ _POLL_S = 0.05
 _PLAN_WAIT_S = 0.05
 _JOURNAL_S = 1.0
 _START_COUNTS = 2
-_LATE_PLAN_S = 60.0
+_START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
+"""A section starts when so much motion is sent, or so long after its first chunk."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Sender:
         item = self._wait_item()
         while item is not None:
             section = item[0]
-            self._section(section, item[1], first=sections == 0)
+            self._section(section, item[1])
             sections += 1
             item = self._wait_item()
         at_rest(self.at, self._file_of_last(), self.plan.after, self.operator)
@@ -131,10 +131,10 @@ class Sender:
         if self.at.rig is not None:
             self.at.rig.check()
 
-    def _section(self, section: PlannedSection, chunk: Chunk, *, first: bool) -> None:
-        self._to_start(chunk, first=first)
+    def _section(self, section: PlannedSection, chunk: Chunk) -> None:
+        self._to_start(chunk)
         at_rest(self.at, section.file, section.before, self.operator)
-        self._to_start(chunk, first=False)
+        self._to_start(chunk)
         if self.journal is not None:
             header = chunk.header
             self.journal.update(
@@ -145,7 +145,7 @@ class Sender:
         close_stream(self.at.controller)
         self._stream(section)
 
-    def _to_start(self, chunk: Chunk, *, first: bool) -> None:
+    def _to_start(self, chunk: Chunk) -> None:
         """Moves the axes to where a section begins, unless they stand there."""
         _, points = NativeProgram(chunk.image).setpoints(
             self.kernel, self.machine.counts_per_mm, 0, 1
@@ -155,14 +155,13 @@ class Sender:
         if off > _START_COUNTS:
             close_stream(self.at.controller)
             goto(self.at.controller, self.machine, start, unhomed=self.unhomed)
-        del first
 
     def _stream(self, section: PlannedSection) -> None:
         """Sends the chunks of a section and waits for its end."""
         controller = self.at.controller
         follower = Follower(controller, self.at.note)
         started = all_sent = False
-        sent = 0
+        sent, first_s = 0, 0.0
         while True:
             self._look()
             status = stream_status(controller) if sent else None
@@ -176,12 +175,18 @@ class Sender:
                 last = self._send_one(section, status)
             if last is not None:
                 sent, all_sent = sent + 1, last
-                if not started:
-                    self._slow_down()
-                    controller.start(unhomed=self.unhomed)
-                    started = True
+                first_s = first_s or controller.clock.now_s()
             else:
                 controller.clock.sleep(_POLL_S)
+            if not started and sent and (all_sent or self._may_start(first_s)):
+                self._slow_down()
+                controller.start(unhomed=self.unhomed)
+                started = True
+
+    def _may_start(self, first_s: float) -> bool:
+        """Whether enough is sent, or the first chunk has waited for long enough."""
+        waited_s = self.at.controller.clock.now_s() - first_s
+        return waited_s > _START_WAIT_S or stream_status(self.at.controller).committed_s > _START_AHEAD_S
 
     def _send_one(self, section: PlannedSection, status: StreamStatus | None) -> bool | None:
         """Sends the next chunk, if it is planned and there is room: whether it is the last one of the section."""
@@ -255,12 +260,5 @@ class Sender:
                 f"{section.file}:{status.line}: stopped before its end: the job ends here; "
                 "hodograph stream --continue goes on"
             )
-        controller.wait_for((*ON_PATH, HELD, READY, 5), 0.0)
+        controller.wait_for((*MOVING, READY), 0.0)
         return False
-
-
-def operator_waits(commands: Sequence[Command]) -> bool:
-    """Whether the operator is asked for something by one of the commands."""
-    from ..job_run import stops
-
-    return any(True for _ in stops(commands))
