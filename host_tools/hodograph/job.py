@@ -268,9 +268,7 @@ class SectionMaker:
             feed = np.where(reference.feed_mm_s < inf, self.feed_mm_s, inf)
             section = replace(section, reference=replace(reference, feed_mm_s=feed))
         self._check_plane(section)
-        found = fit(
-            section.reference, Tolerance(section.tolerance_mm, self._limits), section.tied
-        )
+        found = fit(section.reference, Tolerance(section.tolerance_mm, self._limits), section.tied)
         if isinstance(found, FittedPath):
             yield self._section(section, found)
             return

@@ -28,6 +28,11 @@ _LOOK_S = 0.1
 _START_COUNTS = 2
 """So far off its start a section begins at once: the rounding of the end of the one before."""
 
+
+class NoRoomError(PlanError):
+    """A section takes more memory than the controller has for a program."""
+
+
 Look = Callable[[], None]
 """Waits a little and raises what has gone wrong on the bus meanwhile."""
 
@@ -85,9 +90,9 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
         needed = memory_bytes(program.image, *RECORD_BYTES[kernel])
         room = job.machine.program_bytes or LARGEST_BANK
         if needed > room:
-            raise PlanError(
+            raise NoRoomError(
                 f"{job.file}:{section.first_line}: the section up to line {section.last_line} takes {needed} bytes of "
-                f"a controller, which has {room}: divide it by a dwell (G4 P0), or raise --tolerance"
+                f"a controller, which has {room}: hodograph stream takes jobs of any length"
             )
         programs.append(program)
     return PreparedJob(job, kernel, tuple(programs), perf_counter() - begin)

@@ -9,11 +9,13 @@ import time
 from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from ..bus.address import BusAddress
 from ..bus.own_bus import opened_bus
 from ..bus.run import bring_up
-from ..bus.sdo.objects import STREAM
+from ..bus.sdo.controller import connect
+from ..bus.sdo.objects import ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
 from ..config import Machine, load_machine
@@ -28,8 +30,8 @@ from ..stream.plan import JobFiles, JobPlan, Place
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
 from ..toolpath.files import ReadOptions
+from .bus_session import await_enter, pass_stop, session
 from .output import duration_text, note, number, print_json, print_rows, progress, size_text
-from .run_command import await_enter, pass_stop, session
 from .toolpath_commands import reading_of, require_toolpath
 
 _RING_SHARE = 3
@@ -40,7 +42,8 @@ _SMALL_RING = 48 * 1024
 
 _EVERY_S = 5.0
 _FRAME_BITS, _FRAME_BYTES, _USED = 135, 7, 0.85
-"""Of a frame of a block download, with all stuff bits; share of the free bus that it reaches beside answers and pauses."""
+"""Of a frame of a block download, with all stuff bits; share of the free bus that is reached beside answers and
+pauses."""
 
 
 def stream(options: Namespace) -> None:
@@ -50,28 +53,36 @@ def stream(options: Namespace) -> None:
         return
     if not options.files:
         raise InputError("stream: give one FILE at least, or - for standard input, or --continue")
-    if options.machine is None:
-        raise InputError(f"{options.files[0]}: a toolpath names no machine: add --machine FILE")
     for file in options.files:
         require_toolpath(file)
-    tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
-    job = JobFiles(
-        tuple(options.files), load_machine(options.machine), tolerance_mm, reading_of(options)
-    )
     if options.simulate:
-        _simulate(job, options)
+        _simulate(_job(options), options)
         return
+    with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
+        stream_on(options, address)
+
+
+def stream_on(options: Namespace, address: BusAddress) -> None:
+    """Streams the files of `stream`, or of `run` where they do not fit the memory of the controller."""
+    job = _job(options)
     require_fit(job.machine)
     number = random.SystemRandom().randrange(1, 2**31)
-    journal = _journal(job, options, number)
-    with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
-        _run(job, options, address, number, Place(), journal)
+    _run(job, options, address, number, Place(), _journal(job, options, number))
+
+
+def _job(options: Namespace) -> JobFiles:
+    if options.machine is None:
+        raise InputError(f"{options.files[0]}: a toolpath names no machine: add --machine FILE")
+    tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
+    machine = load_machine(options.machine)
+    return JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
 
 
 def journal_file(options: Namespace) -> Path:
     """Where the journal is."""
-    if options.journal is not None:
-        return Path(options.journal)
+    given = getattr(options, "journal", None)
+    if given is not None:
+        return Path(given)
     home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     return Path(home) / "hodograph" / "stream.json"
 
@@ -93,13 +104,13 @@ def _continue(options: Namespace) -> None:
     file = journal_file(options)
     entry = load(file)
     own = entry.options
-    reading = own["reading"]
-    job = JobFiles(
-        tuple(Path(one.path) for one in entry.files),
-        load_machine(Path(entry.machine)),
-        own["tolerance_mm"],
-        ReadOptions(**{k: tuple(v) if isinstance(v, list) else v for k, v in reading.items()}),
-    )
+    given: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in own["reading"].items()
+    }
+    files = tuple(Path(one.path) for one in entry.files)
+    machine = load_machine(Path(entry.machine))
+    job = JobFiles(files, machine, own["tolerance_mm"], ReadOptions(**given))
     require_fit(job.machine)
     with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
         _run(job, options, address, random.SystemRandom().randrange(1, 2**31), None, None, entry)
@@ -109,30 +120,26 @@ def _run(
     job: JobFiles,
     options: Namespace,
     address: BusAddress,
-    number: int,
+    job_number: int,
     begin: Place | None,
     journal: Journal | None,
     entry: Entry | None = None,
 ) -> None:
     kernel = options.kernel or job.machine.kernel
+    if begin is None:
+        assert entry is not None
+        begin = _rests_at(entry, job.machine, address, options.wait)
     with session(job.machine, address, options) as at:
-        if begin is None:
-            assert entry is not None
-            status = stream_status(at.controller)
-            begin = _place(entry, status.job, round(status.way_mm * 2**40))
-            note(
-                f"goes on in section {begin.section + 1} at {number(begin.way_q40 * 2.0**-40)} mm of it"
-            )
+        if entry is not None:
             fresh = Entry(
-                entry.files, entry.machine, entry.options, number, begin.section, begin.way_q40
+                entry.files, entry.machine, entry.options, job_number, begin.section, begin.way_q40
             )
             journal = Journal(journal_file(options), fresh)
-        at.controller.stop_and_wait()
         bring_up(at, job.machine, kernel)
         close_stream(at.controller)
         room = at.controller.read(STREAM, 7) // _RING_SHARE
         most = min(room, CHUNK_BYTES)
-        with JobPlan(job, most, number, begin) as plan:
+        with JobPlan(job, most, job_number, begin) as plan:
             sender = Sender(
                 at,
                 job.machine,
@@ -150,14 +157,23 @@ def _run(
     _print(done, options)
 
 
-def _place(entry: Entry, job: int, way_q40: int) -> Place:
-    """Where the machine rests: what the controller says of the job, if it is still there, else the journal."""
-    if job == entry.job:
-        return Place(entry.section, way_q40)
-    note(
-        "the controller no longer knows the job: the place is the last one in the journal, and the axes are moved there"
-    )
-    return Place(entry.section, entry.way_q40)
+def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place:
+    """Where the machine rests, after a stop: what the controller says of the job if it is still there, else the
+    journal.
+    """
+    place = Place(entry.section, entry.way_q40)
+    with connect(address, machine.node, machine.bitrate) as controller:
+        known = controller.answers(wait_s)
+        if known:
+            if controller.state() in ON_PATH:
+                controller.stop_and_wait()
+            status = stream_status(controller)
+            known = status.job == entry.job
+            place = Place(entry.section, round(status.way_mm * 2**40)) if known else place
+    if not known:
+        note("the controller no longer knows the job: it goes on from the last place in the journal")
+    note(f"goes on in section {place.section + 1} at {number(place.way_q40 * 2.0**-40)} mm of it")
+    return place
 
 
 def _free_rate(machine: Machine, address: BusAddress) -> float | None:
@@ -233,7 +249,10 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
         [
             ("sections", str(len(found))),
             ("chunks", f"{counted['chunks']}, {size_text(counted['bytes'])}"),
-            ("motion", f"{duration_text(motion_s)}, planned and simulated in {duration_text(took_s)}"),
+            (
+                "motion",
+                f"{duration_text(motion_s)}, planned and simulated in {duration_text(took_s)}",
+            ),
             ("bytes a second", f"{number(rate)} at most, over 3 s"),
         ]
     )

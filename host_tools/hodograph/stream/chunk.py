@@ -124,9 +124,21 @@ def parse(data: bytes) -> Chunk:
         raise InputError(f"chunk: says {size} bytes, and there are {len(data)}")
     if zlib.crc32(data[_CRC_FROM:size]) != crc:
         raise InputError("chunk: CRC-32 is wrong")
-    remaining = None if rest[10] == TIME_UNKNOWN else rest[10]
+    job, sequence, *shared, arc, time, start, line, remaining, _, _ = rest
     header = ChunkHeader(
-        bool(flags & FLAG_FIRST), bool(flags & FLAG_LAST), *rest[:10], remaining_ms=remaining
+        bool(flags & FLAG_FIRST),
+        bool(flags & FLAG_LAST),
+        job,
+        sequence,
+        shared[0],
+        shared[1],
+        shared[2],
+        shared[3],
+        arc,
+        time,
+        start,
+        line,
+        None if remaining == TIME_UNKNOWN else remaining,
     )
     return Chunk(header, bytes(data[HEADER_SIZE:size]))
 

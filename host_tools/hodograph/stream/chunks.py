@@ -74,8 +74,11 @@ class PlannedChunk:
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """What the next chunk has to know of the last one: its header, and arc lengths of the section where its first
-    segment begins and its program ends; numbers in the section of its first segment, and of the one behind its last; and its pieces.
+    """What the next chunk has to know of the last one.
+
+    first_segment, end_segment  numbers in the section of its first segment and of the one behind its last
+    end_q40                     arc length of the section where its program ends
+    pieces                      how many it has
     """
 
     header: ChunkHeader
@@ -129,7 +132,11 @@ class SectionChunks:
         self._name, self._job = name[:_LONGEST_NAME], job
         self._limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
         self._feed = SectionFeed(
-            machine, blocks, Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)), self._exceeded, begin_q40
+            machine,
+            blocks,
+            Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)),
+            self._exceeded,
+            begin_q40,
         )
         self._most = most_bytes
         self._kept = _Kept()
@@ -298,13 +305,11 @@ class SectionChunks:
         seconds = np.ldexp(stretch.pieces.duration_q32_s[first:joint].astype(np.float64), -32)
         codes = _no_codes(len(stretch.pieces))
         for spacing_s in (SEARCH_S, 0.0):
-            found = codes[first:joint, :, DECELERATION].all(axis=1)
+            found = np.asarray(codes[first:joint, :, DECELERATION].all(axis=1))
             wanted = np.zeros(len(stretch.pieces), dtype=np.bool_)
             wanted[first:joint] = _spaced(seconds, spacing_s, found)
             if wanted.any():
-                codes = np.where(
-                    wanted[:, None, None], self._codes(window, stretch, wanted), codes
-                )
+                codes = np.where(wanted[:, None, None], self._codes(window, stretch, wanted), codes)
         return codes[first:joint]
 
     def _all_codes(self, window: Window, first: int, joint: int) -> Codes:

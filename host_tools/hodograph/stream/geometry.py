@@ -7,8 +7,10 @@ never changes once it is here: chunks that were sent have its bits.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +59,7 @@ def short_segments(block: Block) -> Block:
     longest = np.minimum(2.0 ** np.floor(np.log2(longest)), LONGEST_SEGMENT_MM)
     edges = [0, *(np.flatnonzero(np.diff(longest)) + 1).tolist(), longest.size]
     curves, feeds, lines = [], [], []
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in itertools.pairwise(edges):
         part = sliced(block.curve, first, last)
         split = part.split(float(longest[first]), _SPEED_RATIO)
         ends = np.searchsorted(split.segment_starts_mm, part.segment_starts_mm - 1e-9)
@@ -102,16 +104,24 @@ def _behind(block: Block, begin_mm: float) -> Block:
     """A block without its first part."""
     segment, xi = block.curve.locate(begin_mm)
     first, x = int(segment), float(xi)
-    curve = sliced(block.curve, first)
-    point = block.curve.position(first, x)
-    w = curve.w if isinstance(curve, PHSpline) else curve.preimage
-    a, b, c = np.moveaxis(w[:1], -1, 0)
-    b1, c1 = b + x * (c - b), c
-    middle = (a + x * (b - a)) + x * (b1 - (a + x * (b - a)))
-    w = np.concatenate((np.stack((middle, b1, c1), axis=-1) * np.sqrt(1.0 - x), w[1:]))
-    origin = np.concatenate((np.asarray(point)[None], curve.origin[1:]))
-    made = PHSpline(origin, w, False) if isinstance(curve, PHSpline) else SpatialPHSpline(origin, w, False)
+    made: Curve
+    if isinstance(block.curve, PHSpline):
+        planar = block.curve
+        start = np.append(planar.position(first, x), planar.origin[first + 1 :])
+        made = PHSpline(start, _behind_at(planar.w[first:], x), False)
+    else:
+        curve = block.curve
+        origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
+        made = SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
     return Block(made, block.feed_mm_s[first:], block.line[first:])
+
+
+def _behind_at(w: Any, x: float) -> Any:
+    """Preimages (n, …, 3) whose first one begins at x of it; de Casteljau."""
+    a, b, c = np.moveaxis(w[:1], -1, 0)
+    near, far = a + x * (b - a), b + x * (c - b)
+    halved = np.stack((near + x * (far - near), far, c), axis=-1)
+    return np.concatenate((halved * np.sqrt(1.0 - x), w[1:]))
 
 
 class StreamPath:
@@ -163,7 +173,9 @@ class StreamPath:
         ways = segment_ways(made.a_q44[:, -1:])
         self._end_point = point[:, -1] + np.array([way_to_q40(w)[0] for w in ways[:-1]])
         if int(self.start_q40[-1]) + int(made.start_q40[-1]) >= _FARTHEST_Q40:
-            raise PlanError(f"line {block.line[-1]}: the section is longer than 4 km: divide it by a dwell (G4 P0)")
+            raise PlanError(
+                f"line {block.line[-1]}: the section is longer than 4 km: divide it by a dwell (G4 P0)"
+            )
         self.start_q40 = np.concatenate((self.start_q40, self.start_q40[-1] + made.start_q40[1:]))
         self.feed_mm_s = np.concatenate((self.feed_mm_s, block.feed_mm_s))
         self.line = np.concatenate((self.line, block.line))
@@ -201,6 +213,6 @@ class StreamPath:
         edges = [0, *(np.flatnonzero(np.diff(feed)) + 1).tolist(), feed.size]
         return nominal, tuple(
             FeedZone(float(starts[first]), float(starts[last]), float(feed[first]))
-            for first, last in zip(edges[:-1], edges[1:], strict=True)
+            for first, last in itertools.pairwise(edges)
             if feed[first] < nominal
         )

@@ -88,7 +88,9 @@ class Journal:
                 os.fsync(out.fileno())
             fresh.replace(self.file)
         except OSError as error:
-            raise InputError(f"{self.file}: the journal cannot be written: {error.strerror}") from None
+            raise InputError(
+                f"{self.file}: the journal cannot be written: {error.strerror}"
+            ) from None
 
 
 def load(file: Path) -> Entry:
@@ -96,11 +98,15 @@ def load(file: Path) -> Entry:
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
         if found.pop("version") != VERSION:
-            raise InputError(f"{file}: is of another version of hodograph: stream the job from its start")
+            raise InputError(
+                f"{file}: is of another version of hodograph: stream the job from its start"
+            )
         found["files"] = tuple(FileMark(**one) for one in found["files"])
         entry = Entry(**found)
     except FileNotFoundError:
-        raise InputError(f"{file}: no job was streamed with this journal: nothing to continue") from None
+        raise InputError(
+            f"{file}: no job was streamed with this journal: nothing to continue"
+        ) from None
     except (OSError, ValueError, KeyError, TypeError):
         raise InputError(f"{file}: is no journal of a streamed job, or it is damaged") from None
     if entry.done:

@@ -59,7 +59,7 @@ class JobPlan:
         self.notes: list[str] = []
         self.after: tuple[Command, ...] = ()
         self.sections: list[PlannedSection] = []
-        self._file = tempfile.TemporaryFile(prefix="hodograph-stream-")
+        self._file = tempfile.TemporaryFile(prefix="hodograph-stream-")  # noqa: SIM115
         self._ends = array("q", [0])
         self._motion_s = array("d", [0.0])
         self._section_of = array("l")
@@ -217,5 +217,3 @@ _RATE_S, _FOR_EVER_S = 3.0, 1e6
 def dwell_s(commands: Sequence[Command]) -> float:
     """Standstill that commands ask for."""
     return sum(command.duration_s for command in commands if isinstance(command, Dwell))
-
-

@@ -46,7 +46,7 @@ class StreamProgress:
     """Where a job is.
 
     ahead_s      motion that the controller has before it would rest
-    remaining_s  to the end of the job; None: not all of it is planned yet, and `planned_s` of motion is to come at least
+    remaining_s  to the end of the job; None: not all of it is planned yet, and `planned_s` of it is to come at least
     """
 
     file: Path
@@ -186,7 +186,10 @@ class Sender:
     def _may_start(self, first_s: float) -> bool:
         """Whether enough is sent, or the first chunk has waited for long enough."""
         waited_s = self.at.controller.clock.now_s() - first_s
-        return waited_s > _START_WAIT_S or stream_status(self.at.controller).committed_s > _START_AHEAD_S
+        return (
+            waited_s > _START_WAIT_S
+            or stream_status(self.at.controller).committed_s > _START_AHEAD_S
+        )
 
     def _send_one(self, section: PlannedSection, status: StreamStatus | None) -> bool | None:
         """Sends the next chunk, if it is planned and there is room: whether it is the last one of the section."""

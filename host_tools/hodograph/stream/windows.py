@@ -31,8 +31,8 @@ from ..feed.optimal.window import Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
 from ..feed.request import LONGEST_S, OPTIMAL
-from ..program.image import PIECE_SIZE, STOP_SIZE, segment_size
 from ..pipeline import axis_limits, axis_names, controller_limits, plants
+from ..program.image import PIECE_SIZE, STOP_SIZE, segment_size
 from .geometry import Block, StreamPath
 
 Real = NDArray[np.float64]
@@ -227,7 +227,9 @@ class SectionFeed:
         joints = self._joints(found, count)
         marks = found.grid.s[list(joints)]
         track = make_track(
-            _begun(ends_of(found, found.grid.size), self._moving), 1.0, np.concatenate((self.path.curve.segment_starts_mm, marks))
+            _begun(ends_of(found, found.grid.size), self._moving),
+            1.0,
+            np.concatenate((self.path.curve.segment_starts_mm, marks)),
         )
         plan = self._plan(given, track)
         stretch = self._stretch(track, plan, self._low_q40)
@@ -237,7 +239,8 @@ class SectionFeed:
     def _to_rest(self) -> Window:
         """The rest of the last window, to its end: nothing is found that goes on in motion."""
         last, held = self._last, self._held
-        assert last is not None and held is not None
+        assert last is not None
+        assert held is not None
         pieces = taken(last.stretch.pieces, slice(last.count, None))
         stretch, count = Stretch(pieces, last.stretch.end_q40), len(pieces)
         end_mm = float(held.grid.s[-1])
@@ -288,15 +291,15 @@ class SectionFeed:
     def _limits(self) -> tuple[PlanLimits, tuple[FeedRequest, Limits, Plants | None]]:
         machine = self.machine
         nominal, zones = self.path.feeds(machine.feed_mm_s)
-        limits = Limits(zones=zones, reserve=RESERVE).on_machine(axis_names(machine), axis_limits(machine))
+        limits = Limits(zones=zones, reserve=RESERVE).on_machine(
+            axis_names(machine), axis_limits(machine)
+        )
         limits = limits.of_axes(self.path.curve.axes)
         request, own = FeedRequest(OPTIMAL, nominal), plants(machine, limits)
         found = gather(request, limits, controller_limits(machine), own, machine.period_us)
         return found, (request, limits, own)
 
-    def _plan(
-        self, given: tuple[FeedRequest, Limits, Plants | None], track: Track
-    ) -> FeedPlan:
+    def _plan(self, given: tuple[FeedRequest, Limits, Plants | None], track: Track) -> FeedPlan:
         request, limits, own = given
         machine = self.machine
         bounds = PathBounds(self.path.curve, limits, own)
@@ -314,13 +317,13 @@ class SectionFeed:
         for share in (0.0, *_EASED):
             tried = limits if share == 0.0 else limits.eased(max(self._period_s, share * stop_s))
             with suppress(FloatingPointError):
-                found = plan_window(
-                    curve, tried, low, high, moving, self._period_s, held, known_to
-                )
+                found = plan_window(curve, tried, low, high, moving, self._period_s, held, known_to)
                 if found is not None:
                     return measured(curve, found)
         if moving is None:
-            raise PlanError(f"line {self.path.line_at(self._low_q40)}: the planner found no feed: please report this file")
+            raise PlanError(
+                f"line {self.path.line_at(self._low_q40)}: the planner found no feed: please report this file"
+            )
         return None
 
     def _joints(self, found: Solution, count: int) -> tuple[int, ...]:
@@ -342,7 +345,9 @@ class SectionFeed:
         joints = path.start_q40 - base
         starts = np.rint(track.s * 2.0**40).astype(np.int64)
         near = joints[np.clip(np.searchsorted(joints, starts - _DRIFT_Q40), 0, joints.size - 1)]
-        moved = np.isin(track.s, path.curve.segment_starts_mm) & (np.abs(near - starts) <= _DRIFT_Q40)
+        moved = np.isin(track.s, path.curve.segment_starts_mm) & (
+            np.abs(near - starts) <= _DRIFT_Q40
+        )
         starts = np.where(moved, near, starts)
         starts[0] = start_q40 - base
         c = round_pieces(track.t_q32, starts, track.shape)
@@ -396,7 +401,7 @@ def _braking_mm(state: State, limits: PlanLimits) -> float:
     pull = min(0.7 * limits.least_acceleration, (limits.least_jerk * feed) ** 0.5)
     lead_s = max(0.5 * state.slope, 0.0) / limits.least_jerk
     peak = feed + 0.25 * state.slope * lead_s if state.slope > 0.0 else feed
-    return peak * (lead_s + 0.5 * (peak / pull + pull / limits.least_jerk))
+    return float(peak * (lead_s + 0.5 * (peak / pull + pull / limits.least_jerk)))
 
 
 def taken(pieces: FeedPieces, part: slice) -> FeedPieces:
@@ -426,5 +431,3 @@ def _shifted(found: Solution, passed_mm: float) -> Solution:
     grid = found.grid
     x0 = np.where(grid.grade == 0, grid.x0 - passed_mm, grid.x0)
     return replace(found, grid=replace(grid, s=grid.s - passed_mm, x0=x0))
-
-

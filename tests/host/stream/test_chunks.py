@@ -73,7 +73,8 @@ def _verify(chunks: list[Chunk], machine: Machine, most: int = MOST) -> None:
         assert chunk.size <= most
         assert before is None or chunk.header.shared_pieces >= LEAST_SHARED_PIECES
         before = chunk
-    assert before is not None and before.header.last
+    assert before is not None
+    assert before.header.last
     whole = concatenated(chunks)
     assert check(whole, replace(program_limits(machine), stop_time_ms=0)) is None
     program = NativeProgram(encode(whole))
@@ -178,9 +179,7 @@ def test_a_part_of_a_section_begins_where_it_is_asked_for(tmp_path: Path, machin
     blocks = list(section.blocks)
     begin_mm = 0.37 * sum(block.curve.length_mm for block in blocks)
     begin_q40 = round(begin_mm * 2**40)
-    made = SectionChunks(
-        machine, "walk", blocks_from(iter(blocks), begin_mm), 1, MOST, begin_q40
-    )
+    made = SectionChunks(machine, "walk", blocks_from(iter(blocks), begin_mm), 1, MOST, begin_q40)
     chunks = [one.chunk for one in made.chunks()]
     assert chunks[0].header.job_start_q40 == begin_q40
     first = chunks[0].program

@@ -76,9 +76,7 @@ def _fate(node: Node, before: tuple[int, int]) -> str:
     return "the old program is unharmed" if before[1] else "there is no program yet"
 
 
-def block_download(
-    node: Node, index: int, image: bytes, progress: Progress | None = None
-) -> None:
+def block_download(node: Node, index: int, image: bytes, progress: Progress | None = None) -> None:
     """Writes sub 1 of an object by block download. Raises the errors of the SDO client."""
     stream = node.sdo.open(index, 1, "wb", buffering=0, size=len(image), block_transfer=True)
     node.transfer_begun()

@@ -172,9 +172,7 @@ class _Plan:
     known: list[Segments | None] = field(default_factory=list)
 
     @classmethod
-    def of(
-        cls, path: Outline, how: Tolerance, cap_mm_s: float, tied: tuple[bool, bool]
-    ) -> _Plan:
+    def of(cls, path: Outline, how: Tolerance, cap_mm_s: float, tied: tuple[bool, bool]) -> _Plan:
         long, reach = path.anchored, path.reach_mm
         leg, count = path.leg_mm, path.leg_mm.size
         both = reach[:-1] + reach[1:]

@@ -101,6 +101,7 @@ class Divider:
     tied: bool = False
 
     def take(self, command: Command) -> None:
+        """The next command."""
         if isinstance(command, StraightMove | ArcMove | SplineMove):
             self._move(command)
         elif isinstance(command, PathMode):
