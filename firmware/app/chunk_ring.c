@@ -2,6 +2,7 @@
 #include "app/chunk_ring.h"
 
 #include <stddef.h>
+#include <string.h>
 
 static uint32_t rounded_down(uint32_t size)
 {
@@ -15,7 +16,9 @@ static uint32_t rounded_up(uint32_t size)
 
 void chunk_ring_init(struct chunk_ring *ring, uint8_t *memory, uint32_t size)
 {
-    *ring = (struct chunk_ring){.memory = memory, .size = rounded_down(size)};
+    memset(ring, 0, sizeof *ring);
+    ring->memory = memory;
+    ring->size = rounded_down(size);
 }
 
 void chunk_ring_clear(struct chunk_ring *ring)

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "canopen/cob.h"
 #include "port/port.h"
 
 static enum machine_refusal locked(struct machine *machine,
@@ -174,6 +175,28 @@ static enum machine_refusal execute(struct controller *controller, enum command 
     }
     return starts_program(command) ? attempt_start(controller, command)
                                    : dispatch(controller, command);
+}
+
+bool command_urgent_request(const struct can_msg *frame, uint8_t node)
+{
+    static const uint8_t request[4] = {0x2F, 0x01, 0x20, 0x00};
+    static const uint8_t rest[3] = {0};
+    return frame->id == COB_SDO_ASK + node && frame->len == CAN_DATA_MAX &&
+           memcmp(frame->data, request, sizeof request) == 0 && command_is_urgent(frame->data[4]) &&
+           memcmp(frame->data + 5, rest, sizeof rest) == 0;
+}
+
+void commands_execute_urgent(struct machine *machine, uint16_t set)
+{
+    if ((set & 1u << COMMAND_HOLD) != 0u) {
+        (void)machine_hold(machine);
+    }
+    if ((set & 1u << COMMAND_STOP) != 0u) {
+        (void)machine_request_stop(machine);
+    }
+    if ((set & 1u << COMMAND_QUICK_STOP) != 0u) {
+        (void)machine_quick_stop(machine);
+    }
 }
 
 enum machine_refusal commands_execute(struct controller *controller, enum command command)

@@ -130,8 +130,28 @@ static void beat_in_stream(void *self)
     controller_beat(controller);
     port_lock();
     machine_attend(&controller->machine);
+    commands_execute_urgent(&controller->machine, controller->urgent);
+    controller->urgent = 0;
     port_unlock();
     stream_process(&controller->stream, &controller->machine);
+}
+
+static void set_checking(struct controller *controller, bool checks)
+{
+    port_lock();
+    controller->checks_chunk = checks;
+    controller->urgent = 0;
+    port_unlock();
+}
+
+void controller_check_begins(struct controller *controller)
+{
+    set_checking(controller, true);
+}
+
+void controller_check_ends(struct controller *controller)
+{
+    set_checking(controller, false);
 }
 
 void controller_init(struct controller *controller, uint8_t node)
@@ -183,9 +203,18 @@ static void take_boot_up(struct machine *machine, const struct can_msg *message)
     }
 }
 
+/* Queued as any frame, and answered in its turn; then it changes nothing any more. */
+static void note_urgent(struct controller *controller, const struct can_msg *message)
+{
+    if (controller->checks_chunk && command_urgent_request(message, controller->node)) {
+        controller->urgent |= (uint16_t)(1u << message->data[4]);
+    }
+}
+
 static void receive_other(struct controller *controller, const struct can_msg *message)
 {
     uint32_t inputs;
+    note_urgent(controller, message);
     take_boot_up(&controller->machine, message);
     const int node = pdo_decode_inputs(message, &inputs);
     if (node != 0) {

@@ -51,6 +51,9 @@ struct controller {
     struct machine machine;
     struct tick tick;
     struct frame_queue queue;
+    bool checks_chunk; /* the mainline is busy with a chunk while the motion may go on: */
+    uint16_t
+        urgent; /* commands to stop that have come meanwhile, bit by enum command; they wait in the queue as well */
     /* mainline only */
     struct config config; /* the same values as machine.config */
     struct configured configured;
@@ -98,6 +101,10 @@ bool controller_configured(const struct controller *controller);
 /* A sign of life in long work of the main loop, such as the check of a program, at each step: sends the heartbeat if it is due
  * and tells the port (port_progress). `self`: the controller. */
 void controller_beat(void *self);
+
+/* Around the check of a chunk: commands to stop that come meanwhile take effect at once. */
+void controller_check_begins(struct controller *controller);
+void controller_check_ends(struct controller *controller);
 
 /* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
 void controller_start_itself(struct controller *controller);

@@ -135,8 +135,7 @@ static uint32_t object_write_command(struct controller *controller, const struct
 /* Hold, stop and quick stop wait for no transfer of another client. */
 static bool object_urgent_command(uint8_t value)
 {
-    return value == (uint8_t)COMMAND_STOP || value == (uint8_t)COMMAND_HOLD ||
-           value == (uint8_t)COMMAND_QUICK_STOP;
+    return command_is_urgent(value);
 }
 
 static void object_written_override(struct controller *controller)

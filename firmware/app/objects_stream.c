@@ -38,7 +38,9 @@ uint32_t object_chunk_write(struct controller *controller, uint32_t offset, cons
 
 uint32_t object_chunk_end(struct controller *controller, uint32_t size)
 {
+    controller_check_begins(controller);
     const int result = stream_finish(&controller->stream, size, &controller->config);
+    controller_check_ends(controller);
     return result == 0 ? SDO_OK : SDO_ABORT_VALUE;
 }
 

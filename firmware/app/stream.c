@@ -296,12 +296,11 @@ static bool take_next_over(struct stream *stream, struct machine *machine)
 
 void stream_process(struct stream *stream, struct machine *machine)
 {
-    if (!stream->started || stream->executed == NULL) {
-        return;
-    }
-    do {
+    bool again = stream->started;
+    while (again && stream->executed != NULL) {
         note_state(stream, machine);
-    } while (!is_over(stream) && take_next_over(stream, machine));
+        again = stream->executed != NULL && !is_over(stream) && take_next_over(stream, machine);
+    }
 }
 
 /* ---- What is so ---- */

@@ -430,7 +430,9 @@ static int is_shared(const struct feed_override *f, const struct chunk *next)
 {
     const struct program *p = f->clock.program;
     const uint32_t joint = next->piece_shift + next->shared_pieces;
-    if (f->clock.piece < next->piece_shift || f->clock.piece >= joint) {
+    /* the time is rounded up into a piece: in the first one it may be a unit before */
+    if (f->clock.piece < next->piece_shift || f->clock.piece >= joint ||
+        f->clock.time_q42_s < qmath_q42_of_q32(next->time_shift_q32_s)) {
         return 0;
     }
     const int64_t start_q40_mm = program_piece_start(p, f->clock.piece) - next->arc_shift_q40_mm;

@@ -39,6 +39,8 @@ static struct {
     const struct fake_port_store *store;
     void (*wait_hook)(void *context);
     void *wait_context;
+    void (*progress_hook)(void *context);
+    void *progress_context;
     void (*unlock_hook)(void *context);
     void *unlock_context;
 } self;
@@ -331,10 +333,19 @@ void port_wait(uint32_t timeout_us)
     }
 }
 
+void fake_port_on_progress(void (*hook)(void *context), void *context)
+{
+    self.progress_hook = hook;
+    self.progress_context = context;
+}
+
 void port_progress(void)
 {
     TEST_ASSERT_FALSE_MESSAGE(self.locked, "long work inside a critical section");
     self.progress++;
+    if (self.progress_hook != NULL) {
+        self.progress_hook(self.progress_context);
+    }
 }
 
 void port_wake(void)

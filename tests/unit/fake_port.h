@@ -77,6 +77,9 @@ void fake_port_on_unlock(void (*hook)(void *context), void *context);
 /* What port_stop_insisted says from now on. */
 void fake_port_insist(bool insisted);
 
+/* Called by port_progress; may be NULL. */
+void fake_port_on_progress(void (*hook)(void *context), void *context);
+
 /* Called by port_wait; may be NULL. */
 void fake_port_on_wait(void (*hook)(void *context), void *context);
 

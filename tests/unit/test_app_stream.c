@@ -509,6 +509,55 @@ static void test_stop_while_a_takeover_is_pending(void)
     }
 }
 
+/* ---- Commands to stop while a chunk is checked ---- */
+
+static struct {
+    unsigned calls;
+    uint8_t command;
+    enum machine_state state; /* a piece later */
+} during_check;
+
+/* Ticks go on meanwhile, and in one of them a command comes. */
+static void interrupt_check(void *context)
+{
+    (void)context;
+    during_check.calls++;
+    fake_port_advance_us(1000);
+    if (during_check.calls == 10u) {
+        const struct can_msg in = {
+            .id = 0x601, .len = 8, .data = {0x2F, 0x01, 0x20, 0x00, during_check.command}};
+        fake_port_receive(&in);
+    } else if (during_check.calls == 11u) {
+        during_check.state = bench.controller.machine.state;
+    }
+}
+
+static void test_stops_do_not_wait_for_a_check(void)
+{
+    static const struct {
+        uint8_t command;
+        enum machine_state state;
+    } rows[] = {{COMMAND_HOLD, MACHINE_HOLDING},
+                {COMMAND_STOP, MACHINE_STOPPING},
+                {COMMAND_QUICK_STOP, MACHINE_QUICK_STOP}};
+    for (uint32_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+        app_bench_init(&bench, X_MM * UNIT, Y_MM * UNIT);
+        power_on();
+        expect_sent(&parts[0]);
+        command(COMMAND_START);
+        app_bench_periods(&bench, 700);
+        during_check.calls = 0;
+        during_check.command = rows[i].command;
+        fake_port_on_progress(interrupt_check, NULL);
+        expect_sent(&parts[1]);
+        fake_port_on_progress(NULL, NULL);
+        TEST_ASSERT_GREATER_THAN_UINT(20, during_check.calls);
+        TEST_ASSERT_EQUAL_INT(rows[i].state, during_check.state);
+        app_bench_periods(&bench, 1000);
+        TEST_ASSERT_EQUAL_INT(0, bench.controller.urgent);
+    }
+}
+
 static void test_stop_in_an_underrun(void)
 {
     expect_sent(&parts[0]);
@@ -703,6 +752,7 @@ int main(void)
     RUN_TEST(test_hold_in_the_shared_part);
     RUN_TEST(test_hold_and_resume_in_an_underrun);
     RUN_TEST(test_stop_while_a_takeover_is_pending);
+    RUN_TEST(test_stops_do_not_wait_for_a_check);
     RUN_TEST(test_stop_in_an_underrun);
     RUN_TEST(test_a_fault_ends_the_job_on_its_path);
     RUN_TEST(test_override_in_a_job);

@@ -8,6 +8,7 @@ import re
 import struct
 import subprocess
 import zlib
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,20 +17,75 @@ import pytest
 from hodograph.errors import InputError
 from hodograph.native import NativeLimits, NativeProgram, OfflineStream
 from hodograph.native.feed_override import State
+from hodograph.program import check, decode, encode
 from hodograph.program.codes import ProgramError
+from hodograph.program.image import Program
 
 ROOT = Path(__file__).resolve().parents[3]
-IMAGE = (ROOT / "tests/data/programs/alpha_minimax.hdgp").read_bytes()
+DATA = ROOT / "tests/data/programs"
+IMAGE = (DATA / "alpha_minimax.hdgp").read_bytes()
 FIRST, LAST = 1, 2
 CUTS = 1_000_000
+REACH_Q40 = 1 << 26
+"""The least length of a tail for a takeover in motion: how far a piece may reach beyond its end."""
 
 
-def chunk(image: bytes, flags: int, sequence: int = 0, job: int = 7) -> bytes:
-    """A chunk without a shared part."""
-    behind = struct.pack("<6I qQq 4I", job, sequence, 0, 0, 0, 0, 0, 0, 0, 0, 2**32 - 1, 0, 0)
+@dataclass(frozen=True)
+class Shared:
+    """What a chunk has of its predecessor: numbers there of its first piece and segment, and how many it repeats."""
+
+    piece: int = 0
+    segment: int = 0
+    pieces: int = 0
+    segments: int = 0
+    arc_q40: int = 0
+    time_q32: int = 0
+    job_start_q40: int = 0
+
+
+def chunk(
+    image: bytes, flags: int, sequence: int = 0, job: int = 7, shared: Shared = Shared()
+) -> bytes:
+    """Header and image."""
+    counts = (shared.piece, shared.segment, shared.pieces, shared.segments)
+    starts = (shared.arc_q40, shared.time_q32, shared.job_start_q40)
+    behind = struct.pack("<6I qQq 4I", job, sequence, *counts, *starts, 0, 2**32 - 1, 0, 0)
     size = 16 + len(behind) + len(image)
     crc = zlib.crc32(behind + image)
     return struct.pack("<4sHHII", b"HDGC", 1, flags, size, crc) + behind + image
+
+
+def behind_piece(program: Program, first: int) -> tuple[Program, Shared]:
+    """The program from this piece on, in motion; the predecessor may end as it does."""
+    pieces, stops = program.pieces, program.stops
+    start = int(pieces.start_q40[first])
+    segment = int(np.searchsorted(program.start_q40, start, side="right")) - 1
+    arc = int(program.start_q40[segment])
+    time = sum(int(one) for one in pieces.duration_q32_s[:first])
+    kept = {field.name: getattr(pieces, field.name)[first:] for field in fields(pieces)}
+    bounds = stops.bound_us[first:]
+    rest = replace(
+        program,
+        moving=True,
+        closed=False,
+        duration_q32_s=program.duration_q32_s - time,
+        length_q40=program.length_q40 - arc,
+        start_q40=program.start_q40[segment:] - arc,
+        point_q40=program.point_q40[:, segment:],
+        a_q44=program.a_q44[:, segment:],
+        extra_q40=program.extra_q40[:, segment:],
+        pieces=replace(pieces, **kept | {"start_q40": pieces.start_q40[first:] - arc}),
+        stops=replace(
+            stops,
+            codes=stops.codes[first:],
+            bound_us=bounds,
+            worst_us=(int(bounds[:, 0].max()), int(bounds[:, 1].max())),
+        ),
+    )
+    far = rest.length_q40 - rest.pieces.start_q40 >= REACH_Q40
+    return rest, Shared(
+        first, segment, int(np.count_nonzero(far)) - 1, rest.segment_count, arc, time
+    )
 
 
 @pytest.mark.parametrize("kernel", ["fixed", "float", "double"])
@@ -43,6 +99,49 @@ def test_a_job_of_one_chunk_has_the_setpoints_of_its_program(kernel: str) -> Non
     assert stream.state is State.ENDED
     assert stream.run(10).size == 0
     assert (stream.sequence, stream.takeovers, stream.underruns) == (0, (0, 0), 0)
+
+
+@pytest.mark.parametrize("name", ["alpha_exponential", "heart_exponential", "space3", "space6"])
+@pytest.mark.parametrize("kernel", ["fixed", "float", "double"])
+def test_any_number_of_axes_goes_on_bit_for_bit(name: str, kernel: str) -> None:
+    image = (DATA / f"{name}.hdgp").read_bytes()
+    whole = NativeProgram(image)
+    whole.require()
+    expected = whole.setpoints(kernel, 1_000_000)[0]
+    stream = OfflineStream(kernel)
+    assert stream.give(chunk(image, FIRST)) is None
+    program, made, job_start = decode(image), [], 0
+    step = max(program.piece_count // 5, 1)
+    for sequence in range(1, 4):
+        made.append(stream.run(expected.size // 5))
+        program, shared = behind_piece(program, step)
+        job_start += shared.arc_q40
+        last = LAST if sequence == 3 else 0
+        shared = replace(shared, job_start_q40=job_start)
+        assert stream.give(chunk(encode(program), last, sequence, shared=shared)) is None
+    made.append(stream.run(2 * expected.size))
+    assert np.array_equal(np.concatenate(made), expected)
+    assert stream.takeovers[0] == 3
+    assert stream.sequence == 3
+
+
+@pytest.mark.parametrize("name", ["alpha_exponential", "space6"])
+def test_both_checks_accept_a_program_in_motion_in_a_chunk_only(name: str) -> None:
+    def codes(program: Program, *, in_chunk: bool) -> set[int]:
+        native = NativeProgram(encode(program)).check(NativeLimits(chunk=in_chunk))
+        python = check(program, chunk=in_chunk)
+        return {one.code if one else 0 for one in (native, python)}
+
+    moving, _ = behind_piece(decode((DATA / f"{name}.hdgp").read_bytes()), 10)
+    assert codes(moving, in_chunk=True) == {0}
+    assert codes(moving, in_chunk=False) == {ProgramError.FLAGS}
+    resting = replace(moving, moving=False)
+    assert codes(resting, in_chunk=True) == {
+        ProgramError.PIECE_FIRST if moving.pieces.start_q40[0] else ProgramError.START_MOVING
+    }
+    away = moving.pieces.start_q40 + moving.start_q40[1] - moving.pieces.start_q40[0]
+    elsewhere = replace(moving, pieces=replace(moving.pieces, start_q40=away))
+    assert codes(elsewhere, in_chunk=True) == {ProgramError.PIECE_FIRST}
 
 
 def test_without_the_last_chunk_it_rests_at_the_end_and_waits() -> None:
