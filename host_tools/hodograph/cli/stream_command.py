@@ -171,7 +171,9 @@ def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float
             known = status.job == entry.job
             place = Place(entry.section, round(status.way_mm * 2**40)) if known else place
     if not known:
-        note("the controller no longer knows the job: it goes on from the last place in the journal")
+        note(
+            "the controller no longer knows the job: it goes on from the last place in the journal"
+        )
     note(f"goes on in section {place.section + 1} at {number(place.way_q40 * 2.0**-40)} mm of it")
     return place
 

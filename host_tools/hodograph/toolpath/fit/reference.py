@@ -116,12 +116,12 @@ class ReferenceBuilder:
     def cut(self, chord: int) -> Reference:
         """The chords of all moves so far up to the middle of this one; the other half and what follows stays."""
         a, b = self._points[chord : chord + 2]
-        middle = tuple(0.5 * (p + q) for p, q in zip(a, b, strict=True))
+        middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2]))
         points, rows = self._points, self._rows
         self._points, self._rows = [*points[: chord + 1], middle], rows[: chord + 1]
         part = self.reference()
         self._points, self._rows = [middle, *points[chord + 1 :]], rows[chord:]
-        self.start = (*middle, *self._at[3:])
+        self.start = (*middle, self._at[3], self._at[4], self._at[5])
         self.length_mm -= float(part.place_mm[-1])
         return part
 
