@@ -150,6 +150,10 @@ PYTHON_RULES: dict[str, set[str]] = {
         "toolpath",
     },
     "job_run": {"errors", "config", "native", "program", "simulate", "bus", "job", "toolpath"},
+    "stream": {
+        *("errors", "config", "spline", "feed", "program", "native", "pipeline", "bus", "bus.sdo"),
+        *("toolpath", "job", "job_run"),
+    },
     "paper": {
         "errors",
         "data",

@@ -132,6 +132,7 @@ class JobSection:
 
     before  commands that happen at rest, before it starts
     events  commands on the way, with the arc lengths in mm where they happen
+    tied    whether it begins and ends in motion, as a part of a longer section
     """
 
     fitted: FittedPath
@@ -139,6 +140,7 @@ class JobSection:
     pipeline: SectionPipeline
     before: tuple[Command, ...]
     events: tuple[tuple[float, Command], ...]
+    tied: tuple[bool, bool] = (False, False)
 
     @property
     def first_line(self) -> int:
@@ -250,16 +252,16 @@ def load_job(
             f"--tolerance {tolerance_mm:g}: must be from 0 to {GREATEST_TOLERANCE_MM:g} mm"
         )
     reading, notes = reading or ReadOptions(), list[str]()
-    path = divided(_commands(file, reading, notes), tolerance_mm, str(file))
+    path = divided(toolpath_commands(file, reading, notes), tolerance_mm, str(file))
     if not path.sections:
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
-    maker = _Maker(file, machine, reading.feed_mm_s, notes)
+    maker = SectionMaker(file, machine, reading.feed_mm_s, notes)
     sections = tuple(made for section in path.sections for made in maker.made(section))
     notes += _ignored_commands(path, file)
     return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
 
 
-def _commands(file: Path, reading: ReadOptions, notes: list[str]) -> Iterator[Command]:
+def toolpath_commands(file: Path, reading: ReadOptions, notes: list[str]) -> Iterator[Command]:
     """The commands of a file; what the reader of a drawing or of points says goes to `notes`. Raises InputError."""
     for command in read_toolpath(file, reading):
         if isinstance(command, Message) and not is_gcode(file):
@@ -284,7 +286,7 @@ def _ignored_commands(path: Toolpath, file: Path) -> Iterator[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Maker:
+class SectionMaker:
     """Makes sections of a job."""
 
     file: Path
@@ -299,7 +301,7 @@ class _Maker:
             feed = np.where(reference.feed_mm_s < inf, self.feed_mm_s, inf)
             section = replace(section, reference=replace(reference, feed_mm_s=feed))
         self._check_plane(section)
-        found = fit(section.reference, Tolerance(section.tolerance_mm, self._limits))
+        found = fit(section.reference, Tolerance(section.tolerance_mm, self._limits), section.tied)
         if isinstance(found, FittedPath):
             yield self._section(section, found)
             return
@@ -356,7 +358,9 @@ class _Maker:
             (float(s), event.command) for s, event in zip(places, section.events, strict=True)
         )
         pipeline = SectionPipeline(file, self.machine, fitted)
-        return JobSection(fitted, section.tolerance_mm, pipeline, section.before, events)
+        return JobSection(
+            fitted, section.tolerance_mm, pipeline, section.before, events, section.tied
+        )
 
     def _check_travel(self, section: Section, fitted: FittedPath) -> None:
         """Raises PlanError, naming the line, where the curve leaves the travel of an axis."""

@@ -28,6 +28,11 @@ _LOOK_S = 0.1
 _START_COUNTS = 2
 """So far off its start a section begins at once: the rounding of the end of the one before."""
 
+
+class NoRoomError(PlanError):
+    """A section takes more memory than the controller has for a program."""
+
+
 Look = Callable[[], None]
 """Waits a little and raises what has gone wrong on the bus meanwhile."""
 
@@ -85,9 +90,9 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
         needed = memory_bytes(program.image, *RECORD_BYTES[kernel])
         room = job.machine.program_bytes or LARGEST_BANK
         if needed > room:
-            raise PlanError(
+            raise NoRoomError(
                 f"{job.file}:{section.first_line}: the section up to line {section.last_line} takes {needed} bytes of "
-                f"a controller, which has {room}: divide it by a dwell (G4 P0), or raise --tolerance"
+                f"a controller, which has {room}: hodograph stream takes jobs of any length"
             )
         programs.append(program)
     return PreparedJob(job, kernel, tuple(programs), perf_counter() - begin)
@@ -96,11 +101,12 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
 def operator_stops(job: Job) -> Iterator[tuple[int, str]]:
     """Where a job waits for the operator: source line, and the code of it."""
     for section in job.sections:
-        yield from _stops(section.before)
-    yield from _stops(job.after)
+        yield from stops(section.before)
+    yield from stops(job.after)
 
 
-def _stops(commands: Sequence[Command]) -> Iterator[tuple[int, str]]:
+def stops(commands: Sequence[Command]) -> Iterator[tuple[int, str]]:
+    """The same of some commands."""
     for command in commands:
         if isinstance(command, ProgramStop):
             yield command.line, "M1" if command.optional else "M0"
@@ -132,7 +138,7 @@ def run_job(
     passed = 0
     _to_start(at, made, made.programs[0], unhomed)
     for number, (section, program) in enumerate(zip(job.sections, made.programs, strict=True), 1):
-        _rest(at, job, section.before, operator)
+        at_rest(at, job.file, section.before, operator)
         place = f"{job.file}:{section.first_line}: section {number} of {len(job.sections)}"
         # No move, unless an operator moved the axes during the stop.
         _to_start(at, made, program, unhomed)
@@ -146,7 +152,7 @@ def run_job(
         )
         _require_end(at, made, program, place)
         passed += program.ticks
-        _say(at, job, [command for _, command in section.events])
+        _say(at, job.file, [command for _, command in section.events])
         try:
             file = _record_of(record, number, job)
             runs.append(analysed(at, job.machine, program.image, made.kernel, recorded, file))
@@ -154,7 +160,7 @@ def run_job(
             raise RunError(f"{place}: {error}") from None
         except RunError as error:
             failure = failure or RunError(f"{place}: {error}")
-    _rest(at, job, job.after, operator)
+    at_rest(at, job.file, job.after, operator)
     if failure is not None:
         raise failure
     motion = JobMotion(job, tuple(run.motion for run in runs), made.planning_s)
@@ -195,21 +201,21 @@ def _require_end(at: RunSession, made: PreparedJob, program: NativeProgram, plac
         raise RunError(f"{place}: stopped before its end: the job ends here")
 
 
-def _rest(at: RunSession, job: Job, commands: Sequence[Command], operator: Operator) -> None:
+def at_rest(at: RunSession, file: Path, commands: Sequence[Command], operator: Operator) -> None:
     """What happens at rest, in its order. Commands that the machine has nothing for are passed."""
     for command in commands:
-        _say(at, job, [command])
+        _say(at, file, [command])
         if isinstance(command, Dwell):
             _dwell(at, command.duration_s)
-        for line, code in _stops([command]):
-            operator(f"{job.file}:{line}: {code}", lambda: _look(at, _LOOK_S))
+        for line, code in stops([command]):
+            operator(f"{file}:{line}: {code}", lambda: _look(at, _LOOK_S))
 
 
-def _say(at: RunSession, job: Job, commands: Sequence[Command]) -> None:
+def _say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
     """Tells the messages among commands. Those on the way of a section are told at its end."""
     for command in commands:
         if isinstance(command, Message):
-            at.note(f"{job.file}:{command.line}: {command.text}")
+            at.note(f"{file}:{command.line}: {command.text}")
 
 
 def _dwell(at: RunSession, duration_s: float) -> None:

@@ -20,8 +20,8 @@ from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import FAULT_STATE, HELD, READY, RUNNING
 from hodograph.bus.sdo.objects import DISABLE, HOLD, RESUME, STOP
+from hodograph.cli.bus_session import await_enter
 from hodograph.cli.main import main
-from hodograph.cli.run_command import _await_enter
 
 MILL = EXAMPLES / "machines" / "mill.toml"
 WAIT_S = 60.0
@@ -246,7 +246,7 @@ def test_enter_is_waited_for(terminal: _Terminal) -> None:
         if len(looks) == 5:
             os.write(terminal.keyboard, b"\n")
 
-    _await_enter("M0", look)
+    await_enter("M0", look)
     assert len(looks) == 5
 
 

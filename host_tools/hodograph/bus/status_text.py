@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from .capture.load import BusLoad
 from .diagnostics.texts import TIMINGS
 from .sdo.status import AxisStatus, LoadedProgram, Override, Statistics, Status
+from .sdo.stream_channel import StreamStatus
 
 Row = tuple[str, str]
 
@@ -21,6 +22,7 @@ def status_rows(
     rows.append(("configuration", _configuration_words(status)))
     rows.append(("program", _program_words(status.program)))
     rows += _stop_rows(status.program)
+    rows += [] if status.stream is None else [("stream", stream_words(status.stream))]
     rows.append(("position", _position_words(status)))
     rows.append(("feed", f"{status.motion.feed_mm_s:.3f} mm/s"))
     rows.append(("override", _override_words(status.override)))
@@ -37,6 +39,20 @@ def status_rows(
     rows += _timing_rows(status.timing)
     rows += _statistics_rows(status.statistics)
     return rows
+
+
+_STREAM_STATES = ("none", "open", "waits for its next part", "ended", "stopped before its end")
+
+
+def stream_words(stream: StreamStatus) -> str:
+    """A job in chunks: line, motion ahead, time left."""
+    left = "time left not known"
+    if stream.remaining_s is not None:
+        left = f"{stream.committed_s + stream.remaining_s:.0f} s left"
+    return (
+        f"{_STREAM_STATES[stream.state]}, line {stream.line}, {stream.way_mm:.3f} mm, "
+        f"{stream.committed_s:.1f} s ahead in the controller, {left}, {stream.underruns} rests for want of chunks"
+    )
 
 
 def _timing_rows(timing: str) -> list[Row]:

@@ -280,6 +280,49 @@ def _goto(command: Command) -> None:
     options.kernel(goto)
 
 
+def _stream(command: Command) -> None:
+    stream = command("stream", "run toolpaths of any length: sent part by part while they run")
+    stream.add_argument(
+        "files",
+        metavar="FILE",
+        type=Path,
+        nargs="*",
+        help=f"{options.TOOLPATH}; several are one job",
+    )
+    stream.add_argument(
+        "--continue",
+        dest="resume",
+        action="store_true",
+        help="go on with the job of the journal where the machine rests",
+    )
+    stream.add_argument(
+        "--journal",
+        type=Path,
+        metavar="JSON",
+        help="of the job (default stream.json in ~/.local/state/hodograph)",
+    )
+    stream.add_argument(
+        "--simulate",
+        action="store_true",
+        help="no bus: plan all chunks, check them and take them over as the controller does",
+    )
+    options.unhomed(stream)
+    stream.add_argument("--machine", type=Path, metavar="FILE", help="machine file")
+    options.toolpath(stream)
+    stream.add_argument(
+        "--no-stops",
+        action="store_true",
+        help="do not wait for Enter at program stops and tool changes (M0, M1, M6)",
+    )
+    options.bus(stream, can_serve=True)
+    options.kernel(stream)
+    options.json(stream)
+    stream.add_argument(
+        "--pace", choices=PACES, help="of a controller started here (default real-time)"
+    )
+    options.controller(stream)
+
+
 def _run(command: Command) -> None:
     run = command("run", "run paths on the bus, record and analyse")
     options.file(run, many=True, what=f"path file (TOML), or {options.TOOLPATH}")
@@ -340,7 +383,7 @@ def _rig(command: Command) -> None:
     options.controller(rig)
 
 
-_MOVING = (_upload, _goto, _run, _demo, _rig)
+_MOVING = (_upload, _goto, _run, _stream, _demo, _rig)
 
 
 def _start(command: Command) -> None:

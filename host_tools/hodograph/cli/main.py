@@ -27,6 +27,7 @@ _MODULES = {
     **dict.fromkeys(("spline", "feed", "compile", "inspect", "simulate"), "path_commands"),
     **dict.fromkeys(("upload", "goto", "rig"), "motion_commands"),
     "run": "run_command",
+    "stream": "stream_command",
     **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
     "completion": "completion",
     **dict.fromkeys(("scan", "check"), "commission_commands"),
@@ -62,7 +63,7 @@ _COMPUTING = frozenset(
             "replay",
             "report",
         ),
-        *("paper", "tune", "identify", "upload", "goto", "run", "campaign"),
+        *("paper", "tune", "identify", "upload", "goto", "run", "stream", "campaign"),
     )
 )
 """Commands that a terminal shows the time of, while they compute."""

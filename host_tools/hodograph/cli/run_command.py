@@ -3,29 +3,27 @@
 
 from __future__ import annotations
 
-import select
 import sys
 from argparse import Namespace
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from ..bus.address import BusAddress
 from ..bus.capture.recordings import check_suffix
 from ..bus.own_bus import opened_bus
-from ..bus.run import BusRun, RunSession, run_program, run_session
+from ..bus.run import BusRun, run_program
 from ..bustime import require_fit
-from ..config import Machine
 from ..errors import BusError, InputError
 from ..job import write_job_trace
-from ..job_run import JobRun, Look, PreparedJob, operator_stops, prepared, run_job
+from ..job_run import JobRun, NoRoomError, PreparedJob, operator_stops, prepared, run_job
 from ..names import is_toolpath
 from ..pipeline import Pipeline, load_pipeline
 from ..simulate import write_trace
+from .bus_session import await_enter, pass_stop, session
 from .motion_commands import print_run
 from .output import duration_text, note, number, print_json, print_rows, progress
 from .path_commands import print_notes
+from .stream_command import stream_on
 from .toolpath_commands import job_rows, refuse_toolpath_options, toolpath_job
 
 Task = Pipeline | PreparedJob
@@ -45,7 +43,14 @@ def _run_all(options: Namespace, address: BusAddress) -> None:
             "(slcand makes one of a serial adapter)"
         )
     _check_outputs(options)
-    tasks = [_task(options, file) for file in options.files]
+    try:
+        tasks = [_task(options, file) for file in options.files]
+    except NoRoomError as error:
+        if len(options.files) > 1 or any((options.trace, options.report, options.record)):
+            raise
+        note(f"{error}: it is streamed")
+        stream_on(options, address)
+        return
     runs = [_run_one(task, address, options) for task in tasks]
     if options.trace is not None:
         _write_trace(runs[0], options.trace)
@@ -98,48 +103,21 @@ def _task(options: Namespace, file: Path) -> Task:
 def _run_one(task: Task, address: BusAddress, options: Namespace) -> BusRun | JobRun:
     if isinstance(task, PreparedJob):
         with (
-            _session(task.job.machine, address, options) as at,
+            session(task.job.machine, address, options) as at,
             progress(f"run {task.job.file.name}", "tick", task.ticks) as bar,
         ):
-            operator = _pass if options.no_stops else _await_enter
+            operator = pass_stop if options.no_stops else await_enter
             return run_job(at, task, operator, bar, options.record, unhomed=options.unhomed)
     machine = task.machine
     print_notes(task, task.compilation.plan)
     with (
-        _session(machine, address, options) as at,
+        session(machine, address, options) as at,
         progress(f"run {task.file.name}", "tick", task.program.ticks) as bar,
     ):
         kernel = options.kernel or machine.kernel
         return run_program(
             at, machine, task.image, kernel, bar, options.record, unhomed=options.unhomed
         )
-
-
-@contextmanager
-def _session(machine: Machine, address: BusAddress, options: Namespace) -> Iterator[RunSession]:
-    with run_session(
-        machine, address, options.pace or "real-time", options.wait, note, options.controller
-    ) as at:
-        if options.pace is not None and at.pace is None:
-            note("--pace has no effect on a controller that is running already")
-        if options.controller is not None and at.pace is None:
-            note("--controller has no effect where one is running already")
-        yield at
-
-
-def _pass(text: str, look: Look) -> None:
-    look()
-    note(f"{text}: passed without waiting (--no-stops)")
-
-
-def _await_enter(text: str, look: Look) -> None:
-    note(f"{text}: waits for Enter; Ctrl-C ends the job")
-    while True:
-        look()
-        if select.select([sys.stdin], [], [], 0.0)[0]:
-            if not sys.stdin.readline():
-                raise InputError(f"{text}: standard input has ended: the job ends here")
-            return
 
 
 def _write_trace(found: BusRun | JobRun, file: Path) -> None:

@@ -34,7 +34,15 @@ def toolpath_job(options: Namespace, file: Path) -> Job:
     if options.machine is None:
         raise InputError(f"{file}: a toolpath names no machine: add --machine FILE")
     tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
-    reading = ReadOptions(
+    job = load_job(file, load_machine(options.machine), tolerance_mm, reading_of(options))
+    for line in job.notes:
+        note(line)
+    return job
+
+
+def reading_of(options: Namespace) -> ReadOptions:
+    """How options say that a toolpath is read."""
+    return ReadOptions(
         feed_mm_s=options.feed,
         layers=tuple(options.layer),
         ids=tuple(options.id),
@@ -44,10 +52,6 @@ def toolpath_job(options: Namespace, file: Path) -> Job:
         unit_mm=options.unit,
         closed=options.closed,
     )
-    job = load_job(file, load_machine(options.machine), tolerance_mm, reading)
-    for line in job.notes:
-        note(line)
-    return job
 
 
 def require_toolpath(file: Path) -> None:

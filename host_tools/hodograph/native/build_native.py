@@ -29,9 +29,9 @@ HEADERS = (
     "offline/contour.h",
     "offline/offline.h",
     "offline/stop_search.h",
+    "offline/stream.h",
     "offline/stop_trial.h",
     "offline/axis_run.h",
-    "offline/stream.h",
 )
 LIBRARIES = ("sim", "core")
 SOURCES = ("firmware/core", "sim/plant", "sim/offline")

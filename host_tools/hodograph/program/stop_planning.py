@@ -76,6 +76,20 @@ def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     return _checked(with_bounds(_with_codes(*tree.joined(codes))), terms)
 
 
+def stop_codes(
+    program: Program, plan: FeedPlan, terms: StopTerms, wanted: NDArray[np.bool_]
+) -> NDArray[np.uint8]:
+    """Codes (M, 2, 3) of the wanted (M,) pieces, 0 elsewhere. No piece is halved; the program may begin in motion."""
+    search = StopSearch(NativeProgram(encode(program)))
+    limits = [
+        own.raised(search.used(own))
+        for own in (hold_limits(plan, terms), fault_limits(plan, terms))
+    ]
+    codes = np.zeros((program.piece_count, 2, 3), dtype=np.uint8)
+    _search_round(program, limits, codes, np.repeat(~wanted[:, None], 2, axis=1))
+    return codes
+
+
 def _searched(tree: _Halves, limits: Sequence[StopLimits]) -> NDArray[np.uint8]:
     """Codes (M, 2, 3) of a program whose pieces without numbers of a kind are halved until all have them, or are too
     short to be halved, or MOST_MISSES halvings one after the other have found none. What has numbers keeps them, so

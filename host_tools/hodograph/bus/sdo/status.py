@@ -45,6 +45,7 @@ from .objects import (
     TIMING,
     UNHOMED_START,
 )
+from .stream_channel import NONE, StreamStatus, stream_status
 from .upload import program_fault_text
 
 _Q40 = 2.0**-40
@@ -178,6 +179,7 @@ class Statistics:
 class Status:
     """Everything that the controller reports, at about one instant. `timing` is one of TIMINGS.
 
+    `stream`: the job in chunks; None: there is none.
     `unhomed_nodes`: drives that should have been homed, and were not, when the present or last program was started.
     """
 
@@ -195,6 +197,7 @@ class Status:
     axes: tuple[AxisStatus, ...]
     timing: str
     statistics: Statistics
+    stream: StreamStatus | None = None
 
     def json(self) -> dict[str, Any]:
         """As nested dictionaries and lists, ready for JSON."""
@@ -218,6 +221,7 @@ def snapshot(controller: Controller) -> Status:
         configured = _configured(controller)
         unhomed = controller.read(UNHOMED_START, 2)
         statistics = Statistics(**controller.statistics())
+        stream = stream_status(controller)
         timing = controller.read(TIMING)
     with controller.turn():
         axis_count = controller.read(CONFIGURATION, 1)
@@ -240,6 +244,7 @@ def snapshot(controller: Controller) -> Status:
         axes=axes,
         timing=TIMINGS.get(timing, str(timing)),
         statistics=statistics,
+        stream=None if stream.state == NONE else stream,
     )
 
 

@@ -33,7 +33,7 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
     before = _active(node)
     patience, node.sdo.RESPONSE_TIMEOUT = node.sdo.RESPONSE_TIMEOUT, 5.0
     try:
-        node.patiently(PROGRAM, 1, lambda: _block_download(node, image, progress))
+        node.patiently(PROGRAM, 1, lambda: block_download(node, PROGRAM, image, progress))
     except SdoAbortedError as error:
         raise _refusal(node, error, before) from error
     except (SdoCommunicationError, RuntimeError) as error:
@@ -76,8 +76,9 @@ def _fate(node: Node, before: tuple[int, int]) -> str:
     return "the old program is unharmed" if before[1] else "there is no program yet"
 
 
-def _block_download(node: Node, image: bytes, progress: Progress | None) -> None:
-    stream = node.sdo.open(PROGRAM, 1, "wb", buffering=0, size=len(image), block_transfer=True)
+def block_download(node: Node, index: int, image: bytes, progress: Progress | None = None) -> None:
+    """Writes sub 1 of an object by block download. Raises the errors of the SDO client."""
+    stream = node.sdo.open(index, 1, "wb", buffering=0, size=len(image), block_transfer=True)
     node.transfer_begun()
     try:
         while stream.pos < len(image):

@@ -69,11 +69,11 @@ def plan_windows(
             found = plan_window(spline, limits, low, high, None, period_s)
         if found is None:
             raise NothingFoundError(f"feed: nothing found from arc length {low:g} mm")
-        held = found = _measured(spline, found)
+        held = found = measured(spline, found)
         if found.grid.s[-1] >= length:
             yield ends_of(found, found.grid.size)
             return
-        count = _keep(found, overview.stop_s)
+        count = kept(found, overview.stop_s)
 
 
 def _continued(
@@ -90,18 +90,19 @@ def _continued(
     state = State(float(held.q[count]), float(held.slope[count]))
     high = overview.window_end(low, intervals)
     return plan_window(
-        spline, limits, low, high, state, period_s, held, _trusted_to(held, overview.stop_s)
+        spline, limits, low, high, state, period_s, held, trusted_to(held, overview.stop_s)
     )
 
 
-def _keep(found: Solution, stop_s: float) -> int:
+def kept(found: Solution, stop_s: float) -> int:
     """How many intervals are far enough from the stop at the end."""
     left = found.duration_s - np.cumsum(found.times)
     count = int(np.count_nonzero(left > _STOPS * stop_s))
     return max(count, found.grid.size // 3)
 
 
-def _trusted_to(found: Solution, stop_s: float) -> float:
+def trusted_to(found: Solution, stop_s: float) -> float:
+    """Arc length up to which the stop at the end affects a window so little that the next one begins with it."""
     left = found.duration_s - np.concatenate((np.zeros(1), np.cumsum(found.times)))
     return float(found.grid.s[int(np.count_nonzero(left > 2.0 * stop_s))])
 
@@ -126,13 +127,17 @@ def _overview(spline: Curve, limits: PlanLimits, period_s: float) -> _Overview:
     count = np.concatenate(
         (np.zeros(1), np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(found.t)))
     )
-    feed = float(np.sqrt(found.q.max()))
+    return _Overview(found.s, count, stopping_s(limits, float(np.sqrt(found.q.max()))))
+
+
+def stopping_s(limits: PlanLimits, feed_mm_s: float) -> float:
+    """Roughly how long stopping takes from a feed."""
     jerk = limits.least_jerk
-    pull = min(0.7 * limits.least_acceleration, (jerk * feed) ** 0.5)
-    return _Overview(found.s, count, feed / pull + pull / jerk)
+    pull = min(0.7 * limits.least_acceleration, (jerk * feed_mm_s) ** 0.5)
+    return feed_mm_s / pull + pull / jerk
 
 
-def _measured(spline: Curve, found: Solution) -> Solution:
+def measured(spline: Curve, found: Solution) -> Solution:
     """A window, with tighter limits on intervals whose piece is above one by more than 0.3 %."""
     best, trial = found, found
     usage = _usage(spline, found)

@@ -81,8 +81,13 @@ class Unfit:
     chord: Index
 
 
-def fit(reference: Reference, how: Tolerance) -> FittedPath | Unfit:
+def fit(
+    reference: Reference, how: Tolerance, tied: tuple[bool, bool] = (False, False)
+) -> FittedPath | Unfit:
     """The curve of a reference without turns beyond SHARPEST_RAD, and that begins and ends at rest.
+
+    Where start or end is `tied`, it is straight there, in the direction of the chord: curves of both halves of a chord
+    join with continuous curvature.
 
     Smoothing weighs its cost with estimated speeds. Of a path that is not very long, two curves are made, for estimates
     with the programmed feeds and with lower ones; the one that should take less time is taken.
@@ -92,7 +97,7 @@ def fit(reference: Reference, how: Tolerance) -> FittedPath | Unfit:
     caps = [limits.feed_mm_s]
     if reference.count <= _MOST_FOR_TWO and slow < min(caps[0], float(reference.feed_mm_s.max())):
         caps.append(slow)
-    found = [_fit(reference, how, cap) for cap in caps]
+    found = [_fit(reference, how, cap, tied) for cap in caps]
     good = [one for one in found if isinstance(one, FittedPath)]
     return min(good, key=lambda one: _estimated_s(one, limits)) if good else found[0]
 
@@ -112,10 +117,12 @@ def _estimated_s(path: FittedPath, limits: MotionLimits) -> float:
     return float(np.sum(2.0 * np.diff(place) / (speed[1:] + speed[:-1])))
 
 
-def _fit(reference: Reference, how: Tolerance, cap_mm_s: float) -> FittedPath | Unfit:
+def _fit(
+    reference: Reference, how: Tolerance, cap_mm_s: float, tied: tuple[bool, bool]
+) -> FittedPath | Unfit:
     """A curve for estimated speeds of at most `cap_mm_s`."""
-    path = outline(reference, how.tolerance_mm)
-    plan = _Plan.of(path, how, cap_mm_s)
+    path = outline(reference, how.tolerance_mm, tied)
+    plan = _Plan.of(path, how, cap_mm_s, tied)
     room = _ROOM_SHARE
     plan = plan.with_stretches(room)
     bad = np.zeros(0, dtype=np.intp)
@@ -156,6 +163,7 @@ class _Plan:
     path: Outline
     how: Tolerance
     cap_mm_s: float
+    tied: tuple[bool, bool]
     corner: Index
     shape: Index
     size: Real
@@ -164,7 +172,7 @@ class _Plan:
     known: list[Segments | None] = field(default_factory=list)
 
     @classmethod
-    def of(cls, path: Outline, how: Tolerance, cap_mm_s: float) -> _Plan:
+    def of(cls, path: Outline, how: Tolerance, cap_mm_s: float, tied: tuple[bool, bool]) -> _Plan:
         long, reach = path.anchored, path.reach_mm
         leg, count = path.leg_mm, path.leg_mm.size
         both = reach[:-1] + reach[1:]
@@ -192,7 +200,7 @@ class _Plan:
                 after = min(near[last + 1], _ENDS * reach[last + 1])
                 last += 1
             spans.append((first, last, float(before), float(after)))
-        return cls(path, how, cap_mm_s, alone, shape, size, tuple(spans))
+        return cls(path, how, cap_mm_s, tied, alone, shape, size, tuple(spans))
 
     def with_stretches(self, share: float) -> _Plan:
         """With stations on the stretches, which have `share` of the tolerance as room."""
@@ -271,19 +279,21 @@ class _Plan:
 
     def _stretch(self, index: int, points: Real, place: Real) -> Segments:
         first, last, before, after = self.spans[index]
+        starts = before > 0.0 or (first == 0 and self.tied[0])
+        ends = after > 0.0 or (last == self.path.leg_mm.size - 1 and self.tied[1])
         points, place = _thinned(points, place, _THIN_SHARE * self.how.tolerance_mm)
         direction = self.path.direction
         found = spatial_through_points(
             points,
             False,
             ends="natural",
-            start_tangent=direction[first] if before > 0.0 else None,
-            end_tangent=direction[last] if after > 0.0 else None,
+            start_tangent=direction[first] if starts else None,
+            end_tangent=direction[last] if ends else None,
         ).spline
         preimage, spans = found.preimage.copy(), np.linalg.norm(np.diff(points, axis=0), axis=1)
-        if before > 0.0:
+        if starts:
             preimage[:3] = straightened(preimage[:3], spans[:3], direction[first])
-        if after > 0.0:
+        if ends:
             reverse = straightened(preimage[:-4:-1, :, ::-1], spans[:-4:-1], direction[last])
             preimage[-3:] = reverse[::-1, :, ::-1]
         joint = points[0] + np.concatenate(

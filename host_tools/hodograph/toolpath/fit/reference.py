@@ -104,6 +104,27 @@ class ReferenceBuilder:
             self._rows.extend([(move.line, feed, sag)] * (points.shape[0] - 1))
         self._at = move.end
 
+    @property
+    def count(self) -> int:
+        """Chords of all moves so far."""
+        return len(self._rows)
+
+    def points(self, first: int, end: int) -> Real:
+        """Points (n, 3) first … end - 1, as far as there are so many."""
+        return np.array(self._points[max(first, 0) : end], dtype=np.float64)
+
+    def cut(self, chord: int) -> Reference:
+        """The chords of all moves so far up to the middle of this one; the other half and what follows stays."""
+        a, b = self._points[chord : chord + 2]
+        middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2]))
+        points, rows = self._points, self._rows
+        self._points, self._rows = [*points[: chord + 1], middle], rows[: chord + 1]
+        part = self.reference()
+        self._points, self._rows = [middle, *points[chord + 1 :]], rows[chord:]
+        self.start = (*middle, self._at[3], self._at[4], self._at[5])
+        self.length_mm -= float(part.place_mm[-1])
+        return part
+
     def reference(self) -> Reference:
         """The chords of all moves so far, without those of length 0."""
         rows = np.array(self._rows, dtype=np.float64).reshape(-1, 3)

@@ -72,12 +72,15 @@ class Section:
     tolerance_mm  how far the curve may be from it
     before        commands that happen at rest, before the section starts
     events        commands that happen on the way
+    tied          whether start and end are no rests, but in the middle of a chord of a longer section: the curve is
+                  straight there, in the direction of the chord
     """
 
     reference: Reference
     tolerance_mm: float
     before: tuple[Command, ...] = ()
     events: tuple[PathEvent, ...] = ()
+    tied: tuple[bool, bool] = (False, False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,7 @@ class Toolpath:
 
 
 @dataclass
-class _Divider:
+class Divider:
     """Collects moves until something asks for a stop."""
 
     file: str
@@ -102,8 +105,10 @@ class _Divider:
     tolerance_mm: float = 0.0
     moved: bool = False
     direction: Real | None = None
+    tied: bool = False
 
     def take(self, command: Command) -> None:
+        """The next command."""
         if isinstance(command, StraightMove | ArcMove | SplineMove):
             self._move(command)
         elif isinstance(command, PathMode):
@@ -184,17 +189,25 @@ class _Divider:
     def _on_the_way(self, command: Command) -> None:
         self.events.append(PathEvent(self.builder.length_mm, command))
 
+    def add(self, reference: Reference, *, ends_tied: bool) -> None:
+        """Adds what was collected as sections; `ends_tied`: the last one goes on in motion."""
+        whole = Section(
+            reference,
+            self.section_tolerance,
+            tuple(self.before),
+            tuple(self.events),
+            (self.tied, ends_tied),
+        )
+        self.sections.extend(_without_reversals(whole))
+        self.before, self.events, self.tied = [], [], ends_tied
+
     def stop(self) -> None:
         """Whatever comes next starts from rest."""
         if not self.moved:
             return
         reference = self.builder.reference()
         if reference.count and float(reference.place_mm[-1]) >= _SHORTEST_MM:
-            whole = Section(
-                reference, self.section_tolerance, tuple(self.before), tuple(self.events)
-            )
-            self.sections.extend(_without_reversals(whole))
-            self.before, self.events = [], []
+            self.add(reference, ends_tied=False)
             begin = self.builder.position
         else:  # too short to be run: the next section makes it good
             begin = self.builder.start
@@ -211,7 +224,7 @@ def divided(
                   itself (G64 P) counts where it is less
     Raises InputError, naming file and line: moves that have no path.
     """
-    divider = _Divider(
+    divider = Divider(
         file, tolerance_mm, ReferenceBuilder(start, SAG_SHARE * (tolerance_mm or EXACT_MM))
     )
     divider.tolerance_mm = tolerance_mm
@@ -223,7 +236,7 @@ def divided(
 
 def _without_reversals(section: Section) -> Iterator[Section]:
     """The section cut where it turns so sharply that a stop costs no more than a curve."""
-    path = outline(section.reference, section.tolerance_mm)
+    path = outline(section.reference, section.tolerance_mm, section.tied)
     sharp = path.place_mm[path.turn_rad > SHARPEST_RAD]
     yield from cut_at(section, sharp)
 
@@ -242,5 +255,7 @@ def cut_at(section: Section, places: np.ndarray) -> Iterator[Section]:
             for event in section.events
             if low <= event.place_mm < high or (final and event.place_mm == high)
         )
-        yield Section(section.reference.part(first, last), section.tolerance_mm, before, events)
+        tied = (first == 0 and section.tied[0], final and section.tied[1])
+        part = section.reference.part(first, last)
+        yield Section(part, section.tolerance_mm, before, events, tied)
         before = ()

@@ -86,16 +86,23 @@ def turns(point: Real) -> Real:
     return out
 
 
-def outline(reference: Reference, tolerance_mm: float) -> Outline:
-    """The vertices of a reference, without those that lie on the way between their neighbours."""
-    point, place, off = _thinned(reference, THIN_SHARE * tolerance_mm)
+def outline(
+    reference: Reference, tolerance_mm: float, tied: tuple[bool, bool] = (False, False)
+) -> Outline:
+    """The vertices of a reference, without those that lie on the way between their neighbours.
+
+    tied  whether the first and the last leg have to be the first and the last chord
+    """
+    point, place, off = _thinned(reference, THIN_SHARE * tolerance_mm, tied)
     turn = turns(point)
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = np.where(turn > 0.0, tolerance_mm * extent(np.minimum(turn, SHARPEST_RAD)), 0.0)
     return Outline(point, place, off, turn, reach, reference)
 
 
-def _thinned(reference: Reference, off_mm: float) -> tuple[Real, Real, Real]:
+def _thinned(
+    reference: Reference, off_mm: float, tied: tuple[bool, bool]
+) -> tuple[Real, Real, Real]:
     """Kept points, their places, and how far what lies between is from the legs."""
     point, place = reference.point, reference.place_mm
     off = np.zeros(reference.count)
@@ -106,6 +113,8 @@ def _thinned(reference: Reference, off_mm: float) -> tuple[Real, Real, Real]:
         total = aside + np.maximum(off[:-1], off[1:])
         drop = np.zeros(point.shape[0], dtype=np.bool_)
         drop[1:-1] = total <= off_mm
+        drop[1] &= not tied[0]
+        drop[-2] &= not tied[1]
         # No two neighbours in one round: of each run every second one.
         run = np.arange(drop.size) - np.maximum.accumulate(np.where(drop, 0, np.arange(drop.size)))
         drop &= run % 2 == 1

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Object 0x2060 of the controller: chunks of a job, and what has become of them (docs/reference/protocol.md 3.7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from ...errors import BusError, RefusedError, one_line
+from .node import Node
+from .objects import STREAM
+from .upload import ABORT_VALUE_RANGE, block_download, program_fault_text
+
+ABORT_NO_ROOM = 0x05040005
+NONE, OPEN, UNDERRUN, ENDED, STOPPED = range(5)
+"""Values of sub 2."""
+UNKNOWN_MS = 0xFFFFFFFF
+_TRIES = 4
+_PATIENCE_S = 5.0
+_CORRUPT = (-4, -80, -81)
+"""Refusals that a transfer with wrong bytes brings too: the chunk is sent again."""
+
+
+@dataclass(frozen=True)
+class StreamStatus:
+    """What object 0x2060 says.
+
+    committed_s   motion from here to the rest at the end of the newest accepted chunk
+    line, way_mm  where the motion is: source line of the executed chunk, arc length of the job
+    remaining_s   from the newest accepted chunk to the end of the job; None: not known
+    """
+
+    state: int
+    job: int
+    wanted: int
+    free_bytes: int
+    committed_s: float
+    sequence: int
+    line: int
+    way_mm: float
+    remaining_s: float | None
+    underruns: int
+
+
+def stream_status(node: Node) -> StreamStatus:
+    """Raises BusError and RefusedError: the controller does not answer, or has no streams."""
+    values = [node.read(STREAM, sub) for sub in (2, 3, 4, 7, 8, 9, 10, 11, 12, 13)]
+    state, job, wanted, free, committed, sequence, line, way, remaining, underruns = values
+    return StreamStatus(
+        state,
+        job,
+        wanted,
+        free,
+        1e-3 * committed,
+        sequence,
+        line,
+        way * 2.0**-40,
+        None if remaining == UNKNOWN_MS else 1e-3 * remaining,
+        underruns,
+    )
+
+
+def close_stream(node: Node) -> None:
+    """Forgets a job that is over, so that all memory is free. Raises RefusedError: it moves."""
+    if node.read(STREAM, 2) != NONE:
+        node.write(STREAM, 15, 1)
+
+
+def send_chunk(node: Node, data: bytes, job: int, sequence: int, place: str) -> bool:
+    """Sends a chunk, again where the transfer broke off or its bytes came wrong. False: there is no room for it now.
+
+    place  file and line, for messages
+    Raises RefusedError: the controller refuses it; BusError: it does not come through.
+    """
+    last = ""
+    for _ in range(_TRIES):
+        patience, node.sdo.RESPONSE_TIMEOUT = node.sdo.RESPONSE_TIMEOUT, _PATIENCE_S
+        try:
+            node.patiently(STREAM, 1, lambda: block_download(node, STREAM, data))
+            return True
+        except SdoAbortedError as error:
+            if error.code == ABORT_NO_ROOM:
+                return False
+            last = str(error)
+            if _accepted(node, job, sequence):
+                return True
+            if error.code == ABORT_VALUE_RANGE:
+                _check_refusal(node, place)
+        except (SdoCommunicationError, RuntimeError) as error:
+            last = one_line(error)
+            if _accepted(node, job, sequence):
+                return True
+        finally:
+            node.sdo.RESPONSE_TIMEOUT = patience
+    raise BusError(
+        f"{place}: a part of the job does not come through to {node.who()}: {last}: the motion rests on the path; "
+        "hodograph stream --continue goes on"
+    )
+
+
+def _accepted(node: Node, job: int, sequence: int) -> bool:
+    """Whether the controller has the chunk: the answer to it may have been lost."""
+    try:
+        return node.read(STREAM, 3) == job and node.read(STREAM, 4) > sequence
+    except BusError:
+        return False
+
+
+def _check_refusal(node: Node, place: str) -> None:
+    """Raises RefusedError, unless the bytes may have come wrong."""
+    code, index = node.read(STREAM, 5), node.read(STREAM, 6)
+    if code not in _CORRUPT:
+        raise RefusedError(
+            f"{place}: {node.who()} refused a part of the job: {program_fault_text(code, index)}: the motion rests on "
+            "the path; hodograph stop ends it"
+        )

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: MIT
+"""hodograph stream: toolpaths of any length, as one job, through a controller with little memory."""
+
+from __future__ import annotations
+
+import os
+import random
+import time
+from argparse import Namespace
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ..bus.address import BusAddress
+from ..bus.own_bus import opened_bus
+from ..bus.run import bring_up
+from ..bus.sdo.controller import connect
+from ..bus.sdo.objects import ON_PATH, STREAM
+from ..bus.sdo.stream_channel import close_stream, stream_status
+from ..bustime import machine_bus_time, require_fit
+from ..config import Machine, load_machine
+from ..errors import InputError
+from ..job import DEFAULT_TOLERANCE_MM
+from ..names import STANDARD_INPUT
+from ..native.program import NativeLimits
+from ..pipeline import program_limits
+from ..stream.chunks import CHUNK_BYTES
+from ..stream.journal import Entry, Journal, load, mark
+from ..stream.plan import JobFiles, JobPlan, Place
+from ..stream.sender import Sender, StreamedJob, StreamProgress
+from ..stream.simulation import StreamedMotion, simulate_chunks
+from ..toolpath.files import ReadOptions
+from .bus_session import await_enter, pass_stop, session
+from .output import duration_text, note, number, print_json, print_rows, progress, size_text
+from .toolpath_commands import reading_of, require_toolpath
+
+_RING_SHARE = 3
+"""A chunk of a third of the ring always finds room in the end (docs/reference/protocol.md 3.7)."""
+
+_SMALL_RING = 48 * 1024
+"""Of the small controllers; --simulate makes chunks for it."""
+
+_EVERY_S = 5.0
+_FRAME_BITS, _FRAME_BYTES, _USED = 135, 7, 0.85
+"""Of a frame of a block download, with all stuff bits; share of the free bus that is reached beside answers and
+pauses."""
+
+
+def stream(options: Namespace) -> None:
+    """hodograph stream."""
+    if options.resume:
+        _continue(options)
+        return
+    if not options.files:
+        raise InputError("stream: give one FILE at least, or - for standard input, or --continue")
+    for file in options.files:
+        require_toolpath(file)
+    if options.simulate:
+        _simulate(_job(options), options)
+        return
+    with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
+        stream_on(options, address)
+
+
+def stream_on(options: Namespace, address: BusAddress) -> None:
+    """Streams the files of `stream`, or of `run` where they do not fit the memory of the controller."""
+    job = _job(options)
+    require_fit(job.machine)
+    number = random.SystemRandom().randrange(1, 2**31)
+    _run(job, options, address, number, Place(), _journal(job, options, number))
+
+
+def _job(options: Namespace) -> JobFiles:
+    if options.machine is None:
+        raise InputError(f"{options.files[0]}: a toolpath names no machine: add --machine FILE")
+    tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
+    machine = load_machine(options.machine)
+    return JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
+
+
+def journal_file(options: Namespace) -> Path:
+    """Where the journal is."""
+    given = getattr(options, "journal", None)
+    if given is not None:
+        return Path(given)
+    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(home) / "hodograph" / "stream.json"
+
+
+def _journal(job: JobFiles, options: Namespace, number: int) -> Journal | None:
+    if any(str(file) == STANDARD_INPUT for file in job.files):
+        note("standard input cannot be read again: --continue is not possible for this job")
+        return None
+    marks = tuple(mark(file) for file in job.files)
+    own = {"tolerance_mm": job.tolerance_mm, "reading": asdict(job.reading)}
+    machine = str(options.machine.resolve())
+    return Journal(journal_file(options), Entry(marks, machine, own, number))
+
+
+def _continue(options: Namespace) -> None:
+    """Goes on with the job of the journal."""
+    if options.files:
+        raise InputError("stream --continue: goes on with the files of the last job: give none")
+    file = journal_file(options)
+    entry = load(file)
+    own = entry.options
+    given: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in own["reading"].items()
+    }
+    files = tuple(Path(one.path) for one in entry.files)
+    machine = load_machine(Path(entry.machine))
+    job = JobFiles(files, machine, own["tolerance_mm"], ReadOptions(**given))
+    require_fit(job.machine)
+    with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
+        _run(job, options, address, random.SystemRandom().randrange(1, 2**31), None, None, entry)
+
+
+def _run(
+    job: JobFiles,
+    options: Namespace,
+    address: BusAddress,
+    job_number: int,
+    begin: Place | None,
+    journal: Journal | None,
+    entry: Entry | None = None,
+) -> None:
+    kernel = options.kernel or job.machine.kernel
+    if begin is None:
+        assert entry is not None
+        begin = _rests_at(entry, job.machine, address, options.wait)
+    with session(job.machine, address, options) as at:
+        if entry is not None:
+            fresh = Entry(
+                entry.files, entry.machine, entry.options, job_number, begin.section, begin.way_q40
+            )
+            journal = Journal(journal_file(options), fresh)
+        bring_up(at, job.machine, kernel)
+        close_stream(at.controller)
+        room = at.controller.read(STREAM, 7) // _RING_SHARE
+        most = min(room, CHUNK_BYTES)
+        with JobPlan(job, most, job_number, begin) as plan:
+            sender = Sender(
+                at,
+                job.machine,
+                plan,
+                pass_stop if options.no_stops else await_enter,
+                journal,
+                None if options.quiet or options.no_progress else _Progress(_EVERY_S),
+                kernel,
+                unhomed=options.unhomed,
+                slow=_free_rate(job.machine, address),
+            )
+            done = sender.run()
+            for line in plan.notes:
+                note(line)
+    _print(done, options)
+
+
+def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place:
+    """Where the machine rests, after a stop: what the controller says of the job if it is still there, else the
+    journal.
+    """
+    place = Place(entry.section, entry.way_q40)
+    with connect(address, machine.node, machine.bitrate) as controller:
+        known = controller.answers(wait_s)
+        if known:
+            if controller.state() in ON_PATH:
+                controller.stop_and_wait()
+            status = stream_status(controller)
+            known = status.job == entry.job
+            place = Place(entry.section, round(status.way_mm * 2**40)) if known else place
+    if not known:
+        note(
+            "the controller no longer knows the job: it goes on from the last place in the journal"
+        )
+    note(f"goes on in section {place.section + 1} at {number(place.way_q40 * 2.0**-40)} mm of it")
+    return place
+
+
+def _free_rate(machine: Machine, address: BusAddress) -> float | None:
+    """Bytes a second that a bus has for chunks; None: it is no bus of that bit rate."""
+    if not address.is_socketcan or address.channel.startswith("vcan"):
+        return None
+    free = 1.0 - 0.01 * machine_bus_time(machine).load_percent
+    return max(free, 0.01) * machine.bitrate / _FRAME_BITS * _FRAME_BYTES * _USED
+
+
+class _Progress:
+    """Says now and then where the job is."""
+
+    def __init__(self, every_s: float) -> None:
+        self._every_s, self._due_s = every_s, time.monotonic() + every_s
+
+    def __call__(self, now: StreamProgress) -> None:
+        if time.monotonic() < self._due_s:
+            return
+        self._due_s = time.monotonic() + self._every_s
+        if now.remaining_s is None:
+            left = f"more than {duration_text(now.planned_s)} left"
+        else:
+            left = f"{duration_text(now.remaining_s)} left"
+        note(f"{now.file}:{now.line}: {left}, {now.ahead_s:.1f} s ahead in the controller")
+
+
+def _print(done: StreamedJob, options: Namespace) -> None:
+    if options.json:
+        print_json(asdict(done))
+        return
+    print_rows(
+        [
+            ("sections", str(done.sections)),
+            ("chunks", f"{done.chunks}, {size_text(done.bytes)}"),
+            ("motion", f"{duration_text(done.motion_s)} in {duration_text(done.took_s)}"),
+            ("rests for want of chunks", str(done.underruns)),
+        ]
+    )
+
+
+def _simulate(job: JobFiles, options: Namespace) -> None:
+    """All chunks through the controller's core, without a bus."""
+    machine = job.machine
+    limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
+    kernel = options.kernel or machine.kernel
+    found: list[StreamedMotion] = []
+    begin_s = time.perf_counter()
+    with (
+        JobPlan(job, _SMALL_RING // _RING_SHARE, 1, Place()) as plan,
+        progress("simulate", "section") as bar,
+    ):
+        for chunks in plan.by_section():
+            found.append(simulate_chunks(chunks, limits, kernel, machine.counts_per_mm))
+            bar(len(found))
+        motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
+        counted = {"chunks": plan.chunks, "bytes": plan.bytes}
+    took_s = time.perf_counter() - begin_s
+    for line in notes:
+        note(line)
+    if options.json:
+        print_json(
+            {
+                "duration_s": motion_s,
+                "wall_s": took_s,
+                "greatest_bytes_per_s": rate,
+                **counted,
+                "section": [asdict(one) for one in found],
+            }
+        )
+        return
+    print_rows(
+        [
+            ("sections", str(len(found))),
+            ("chunks", f"{counted['chunks']}, {size_text(counted['bytes'])}"),
+            (
+                "motion",
+                f"{duration_text(motion_s)}, planned and simulated in {duration_text(took_s)}",
+            ),
+            ("bytes a second", f"{number(rate)} at most, over 3 s"),
+        ]
+    )
+    for k, one in enumerate(found, 1):
+        print(f"section {k}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
+
+
+COMMANDS = {"stream": stream}

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: MIT
+"""A chunk of a stream: a header and a whole program image, to and from bytes; docs/reference/protocol.md 1.7.
+
+Every chunk ends at rest. Its last pieces are a tail that brakes along the path; the next chunk repeats the pieces
+before the tail bit for bit and goes on from their end, the joint.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..program.image import Program, decode, encode
+
+MAGIC = b"HDGC"
+VERSION = 1
+HEADER_SIZE = 80
+FLAG_FIRST, FLAG_LAST = 1, 2
+TIME_UNKNOWN = 0xFFFFFFFF
+LEAST_SHARED_PIECES = 16
+"""The largest look-ahead window of the controller: so many pieces before a joint are in both chunks."""
+
+_HEADER = struct.Struct("<4sHH I I I I I I I I q Q q I I II".replace(" ", ""))
+_CRC_FROM = 16
+
+
+@dataclass(frozen=True)
+class ChunkHeader:
+    """What a chunk says beside its program.
+
+    first, last       the job begins with it, at rest; the job ends with it
+    job               number of the job, not 0
+    sequence          0, 1, 2, …
+    piece_shift       index in the predecessor of piece 0 here; `segment_shift` the same of segment 0
+    shared_pieces     so many pieces from the first are those of the predecessor: the joint is the end of the last
+    shared_segments   the same of segments
+    arc_shift_q40     arc length in the predecessor of arc length 0 here
+    time_shift_q32_s  program time in the predecessor of time 0 here
+    job_start_q40     arc length of the job at arc length 0 here
+    line              source line at its joint; 0: none
+    remaining_ms      of the job, from the joint to its end; None: not known yet
+    """
+
+    first: bool
+    last: bool
+    job: int
+    sequence: int
+    piece_shift: int = 0
+    segment_shift: int = 0
+    shared_pieces: int = 0
+    shared_segments: int = 0
+    arc_shift_q40: int = 0
+    time_shift_q32_s: int = 0
+    job_start_q40: int = 0
+    line: int = 0
+    remaining_ms: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """A header and the image of its program."""
+
+    header: ChunkHeader
+    image: bytes
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return HEADER_SIZE + len(self.image)
+
+    @property
+    def program(self) -> Program:
+        """The program. Raises InputError: the image cannot be read."""
+        return decode(self.image)
+
+    def with_remaining(self, remaining_s: float | None) -> Chunk:
+        """The same with this time from its joint to the end of the job."""
+        ms = None if remaining_s is None else min(round(1000.0 * remaining_s), TIME_UNKNOWN - 1)
+        return replace(self, header=replace(self.header, remaining_ms=ms))
+
+    def encode(self) -> bytes:
+        """The bytes. Raises InputError for values that the fields cannot hold."""
+        one = self.header
+        try:
+            body = _HEADER.pack(
+                MAGIC,
+                VERSION,
+                FLAG_FIRST * one.first | FLAG_LAST * one.last,
+                self.size,
+                0,
+                one.job,
+                one.sequence,
+                one.piece_shift,
+                one.segment_shift,
+                one.shared_pieces,
+                one.shared_segments,
+                one.arc_shift_q40,
+                one.time_shift_q32_s,
+                one.job_start_q40,
+                one.line,
+                TIME_UNKNOWN if one.remaining_ms is None else one.remaining_ms,
+                0,
+                0,
+            )
+        except struct.error as error:
+            raise InputError(f"chunk: a header field does not fit the format: {error}") from None
+        whole = body + self.image
+        crc = zlib.crc32(whole[_CRC_FROM:])
+        return whole[: _CRC_FROM - 4] + struct.pack("<I", crc) + whole[_CRC_FROM:]
+
+
+def parse(data: bytes) -> Chunk:
+    """The chunk in these bytes. Raises InputError: magic, version, size, flags, CRC or a reserved field is wrong."""
+    if len(data) < HEADER_SIZE:
+        raise InputError(f"chunk: {len(data)} bytes are less than a header")
+    (magic, version, flags, size, crc, *rest) = _HEADER.unpack_from(data)
+    if magic != MAGIC or version != VERSION or flags & ~(FLAG_FIRST | FLAG_LAST) or any(rest[-2:]):
+        raise InputError("chunk: wrong magic, version or flag, or a reserved field is not 0")
+    if not HEADER_SIZE <= size <= len(data):
+        raise InputError(f"chunk: says {size} bytes, and there are {len(data)}")
+    if zlib.crc32(data[_CRC_FROM:size]) != crc:
+        raise InputError("chunk: CRC-32 is wrong")
+    job, sequence, *shared, arc, time, start, line, remaining, _, _ = rest
+    header = ChunkHeader(
+        bool(flags & FLAG_FIRST),
+        bool(flags & FLAG_LAST),
+        job,
+        sequence,
+        shared[0],
+        shared[1],
+        shared[2],
+        shared[3],
+        arc,
+        time,
+        start,
+        line,
+        None if remaining == TIME_UNKNOWN else remaining,
+    )
+    return Chunk(header, bytes(data[HEADER_SIZE:size]))
+
+
+def make(header: ChunkHeader, program: Program) -> Chunk:
+    """A chunk of a program."""
+    return Chunk(header, encode(program))
+
+
+def shared_fault(chunk: Chunk, before: Chunk | None) -> str | None:
+    """What is wrong with how a chunk follows its predecessor (None: it is the first); None: nothing.
+
+    The program itself is for `hodograph.program.check`.
+    """
+    one = chunk.header
+    if before is None:
+        alone = one.first and one.sequence == 0 and not (one.shared_pieces or one.shared_segments)
+        return None if alone else "it is no first chunk"
+    if one.first or one.job != before.header.job or one.sequence != before.header.sequence + 1:
+        return "it is not the next chunk of the job"
+    if one.job_start_q40 != before.header.job_start_q40 + one.arc_shift_q40:
+        return "the arc length of the job does not go on"
+    return _shared_fault(one, chunk.program, before.program)
+
+
+def _shared_fault(one: ChunkHeader, own: Program, old: Program) -> str | None:
+    """The same of the programs."""
+    if one.piece_shift + one.shared_pieces >= old.piece_count + 1 or not one.shared_pieces:
+        return "the shared pieces are not in the predecessor"
+    if one.segment_shift + one.shared_segments != old.segment_count:
+        return "the shared segments are not all that the predecessor has"
+    if one.shared_segments > own.segment_count or one.shared_pieces > own.piece_count:
+        return "it is shorter than its shared part"
+    mine, theirs = slice(0, one.shared_segments), slice(one.segment_shift, None)
+    moved = own.start_q40[mine] + one.arc_shift_q40
+    same = (
+        np.array_equal(moved, old.start_q40[theirs])
+        and np.array_equal(own.point_q40[:, mine], old.point_q40[:, theirs])
+        and np.array_equal(own.a_q44[:, mine], old.a_q44[:, theirs])
+        and np.array_equal(own.extra_q40[:, mine], old.extra_q40[:, theirs])
+    )
+    if not same:
+        return "a shared segment is not that of the predecessor"
+    mine = slice(0, one.shared_pieces)
+    theirs = slice(one.piece_shift, one.piece_shift + one.shared_pieces)
+    a, b = own.pieces, old.pieces
+    same = np.array_equal(a.start_q40[mine] + one.arc_shift_q40, b.start_q40[theirs]) and all(
+        np.array_equal(getattr(a, name)[mine], getattr(b, name)[theirs])
+        for name in (
+            "duration_q32_s",
+            "c_q40",
+            "override_factor_q14",
+            "override_rate_codes",
+            "override_second_codes",
+        )
+    )
+    if not same:
+        return "a shared piece is not that of the predecessor"
+    passed = sum(int(d) for d in b.duration_q32_s[: one.piece_shift])
+    return None if passed == one.time_shift_q32_s else "the time shift is not that of the pieces"

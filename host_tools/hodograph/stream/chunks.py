@@ -1,0 +1,355 @@
+# SPDX-License-Identifier: MIT
+"""A section as a chain of chunks: every piece is planned once, and has the same bits in all chunks that hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import Machine
+from ..errors import PlanError
+from ..feed import FeedZone
+from ..feed.pieces import FeedPieces
+from ..native.program import NativeFault, NativeLimits, NativeProgram
+from ..pipeline import program_limits, stop_terms
+from ..program.codes import ProgramError
+from ..program.image import Program, encode
+from ..program.stop_planning import stop_codes, with_bounds
+from ..program.stops import DECELERATION, no_stops
+from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader
+from .geometry import Block
+from .windows import JOINTS, SectionFeed, Spacing, Stretch, Window, chained, taken
+
+Codes = NDArray[np.uint8]
+Real = NDArray[np.float64]
+
+CHUNK_S = 0.7
+"""New motion of a chunk."""
+
+CHUNK_BYTES = 24 * 1024 - 64
+"""The largest chunk: half of the ring of a small controller, which holds two."""
+
+_NEW_SHARE = 0.5
+"""Of these bytes, for what is new: the rest is for the repeated part and the tail."""
+
+LATENESS_S, LEAST_LATENESS_S = 0.1, 0.02
+"""A takeover may be so late without effect on the motion; the lesser where there is no room for more."""
+
+SEARCH_S, GAP_S = 0.02, 0.06
+"""Stops may begin about so often, and all pieces are searched where they may not for so long."""
+
+_LONGEST_NAME = 32
+_MOVING_FAULTS = frozenset(
+    (
+        ProgramError.FEED,
+        ProgramError.ACCELERATION,
+        ProgramError.JERK,
+        ProgramError.OVERRIDE,
+        ProgramError.AXIS_VELOCITY,
+        ProgramError.AXIS_ACCELERATION,
+        ProgramError.AXIS_JERK,
+        ProgramError.AXIS_STEP,
+    )
+)
+"""What a slower feed at a piece avoids."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedChunk:
+    """A chunk, and what it brings.
+
+    new_s     motion from the joint before to its own joint; of the last one, to the end
+    line      source line at its own joint
+    way_q40   arc length of the section at its own joint
+    """
+
+    chunk: Chunk
+    new_s: float
+    line: int
+    way_q40: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """What the next chunk has to know of the last one.
+
+    first_segment, end_segment  numbers in the section of its first segment and of the one behind its last
+    end_q40                     arc length of the section where its program ends
+    pieces                      how many it has
+    """
+
+    header: ChunkHeader
+    first_segment: int
+    end_segment: int
+    end_q40: int
+    pieces: int
+
+
+@dataclass
+class _Kept:
+    """The pieces of the last chunk without its tail, with their stop codes; arc lengths are those of the section."""
+
+    pieces: FeedPieces | None = None
+    codes: Codes = field(default_factory=lambda: _no_codes(0))
+
+    def with_new(self, pieces: FeedPieces, codes: Codes) -> _Kept:
+        """With pieces behind them."""
+        old = [] if self.pieces is None else [self.pieces]
+        return _Kept(chained([*old, pieces]), np.concatenate((self.codes, codes)))
+
+    def repeated(self, lateness_s: float) -> tuple[_Kept, int, int]:
+        """The pieces that the next chunk repeats, how many before them it does not, and their time in 2^-32 s."""
+        if self.pieces is None:
+            return self, 0, 0
+        count = len(self.codes)
+        times = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(self.pieces.duration_q32_s)))
+        looked = max(count - LEAST_SHARED_PIECES, 0)
+        late = times[looked] - round(lateness_s * 2**32)
+        shift = max(int(np.searchsorted(times, late, side="right")) - 1, 0)
+        kept = _Kept(taken(self.pieces, slice(shift, None)), self.codes[shift:])
+        return kept, shift, int(times[shift])
+
+
+class SectionChunks:
+    """Makes the chunks of one section."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        name: str,
+        blocks: Iterator[Block],
+        job: int,
+        most_bytes: int = CHUNK_BYTES,
+        begin_q40: int = 0,
+    ) -> None:
+        """`job`: number that the chunks carry; `most_bytes`: of a chunk, as the controller has room for; `begin_q40`:
+        arc length of the section where the path of the blocks begins.
+        """
+        self.machine = machine
+        self._name, self._job = name[:_LONGEST_NAME], job
+        self._limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
+        self._feed = SectionFeed(
+            machine,
+            blocks,
+            Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)),
+            self._exceeded,
+            begin_q40,
+        )
+        self._most = most_bytes
+        self._kept = _Kept()
+        self._last: _Made | None = None
+
+    def chunks(self) -> Iterator[PlannedChunk]:
+        """The chunks in order. Raises InputError and PlanError."""
+        for window in self._feed.windows():
+            first, joints = 0, list(window.joints)
+            while joints:
+                planned, used = self._next(window, first, joints[:JOINTS])
+                yield planned
+                first, joints = joints[used - 1], joints[used:]
+            assert self._last is not None
+            self._feed.forget(self._last.first_segment)
+
+    def _next(self, window: Window, first: int, joints: list[int]) -> tuple[PlannedChunk, int]:
+        """The chunk whose new pieces are those from knot `first` to the last one of these joints that there is room
+        for, and which this is.
+        """
+        codes = self._stop_codes(window, first, joints[-1])
+        before = self._kept
+        for lateness_s, used in [
+            *((LATENESS_S, count) for count in range(len(joints), 0, -1)),
+            (LEAST_LATENESS_S, 1),
+        ]:
+            kept, piece_shift, time_shift = before.repeated(lateness_s)
+            joint = joints[used - 1]
+            new = taken(window.stretch.pieces, slice(first, joint))
+            self._kept = kept.with_new(new, codes[: joint - first])
+            program, fault = self._with_tail(window, joint)
+            if fault is not None and fault.code == ProgramError.STOP_LONG:
+                codes = self._all_codes(window, first, joints[-1])
+                self._kept = kept.with_new(new, codes[: joint - first])
+                program, fault = self._with_tail(window, joint, search_tail=True)
+            if fault is None and program.image_size + HEADER_SIZE <= self._most:
+                break
+        header = self._header(window, joint, program)
+        if self._last is not None:
+            # One piece of the predecessor at least is behind the joint (docs/reference/protocol.md 1.7).
+            shared = min(len(kept.codes), self._last.pieces - piece_shift - 1)
+            header = replace(
+                header, piece_shift=piece_shift, time_shift_q32_s=time_shift, shared_pieces=shared
+            )
+        self._require_room(program, header.line)
+        if fault is not None:
+            raise PlanError(
+                f"line {header.line}: the controller would refuse this part: {fault.text} "
+                f"(code {fault.code}): lower the feed there, and please report this file"
+            )
+        self._last = self._made(header, program)
+        joint_q40 = window.joint_q40(joint)
+        line = self._feed.path.line_at(joint_q40)
+        new_s = float(new.duration_q32_s.sum()) * 2.0**-32
+        return PlannedChunk(Chunk(header, encode(program)), new_s, line, joint_q40), used
+
+    def _require_room(self, program: Program, line: int) -> None:
+        size = program.image_size + HEADER_SIZE
+        if size > self._most:
+            raise PlanError(
+                f"line {line}: a part of the path that the controller needs at once takes {size} bytes, and it takes "
+                f"{self._most}: raise --tolerance, lower the feed there, or give the controller more memory"
+            )
+
+    def _header(self, window: Window, joint: int, program: Program) -> ChunkHeader:
+        """The header, without what it says of shared pieces."""
+        last, path = self._last, self._feed.path
+        assert self._kept.pieces is not None
+        begin_q40 = int(self._kept.pieces.start_q40[0])
+        segment = path.segment_at(begin_q40)
+        header = ChunkHeader(
+            first=last is None,
+            last=window.rests and joint == window.count and self._feed.at_end(window),
+            job=self._job,
+            sequence=0 if last is None else last.header.sequence + 1,
+            job_start_q40=int(path.start_q40[segment]),
+            line=path.line_at(begin_q40),
+        )
+        if last is None:
+            return header
+        number = path.passed + segment
+        return replace(
+            header,
+            segment_shift=number - last.first_segment,
+            shared_segments=last.end_segment - number,
+            arc_shift_q40=header.job_start_q40 - last.header.job_start_q40,
+        )
+
+    def _made(self, header: ChunkHeader, program: Program) -> _Made:
+        path = self._feed.path
+        first = path.passed + path.segment_at(header.job_start_q40)
+        end_q40 = header.job_start_q40 + program.length_q40
+        end = first + program.segment_count
+        return _Made(header, first, end, end_q40, program.piece_count)
+
+    def _with_tail(
+        self, window: Window, joint: int, *, search_tail: bool = False
+    ) -> tuple[Program, NativeFault | None]:
+        """The program of the kept pieces with the first tail that the controller accepts, and what it finds in it.
+
+        `search_tail`: stops may begin in the tail too. It is at rest soon anyway.
+        """
+        kept, codes = self._kept.pieces, self._kept.codes
+        assert kept is not None
+        if window.rests and joint == window.count:
+            program = self._program(Stretch(kept, window.stretch.end_q40), codes)
+            return program, self._fault(program)
+        least_q40 = 0 if self._last is None else self._last.end_q40
+        for tail in self._feed.tails(window, joint, least_q40):
+            whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
+            own = self._tail_codes(window, tail) if search_tail else _no_codes(len(tail.pieces))
+            program = self._program(whole, np.concatenate((codes, own)))
+            fault = self._fault(program)
+            if program.image_size + HEADER_SIZE > self._most:
+                break
+            if fault is None:
+                break
+        return program, fault
+
+    def _program(self, stretch: Stretch, codes: Codes) -> Program:
+        """A program of pieces from inside the path in memory to an end of a segment."""
+        pieces, path, machine = stretch.pieces, self._feed.path, self.machine
+        first = path.segment_at(int(pieces.start_q40[0]))
+        end = int(np.searchsorted(path.start_q40, stretch.end_q40))
+        base = int(path.start_q40[first])
+        program = Program(
+            name=self._name,
+            period_us=machine.period_us,
+            closed=False,
+            duration_q32_s=pieces.total_q32_s,
+            length_q40=stretch.end_q40 - base,
+            offset_q40=tuple(round(mm * 2**40) for mm in machine.offset_mm),
+            feed_limit_um_s=0,
+            acceleration_limit_um_s2=0,
+            jerk_limit_mm_s3=0,
+            start_q40=path.start_q40[first:end] - base,
+            point_q40=path.point_q40[:, first:end],
+            a_q44=path.a_q44[:, first:end],
+            pieces=replace(pieces, start_q40=pieces.start_q40 - base),
+            stops=replace(no_stops(len(pieces)), codes=codes),
+            moving=int(pieces.start_q40[0]) != self._feed.begin_q40,
+        )
+        return with_bounds(program)
+
+    def _fault(self, program: Program) -> NativeFault | None:
+        return NativeProgram(encode(program)).check(self._limits)
+
+    def _exceeded(self, stretch: Stretch) -> NDArray[np.bool_]:
+        """The pieces (M,) of a stretch that the controller would refuse for their motion, of several the first ones."""
+        pieces = stretch.pieces
+        codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
+        bad = np.asarray((codes == 0).any(axis=1))
+        if not bad.any():
+            fault = self._fault(self._program(stretch, _no_codes(len(pieces))))
+            if fault is not None and fault.code in _MOVING_FAULTS:
+                bad[fault.index] = True
+        return bad
+
+    def _stop_codes(self, window: Window, first: int, joint: int) -> Codes:
+        """Codes of the pieces between two knots, good for all of the path that the window knows behind them.
+
+        Of brief pieces only some are searched: a stop that is commanded in another one begins in the next that has
+        codes, a little later.
+        """
+        stretch = window.stretch
+        seconds = np.ldexp(stretch.pieces.duration_q32_s[first:joint].astype(np.float64), -32)
+        codes = _no_codes(len(stretch.pieces))
+        for spacing_s in (SEARCH_S, 0.0):
+            found = np.asarray(codes[first:joint, :, DECELERATION].all(axis=1))
+            wanted = np.zeros(len(stretch.pieces), dtype=np.bool_)
+            wanted[first:joint] = _spaced(seconds, spacing_s, found)
+            if wanted.any():
+                codes = np.where(wanted[:, None, None], self._codes(window, stretch, wanted), codes)
+        return codes[first:joint]
+
+    def _all_codes(self, window: Window, first: int, joint: int) -> Codes:
+        """The same with every piece searched."""
+        wanted = np.zeros(len(window.stretch.pieces), dtype=np.bool_)
+        wanted[first:joint] = True
+        return self._codes(window, window.stretch, wanted)[first:joint]
+
+    def _tail_codes(self, window: Window, tail: Stretch) -> Codes:
+        """Codes of a tail that takes longer than a fault stop may."""
+        return self._codes(window, tail, np.ones(len(tail.pieces), dtype=np.bool_))
+
+    def _codes(self, window: Window, stretch: Stretch, wanted: NDArray[np.bool_]) -> Codes:
+        path = self._feed.path
+        program = self._program(stretch, _no_codes(len(stretch.pieces)))
+        begin = path.segment_at(int(stretch.pieces.start_q40[0]))
+        base_mm = float(path.curve.segment_starts_mm[begin])
+        limits = window.plan.limits
+        plan = replace(window.plan, limits=replace(limits, zones=_moved(limits.zones, base_mm)))
+        return stop_codes(program, plan, stop_terms(self.machine, limits), wanted)
+
+
+def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The pieces (M,) that are searched next: one in `spacing_s`; once some are found, all in gaps of GAP_S between."""
+    t = np.concatenate((np.zeros(1), np.cumsum(seconds)))
+    if spacing_s > 0.0:
+        return np.asarray(np.diff(np.floor(t / spacing_s)) > 0.0)
+    before = np.maximum.accumulate(np.where(found, t[1:], 0.0))
+    after = np.minimum.accumulate(np.where(found, t[:-1], t[-1])[::-1])[::-1]
+    return np.asarray((after - before > GAP_S) & ~found)
+
+
+def _no_codes(count: int) -> Codes:
+    return np.zeros((count, 2, 3), dtype=np.uint8)
+
+
+def _moved(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
+    """Zones of a path that begins at `base_mm`."""
+    return tuple(
+        FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
+        for zone in zones
+        if zone.to_mm > base_mm
+    )

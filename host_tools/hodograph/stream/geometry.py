@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: MIT
+"""The part of a section's path that is in memory: integer segments as the image has them, and their curve.
+
+Blocks of segments are added at its end as they are fitted and removed from its start as they are passed. A segment
+never changes once it is here: chunks that were sent have its bits.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, PlanError
+from ..feed import FeedZone
+from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
+from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_ways, way_to_q40
+from ..spline import PHSpline
+from ..spline.spatial import SpatialPHSpline
+
+Real = NDArray[np.float64]
+Int = NDArray[np.int64]
+Curve = PHSpline | SpatialPHSpline
+
+SEGMENT_S = 0.1
+"""A segment is halved until it takes about so long at its feed: tails end where segments do."""
+
+_LEAST_HALVED_MM = 0.25
+_SPEED_RATIO = 2.0
+_PAIR_SHARE = 0.997
+"""Of the feed at which a tick at 200 % crosses more than two ends of segments."""
+
+_BESIDE_MM = 1e-6
+_FARTHEST_Q40 = 1 << 62
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Consecutive segments of a section's path, as they were fitted.
+
+    curve      their curve, which begins where that of the block before ends
+    feed_mm_s  (n,) programmed feed of each segment; inf: as fast as the machine can
+    line       (n,) source line of each
+    """
+
+    curve: Curve
+    feed_mm_s: Real
+    line: Int
+
+
+def short_segments(block: Block) -> Block:
+    """The same curve in segments that the format takes, and that are passed in about SEGMENT_S."""
+    feed = np.minimum(block.feed_mm_s, GREATEST_FEED_MM_S)
+    longest = np.clip(SEGMENT_S * feed, _LEAST_HALVED_MM, LONGEST_SEGMENT_MM)
+    longest = np.minimum(2.0 ** np.floor(np.log2(longest)), LONGEST_SEGMENT_MM)
+    edges = [0, *(np.flatnonzero(np.diff(longest)) + 1).tolist(), longest.size]
+    curves, feeds, lines = [], [], []
+    for first, last in itertools.pairwise(edges):
+        part = sliced(block.curve, first, last)
+        split = part.split(float(longest[first]), _SPEED_RATIO)
+        ends = np.searchsorted(split.segment_starts_mm, part.segment_starts_mm - 1e-9)
+        source = np.repeat(np.arange(first, last), np.diff(ends))
+        curves.append(split)
+        feeds.append(block.feed_mm_s[source])
+        lines.append(block.line[source])
+    return Block(joined(curves), np.concatenate(feeds), np.concatenate(lines))
+
+
+def sliced(curve: Curve, first: int, last: int | None = None) -> Curve:
+    """Segments first … last - 1 of a curve."""
+    part = slice(first, last)
+    if isinstance(curve, PHSpline):
+        return PHSpline(curve.origin[part], curve.w[part], False)
+    return SpatialPHSpline(curve.origin[part], curve.preimage[part], False)
+
+
+def joined(curves: Sequence[Curve]) -> Curve:
+    """Curves one after the other, all of the same kind."""
+    origin = np.concatenate([one.origin for one in curves])
+    if isinstance(curves[0], PHSpline):
+        return PHSpline(origin, np.concatenate([one.w for one in curves]), False)  # type: ignore[union-attr]
+    return SpatialPHSpline(origin, np.concatenate([one.preimage for one in curves]), False)  # type: ignore[union-attr]
+
+
+def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
+    """The blocks of a section from an arc length on. Raises InputError: it is not that long."""
+    for block in blocks:
+        length = block.curve.length_mm
+        if begin_mm >= length:
+            begin_mm -= length
+            continue
+        if begin_mm > 0.0:
+            block, begin_mm = _behind(block, begin_mm), 0.0
+        yield block
+    if begin_mm > _BESIDE_MM:
+        raise InputError(f"the section ends {begin_mm:g} mm before the place where it shall go on")
+
+
+def _behind(block: Block, begin_mm: float) -> Block:
+    """A block without its first part."""
+    segment, xi = block.curve.locate(begin_mm)
+    first, x = int(segment), float(xi)
+    made: Curve
+    if isinstance(block.curve, PHSpline):
+        planar = block.curve
+        start = np.append(planar.position(first, x), planar.origin[first + 1 :])
+        made = PHSpline(start, _behind_at(planar.w[first:], x), False)
+    else:
+        curve = block.curve
+        origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
+        made = SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
+    return Block(made, block.feed_mm_s[first:], block.line[first:])
+
+
+def _behind_at(w: Any, x: float) -> Any:
+    """Preimages (n, …, 3) whose first one begins at x of it; de Casteljau."""
+    a, b, c = np.moveaxis(w[:1], -1, 0)
+    near, far = a + x * (b - a), b + x * (c - b)
+    halved = np.stack((near + x * (far - near), far, c), axis=-1)
+    return np.concatenate((halved * np.sqrt(1.0 - x), w[1:]))
+
+
+class StreamPath:
+    """The segments in memory. Arc lengths of `curve` and of zones count from their first one, those in q40 from the
+    start of the section.
+
+    passed     segments of the section that are no longer here
+    start_q40  (N + 1,) of the segments and of the end
+    point_q40  (A, N), a_q44 (2 or 4, N, 3): as in a program
+    """
+
+    def __init__(self, offset_mm: Sequence[float], period_us: int, begin_q40: int = 0) -> None:
+        """`offset_mm`: work offset of each axis of the path; `begin_q40`: arc length of the section at its start."""
+        self._offset_mm = tuple(offset_mm)
+        self._period_s = 1e-6 * period_us
+        self._curve: Curve | None = None
+        self._end_point: Int | None = None
+        self.start_q40: Int = np.array([begin_q40], dtype=np.int64)
+        self.feed_mm_s: Real = np.zeros(0)
+        self.line: Int = np.zeros(0, dtype=np.int64)
+        self.complete = False
+        self.passed = 0
+
+    @property
+    def curve(self) -> Curve:
+        """The curve of the segments."""
+        assert self._curve is not None, "a block comes first"
+        return self._curve
+
+    @property
+    def count(self) -> int:
+        """Segments."""
+        return int(self.line.size)
+
+    def append(self, block: Block) -> None:
+        """Adds a block. Raises InputError and PlanError: it is beyond the format."""
+        block = short_segments(block)
+        made = quantise(block.curve, self._offset_mm)
+        point = made.point_q40
+        if self._curve is None:
+            self._curve, self.point_q40, self.a_q44 = block.curve, point, made.a_q44
+        else:
+            assert self._end_point is not None
+            # The block is moved to the last bit of the end: it follows from the ideal curve to some 1e-11 mm.
+            point = point + (self._end_point - point[:, 0])[:, None]
+            self._curve = joined((self._curve, block.curve))
+            self.point_q40 = np.concatenate((self.point_q40, point), axis=1)
+            self.a_q44 = np.concatenate((self.a_q44, made.a_q44), axis=1)
+        ways = segment_ways(made.a_q44[:, -1:])
+        self._end_point = point[:, -1] + np.array([way_to_q40(w)[0] for w in ways[:-1]])
+        if int(self.start_q40[-1]) + int(made.start_q40[-1]) >= _FARTHEST_Q40:
+            raise PlanError(
+                f"line {block.line[-1]}: the section is longer than 4 km: divide it by a dwell (G4 P0)"
+            )
+        self.start_q40 = np.concatenate((self.start_q40, self.start_q40[-1] + made.start_q40[1:]))
+        self.feed_mm_s = np.concatenate((self.feed_mm_s, block.feed_mm_s))
+        self.line = np.concatenate((self.line, block.line))
+
+    def drop(self, count: int) -> float:
+        """Removes the first segments. Returns by how much arc lengths of `curve` are less then."""
+        if count == 0:
+            return 0.0
+        self.passed += count
+        passed_mm = float(self.curve.segment_starts_mm[count])
+        self._curve = sliced(self.curve, count)
+        self.start_q40 = self.start_q40[count:]
+        self.point_q40, self.a_q44 = self.point_q40[:, count:], self.a_q44[:, count:]
+        self.feed_mm_s, self.line = self.feed_mm_s[count:], self.line[count:]
+        return passed_mm
+
+    def segment_at(self, s_q40: int) -> int:
+        """The segment that holds an arc length of the section."""
+        return int(np.searchsorted(self.start_q40[1:-1], s_q40, side="right"))
+
+    def line_at(self, s_q40: int) -> int:
+        """The source line of an arc length of the section."""
+        return int(self.line[self.segment_at(s_q40)])
+
+    def feeds(self, most_mm_s: float) -> tuple[float, tuple[FeedZone, ...]]:
+        """The greatest feed, and zones where it is less: the programmed one, and what short segments allow."""
+        starts = self.curve.segment_starts_mm
+        pair = (starts[2:] - starts[:-2]) * (_PAIR_SHARE / (2.0 * self._period_s))
+        feed = np.minimum(self.feed_mm_s, most_mm_s)
+        if pair.size:
+            feed[:-1] = np.minimum(feed[:-1], pair)
+            feed[1:] = np.minimum(feed[1:], pair)
+        feed = np.clip(feed, LEAST_FEED_MM_S, GREATEST_FEED_MM_S)
+        nominal = float(feed.max())
+        edges = [0, *(np.flatnonzero(np.diff(feed)) + 1).tolist(), feed.size]
+        return nominal, tuple(
+            FeedZone(float(starts[first]), float(starts[last]), float(feed[first]))
+            for first, last in itertools.pairwise(edges)
+            if feed[first] < nominal
+        )

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""The journal of a streamed job: what `hodograph stream --continue` needs to find the place where the machine rests.
+
+A JSON document that is replaced at once, so that a loss of power leaves the old one or the new one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class FileMark:
+    """A file of the job, with size and time by which a change shows."""
+
+    path: str
+    size: int
+    modified_ns: int
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The job and how far it has come.
+
+    files, machine, options  as on the command line
+    section, way_q40         the section in motion, and arc length in it that was reported last
+    committed_q40            arc length up to which chunks of it were sent: the machine rests before it or there
+    job                      number of this section's job in the controller
+    job0                     number of the first section's job
+    done                     the job came to its end
+    """
+
+    files: tuple[FileMark, ...]
+    machine: str
+    options: dict[str, Any]
+    job0: int
+    section: int = 0
+    way_q40: int = 0
+    committed_q40: int = 0
+    done: bool = False
+
+    @property
+    def job(self) -> int:
+        """Number of the present section's job in the controller."""
+        return self.job0 + self.section
+
+
+def mark(file: Path) -> FileMark:
+    """Raises InputError: the file is not there."""
+    try:
+        found = file.stat()
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+    return FileMark(str(file.resolve()), found.st_size, found.st_mtime_ns)
+
+
+class Journal:
+    """Writes the journal of one job."""
+
+    def __init__(self, file: Path, entry: Entry) -> None:
+        """Raises InputError: it cannot be written."""
+        self.file, self.entry = file, entry
+        self._write()
+
+    def update(self, **changes: Any) -> None:
+        """Changes fields of the entry; written only where one changes."""
+        entry = replace(self.entry, **changes)
+        if entry != self.entry:
+            self.entry = entry
+            self._write()
+
+    def _write(self) -> None:
+        text = json.dumps({"version": VERSION, **asdict(self.entry)}, indent=1)
+        fresh = self.file.with_name(self.file.name + ".new")
+        try:
+            self.file.parent.mkdir(parents=True, exist_ok=True)
+            with fresh.open("w", encoding="utf-8") as out:
+                out.write(text + "\n")
+                out.flush()
+                os.fsync(out.fileno())
+            fresh.replace(self.file)
+        except OSError as error:
+            raise InputError(
+                f"{self.file}: the journal cannot be written: {error.strerror}"
+            ) from None
+
+
+def load(file: Path) -> Entry:
+    """The entry of a journal. Raises InputError: there is none, it is damaged, or its job is done."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        if found.pop("version") != VERSION:
+            raise InputError(
+                f"{file}: is of another version of hodograph: stream the job from its start"
+            )
+        found["files"] = tuple(FileMark(**one) for one in found["files"])
+        entry = Entry(**found)
+    except FileNotFoundError:
+        raise InputError(
+            f"{file}: no job was streamed with this journal: nothing to continue"
+        ) from None
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{file}: is no journal of a streamed job, or it is damaged") from None
+    if entry.done:
+        raise InputError(f"{file}: the last job came to its end: nothing to continue")
+    for one in entry.files:
+        if mark(Path(one.path)) != one:
+            raise InputError(
+                f"{one.path}: has been changed since the job was streamed: stream it from its start"
+            )
+    return entry

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: MIT
+"""The plan of a job, made ahead by a thread and kept in a file, so that it takes no memory."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..config import Machine
+from ..toolpath.files import ReadOptions
+from ..toolpath.moves import Command, Dwell
+from .chunk import Chunk, parse
+from .chunks import SectionChunks
+from .geometry import blocks_from
+from .reading import StreamReader
+
+
+@dataclass(frozen=True)
+class JobFiles:
+    """What is streamed, and how it is read. Files are absolute paths, or "-"."""
+
+    files: tuple[Path, ...]
+    machine: Machine
+    tolerance_mm: float
+    reading: ReadOptions
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a job: section, counted from 0 over all files, and arc length in it in 2^-40 mm."""
+
+    section: int = 0
+    way_q40: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedSection:
+    """A section: number in the job, file, what happens at rest before it."""
+
+    number: int
+    file: Path
+    first_line: int
+    before: tuple[Command, ...]
+
+
+class JobPlan:
+    """Chunks of a job in order, planned ahead of those who read them. A context manager: its end ends the planning.
+
+    notes  of reading and fitting; grows
+    """
+
+    def __init__(self, job: JobFiles, most_bytes: int, number: int, begin: Place) -> None:
+        """`number`: of the first section's job in the controller, the next ones count on; `begin`: where it begins."""
+        self._job, self._most, self._number, self._begin = job, most_bytes, number, begin
+        self.notes: list[str] = []
+        self.after: tuple[Command, ...] = ()
+        self.sections: list[PlannedSection] = []
+        self._file = tempfile.TemporaryFile(prefix="hodograph-stream-")  # noqa: SIM115
+        self._ends = array("q", [0])
+        self._motion_s = array("d", [0.0])
+        self._section_of = array("l")
+        self._error: BaseException | None = None
+        self._done = self._ending = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._work, name="planner", daemon=True)
+
+    def __enter__(self) -> JobPlan:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ending = True
+        self._thread.join()
+        self._file.close()
+
+    def item(self, index: int, wait_s: float) -> tuple[PlannedSection, Chunk, float] | None:
+        """The chunk with this index, its section and its new motion in s. None: not yet planned after `wait_s`.
+
+        Raises IndexError behind the last one, and what planning raised where it comes to that.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._planned > index or self._done, wait_s)
+            if self._planned > index:
+                begin, end = self._ends[index], self._ends[index + 1]
+                self._file.seek(begin)
+                chunk = parse(self._file.read(end - begin))
+                self._file.seek(0, 2)
+                new_s = self._motion_s[index + 1] - self._motion_s[index]
+                return self.sections[self._section_of[index]], chunk, new_s
+            if self._error is not None:
+                raise self._error
+            if self._done:
+                raise IndexError(index)
+            return None
+
+    def by_section(self) -> Iterator[Iterator[Chunk]]:
+        """The chunks of each section, as they are planned; each section is to be read to its end first."""
+        at = [0]
+
+        def chunks() -> Iterator[Chunk]:
+            last = False
+            while not last:
+                item = self.item(at[0], _FOR_EVER_S)
+                assert item is not None
+                at[0] += 1
+                yield item[1]
+                last = item[1].header.last
+
+        while True:
+            try:
+                self.item(at[0], _FOR_EVER_S)
+            except IndexError:
+                return
+            yield chunks()
+
+    @property
+    def chunks(self) -> int:
+        """Planned so far."""
+        return self._planned
+
+    @property
+    def bytes(self) -> int:
+        """Of these chunks."""
+        return self._ends[-1]
+
+    @property
+    def _planned(self) -> int:
+        return len(self._section_of)
+
+    def behind_s(self, index: int) -> float | None:
+        """Motion and dwells behind the chunk with this index; None: not known before all is planned."""
+        with self._changed:
+            if not self._done or self._error is not None:
+                return None
+            at = min(index + 1, self._planned)
+            own = self._section_of[at - 1] if at else -1
+            waits_s = sum(dwell_s(section.before) for section in self.sections[own + 1 :])
+            return self._motion_s[-1] - self._motion_s[at] + waits_s + dwell_s(self.after)
+
+    @property
+    def planned_s(self) -> float:
+        """Motion planned so far."""
+        return self._motion_s[-1]
+
+    def greatest_rate(self) -> float:
+        """Greatest bytes for each second of motion, over about _RATE_S, so far."""
+        with self._changed:
+            worst, first = 0.0, 0
+            for last in range(1, self._planned + 1):
+                while self._motion_s[last] - self._motion_s[first + 1] > _RATE_S:
+                    first += 1
+                time_s = self._motion_s[last] - self._motion_s[first]
+                if time_s >= _RATE_S:
+                    worst = max(worst, (self._ends[last] - self._ends[first]) / time_s)
+            return worst
+
+    def _work(self) -> None:
+        try:
+            for section, chunk, new_s in self._planning():
+                data = chunk.encode()
+                with self._changed:
+                    self._file.write(data)
+                    self._file.flush()
+                    if not self.sections or self.sections[-1] is not section:
+                        self.sections.append(section)
+                    self._ends.append(self._ends[-1] + len(data))
+                    self._motion_s.append(self._motion_s[-1] + new_s)
+                    self._section_of.append(len(self.sections) - 1)
+                    self._changed.notify_all()
+                if self._ending:
+                    return
+        except BaseException as error:
+            self._error = error
+        finally:
+            with self._changed:
+                self._done = True
+                self._changed.notify_all()
+
+    def _planning(self) -> Iterator[tuple[PlannedSection, Chunk, float]]:
+        number = 0
+        for file in self._job.files:
+            reader = StreamReader(
+                file, self._job.machine, self._job.tolerance_mm, self._job.reading, self.notes
+            )
+            carried = self.after
+            for section in reader.sections():
+                begin_q40 = self._begin.way_q40 if number == self._begin.section else 0
+                if number >= self._begin.section:
+                    before = () if begin_q40 else (*carried, *section.before)
+                    made = PlannedSection(number, file, section.first_line, before)
+                    chunks = SectionChunks(
+                        self._job.machine,
+                        file.stem,
+                        blocks_from(section.blocks, begin_q40 * 2.0**-40),
+                        self._number + number,
+                        self._most,
+                        begin_q40,
+                    )
+                    for planned in chunks.chunks():
+                        yield made, planned.chunk, planned.new_s
+                else:
+                    for _ in section.blocks:
+                        if self._ending:
+                            return
+                carried = ()
+                number += 1
+            self.after = reader.after
+
+
+_RATE_S, _FOR_EVER_S = 3.0, 1e6
+
+
+def dwell_s(commands: Sequence[Command]) -> float:
+    """Standstill that commands ask for."""
+    return sum(command.duration_s for command in commands if isinstance(command, Dwell))

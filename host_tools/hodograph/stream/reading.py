@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""Toolpaths of any length as sections, read and fitted part by part.
+
+A section that is longer than a window of chords is cut in the middle of chords where the path is nearly straight. The
+curve of each part begins and ends there in the direction of the chord with curvature 0, so they join C2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..config import Machine
+from ..errors import InputError
+from ..feed.request import GREATEST_FEED_MM_S
+from ..job import GREATEST_TOLERANCE_MM, JobSection, SectionMaker, toolpath_commands
+from ..toolpath.files import ReadOptions
+from ..toolpath.fit.reference import ReferenceBuilder
+from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
+from ..toolpath.fit.stations import turns
+from ..toolpath.moves import ORIGIN, Command, Move
+from .geometry import Block
+
+WINDOW_CHORDS = 1500
+"""Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
+FIRST_CHORDS = 300
+
+_SEARCHED = 200
+"""Chords at the end of a window among which the cut is chosen."""
+
+_SHORT_SHARE = 0.5
+"""Of the median length: shorter chords are not cut."""
+
+
+@dataclass
+class _Windows(Divider):
+    """A divider that cuts sections which become too long to be fitted at once."""
+
+    window: int = FIRST_CHORDS
+
+    def _move(self, move: Move) -> None:
+        super()._move(move)
+        while self.builder.count > self.window + _SEARCHED:
+            chord = _straightest(self.builder, self.window)
+            if chord is None:
+                break
+            self.add(self.builder.cut(chord), ends_tied=True)
+            self.window = WINDOW_CHORDS
+
+
+def _straightest(builder: ReferenceBuilder, first: int) -> int | None:
+    """The chord behind the first ones where the path turns least; None: it has none that is long enough."""
+    point = builder.points(first - 1, first + _SEARCHED + 2)
+    length = np.linalg.norm(np.diff(point, axis=0), axis=1)
+    if not length.all():
+        return first
+    turn = turns(point)
+    cost = turn[1:-2] + turn[2:-1]
+    cost[length[1:-1] < _SHORT_SHARE * np.median(length)] = np.inf
+    return first + int(np.argmin(cost)) if np.isfinite(cost).any() else None
+
+
+@dataclass(frozen=True, eq=False)
+class StreamSection:
+    """Moves from rest to rest, as far as they are read.
+
+    file, first_line  where it begins
+    before            commands that happen at rest, before it starts
+    blocks            its path; reading them reads the file
+    """
+
+    file: Path
+    first_line: int
+    before: tuple[Command, ...]
+    blocks: Iterator[Block]
+
+
+@dataclass
+class StreamReader:
+    """Reads a toolpath file; `sections` gives its sections one after the other, each to be read to its end first.
+
+    notes  one line for each thing that the user should know; grows while the file is read
+    after  commands that happen at rest at the end, known then
+    """
+
+    file: Path
+    machine: Machine
+    tolerance_mm: float
+    reading: ReadOptions
+    notes: list[str] = field(default_factory=list)
+    after: tuple[Command, ...] = ()
+
+    def sections(self) -> Iterator[StreamSection]:
+        """Raises InputError and PlanError, naming the line."""
+        if not 0.0 <= self.tolerance_mm <= GREATEST_TOLERANCE_MM:
+            raise InputError(
+                f"--tolerance {self.tolerance_mm:g}: must be from 0 to {GREATEST_TOLERANCE_MM:g} mm"
+            )
+        parts = self._parts()
+        part = next(parts, None)
+        if part is None:
+            raise InputError(f"{self.file}: moves nothing: a job needs a move of 2 um at least")
+        while part is not None:
+            rest = _Rest(part, parts)
+            yield StreamSection(self.file, part.first_line, part.before, rest.blocks())
+            part = rest.next_part
+
+    def _parts(self) -> Iterator[JobSection]:
+        """Fitted parts, tied to each other or from rest to rest."""
+        maker = SectionMaker(self.file, self.machine, self.reading.feed_mm_s, self.notes)
+        for section in self._divided():
+            yield from maker.made(section)
+
+    def _divided(self) -> Iterator[Section]:
+        sag = SAG_SHARE * (self.tolerance_mm or EXACT_MM)
+        divider = _Windows(str(self.file), self.tolerance_mm, ReferenceBuilder(ORIGIN, sag))
+        divider.tolerance_mm = self.tolerance_mm
+        for command in toolpath_commands(self.file, self.reading, self.notes):
+            divider.take(command)
+            yield from divider.sections
+            divider.sections.clear()
+        divider.stop()
+        yield from divider.sections
+        self.after = tuple(divider.before)
+
+
+class _Rest:
+    """The parts of a section after its first one; `next_part` is the first of the next section once all are read."""
+
+    def __init__(self, part: JobSection, parts: Iterator[JobSection]) -> None:
+        self.next_part: JobSection | None = None
+        self._part, self._parts = part, parts
+
+    def blocks(self) -> Iterator[Block]:
+        part: JobSection | None = self._part
+        while part is not None:
+            yield block_of(part)
+            tied = part.tied[1]
+            part = next(self._parts, None)
+            if part is not None and not tied:
+                self.next_part = part
+                return
+
+
+def block_of(section: JobSection) -> Block:
+    """The curve of a section, or of a part of one, with the feeds and lines of its segments."""
+    fitted, reference = section.fitted, section.fitted.reference
+    place = fitted.place_mm
+    low = np.searchsorted(reference.place_mm, place[:-1], side="right") - 1
+    high = np.searchsorted(reference.place_mm, place[1:], side="left")
+    low = np.clip(low, 0, reference.count - 1)
+    high = np.clip(high, low + 1, reference.count)
+    padded = np.append(np.minimum(reference.feed_mm_s, GREATEST_FEED_MM_S), np.inf)
+    ranges = np.column_stack((low, high)).ravel()
+    feed = np.minimum.reduceat(padded, ranges)[::2]
+    return Block(section.pipeline.curve, feed, reference.line[low])

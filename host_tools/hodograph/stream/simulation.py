@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""A stream without a bus: chunks one after the other through the controller's core, and their pieces as one program."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RunError
+from ..feed.pieces import FeedPieces
+from ..native.feed_override import State
+from ..native.program import NativeLimits, counts_from_q40_mm
+from ..native.stream import OfflineStream
+from ..program.image import Program
+from ..program.stop_planning import with_bounds
+from ..program.stops import no_stops
+from .chunk import Chunk
+from .windows import chained, taken
+
+_SLICE_TICKS = 50
+"""Less than a takeover may be late (LATENESS_S), at the shortest period."""
+
+
+@dataclass(frozen=True)
+class StreamedMotion:
+    """A simulated section.
+
+    ticks              setpoints, from the first to the exact end
+    setpoints_sha256   over them, as docs/reference/protocol.md section 2 has it
+    takeovers          in motion, and at rest
+    """
+
+    ticks: int
+    setpoints_sha256: str
+    takeovers: tuple[int, int]
+
+
+def simulate_chunks(
+    chunks: Iterable[Chunk], limits: NativeLimits, kernel: str, counts_per_mm: int
+) -> StreamedMotion:
+    """Runs the chunks of a section through the controller's core: each is given when its predecessor is under way.
+
+    Raises RunError: a chunk is refused.
+    """
+    stream, digest, ticks = OfflineStream(kernel, limits), hashlib.sha256(), 0
+    axes = 0
+
+    def run(points: NDArray[np.void]) -> int:
+        counts = counts_from_q40_mm(points["position_q40"][:, :axes], counts_per_mm)
+        digest.update(counts.tobytes())
+        return len(points)
+
+    for chunk in chunks:
+        fault = stream.give(chunk.encode())
+        if fault is not None:
+            raise RunError(
+                f"line {chunk.header.line}: the controller would refuse chunk {chunk.header.sequence}: {fault.text} "
+                f"(code {fault.code}, number {fault.index}): please report this file"
+            )
+        axes = axes or chunk.program.axis_count
+        while stream.sequence != chunk.header.sequence:
+            if stream.waits:
+                raise RunError(f"chunk {chunk.header.sequence} is not taken over: report a bug")
+            ticks += run(stream.run(_SLICE_TICKS, until_rest=True))
+    while stream.state is not State.ENDED:
+        ticks += run(stream.run(_SLICE_TICKS))
+    return StreamedMotion(ticks, digest.hexdigest(), stream.takeovers)
+
+
+class Concatenation:
+    """The pieces of chunks, without tails and repetitions, as one program: it takes the memory of the whole section."""
+
+    def __init__(self) -> None:
+        self._pieces: list[FeedPieces] = []
+        self._points: list[np.ndarray] = []
+        self._a: list[np.ndarray] = []
+        self._starts: list[np.ndarray] = []
+        self._codes: list[np.ndarray] = []
+        self._before: tuple[Chunk, Program] | None = None
+
+    def add(self, chunk: Chunk, next_shared_end: int | None) -> None:
+        """The next chunk; `next_shared_end`: how many of its pieces are before its joint, None: all (the last one)."""
+        own, header = chunk.program, chunk.header
+        new = slice(header.shared_pieces, next_shared_end)
+        part = taken(own.pieces, new)
+        self._pieces.append(replace(part, start_q40=part.start_q40 + header.job_start_q40))
+        self._codes.append(own.stops.codes[new])
+        fresh = slice(header.shared_segments, None)
+        self._starts.append(own.start_q40[fresh] + header.job_start_q40)
+        self._points.append(own.point_q40[:, fresh])
+        self._a.append(own.a_q44[:, fresh])
+        self._before = (chunk, own)
+
+    def program(self) -> Program:
+        """The whole."""
+        assert self._before is not None
+        chunk, own = self._before
+        pieces = chained(self._pieces)
+        codes = np.concatenate(self._codes)
+        whole = replace(
+            own,
+            duration_q32_s=pieces.total_q32_s,
+            length_q40=own.length_q40 + chunk.header.job_start_q40,
+            start_q40=np.concatenate(self._starts),
+            point_q40=np.concatenate(self._points, axis=1),
+            a_q44=np.concatenate(self._a, axis=1),
+            extra_q40=np.zeros((0, 0, 5), dtype=np.int64),
+            pieces=pieces,
+            stops=replace(no_stops(len(pieces)), codes=codes),
+            moving=False,
+        )
+        return with_bounds(whole)
+
+
+def concatenated(chunks: Iterable[Chunk]) -> Program:
+    """The pieces of the chunks of a section as one program."""
+    whole = Concatenation()
+    before: Chunk | None = None
+    for chunk in chunks:
+        if before is not None:
+            whole.add(before, chunk.header.piece_shift + chunk.header.shared_pieces)
+        before = chunk
+    assert before is not None
+    whole.add(before, None)
+    return whole.program()

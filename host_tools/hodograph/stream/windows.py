@@ -1,0 +1,433 @@
+# SPDX-License-Identifier: MIT
+"""The feed of a section in windows: each begins where the kept part of the last one ends, in motion, and is planned to
+rest at its own end; docs/theory/numerics.md 5.6.
+
+Pieces that are kept never change again. What follows a joint until the next chunk comes is a tail: the fastest way
+to rest at the end of a segment not far behind the joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import Machine
+from ..errors import PlanError
+from ..feed import FeedPlan, FeedRequest, Limits
+from ..feed.kinematics import PathBounds
+from ..feed.limits import Plants
+from ..feed.optimal.feasible import check_feasible, within_reach
+from ..feed.optimal.knots import first_estimate
+from ..feed.optimal.plan_limits import PlanLimits, gather
+from ..feed.optimal.sequence import kept, measured, stopping_s, trusted_to
+from ..feed.optimal.track import Ends, Track, ends_of, make_track
+from ..feed.optimal.window import Solution, State, plan_window, tightened
+from ..feed.override import with_override
+from ..feed.pieces import FeedPieces, RawPieces, round_pieces
+from ..feed.request import LONGEST_S, OPTIMAL
+from ..pipeline import axis_limits, axis_names, controller_limits, plants
+from ..program.image import PIECE_SIZE, STOP_SIZE, segment_size
+from .geometry import Block, StreamPath
+
+Real = NDArray[np.float64]
+Int = NDArray[np.int64]
+_Made = TypeVar("_Made")
+
+FIRST_WINDOW_S, WINDOW_S = 1.0, 3.0
+"""Motion that a window keeps: the first is shorter, so that a job starts soon."""
+
+_STOPS = 4.0
+"""The rejected end of a window, in times that stopping takes."""
+
+_END_SHARE = 0.5
+"""A window takes what remains of a section when that is less than this share of it more."""
+
+RESERVE = 0.01
+"""Share of the axis limits that windows leave free: what is kept is not planned again when a later piece needs more."""
+
+_EASED = (1e-3, 1e-2)
+"""Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
+
+_TAIL_WAYS = (1.15, 1.5, 2.2, 3.3)
+"""Ways of tails that are tried, in times the way that braking takes at least."""
+
+_MOST_LOWERED, _LOWERED = 8, 1.01
+"""How often, and by which share, the limits of an interval are lowered that the controller would refuse."""
+
+_TAIL_EXCESS = 1.003
+_DRIFT_Q40 = 1024
+
+
+JOINTS = 4
+"""Places for a joint in what is new in a chunk: the last one is taken where there is room."""
+
+PIECE_BYTES = PIECE_SIZE + STOP_SIZE
+_SLIGHTLY_MORE = 0.25
+"""A chunk may have this share more of what is new than is wanted, rather than that there is one more."""
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """How far joints are apart at most: in time, and in bytes of pieces and segments."""
+
+    time_s: float
+    bytes: int
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Feed pieces with arc lengths from the start of the section, and where the last one ends."""
+
+    pieces: FeedPieces
+    end_q40: int
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A planned window.
+
+    count   intervals that are kept; all of them where `rests`: the motion is at rest there
+    joints  (j,) numbers of the knots at which tails may begin, JOINTS for a chunk; the last one is `count`
+    end_mm  where the kept part ends, in the arc length of the path in memory
+    """
+
+    solution: Solution
+    limits: PlanLimits
+    plan: FeedPlan
+    stretch: Stretch
+    count: int
+    joints: tuple[int, ...]
+    rests: bool
+    end_mm: float
+
+    def joint_q40(self, joint: int) -> int:
+        """Arc length of the section at a knot."""
+        pieces = self.stretch.pieces
+        return int(pieces.start_q40[joint]) if joint < len(pieces) else self.stretch.end_q40
+
+
+class SectionFeed:
+    """Plans the windows of a section, whose path it reads from blocks as far as it needs it."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        blocks: Iterator[Block],
+        joint: Spacing,
+        exceeded: Callable[[Stretch], NDArray[np.bool_]],
+        begin_q40: int = 0,
+    ) -> None:
+        """`joint`: how far apart joints are; `exceeded`: the pieces (M,) of a stretch that the controller would
+        refuse for their motion; `begin_q40`: arc length of the section where the blocks begin.
+        """
+        self.machine = machine
+        self.path = StreamPath(machine.offset_mm, machine.period_us, begin_q40)
+        self.begin_q40 = begin_q40
+        self._blocks = blocks
+        self._joint = joint
+        self._exceeded = exceeded
+        self._period_s = 1e-6 * machine.period_us
+        self._held: Solution | None = None
+        self._last: Window | None = None
+        self._moving: State | None = None
+        self._carried = (0.0, 0.0)
+        self._low_q40 = begin_q40
+        self._low_mm = 0.0
+        self._first = True
+        self._needed = 0
+
+    def windows(self) -> Iterator[Window]:
+        """The windows in order; the last one ends the section. Raises PlanError."""
+        while True:
+            window = self._next()
+            yield window
+            if window.rests and self.at_end(window):
+                return
+            self._advance(window)
+            self._drop()
+
+    def at_end(self, window: Window) -> bool:
+        """Whether a window ends where the section does."""
+        return self.path.complete and window.stretch.end_q40 == int(self.path.start_q40[-1])
+
+    def _advance(self, window: Window) -> None:
+        found, count = window.solution, window.count
+        self._first, self._last = False, window
+        self._low_mm = window.end_mm
+        self._low_q40 = window.joint_q40(count)
+        if window.rests:
+            self._held, self._moving = None, None
+            return
+        self._held = found
+        self._moving = State(float(found.q[count]), float(found.slope[count]))
+
+    def forget(self, segment: int) -> None:
+        """The segments of the section before this one are no longer needed after the present window."""
+        self._needed = segment
+
+    def _drop(self) -> None:
+        """Removes what is no longer needed."""
+        passed_mm = self.path.drop(self._needed - self.path.passed)
+        self._low_mm -= passed_mm
+        if self._held is not None and passed_mm > 0.0:
+            self._held = _shifted(self._held, passed_mm)
+
+    def _next(self) -> Window:
+        self._read()
+        limits, given = self._limits()
+        high, stop_s = self._high(limits)
+        found = self._solved(limits, high, stop_s)
+        if found is None:
+            return self._to_rest()
+        made, bad = self._lowered(
+            found, lambda one: self._window(one, limits, given, high, stop_s), lambda w: w.stretch
+        )
+        if self._moving is not None and bad[: made.count].any():
+            return self._to_rest()
+        return made
+
+    def _lowered(
+        self,
+        found: Solution,
+        made: Callable[[Solution], _Made],
+        stretch_of: Callable[[_Made], Stretch],
+    ) -> tuple[_Made, NDArray[np.bool_]]:
+        """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse; and the
+        pieces that it still would refuse.
+        """
+        tight, out = np.ones(found.grid.size), made(found)
+        for _ in range(_MOST_LOWERED):
+            bad = self._exceeded(stretch_of(out))
+            if not bad.any():
+                return out, bad
+            tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= _LOWERED
+            lower = tightened(found, tight)
+            if lower is None:
+                break
+            found = lower
+            out = made(found)
+        return out, self._exceeded(stretch_of(out))
+
+    def _window(
+        self,
+        found: Solution,
+        limits: PlanLimits,
+        given: tuple[FeedRequest, Limits, Plants | None],
+        high: float,
+        stop_s: float,
+    ) -> Window:
+        rests = high >= self.path.curve.length_mm and self.path.complete
+        count = found.grid.size if rests else kept(found, stop_s)
+        joints = self._joints(found, count)
+        marks = found.grid.s[list(joints)]
+        track = make_track(
+            _begun(ends_of(found, found.grid.size), self._moving),
+            1.0,
+            np.concatenate((self.path.curve.segment_starts_mm, marks)),
+        )
+        plan = self._plan(given, track)
+        stretch = self._stretch(track, plan, self._low_q40)
+        end_mm = float(found.grid.s[count])
+        return Window(found, limits, plan, stretch, count, joints, rests, end_mm)
+
+    def _to_rest(self) -> Window:
+        """The rest of the last window, to its end: nothing is found that goes on in motion."""
+        last, held = self._last, self._held
+        assert last is not None
+        assert held is not None
+        pieces = taken(last.stretch.pieces, slice(last.count, None))
+        stretch, count = Stretch(pieces, last.stretch.end_q40), len(pieces)
+        end_mm = float(held.grid.s[-1])
+        return replace(
+            last, stretch=stretch, count=count, joints=(count,), rests=True, end_mm=end_mm
+        )
+
+    def _read(self) -> None:
+        """Reads blocks until what is known takes longer than a window."""
+        while not self.path.complete:
+            if self.path.count and self._ahead_s() > self._wanted_s * (1.0 + _END_SHARE):
+                return
+            block = next(self._blocks, None)
+            if block is None:
+                self.path.complete = True
+            else:
+                self.path.append(block)
+
+    @property
+    def _wanted_s(self) -> float:
+        return FIRST_WINDOW_S if self._first else WINDOW_S
+
+    def _estimate(self, limits: PlanLimits) -> tuple[Real, Real, float]:
+        """Arc lengths (n,), roughly when they are passed (n,), and how long stopping takes."""
+        curve, moving = self.path.curve, self._moving
+        length = curve.length_mm
+        if length - self._low_mm < 1e-6:
+            return np.array([self._low_mm, length]), np.zeros(2), 0.0
+        q = None if moving is None else moving.q
+        found = first_estimate(curve, limits, self._low_mm, length, q, self._period_s)
+        return found.s, found.t, stopping_s(limits, float(np.sqrt(found.q.max())))
+
+    def _ahead_s(self) -> float:
+        _, t, stop_s = self._estimate(self._limits()[0])
+        return float(t[-1]) - (_STOPS + 2.0) * stop_s
+
+    def _high(self, limits: PlanLimits) -> tuple[float, float]:
+        """Where the next window ends, at an end of a segment, and how long stopping takes."""
+        s, t, stop_s = self._estimate(limits)
+        wanted_s = self._wanted_s + _STOPS * stop_s
+        curve = self.path.curve
+        if self.path.complete and t[-1] < wanted_s * (1.0 + _END_SHARE):
+            return curve.length_mm, stop_s
+        ends = curve.segment_starts_mm
+        at = int(np.searchsorted(ends, float(np.interp(wanted_s, t, s))))
+        return float(ends[min(at, ends.size - 1)]), stop_s
+
+    def _limits(self) -> tuple[PlanLimits, tuple[FeedRequest, Limits, Plants | None]]:
+        machine = self.machine
+        nominal, zones = self.path.feeds(machine.feed_mm_s)
+        limits = Limits(zones=zones, reserve=RESERVE).on_machine(
+            axis_names(machine), axis_limits(machine)
+        )
+        limits = limits.of_axes(self.path.curve.axes)
+        request, own = FeedRequest(OPTIMAL, nominal), plants(machine, limits)
+        found = gather(request, limits, controller_limits(machine), own, machine.period_us)
+        return found, (request, limits, own)
+
+    def _plan(self, given: tuple[FeedRequest, Limits, Plants | None], track: Track) -> FeedPlan:
+        request, limits, own = given
+        machine = self.machine
+        bounds = PathBounds(self.path.curve, limits, own)
+        controller = controller_limits(machine)
+        return FeedPlan(request, limits, controller, machine.period_us, track, paths=(bounds,))
+
+    def _solved(self, limits: PlanLimits, high: float, stop_s: float) -> Solution | None:
+        """The window to `high`; from rest, or on from the last one. None: nothing is found in motion."""
+        curve, low, moving = self.path.curve, self._low_mm, self._moving
+        held = self._held
+        if moving is None:
+            check_feasible(curve, limits, LONGEST_S)
+            limits = within_reach(curve, limits)
+        known_to = 0.0 if held is None else trusted_to(held, stop_s)
+        for share in (0.0, *_EASED):
+            tried = limits if share == 0.0 else limits.eased(max(self._period_s, share * stop_s))
+            with suppress(FloatingPointError):
+                found = plan_window(curve, tried, low, high, moving, self._period_s, held, known_to)
+                if found is not None:
+                    return measured(curve, found)
+        if moving is None:
+            raise PlanError(
+                f"line {self.path.line_at(self._low_q40)}: the planner found no feed: please report this file"
+            )
+        return None
+
+    def _joints(self, found: Solution, count: int) -> tuple[int, ...]:
+        """Knots up to `count`, JOINTS of them for the time and the bytes of a chunk, evenly in the greater one."""
+        t = np.concatenate((np.zeros(1), np.cumsum(found.times)))[: count + 1]
+        knots = found.grid.s[: count + 1]
+        segments = np.searchsorted(self.path.curve.segment_starts_mm, knots)
+        own = np.arange(count + 1) * PIECE_BYTES + segments * segment_size(self.path.curve.axes)
+        share = np.maximum(t / self._joint.time_s, (own - own[0]) / self._joint.bytes)
+        parts = JOINTS * max(1, ceil(float(share[-1]) - _SLIGHTLY_MORE))
+        at = np.searchsorted(share, share[-1] * np.arange(1, parts) / parts)
+        inner = [int(k) for k in np.unique(at) if 2 < k < count - 2]
+        return (*inner, count)
+
+    def _stretch(self, track: Track, plan: FeedPlan, start_q40: int) -> Stretch:
+        """The pieces of a track that begins at an arc length of the section."""
+        path = self.path
+        base = int(path.start_q40[0])
+        joints = path.start_q40 - base
+        starts = np.rint(track.s * 2.0**40).astype(np.int64)
+        near = joints[np.clip(np.searchsorted(joints, starts - _DRIFT_Q40), 0, joints.size - 1)]
+        moved = np.isin(track.s, path.curve.segment_starts_mm) & (
+            np.abs(near - starts) <= _DRIFT_Q40
+        )
+        starts = np.where(moved, near, starts)
+        starts[0] = start_q40 - base
+        c = round_pieces(track.t_q32, starts, track.shape)
+        raw = RawPieces(np.diff(track.t_q32), starts[:-1], c, 0.0, 0.0)
+        own = with_override(raw, plan.controller, plan.limits, plan.paths)
+        return Stretch(replace(own, start_q40=own.start_q40 + base), int(starts[-1]) + base)
+
+    def tails(self, window: Window, joint: int, least_q40: int) -> Iterator[Stretch]:
+        """Ways to rest from a joint of a window, the shortest first, each to the end of a segment at arc length
+        `least_q40` of the section or behind it. The last one is the rest of the window.
+        """
+        found, curve = window.solution, self.path.curve
+        low = float(found.grid.s[joint])
+        state = State(float(found.q[joint]), float(found.slope[joint]))
+        least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
+        ends = curve.segment_starts_mm
+        tried = -1
+        for way in _TAIL_WAYS:
+            wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
+            at = int(np.searchsorted(ends, wanted))
+            if at == tried:
+                continue
+            if at >= ends.size or ends[at] >= found.grid.s[-1]:
+                break
+            tried = at
+            one = plan_window(curve, window.limits, low, float(ends[at]), state, self._period_s)
+            one = None if one is None else measured(curve, one)
+            if one is None or one.excess > _TAIL_EXCESS - 1.0:
+                continue
+            begin_q40 = window.joint_q40(joint)
+
+            def made(found: Solution) -> Stretch:
+                own = _begun(ends_of(found, found.grid.size), state)
+                return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
+
+            yield self._lowered(one, made, lambda tail: tail)[0]
+        pieces = taken(window.stretch.pieces, slice(joint, None))
+        yield Stretch(pieces, window.stretch.end_q40)
+
+
+def _begun(ends: Ends, state: State | None) -> Ends:
+    """With the very state in which what is before ends; None: at rest."""
+    if state is not None:
+        ends.feed[0], ends.acceleration[0] = np.sqrt(state.q), 0.5 * state.slope
+    return ends
+
+
+def _braking_mm(state: State, limits: PlanLimits) -> float:
+    """About the shortest way to rest."""
+    feed = state.q**0.5
+    pull = min(0.7 * limits.least_acceleration, (limits.least_jerk * feed) ** 0.5)
+    lead_s = max(0.5 * state.slope, 0.0) / limits.least_jerk
+    peak = feed + 0.25 * state.slope * lead_s if state.slope > 0.0 else feed
+    return float(peak * (lead_s + 0.5 * (peak / pull + pull / limits.least_jerk)))
+
+
+def taken(pieces: FeedPieces, part: slice) -> FeedPieces:
+    """Some of the pieces."""
+    return FeedPieces(
+        pieces.duration_q32_s[part],
+        pieces.start_q40[part],
+        pieces.c_q40[part],
+        pieces.override_factor_q14[part],
+        pieces.override_rate_codes[part],
+        pieces.override_second_codes[part],
+    )
+
+
+def chained(parts: list[FeedPieces]) -> FeedPieces:
+    """Pieces one after the other."""
+    return FeedPieces(
+        *(
+            np.concatenate([getattr(one, name) for one in parts])
+            for name in FeedPieces.__dataclass_fields__
+        )
+    )
+
+
+def _shifted(found: Solution, passed_mm: float) -> Solution:
+    """The same solution on a curve whose first `passed_mm` are removed."""
+    grid = found.grid
+    x0 = np.where(grid.grade == 0, grid.x0 - passed_mm, grid.x0)
+    return replace(found, grid=replace(grid, s=grid.s - passed_mm, x0=x0))

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: MIT
+"""Sections as chains of chunks: every chunk is accepted, shares what it says, and together they are one program."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.config import Machine, load_machine
+from hodograph.errors import InputError
+from hodograph.job import load_job
+from hodograph.native import NativeProgram
+from hodograph.native.program import NativeLimits
+from hodograph.native.stream import OfflineStream
+from hodograph.pipeline import program_limits
+from hodograph.program import encode
+from hodograph.program.check import check, check_image
+from hodograph.stream.chunk import LEAST_SHARED_PIECES, Chunk, parse, shared_fault
+from hodograph.stream.chunks import SectionChunks
+from hodograph.stream.geometry import blocks_from
+from hodograph.stream.reading import StreamReader
+from hodograph.stream.simulation import concatenated, simulate_chunks
+from hodograph.toolpath.files import ReadOptions
+
+ROOT = Path(__file__).resolve().parents[3]
+MOST = 16 * 1024
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    """The mill of the examples."""
+    return load_machine(ROOT / "examples" / "machines" / "mill.toml")
+
+
+def _walk(seed: int, count: int, step_mm: float, turn_rad: float) -> str:
+    """G-code of a random walk whose direction changes little from line to line, with changing feeds."""
+    draw = np.random.default_rng(seed)
+    heading = np.cumsum(draw.normal(0.0, turn_rad, count))
+    step = step_mm * draw.uniform(0.4, 2.0, count)
+    x, y = np.cumsum(step * np.cos(heading)), np.cumsum(step * np.sin(heading))
+    z = np.cumsum(draw.normal(0.0, 0.02 * step_mm, count))
+    feed = np.where(draw.random(count) < 0.05, draw.uniform(600.0, 6000.0, count), 0.0)
+    lines = ["G21 G90 G64 P0.01", "F3000"]
+    for k in range(count):
+        speed = f" F{feed[k]:.0f}" if feed[k] else ""
+        lines.append(f"G1 X{x[k]:.4f} Y{y[k]:.4f} Z{z[k]:.4f}{speed}")
+    return "\n".join([*lines, "M2", ""])
+
+
+def _sections(file: Path, machine: Machine, most: int = MOST) -> Iterator[list[Chunk]]:
+    reader = StreamReader(file, machine, 0.01, ReadOptions())
+    for number, section in enumerate(reader.sections(), 1):
+        made = SectionChunks(machine, file.stem, section.blocks, number, most)
+        yield [one.chunk for one in made.chunks()]
+
+
+def _limits(machine: Machine) -> NativeLimits:
+    return NativeLimits(**asdict(program_limits(machine)), chunk=1)
+
+
+def _verify(chunks: list[Chunk], machine: Machine, most: int = MOST) -> None:
+    """Both checks of every chunk, the shared parts, and one program of all, whose setpoints are those of the stream."""
+    before: Chunk | None = None
+    for chunk in chunks:
+        assert parse(chunk.encode()).header == chunk.header
+        assert check_image(chunk.image, program_limits(machine), chunk=True) is None
+        assert shared_fault(chunk, before) is None
+        assert chunk.size <= most
+        assert before is None or chunk.header.shared_pieces >= LEAST_SHARED_PIECES
+        before = chunk
+    assert before is not None
+    assert before.header.last
+    whole = concatenated(chunks)
+    assert check(whole, replace(program_limits(machine), stop_time_ms=0)) is None
+    program = NativeProgram(encode(whole))
+    # Its fault stops may take longer than those of chunks, whose ends are near: only pieces and joints count here.
+    assert program.check(replace(_limits(machine), chunk=0, stop_time_ms=0)) is None
+    run = simulate_chunks(chunks, _limits(machine), "fixed", machine.counts_per_mm)
+    _, setpoints = program.setpoints("fixed", machine.counts_per_mm)
+    assert run.ticks == program.ticks
+    assert run.setpoints_sha256 == hashlib.sha256(setpoints.tobytes()).hexdigest()
+    assert run.takeovers == (len(chunks) - 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("seed", "count", "step_mm", "turn_rad"), [(1, 40, 1.0, 0.1), (2, 10, 6.0, 0.5)]
+)
+def test_random_paths(
+    tmp_path: Path, machine: Machine, seed: int, count: int, step_mm: float, turn_rad: float
+) -> None:
+    file = tmp_path / "walk.ngc"
+    file.write_text(_walk(seed, count, step_mm, turn_rad))
+    for chunks in _sections(file, machine):
+        _verify(chunks, machine)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["dispensing", "engraving", "pocket"])
+def test_examples(machine: Machine, name: str) -> None:
+    file = ROOT / "examples" / "toolpaths" / f"{name}.ngc"
+    for chunks in _sections(file, machine):
+        _verify(chunks, machine)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(10, 22))
+def test_more_random_paths(tmp_path: Path, machine: Machine, seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    file = tmp_path / "walk.ngc"
+    step, turn = 10.0 ** draw.uniform(-0.7, 1.0), draw.uniform(0.02, 1.5)
+    file.write_text(_walk(seed, int(draw.integers(50, 900)), float(step), float(turn)))
+    for chunks in _sections(file, machine):
+        _verify(chunks, machine)
+
+
+@pytest.fixture(scope="module")
+def short(machine: Machine, tmp_path_factory: pytest.TempPathFactory) -> list[Chunk]:
+    """Some chunks."""
+    file = tmp_path_factory.mktemp("short") / "walk.ngc"
+    file.write_text(_walk(3, 25, 2.0, 0.1))
+    (chunks,) = _sections(file, machine)
+    return chunks
+
+
+def test_the_time_is_that_of_the_whole_plan(
+    short: list[Chunk], machine: Machine, tmp_path: Path
+) -> None:
+    file = tmp_path / "walk.ngc"
+    file.write_text(_walk(3, 25, 2.0, 0.1))
+    (section,) = load_job(file, machine).sections
+    streamed_s = concatenated(short).duration_s
+    assert streamed_s < 1.01 * section.pipeline.plan.duration_s
+
+
+def test_a_late_chunk_rests_on_the_path_and_goes_on(short: list[Chunk], machine: Machine) -> None:
+    stream = OfflineStream("fixed", _limits(machine))
+    for chunk in short:
+        assert stream.give(chunk.encode()) is None
+        points = stream.run(60_000, until_rest=True)
+        assert len(points) < 60_000
+        assert stream.waits or chunk.header.last
+    whole = concatenated(short)
+    assert points["arc_length_q40_mm"][-1] == whole.length_q40
+    assert stream.underruns == len(short) - 1
+
+
+@pytest.mark.parametrize("at", [0, 5, 9, 17, 40, 70, 200])
+def test_a_changed_byte_is_refused(short: list[Chunk], at: int) -> None:
+    data = bytearray(short[1].encode())
+    data[at] ^= 0x40
+    with pytest.raises(InputError, match="chunk"):
+        parse(bytes(data))
+
+
+def test_what_does_not_follow_is_found(short: list[Chunk]) -> None:
+    one, two = short[0], short[1]
+    assert shared_fault(two, one) is None
+    assert shared_fault(two, None) is not None
+    for changed in (
+        replace(two.header, piece_shift=two.header.piece_shift + 1),
+        replace(two.header, arc_shift_q40=two.header.arc_shift_q40 + 1),
+        replace(two.header, sequence=2),
+        replace(two.header, time_shift_q32_s=two.header.time_shift_q32_s + 1),
+        replace(two.header, shared_segments=two.header.shared_segments - 1),
+    ):
+        assert shared_fault(replace(two, header=changed), one) is not None
+
+
+def test_a_part_of_a_section_begins_where_it_is_asked_for(tmp_path: Path, machine: Machine) -> None:
+    file = tmp_path / "walk.ngc"
+    file.write_text(_walk(3, 25, 2.0, 0.1))
+    reader = StreamReader(file, machine, 0.01, ReadOptions())
+    (section,) = reader.sections()
+    blocks = list(section.blocks)
+    begin_mm = 0.37 * sum(block.curve.length_mm for block in blocks)
+    begin_q40 = round(begin_mm * 2**40)
+    made = SectionChunks(machine, "walk", blocks_from(iter(blocks), begin_mm), 1, MOST, begin_q40)
+    chunks = [one.chunk for one in made.chunks()]
+    assert chunks[0].header.job_start_q40 == begin_q40
+    first = chunks[0].program
+    wanted = blocks[0].curve.point(begin_mm)
+    assert np.allclose(first.point_q40[:, 0] * 2.0**-40, wanted, atol=1e-9)
+    stream = OfflineStream("fixed", _limits(machine))
+    for chunk in chunks:
+        assert stream.give(chunk.encode()) is None
+        points = stream.run(60_000, until_rest=True)
+    length_q40 = round(sum(block.curve.length_mm for block in blocks) * 2**40)
+    assert abs(int(points["arc_length_q40_mm"][-1]) - length_q40) < 2**12

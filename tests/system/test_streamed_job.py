@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""`hodograph stream` on a bus: to the end, stopped, killed and continued."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bench import EXAMPLES, Bench, MakeBench
+from commands import Command, run_command, running
+from hodograph.bus.clock import VirtualClock
+from hodograph.bus.sdo.controller import READY, RUNNING
+from hodograph.bus.sdo.stream_channel import ENDED, STOPPED, stream_status
+
+pytestmark = pytest.mark.long
+
+MILL = EXAMPLES / "machines" / "mill.toml"
+WAIT_S = 120.0
+COUNTS_PER_MM = 1_000_000
+JOB = "F6000\nG1 X12\nG4 P0.2\nF300\nG1 Y15\nG4 P0.1\nF6000\nG1 X0 Y0 Z-3\nM2\n"
+"""Three sections: 12 mm along x, 15 mm along y at 5 mm/s, and back."""
+
+
+@pytest.fixture
+def bench(make_bench: MakeBench) -> Bench:
+    return make_bench(file=MILL)
+
+
+@pytest.fixture
+def under_way(bench: Bench, clock: VirtualClock, tmp_path: Path) -> Iterator[Command]:
+    """A job that is 4 mm along its second section."""
+    file = tmp_path / "part.ngc"
+    file.write_text(JOB)
+    journal = ("--journal", str(tmp_path / "stream.json"))
+    with running(
+        clock, "stream", str(file), "--machine", str(MILL), *journal, name="stream"
+    ) as command:
+        end_s = clock.now_s() + WAIT_S
+        while bench.controller.targets(2)[1] < 4 * COUNTS_PER_MM:
+            assert clock.now_s() < end_s
+            assert command.child.poll() is None, command.err
+            clock.sleep(0.02)
+        yield command
+
+
+def _continued(clock: VirtualClock, folder: Path) -> str:
+    done = run_command(clock, "stream", "--continue", "--journal", str(folder / "stream.json"))
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def _at_the_end(bench: Bench) -> bool:
+    at = bench.controller.targets(3)
+    return at == [0, 0, -3 * COUNTS_PER_MM] and stream_status(bench.controller).state == ENDED
+
+
+def test_a_job_comes_to_its_end(
+    bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path
+) -> None:
+    assert under_way.wait(WAIT_S) == 0, under_way.err
+    assert _at_the_end(bench)
+    again = run_command(clock, "stream", "--continue", "--journal", str(tmp_path / "stream.json"))
+    assert again.returncode == 2
+    assert "came to its end" in again.stderr
+
+
+def test_a_killed_host_leaves_the_machine_on_its_path(
+    bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path
+) -> None:
+    under_way.kill()
+    clock.sleep(8.0)
+    x, y, z = bench.controller.targets(3)
+    assert (x, z) == (12 * COUNTS_PER_MM, 0)
+    assert 4 * COUNTS_PER_MM <= y <= 15 * COUNTS_PER_MM
+    clock.sleep(0.5)
+    assert bench.controller.targets(3) == [x, y, z]
+    assert bench.controller.state() in (RUNNING, READY)
+    _continued(clock, tmp_path)
+    assert _at_the_end(bench)
+
+
+def test_an_interrupt_rests_on_the_path(
+    bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path
+) -> None:
+    under_way.signal(signal.SIGINT)
+    assert under_way.wait(WAIT_S) == 130
+    x, y, z = bench.controller.targets(3)
+    assert (x, z) == (12 * COUNTS_PER_MM, 0)
+    assert 4 * COUNTS_PER_MM <= y < 15 * COUNTS_PER_MM
+    assert bench.controller.state() == READY
+    assert stream_status(bench.controller).state == STOPPED
+    _continued(clock, tmp_path)
+    assert _at_the_end(bench)
