@@ -9,18 +9,8 @@
 #define MOST_PARTS    32u
 #define MOST_HALVINGS 20 /* of a cell */
 #define CUT_STEPS     30
-#define ROUNDING_BITS 14 /* of each limit, 2^-14 is left for the rounding of numbers here */
 
 static const struct real zero = {0, 0};
-
-/* One feed piece: F in mm from its start, in powers of u = time / duration. */
-struct way {
-    struct real c[WAY_DEGREE + 1];
-    struct real per_s; /* 1 / duration */
-    struct program_override override;
-    int64_t start_q40_mm;
-    struct real end_mm;
-};
 
 /* A stretch of a piece on a segment, u from middle - half to middle + half. */
 struct cell {
@@ -35,35 +25,10 @@ struct cell {
 struct check {
     const struct program *program;
     uint32_t axis_count;
-    struct real limit[PROGRAM_AXES][QUANTITIES]; /* m = 0: none */
-    struct real per_period;                      /* 1/s */
-    struct motion last; /* at the end of the stretch before; at rest before the first */
+    struct motion limit;    /* m = 0: none */
+    struct real per_period; /* 1/s */
+    struct motion last;     /* at the end of the stretch before; at rest before the first */
 };
-
-static struct real milli(uint32_t value)
-{
-    const struct real thousand = real_make(1000, 0);
-    return real_div(real_make((int64_t)value, 0), thousand);
-}
-
-/* --- What is read from the image --- */
-
-static void read_way(struct way *way, const struct program *p, uint32_t i)
-{
-    struct program_piece piece;
-    program_piece_get(p, i, &piece);
-    const int e = program_piece_exponent(piece.duration_q32_s);
-    const struct real duration_s = real_make((int64_t)piece.duration_q32_s, -32);
-    way->c[0] = zero;
-    for (int k = 1; k <= WAY_DEGREE; k++) {
-        way->c[k] = real_make(piece.c_q40_mm[k - 1], -40);
-    }
-    path_motion_stretch(way->c, WAY_DEGREE, real_scale(duration_s, -e));
-    way->per_s = real_div(real_make(1, 0), duration_s);
-    way->override = piece.override;
-    way->start_q40_mm = piece.start_q40_mm;
-    way->end_mm = path_motion_horner(way->c, WAY_DEGREE, real_make(1, 0));
-}
 
 /* --- The motion at an instant --- */
 
@@ -152,7 +117,7 @@ static int take_sample(const struct check *check, const struct cell *cell, struc
         struct real values[QUANTITIES];
         at_all_rates(cell->way, found.of[axis], values);
         for (int k = 0; k < QUANTITIES; k++) {
-            if (passes(values[k], check->limit[axis][k])) {
+            if (passes(values[k], check->limit.of[axis][k])) {
                 return codes[k];
             }
             peak->of[axis][k] = real_max(peak->of[axis][k], values[k]);
@@ -169,7 +134,7 @@ static int judge(const struct check *check, const struct motion *peak, const str
         for (int k = 0; k < QUANTITIES; k++) {
             /* M h^2 / 8 with h = 2 / parts */
             const struct real between = real_scale(rise->of[axis][k], -1 - 2 * (int32_t)parts_log2);
-            if (passes(real_add(peak->of[axis][k], between), check->limit[axis][k])) {
+            if (passes(real_add(peak->of[axis][k], between), check->limit.of[axis][k])) {
                 return codes[k];
             }
         }
@@ -241,8 +206,8 @@ static int check_step(const struct check *check, const struct motion *now)
         }
         const struct real jump = real_mul(step[VELOCITY], check->per_period);
         const struct real jerk = real_mul(real_add(jump, step[ACCELERATION]), check->per_period);
-        if (passes(jump, real_mul(check->limit[axis][ACCELERATION], share)) ||
-            passes(jerk, real_mul(check->limit[axis][JERK], share))) {
+        if (passes(jump, real_mul(check->limit.of[axis][ACCELERATION], share)) ||
+            passes(jerk, real_mul(check->limit.of[axis][JERK], share))) {
             return PROGRAM_ERR_AXIS_STEP;
         }
     }
@@ -314,7 +279,7 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
     struct way way;
     struct path path;
     int code = 0;
-    read_way(&way, p, piece);
+    path_motion_read_way(&way, p, piece);
     while (next_start(p, *segment) <= way.start_q40_mm) {
         (*segment)++;
     }
@@ -338,41 +303,18 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
     return code;
 }
 
-static void set_limits(struct check *check, const struct program_limits *limits)
-{
-    const struct real kept = real_make((1 << ROUNDING_BITS) - 1, -ROUNDING_BITS);
-    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
-        const struct real jerk = real_make((int64_t)limits->axis_jerk_mm_s3[axis], 0);
-        check->limit[axis][VELOCITY] = real_mul(milli(limits->axis_velocity_um_s[axis]), kept);
-        check->limit[axis][ACCELERATION] =
-            real_mul(milli(limits->axis_acceleration_um_s2[axis]), kept);
-        check->limit[axis][JERK] = real_mul(jerk, kept);
-    }
-}
-
-static int any_limit(const struct check *check)
-{
-    int any = 0;
-    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
-        for (int k = 0; k < QUANTITIES; k++) {
-            any |= check->limit[axis][k].m;
-        }
-    }
-    return any;
-}
-
 int limit_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
 {
     struct motion rest;
     struct check check = {.program = p, .axis_count = p->header.axis_count};
     uint32_t segment = 0;
     int code = 0;
-    set_limits(&check, limits);
+    const int any = path_motion_limits(&check.limit, limits, check.axis_count);
     path_motion_clear(&rest);
     check.last = rest;
     check.per_period = real_div(real_make(1000000, 0), real_make((int64_t)p->header.period_us, 0));
     *index = 0;
-    if (any_limit(&check) == 0) {
+    if (any == 0) {
         return 0;
     }
     for (uint32_t i = 0; i < p->header.piece_count && code == 0; i++) {

@@ -3,8 +3,9 @@
 
 #include "core/ph_segment.h"
 
-#define ORDERS       5 /* of time, in majorants: jerk'' is the fifth derivative of the point */
-#define NEWTON_STEPS 4
+#define ORDERS        5 /* of time, in majorants: jerk'' is the fifth derivative of the point */
+#define NEWTON_STEPS  4
+#define ROUNDING_BITS 14
 
 static const struct real zero = {0, 0};
 
@@ -15,6 +16,27 @@ void path_motion_clear(struct motion *out)
             out->of[axis][k] = zero;
         }
     }
+}
+
+static struct real milli(uint32_t value)
+{
+    const struct real thousand = real_make(1000, 0);
+    return real_div(real_make((int64_t)value, 0), thousand);
+}
+
+int path_motion_limits(struct motion *out, const struct program_limits *limits, uint32_t axis_count)
+{
+    const struct real kept = real_make((1 << ROUNDING_BITS) - 1, -ROUNDING_BITS);
+    int32_t any = 0;
+    path_motion_clear(out);
+    for (uint32_t axis = 0; axis < axis_count; axis++) {
+        struct real *own = out->of[axis];
+        own[VELOCITY] = real_mul(milli(limits->axis_velocity_um_s[axis]), kept);
+        own[ACCELERATION] = real_mul(milli(limits->axis_acceleration_um_s2[axis]), kept);
+        own[JERK] = real_mul(real_make((int64_t)limits->axis_jerk_mm_s3[axis], 0), kept);
+        any |= own[VELOCITY].m | own[ACCELERATION].m | own[JERK].m;
+    }
+    return any != 0 ? 1 : 0;
 }
 
 struct real path_motion_horner(const struct real *c, int degree, struct real x)
@@ -152,6 +174,23 @@ void path_motion_read(struct path *path, const struct program *p, uint32_t i)
         path->arc[k] = real_div(path->sigma[k], real_make(k + 1, 0));
     }
     read_speed(path, &segment);
+}
+
+void path_motion_read_way(struct way *way, const struct program *p, uint32_t i)
+{
+    struct program_piece piece;
+    program_piece_get(p, i, &piece);
+    const int e = program_piece_exponent(piece.duration_q32_s);
+    const struct real duration_s = real_make((int64_t)piece.duration_q32_s, -32);
+    way->c[0] = zero;
+    for (int k = 1; k <= WAY_DEGREE; k++) {
+        way->c[k] = real_make(piece.c_q40_mm[k - 1], -40);
+    }
+    path_motion_stretch(way->c, WAY_DEGREE, real_scale(duration_s, -e));
+    way->per_s = real_div(real_make(1, 0), duration_s);
+    way->override = piece.override;
+    way->start_q40_mm = piece.start_q40_mm;
+    way->end_mm = path_motion_horner(way->c, WAY_DEGREE, real_make(1, 0));
 }
 
 /* --- The motion at an instant --- */
@@ -326,6 +365,22 @@ static void parameter_majorant(struct real xi[ORDERS + 1], const struct real way
     }
 }
 
+/* A lower bound of sigma within `half` of `middle`. */
+static struct real least_sigma(const struct path *path, struct real middle, struct real half)
+{
+    struct real c[PATH_DEGREE + 1];
+    for (int k = 0; k <= PATH_DEGREE; k++) {
+        c[k] = path->sigma[k];
+    }
+    path_motion_shift(c, PATH_DEGREE, middle);
+    path_motion_stretch(c, PATH_DEGREE, half);
+    struct real least = c[0];
+    for (int k = 1; k <= PATH_DEGREE; k++) {
+        least = real_sub(least, real_abs(c[k]));
+    }
+    return real_max(real_mul(least, real_make(1023, -10)), path->least_sigma);
+}
+
 void path_motion_bend(const struct path *path, const struct real c[WAY_DEGREE + 1],
                       struct real per_s, struct real offset_mm, struct motion *out)
 {
@@ -344,7 +399,7 @@ void path_motion_bend(const struct path *path, const struct real c[WAY_DEGREE + 
     struct real half = real_abs(real_scale(real_sub(high, low), -1));
     half = real_add(real_mul(half, real_make(1025, -10)), real_make(1, -20));
     majorant(polynomial, path->sigma, PATH_DEGREE, middle, half);
-    parameter_majorant(xi, way, polynomial, real_div(one, path->least_sigma));
+    parameter_majorant(xi, way, polynomial, real_div(one, least_sigma(path, middle, half)));
     for (int k = 0; k < ORDERS; k++) {
         slope[k] = real_times(xi[k + 1], k + 1);
     }

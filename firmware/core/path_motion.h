@@ -14,6 +14,7 @@
 #define HODOGRAPH_CORE_PATH_MOTION_H
 
 #include "core/program.h"
+#include "core/program_check.h"
 #include "core/real.h"
 
 #define WAY_DEGREE  7
@@ -33,10 +34,24 @@ struct path {
     struct real least_sigma;
 };
 
+/* One feed piece: F in mm from its start, in powers of u = time / duration. */
+struct way {
+    struct real c[WAY_DEGREE + 1];
+    struct real per_s; /* 1 / duration */
+    struct program_override override;
+    int64_t start_q40_mm;
+    struct real end_mm;
+};
+
 /* Velocity, acceleration and jerk of each axis at an instant, at rate 1. */
 struct motion {
     struct real of[PROGRAM_AXES][QUANTITIES];
 };
+
+/* Limits of the path axes of a program in mm and s; m = 0: none. Less 2^-14 of each, for the rounding of numbers here. Returns
+ * 0 where there is none at all. */
+int path_motion_limits(struct motion *out, const struct program_limits *limits,
+                       uint32_t axis_count);
 
 /* All of them 0. */
 void path_motion_clear(struct motion *out);
@@ -50,6 +65,9 @@ void path_motion_stretch(struct real *c, int degree, struct real by);
 
 /* Segment i of a program that keeps the rules of protocol.md 1.2. */
 void path_motion_read(struct path *path, const struct program *p, uint32_t i);
+
+/* Feed piece i of a program that keeps the rules of protocol.md 1.3. */
+void path_motion_read_way(struct way *way, const struct program *p, uint32_t i);
 
 /* At an arc length of the segment, with the first three derivatives of arc length in time; the curve is continued beyond its
  * ends. Sets the program's axes. */

@@ -118,7 +118,7 @@ class NativeProgram:
         """The controller's check of all rules; None: accepted, so that it may be interpolated as well."""
         ffi, lib = library()
         given = limits or NativeLimits()
-        c_limits = ffi.new("struct program_limits *", _limits(given))
+        c_limits = ffi.new("struct program_limits *", limits_fields(given))
         fault = ffi.new("struct program_fault *")
         code = lib.program_check(self.pointer, c_limits, fault)
         if code == 0:
@@ -196,7 +196,7 @@ class NativeProgram:
         )
 
 
-def _limits(given: NativeLimits) -> dict[str, object]:
+def limits_fields(given: NativeLimits) -> dict[str, object]:
     """As cffi takes a struct program_limits: axes that are not given have all travel that an image can have."""
     fields = {name: getattr(given, name) for name in given.__dataclass_fields__}
     for name, far in (("min_q40_mm", -(2**52)), ("max_q40_mm", 2**52)):
