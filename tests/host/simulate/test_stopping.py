@@ -208,7 +208,7 @@ def test_100_000_random_commands(tmp_path) -> None:
 
 
 def random_space_file(folder: Path, seed: int) -> Path:
-    """A path file with a random path in space, profile and limits, for a machine whose axes are its narrowest limits."""
+    """A path file with a random path in space, profile and limits, for a machine with narrow limits of its axes."""
     rng = np.random.default_rng([seed, 13])
     count = int(rng.integers(5, 10))
     turn, step = np.cumsum(rng.uniform(-1.2, 1.2, count)), rng.uniform(4.0, 25.0, count)
