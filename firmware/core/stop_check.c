@@ -108,6 +108,11 @@ static uint64_t greatest_slope_q16(const struct program_override *bounds, uint32
     return lesser(rate_q16, qmath_root(square_q32) + 1u);
 }
 
+uint64_t stop_level_slope_q16(const struct program_override *bounds, uint32_t level)
+{
+    return greatest_slope_q16(bounds, level);
+}
+
 void stop_level_start(const struct stop_extent *extent, const struct program_override *bounds,
                       uint32_t level, struct stop_start *out)
 {

@@ -66,6 +66,9 @@ struct stop_start {
 void stop_level_start(const struct stop_extent *extent, const struct program_override *bounds,
                       uint32_t level, struct stop_start *out);
 
+/* The greatest slope of the rate of program time in a level, 2^-16 /s. */
+uint64_t stop_level_slope_q16(const struct program_override *bounds, uint32_t level);
+
 /* The brake of the table alone: its continuous curve. */
 struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop);
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TypeVar
 
+import numpy as np
+
 from .config import (
     PLANE_AXES,
     Drive,
@@ -39,6 +41,7 @@ from .feed import (
 )
 from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
 from .names import AXES
+from .native.brake_check import BrakeCheck
 from .native.program import NativeFault, NativeLimits, NativeProgram
 from .program import (
     Compilation,
@@ -51,6 +54,7 @@ from .program import (
     fit_plan,
 )
 from .program.codes import ProgramError
+from .program.stops import DECELERATION, FAULT, HOLD
 from .spline import PHSpline, SplineResult, from_control_polygon, through_points
 from .spline.spatial import (
     SpatialSplineResult,
@@ -158,6 +162,47 @@ def program_limits(machine: Machine) -> ProgramLimits:
 def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault | None:
     """What the controller of this machine finds in a program; None: it accepts it."""
     return program.check(NativeLimits(**asdict(program_limits(machine))))
+
+
+@dataclass(frozen=True)
+class ProvedStops:
+    """What is proved of the stops of one kind: from how many feed pieces one may begin, from how many of them all stops
+    keep the limits of the axes until standstill, and where the others begin, mm.
+    """
+
+    kind: str
+    pieces: int
+    open_mm: tuple[float, ...]
+
+    @property
+    def proved(self) -> int:
+        """Pieces from which all stops are proved."""
+        return self.pieces - len(self.open_mm)
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return "feed hold and stop" if self.kind == "hold" else "fault stop"
+
+
+def proved_stops(
+    native: NativeProgram, program: Program, machine: Machine
+) -> tuple[ProvedStops, ...]:
+    """Of feed holds and of fault stops of a program that the controller of a machine accepts
+    (firmware/core/brake_check.h).
+    """
+    check = BrakeCheck(native, NativeLimits(**asdict(program_limits(machine))))
+    out = []
+    for kind, name in ((HOLD, "hold"), (FAULT, "fault")):
+        codes = program.stops.codes[:, kind]
+        pieces = np.flatnonzero(codes[:, DECELERATION]).tolist()
+        places = [
+            float(program.piece_starts_mm[piece])
+            for piece in pieces
+            if not check.proves(piece, kind, codes[piece].tolist())
+        ]
+        out.append(ProvedStops(name, len(pieces), tuple(places)))
+    return tuple(out)
 
 
 def proved_limits(machine: Machine) -> str:

@@ -77,7 +77,8 @@ struct piece {
     double level[PROGRAM_LEVELS], slope[PROGRAM_LEVELS],
         second[PROGRAM_LEVELS];         /* bounds up to these rates */
     uint32_t suspect;                   /* the instant at which a limit was broken last, */
-    struct overridden suspect_override; /* and the same at other feed overrides */
+    struct overridden suspect_override; /* and the same at other feed overrides, */
+    struct overridden suspect_before;   /* and where a brake out of another broke one */
     struct piece *close;                /* the same piece with more instants */
 };
 
@@ -899,6 +900,7 @@ static void piece_look(const struct search *search, const struct program *p, uin
     piece->seconds = piece_powers(&from, c);
     piece->suspect = 0;
     piece->suspect_override = (struct overridden){0, 0, -1};
+    piece->suspect_before = (struct overridden){0, 0, 0};
     piece->left_s = left_s;
     piece->factor = ldexp((double)from.override_factor_q24, -24);
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
@@ -1098,25 +1100,42 @@ static double override_at(const struct piece *piece, uint32_t r)
     return r < SHARE_COUNT ? SHARES[r] : piece->factor * SHARES[r - SHARE_COUNT];
 }
 
+/* The state at an instant and override; a rise of the override adds `little` to the acceleration at most. Returns 0 for a state
+ * that there is not. */
+static int overridden_state(const struct piece *piece, const struct overridden *which,
+                            double little, struct state *from)
+{
+    const double rate = override_at(piece, which->rate);
+    if ((which->rate >= SHARE_COUNT && rate <= 1.0) ||
+        (which->slope > 0 && rate >= piece->factor)) {
+        return 0;
+    }
+    *from = piece->at[which->instant];
+    const double change = slope_at(piece, rate, which->slope) * from->v;
+    const double more = which->slope < 0 ? -change : which->slope > 0 ? fmin(change, little) : 0.0;
+    from->a = rate * rate * from->a + more;
+    from->v *= rate;
+    return 1;
+}
+
+/* A quarter of the deceleration. */
+static double quarter(const struct search *search, const struct path_brake_numbers *numbers)
+{
+    return 0.25 * (double)numbers->deceleration_q56 * 0x1p-56 /
+           (search->period_s * search->period_s);
+}
+
 /* Whether a brake out of this state fits and keeps the limits, or need not fit; 1 for a state that there is not. */
 static int overridden_keeps(const struct search *search, const struct piece *piece,
                             const struct keeping *keeping, const struct overridden *which,
                             const struct path_brake_numbers *numbers)
 {
-    const double rate = override_at(piece, which->rate);
-    if ((which->rate >= SHARE_COUNT && rate <= 1.0) ||
-        (which->slope > 0 && rate >= piece->factor)) {
+    const double little = search->rise_is_cut ? quarter(search, numbers) : HUGE_VAL;
+    const uint32_t row = piece->row[which->instant];
+    struct state from;
+    if (!overridden_state(piece, which, little, &from)) {
         return 1;
     }
-    const double deceleration =
-        (double)numbers->deceleration_q56 * 0x1p-56 / (search->period_s * search->period_s);
-    const double little = search->rise_is_cut ? 0.25 * deceleration : HUGE_VAL;
-    struct state from = piece->at[which->instant];
-    const double change = slope_at(piece, rate, which->slope) * from.v;
-    const double more = which->slope < 0 ? -change : which->slope > 0 ? fmin(change, little) : 0.0;
-    const uint32_t row = piece->row[which->instant];
-    from.a = rate * rate * from.a + more;
-    from.v *= rate;
     return (!keeping->surely &&
             strain(search, keeping->inverse, &search->rows[row], &from, 0.0) > 1.0) ||
            state_keeps(search, keeping, &from, row, numbers);
@@ -1157,21 +1176,20 @@ static int close_keep(const struct search *search, struct piece *close,
     return 1;
 }
 
-/* Whether a brake out of one that has begun with the numbers `before` keeps the limits. */
-static int out_of_brake_keeps(const struct search *search, const struct piece *piece, uint32_t i,
+/* Whether a brake out of one that has begun at this state with the numbers `before` keeps the limits. */
+static int out_of_brake_keeps(const struct search *search, const struct state *from, uint32_t row,
                               const struct path_brake_numbers *before,
                               const struct path_brake_numbers *numbers)
 {
     struct path_brake first;
     struct path_brake second;
-    if (!brake_begin(&first, &piece->at[i], before, search->period_s)) {
+    if (!brake_begin(&first, from, before, search->period_s)) {
         return 1;
     }
     path_brake_first(&first);
     for (uint32_t k = 1; !path_brake_rests(&first); k++) {
         if (k % BRAKE_EACH == 0u && path_brake_begin(&second, &first.at, numbers) &&
-            !brake_keeps(search, &search->at_any_rate, &second, piece->at[i].s, piece->row[i],
-                         FINE_S)) {
+            !brake_keeps(search, &search->at_any_rate, &second, from->s, row, FINE_S)) {
             return 0;
         }
         path_brake_step(&first);
@@ -1179,20 +1197,39 @@ static int out_of_brake_keeps(const struct search *search, const struct piece *p
     return 1;
 }
 
-static int brakes_keep(const struct search *search, const struct piece *piece, const int codes[3])
+/* From one instant and override. A feed hold first cuts a rise. */
+static int out_of_overridden_keeps(const struct search *search, const struct piece *piece,
+                                   const struct overridden *which,
+                                   const struct path_brake_numbers *before,
+                                   const struct path_brake_numbers *numbers)
+{
+    struct state from;
+    return !overridden_state(piece, which, quarter(search, before), &from) ||
+           out_of_brake_keeps(search, &from, piece->row[which->instant], before, numbers);
+}
+
+/* From some instants, at all overrides, also while the override changes; the one that broke a limit last is looked at first. */
+static int brakes_keep(const struct search *search, struct piece *piece, const int codes[3])
 {
     struct path_brake_numbers numbers;
     struct path_brake_numbers before;
+    struct overridden which = {0, 0, 0};
     if (piece->before[1] == 0 || !numbers_of(search, piece->before, &before)) {
         return 1;
     }
-    if (!numbers_of(search, codes, &numbers)) {
+    if (!numbers_of(search, codes, &numbers) ||
+        !out_of_overridden_keeps(search, piece, &piece->suspect_before, &before, &numbers)) {
         return 0;
     }
     const uint32_t each = 1u + piece->count / BRAKE_INSTANTS;
-    for (uint32_t i = 0; i < piece->count; i += each) {
-        if (!out_of_brake_keeps(search, piece, i, &before, &numbers)) {
-            return 0;
+    for (; which.instant < piece->count; which.instant += each) {
+        for (which.rate = 0; which.rate < 2u * SHARE_COUNT; which.rate++) {
+            for (which.slope = -1; which.slope <= 1; which.slope++) {
+                if (!out_of_overridden_keeps(search, piece, &which, &before, &numbers)) {
+                    piece->suspect_before = which;
+                    return 0;
+                }
+            }
         }
     }
     return 1;

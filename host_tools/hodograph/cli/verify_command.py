@@ -13,7 +13,14 @@ from ..errors import InputError, LimitError
 from ..feed import Peak
 from ..names import is_toolpath
 from ..native.program import NativeFault, NativeProgram
-from ..pipeline import Pipeline, controller_verdict, load_pipeline, proved_limits
+from ..pipeline import (
+    Pipeline,
+    ProvedStops,
+    controller_verdict,
+    load_pipeline,
+    proved_limits,
+    proved_stops,
+)
 from ..program import compile_program, encode
 from ..program.compiler import ProgramOptions
 from ..verify import (
@@ -49,14 +56,17 @@ def verify(options: Namespace) -> None:
     if machine is not None and options.program is not None:  # else it has been accepted already
         fault = controller_verdict(native, machine)
     native.require()
+    stops = None if machine is None or fault is not None else proved_stops(native, program, machine)
     found = verify_program(program, pipeline.limits, _drives(machine))
     drives_see = sampled(native)
     counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
     noise = bus_noise(counts_per_mm, program.period_us)
     if options.json:
-        print_json(_verdict_document(machine, fault) | _document(found, drives_see, noise))
+        verdict = _verdict_document(machine, fault) | {"stops": _stops_document(stops)}
+        print_json(verdict | _document(found, drives_see, noise))
     else:
         print(_verdict(machine, fault))
+        print("".join(f"{_stops_line(one)}\n" for one in stops or ()), end="")
         print(_text(found, drives_see, noise, _axes(pipeline, program.axis_count)))
     if fault is not None:
         raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
@@ -112,6 +122,24 @@ def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:
     if fault is not None:
         return f"controller's check: refused, {fault.text} (code {fault.code}, piece {fault.index})"
     return f"controller's check: proved at all times and overrides: {proved_limits(machine)}"
+
+
+def _stops_line(stops: ProvedStops) -> str:
+    """In how many of the pieces from which a stop may begin it is proved to keep the machine's limits."""
+    tested = "" if stops.proved == stops.pieces else "; the others are tested, not proved"
+    return (
+        f"{stops.name}: the same limits are proved until standstill in {stops.proved} of {stops.pieces} "
+        f"feed pieces in which one may begin{tested}"
+    )
+
+
+def _stops_document(stops: tuple[ProvedStops, ...] | None) -> dict[str, object] | None:
+    if stops is None:
+        return None
+    return {
+        one.kind: {"pieces": one.pieces, "proved": one.proved, "not_proved_at_mm": one.open_mm}
+        for one in stops
+    }
 
 
 def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dict[str, object]:

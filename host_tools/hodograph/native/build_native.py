@@ -21,6 +21,7 @@ ROOT = PACKAGE.parents[2]
 HEADERS = (
     "core/program_check.h",
     "core/stop_check.h",
+    "core/brake_check.h",
     "core/coefficients.h",
     "core/interpolator.h",
     "core/chunk.h",

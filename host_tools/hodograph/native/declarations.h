@@ -45,6 +45,20 @@ struct stop_walk {
 void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);
 struct stop_bound stop_walk_back(struct stop_walk *walk, uint32_t piece);
 
+/* core/brake_check.h */
+struct program_stop {
+    uint8_t jerk_down, deceleration, jerk_up;
+    ...;
+};
+struct brake_check {
+    uint32_t looks;
+    ...;
+};
+void brake_check_begin(struct brake_check *check, const struct program *p,
+                       const struct program_limits *limits);
+int brake_check_piece(struct brake_check *check, uint32_t piece, enum program_stop_kind kind,
+                      const struct program_stop *stop);
+
 /* core/coefficients.h */
 struct kernel;
 const struct kernel *kernel_find(uint32_t number);

@@ -13,6 +13,7 @@ from hodograph.cli.main import main
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 KEYS = {
+    "stops",
     "controller", "kept", "duration_s", "length_mm", "samples", "peak", "excesses", "setpoints", "bus_noise",
 }  # fmt: skip
 PEAK_KEYS = {"value", "at_most", "limit", "ratio", "s_mm", "t_s"}
@@ -38,6 +39,8 @@ def test_keys(capsys: pytest.CaptureFixture[str]) -> None:
     assert set(found) == KEYS
     assert set(found["setpoints"]) == {"fixed", "float", "double"}
     assert found["kept"]
+    assert found["stops"]["hold"] == {"pieces": 35, "proved": 35, "not_proved_at_mm": []}
+    assert 0 < found["stops"]["fault"]["proved"] <= found["stops"]["fault"]["pieces"]
     assert not found["excesses"]
     for peak in found["peak"].values():
         assert set(peak) == PEAK_KEYS

@@ -205,3 +205,42 @@ def test_random_commands_on_random_programs(tmp_path) -> None:
 def test_100_000_random_commands(tmp_path) -> None:
     """None over its bound, none late, and none over its limits by more than what lies between the places looked at."""
     assert sum(check_random(tmp_path, seed, 1500) for seed in range(100, 190)) >= 100_000
+
+
+def random_space_file(folder: Path, seed: int) -> Path:
+    """A path file with a random path in space, profile and limits, for a machine with narrow limits of its axes."""
+    rng = np.random.default_rng([seed, 13])
+    count = int(rng.integers(5, 10))
+    turn, step = np.cumsum(rng.uniform(-1.2, 1.2, count)), rng.uniform(4.0, 25.0, count)
+    ways = (step * np.cos(turn), step * np.sin(turn), rng.uniform(-8.0, 8.0, count))
+    listed = np.stack([np.cumsum(way) for way in ways], axis=1).round(6).tolist()
+    profile = ("quintic", "exponential", "minimax")[int(rng.integers(1, 4)) - 1]
+    feed = (
+        f"nominal_mm_s = {rng.uniform(20, 150):.3f}\nramp_time_s = {rng.uniform(0.05, 0.3):.3f}\n"
+    )
+    limits = f"acceleration_mm_s2 = {rng.uniform(500, 1800):.1f}\njerk_mm_s3 = {rng.uniform(1e4, 4.5e4):.1f}\n"
+    file = folder / f"space{seed}.toml"
+    file.write_text(
+        f'[path]\nclosed = false\ncontrol_points = {listed}\n[feed]\nprofile = "{profile}"\n{feed}'
+        f'[limits]\n{limits}[machine]\nfile = "{ROOT / "examples/machines/mill.toml"}"\n',
+        encoding="utf-8",
+    )
+    return file
+
+
+def space_trials(folder: Path, seed: int, count: int) -> StopTrials:
+    """Random commands on a random program in space."""
+    return trials(load_pipeline(random_space_file(folder, seed), allow_space=True), count, seed)
+
+
+def test_a_fault_stop_out_of_a_hold_keeps_the_limits_at_every_override(tmp_path) -> None:
+    """Of a hold that began while the override rose."""
+    found = space_trials(tmp_path, 70006, 1000)
+    assert found.kept, found
+
+
+@pytest.mark.long
+def test_random_commands_on_random_programs_in_space(tmp_path) -> None:
+    for seed in range(40):
+        found = space_trials(tmp_path, seed, 1000)
+        assert found.within(BETWEEN), f"random path in space {seed}: {found}"

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Bounds of how the axes move along the path, for a stretch of it: the first three derivatives of each axis by arc length.
+ *
+ * Each segment is cut into equal parts, 8 to 64, the shorter the stretch the more. For a part the derivatives at both ends are
+ * kept, and by how much a derivative may differ from the straight line between them, which follows from a bound of its second
+ * derivative (core/path_motion). The parts looked at last are kept, since the next stretch is near.
+ *
+ * Integers only (core/real.h). Main loop; the caller lends the memory, some 2.5 KiB.
+ */
+#ifndef HODOGRAPH_CORE_PATH_BOUNDS_H
+#define HODOGRAPH_CORE_PATH_BOUNDS_H
+
+#include "core/path_motion.h"
+
+#define PATH_BOUNDS_KEPT 32u /* parts of a planar program; fewer with more axes */
+
+struct span {
+    struct real low;
+    struct real high;
+};
+
+/* By axis: derivatives 1 to 3 by arc length, 1, 1/mm and 1/mm^2. */
+struct path_stretch {
+    struct span of[PROGRAM_AXES][QUANTITIES];
+};
+
+/* m 2^e, |m| < 2^15: a number to keep. */
+struct path_bounds_number {
+    int16_t m;
+    int16_t e;
+};
+
+/* Contents private. */
+struct path_bounds {
+    const struct program *program;
+    struct path path;                   /* segment number `segment`, */
+    uint32_t segment;                   /* the one read last; UINT32_MAX: none */
+    uint32_t size;                      /* numbers of a part, */
+    uint32_t kept;                      /* and how many parts there is room for */
+    uint32_t part_of[PATH_BOUNDS_KEPT]; /* which part is kept there; 0: none */
+    struct path_bounds_number numbers[PATH_BOUNDS_KEPT * 3u * PROGRAM_PLANE * QUANTITIES];
+};
+
+/* For a program whose segments have passed their checks. */
+void path_bounds_begin(struct path_bounds *bounds, const struct program *p);
+
+/* The stretch from one arc length to another, which lie on the path or are taken as its ends. `segment`: one at or before the
+ * segment of the first. Sets the program's axes. */
+void path_bounds_of(struct path_bounds *bounds, uint32_t segment, int64_t from_q40_mm,
+                    int64_t to_q40_mm, struct path_stretch *out);
+
+#endif

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""The proof that stops keep the limits of the axes, as the controller makes it (firmware/core/brake_check.h)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .library import library
+from .program import NativeLimits, NativeProgram, limits_fields
+
+
+class BrakeCheck:
+    """A program that keeps the other rules of program_check, on a machine; its stop table is not read."""
+
+    def __init__(self, program: NativeProgram, limits: NativeLimits) -> None:
+        ffi, lib = library()
+        self._program = program
+        self._limits = ffi.new("struct program_limits *", limits_fields(limits))
+        self._check = ffi.new("struct brake_check *")
+        lib.brake_check_begin(self._check, program.pointer, self._limits)
+
+    @property
+    def looks(self) -> int:
+        """Stretches of brakes that the last proof has looked at: its cost."""
+        return int(self._check.looks)
+
+    def proves(self, piece: int, kind: int, codes: Sequence[int]) -> bool:
+        """Whether stops of a kind (HOLD or FAULT of hodograph.program.stops) that begin in a feed piece keep the limits
+        with these three codes.
+        """
+        ffi, lib = library()
+        own = ffi.new("struct program_stop *", tuple(int(code) for code in codes))
+        return bool(lib.brake_check_piece(self._check, piece, kind, own))
