@@ -46,6 +46,7 @@ KEYS = {
     "axes",
     "timing",
     "statistics",
+    "stream",
     "bus_load",
 }
 AXIS_KEYS = {
