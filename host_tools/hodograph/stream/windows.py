@@ -31,7 +31,7 @@ from ..feed.optimal.window import Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
 from ..feed.request import LONGEST_S, OPTIMAL
-from ..pipeline import axis_limits, axis_names, controller_limits, plants
+from ..pipeline import axis_limits, controller_limits, plants
 from ..program.image import PIECE_SIZE, STOP_SIZE, segment_size
 from .geometry import Block, StreamPath
 
@@ -292,7 +292,7 @@ class SectionFeed:
         machine = self.machine
         nominal, zones = self.path.feeds(machine.feed_mm_s)
         limits = Limits(zones=zones, reserve=RESERVE).on_machine(
-            axis_names(machine), axis_limits(machine)
+            machine.path_names, axis_limits(machine), machine.path_units
         )
         limits = limits.of_axes(self.path.curve.axes)
         request, own = FeedRequest(OPTIMAL, nominal), plants(machine, limits)

@@ -10,6 +10,7 @@ feed over arc length that it is made from.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -133,7 +134,7 @@ def _overview(spline: Curve, limits: PlanLimits, period_s: float) -> _Overview:
 def stopping_s(limits: PlanLimits, feed_mm_s: float) -> float:
     """Roughly how long stopping takes from a feed."""
     jerk = limits.least_jerk
-    pull = min(0.7 * limits.least_acceleration, (jerk * feed_mm_s) ** 0.5)
+    pull = min(0.7 * limits.least_acceleration, math.sqrt(jerk * feed_mm_s))
     return feed_mm_s / pull + pull / jerk
 
 
