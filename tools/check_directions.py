@@ -177,6 +177,8 @@ PYTHON_RULES: dict[str, set[str]] = {
         "bustime",
         "paper",
         "tune",
+        "toolpath",
+        "job",
     },
     "tune": {"errors", "config", "native", "simulate", "pipeline"},
     "identify": {"errors", "config", "native", "bus"},

@@ -103,8 +103,11 @@ static void read_numbers(struct numbers *out, const struct program_stop *stop)
 /* The greatest and least of products of two spans. */
 static struct span product(const struct span *a, const struct span *b)
 {
-    const struct real ends[4] = {real_mul(a->low, b->low), real_mul(a->low, b->high),
-                                 real_mul(a->high, b->low), real_mul(a->high, b->high)};
+    struct real ends[4];
+    ends[0] = real_mul(a->low, b->low);
+    ends[1] = real_mul(a->low, b->high);
+    ends[2] = real_mul(a->high, b->low);
+    ends[3] = real_mul(a->high, b->high);
     struct span out = {ends[0], ends[0]};
     for (int i = 1; i < 4; i++) {
         out.low = real_min(out.low, ends[i]);

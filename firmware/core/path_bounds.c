@@ -34,7 +34,10 @@ void path_bounds_begin(struct path_bounds *bounds, const struct program *p)
 static void derivatives_at(const struct path_bounds *bounds, struct real s_mm, struct motion *out)
 {
     const struct real zero = {0, 0};
-    const struct real f[QUANTITIES] = {real_make(1, 0), zero, zero};
+    struct real f[QUANTITIES];
+    f[0] = real_make(1, 0);
+    f[1] = zero;
+    f[2] = zero;
     path_motion_at(&bounds->path, s_mm, f, out);
 }
 
@@ -83,7 +86,7 @@ static void fill(struct path_bounds *bounds, struct path_bounds_number *numbers,
 {
     const uint32_t axes = bounds->program->header.axis_count;
     const int32_t begin = 2 * (int32_t)part->number; /* in halves of parts */
-    struct real way[WAY_DEGREE + 1] = {{0, 0}};
+    struct real way[WAY_DEGREE + 1];
     struct motion ends[2];
     struct motion aside;
     if (part->segment != bounds->segment) {
@@ -93,6 +96,9 @@ static void fill(struct path_bounds *bounds, struct path_bounds_number *numbers,
     const struct real half = real_scale(bounds->path.length_mm, -1 - part->log2);
     way[0] = real_times(half, begin + 1);
     way[1] = half;
+    for (int k = 2; k <= WAY_DEGREE; k++) {
+        way[k] = real_make(0, 0);
+    }
     derivatives_at(bounds, real_times(half, begin), &ends[0]);
     derivatives_at(bounds, real_times(half, begin + 2), &ends[1]);
     path_motion_bend(&bounds->path, way, real_div(real_make(1, 0), half), real_make(0, 0), &aside);
