@@ -8,7 +8,8 @@
 #include "core/little_endian.h"
 #include "core/override_ramp.h"
 
-#define CRC_FROM      16u /* the CRC covers everything behind itself */
+#define CRC_AT        12u /* the CRC covers everything but the magic before it and itself */
+#define CRC_FROM      16u
 #define ARC_LIMIT_Q40 ((int64_t)1 << 62)
 
 static void read_header(struct chunk *c, const uint8_t *b)
@@ -28,6 +29,12 @@ static void read_header(struct chunk *c, const uint8_t *b)
     c->remaining_ms = read_u32(b + 68);
 }
 
+static uint32_t crc_of(const uint8_t *bytes, uint32_t size)
+{
+    const uint32_t before = crc32_update(0, bytes + 4, CRC_AT - 4u);
+    return crc32_update(before, bytes + CRC_FROM, size - CRC_FROM);
+}
+
 int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size)
 {
     if (bytes == NULL || size < CHUNK_HEADER_SIZE || memcmp(bytes, "HDGC", 4) != 0 ||
@@ -39,7 +46,7 @@ int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size)
         (c->flags & ~(CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST)) != 0u || read_u64(bytes + 72) != 0u) {
         return PROGRAM_ERR_CHUNK_FORMAT;
     }
-    if (crc32_update(0, bytes + CRC_FROM, c->size - CRC_FROM) != read_u32(bytes + 12)) {
+    if (crc_of(bytes, c->size) != read_u32(bytes + CRC_AT)) {
         return PROGRAM_ERR_CHUNK_CRC;
     }
     const int code =

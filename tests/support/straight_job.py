@@ -117,7 +117,7 @@ def chunk(part: Part, sequence: int, job: int) -> bytes:
     head = HEADER.pack(
         b"HDGC", 1, flags, size, 0, job, sequence, *fields, 100 + sequence, 0xFFFFFFFF, 0, 0
     )
-    crc = zlib.crc32(head[16:] + image)
+    crc = zlib.crc32(head[16:] + image, zlib.crc32(head[4:12]))
     return head[:12] + crc.to_bytes(4, "little") + head[16:] + image
 
 

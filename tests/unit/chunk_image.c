@@ -158,5 +158,5 @@ void chunk_image_seal(uint8_t *bytes)
     const uint32_t size = (uint32_t)cob_get(bytes + 8, 4);
     uint8_t *image = bytes + CHUNK_HEADER_SIZE;
     cob_put(image + 12, crc32_update(0, image + 16, size - CHUNK_HEADER_SIZE - 16u), 4);
-    cob_put(bytes + 12, crc32_update(0, bytes + 16, size - 16u), 4);
+    cob_put(bytes + 12, crc32_update(crc32_update(0, bytes + 4, 8), bytes + 16, size - 16u), 4);
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/crc32.h"
 #include "core/little_endian.h"
 #include "golden.h"
 #include "stop_table.h"
@@ -285,7 +286,10 @@ static void write_image(uint8_t *image, uint32_t size, const struct override_pro
 void chunked_seal(uint8_t *bytes, uint32_t size)
 {
     golden_seal(bytes + CHUNK_HEADER_SIZE, size - CHUNK_HEADER_SIZE);
-    golden_seal(bytes, size);
+    const uint32_t crc = crc32_update(crc32_update(0, bytes + 4, 8), bytes + 16, size - 16u);
+    for (int i = 0; i < 4; i++) {
+        bytes[12 + i] = (uint8_t)(crc >> (8 * i));
+    }
 }
 
 static void write_header(uint8_t *at, uint32_t size, const struct program *p,

@@ -82,10 +82,10 @@ static int code_with(uint32_t at, uint32_t value, uint32_t bytes)
     for (uint32_t i = 0; i < bytes; i++) {
         chunk[at + i] = (uint8_t)(value >> (8u * i));
     }
-    golden_seal(chunk, chain.sizes[1]);
+    chunked_seal(chain.bytes[1], chain.sizes[1]);
     const int code = check_chunk(1, &fault);
     memcpy(chunk + at, before, bytes);
-    golden_seal(chunk, chain.sizes[1]);
+    chunked_seal(chain.bytes[1], chain.sizes[1]);
     return code;
 }
 

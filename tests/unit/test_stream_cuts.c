@@ -288,8 +288,7 @@ static void refuse(uint64_t *random)
     const struct program_limits limits = golden_no_limits();
     struct chunked *cuts = &now.chain->cuts;
     const uint32_t i = (uint32_t)(golden_random(random) % cuts->count);
-    /* not of magic, version, flags and size, which the CRC does not cover */
-    const uint64_t bit = 8u * 12u + golden_random(random) % (8u * (cuts->sizes[i] - 12u));
+    const uint64_t bit = golden_random(random) % (8u * cuts->sizes[i]);
     struct program_fault fault;
     struct chunk chunk;
     if (i != now.m.chunk + 1u && golden_random(random) % 2u == 0) { /* again, or out of order */

@@ -109,8 +109,13 @@ class Chunk:
         except struct.error as error:
             raise InputError(f"chunk: a header field does not fit the format: {error}") from None
         whole = body + self.image
-        crc = zlib.crc32(whole[_CRC_FROM:])
+        crc = _crc_of(whole)
         return whole[: _CRC_FROM - 4] + struct.pack("<I", crc) + whole[_CRC_FROM:]
+
+
+def _crc_of(whole: bytes) -> int:
+    """Of all bytes but the magic and the CRC itself."""
+    return zlib.crc32(whole[_CRC_FROM:], zlib.crc32(whole[4 : _CRC_FROM - 4]))
 
 
 def parse(data: bytes) -> Chunk:
@@ -122,7 +127,7 @@ def parse(data: bytes) -> Chunk:
         raise InputError("chunk: wrong magic, version or flag, or a reserved field is not 0")
     if not HEADER_SIZE <= size <= len(data):
         raise InputError(f"chunk: says {size} bytes, and there are {len(data)}")
-    if zlib.crc32(data[_CRC_FROM:size]) != crc:
+    if _crc_of(data[:size]) != crc:
         raise InputError("chunk: CRC-32 is wrong")
     job, sequence, *shared, arc, time, start, line, remaining, _, _ = rest
     header = ChunkHeader(
