@@ -49,6 +49,7 @@ def test_the_wheel_alone_runs_the_demo(tmp_path: Path) -> None:
     check_wheel(wheel)
     environment = unpacked(wheel, tmp_path)
     check_share(Path(environment["PYTHONPATH"]))
+    check_module(Path(environment["PYTHONPATH"]))
     where = "import hodograph.bus.processes as p; print(p.find_program('hodograph-hub'))"
     found = python(environment, tmp_path, "-c", where)
     assert found.startswith(environment["PYTHONPATH"])
@@ -78,6 +79,14 @@ def check_share(site: Path) -> None:
         "fish/vendor_completions.d/hodograph.fish",
     ):
         assert (site / "share" / name).stat().st_size > 5000, name
+
+
+def check_module(site: Path) -> None:
+    """The native module searches no folder of the computer that linked it."""
+    (module,) = site.glob("hodograph/native/*.so")
+    found = subprocess.run(["readelf", "-d", module], check=True, capture_output=True, text=True)
+    assert "(NEEDED)" in found.stdout
+    assert "PATH)" not in found.stdout
 
 
 def check_source(source: Path) -> None:

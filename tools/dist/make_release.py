@@ -17,6 +17,7 @@ import hashlib
 import os
 import subprocess
 import sys
+import sysconfig
 import tarfile
 import tempfile
 from pathlib import Path
@@ -36,7 +37,12 @@ def epoch_s() -> int:
 
 def backend(what: str, tree: Path, out: Path, time_s: int) -> None:
     """Calls build_sdist or build_wheel of the build backend in a tree; raises CalledProcessError."""
-    environment = os.environ | {"SOURCE_DATE_EPOCH": str(time_s), "HODOGRAPH_BUILT_BY_MAKE": ""}
+    environment = os.environ | {
+        "SOURCE_DATE_EPOCH": str(time_s),
+        "HODOGRAPH_BUILT_BY_MAKE": "",
+        # Python's own link command may name folders of this computer, which the module would then search.
+        "LDSHARED": f"{sysconfig.get_config_var('CC') or 'cc'} -shared",
+    }
     command = [sys.executable, "-c", _BUILD.format(what=what, out=str(out))]
     subprocess.run(command, check=True, cwd=tree, env=environment, stdout=subprocess.DEVNULL)
 

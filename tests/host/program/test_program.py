@@ -231,10 +231,10 @@ def test_compile_and_check_take_linear_time() -> None:
         origin = np.concatenate(([0.0], np.cumsum(ways)[:-1]))
         spline = PHSpline(origin, w, False)
         plan = plan_feed(spline.length_mm, REQUEST, None, CONTROLLER)
-        begin = time.perf_counter()
+        begin = time.process_time()
         image = encode(compile_program(spline, plan, ProgramOptions(limits=LIMITS)))
         assert decode(image).segment_count >= count
-        return time.perf_counter() - begin
+        return time.process_time() - begin
 
     small = min(seconds(5_000) for _ in range(2))
     large = seconds(50_000)
