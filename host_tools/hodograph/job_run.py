@@ -87,7 +87,7 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
     programs = []
     for section in job.sections:
         program = section.pipeline.accepted
-        needed = memory_bytes(program.image, *RECORD_BYTES[kernel])
+        needed = memory_bytes(program.image, RECORD_BYTES[kernel])
         room = job.machine.program_bytes or LARGEST_BANK
         if needed > room:
             raise NoRoomError(

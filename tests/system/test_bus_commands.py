@@ -9,6 +9,7 @@ import os
 import select
 import signal
 from collections.abc import Callable, Iterator
+from dataclasses import astuple
 from pathlib import Path
 
 import pytest
@@ -255,8 +256,8 @@ def test_a_program_that_no_bank_can_hold_is_refused_before_it_is_sent(
 
 
 def test_the_sizes_of_records_are_those_of_the_controller(controller: Controller) -> None:
-    found = tuple(controller.read(PROGRAM_MEMORY, sub) for sub in (1, 2, 3))
-    assert found == (LARGEST_BANK, *RECORD_BYTES["fixed"])
+    found = tuple(controller.read(PROGRAM_MEMORY, sub) for sub in range(1, 6))
+    assert found == (LARGEST_BANK, *astuple(RECORD_BYTES["fixed"]))
 
 
 def test_nothing_is_said_of_the_old_program_that_is_not_known(

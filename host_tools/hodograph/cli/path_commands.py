@@ -217,7 +217,7 @@ def compile_(options: Namespace) -> None:
 
 def _warn_of_size(image: bytes, machine: Machine) -> None:
     """Where `upload` would refuse the program for its size."""
-    needed = memory_bytes(image, *RECORD_BYTES[machine.kernel])
+    needed = memory_bytes(image, RECORD_BYTES[machine.kernel])
     room, whose = machine.program_bytes, f"[controller] program_bytes of {machine.file.name}"
     if room is None:
         room, whose = LARGEST_BANK, "the largest controller there is"

@@ -360,14 +360,31 @@ class ProgramLimits:
     axis_count: int = 0
 
 
-RECORD_BYTES = {"fixed": (288, 208), "float": (272, 208), "double": (248, 176)}
-"""Of a segment, of a piece, by kernel."""
+@dataclass(frozen=True)
+class RecordBytes:
+    """Bytes that a controller needs beside an image: of each segment in the plane, piece, segment in space, and extra axis
+    of such a segment (docs/reference/protocol.md 1.6; 0x2041 subs 2 to 5)."""
+
+    segment: int
+    piece: int
+    spatial_segment: int
+    extra_axis: int
+
+
+RECORD_BYTES = {
+    "fixed": RecordBytes(288, 208, 376, 56),
+    "float": RecordBytes(272, 208, 336, 56),
+    "double": RecordBytes(248, 176, 312, 48),
+}
+"""By kernel."""
 LARGEST_BANK = 64 * 2**20 - 16
 """Bytes for a program of the largest store that a port of this project has (Linux); a board's is smaller."""
-_COUNTS = struct.Struct("<20xII")
+_COUNTS = struct.Struct("<20xIIxxH")
 
 
-def memory_bytes(image: bytes, segment_bytes: int, piece_bytes: int) -> int:
-    """Image and records of these sizes. The image has a whole header."""
-    segments, pieces = _COUNTS.unpack_from(image[:HEADER_SIZE])
-    return len(image) + int(segments) * segment_bytes + int(pieces) * piece_bytes
+def memory_bytes(image: bytes, records: RecordBytes) -> int:
+    """Image and its records. The image has a whole header."""
+    segments, pieces, axes = _COUNTS.unpack_from(image[:HEADER_SIZE])
+    extra = max(0, axes - SPACE_AXES) * records.extra_axis
+    segment = records.segment if axes <= PLANE_AXES else records.spatial_segment + extra
+    return len(image) + int(segments) * segment + int(pieces) * records.piece

@@ -172,7 +172,7 @@ def test_compile_warns_of_what_the_machines_controller_cannot_hold(
         return capsys.readouterr().err
 
     assert told(None) == ""
-    needed = memory_bytes(output.read_bytes(), *RECORD_BYTES["fixed"])
+    needed = memory_bytes(output.read_bytes(), RECORD_BYTES["fixed"])
     assert told(needed) == ""
     assert (
         f"takes {needed} bytes of a controller with what is prepared from it, more than the {needed - 1} of "

@@ -15,12 +15,15 @@ import numpy as np
 import pytest
 
 from hodograph.feed import ControllerLimits
+from hodograph.names import KERNELS
 from hodograph.native.feed_override import FeedOverride
-from hodograph.native.program import NativeLimits, NativeProgram
+from hodograph.native.library import library
+from hodograph.native.program import NativeLimits, NativeProgram, kernel_code
 from hodograph.native.stop_bounds import stop_bounds
 from hodograph.native.stop_search import StopLimits, StopSearch
 from hodograph.native.stop_trial import run_trials
 from hodograph.program import Program, decode
+from hodograph.program.image import RECORD_BYTES, memory_bytes
 from hodograph.program.stops import Stops, mantissas, no_stops
 from spatial_image import (
     Q40,
@@ -35,6 +38,7 @@ from spatial_image import (
     wandering,
 )
 
+PROGRAMS = Path(__file__).resolve().parents[2] / "data" / "programs"
 CONTROLLER = ControllerLimits(500.0, 5000.0, 200000.0, 0.02)
 NAMES = ("velocity", "acceleration", "jerk")
 AXIS_CODES = (-70, -71, -72)
@@ -488,3 +492,14 @@ def test_what_a_spatial_program_uses_is_what_its_axes_do(six: Case) -> None:
         (used.axis_velocity, used.axis_acceleration, used.axis_jerk), at_one, strict=True
     ):
         assert np.array(found) == pytest.approx(np.abs(rows).max(axis=0), rel=0.02)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("name", ["alpha_quintic", "space3", "space6"])
+def test_the_memory_that_the_host_expects_is_what_the_core_takes(name: str, kernel: str) -> None:
+    """A controller keeps the records of core/coefficients.h beside the image."""
+    data = (PROGRAMS / f"{name}.hdgp").read_bytes()
+    ffi, lib = library()
+    program = NativeProgram(data)
+    records = lib.coefficients_size(program.pointer, lib.kernel_find(kernel_code(kernel)))
+    assert memory_bytes(data, RECORD_BYTES[kernel]) == len(data) + records

@@ -46,12 +46,12 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
 
 def require_room(node: Node, image: bytes) -> None:
     """Raises RefusedError when no bank of this controller can hold the program with its records."""
-    from ...program.image import HEADER_SIZE, memory_bytes
+    from ...program.image import HEADER_SIZE, RecordBytes, memory_bytes
 
     if len(image) < HEADER_SIZE:
         return
-    bank, segment, piece = (node.read(PROGRAM_MEMORY, sub) for sub in (1, 2, 3))
-    needed = memory_bytes(image, segment, piece)
+    bank, *records = (node.read(PROGRAM_MEMORY, sub) for sub in range(1, 6))
+    needed = memory_bytes(image, RecordBytes(*records))
     if needed > bank:
         raise RefusedError(
             f"{node.who()} has {bank} bytes for a program, this one takes {needed} with what is prepared from it: "
