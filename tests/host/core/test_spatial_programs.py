@@ -499,7 +499,7 @@ def test_what_a_spatial_program_uses_is_what_its_axes_do(six: Case) -> None:
 def test_the_memory_that_the_host_expects_is_what_the_core_takes(name: str, kernel: str) -> None:
     """A controller keeps the records of core/coefficients.h beside the image."""
     data = (PROGRAMS / f"{name}.hdgp").read_bytes()
-    ffi, lib = library()
+    _, lib = library()
     program = NativeProgram(data)
     records = lib.coefficients_size(program.pointer, lib.kernel_find(kernel_code(kernel)))
     assert memory_bytes(data, RECORD_BYTES[kernel]) == len(data) + records
