@@ -4,7 +4,7 @@
  * same state) and any limits: nothing overflows, every index and shift is in range.
  *
  * prover: eva
- * options: -eva-domains equality,symbolic-locations -eva-slevel 2000
+ * options: -eva-domains equality,symbolic-locations -eva-slevel 8000
  * assumes: qmath_div_u64 feed_bounds_start feed_bounds_end feed_bounds_contained feed_bounds_within
  * shows: piece_check_all program_piece_get program_piece_duration program_piece_start program_piece_override
  * mutant: core/piece_check.c: COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 54) => COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 57)
