@@ -11,7 +11,7 @@
  * assumes: qmath_div_u64 override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
  * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
  * mutant: core/override_plan.c: if (behind < left) { => if (behind <= left + 1u) {
- * mutant: core/override_plan.c: percent < OVERRIDE_MOST_PERCENT ? percent => percent < 2 * OVERRIDE_MOST_PERCENT ? percent
+ * mutant: core/override_plan.c: qmath_lesser(plan->asked_q57, most_q57) => plan->asked_q57 + most_q57
  * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
 #include "core/override_plan.h"
