@@ -51,8 +51,9 @@ def chunk(
     starts = (shared.arc_q40, shared.time_q32, shared.job_start_q40)
     behind = struct.pack("<6I qQq 4I", job, sequence, *counts, *starts, 0, 2**32 - 1, 0, 0)
     size = 16 + len(behind) + len(image)
-    crc = zlib.crc32(behind + image)
-    return struct.pack("<4sHHII", b"HDGC", 1, flags, size, crc) + behind + image
+    before = struct.pack("<HHI", 1, flags, size)
+    crc = zlib.crc32(before + behind + image)
+    return b"HDGC" + before + struct.pack("<I", crc) + behind + image
 
 
 def behind_piece(program: Program, first: int) -> tuple[Program, Shared]:
