@@ -28,7 +28,7 @@ MACHINES = {
     "an500": ["mps2-an500"],  # Cortex-M7
     "an505": ["mps2-an505"],  # Cortex-M33
     # Cortex-M0: RAM for the controller, and for programs (firmware/targets/microbit_controller.ld)
-    "microbit": ["microbit", "-global", f"nrf51-soc.sram-size={40 * 2**10 + 2**24}"],
+    "microbit": ["microbit", "-global", f"nrf51-soc.sram-size={48 * 2**10 + 2**24}"],
 }
 TARGETS = tuple(MACHINES)
 _SHIFTS = {"microbit": 5}
