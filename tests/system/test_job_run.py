@@ -282,7 +282,7 @@ def test_a_section_begins_where_the_one_before_ended(tmp_path: Path) -> None:
     from hodograph.job import load_job
 
     rounds = "".join(f"G1 X{0.1 * k:.3f} Y{k % 3 / 7:.6f} Z{k % 5 / 3:.6f}\n" for k in range(1, 60))
-    job = load_job(Path(job_file(tmp_path, f"G61\nF3000\n{rounds}M2\n")), load_machine(MILL))
+    job = load_job(Path(job_file(tmp_path, f"G61.1\nF3000\n{rounds}M2\n")), load_machine(MILL))
     assert len(job.sections) == 59
     programs = [section.pipeline.accepted for section in job.sections]
     for before, after in itertools.pairwise(programs):

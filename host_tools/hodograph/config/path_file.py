@@ -123,7 +123,8 @@ def load_path_file(file: Path) -> PathFile:
     """The path file `file`; raises InputError. The machine file is named, not looked for."""
     if is_toolpath(file):
         raise InputError(
-            f"{file}: is a toolpath, which only import, simulate, compile and run take: give a path file"
+            f"{file}: is a toolpath, which only import, simulate, verify, report, compile, run and stream take: "
+            "give a path file"
         )
     root = Table(file, "", read_toml(file), _SECTIONS)
     machine = root.table("machine", ("file",), required=False)

@@ -110,7 +110,6 @@ def test_standard_input_is_gcode() -> None:
         ("feed G.NGC", "G.NGC: is a toolpath, which only"),
         ("goto G.NGC", "G.NGC: is a toolpath, which only"),
         ("rig d.svg", "d.svg: is a toolpath, which only"),
-        ("report p.csv", "p.csv: is a toolpath, which only"),
     ],
 )
 def test_messages(capsys: pytest.CaptureFixture[str], words: str, message: str) -> None:
