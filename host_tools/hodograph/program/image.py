@@ -362,8 +362,8 @@ class ProgramLimits:
 
 @dataclass(frozen=True)
 class RecordBytes:
-    """Bytes that a controller needs beside an image: of each segment in the plane, piece, segment in space, and extra axis
-    of such a segment (docs/reference/protocol.md 1.6; 0x2041 subs 2 to 5)."""
+    """Bytes that a controller needs beside an image: of each segment in the plane, each piece, each segment in space,
+    and each extra axis of such a segment (docs/reference/protocol.md 1.6; 0x2041 subs 2 to 5)."""
 
     segment: int
     piece: int
