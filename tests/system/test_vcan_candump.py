@@ -22,11 +22,11 @@ LIMIT_S = 120.0
 
 SLEEP = """\
 #!/bin/sh
-# The pause that a person gives candump to start: here until it listens for 581, however busy the computer is.
+# The pause that a person gives candump to start. Afterwards somebody must listen for 581, however busy the computer is;
+# others may do so as well, so that this alone does not tell that candump does.
+/bin/sleep "$@"
 if [ "$1" = 0.5 ]; then
     until grep -q ' 581 ' /proc/net/can/rcvlist_fil; do /bin/sleep 0.01; done
-else
-    exec /bin/sleep "$@"
 fi
 """
 
