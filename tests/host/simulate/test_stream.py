@@ -5,10 +5,8 @@ from __future__ import annotations
 
 import os
 import re
-import struct
 import subprocess
-import zlib
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,44 +18,26 @@ from hodograph.native.feed_override import State
 from hodograph.program import check, decode, encode
 from hodograph.program.codes import ProgramError
 from hodograph.program.image import Program
+from hodograph.stream.chunk import Chunk, ChunkHeader
 
 ROOT = Path(__file__).resolve().parents[3]
 DATA = ROOT / "tests/data/programs"
 IMAGE = (DATA / "alpha_minimax.hdgp").read_bytes()
 FIRST, LAST = 1, 2
+JOB = 7
 CUTS = 1_000_000
 REACH_Q40 = 1 << 26
 """The least length of a tail for a takeover in motion: how far a piece may reach beyond its end."""
 
 
-@dataclass(frozen=True)
-class Shared:
-    """What a chunk has of its predecessor: numbers there of its first piece and segment, and how many it repeats."""
-
-    piece: int = 0
-    segment: int = 0
-    pieces: int = 0
-    segments: int = 0
-    arc_q40: int = 0
-    time_q32: int = 0
-    job_start_q40: int = 0
+def chunk(image: bytes, flags: int, sequence: int = 0, job: int = JOB) -> bytes:
+    """A chunk that shares nothing."""
+    header = ChunkHeader(bool(flags & FIRST), bool(flags & LAST), job, sequence)
+    return Chunk(header, image).encode()
 
 
-def chunk(
-    image: bytes, flags: int, sequence: int = 0, job: int = 7, shared: Shared = Shared()
-) -> bytes:
-    """Header and image."""
-    counts = (shared.piece, shared.segment, shared.pieces, shared.segments)
-    starts = (shared.arc_q40, shared.time_q32, shared.job_start_q40)
-    behind = struct.pack("<6I qQq 4I", job, sequence, *counts, *starts, 0, 2**32 - 1, 0, 0)
-    size = 16 + len(behind) + len(image)
-    before = struct.pack("<HHI", 1, flags, size)
-    crc = zlib.crc32(before + behind + image)
-    return b"HDGC" + before + struct.pack("<I", crc) + behind + image
-
-
-def behind_piece(program: Program, first: int) -> tuple[Program, Shared]:
-    """The program from this piece on, in motion; the predecessor may end as it does."""
+def behind_piece(program: Program, first: int) -> tuple[Program, ChunkHeader]:
+    """The program from this piece on, in motion, and what it shares; the predecessor may end as it does."""
     pieces, stops = program.pieces, program.stops
     start = int(pieces.start_q40[first])
     segment = int(np.searchsorted(program.start_q40, start, side="right")) - 1
@@ -84,8 +64,17 @@ def behind_piece(program: Program, first: int) -> tuple[Program, Shared]:
         ),
     )
     far = rest.length_q40 - rest.pieces.start_q40 >= REACH_Q40
-    return rest, Shared(
-        first, segment, int(np.count_nonzero(far)) - 1, rest.segment_count, arc, time
+    return rest, ChunkHeader(
+        first=False,
+        last=False,
+        job=JOB,
+        sequence=0,
+        piece_shift=first,
+        segment_shift=segment,
+        shared_pieces=int(np.count_nonzero(far)) - 1,
+        shared_segments=rest.segment_count,
+        arc_shift_q40=arc,
+        time_shift_q32_s=time,
     )
 
 
@@ -115,11 +104,10 @@ def test_any_number_of_axes_goes_on_bit_for_bit(name: str, kernel: str) -> None:
     step = max(program.piece_count // 5, 1)
     for sequence in range(1, 4):
         made.append(stream.run(expected.size // 5))
-        program, shared = behind_piece(program, step)
-        job_start += shared.arc_q40
-        last = LAST if sequence == 3 else 0
-        shared = replace(shared, job_start_q40=job_start)
-        assert stream.give(chunk(encode(program), last, sequence, shared=shared)) is None
+        program, header = behind_piece(program, step)
+        job_start += header.arc_shift_q40
+        header = replace(header, sequence=sequence, last=sequence == 3, job_start_q40=job_start)
+        assert stream.give(Chunk(header, encode(program)).encode()) is None
     made.append(stream.run(2 * expected.size))
     assert np.array_equal(np.concatenate(made), expected)
     assert stream.takeovers[0] == 3
