@@ -158,10 +158,18 @@ class JobSection:
 
     def line_at(self, s_mm: Real) -> Int:
         """Source lines (n,) of places of the curve at arc lengths (n,)."""
+        return np.asarray(self.fitted.reference.line[self._chord_at(s_mm)])
+
+    def is_rapid_at(self, s_mm: Real) -> NDArray[np.bool_]:
+        """Whether these places (n,) belong to rapid moves (G0)."""
+        return np.isinf(self.fitted.reference.feed_mm_s[self._chord_at(s_mm)])
+
+    def _chord_at(self, s_mm: Real) -> NDArray[np.intp]:
+        """Chords (n,) of the reference."""
         reference = self.fitted.reference
         starts = self.fitted.arc_length_at(reference.place_mm[:-1])
         at = np.searchsorted(starts, s_mm, side="right") - 1
-        return np.asarray(reference.line[np.clip(at, 0, reference.count - 1)])
+        return np.clip(at, 0, reference.count - 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -317,10 +317,15 @@ def _stream(command: Command) -> None:
     options.bus(stream, can_serve=True)
     options.kernel(stream)
     options.json(stream)
-    stream.add_argument(
+    _pace(stream)
+    options.controller(stream)
+
+
+def _pace(parser: ArgumentParser) -> None:
+    """--pace, of commands that find a controller or start one."""
+    parser.add_argument(
         "--pace", choices=PACES, help="of a controller started here (default real-time)"
     )
-    options.controller(stream)
 
 
 def _run(command: Command) -> None:
@@ -337,9 +342,7 @@ def _run(command: Command) -> None:
     options.bus(run, can_serve=True)
     options.kernel(run)
     options.json(run)
-    run.add_argument(
-        "--pace", choices=PACES, help="of a controller started here (default real-time)"
-    )
+    _pace(run)
     options.controller(run)
     run.add_argument(
         "--trace", type=Path, metavar="CSV", help="write one row a tick (one FILE only)"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 from .library import library
 from .program import NativeProgram
@@ -42,7 +43,49 @@ class Step:
     rate: float
 
 
-class FeedOverride:
+class FeedCommands:
+    """What can be asked of a motion, and what it is told: a struct feed_override. Commands act from the next tick."""
+
+    _lib: Any
+    _feed: Any
+
+    @property
+    def state(self) -> State:
+        """After the last tick."""
+        return State(self._lib.feed_override_state(self._feed))
+
+    @property
+    def late(self) -> bool:
+        """Whether a stop has taken longer than its bound and a fifth."""
+        return bool(self._lib.feed_override_late(self._feed))
+
+    @property
+    def time_s(self) -> float:
+        """Program time (of a job: in the chunk under way) of the last tick; in a brake that of its begin."""
+        return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
+
+    def hold(self) -> None:
+        """To rest, until resumed."""
+        self._lib.feed_override_hold(self._feed)
+
+    def resume(self) -> None:
+        """Back to the override."""
+        self._lib.feed_override_resume(self._feed)
+
+    def override(self, percent: int) -> None:
+        """The rate wanted, 0 to 200; before the last chunk of a job above 100 counts as 100."""
+        self._lib.feed_override_set(self._feed, percent)
+
+    def stop(self) -> None:
+        """To rest inside the program's limits, for good."""
+        self._lib.feed_override_stop(self._feed)
+
+    def fault_stop(self) -> None:
+        """To rest inside the machine's limits, for good."""
+        self._lib.feed_override_fault_stop(self._feed)
+
+
+class FeedOverride(FeedCommands):
     """One program from its start, tick by tick. Commands take effect from the next step."""
 
     def __init__(self, program: NativeProgram, kernel: str = "fixed") -> None:
@@ -77,38 +120,3 @@ class FeedOverride:
         now = self._feed.plan.now
         slope_per_s = now.slope_q56 * 2.0**-56 / self._period_s
         return PlanStep(self.time_s, now.override_q57 * 2.0**-57, slope_per_s)
-
-    @property
-    def state(self) -> State:
-        """After the last step."""
-        return State(self._lib.feed_override_state(self._feed))
-
-    @property
-    def late(self) -> bool:
-        """Whether a stop has taken longer than its bound and a fifth."""
-        return bool(self._lib.feed_override_late(self._feed))
-
-    @property
-    def time_s(self) -> float:
-        """Program time of the last step; in a brake that of its begin."""
-        return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
-
-    def hold(self) -> None:
-        """To rest, until resumed."""
-        self._lib.feed_override_hold(self._feed)
-
-    def resume(self) -> None:
-        """Back to the override."""
-        self._lib.feed_override_resume(self._feed)
-
-    def override(self, percent: int) -> None:
-        """The rate wanted, 0 to 200."""
-        self._lib.feed_override_set(self._feed, percent)
-
-    def stop(self) -> None:
-        """To rest inside the program's limits, for good."""
-        self._lib.feed_override_stop(self._feed)
-
-    def fault_stop(self) -> None:
-        """To rest inside the machine's limits, for good."""
-        self._lib.feed_override_fault_stop(self._feed)

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import HodographError
-from .feed_override import State
+from .feed_override import FeedCommands
 from .library import library, text
 from .program import POINT, NativeFault, NativeLimits, kernel_code, limits_fields
 
 
-class OfflineStream:
+class OfflineStream(FeedCommands):
     """Chunks of docs/reference/protocol.md 1.7 in, setpoints out. Chunks and commands take effect from the next tick.
 
     Memory of a chunk is given back when a later one has been taken over.
@@ -25,6 +25,7 @@ class OfflineStream:
         self._ffi, self._lib = library()
         self._kernel = self._lib.kernel_find(kernel_code(kernel))
         self._stream = self._ffi.new("struct offline_stream *")
+        self._feed = self._ffi.addressof(self._stream, "feed")
         self._parts: list[tuple[Any, ...]] = []
         given = self._ffi.new("struct program_limits *", limits_fields(limits or NativeLimits()))
         self._lib.offline_stream_begin(self._stream, self._kernel, given)
@@ -65,11 +66,6 @@ class OfflineStream:
         return points[: int(made)]
 
     @property
-    def state(self) -> State:
-        """After the last tick."""
-        return State(self._lib.feed_override_state(self._feed))
-
-    @property
     def waits(self) -> bool:
         """Whether it is at rest at the end of a tail, until the next chunk is taken over."""
         return bool(self._lib.feed_override_waits(self._feed))
@@ -81,11 +77,6 @@ class OfflineStream:
         return None if active == self._ffi.NULL else int(active.chunk.sequence)
 
     @property
-    def time_s(self) -> float:
-        """Program time in the chunk under way."""
-        return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
-
-    @property
     def takeovers(self) -> tuple[int, int]:
         """In motion, at rest."""
         return int(self._stream.moving), int(self._stream.resting)
@@ -94,27 +85,3 @@ class OfflineStream:
     def underruns(self) -> int:
         """How often it has come to rest at the end of a tail."""
         return int(self._stream.underruns)
-
-    def hold(self) -> None:
-        """To rest, until resumed."""
-        self._lib.feed_override_hold(self._feed)
-
-    def resume(self) -> None:
-        """Back to the override."""
-        self._lib.feed_override_resume(self._feed)
-
-    def override(self, percent: int) -> None:
-        """The rate wanted, 0 to 200; above 100 it counts as 100 until the last chunk."""
-        self._lib.feed_override_set(self._feed, percent)
-
-    def stop(self) -> None:
-        """To rest inside the program's limits, for good."""
-        self._lib.feed_override_stop(self._feed)
-
-    def fault_stop(self) -> None:
-        """To rest inside the machine's limits, for good."""
-        self._lib.feed_override_fault_stop(self._feed)
-
-    @property
-    def _feed(self) -> Any:
-        return self._ffi.addressof(self._stream, "feed")

@@ -48,7 +48,7 @@ def path_figure(run: JobMotion) -> bytes:
     points, feeds = [], []
     for section, motion in zip(run.job.sections, run.motions, strict=True):
         at = motion.cmd_mm[: motion.ticks, :2]
-        rapid = rapid_at(section, motion.arc_length_mm[: motion.ticks])
+        rapid = section.is_rapid_at(motion.arc_length_mm[: motion.ticks])
         for first, last in _stretches(rapid):
             part = at[first : last + 1]
             axes.plot(*part.T, color=SOFT, linewidth=0.9, linestyle=(0, (4, 3)), zorder=2)
@@ -63,14 +63,6 @@ def path_figure(run: JobMotion) -> bytes:
     axes.set_title(f"{run.job.file.name}: feed along the path; dashed: rapid moves")
     figure.colorbar(lines, ax=axes, label="feed, mm/s", shrink=0.8)
     return png(figure)
-
-
-def rapid_at(section: JobSection, s_mm: Real) -> NDArray[np.bool_]:
-    """Whether places (n,) of the curve of a section belong to rapid moves (G0)."""
-    reference = section.fitted.reference
-    starts = section.fitted.arc_length_at(reference.place_mm[:-1])
-    chord = np.searchsorted(starts, s_mm, side="right") - 1
-    return np.isinf(reference.feed_mm_s[np.clip(chord, 0, reference.count - 1)])
 
 
 def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -18,7 +18,6 @@ from .toolpath_figures import (
     corner_figure,
     feed_figure,
     path_figure,
-    rapid_at,
     widest_corners,
 )
 
@@ -114,7 +113,7 @@ def view_data(run: JobMotion) -> dict[str, object]:
             strict=False,
         ):
             columns[name] += np.round(values, 4).tolist()
-        columns["r"] += rapid_at(section, s_mm).astype(int).tolist()
+        columns["r"] += section.is_rapid_at(s_mm).astype(int).tolist()
     return {**columns, "text": _source(run.job, {int(str(line)) for line in columns["l"]})}
 
 

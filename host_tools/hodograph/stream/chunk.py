@@ -41,7 +41,7 @@ class ChunkHeader:
     arc_shift_q40     arc length in the predecessor of arc length 0 here
     time_shift_q32_s  program time in the predecessor of time 0 here
     job_start_q40     arc length of the job at arc length 0 here
-    line              source line at its joint; 0: none
+    line              source line at its start; 0: none
     remaining_ms      of the job, from the joint to its end; None: not known yet
     """
 

@@ -174,12 +174,15 @@ class Drawing:
             yield Message(first, f"left out: {what}, {count} times, first in line {first}")
         self._check_names()
         if not len(self.contours):
-            raise self.error(max(1, self.last_line), "the drawing has no line or curve to follow")
+            raise self._empty()
         visits, message = self._sequence()
         yield Message(0, message)
         x, y, z = self.options.start[:3]
         yield from self._moves(visits, feeds, (x, y, z))
         yield ProgramEnd(max(1, self.last_line))
+
+    def _empty(self) -> ToolpathError:
+        return self.error(max(1, self.last_line), "the drawing has no line or curve to follow")
 
     def _check_names(self) -> None:
         wanted = [name for name in self.options.layers if name not in self._layers]
@@ -215,7 +218,7 @@ class Drawing:
             chain for chain in join(contours, options.gap_mm) if _moves_at_all(contours, chain)
         ]
         if not chains:
-            raise self.error(max(1, self.last_line), "the drawing has no line or curve to follow")
+            raise self._empty()
         start = here = (options.start[0], options.start[1], options.start[2])
         as_given = rapid_length(contours, in_file_order(chains), start)
         visits: list[Visit] = []

@@ -13,7 +13,7 @@ import pytest
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.job import JobMotion, load_job, simulate_job
-from hodograph.report.toolpath_figures import rapid_at, widest_corners
+from hodograph.report.toolpath_figures import widest_corners
 from hodograph.report.toolpath_report import view_data, write_toolpath_report
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -30,8 +30,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> JobMotion:
 
 def test_rapid_moves_are_those_of_the_file(run: JobMotion) -> None:
     first, last = run.job.sections
-    assert rapid_at(first, np.array([0.0, 1.0, 3.0, 8.0])).tolist() == [True, True, False, False]
-    assert rapid_at(last, np.array([0.5])).all()
+    assert first.is_rapid_at(np.array([0.0, 1.0, 3.0, 8.0])).tolist() == [True, True, False, False]
+    assert last.is_rapid_at(np.array([0.5])).all()
 
 
 def test_corners_are_the_programmed_ones_and_inside_the_tolerance(run: JobMotion) -> None:
