@@ -12,7 +12,7 @@
  * mutant: core/segment_check.c: target_q40 * 256 => target_q40 * 1024
  * mutant: core/ph_segment.c: 8 * (e3 - e1) => 64 * (e3 - e1)
  * mutant: core/joint_check.c: real_scale(along, -2 * DIRECTION_BITS) => real_scale(along, -2147483647)
- * mutant: core/program.c: (uint64_t)read_u16(b + 4) << 48) >> 16 => (uint64_t)read_u16(b + 4) << 48)
+ * mutant: core/little_endian.h: (uint64_t)read_u16(b + 4) << 48) >> 16 => (uint64_t)read_u16(b + 4) << 48)
  * mutant: core/segment_check.c: *index < p->header.segment_count => *index <= p->header.segment_count
  */
 

@@ -102,6 +102,15 @@ def read_proof(path: Path) -> Proof:
     return proof
 
 
+def stale_changes(proof: Proof, firmware: Path) -> list[str]:
+    """Changes of a proof (`mutant:`, `instead:`) whose text is no longer in its file: a line for each."""
+    return [
+        f"{proof.name}: {file} has no `{old}` to change"
+        for file, old, _ in [*proof.instead, *proof.mutants]
+        if not (firmware / file).is_file() or old not in (firmware / file).read_text()
+    ]
+
+
 def _call(command: list[str]) -> tuple[int, str]:
     limited = ["prlimit", f"--cpu={LIMIT_S}", *command]
     try:
@@ -373,6 +382,8 @@ def main() -> int:
             print("\n".join(f"| `{name}` | {users} | {shown} |" for name, users, shown in table))
             return 0
         proofs = [read_proof(PROOFS / f"{name}.c") for name in options.names] or everything
+        if stale := [line for proof in proofs for line in stale_changes(proof, ROOT / "firmware")]:
+            raise BadProof("\n".join(stale))
         runs = [Run(proof, bits) for proof in proofs for bits in MACHDEP]
         if not options.no_mutants:
             runs += [Run(proof, 64, i) for proof in proofs for i in range(len(proof.mutants))]
