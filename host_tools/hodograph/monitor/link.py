@@ -39,7 +39,7 @@ from ..bus.sdo.objects import (
     STOP,
 )
 from ..bus.sdo.status import read_status
-from ..data import CONTROLLER_EDS
+from ..data import CONTROLLER_EDS, object_dictionary
 from ..errors import BusError, HodographError, InputError, RefusedError
 from .pump import Publish
 
@@ -137,7 +137,7 @@ class Link:
     @contextmanager
     def _open(self) -> Iterator[_Prompt]:
         with open_network(self._address, self._node, self._bitrate) as network:
-            remote = network.add_node(self._node, str(CONTROLLER_EDS))
+            remote = network.add_node(self._node, object_dictionary(CONTROLLER_EDS, self._node))
             controller = _Prompt(self._address, self._node, remote, network.clock)
             controller.sdo.RESPONSE_TIMEOUT = _ANSWER_S
             controller.before_read = lambda: self._execute(controller)
