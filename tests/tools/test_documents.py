@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from hodograph import __version__
 from hodograph.cli.parser import make_parser
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,6 +60,20 @@ def test_generated_pages_are_current(tool: str) -> None:
     command = [sys.executable, str(ROOT / "tools" / tool), "--check"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_every_page_has_the_version_of_the_package() -> None:
+    """It is in hodograph/__init__.py; the changelog begins with its release, and citations name it."""
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    releases = re.findall(
+        r"^## (\S+) \((?:\d{4}-\d\d-\d\d|not released yet)\)$", changes, re.MULTILINE
+    )
+    assert releases == re.findall(r"^## (\S+)", changes, re.MULTILINE)
+    assert releases[0] == __version__
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^version: (.*)$", citation, re.MULTILINE) == [__version__]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"version {__version__}." in readme.partition("## How to cite")[2]
 
 
 def test_each_tool_has_a_row() -> None:
