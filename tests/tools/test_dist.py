@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from dist.make_release import build_environment, make_release
-from dist.programs import PROGRAMS
+from dist.programs import PROGRAMS, programs_for
 
 ROOT = Path(__file__).resolve().parents[2]
 HANGS_S = 600.0
@@ -65,6 +65,12 @@ def test_the_linker_of_another_platform_stays() -> None:
     assert built["LDSHARED"] == given["LDSHARED"]
     assert built["HODOGRAPH_BUILT_BY_MAKE"] == ""
     assert "-L" not in build_environment(7, {})["LDSHARED"]
+
+
+def test_other_systems_get_no_programs() -> None:
+    """They need Linux; the native module does not."""
+    assert programs_for("linux") == PROGRAMS
+    assert [programs_for(platform) for platform in ("darwin", "win32")] == [{}, {}]
 
 
 def check_wheel(wheel: Path) -> None:
