@@ -31,12 +31,8 @@ from dist.runtime import PYTHON, SITE, pip_install
 PARTS = ROOT / "packaging/debian"
 HOME = Path("usr/lib/hodograph")
 LAUNCHER = f"""\
-#!/{HOME}/bin/python3
-import sys
-
-from hodograph.cli.main import main
-
-sys.exit(main())
+#!/bin/sh
+exec /{HOME}/bin/python3 -P -m hodograph "$@"
 """
 COPYRIGHT = """\
 Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/

@@ -58,6 +58,15 @@ def failed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, st
 USAGE = [
     ((), r"COMMAND"),
     (("simulat",), r'no command "simulat"; did you mean "simulate"\?'),
+    (
+        ("simulate", ALPHA, "--kernal", "fixed"),
+        r'--kernal fixed; did you mean "--kernel"\? .*simulate',
+    ),
+    (
+        ("--quite", "simulate", ALPHA),
+        r'unknown: --quite; did you mean "--quiet"\? \(see hodograph --help',
+    ),
+    (("simulate", ALPHA, "other.toml"), r"unknown: other.toml \(see hodograph simulate --help\)"),
     (("quik-stop",), r'did you mean "quick-stop"\?'),
     (("spline",), r"FILE"),
     (("spline", ALPHA, "--jsn"), r"--jsn"),
