@@ -1,16 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h, docs/reference/protocol.md 1.7).
+ * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h,
+ * docs/reference/protocol.md 1.7).
  *
- * Chunks are downloaded in order to a ring in RAM, checked there as strictly as a program, and given coefficient records.
- * In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part that the next
- * chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free. So whatever
- * happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an underrun), and
- * goes on when the next chunk has come.
+ * Chunks are downloaded in order to a ring in RAM, checked there as strictly as a program, and given coefficient
+ * records. In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part
+ * that the next chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free.
+ * So whatever happens to the line or the host, the motion stays on the path: it comes to rest at the end of a tail (an
+ * underrun), and goes on when the next chunk has come.
  *
- * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped or
- * has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. The power takes it
- * away. A job is bound to the configuration that it was checked under. Main loop; machine is locked here where it has to be.
+ * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped
+ * or has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. It does not
+ * survive a loss of power. A job is bound to the configuration that it was checked under. Main loop; machine is locked
+ * here where it has to be.
  */
 #ifndef APP_STREAM_H
 #define APP_STREAM_H
@@ -50,7 +52,8 @@ struct stream {
     uint32_t underruns;           /* since the job was opened */
     struct stream_place place;
     void (*attend)(
-        void *self); /* called with `self` now and then while a chunk is checked; may be NULL */
+        void
+            *self); /* called with `self` from time to time while a chunk is checked; may be NULL */
     void *self;
 
     struct chunk_ring ring;
@@ -67,8 +70,8 @@ struct stream {
 
 void stream_init(struct stream *stream);
 
-/* A download of a chunk: begin (`size` bytes, 0: not known), write in order, then finish or abandon. Begin and write: 0 or
- * PROGRAM_ERR_ROOM, when the chunk does not fit the ring now. Finish checks: 0, or the code that is then in
+/* A download of a chunk: begin (`size` bytes, 0: not known), write in order, then finish or abandon. Begin and write: 0
+ * or PROGRAM_ERR_ROOM, when the chunk does not fit the ring now. Finish checks: 0, or the code that is then in
  * stream->refused; then nothing has changed. */
 int stream_begin(struct stream *stream, uint32_t size);
 int stream_write(struct stream *stream, uint32_t offset, const uint8_t *data, uint32_t size);
@@ -90,7 +93,8 @@ enum machine_refusal stream_prepare(const struct stream *stream, const struct co
 /* machine_start has accepted it. */
 void stream_started(struct stream *stream);
 
-/* A round: takes the next chunk over where it can be; notes underrun and end. Short; also to be called from `attend`. */
+/* A round: takes the next chunk over where it can be; notes underrun and end. Short; also to be called from
+ * `attend`. */
 void stream_process(struct stream *stream, struct machine *machine);
 
 /* The longest hold of the program that is executed, us; 0: none is. */

@@ -2,10 +2,10 @@
 /*
  * The program clock: which program time each tick has, and which feed piece that time is in.
  *
- * A tick advances the clock by the period times the feed override of that tick (core/override_plan decides the override).
- * At override 1, tick k is at min(k period, duration), without drift, in two resolutions: q42 is
- * floor(k period_us 2^42 / 10^6 + 1/2), which a tick uses; q32 likewise, which the object dictionary shows.
- * At another override the time is exact to 2^-62 s in each tick (docs/theory/numerics.md section 12, "Feed override").
+ * A tick advances the clock by the period times the feed override of that tick (core/override_plan decides the
+ * override). At override 1, tick k is at min(k period, duration), without drift, in two resolutions: q42 is floor(k
+ * period_us 2^42 / 10^6 + 1/2), which a tick uses; q32 likewise, which the object dictionary shows. At another override
+ * the time is exact to 2^-62 s in each tick (docs/theory/numerics.md section 12, "Feed override").
  *
  * Integers only, the same on every target. No heap; about 0.1 KiB. What a tick calls is inline here.
  */
@@ -54,8 +54,8 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
                        const struct coefficients_piece *record);
 
-/* The same instant in a program that begins `shift` later, inside its piece of this number: what is left below 2^-42 s
- * stays. Main loop. */
+/* Sets the clock to the same instant in a program that begins `shift` later, in its piece of this number. The part
+ * below 2^-42 s stays. Main loop. */
 void program_clock_carry(struct program_clock *clock, const struct program *p, uint64_t shift_q42_s,
                          uint32_t piece);
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements override_program.h (see there): programs for the override's property test. */
 #include "override_program.h"
 
 #include <math.h>

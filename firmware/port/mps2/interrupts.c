@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/mps2/interrupts.h (see there): the tick, and what both links do with a frame that came. */
 #include "port/mps2/interrupts.h"
 
 #include <string.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line (docs/guides/target.md):
+ * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line
+ * (docs/guides/target.md):
  *
  *   link_fifo   records on two FIFOs, exchanged in the tick's interrupt while the clock of the guest stands still
  *   link_slcan  text on a UART, received by interrupt in real time
@@ -23,11 +24,11 @@ struct link_wish {
 };
 
 struct link {
-    /* Whether the mainline sleeps (WFI) while it has nothing to do. Where the guest's clock counts instructions that only costs the emulator
-     * changes of its threads, so it spins there. */
+    /* Whether the main loop sleeps (WFI) while it has nothing to do. Where the guest's clock counts instructions that
+     * only costs the emulator changes of its threads, so it spins there. */
     bool sleeps;
 
-    /* Mainline, in this order. 0 or PORT_ERR_SYSTEM. */
+    /* Main loop, in this order. 0 or PORT_ERR_SYSTEM. */
     int (*begin)(const struct command_line *line);
     int (*accept)(const struct can_match *filters, size_t count);
 
@@ -37,14 +38,14 @@ struct link {
     /* port_can_delivered(): in a tick. */
     bool (*delivered)(void);
 
-    /* In the tick's interrupt, after the tick. `wish` changes when a frame that was received ends the waiting. Returns how late the next tick
-     * will be, in ns. */
+    /* In the tick's interrupt, after the tick. `wish` changes when a frame that was received ends the waiting. Returns
+     * how late the next tick will be, in ns. */
     uint32_t (*after_tick)(const struct link_wish *wish);
 
-    /* What was sent last leaves. Mainline, with the tick ended. */
+    /* What was sent last leaves. Main loop, with the tick ended. */
     void (*end)(void);
 
-    bool (*stop_requested)(void); /* when it becomes true the link wakes the mainline */
+    bool (*stop_requested)(void); /* when it becomes true the link wakes the main loop */
     bool (*failed)(void);         /* the other end is gone */
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right behind the tick. */
+/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right after the tick. */
 #include "port/cortex_m/core.h"
 #include "port/cortex_m/systick.h"
 #include "port/mps2/exchange.h"

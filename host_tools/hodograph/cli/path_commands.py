@@ -94,7 +94,7 @@ def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> 
 
 
 def _places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> list[list[float]]:
-    """Points at arc lengths, with the extra axes behind x, y, z."""
+    """Points at arc lengths, with the extra axes after x, y, z."""
     if isinstance(curve, SpatialPHSpline):
         return _lists(curve.axes_point(s))
     return _lists(curve.point(s))
@@ -381,7 +381,7 @@ def motion_rows(motion: Motion) -> list[tuple[str, str]]:
 
 
 def _orientation_rows(motion: Motion) -> list[tuple[str, str]]:
-    """The greatest errors of the axes behind x, y, z."""
+    """The greatest errors of the axes after x, y, z."""
     if not motion.extra_names:
         return []
     every = zip(motion.extra_names, motion.units[3:], motion.max_orientation_error, strict=True)
