@@ -1,18 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h,
- * docs/reference/protocol.md 1.7).
+ * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h, docs/reference/protocol.md 1.7).
  *
- * Chunks are downloaded in order to a ring in RAM, checked there as strictly as a program, and given coefficient
- * records. In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part
- * that the next chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free.
- * So whatever happens to the line or the host, the motion stays on the path: it comes to rest at the end of a tail (an
- * underrun), and goes on when the next chunk has come.
+ * Chunks are downloaded in order to a ring in RAM, checked there as strictly as a program, and given coefficient records.
+ * In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part that the next
+ * chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free. So whatever
+ * happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an underrun), and
+ * goes on when the next chunk has come.
  *
- * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped
- * or has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. It does not
- * survive a loss of power. A job is bound to the configuration that it was checked under. Main loop; machine is locked
- * here where it has to be.
+ * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped or
+ * has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. The power takes it
+ * away. A job is bound to the configuration that it was checked under. Main loop; machine is locked here where it has to be.
  */
 #ifndef APP_STREAM_H
 #define APP_STREAM_H

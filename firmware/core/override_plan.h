@@ -78,7 +78,7 @@ struct override_plan {
 /* For a program at rest, commanded 100 %. Reads all pieces: main loop. */
 void override_plan_begin(struct override_plan *plan, const struct program *p);
 
-/* The largest commanded override that counts. Not lowered while the override is above it. */
+/* The most that counts of the override asked for. Not lowered while the override is above. */
 void override_plan_limit(struct override_plan *plan, int64_t most_q57);
 
 /* 1 when nothing on its way depends on pieces that begin at this program time or later: the override is steady, or on a

@@ -16,11 +16,11 @@
 
 struct kernel; /* core/kernel.h */
 
-#define PROGRAM_AXES   6u /* greatest number of path axes */
-#define PROGRAM_PLANE  2u /* path axes of a planar program: x, y */
-#define PROGRAM_SPACE  3u /* at least, of a spatial one: x, y, z; further ones are extra axes */
-#define PROGRAM_EXTRAS (PROGRAM_AXES - PROGRAM_SPACE)
-#define PROGRAM_HEADER_SIZE  128u /* and 8 for each path axis after y */
+#define PROGRAM_AXES  6u /* greatest number of path axes */
+#define PROGRAM_PLANE 2u /* path axes of a planar program: x, y */
+#define PROGRAM_SPACE 3u /* at least, of a spatial one: x, y, z; those behind them are extra axes */
+#define PROGRAM_EXTRAS       (PROGRAM_AXES - PROGRAM_SPACE)
+#define PROGRAM_HEADER_SIZE  128u /* and 8 for each path axis behind y */
 #define PROGRAM_SEGMENT_SIZE 72u  /* of a planar program */
 #define PROGRAM_SPACE_SIZE   104u /* of a segment of a spatial one, */
 #define PROGRAM_EXTRA_SIZE   38u  /* and for each extra axis */

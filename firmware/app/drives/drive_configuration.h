@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_configuration: the configuration of one drive as a list of operations on its dictionary, in order: CiA 301 and
- * CiA 402-2, docs/reference/protocol.md section 2. The table is in drive_configuration.c; one row for each object, or
- * PDO.
+ * drive_configuration: the configuration of one drive as a list of operations on its dictionary, in order:
+ * CiA 301 and CiA 402-2, docs/reference/protocol.md section 2. The table is in drive_configuration.c; one row for each object,
+ * or PDO.
  *
  *     drive_configuration_begin(&configuration, &config, axis, &facts);
  *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_monitor: heartbeats and emergency messages of the drives, and what they mean for the zero of a homed axis: a
- * drive that has sent nothing for a while may have been switched off and on, with its boot-up message lost. Also
- * heartbeats of the host, where 0x1016 names its node. Main loop; takes the port's lock where it touches the machine.
+ * drive_monitor: heartbeats and emergency messages of the drives, and what they mean for the zero of a homed axis: a drive that
+ * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody heard its boot-up
+ * message. Also heartbeats of the host, where 0x1016 names its node. Mainline; takes the port's lock where it touches the machine.
  */
 #ifndef APP_DRIVES_DRIVE_MONITOR_H
 #define APP_DRIVES_DRIVE_MONITOR_H

@@ -38,8 +38,8 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 /* As motion_begin, for the first chunk of a job. */
 int motion_begin_job(struct motion *motion, const struct chunk *first, const struct config *config);
 
-/* Goes on with the next chunk of the job, where the motion is in the part that it shares with the program under way, or
- * rests: then true, and that program is not needed any more. Under the lock. */
+/* Goes on with the next chunk of the job, where the motion is in the part that it shares with the program under way, or rests: then
+ * true, and that program is not needed any more. Under the lock. */
 bool motion_take_over(struct motion *motion, const struct chunk *next);
 
 /* The next setpoint: targets of the program's path axes. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.

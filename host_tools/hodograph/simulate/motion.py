@@ -171,7 +171,7 @@ class Tally:
         """Of a program with `ticks` ticks and these axes; what is added beyond the ticks counts as settling.
 
         units    of the axes (default mm)
-        contour  of a program with axes after x, y, z; None: it has none
+        contour  of a program with axes behind x, y, z; None: it has none
         """
         self._left = ticks
         self._names = names
