@@ -93,7 +93,7 @@ def scan(options: Namespace) -> None:
 
 
 def _identity(facts: DriveFacts) -> Identity:
-    """As LSS compares it: what a node does not tell is 0."""
+    """As LSS compares it: what a node does not report is 0."""
     numbers = (facts.vendor, facts.product, facts.revision, facts.serial)
     return Identity(*(number or 0 for number in numbers))
 

@@ -36,7 +36,7 @@ class Motion:
     did not keep them. Arrays of all A axes that follow the path, `names`, are (n, A). Hashes are over i32 little-endian
     x, y (…) of the program's ticks. The following error
     is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
-    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not tell their volts.
+    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not report their volts.
 
     `units`, `counts_per_unit` by axis. An axis that turns has degrees where names say mm, and thousandths of a degree
     where they say um; the greatest following error is that of the axes in mm. Axes after x, y, z have an orientation

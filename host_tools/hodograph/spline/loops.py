@@ -41,7 +41,7 @@ class Unlooped:
 
 
 def suspects(w: Complex, guide_turning: Real) -> list[int]:
-    """Spans that turn so sharply that the other side is worth a look, the sharpest first.
+    """Spans that turn so sharply that the other side has to be tried, the sharpest first.
 
     Those are spans that turn by more than 225 degrees, and spans with a root of w close by that
     turn by 90 degrees more or less than the guide or whose bending energy times length exceeds

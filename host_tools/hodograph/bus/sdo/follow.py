@@ -13,7 +13,7 @@ LOOK_S = 0.5
 
 
 class Follower:
-    """Call it again and again; it looks twice a second, and tells `note` when nothing moves and why."""
+    """Call it again and again; it reads the state twice a second, and calls `note` when nothing moves, with the reason."""
 
     def __init__(self, controller: Controller, note: Callable[[str], None]) -> None:
         self._controller = controller
