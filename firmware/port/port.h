@@ -45,7 +45,7 @@ int port_begin(int argc, char **argv);
 int port_end(void);
 
 /* True when the machine wants the controller to end (SIGTERM, SIGINT); never on a board without
- * such a wish. */
+ * such a request. */
 bool port_stop_requested(void);
 
 /* True when it has been asked for a second time: not along the path any more, but as quickly as the drives can. */
@@ -119,7 +119,7 @@ enum port_timing port_timing(void);
 void port_lock(void);
 void port_unlock(void);
 
-/* Sleeps until port_wake(), a wish to stop, or timeout_us; sometimes less. Main loop, outside the critical section. */
+/* Sleeps until port_wake(), a request to stop, or timeout_us; sometimes less. Main loop, outside the critical section. */
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 

@@ -12,7 +12,7 @@
 #include "port/linux/interrupts_thread.h"
 #include "port/linux/schedule.h"
 
-#define LONGEST_SLEEP_NS 100000000u /* how late a wish to end may be noticed */
+#define LONGEST_SLEEP_NS 100000000u /* how late a request to end may be noticed */
 #define BATCHES_MAX      8u
 
 static struct {

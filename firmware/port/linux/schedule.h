@@ -6,8 +6,8 @@
  * are not bunched: two starts are at least three quarters of a period apart, so that a small lateness is made up over
  * some ticks. After one of more than a period the clock of the ticks is set anew.
  *
- * A tick may wish that the next one waits until everybody is ready (schedule_await), for a guard time at most: it is
- * then late rather than on time. At lock step it may also wish to have it as soon as that. The guard time is counted in
+ * A tick may request that the next one waits until everybody is ready (schedule_await), for a guard time at most: it is
+ * then late rather than on time. At lock step it may also request it as soon as that. The guard time is counted in
  * slices: the thread wakes at least every SCHEDULE_SLICE_NS while it waits and says so (schedule_wait); a slice that
  * took longer than SCHEDULE_SLICE_MAX_NS counts as that. So a stall of the whole machine, in which nobody could have
  * become ready, hardly counts.
@@ -56,10 +56,10 @@ struct schedule {
     uint64_t nominal_ns;  /* of the next tick, on the clock of the ticks */
     uint64_t earliest_ns; /* when it may start: later than nominal_ns where ticks would bunch */
     uint64_t due_ns;      /* when it has to start: later than that while somebody is waited for */
-    uint64_t guard_ns;    /* what is left of the wish to wait */
+    uint64_t guard_ns;    /* what is left of the requested waiting */
     uint64_t counted_ns;  /* up to when it was counted */
     bool awaiting;        /* somebody is waited for, since the present tick */
-    bool hurry;           /* its other wish */
+    bool hurry;           /* its other request */
     bool lock_step;       /* whether ticks may be faster than the clock */
     bool urgent;          /* none is put off for the main loop: drives are real */
     struct schedule_main_loop main_loop;
@@ -67,7 +67,7 @@ struct schedule {
 
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step);
 
-/* Wishes of the application, from inside a tick; and from the receive handler, without effect where nobody is waited
+/* Requests of the application, from inside a tick; and from the receive handler, without effect where nobody is waited
  * for (any more). */
 void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry);
 void schedule_ready(struct schedule *schedule, uint64_t now_ns);
@@ -75,7 +75,7 @@ void schedule_ready(struct schedule *schedule, uint64_t now_ns);
 /* The thread has woken: counts the guard time, moves due_ns along. */
 void schedule_wait(struct schedule *schedule, uint64_t now_ns);
 
-/* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the wishes of
+/* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the requests of
  * the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);
 

@@ -16,8 +16,8 @@
 #include "port/mps2/command_line.h"
 #include "port/port.h"
 
-/* What the tick wishes of the next one: port_tick_await(). */
-struct link_wish {
+/* What a tick requests for the next one: port_tick_await(). */
+struct link_request {
     uint32_t guard_us;
     bool awaiting; /* until port_tick_ready() */
     bool hurry;
@@ -38,9 +38,9 @@ struct link {
     /* port_can_delivered(): in a tick. */
     bool (*delivered)(void);
 
-    /* In the tick's interrupt, after the tick. `wish` changes when a frame that was received ends the waiting. Returns
+    /* In the tick's interrupt, after the tick. `request` changes when a frame that was received ends the waiting. Returns
      * how late the next tick will be, in ns. */
-    uint32_t (*after_tick)(const struct link_wish *wish);
+    uint32_t (*after_tick)(const struct link_request *request);
 
     /* What was sent last leaves. Main loop, with the tick ended. */
     void (*end)(void);

@@ -65,9 +65,9 @@ static bool delivered(void)
 }
 
 /* The clock alone says when the next tick is due. */
-static uint32_t after_tick(const struct link_wish *wish)
+static uint32_t after_tick(const struct link_request *request)
 {
-    (void)wish;
+    (void)request;
     return 0;
 }
 
