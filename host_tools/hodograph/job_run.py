@@ -212,7 +212,7 @@ def at_rest(at: RunSession, file: Path, commands: Sequence[Command], operator: O
 
 
 def _say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
-    """Prints the messages among commands. Those in the middle of a section are printed at its end."""
+    """Tells the messages among commands. Those on the way of a section are told at its end."""
     for command in commands:
         if isinstance(command, Message):
             at.note(f"{file}:{command.line}: {command.text}")
