@@ -91,8 +91,7 @@ enum machine_refusal stream_prepare(const struct stream *stream, const struct co
 /* machine_start has accepted it. */
 void stream_started(struct stream *stream);
 
-/* A round: takes the next chunk over where it can be; notes underrun and end. Short; also to be called from
- * `attend`. */
+/* A round: takes the next chunk over where it can be; notes underrun and end. Short; also to be called from `attend`. */
 void stream_process(struct stream *stream, struct machine *machine);
 
 /* The longest hold of the program that is executed, us; 0: none is. */

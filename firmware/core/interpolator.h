@@ -81,9 +81,8 @@ int interpolator_begin(struct interpolator *it, const struct program *p);
 void interpolator_ends(const struct program *p, const struct kernel *kernel,
                        struct interpolator_point *first, struct interpolator_point *last);
 
-/* Continues in another program for the same kernel. The present segment has a number there that is lower by
- * `segment_shift`. `end` is the exact end point of the other program; `piece` and arc length are the place in it. Main
- * loop; constant time. */
+/* Goes on in another program for the same kernel, which has the present segment of this one, `segment_shift` numbers lower, and
+ * this exact end point; at this arc length and in this piece of the other. Main loop; constant time. */
 void interpolator_carry(struct interpolator *it, const struct program *p,
                         const struct interpolator_point *end, uint32_t segment_shift,
                         uint32_t piece, int64_t arc_length_q40_mm);

@@ -62,8 +62,8 @@ struct override_plan {
     uint32_t task;   /* of the next tick at rest, enum override_task */
     uint32_t kind;   /* of the ramp that is on its way or looked for, enum override_kind */
     uint32_t step;   /* of the search, enum override_search */
-    uint32_t window; /* evaluated next, */
-    struct override_window ahead; /* and the one evaluated last */
+    uint32_t window; /* looked at next, */
+    struct override_window ahead; /* and the one looked at */
     uint32_t searched;            /* last search above guaranteed_q57 began in this piece */
     int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
     int64_t target_q57;           /* what is looked for, */
@@ -90,7 +90,7 @@ int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s)
 void override_plan_carry(struct override_plan *plan, const struct program_override *least,
                          uint64_t shift_q32_s);
 
-/* The path came to rest by a path stop: the override continues from 0. */
+/* The path came to rest otherwise: the override goes on from 0. */
 void override_plan_rest(struct override_plan *plan);
 
 /* --- Commands: take effect in the next tick, or when the ramp under way may be cut. --- */

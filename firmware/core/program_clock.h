@@ -54,8 +54,8 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
                        const struct coefficients_piece *record);
 
-/* Sets the clock to the same instant in a program that begins `shift` later, in its piece of this number. The part
- * below 2^-42 s stays. Main loop. */
+/* The same instant in a program that begins `shift` later, inside its piece of this number: what is left below 2^-42 s
+ * stays. Main loop. */
 void program_clock_carry(struct program_clock *clock, const struct program *p, uint64_t shift_q42_s,
                          uint32_t piece);
 

@@ -151,8 +151,8 @@ uint8_t machine_unhomed(const struct machine *machine);
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
                                    const int32_t start_counts[AXES_MAX]);
 
-/* Goes on with the next chunk of a job (motion_take_over): true when it has been taken over, false when it cannot be
- * now. A path that is held stays so. After a stop, and in a fault, nothing is taken over any more. */
+/* Goes on with the next chunk of a job (motion_take_over): true when it has been taken over, false when it cannot be now. A path
+ * that is held stays so. After a stop, and in a fault, nothing is taken over any more. */
 bool machine_take_over(struct machine *machine, const struct chunk *next);
 
 /* Homing, from OFF to OFF. In between the main loop sets each axis's `goal` and `control_extra`
