@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/objects.h (see there): what the controller's object dictionary (controller.eds) does beside
+ * storing values. */
 #include "app/objects.h"
 
 #include <stddef.h>
@@ -23,8 +25,7 @@ static uint64_t object_read_state(struct controller *controller, const struct od
     return (uint64_t)controller->machine.state;
 }
 
-/* While the drives are being looked for, node and detail tell which one keeps the others waiting.
- */
+/* In BOOT, node and detail name the drive that the others wait for. */
 static uint64_t object_read_fault(struct controller *controller, const struct od_entry *entry)
 {
     const struct machine *machine = &controller->machine;
@@ -250,7 +251,8 @@ static uint32_t object_write_confirmation(struct controller *controller,
     return SDO_OK;
 }
 
-/* The dictionary has the new value while the configuration is read from it, and the old one again when it is refused. */
+/* The dictionary has the new value while the configuration is read from it, and the old one again when it is
+ * refused. */
 static uint32_t reconfigure(struct controller *controller, const struct od_entry *entry,
                             uint64_t value)
 {
@@ -314,8 +316,8 @@ static void object_written_consumer(struct controller *controller)
 
 /* ---- The table ---- */
 
-/* Entries that have handlers: those of the indices first ... last with the sub-indices sub_first ... sub_last. A handler that is
- * NULL is not needed: the field holds the value, any value may be written. */
+/* Entries that have handlers: those of the indices first ... last with the sub-indices sub_first ... sub_last. A
+ * handler that is NULL is not needed: the field holds the value, any value may be written. */
 struct object {
     uint16_t first;
     uint16_t last;
@@ -336,7 +338,7 @@ struct object {
     bool (*urgent)(uint8_t value);
 };
 
-/* What only the mainline writes; what the interrupts write too. */
+/* What only the main loop writes; what the interrupts write too. */
 #define OWN    false
 #define SHARED true
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/stream.h (see there): a job that comes in chunks (object 0x2060). */
 #include "app/stream.h"
 
 #include <string.h>

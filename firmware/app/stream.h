@@ -50,7 +50,8 @@ struct stream {
     uint32_t underruns;           /* since the job was opened */
     struct stream_place place;
     void (*attend)(
-        void *self); /* called with `self` now and then while a chunk is checked; may be NULL */
+        void
+            *self); /* called with `self` from time to time while a chunk is checked; may be NULL */
     void *self;
 
     struct chunk_ring ring;
@@ -67,8 +68,8 @@ struct stream {
 
 void stream_init(struct stream *stream);
 
-/* A download of a chunk: begin (`size` bytes, 0: not known), write in order, then finish or abandon. Begin and write: 0 or
- * PROGRAM_ERR_ROOM, when the chunk does not fit the ring now. Finish checks: 0, or the code that is then in
+/* A download of a chunk: begin (`size` bytes, 0: not known), write in order, then finish or abandon. Begin and write: 0
+ * or PROGRAM_ERR_ROOM, when the chunk does not fit the ring now. Finish checks: 0, or the code that is then in
  * stream->refused; then nothing has changed. */
 int stream_begin(struct stream *stream, uint32_t size);
 int stream_write(struct stream *stream, uint32_t offset, const uint8_t *data, uint32_t size);

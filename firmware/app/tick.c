@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/tick.h (see there): what happens each period: SYNC, supervision, setpoints. */
 #include "app/tick.h"
 
 #include <string.h>

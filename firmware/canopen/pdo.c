@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/pdo.h (see there): the fixed process data of the bus. */
 #include "canopen/pdo.h"
 
 #include "canopen/cob.h"

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* pdo: the fixed process data of the bus (docs/reference/protocol.md, section 2).
- *
- * `drive` is always the node id of the drive, on both sides. Decoding returns the drive's node id,
- * or 0 when the frame is not this PDO of a node, or PDO_ERR_SHORT when it is but has fewer bytes
- * than the mapping (CiA 301: such a PDO is not processed); longer ones are accepted, extra bytes
- * ignored. Both directions are here, though the controller needs one of each: the other is what the drives of the tests
- * speak with, so that the two are one truth. Pure functions, any context.
- */
+ * 
+ * `drive` is always the node id of the drive, on both sides. Decoding returns the drive's node id, or 0 when the frame
+ * is not this PDO of a node, or PDO_ERR_SHORT when it is but has fewer bytes than the mapping (CiA 301: such a PDO is
+ * not processed); longer ones are accepted, extra bytes ignored. Both directions are here, though the controller needs
+ * one of each: the simulated drives of tests use the other, so that both sides share one definition. Pure functions,
+ * any context. */
 #ifndef CANOPEN_PDO_H
 #define CANOPEN_PDO_H
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/chunk.h (see there): a chunk, a part of a job that is longer than the controller's memory:
+ * reading and checking it. */
 #include "core/chunk.h"
 
 #include <stddef.h>

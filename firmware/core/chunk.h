@@ -2,10 +2,11 @@
 /*
  * A chunk: a part of a job that is longer than the memory of the controller (docs/reference/protocol.md 1.7).
  *
- * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside the
- * limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before the joint,
- * where that tail begins, bit for bit, and goes on from there. The controller takes it over while the motion is in the
- * shared part (feed_override_take_over). When that does not come to pass, the motion follows the tail and rests on the path.
+ * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside
+ * the limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before
+ * the joint, where that tail begins, bit for bit, and goes on from there. The controller takes it over while the motion
+ * is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the tail and
+ * rests on the path.
  *
  * A chunk is never copied; its bytes must stay unchanged as long as a struct chunk refers to them. No heap, no globals.
  */
@@ -48,18 +49,18 @@ struct chunk {
     struct interpolator_point end; /* and its exact end point */
 };
 
-/* Opens a chunk of `size` bytes: magic, version, size, flags, CRC, and the program in it (program_open). The buffer may be
- * longer than the chunk says, never shorter. Cost: two CRCs, linear in the size. Returns 0 or a negative enum
+/* Opens a chunk of `size` bytes: magic, version, size, flags, CRC, and the program in it (program_open). The buffer may
+ * be longer than the chunk says, never shorter. Cost: two CRCs, linear in the size. Returns 0 or a negative enum
  * program_error; *c is then not usable. */
 int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size);
 
-/* Checks an opened chunk: its whole program (program_check), and that it goes on from its predecessor, which has passed this
- * check; NULL for the first. Returns 0, or the code of the first rule broken; *fault gets the same code and its index. What
- * costs little and refuses a wrong chunk comes first. Main loop; linear. */
+/* Checks an opened chunk: its whole program (program_check), and that it goes on from its predecessor, which has passed
+ * this check; NULL for the first. Returns 0, or the code of the first rule broken; *fault gets the same code and its
+ * index. What costs little and refuses a wrong chunk comes first. Main loop; linear. */
 int chunk_check(struct chunk *next, const struct chunk *previous,
                 const struct program_limits *limits, struct program_fault *fault);
 
-/* 1: the job goes on behind the end of this chunk's program, which is the end of a tail. */
+/* 1: the job goes on after this chunk's program, whose end is then the end of a tail. */
 static inline int chunk_goes_on(const struct chunk *c)
 {
     return (c->flags & CHUNK_FLAG_LAST) == 0u;

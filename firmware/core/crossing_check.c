@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/crossing_check.h (see there): the check that no tick crosses more than two segment ends. */
 #include "core/crossing_check.h"
 
 #include "core/feed_bounds.h"

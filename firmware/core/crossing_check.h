@@ -8,11 +8,10 @@
 
 #include "core/program_check.h"
 
-/* Each two neighbouring segments (not the first, not the last of the program) are longer than the
- * way of one tick at 200 % of the highest feed of the pieces over them; a feed below 2^-10 mm/s
- * counts as that. Segments and pieces must have passed their own checks. Linear: pieces and
- * segments advance together. Returns 0 or PROGRAM_ERR_SEGMENT_SHORT with the index of the later of
- * the two. */
+/* Any two adjacent segments (not the first, not the last of the program) are longer than the distance of one tick at
+ * 200 % of the highest feed of the pieces on them; a feed below 2^-10 mm/s counts as 2^-10 mm/s. Segments and pieces
+ * must have passed their own checks. Linear: pieces and segments advance together. Returns 0 or
+ * PROGRAM_ERR_SEGMENT_SHORT with the index of the later of the two. */
 int crossing_check_all(const struct program *p, uint32_t *index);
 
 #endif

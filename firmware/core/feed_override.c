@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/feed_override.h (see there): the feed override and path stops: which place of the path each tick
+ * has. */
 #include "core/feed_override.h"
 
 #include <stddef.h>

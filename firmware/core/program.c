@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/program.h (see there): reading header, segments, feed pieces and stops of a program image. */
 #include "core/program.h"
 
 #include <stddef.h>
@@ -9,7 +10,7 @@
 #include "core/program_check.h"
 #include "core/qmath.h"
 
-#define CRC_FROM 16u /* the CRC covers everything behind itself */
+#define CRC_FROM 16u /* the CRC covers everything after itself */
 
 static void read_header(struct program_header *h, const uint8_t *b)
 {
@@ -38,7 +39,7 @@ static void read_header(struct program_header *h, const uint8_t *b)
     h->fault_worst_um = read_u32(b + 124);
 }
 
-/* Those of the axes behind y stand behind the header of a planar program. */
+/* Those of the axes after y stand after the header of a planar program. */
 static void read_offsets(struct program_header *h, const uint8_t *b)
 {
     for (uint32_t axis = PROGRAM_PLANE; axis < h->axis_count; axis++) {

@@ -2,11 +2,10 @@
 /*
  * The uploaded program image: reading its header, segments, feed pieces and stops.
  *
- * The format is docs/reference/protocol.md section 1: little-endian scaled integers at any alignment. The
- * image is never copied; it must stay unchanged as long as a struct program or a struct interpolator
- * refers to it. `program_open` checks what is needed to read without leaving the image (sizes,
- * counts, CRC); everything else is the business of `program_check` (core/program_check.h), which
- * has to pass before a program is interpolated.
+ * The format is docs/reference/protocol.md section 1: little-endian scaled integers at any alignment. The image is
+ * never copied; it must stay unchanged as long as a struct program or a struct interpolator refers to it.
+ * `program_open` checks what is needed to read without leaving the image (sizes, counts, CRC); `program_check`
+ * (core/program_check.h) checks everything else, and has to pass before a program is interpolated.
  *
  * No heap, no globals; every function may be called from any context.
  */
@@ -56,8 +55,8 @@ struct program_header {
     uint32_t fault_worst_um;
 };
 
-/* Components of the preimage A = u + v i + p j + q k, whose hodograph is A i A*. That of a planar program has u and q only:
- * w = u + iq. */
+/* Components of the preimage A = u + v i + p j + q k, whose hodograph is A i A*. That of a planar program has u and q
+ * only: w = u + iq. */
 enum program_component { PROGRAM_U, PROGRAM_V, PROGRAM_P, PROGRAM_Q };
 #define PROGRAM_COMPONENTS 4u
 
@@ -121,8 +120,8 @@ enum program_stop_kind {
     PROGRAM_STOP_FAULT = 1, /* fault stop: inside the machine's */
 };
 
-/* What a brake along the path may use that begins in a piece, protocol.md 1.4: codes, decoded by core/path_brake. All of
- * them 0: no brake may begin in this piece. */
+/* What a brake along the path may use that begins in a piece, protocol.md 1.4: codes, decoded by core/path_brake. All
+ * of them 0: no brake may begin in this piece. */
 struct program_stop {
     uint8_t jerk_down;
     uint8_t deceleration;

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/program_check.h (see there): all checks of a program before it may run, and the texts of
+ * refusals. */
 #include "core/program_check.h"
 
 #include "core/crossing_check.h"

@@ -417,7 +417,7 @@ def _feeds(fitted: FittedPath) -> tuple[float, tuple[FeedZone, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class JobMotion:
-    """A run of a job: the motions of its sections, one behind the other.
+    """A run of a job: the motions of its sections, one after the other.
 
     The last point of a section is the first one of the next and counts once. Dwells are not part of it.
     """

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/drives.h (see there): the simulated drives of one process on one SocketCAN bus. */
 #define _GNU_SOURCE
 #include "node/drives.h"
 

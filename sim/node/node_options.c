@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/node_options.h (see there): the command line of hodograph-drive. */
 #include "node/node_options.h"
 
 #include <errno.h>

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/offline.h (see there): interpolation, rounding and simulated axes in one process, without a
+ * bus. */
 #include "offline/offline.h"
 
 #include <stddef.h>

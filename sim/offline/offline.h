@@ -6,7 +6,7 @@
  * Timing (docs/reference/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
  * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC
  * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
- * repeat its end point (settling), those behind a stop its place of rest.
+ * repeat its end point (settling), those after a stop its place of rest.
  *
  * Use: offline_begin, then offline_run as often as wanted. No heap: the caller lends the segment array, and
  * the program, its image, its coefficient records and the segments must outlive the simulation. Main loop only.

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_search.h (see there): the search of stop parameters for each feed piece. */
 #include "offline/stop_search.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stream.h (see there): a job in chunks without a bus. */
 #include "offline/stream.h"
 
 #include <stddef.h>

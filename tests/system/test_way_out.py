@@ -38,7 +38,7 @@ STATE_BITS, POWERED = 0x6F, (0x27, 0x07)
 STANDS_COUNTS = 2000
 """2 um: the last of the settling."""
 LATE_US = 7000
-"""A round of the mainline, and the ticks until its word is on the bus."""
+"""A round of the main loop, and the ticks until its word is on the bus."""
 
 
 @dataclass(frozen=True)

@@ -35,14 +35,14 @@ void app_bench_init(struct app_bench *bench, int32_t x_counts, int32_t y_counts)
 /* The power of the controller goes off and on; drives, the store and the recorded counts stay. */
 void app_bench_power_cycle(struct app_bench *bench);
 
-/* One period: tick, answers, mainline. */
+/* One period: tick, answers, main loop. */
 void app_bench_period(struct app_bench *bench);
 void app_bench_periods(struct app_bench *bench, uint32_t count);
 
 /* Periods until the state; fails the test when it takes more than `most`. Returns how many. */
 uint32_t app_bench_until(struct app_bench *bench, enum machine_state state, uint32_t most);
 
-/* Delivers all frames that are under way, and lets the mainline do what they ask for. */
+/* Delivers all frames that are under way, and lets the main loop do what they ask for. */
 void app_bench_settle(struct app_bench *bench);
 
 /* The host. Results: abort codes. */

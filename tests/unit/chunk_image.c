@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements chunk_image.h (see there): chunks of a job that is small enough to be written by hand. */
 #include "chunk_image.h"
 
 #include <string.h>

@@ -56,7 +56,7 @@ static void test_every_read_only_object_of_the_machine_is_computed(void)
     TEST_ASSERT_GREATER_THAN_UINT(100, seen);
 }
 
-/* A reader behind a value that the host writes would give back another one. */
+/* A reader after a value that the host writes would give back another one. */
 static void test_what_the_host_wrote_is_read_back(void)
 {
     const struct od_table *table = bench.controller.od.table;

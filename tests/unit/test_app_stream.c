@@ -18,7 +18,7 @@
 #define JOB        7u
 #define UNIT       1000000 /* counts a mm */
 #define SMALL_RING (80u * 1024u)
-#define WHOLE      97u /* pieces of the job, behind which it ends: 0.5 s + 96 / 32 s + 0.5 s */
+#define WHOLE      97u /* pieces of the job, after which it ends: 0.5 s + 96 / 32 s + 0.5 s */
 
 static struct app_bench bench;
 static uint8_t bytes[CHUNK_IMAGE_SIZE_MAX];

@@ -329,7 +329,7 @@ static void test_power_lost_at_any_operation_leaves_a_whole_program(void)
 {
     load_images();
     const uint32_t operations = count_operations();
-    /* a double word for eight bytes of the program and more, behind it, that it is made ready with */
+    /* a double word for eight bytes of the program and more, after it, that it is made ready with */
     TEST_ASSERT_TRUE(operations > images[NEW].size / 8u);
     for (uint32_t operation = 0; operation < operations; operation += STRIDE) {
         for (int remains = 0; remains < FLASH_MODEL_REMAINS; ++remains) {

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/drive_boot.h (see there): finds the drives, configures them by SDO (drive_configuration)
+ * and starts them (NMT), one after the other, and begins again from the first when one does not answer or refuses. */
 #include "app/drives/drive_boot.h"
 
 #include <string.h>

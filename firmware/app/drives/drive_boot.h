@@ -6,7 +6,7 @@
  * A write that is refused is fine when the object reads back as wanted: so a drive with a fixed
  * mapping passes if it is the right one.
  *
- * Frames in, frames out; mainline.
+ * Frames in, frames out; main loop.
  */
 #ifndef APP_DRIVES_DRIVE_BOOT_H
 #define APP_DRIVES_DRIVE_BOOT_H

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/drive_configuration.h (see there): the configuration of one drive as a list of operations
+ * on its dictionary, in order. */
 #include "app/drives/drive_configuration.h"
 
 #include <stddef.h>
@@ -17,7 +19,7 @@ enum drive_when {
     WHEN_SIMULATED, /* the project's own drive */
     WHEN_REAL,
     WHEN_INPUTS,      /* the drive has 0x60FD */
-    WHEN_NOT_MAPPED,  /* and TPDO3 does not tell it */
+    WHEN_NOT_MAPPED,  /* and TPDO3 does not report it */
     WHEN_TORQUE,      /* torque feedforward is on */
     WHEN_NO_TORQUE,   /* it is not, or the drive does not map it */
     WHEN_VELOCITY,    /* velocity feedforward is on */
@@ -172,7 +174,7 @@ static const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
     {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_SILENT_MS},
-    /* it stays operational, so that its TPDOs tell what it does */
+    /* it stays operational, so that its TPDOs show what it does */
     {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NMT_ERROR_NO_CHANGE},
     {WHEN_ALWAYS, ROW_MAY, 0x6007, 0, 2, FROM_ROW, QUICK_STOP},
     /* process data */

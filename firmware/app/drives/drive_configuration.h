@@ -7,7 +7,7 @@
  *     drive_configuration_begin(&configuration, &config, axis, &facts);
  *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }
  *
- * What the drive says of itself on the way (facts) decides what follows. Mainline.
+ * What the drive reports meanwhile (facts) decides what follows. Main loop.
  */
 #ifndef APP_DRIVES_DRIVE_CONFIGURATION_H
 #define APP_DRIVES_DRIVE_CONFIGURATION_H
@@ -19,7 +19,7 @@
 #include "app/machine/config.h"
 
 /* The drive's heartbeat, and for how long it may miss the controller's (sent each 100 ms; checking a
- * long program can keep the mainline from it for a second). */
+ * long program can keep the main loop from it for a second). */
 #define DRIVE_HEARTBEAT_MS         100u
 #define DRIVE_CONTROLLER_SILENT_MS 2000u
 
@@ -28,7 +28,7 @@ enum drive_op_kind {
     DRIVE_OP_NMT_PRE_OPERATIONAL, /* process data off while parameters change */
     DRIVE_OP_READ,                /* `masked` bits must be those of `value`; learns `fact` */
     DRIVE_OP_WRITE,               /* refused: fine when it reads back so already */
-    DRIVE_OP_PREPARE,             /* a write that may be refused: a later one tells */
+    DRIVE_OP_PREPARE, /* a write that may be refused: a later one shows whether that matters */
 };
 
 struct drive_op {
@@ -61,7 +61,8 @@ bool drive_configuration_op(struct drive_configuration *configuration, struct dr
 /* The present operation is done; a read has brought `value`. */
 void drive_configuration_advance(struct drive_configuration *configuration);
 
-/* The drive refuses the present operation with the abort code: true when the configuration can do without it, and has gone on. */
+/* The drive refuses the present operation with the abort code: true when the configuration can do without it, and has
+ * gone on. */
 bool drive_configuration_refused(struct drive_configuration *configuration, uint32_t abort_code);
 
 #endif

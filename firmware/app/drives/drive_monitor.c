@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/drive_monitor.h (see there): heartbeats and emergency messages of the drives, and what
+ * they mean for the zero of a homed axis. */
 #include "app/drives/drive_monitor.h"
 
 #include <stddef.h>

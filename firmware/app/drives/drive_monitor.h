@@ -15,7 +15,7 @@
 /* Consumer time of a drive that has no entry in 0x1016; the drives send ten times as often. */
 #define DRIVE_MONITOR_HEARTBEAT_MS 1000u
 
-/* So long a silence is enough for a drive to have been off and on again without anybody hearing its boot-up message; its
+/* A drive that has sent nothing for so long may have been off and on again, with its boot-up message lost; its
  * heartbeats come five times as often. */
 #define DRIVE_MONITOR_ZERO_MS 500u
 
@@ -29,7 +29,7 @@ struct drive_monitor {
 
 /* Begins to watch the drives of the configuration, all unknown: each from its first heartbeat on. `entries` as in
  * 0x1016: bits 16 ... 23 node, 0 ... 15 time in ms. Other nodes in it are watched as well, likewise from their first
- * heartbeat on: one that falls silent, or restarts, while drives are on is a fault, and its axes come to rest. */
+ * heartbeat on: one that stops sending, or restarts, while drives are on is a fault, and the axes come to rest. */
 void drive_monitor_begin(struct drive_monitor *watch, const struct config *config,
                          const uint32_t entries[AXES_MAX]);
 
@@ -37,7 +37,7 @@ void drive_monitor_begin(struct drive_monitor *watch, const struct config *confi
 void drive_monitor_receive(struct drive_monitor *watch, struct machine *machine,
                            const struct can_msg *in);
 
-/* Lets time pass; a drive that has fallen silent likewise. */
+/* Lets time pass. A drive that has stopped sending makes a fault or a new boot. */
 void drive_monitor_process(struct drive_monitor *watch, struct machine *machine,
                            uint32_t elapsed_us);
 

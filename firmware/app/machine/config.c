@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/config.h (see there): the configuration of the host as one value. */
 #include "app/machine/config.h"
 
 #include <stddef.h>

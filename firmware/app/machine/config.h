@@ -20,10 +20,10 @@
 #define CONFIG_TORQUE_FEEDFORWARD   1u
 #define CONFIG_VELOCITY_FEEDFORWARD 2u
 
-/* A position loop without feedforward lags behind by the way of so long a time, at the most (a gain of 50 / s). */
+/* The largest lag of a position loop without feedforward, as a time (a gain of 50 / s). */
 #define CONFIG_LAG_MS 20u
 
-/* So many SYNCs more than the drive's own time, so that a drive that notices tells of it first. */
+/* SYNCs beyond the drive's own time, so that a drive that detects the deviation reports it first. */
 #define CONFIG_APART_SYNCS 5u
 
 /* What belongs to one axis beside node and travel. Every field has 32 bits, so that tables can name
@@ -76,14 +76,14 @@ struct config {
     uint32_t crc32;      /* of the objects; docs/reference/protocol.md section 3.4 */
     uint32_t turn_tolerance_counts
         [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
-    /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following window
-     * and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit, of an axis in degrees at its own
-     * velocity limit (without one: UINT32_MAX). */
+    /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following
+     * window and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit, of an axis in degrees at
+     * its own velocity limit (without one: UINT32_MAX). */
     uint32_t apart_counts[AXES_MAX];
     uint32_t apart_syncs[AXES_MAX];
 };
 
-/* Copies the present values out of the dictionary. Mainline. */
+/* Copies the present values out of the dictionary. Main loop. */
 void config_read(struct config *config, const struct od *od);
 
 /* Whether a value for the object is one that the dictionary's own ranges would let pass but that
@@ -116,7 +116,7 @@ static inline uint32_t config_tolerance_counts(const struct config *config, uint
  * other. Pure. */
 bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis);
 
-/* The limits in the form that program_check takes; travel is rounded inwards. Mainline. */
+/* The limits in the form that program_check takes; travel is rounded inwards. Main loop. */
 void config_limits(const struct config *config, struct program_limits *limits);
 
 #endif

@@ -167,7 +167,7 @@ void machine_step(struct machine *machine)
         break;
     case MACHINE_OFF:
     case MACHINE_READY:
-    case MACHINE_HOMING: /* led by the mainline */
+    case MACHINE_HOMING: /* led by the main loop */
     default:
         break;
     }

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/motion.h (see there): the point on the path and the targets of the axes, in each tick of
+ * a program. */
 #include "app/machine/motion.h"
 
 #include <string.h>

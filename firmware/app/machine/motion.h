@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * motion: a program on its way: what its plan and the commands make of a tick, point on the path and targets of the
- * axes that follow it.
+ * motion: a program that runs: from its feed plan and the commands, in each tick, the point on the path and the targets
+ * of the axes that follow it.
  *
- * Prepared by the mainline, then owned by the tick (under the port's lock).
+ * Prepared by the main loop, then owned by the tick (under the port's lock).
  */
 #ifndef APP_MACHINE_MOTION_H
 #define APP_MACHINE_MOTION_H
@@ -26,11 +26,11 @@ struct motion {
 };
 
 /* Sets up the first setpoint. The program must have passed program_check; it must stay while the
- * motion lasts. 0 or a negative INTERPOLATOR_ERR_... Mainline; linear in the number of pieces. */
+ * motion lasts. 0 or a negative INTERPOLATOR_ERR_... Main loop; linear in the number of pieces. */
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config);
 
 /* The same, but to go on from rest at an arc length of the program. Gives where that is, in counts.
- * Mainline. */
+ * Main loop. */
 int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
                     int32_t start_counts[AXES_MAX]);

@@ -27,7 +27,7 @@ EVERYWHERE = (
     (("--no-progress",), "no progress on stderr"),
     (("--debug",), "show tracebacks (or HODOGRAPH_DEBUG=1)"),
 )
-"""Options that may stand before the command or behind it."""
+"""Options that may stand before or after the command."""
 
 
 class _Parser(argparse.ArgumentParser):

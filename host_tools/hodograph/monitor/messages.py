@@ -54,7 +54,7 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
 
 
 def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
-    """The program's curve to draw, in space with z; axes behind z over arc length; `note` says why there is none, or
+    """The program's curve to draw, in space with z; axes after z over arc length; `note` says why there is none, or
     what is odd about it.
     """
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}

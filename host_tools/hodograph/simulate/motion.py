@@ -36,10 +36,10 @@ class Motion:
     did not keep them. Arrays of all A axes that follow the path, `names`, are (n, A). Hashes are over i32 little-endian
     x, y (…) of the program's ticks. The following error
     is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
-    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not tell their volts.
+    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not report their volts.
 
     `units`, `counts_per_unit` by axis. An axis that turns has degrees where names say mm, and thousandths of a degree
-    where they say um; the greatest following error is that of the axes in mm. Axes behind x, y, z have an orientation
+    where they say um; the greatest following error is that of the axes in mm. Axes after x, y, z have an orientation
     error: how far they are from where the curve has them beside the point nearest to the tool.
     """
 
@@ -59,13 +59,13 @@ class Motion:
     orientation_error: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     """(n, A - 3), actual less exact, in mm or degrees."""
     max_orientation_error: tuple[float, ...] = ()
-    """Of each axis behind x, y, z, in mm or degrees."""
+    """Of each axis after x, y, z, in mm or degrees."""
     max_following_error_mdeg: float | None = None
     """Of the axes that turn; None: there is none."""
 
     @property
     def extra_names(self) -> tuple[str, ...]:
-        """The axes behind x, y, z."""
+        """The axes after x, y, z."""
         return self.names[3:]
 
     @property

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+"""The native module: what is said where it is missing, the layout of its rows, counts."""
+
 from __future__ import annotations
 
 import sys

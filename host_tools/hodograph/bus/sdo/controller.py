@@ -336,7 +336,7 @@ class Controller(Node):
 
 
 _GOES_ON = {
-    HOLDING: "it goes on braking; hodograph status tells when it is held",
+    HOLDING: "it goes on braking; hodograph status shows when it is held",
     RUNNING: "the program goes on; hodograph stop ends it",
 }
 _STATISTICS = (

@@ -56,7 +56,7 @@ def nodal_values(values: Real, closed: bool) -> Real:
 def without_tail(values: Real, count: int, what: str) -> Real:
     """The first `count` rows of extra axes: those of points that a closed path keeps.
 
-    The points behind repeat the first ones in x, y and z. Raises InputError: an axis does not come back with them.
+    The points after repeat the first ones in x, y and z. Raises InputError: an axis does not come back with them.
     """
     tail = len(values) - count
     apart = np.abs(values[count:] - values[:tail])
