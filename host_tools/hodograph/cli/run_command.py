@@ -46,7 +46,7 @@ def _run_all(options: Namespace, address: BusAddress) -> None:
     try:
         tasks = [_task(options, file) for file in options.files]
     except NoRoomError as error:
-        if len(options.files) > 1 or any((options.trace, options.report, options.record)):
+        if len(options.files) > 1 or any((options.trace, options.report)):
             raise
         note(f"{error}: it is streamed")
         stream_on(options, address)

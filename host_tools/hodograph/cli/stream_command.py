@@ -7,11 +7,17 @@ import os
 import random
 import time
 from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ..bus.address import BusAddress
+from ..bus.capture.bus_recording import BusRecording
+from ..bus.capture.recordings import check_suffix
+from ..bus.capture.setpoint_check import step_limits
+from ..bus.capture.setpoint_watch import jumps
 from ..bus.own_bus import opened_bus
 from ..bus.run import bring_up
 from ..bus.sdo.controller import connect
@@ -19,7 +25,7 @@ from ..bus.sdo.objects import ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
 from ..config import Machine, load_machine
-from ..errors import InputError
+from ..errors import BusError, InputError, RunError
 from ..job import DEFAULT_TOLERANCE_MM
 from ..names import STANDARD_INPUT
 from ..native.program import NativeLimits
@@ -56,6 +62,8 @@ def stream(options: Namespace) -> None:
     for file in options.files:
         require_toolpath(file)
     if options.simulate:
+        if options.record is not None:
+            raise InputError("--record: --simulate has no bus to record")
         _simulate(_job(options), options)
         return
     with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
@@ -129,7 +137,10 @@ def _run(
     if begin is None:
         assert entry is not None
         begin = _rests_at(entry, job.machine, address, options.wait)
-    with session(job.machine, address, options) as at:
+    with (
+        recorded(options.record, job.machine, address) as recording,
+        session(job.machine, address, options) as at,
+    ):
         if entry is not None:
             fresh = Entry(
                 entry.files, entry.machine, entry.options, job_number, begin.section, begin.way_q40
@@ -139,7 +150,7 @@ def _run(
         close_stream(at.controller)
         room = at.controller.read(STREAM, 7) // _RING_SHARE
         most = min(room, CHUNK_BYTES)
-        with JobPlan(job, most, job_number, begin) as plan:
+        with JobPlan(job, most, job_number, begin, stops=not options.no_stops) as plan:
             sender = Sender(
                 at,
                 job.machine,
@@ -150,11 +161,36 @@ def _run(
                 kernel,
                 unhomed=options.unhomed,
                 slow=_free_rate(job.machine, address),
+                recording=recording,
             )
             done = sender.run()
             for line in plan.notes:
                 note(line)
     _print(done, options)
+
+
+@contextmanager
+def recorded(
+    file: Path | None, machine: Machine, address: BusAddress
+) -> Iterator[BusRecording | None]:
+    """Records the bus, if there is a file for it. Raises RunError at its end: frames are missing, a setpoint jumps."""
+    if file is None:
+        yield None
+        return
+    check_suffix(file)
+    if not address.is_raw:
+        raise BusError(f"{address}: --record takes SocketCAN: use socketcan:CHANNEL")
+    made = BusRecording(address, file, machine.nodes)
+    try:
+        yield made
+    finally:
+        made.close()
+    note(f"{file}: {made.frame_count} frames")
+    if made.dropped:
+        raise RunError(made.dropped_text())
+    found = jumps(made.steps, step_limits(machine))
+    if found:
+        raise RunError(f"{file}: {found[0]}; the file is complete")
 
 
 def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place:
@@ -169,7 +205,7 @@ def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float
                 controller.stop_and_wait()
             status = stream_status(controller)
             known = status.job == entry.job
-            place = Place(entry.section, round(status.way_mm * 2**40)) if known else place
+            place = Place(*entry.place_at(round(status.way_mm * 2**40))) if known else place
     if not known:
         note(
             "the controller no longer knows the job: it goes on from the last place in the journal"
@@ -226,9 +262,9 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
     begin_s = time.perf_counter()
     with (
         JobPlan(job, _SMALL_RING // _RING_SHARE, 1, Place()) as plan,
-        progress("simulate", "section") as bar,
+        progress("simulate", "job") as bar,
     ):
-        for chunks in plan.by_section():
+        for chunks in plan.by_job():
             found.append(simulate_chunks(chunks, limits, kernel, machine.counts_per_mm))
             bar(len(found))
         motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
@@ -243,13 +279,13 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
                 "wall_s": took_s,
                 "greatest_bytes_per_s": rate,
                 **counted,
-                "section": [asdict(one) for one in found],
+                "job": [asdict(one) for one in found],
             }
         )
         return
     print_rows(
         [
-            ("sections", str(len(found))),
+            ("sections", str(sum(one.sections for one in found))),
             ("chunks", f"{counted['chunks']}, {size_text(counted['bytes'])}"),
             (
                 "motion",
@@ -259,7 +295,8 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
         ]
     )
     for k, one in enumerate(found, 1):
-        print(f"section {k}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
+        many = f" with {one.sections} sections" if one.sections > 1 else ""
+        print(f"job {k}{many}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
 
 
 COMMANDS = {"stream": stream}

@@ -133,17 +133,31 @@ class StreamPath:
     point_q40  (A, N), a_q44 (2 or 4, N, 3): as in a program
     """
 
-    def __init__(self, offset_mm: Sequence[float], period_us: int, begin_q40: int = 0) -> None:
-        """`offset_mm`: work offset of each axis of the path; `begin_q40`: arc length of the section at its start."""
+    def __init__(
+        self,
+        offset_mm: Sequence[float],
+        period_us: int,
+        begin_q40: int = 0,
+        begin_point_q40: Int | None = None,
+    ) -> None:
+        """`offset_mm`: work offset of each axis of the path; `begin_q40`: arc length of the section at its start;
+        `begin_point_q40`: where the path begins to the last bit, None: where its first block does.
+        """
         self._offset_mm = tuple(offset_mm)
         self._period_s = 1e-6 * period_us
         self._curve: Curve | None = None
-        self._end_point: Int | None = None
+        self._end_point = begin_point_q40
         self.start_q40: Int = np.array([begin_q40], dtype=np.int64)
         self.feed_mm_s: Real = np.zeros(0)
         self.line: Int = np.zeros(0, dtype=np.int64)
         self.complete = False
         self.passed = 0
+
+    @property
+    def end_point_q40(self) -> Int:
+        """Where the path ends, in machine coordinates (A,)."""
+        assert self._end_point is not None, "a block comes first"
+        return self._end_point
 
     @property
     def curve(self) -> Curve:
@@ -161,12 +175,12 @@ class StreamPath:
         block = short_segments(block)
         made = quantise(block.curve, self._offset_mm)
         point = made.point_q40
+        if self._end_point is not None:
+            # The block is moved to the last bit of the end: it follows from the ideal curve to some 1e-11 mm.
+            point = point + (self._end_point - point[:, 0])[:, None]
         if self._curve is None:
             self._curve, self.point_q40, self.a_q44 = block.curve, point, made.a_q44
         else:
-            assert self._end_point is not None
-            # The block is moved to the last bit of the end: it follows from the ideal curve to some 1e-11 mm.
-            point = point + (self._end_point - point[:, 0])[:, None]
             self._curve = joined((self._curve, block.curve))
             self.point_q40 = np.concatenate((self.point_q40, point), axis=1)
             self.a_q44 = np.concatenate((self.a_q44, made.a_q44), axis=1)

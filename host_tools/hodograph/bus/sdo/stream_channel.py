@@ -13,7 +13,7 @@ from .objects import STREAM
 from .upload import ABORT_VALUE_RANGE, block_download, program_fault_text
 
 ABORT_NO_ROOM = 0x05040005
-NONE, OPEN, UNDERRUN, ENDED, STOPPED = range(5)
+NONE, OPEN, UNDERRUN, ENDED, STOPPED, PROGRAM_STOP = range(6)
 """Values of sub 2."""
 UNKNOWN_MS = 0xFFFFFFFF
 _TRIES = 4
