@@ -24,12 +24,12 @@ from ..bus.sdo.controller import connect
 from ..bus.sdo.objects import ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
-from ..config import Machine, load_machine
+from ..config import Machine, load_machine, load_paths
 from ..errors import BusError, InputError, RunError
 from ..job import DEFAULT_TOLERANCE_MM
-from ..names import STANDARD_INPUT
+from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
-from ..pipeline import program_limits
+from ..pipeline import Pipeline, program_limits
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import Entry, Journal, load, mark
 from ..stream.plan import JobFiles, JobPlan, Place
@@ -38,7 +38,7 @@ from ..stream.simulation import StreamedMotion, simulate_chunks
 from ..toolpath.files import ReadOptions
 from .bus_session import await_enter, pass_stop, session
 from .output import duration_text, note, number, print_json, print_rows, progress, size_text
-from .toolpath_commands import reading_of, require_toolpath
+from .toolpath_commands import reading_of, refuse_toolpath_options, require_toolpath
 
 _RING_SHARE = 3
 """A chunk of a third of the ring always finds room in the end (docs/reference/protocol.md 3.7)."""
@@ -60,7 +60,7 @@ def stream(options: Namespace) -> None:
     if not options.files:
         raise InputError("stream: give one FILE at least, or - for standard input, or --continue")
     for file in options.files:
-        require_toolpath(file)
+        _require_job_file(options, file)
     if options.simulate:
         if options.record is not None:
             raise InputError("--record: --simulate has no bus to record")
@@ -78,11 +78,31 @@ def stream_on(options: Namespace, address: BusAddress) -> None:
     _run(job, options, address, number, Place(), _journal(job, options, number))
 
 
+def _require_job_file(options: Namespace, file: Path) -> None:
+    """Raises InputError: the file is neither a toolpath nor a path file, or has options of the other kind."""
+    if file.suffix == PATH_SUFFIX:
+        refuse_toolpath_options(options, file)
+    else:
+        require_toolpath(file)
+
+
+def has_paths(file: Path) -> bool:
+    """Whether a file is a path file with a list of paths. Raises InputError."""
+    return file.suffix == PATH_SUFFIX and len(load_paths(file)) > 1
+
+
+def _machine(options: Namespace) -> Machine:
+    if options.machine is not None:
+        return load_machine(options.machine)
+    first: Path = options.files[0]
+    if is_toolpath(first):
+        raise InputError(f"{first}: a toolpath names no machine: add --machine FILE")
+    return Pipeline(load_paths(first)[0].file).machine
+
+
 def _job(options: Namespace) -> JobFiles:
-    if options.machine is None:
-        raise InputError(f"{options.files[0]}: a toolpath names no machine: add --machine FILE")
     tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
-    machine = load_machine(options.machine)
+    machine = _machine(options)
     return JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
 
 
@@ -101,7 +121,7 @@ def _journal(job: JobFiles, options: Namespace, number: int) -> Journal | None:
         return None
     marks = tuple(mark(file) for file in job.files)
     own = {"tolerance_mm": job.tolerance_mm, "reading": asdict(job.reading)}
-    machine = str(options.machine.resolve())
+    machine = str(job.machine.file.resolve())
     return Journal(journal_file(options), Entry(marks, machine, own, number))
 
 

@@ -376,7 +376,9 @@ class SectionChunks:
         begin = path.segment_at(int(stretch.pieces.start_q40[0]))
         base_mm = float(path.curve.segment_starts_mm[begin])
         limits = window.plan.limits
-        plan = replace(window.plan, limits=replace(limits, zones=_moved(limits.zones, base_mm)))
+        plan = replace(
+            window.plan, limits=replace(limits, zones=zones_behind(limits.zones, base_mm))
+        )
         return stop_codes(program, plan, stop_terms(self.machine, limits), wanted)
 
 
@@ -394,8 +396,8 @@ def _no_codes(count: int) -> Codes:
     return np.zeros((count, 2, 3), dtype=np.uint8)
 
 
-def _moved(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
-    """Zones of a path that begins at `base_mm`."""
+def zones_behind(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
+    """Zones of the part of a path that begins at `base_mm`."""
     return tuple(
         FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
         for zone in zones

@@ -102,18 +102,19 @@ def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
 
 def _behind(block: Block, begin_mm: float) -> Block:
     """A block without its first part."""
-    segment, xi = block.curve.locate(begin_mm)
-    first, x = int(segment), float(xi)
-    made: Curve
-    if isinstance(block.curve, PHSpline):
-        planar = block.curve
-        start = np.append(planar.position(first, x), planar.origin[first + 1 :])
-        made = PHSpline(start, _behind_at(planar.w[first:], x), False)
-    else:
-        curve = block.curve
-        origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
-        made = SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
+    first, made = curve_behind(block.curve, begin_mm)
     return Block(made, block.feed_mm_s[first:], block.line[first:])
+
+
+def curve_behind(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
+    """A curve without its first part, and how many whole segments that has. Without extra axes."""
+    segment, xi = curve.locate(begin_mm)
+    first, x = int(segment), float(xi)
+    if isinstance(curve, PHSpline):
+        start = np.append(curve.position(first, x), curve.origin[first + 1 :])
+        return first, PHSpline(start, _behind_at(curve.w[first:], x), False)
+    origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
+    return first, SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
 
 
 def _behind_at(w: Any, x: float) -> Any:

@@ -15,12 +15,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config import Machine
+from ..config import Machine, load_paths
+from ..names import is_toolpath
 from ..toolpath.files import ReadOptions
 from ..toolpath.moves import Command, Dwell, ProgramStop, ToolChange
 from .chunk import Chunk, Rest, parse
 from .chunks import JobPlace, SectionChunks
 from .geometry import blocks_from
+from .paths import PathsJob
 from .reading import StreamReader, StreamSection
 
 _MEETS_MM = 1e-6
@@ -209,6 +211,11 @@ class JobPlan:
     def _planning(self) -> Iterator[tuple[PlannedSection, Chunk, float]]:
         number = 0
         for file in self._job.files:
+            if not is_toolpath(file):
+                carried, self.after = self.after, ()
+                yield from self._paths(file, number, carried)
+                number += len(load_paths(file))
+                continue
             place: JobPlace | None = None
             first = number
             reader = StreamReader(
@@ -249,6 +256,24 @@ class JobPlan:
                 carried = ()
                 number += 1
             self.after = reader.after
+
+    def _paths(
+        self, file: Path, number: int, carried: tuple[Command, ...]
+    ) -> Iterator[tuple[PlannedSection, Chunk, float]]:
+        """The paths of a path file, the first of which is section `number`."""
+        begin = self._begin
+        first = max(begin.section - number, 0)
+        begin_q40 = begin.way_q40 if begin.section >= number else 0
+        job = PathsJob(file, self._job.machine, self._number + number, self._most, self.stops)
+        for made in job.chunks(first, begin_q40):
+            header = made.chunk.header
+            before, start_q40 = made.before, header.job_start_q40
+            if header.rest is None:
+                before, start_q40 = () if begin_q40 else (*carried, *before), 0
+            section = PlannedSection(
+                number + header.line - 1, file, header.line, before, start_q40, header.rest
+            )
+            yield section, made.chunk, made.duration_s
 
     def _goes_on(self, section: StreamSection, end_q40: NDArray[np.int64]) -> bool:
         """Whether another section of the file begins where this one ends, at this point."""
