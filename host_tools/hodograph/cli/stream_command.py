@@ -9,7 +9,7 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,13 @@ from ..bus.capture.recordings import check_suffix
 from ..bus.capture.setpoint_check import step_limits
 from ..bus.capture.setpoint_watch import jumps
 from ..bus.own_bus import opened_bus
-from ..bus.run import bring_up
+from ..bus.run import RunSession, bring_up
 from ..bus.sdo.controller import connect
-from ..bus.sdo.objects import ON_PATH, STREAM
+from ..bus.sdo.objects import HOMED, HOMING_METHOD, ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
 from ..config import Machine, load_machine, load_paths
-from ..errors import BusError, InputError, RunError
+from ..errors import BusError, InputError, RefusedError, RunError
 from ..job import DEFAULT_TOLERANCE_MM
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
@@ -33,6 +33,7 @@ from ..pipeline import Pipeline, program_limits
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import Entry, Journal, load, mark
 from ..stream.plan import JobFiles, JobPlan, Place
+from ..stream.resuming import nearest_place
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
 from ..toolpath.files import ReadOptions
@@ -156,17 +157,29 @@ def _run(
     kernel = options.kernel or job.machine.kernel
     if begin is None:
         assert entry is not None
-        begin = _rests_at(entry, job.machine, address, options.wait)
+        begin = _rests_at(entry, job.machine, address, options.wait)  # None: the job is lost
     with (
         recorded(options.record, job.machine, address) as recording,
         session(job.machine, address, options) as at,
     ):
+        bring_up(at, job.machine, kernel)
+        if begin is None:
+            assert entry is not None
+            begin = _nearest(at, job, entry, unhomed=options.unhomed)
         if entry is not None:
-            fresh = Entry(
-                entry.files, entry.machine, entry.options, job_number, begin.section, begin.way_q40
+            note(
+                f"goes on in section {begin.section + 1} at {number(begin.way_q40 * 2.0**-40)} mm of it"
+            )
+            fresh = replace(
+                entry,
+                job0=job_number,
+                section=begin.section,
+                way_q40=begin.way_q40,
+                committed_q40=begin.way_q40,
+                first=begin.section,
+                starts=((begin.section, 0),),
             )
             journal = Journal(journal_file(options), fresh)
-        bring_up(at, job.machine, kernel)
         close_stream(at.controller)
         room = at.controller.read(STREAM, 7) // _RING_SHARE
         most = min(room, CHUNK_BYTES)
@@ -213,25 +226,48 @@ def recorded(
         raise RunError(f"{file}: {found[0]}; the file is complete")
 
 
-def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place:
-    """Where the machine rests, after a stop: what the controller says of the job if it is still there, else the
-    journal.
-    """
-    place = Place(entry.section, entry.way_q40)
+def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place | None:
+    """Where the machine rests, after a stop, as the controller has it; None: the controller does not know the job."""
     with connect(address, machine.node, machine.bitrate) as controller:
-        known = controller.answers(wait_s)
-        if known:
-            if controller.state() in ON_PATH:
-                controller.stop_and_wait()
-            status = stream_status(controller)
-            known = status.job == entry.job
-            place = Place(*entry.place_at(round(status.way_mm * 2**40))) if known else place
-    if not known:
-        note(
-            "the controller no longer knows the job: it goes on from the last place in the journal"
+        if not controller.answers(wait_s):
+            return None
+        if controller.state() in ON_PATH:
+            controller.stop_and_wait()
+        status = stream_status(controller)
+        if status.job != entry.job:
+            return None
+        return Place(*entry.place_at(round(status.way_mm * 2**40)))
+
+
+def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> Place:
+    """The place of the job nearest to the axes. Raises RefusedError: they are not homed, or not on the path."""
+    machine = job.machine
+    note("the controller no longer knows the job: it goes on where the axes stand on its path")
+    lost = [
+        axis.name
+        for i, axis in enumerate(machine.axes, 1)
+        if at.controller.read(HOMING_METHOD, i) and not at.controller.read(HOMED, i)
+    ]
+    if lost and not unhomed:
+        raise RefusedError(
+            f"axis {', '.join(lost)} is not homed, so nobody knows where it stands: hodograph home, hodograph goto "
+            "back to the path, then hodograph stream --continue"
         )
-    note(f"goes on in section {place.section + 1} at {number(place.way_q40 * 2.0**-40)} mm of it")
-    return place
+    counts = at.controller.targets(machine.path_count)
+    found = nearest_place(
+        job,
+        entry,
+        tuple(one / per for one, per in zip(counts, machine.path_counts, strict=True)),
+    )
+    if found.distance_mm > machine.start_tolerance_mm:
+        point = [number(one) for one in found.point_mm]
+        more = f" --z {point[2]}" if len(point) > 2 else ""
+        raise RefusedError(
+            f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
+            f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
+            f"--to {point[0]} {point[1]}{more}, then hodograph stream --continue"
+        )
+    return found.place
 
 
 def _free_rate(machine: Machine, address: BusAddress) -> float | None:
