@@ -35,6 +35,8 @@ _PAIR_SHARE = 0.997
 """Of the feed at which a tick at 200 % crosses more than two ends of segments."""
 
 _BESIDE_MM = 1e-6
+LEAST_REST_MM = 0.002
+"""A section of which less is left is done."""
 _FARTHEST_Q40 = 1 << 62
 
 
@@ -87,7 +89,10 @@ def joined(curves: Sequence[Curve]) -> Curve:
 
 
 def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
-    """The blocks of a section from an arc length on. Raises InputError: it is not that long."""
+    """The blocks of a section from an arc length on; none where less than LEAST_REST_MM of it is left. Raises
+    InputError: it is not that long.
+    """
+    short: Block | None = None
     for block in blocks:
         length = block.curve.length_mm
         if begin_mm >= length:
@@ -95,6 +100,12 @@ def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
             continue
         if begin_mm > 0.0:
             block, begin_mm = _behind(block, begin_mm), 0.0
+            if block.curve.length_mm < LEAST_REST_MM:
+                short = block
+                continue
+        if short is not None:
+            yield short
+            short = None
         yield block
     if begin_mm > _BESIDE_MM:
         raise InputError(f"the section ends {begin_mm:g} mm before the place where it shall go on")

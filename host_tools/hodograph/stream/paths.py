@@ -22,7 +22,7 @@ from ..spline.spatial.curve import SpatialPHSpline
 from ..toolpath.moves import Command, Dwell, ProgramStop
 from .chunk import Chunk, ChunkHeader, Rest
 from .chunks import JobPlace, zones_behind
-from .geometry import curve_behind
+from .geometry import LEAST_REST_MM, curve_behind
 
 _MEETS_Q40 = 1 << 16
 """2^-24 mm: how far a path may begin from the end of the one before (docs/reference/protocol.md 1.7)."""
@@ -74,6 +74,8 @@ class PathsJob:
     def chunks(self, first: int, begin_q40: int) -> Iterator[PathChunk]:
         """From path number `first` on, from this arc length of it."""
         paths = load_paths(self.file)
+        if first < len(paths) and begin_q40 and self._is_done(paths[first], begin_q40):
+            first, begin_q40 = first + 1, 0
         place: JobPlace | None = None
         for number, listed in enumerate(paths):
             if number < first:
@@ -86,6 +88,10 @@ class PathsJob:
             program = made.chunk.program
             way_q40 = header.job_start_q40 + program.length_q40
             place = JobPlace(Rest(), header.sequence + 1, way_q40, end_point_q40(program))
+
+    def _is_done(self, listed: ListedPath, begin_q40: int) -> bool:
+        length_mm = Pipeline(listed.file, self.machine).curve.length_mm
+        return begin_q40 * 2.0**-40 > length_mm - LEAST_REST_MM
 
     def _chunk(
         self,

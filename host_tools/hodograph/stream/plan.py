@@ -9,6 +9,7 @@ from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from math import ceil
 from pathlib import Path
 
@@ -224,7 +225,9 @@ class JobPlan:
             carried = self.after
             for section in reader.sections():
                 begin_q40 = self._begin.way_q40 if number == self._begin.section else 0
-                if number >= self._begin.section:
+                blocks = blocks_from(section.blocks, begin_q40 * 2.0**-40)
+                block = next(blocks, None) if number >= self._begin.section else None
+                if block is not None:
                     before = () if begin_q40 else (*carried, *section.before)
                     if place is None:
                         made = PlannedSection(number, file, section.first_line, before)
@@ -237,7 +240,7 @@ class JobPlan:
                     chunks = SectionChunks(
                         self._job.machine,
                         file.stem,
-                        blocks_from(section.blocks, begin_q40 * 2.0**-40),
+                        chain([block], blocks),
                         self._number + first,
                         self._most,
                         begin_q40,
@@ -269,7 +272,7 @@ class JobPlan:
             header = made.chunk.header
             before, start_q40 = made.before, header.job_start_q40
             if header.rest is None:
-                before, start_q40 = () if begin_q40 else (*carried, *before), 0
+                before, start_q40 = () if header.job_start_q40 else (*carried, *before), 0
             section = PlannedSection(
                 number + header.line - 1, file, header.line, before, start_q40, header.rest
             )

@@ -13,6 +13,7 @@ from ..config import SPACE_AXES, load_paths
 from ..errors import InputError
 from ..names import is_toolpath
 from ..pipeline import Pipeline
+from ..spline import PHSpline
 from .geometry import Block, Curve
 from .journal import Entry
 from .plan import JobFiles, Place
@@ -133,7 +134,8 @@ def _distances(curve: Curve, s: Real, target: Real) -> Real:
 
 def _points(curve: Curve, s: Real, axes: int) -> Real:
     """Points (n, A) at arc lengths (n,)."""
+    if isinstance(curve, PHSpline):
+        planar = curve.point(s)
+        return np.stack((planar.real, planar.imag), axis=-1)
     point = curve.point(s)
-    if np.iscomplexobj(point):
-        return np.stack((point.real, point.imag), axis=-1)
-    return np.asarray(point)[:, :axes]
+    return np.asarray(point, dtype=np.float64)[:, :axes]

@@ -116,7 +116,10 @@ class Sender:
         while item is not None:
             self._job(item[0], item[1])
             item = self._wait_item()
-        at_rest(self.at, self._file_of_last(), self.plan.after, self.operator)
+        if self.plan.sections:
+            at_rest(self.at, self._file_of_last(), self.plan.after, self.operator)
+        else:
+            self.at.note("nothing of the job is left")
         if self.journal is not None:
             self.journal.update(done=True)
         took_s = self.at.controller.clock.now_s() - begun_s
