@@ -30,6 +30,7 @@ from ..job import DEFAULT_TOLERANCE_MM
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
 from ..pipeline import Pipeline, program_limits
+from ..program.inspection import RING_BYTES
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import Entry, Journal, load, mark
 from ..stream.plan import JobFiles, JobPlan, Place
@@ -44,7 +45,7 @@ from .toolpath_commands import reading_of, refuse_toolpath_options, require_tool
 _RING_SHARE = 3
 """A chunk of a third of the ring always finds room in the end (docs/reference/protocol.md 3.7)."""
 
-_SMALL_RING = 48 * 1024
+_SMALL_RING = RING_BYTES
 """Of the small controllers; --simulate makes chunks for it."""
 
 _EVERY_S = 5.0

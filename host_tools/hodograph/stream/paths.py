@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ..config import ListedPath, Machine, load_paths
 from ..errors import InputError, PlanError
 from ..pipeline import Pipeline
-from ..program.geometry import segment_ways, way_to_q40
 from ..program.image import Program
+from ..program.inspection import end_point_q40
 from ..spline import PHSpline
 from ..spline.build import FoundSpline
 from ..spline.spatial.curve import SpatialPHSpline
@@ -158,11 +158,3 @@ def _commands(rest: Rest, number: int) -> tuple[Command, ...]:
 def start_point_q40(program: Program) -> NDArray[np.int64]:
     """(A,) of all axes, mm or degrees."""
     return np.asarray(program.point_q40[:, 0])
-
-
-def end_point_q40(program: Program) -> NDArray[np.int64]:
-    """The same of the end, to 2^-40."""
-    ways = segment_ways(program.a_q44[:, -1:])
-    drawn = [int(way_to_q40(way)[0]) for way in ways[:-1]]
-    extra = program.extra_q40[:, -1, -1].tolist() if len(program.point_q40) > len(drawn) else []
-    return np.asarray(program.point_q40[:, -1] + np.array([*drawn, *extra], dtype=np.int64))

@@ -14,9 +14,10 @@ from hodograph.config import Machine, load_machine, load_path_file, load_paths
 from hodograph.errors import InputError, PlanError
 from hodograph.native.program import NativeLimits
 from hodograph.pipeline import program_limits
+from hodograph.program.inspection import end_point_q40
 from hodograph.stream.chunk import Chunk, Rest
 from hodograph.stream.chunks import CHUNK_BYTES
-from hodograph.stream.paths import PathsJob, end_point_q40, start_point_q40
+from hodograph.stream.paths import PathsJob, start_point_q40
 from hodograph.stream.plan import JobFiles, JobPlan, Place
 from hodograph.stream.simulation import simulate_chunks
 from hodograph.toolpath.files import ReadOptions
