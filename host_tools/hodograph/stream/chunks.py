@@ -397,7 +397,7 @@ def _no_codes(count: int) -> Codes:
 
 
 def zones_behind(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
-    """Zones of the part of a path that begins at `base_mm`."""
+    """Zones of the part of a path that begins at `base_mm`, as arc lengths of that part."""
     return tuple(
         FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
         for zone in zones
