@@ -20,11 +20,11 @@ from ..bus.capture.setpoint_check import StepLimits
 from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.diagnostics.texts import drive_state
 from ..errors import BusError, InputError
-from .chunk_capture import ChunkCapture, JobDrawing
+from ..stream.bus_chunks import ChunkCapture, JobPoints
 from .decoder import Decoder, Samples
 from .derived import Derivation, ProgramPath
 from .emergencies import Emergencies
-from .messages import path_message, rows_message
+from .messages import job_message, path_message, rows_message
 from .source import Source, Taken
 
 LOOK_S = 0.04
@@ -81,7 +81,7 @@ class Pump:
         self._watch = SetpointWatch(layout.nodes)
         self._decoder = Decoder(layout.nodes)
         self._derivation = self._fresh_derivation()
-        self._chunks, self._job = ChunkCapture(layout.controller), JobDrawing()
+        self._chunks, self._job = ChunkCapture(layout.controller), JobPoints()
         self._state_due_s = 0.0
         self._thread = threading.Thread(target=self._work, name="monitor-pump", daemon=True)
 
@@ -189,7 +189,7 @@ class Pump:
             self._job.add(chunk)
         if chunks:
             self._path = None
-            self._publish(self._job.message(self._layout.drawn))
+            self._publish(job_message(self._job.job, self._job.points_mm[:, : self._layout.drawn]))
 
     def _check_setpoints(self, taken: Taken) -> None:
         """Once in half a thousand SYNCs the worst step by each rule, if it breaks its limit."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import struct
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +20,7 @@ from ..errors import InputError
 from ..program.image import Program
 from ..spline import PHSpline
 from ..spline.spatial.curve import SpatialPHSpline
-from ..stream.chunk import Chunk, parse
-from .messages import numbers
+from .chunk import Chunk, parse
 
 REQUEST, RESPONSE = 0x600, 0x580
 _CHUNK = struct.pack("<HB", STREAM, 1)
@@ -100,7 +98,7 @@ def _drawn(program: Program) -> tuple[Floats, Floats]:
     return ways, np.asarray(curve.point(ways), dtype=np.float64)
 
 
-class JobDrawing:
+class JobPoints:
     """Points of the path of a job, as far as its chunks have come; of a long job fewer of each part."""
 
     def __init__(self) -> None:
@@ -124,8 +122,12 @@ class JobDrawing:
             self._stride *= 2
             self._arcs, self._points = self._arcs[::2], self._points[::2]
 
-    def message(self, drawn: int) -> dict[str, Any]:
-        """For the page: the path, with so many axes."""
-        columns = zip("xyz"[:drawn], self._points.T, strict=False)
-        known: dict[str, Any] = {"type": "path", "note": "", "name": f"job {self._job}"}
-        return known | {name: numbers(column, 5) for name, column in columns}
+    @property
+    def job(self) -> int:
+        """Number of the job; 0: none has come."""
+        return self._job
+
+    @property
+    def points_mm(self) -> Floats:
+        """(n, 2) or (n, 3), along the path."""
+        return self._points

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
-from hodograph.monitor.chunk_capture import ChunkCapture, JobDrawing
+from hodograph.monitor.messages import job_message
+from hodograph.stream.bus_chunks import ChunkCapture, JobPoints
 from hodograph.stream.chunk import Chunk, parse
 from straight_job import chunks
 
@@ -80,31 +82,35 @@ def test_what_is_no_accepted_chunk_is_left_out() -> None:
     assert found.encode() == data
 
 
+def _message(drawing: JobPoints) -> dict[str, Any]:
+    return job_message(drawing.job, drawing.points_mm)
+
+
 def test_the_drawing_goes_on_without_tails() -> None:
     parts = _parts()
-    drawing = JobDrawing()
+    drawing = JobPoints()
     drawing.add(parts[0])
-    first = drawing.message(2)
+    first = _message(drawing)
     assert first["name"] == f"job {JOB}"
     end_mm = parts[0].program.length_q40 * 2.0**-40
     assert abs(first["x"][-1] - end_mm) < 1e-3
     for one in parts[1:]:
         drawing.add(one)
-    x = drawing.message(2)["x"]
+    x = _message(drawing)["x"]
     assert (np.diff(x) >= 0.0).all()
-    assert set(drawing.message(2)["y"]) == {0.0}
+    assert set(_message(drawing)["y"]) == {0.0}
     end_q40 = parts[-1].header.job_start_q40 + parts[-1].program.length_q40
     assert abs(x[-1] - end_q40 * 2.0**-40) < 1e-3
     other = Chunk(replace(parts[0].header, job=JOB + 1), parts[0].image)
     drawing.add(other)
-    assert drawing.message(2)["x"] == first["x"]
+    assert _message(drawing)["x"] == first["x"]
 
 
 def test_a_long_job_has_few_points() -> None:
-    drawing = JobDrawing()
+    drawing = JobPoints()
     part = _parts()[0]
     length_q40 = part.program.length_q40
     for k in range(300):
         header = replace(part.header, first=k == 0, sequence=k, job_start_q40=k * length_q40)
         drawing.add(Chunk(header, part.image))
-    assert 1000 < len(drawing.message(2)["x"]) <= 3000
+    assert 1000 < len(_message(drawing)["x"]) <= 3000
