@@ -152,7 +152,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "job_run": {"errors", "config", "native", "program", "simulate", "bus", "job", "toolpath"},
     "stream": {
         *("errors", "config", "spline", "feed", "program", "native", "pipeline", "bus", "bus.sdo"),
-        *("toolpath", "job", "job_run"),
+        *("toolpath", "job", "job_run", "names"),
     },
     "paper": {
         "errors",
@@ -182,7 +182,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     },
     "tune": {"errors", "config", "native", "simulate", "pipeline"},
     "identify": {"errors", "config", "native", "bus"},
-    "monitor": {"errors", "data", "config", "native", "bus", "bustime", "__init__"},
+    "monitor": {"errors", "data", "config", "native", "bus", "bustime", "stream", "__init__"},
     "faults.scenario": {"errors", "config"},
     "faults": {
         "errors",

@@ -382,6 +382,7 @@ static const struct object objects[] = {
     {0x2055, 0x2055, 2, 2, SHARED, object_read_unhomed, NULL, NULL, NULL},
     {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
     {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},
+    {0x2060, 0x2060, 16, 16, OWN, object_read_stream, object_write_optional_stop, NULL, NULL},
 };
 
 static bool contains(const struct object *object, const struct od_entry *entry)

@@ -8,6 +8,9 @@
  * is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the tail and
  * rests on the path.
  *
+ * A chunk with flag REST shares nothing: it begins at rest, where its predecessor ends, after a dwell or a program stop. So
+ * paths with exact stops between them are one job.
+ *
  * A chunk is never copied; its bytes must stay unchanged as long as a struct chunk refers to them. No heap, no globals.
  */
 #ifndef HODOGRAPH_CORE_CHUNK_H
@@ -19,11 +22,16 @@
 #include "core/program.h"
 #include "core/program_check.h"
 
-#define CHUNK_HEADER_SIZE  80u
-#define CHUNK_VERSION      1u
-#define CHUNK_FLAG_FIRST   1u /* the job begins with it, at rest */
-#define CHUNK_FLAG_LAST    2u /* the job ends with it: its end is no tail */
-#define CHUNK_TIME_UNKNOWN UINT32_MAX
+#define CHUNK_HEADER_SIZE   80u
+#define CHUNK_VERSION       1u
+#define CHUNK_FLAG_FIRST    1u /* the job begins with it, at rest */
+#define CHUNK_FLAG_LAST     2u /* the job ends with it: its end is no tail */
+#define CHUNK_FLAG_REST     4u /* it begins at rest where its predecessor ends */
+#define CHUNK_FLAG_JOINED   8u /* its end is no tail: the next chunk has flag REST */
+#define CHUNK_REST_STOP     1u /* of rest_flags: a program stop before it */
+#define CHUNK_REST_OPTIONAL 2u /* an optional one */
+#define CHUNK_REST_TICKS    8u /* the shortest rest before a chunk with flag REST */
+#define CHUNK_TIME_UNKNOWN  UINT32_MAX
 #define CHUNK_SHARED_PIECES                                                                        \
     16u /* of a chunk whose takeover no look-ahead delays: the longest window */
 
@@ -43,6 +51,8 @@ struct chunk {
     int64_t job_start_q40_mm;  /* arc length of the job at arc length 0 */
     uint32_t line;             /* of the source at its start; 0: none */
     uint32_t remaining_ms;     /* of the job from the joint on; CHUNK_TIME_UNKNOWN */
+    uint32_t rest_ms;          /* dwell before it starts */
+    uint32_t rest_flags;       /* CHUNK_REST_STOP, CHUNK_REST_OPTIONAL */
     struct program program;
     /* What a takeover needs of the whole program, made by chunk_check: */
     struct program_override least; /* the least override bounds of its pieces, */
@@ -64,6 +74,20 @@ int chunk_check(struct chunk *next, const struct chunk *previous,
 static inline int chunk_goes_on(const struct chunk *c)
 {
     return (c->flags & CHUNK_FLAG_LAST) == 0u;
+}
+
+/* 1: it shares nothing and begins at rest where its predecessor ends. */
+static inline int chunk_begins_at_rest(const struct chunk *c)
+{
+    return (c->flags & CHUNK_FLAG_REST) != 0u;
+}
+
+/* Ticks of rest before such a chunk: setpoints that repeat the end of its predecessor. */
+static inline uint32_t chunk_rest_ticks(const struct chunk *c)
+{
+    const uint32_t period_ms = c->program.header.period_us / 1000u;
+    const uint32_t ticks = c->rest_ms / period_ms + (c->rest_ms % period_ms != 0u ? 1u : 0u);
+    return ticks > CHUNK_REST_TICKS ? ticks : CHUNK_REST_TICKS;
 }
 
 #endif

@@ -459,9 +459,27 @@ static int may_take_over_resting(const struct feed_override *f, const struct chu
                               program_piece_start(&next->program, 0);
 }
 
+/* A chunk behind a rest: at its start, as a program begins. A path that is held waits. */
+static int begin_at_rest(struct feed_override *f, struct interpolator *it, const struct chunk *next)
+{
+    if (f->phase != PHASE_PLAN || f->state != STATE_WAITING) {
+        return 0;
+    }
+    f->point.arc_length_q40_mm = 0;
+    program_clock_begin(&f->clock, &next->program, f->clock.period_us, 0);
+    (void)interpolator_begin(it, &next->program);
+    override_plan_begin_next(&f->plan, &next->least);
+    f->state = FEED_RUNNING;
+    goes_on(f, next);
+    return 1;
+}
+
 int feed_override_take_over(struct feed_override *f, struct interpolator *it,
                             const struct chunk *next)
 {
+    if (chunk_begins_at_rest(next)) {
+        return begin_at_rest(f, it, next);
+    }
     const struct program *p = &next->program;
     const int resting = rests(f);
     uint64_t shift_q42_s = qmath_q42_of_q32(next->time_shift_q32_s);

@@ -72,7 +72,8 @@ void feed_override_begin_job(struct feed_override *f, const struct chunk *first,
  * same kernel, for the program from the next tick on. In motion: where all setpoints up to the joint are those of the
  * program under way, bit for bit. So not in a brake, nor beyond the joint, nor while the override looks for a ramp or is on
  * one that was decided with pieces behind the joint. At rest (held, or at the end of the tail): on from the same arc length;
- * the motion goes on when it is running and the place is found, with the override from 0.
+ * the motion goes on when it is running and the place is found, with the override from 0. A chunk that begins at rest: at the end
+ * of its predecessor, running; the next tick gives its first setpoint, as of a program.
  * Returns 1, or 0: not now, and nothing has changed; try again after the next tick. After 1 the program before is no longer
  * in use. Main loop with the tick held off; constant time. */
 int feed_override_take_over(struct feed_override *f, struct interpolator *it,

@@ -74,6 +74,13 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     plan->searched = NOWHERE;
 }
 
+void override_plan_begin_next(struct override_plan *plan, const struct program_override *least)
+{
+    override_plan_carry(plan, least, 0);
+    come_to_rest(plan);
+    plan->started = 0;
+}
+
 void override_plan_rest(struct override_plan *plan)
 {
     plan->started = 1;

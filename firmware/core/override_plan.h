@@ -78,6 +78,10 @@ struct override_plan {
 /* For a program at rest, commanded 100 %. Reads all pieces: main loop. */
 void override_plan_begin(struct override_plan *plan, const struct program *p);
 
+/* The same for the next program of a job, which begins at rest, with its least override bounds: what is commanded stays.
+ * Constant time. */
+void override_plan_begin_next(struct override_plan *plan, const struct program_override *least);
+
 /* The most that counts of the override asked for. Not lowered while the override is above. */
 void override_plan_limit(struct override_plan *plan, int64_t most_q57);
 

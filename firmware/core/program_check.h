@@ -95,6 +95,8 @@ enum program_error {
     PROGRAM_ERR_CHUNK_PIECE = -88, /* a shared piece is not the predecessor's; index = the piece */
     PROGRAM_ERR_CHUNK_OVER =
         -89, /* the job has ended or has been stopped, or the configuration has changed (app/stream) */
+    PROGRAM_ERR_CHUNK_REST =
+        -79, /* behind a rest it does not begin where its predecessor ends, or flag REST is missing */
 };
 
 /* What this controller allows. */

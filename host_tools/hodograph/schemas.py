@@ -22,7 +22,7 @@ from .config.axis_table import (
     in_unit,
 )
 from .config.drive_file import MOTOR_GAINS
-from .config.path_file import COORDINATE_LIMIT_MM
+from .config.path_file import COORDINATE_LIMIT_MM, LONGEST_DWELL_MS, STOPS
 from .errors import InputError
 from .faults.scenario import ACTIONS, NO_LIMIT
 from .feed.limits import GREATEST_RESERVE, LEAST_RESERVE, POLICIES
@@ -133,7 +133,11 @@ def _path_file() -> Schema:
     return _table(
         "A path file of Hodograph",
         {
-            "path": _curve(),
+            "path": _either(
+                "The path, or [[path]]: several paths with rests between them, as one job",
+                _table("The curve", *_curve()),
+                _list("Paths, each of which begins where the one before ends", _listed_path()),
+            ),
             "feed": _feed(),
             "limits": _limits(),
             "machine": _table(
@@ -155,10 +159,19 @@ def _points(text: str) -> Schema:
     return {"type": "array", "minItems": 1, "anyOf": alike, "description": text}
 
 
-def _curve() -> Schema:
+def _listed_path() -> Schema:
+    properties, required, more = _curve()
+    rests = {
+        "dwell_ms": _integer("Standstill before this path", 0, LONGEST_DWELL_MS, 0),
+        "stop": _choice("Whether a program stop is before it", STOPS, STOPS[0]),
+    }
+    return _table("A curve, and the rest before it", properties | rests, required, more)
+
+
+def _curve() -> tuple[dict[str, Schema], tuple[str, ...], Schema]:
+    """Properties, those that are required, and the rest of the schema of a curve."""
     open_through = {"required": ["through"], "properties": {"closed": {"const": False}}}
-    return _table(
-        "The curve",
+    return (
         {
             "closed": _flag("Whether the end of the path is its start"),
             "control_points": _points(

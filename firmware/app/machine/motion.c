@@ -34,7 +34,14 @@ bool motion_take_over(struct motion *motion, const struct chunk *next)
     if (feed_override_take_over(&motion->feed, &motion->interp, next) == 0) {
         return false;
     }
-    motion->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
+    if (chunk_begins_at_rest(next)) {
+        const uint32_t ticks = chunk_rest_ticks(next);
+        motion->rest_ticks = ticks > motion->rested_ticks ? ticks - motion->rested_ticks : 0u;
+        motion->rested_ticks = 0;
+        motion->point.arc_length_q40_mm = 0;
+    } else {
+        motion->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
+    }
     return true;
 }
 
@@ -54,8 +61,29 @@ int motion_begin_at(struct motion *motion, const struct program *program,
     return 0;
 }
 
+/* Counts the ticks of a rest between two chunks. True: this one only repeats the last setpoint. */
+static bool rests(struct motion *motion)
+{
+    const bool runs = feed_override_state(&motion->feed) == FEED_RUNNING;
+    if (!motion_waits(motion)) {
+        motion->rested_ticks = 0;
+    } else if (runs && motion->rested_ticks < UINT32_MAX) {
+        motion->rested_ticks++;
+    }
+    if (motion->rest_ticks == 0u || !runs) {
+        return false;
+    }
+    motion->rest_ticks--;
+    return true;
+}
+
 int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX])
 {
+    if (rests(motion)) {
+        motion->setpoints++;
+        path_counts_of(&motion->scale, &motion->point, target_counts);
+        return 0;
+    }
     const int result = feed_override_next(&motion->feed, &motion->interp, &motion->point);
     if (result < 0) {
         return result;

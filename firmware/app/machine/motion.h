@@ -22,6 +22,8 @@ struct motion {
     struct feed_override feed;
     struct interpolator_point point; /* of the last setpoint */
     uint32_t setpoints;              /* given so far */
+    uint32_t rested_ticks;           /* at the end of the program, running, until the next chunk */
+    uint32_t rest_ticks;             /* left before the program starts */
     struct path_counts scale;
 };
 
@@ -39,7 +41,8 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 int motion_begin_job(struct motion *motion, const struct chunk *first, const struct config *config);
 
 /* Goes on with the next chunk of the job, where the motion is in the part that it shares with the program under way, or rests: then
- * true, and that program is not needed any more. Under the lock. */
+ * true, and that program is not needed any more. A chunk that begins at rest starts so many ticks after its predecessor has ended
+ * as it says (chunk_rest_ticks), at once when it comes later; ticks of a hold do not count. Under the lock. */
 bool motion_take_over(struct motion *motion, const struct chunk *next);
 
 /* The next setpoint: targets of the program's path axes. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.

@@ -347,6 +347,12 @@ def _stream(command: Command) -> None:
         action="store_true",
         help="no bus: plan all chunks, check them and take them over as the controller does",
     )
+    stream.add_argument(
+        "--record",
+        type=Path,
+        metavar="RECORDING",
+        help="keep all frames of the bus meanwhile: .log (candump), .asc or .blf",
+    )
     options.unhomed(stream)
     stream.add_argument("--machine", type=Path, metavar="FILE", help="machine file")
     options.toolpath(stream)

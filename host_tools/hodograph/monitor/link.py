@@ -38,7 +38,7 @@ from ..bus.sdo.objects import (
     START,
     STOP,
 )
-from ..bus.sdo.status import read_status
+from ..bus.sdo.status import read_status, stream_dict
 from ..data import CONTROLLER_EDS, object_dictionary
 from ..errors import BusError, HodographError, InputError, RefusedError
 from .pump import Publish
@@ -246,6 +246,7 @@ def _changed(controller: Controller, status: dict[str, Any]) -> bool:
 def _moving_part(controller: Controller) -> dict[str, Any]:
     """What changes from reading to reading: some objects instead of all, the same keys as in `read_status`."""
     return {
+        "stream": stream_dict(controller),
         "motion": {
             "arc_length_mm": controller.read(MOTION, 1) * 2.0**-40,
             "feed_mm_s": controller.read(MOTION, 2) / 1000,

@@ -76,6 +76,14 @@ def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
     return message
 
 
+def job_message(job: int, points_mm: Floats) -> dict[str, Any]:
+    """The path of a streamed job as far as it is known, points (n, 2) or (n, 3), in place of that of a program."""
+    message: dict[str, Any] = {"type": "path", "note": "", "name": f"job {job}"}
+    return message | {
+        name: numbers(column, 5) for name, column in zip("xyz", points_mm.T, strict=False)
+    }
+
+
 def rows_message(
     rows: Rows, period_s: float, age_ms: float | None, drawn: int = 2, path_axes: int = 0
 ) -> dict[str, Any]:

@@ -76,6 +76,7 @@ class ProgramError(IntEnum):
     CHUNK_SEGMENT = -87
     CHUNK_PIECE = -88
     CHUNK_OVER = -89
+    CHUNK_REST = -79
 
     @property
     def text(self) -> str:
@@ -148,4 +149,5 @@ _TEXTS = {
     ProgramError.CHUNK_SEGMENT: "chunk: a shared segment is not that of its predecessor",
     ProgramError.CHUNK_PIECE: "chunk: a shared piece is not that of its predecessor",
     ProgramError.CHUNK_OVER: "chunk: of a job that is over, or checked under another configuration",
+    ProgramError.CHUNK_REST: "chunk: does not begin at rest where its predecessor ends",
 }

@@ -6,12 +6,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import segment_ways, way_to_q40
-from .image import VERSION, Program
+from .image import PIECE_SIZE, STOP_SIZE, VERSION, Program, header_size, segment_size
 from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
+
+RING_BYTES = 48 * 1024
+"""For chunks, in the memory of a small controller."""
 
 _ROWS = 12
 
@@ -20,13 +24,11 @@ def inspect_dict(program: Program) -> dict[str, Any]:
     """What a program holds, as plain numbers in mm and s, for JSON."""
     pieces = program.pieces
     feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)
-    *ways, _ = (int(way_to_q40(way)[0]) for way in segment_ways(program.a_q44[:, -1:]))
-    ways += [int(one) for one in program.extra_q40[:, -1, -1]]
-    end = [int(last) + way for last, way in zip(program.point_q40[:, -1], ways, strict=True)]
     return {
         "name": program.name,
         "version": VERSION,
         "image_bytes": program.image_size,
+        "bytes": _bytes(program),
         "period_us": program.period_us,
         "closed": program.closed,
         "segments": program.segment_count,
@@ -36,7 +38,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "length_mm": program.length_mm,
         "offset_mm": [one * 2.0**-40 for one in program.offset_q40],
         "start_mm": (program.point_q40[:, 0] * 2.0**-40).tolist(),
-        "end_mm": [one * 2.0**-40 for one in end],
+        "end_mm": (end_point_q40(program) * 2.0**-40).tolist(),
         "feed_limit_mm_s": program.feed_limit_um_s / 1000 or None,
         "acceleration_limit_mm_s2": program.acceleration_limit_um_s2 / 1000 or None,
         "jerk_limit_mm_s3": float(program.jerk_limit_mm_s3) or None,
@@ -48,6 +50,35 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "override_second_least_per_s2": float(pieces.override_second_per_s2().min()),
         "stops": stops_dict(program.stops, program.piece_starts_mm),
     }
+
+
+def _bytes(program: Program) -> dict[str, Any]:
+    """Of an image and of each of its records; how many seconds of such a program a ring for chunks has room for."""
+    rate = program.image_size / program.duration_s
+    return {
+        "header": header_size(program.axis_count),
+        "segment": segment_size(program.axis_count),
+        "piece": PIECE_SIZE,
+        "stop": STOP_SIZE,
+        "image_per_s": rate,
+        "ring": RING_BYTES,
+        "seconds_in_ring": RING_BYTES / rate,
+    }
+
+
+def _bytes_text(found: dict[str, Any]) -> str:
+    return (
+        f"bytes     header {found['header']}, segment {found['segment']}, piece {found['piece']} with stop "
+        f"{found['stop']}; {found['image_per_s']:.0f} a second of motion, so {found['seconds_in_ring']:.3g} s in a "
+        f"ring of {found['ring'] // 1024} KiB"
+    )
+
+
+def end_point_q40(program: Program) -> NDArray[np.int64]:
+    """Where it ends, (A,) in 2^-40 mm or degrees."""
+    *ways, _ = (int(way_to_q40(way)[0]) for way in segment_ways(program.a_q44[:, -1:]))
+    ways += [int(one) for one in program.extra_q40[:, -1, -1]]
+    return np.asarray(program.point_q40[:, -1] + np.array(ways, dtype=np.int64))
 
 
 def inspect_text(program: Program, *, full: bool = False) -> str:
@@ -65,6 +96,7 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
     names = AXES[: program.axis_count]
     lines = [
         f"program   {d['name'] or '(no name)'}, format {d['version']}, {d['image_bytes']} bytes",
+        _bytes_text(d["bytes"]),
         f"path      {'closed' if d['closed'] else 'open'}, {d['length_mm']:.9f} mm in {d['segments']} segments",
         f"from      ({', '.join(f'{mm:.9f}' for mm in d['start_mm'])}) mm",
         f"to        ({', '.join(f'{mm:.9f}' for mm in d['end_mm'])}) mm",

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..program.codes import ProgramError
 from ..program.image import Program, encode
 from ..program.stop_planning import stop_codes, with_bounds
 from ..program.stops import DECELERATION, no_stops
-from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader
+from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
 from .geometry import Block
 from .windows import JOINTS, SectionFeed, Spacing, Stretch, Window, chained, taken
 
@@ -55,6 +55,22 @@ _MOVING_FAULTS = frozenset(
     )
 )
 """What a slower feed at a piece avoids."""
+
+
+@dataclass(frozen=True, eq=False)
+class JobPlace:
+    """Where a section stands in its job, when others are before it.
+
+    rest       what happens at rest before it
+    sequence   of its first chunk
+    way_q40    arc length of the job at its start
+    point_q40  (A,) where the section before it ends
+    """
+
+    rest: Rest
+    sequence: int
+    way_q40: int
+    point_q40: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +140,15 @@ class SectionChunks:
         job: int,
         most_bytes: int = CHUNK_BYTES,
         begin_q40: int = 0,
+        place: JobPlace | None = None,
+        goes_on: Callable[[NDArray[np.int64]], bool] = lambda _: False,
     ) -> None:
         """`job`: number that the chunks carry; `most_bytes`: of a chunk, as the controller has room for; `begin_q40`:
-        arc length of the section where the path of the blocks begins.
+        arc length of the section where the path of the blocks begins; `place`: None for the first section of a job;
+        `goes_on`: whether the job goes on, after a rest, from this point (A,) in 2^-40 mm, the end of the section. It
+        is asked when all blocks have been read.
         """
+        self._place, self._goes_on = place, goes_on
         self.machine = machine
         self._name, self._job = name[:_LONGEST_NAME], job
         self._limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
@@ -137,6 +158,7 @@ class SectionChunks:
             Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)),
             self._exceeded,
             begin_q40,
+            None if place is None else place.point_q40,
         )
         self._most = most_bytes
         self._kept = _Kept()
@@ -191,7 +213,33 @@ class SectionChunks:
         joint_q40 = window.joint_q40(joint)
         line = self._feed.path.line_at(joint_q40)
         new_s = float(new.duration_q32_s.sum()) * 2.0**-32
-        return PlannedChunk(Chunk(header, encode(program)), new_s, line, joint_q40), used
+        return PlannedChunk(
+            Chunk(self._in_job(header), encode(program)), new_s, line, joint_q40
+        ), used
+
+    @property
+    def end(self) -> JobPlace:
+        """The place of the next section of the job, behind all chunks, without a rest."""
+        last = self._last
+        assert last is not None
+        header = self._in_job(last.header)
+        way_q40 = header.job_start_q40 - last.header.job_start_q40 + last.end_q40
+        return JobPlace(Rest(), header.sequence + 1, way_q40, self._feed.path.end_point_q40)
+
+    def _in_job(self, header: ChunkHeader) -> ChunkHeader:
+        """A header that counts from the start of the section, as it is in the job."""
+        place = self._place
+        if header.last and self._goes_on(self._feed.path.end_point_q40):
+            header = replace(header, last=False, joined=True)
+        if place is None:
+            return header
+        return replace(
+            header,
+            first=False,
+            rest=place.rest if header.first else None,
+            sequence=header.sequence + place.sequence,
+            job_start_q40=header.job_start_q40 + place.way_q40,
+        )
 
     def _require_room(self, program: Program, line: int) -> None:
         size = program.image_size + HEADER_SIZE
@@ -328,7 +376,9 @@ class SectionChunks:
         begin = path.segment_at(int(stretch.pieces.start_q40[0]))
         base_mm = float(path.curve.segment_starts_mm[begin])
         limits = window.plan.limits
-        plan = replace(window.plan, limits=replace(limits, zones=_moved(limits.zones, base_mm)))
+        plan = replace(
+            window.plan, limits=replace(limits, zones=zones_behind(limits.zones, base_mm))
+        )
         return stop_codes(program, plan, stop_terms(self.machine, limits), wanted)
 
 
@@ -346,8 +396,8 @@ def _no_codes(count: int) -> Codes:
     return np.zeros((count, 2, 3), dtype=np.uint8)
 
 
-def _moved(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
-    """Zones of a path that begins at `base_mm`."""
+def zones_behind(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
+    """Zones of the part of a path that begins at `base_mm`, as arc lengths of that part."""
     return tuple(
         FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
         for zone in zones

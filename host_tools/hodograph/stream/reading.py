@@ -7,11 +7,12 @@ curve of each part begins and ends there in the direction of the chord with curv
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..config import Machine
 from ..errors import InputError
@@ -70,12 +71,14 @@ class StreamSection:
     file, first_line  where it begins
     before            commands that happen at rest, before it starts
     blocks            its path; reading them reads the file
+    next_start        where the next section starts, (3,) in mm, once all blocks are read; None: it is the last one
     """
 
     file: Path
     first_line: int
     before: tuple[Command, ...]
     blocks: Iterator[Block]
+    next_start: Callable[[], NDArray[np.float64] | None]
 
 
 @dataclass
@@ -105,7 +108,9 @@ class StreamReader:
             raise InputError(f"{self.file}: moves nothing: a job needs a move of 2 um at least")
         while part is not None:
             rest = _Rest(part, parts)
-            yield StreamSection(self.file, part.first_line, part.before, rest.blocks())
+            yield StreamSection(
+                self.file, part.first_line, part.before, rest.blocks(), rest.next_start
+            )
             part = rest.next_part
 
     def _parts(self) -> Iterator[JobSection]:
@@ -133,6 +138,12 @@ class _Rest:
     def __init__(self, part: JobSection, parts: Iterator[JobSection]) -> None:
         self.next_part: JobSection | None = None
         self._part, self._parts = part, parts
+
+    def next_start(self) -> NDArray[np.float64] | None:
+        """Where the next section starts."""
+        if self.next_part is None:
+            return None
+        return np.asarray(self.next_part.fitted.curve.nodal_points[0], dtype=np.float64)
 
     def blocks(self) -> Iterator[Block]:
         part: JobSection | None = self._part

@@ -122,12 +122,14 @@ class SectionFeed:
         joint: Spacing,
         exceeded: Callable[[Stretch], NDArray[np.bool_]],
         begin_q40: int = 0,
+        begin_point_q40: NDArray[np.int64] | None = None,
     ) -> None:
         """`joint`: how far apart joints are; `exceeded`: the pieces (M,) of a stretch that the controller would
-        refuse for their motion; `begin_q40`: arc length of the section where the blocks begin.
+        refuse for their motion; `begin_q40`: arc length of the section where the blocks begin; `begin_point_q40`: the
+        very point of that, None: that of the first block.
         """
         self.machine = machine
-        self.path = StreamPath(machine.offset_mm, machine.period_us, begin_q40)
+        self.path = StreamPath(machine.offset_mm, machine.period_us, begin_q40, begin_point_q40)
         self.begin_q40 = begin_q40
         self._blocks = blocks
         self._joint = joint

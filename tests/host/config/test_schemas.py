@@ -16,7 +16,7 @@ import pytest
 from jsonschema import Draft7Validator
 
 from hodograph.campaign.definition import load_campaign
-from hodograph.config import load_drive, load_machine, load_path_file
+from hodograph.config import load_drive, load_machine, load_paths
 from hodograph.errors import InputError
 from hodograph.faults.scenario import load_scenario
 from hodograph.schemas import NAMES, schema
@@ -24,7 +24,7 @@ from hodograph.schemas import NAMES, schema
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"
 READERS: dict[str, Callable[[Path], object]] = {
-    "path": load_path_file,
+    "path": load_paths,
     "machine": load_machine,
     "drive": load_drive,
     "campaign": load_campaign,
@@ -105,6 +105,17 @@ MACHINE: Document = {
 }
 COMPLETE: dict[str, list[Document]] = {
     "path": [
+        {
+            "path": [
+                {"closed": False, "through": [[0, 0], [10, 5], [20, 0]]},
+                {
+                    "closed": True,
+                    "control_points": [[20, 0], [10, 10], [0, 20], [20, 20]],
+                    "dwell_ms": 100,
+                    "stop": "optional",
+                },
+            ],
+        },
         {
             "path": {
                 "closed": False,
@@ -356,8 +367,12 @@ def at(document: Any, way: Way) -> Any:
 def part_of_schema(kind: str, way: Way) -> Document:
     """The schema of what lies there."""
     found: Document = schema(kind)
-    for step in way:
+    for k, step in enumerate(way):
         found = found["items"] if isinstance(step, int) else found["properties"][step]
+        is_list = isinstance((*way, "")[k + 1], int)
+        for one in found.get("anyOf", []):  # a table, or a list of tables
+            if ("items" if is_list else "properties") in one:
+                found = one
     return found
 
 
