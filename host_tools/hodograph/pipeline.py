@@ -169,7 +169,7 @@ class ProvedStops:
     """What is proved of the stops of one kind: from how many feed pieces one may begin, from how many of them all stops
     keep the limits of the axes until standstill, and where the others begin, mm.
 
-    time_share   share of the time of the pieces from which one may begin that is in proved ones; pieces differ in length
+    time_share   share of the time of the pieces from which one may begin that proved ones last: pieces differ in length
     """
 
     kind: str

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Instructions of the controller's proof of the axis limits (core/limit_check.h), by segment and piece, and of the proof
-of stops (core/brake_check.h), by piece and kind of stop.
+"""Instructions of the controller's proof of the axis limits (core/limit_check.h), by segment and piece, and of the
+proof of stops (core/brake_check.h), by piece and kind of stop.
 
 For benchmarks/counts.py, which prints them: runs the image `checker` of two cores over the example programs.
 """
@@ -47,8 +47,8 @@ def costs(build: Path) -> dict[str, Any]:
 
 
 def stop_costs(build: Path) -> dict[str, Any]:
-    """By example and kind of stop, on the Cortex-M4F: instructions of brake_check_piece over the feed pieces that have stop
-    parameters: how many, the median, the most, and all together.
+    """By example and kind of stop, on the Cortex-M4F: instructions of brake_check_piece over the feed pieces that have
+    stop parameters: how many, the median, the most, and all together.
     """
     counter = Counter(build, TARGETS[CORES[0]], "stop_checker", "brake_check_piece")
     out: dict[str, Any] = {}

@@ -130,11 +130,13 @@ def _require_override_headroom(program: Program, spline: Curve) -> None:
     lacking = np.flatnonzero(least == 0)
     if not lacking.size:
         return
-    starts_mm = np.append(pieces.start_q40, program.length_q40)[lacking[0] :][:2] * 2.0**-40
-    curvature = np.abs(frames(spline, np.linspace(*starts_mm, _PLACES)).curvature)
+    first = int(lacking[0])
+    ends_mm = np.append(pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    low_mm, high_mm = float(ends_mm[first]), float(ends_mm[first + 1])
+    curvature = np.abs(frames(spline, np.linspace(low_mm, high_mm, _PLACES)).curvature)
     sharpest = float(curvature.max())
     raise PlanError(
-        f"program: the feed piece at {starts_mm[0]:.6g} mm, where the curvature is up to {sharpest:.3g} 1/mm, leaves no "
+        f"program: the feed piece at {low_mm:.6g} mm, where the curvature is up to {sharpest:.3g} 1/mm, leaves no "
         "headroom for a changing override: raise the limits, or smooth the path there (points too close together make "
         "such places)"
     )

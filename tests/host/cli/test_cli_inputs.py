@@ -121,7 +121,9 @@ def test_a_bend_without_headroom_is_named(
     )
     status, line = failed(capsys, "compile", str(file))
     assert status == 3
-    assert re.search(r"piece at 10\.47\d* mm, where the curvature is up to .* no headroom", line), line
+    assert re.search(r"piece at 10\.47\d* mm, where the curvature is up to .* no headroom", line), (
+        line
+    )
     assert "smooth the path" in line
 
 
