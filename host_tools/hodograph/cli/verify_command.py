@@ -151,8 +151,14 @@ def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:
 
 
 def _stops_line(stops: ProvedStops) -> str:
-    """In how many of the pieces from which a stop may begin it is proved to keep the machine's limits."""
-    tested = "" if stops.proved == stops.pieces else "; the others are tested, not proved"
+    """In how many of the pieces from which a stop may begin, and in which share of their time, it is proved to keep the
+    machine's limits.
+    """
+    tested = (
+        ""
+        if stops.proved == stops.pieces
+        else f" ({100 * stops.time_share:.0f} % of their time); the others are tested, not proved"
+    )
     return (
         f"{stops.name}: the same limits are proved until standstill in {stops.proved} of {stops.pieces} "
         f"feed pieces in which one may begin{tested}"
@@ -163,7 +169,12 @@ def _stops_document(stops: tuple[ProvedStops, ...] | None) -> dict[str, object] 
     if stops is None:
         return None
     return {
-        one.kind: {"pieces": one.pieces, "proved": one.proved, "not_proved_at_mm": one.open_mm}
+        one.kind: {
+            "pieces": one.pieces,
+            "proved": one.proved,
+            "proved_time_share": one.time_share,
+            "not_proved_at_mm": one.open_mm,
+        }
         for one in stops
     }
 
